@@ -169,7 +169,7 @@ STRANGE_ENGINES = {
     "is killed": ('liggghts "$@" & sleep 0.3; kill -KILL $$', failures.EngineKilled, "SIGKILL"),
     "cuts a dump": ('liggghts "$@" && truncate -s -5 bridges.pairs.txt', failures.MissingFrames, r"wrote \d+ of"),
     "empties a dump": ('liggghts "$@" && truncate -s 0 bridges.walls.txt', failures.MissingFrames, "wrote 0 of"),
-    "ends without a word": ("exit 7", failures.EngineFailure, "exit status 7, without a word"),
+    "ends without a word": ("exit 7", failures.EngineFailure, "exit status 7, without output"),
     "says nothing": (
         "trap '' TERM; while :; do sleep 0.1; done",
         *(failures.EngineSilent, r"nothing for 0\.5 s \(run\.silence\) after step 0 of \d+"),
@@ -193,7 +193,7 @@ def test_strange_engines_are_ended_and_told(front: Front, tmp_path: Path, name: 
     case = make_case(run={**SHORT, "silence": "0.5 s", "log_limit": "2 MB"})
     with pytest.raises(kind, match=told) as failure:
         run_case(case, tmp_path / "runs", engine=front(script), time_limit=PATIENCE)
-    assert "last words" not in str(failure.value)
+    assert "last line" not in str(failure.value)
     wait_for(lambda: not processes_in(tmp_path))
     assert _reason(tmp_path / "runs") == type(failure.value).__name__
     (log,) = tmp_path.glob("runs/*/segments/*/engine.log")

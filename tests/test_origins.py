@@ -226,7 +226,7 @@ def test_a_result_says_what_it_rests_on(run_directory: Callable[..., Path], tmp_
     told = {one["key"]: one for one in done.result["rests_on"]}
     assert told["contact.friction.bead_wall"]["origin"] == "given"
     assert told.keys() == library.unmeasured().keys()
-    assert "  as given   " in done.describe()
+    assert "  given      " in done.describe()
     assert (done.case, done.case.document) == (case, case.document)
     assert [(one.key, one.origin) for one in done.case.origins] == [(one.key, one.origin) for one in case.origins]
 
@@ -237,7 +237,7 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     spread = run_spread(case, runs_folder, Options(2), points=4)
     assert {one.key for one in spread.varied} == {one.key for one in case.origins if one.guessed}
     assert {one.key for one in spread.held} == {"contact.friction.bead_bead", "contact.rolling_friction"}
-    assert "as given contact.friction.bead_bead 0.3" in describe(spread)
+    assert "fixed    contact.friction.bead_bead 0.3" in describe(spread)
     assert "too few draws for rank correlations" in describe(spread)
     assert spread.depends == {"velocity": {}}
     table = walkers.load(spread.directory).table()
@@ -256,9 +256,9 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     assert (low, high) == (band.low, band.high)
     own = done.result["velocity"]["mean"]
     assert f"({band_text((min(low, own), max(high, own)), 'm/s')}, 5 to 95 % of {band.points} draws" in done.describe()
-    assert "uncertain:" not in done.describe()
+    assert "uncertain parameters:" not in done.describe()
     unspread = walkers.run(resolve_case({**GLASS, "run": {"cycles": 5}}, name="guessed"), runs_folder)
-    assert "uncertain: volume fraction, viscosity ratio, contact angle, friction, restitution" in " ".join(
+    assert "uncertain parameters: volume fraction, viscosity ratio, contact angle, friction, restitution" in " ".join(
         unspread.describe().split()
     )
     with pytest.raises(InputError, match=r"uncertain.contact.restitution.*: expected a range that holds"):

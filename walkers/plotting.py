@@ -36,7 +36,7 @@ _OF_SHAPE = ("radii", "volume_fraction", "contact_angle")
 
 
 class LeftOutWarning(UserWarning):
-    """Something is not in a figure: points without a result, keys that are not told apart, a theory's prediction."""
+    """Something is not in a figure: points without a result, keys that are not distinguished, a theory's prediction."""
 
 
 def plot_sweep(directory: str | Path, to: str | Path | None = None, **choices: Any) -> Path:
@@ -125,7 +125,7 @@ def _figure_of(
         _tell(f"{empty} of {len(done)} finished points have no {column}")
     laid_out = layout_of(table, done, **layout)
     if laid_out.untold:
-        _tell(f"not told apart: {'; '.join(laid_out.untold)}")
+        _tell(f"not distinguished: {'; '.join(laid_out.untold)}")
     predicted: dict[str, FloatArray] = {}
     cases: list[Case] = []
     if theory:

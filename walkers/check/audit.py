@@ -1,4 +1,4 @@
-"""``walkers check engine``: run the checks on an engine, two decks at a time, and tell what they gave."""
+"""``walkers check engine``: run the checks on an engine, two decks at a time, and report the results."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from walkers.runner.binary import AuditRecord, Engine, find_engine, write_audit
 
 @dataclass(frozen=True)
 class AuditReport:
-    """What an audit found."""
+    """Results of an audit."""
 
     engine: Engine
     version: str

@@ -33,7 +33,7 @@ _LEAST_LEVER = 0.1
 """Of a cluster's extent: large and small beads whose centroids are nearer than that give no heading."""
 _TOUCHING = 0.02
 """Radii by which beads that are given places may be apart and still touch."""
-_TOO_SMALL = "a bead is too small to touch two that touch each other"
+_TOO_SMALL = "a bead is too small to touch two beads that touch each other"
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def _fan(radii: Sequence[float], apart: Apart) -> Places:
             raise ValueError(_TOO_SMALL)
         turns.append(turns[-1] + acos(cosine))
     if turns[-1] + turns[-1] / max(len(turns) - 1, 1) > 2.0 * pi * (1.0 + 1e-9):
-        raise ValueError("so many beads do not fit around the first one")
+        raise ValueError("too many beads to fit around the first one")
     front = apart(0, 1) * radii[0] / (radii[0] + radii[1])
     behind = [(apart(0, bead), pi - turns[-1] / 2.0 + turn) for bead, turn in enumerate(turns, 1)]
     return [(front, 0.0), *((front + away * cos(turn), away * sin(turn)) for away, turn in behind)]
@@ -110,7 +110,7 @@ def _ring(radii: Sequence[float], apart: Apart) -> Places:
         return [2.0 * asin(min(chord / (2.0 * radius), 1.0)) for chord in chords]
 
     if sum(turns(low)) < 2.0 * pi:
-        raise ValueError("these beads close no ring")
+        raise ValueError("these beads do not form a closed ring")
     for _ in range(200):
         middle = (low + high) / 2.0
         low, high = (middle, high) if sum(turns(middle)) > 2.0 * pi else (low, middle)
@@ -144,7 +144,7 @@ def _neighbours(number: int) -> Pairs:
 
 def _raft(radii: Sequence[float], apart: Apart) -> Places:
     if len(set(radii)) > 1:
-        raise ValueError("a raft takes beads of one radius")
+        raise ValueError("expected the same radius for all beads of a raft")
     size = apart(0, 1)
     return [(size * (0.5 + along), size * aside) for along, aside in _sites(len(radii))]
 
@@ -317,7 +317,7 @@ class Walkers:
         def apart(one: int, other: int) -> float:
             between = self.radii[one] + self.radii[other] - known[min(one, other), max(one, other)]
             if between < abs(heights[one] - heights[other]):
-                raise ValueError("so unlike beads rest at heights at which they do not touch each other")
+                raise ValueError("the radii differ too much: the beads do not touch when they rest on the boundary")
             return sqrt(between**2 - (heights[one] - heights[other]) ** 2)
 
         return ARRANGEMENTS[self.arrangement].places(self.radii, apart)

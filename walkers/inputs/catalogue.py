@@ -25,7 +25,7 @@ _COLUMNS: Mapping[str, tuple[str, ...]] = {
 _HEADS = {"youngs_modulus": "Young's modulus", "poissons_ratio": "Poisson's ratio"}
 COMMANDS = {"cases": "run", "sweeps": "sweep", "calibrations": "calibrate"}
 NOT_KNOWN = """\
-Nobody has measured the friction between other pairs of wet surfaces, nor the values below. A case that does not give
+The friction between other pairs of wet surfaces and the values below have not been measured. A case that does not give
 them uses these defaults. walkers run --spread varies them within their ranges."""
 
 
@@ -123,5 +123,7 @@ def describe_one(found: Sequence[Entry], name: str) -> str:
             for key, known in one.numbers.items()
         ]
     if wanted[0].kind == "materials":
-        lines.append(f"Friction of {wanted[0].name} on other wet surfaces has not been measured: see walkers library.")
+        lines.append(
+            f"The friction of {wanted[0].name} on other wet surfaces has not been measured; see walkers library."
+        )
     return "\n".join(filter(None, lines))

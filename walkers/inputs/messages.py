@@ -150,7 +150,7 @@ def check_key(key: str) -> None:
     """Refuse a key that no case has; raises `InputError` if it is one."""
     parts, known = re.sub(r"\[\d+\]", "", key).split("."), keys_of(CaseFile)
     if "" in parts:
-        raise unusable(key, "is no key of a case")
+        raise unusable(key, "is not a key of a case")
     if ".".join(parts) not in known:
         raise unusable(key, _unknown_key(parts, CaseFile, "a case"))
     if known[".".join(parts)]:

@@ -273,12 +273,12 @@ def _at_places(walkers: Walkers, key: str) -> Walkers:
     if overlapping := touching(places, walkers.radii, -_OVERLAP):
         raise unusable(f"{key}[{overlapping[0][1]}]", f"overlaps with {key}[{overlapping[0][0]}]")
     if not any(walkers.front):
-        raise unusable(key, "expected some beads ahead of others: this has no heading")
+        raise unusable(key, "expected some beads ahead of others: this walker has no heading")
     joined = {0}
     for _ in everyone:
         joined |= {bead for pair in walkers.pairs if joined & {*pair} for bead in pair}
     if alone := everyone - joined:
-        raise unusable(f"{key}[{min(alone)}]", "expected beads that touch: nothing joins this one to the first")
+        raise unusable(f"{key}[{min(alone)}]", "expected beads that touch: this bead is not connected to the first")
     return walkers
 
 
@@ -318,7 +318,7 @@ def _spaced(case: Case, key: str, walkers: Walkers, notes: Notes) -> Walkers:
     """Settle the spacing of the walkers under a key and refuse starts in which beads overlap."""
     gap = walkers.gap
     if gap is not None and gap > 0.0:
-        raise unusable(f"{key}.gap", "expected zero or less: a bridge forms on contact, beads apart have none")
+        raise unusable(f"{key}.gap", "expected zero or less: a bridge forms on contact, so beads with a gap have none")
     overlaps = contact_loads(case, walkers).overlaps if gap is None else (-gap,)
     if max(overlaps) * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):
         blamed = f"{key}.gap" if gap is not None else "contact.youngs_modulus"
@@ -339,9 +339,9 @@ def _check_bodies(case: Case, file: CaseFile) -> None:
     """Refuse bodies for which there is no room within the boundary or beside each other."""
     boundary, mixture = case.boundary, case.mixture
     if case.run.ranks > 1 and not boundary.closed:
-        raise unusable("run.ranks", "expected 1: walkers on a plane are slower on several")
+        raise unusable("run.ranks", "expected 1: walkers on a plane run slower on several processes")
     if not case.walkers and mixture is None and "seed" in file.run.model_fields_set:
-        raise unusable("run.seed", "expected none where the beads are placed: every start would be the same")
+        raise unusable("run.seed", "expected none with placed beads: every start would be the same")
     if mixture is not None:
         _check_pour(mixture, boundary, case.tops_of_others(mixture))
     if case.placed is not None or case.meets or (case.walkers and not boundary.bare):
@@ -386,7 +386,7 @@ def _check_places(case: Case, keys: list[str]) -> None:
         least = (1.0 - _OVERLAP) * radius
         beside = clearance < least
         if number < walking and beside:
-            told = f"so many walkers, or such, do not fit between the walls of the {boundary.shape}"
+            told = f"the walkers do not fit between the walls of the {boundary.shape}"
             raise unusable(f"{key}.replicates", told)
         if number < walking and z + radius > boundary.height:
             raise unusable("boundary.height", f"too low for the walkers of {key}")
@@ -402,5 +402,5 @@ def _check_places(case: Case, keys: list[str]) -> None:
         (key, place, first), (other_key, other_place, second) = beads[one], beads[other]
         if dist(place, other_place) < first + second - _OVERLAP * min(first, second):
             if other < walking:
-                raise unusable(f"{other_key}.spacing", "as they are turned, beads of two walkers would overlap")
+                raise unusable(f"{other_key}.spacing", "at their start angles, beads of two walkers would overlap")
             raise unusable(f"{other_key}.at", f"overlaps with {key if one >= walking else f'one of {key}'}")

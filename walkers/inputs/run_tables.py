@@ -135,7 +135,11 @@ def _note_run(run: Run, table: RunTable, case: Case, notes: Notes) -> None:
         notes.default("run.longest_settling", run.longest_settling, "of loose beads")
     if run.rests:
         notes.default("run.settled_below", run.settled_below)
-    notes.derived("run.time_step", run.time_step, "auto: a fraction of the limits, whole steps per cycle")
+    notes.derived(
+        "run.time_step",
+        run.time_step,
+        "auto: a fraction of the stability limits, with a whole number of steps per cycle",
+    )
     notes.derived("run.cycles", cycles, whence)
     notes.derived("run.settling_cycles", run.settling_cycles, "a third of the cycles, at most 20")
     notes.derived("run.silence", silence, "the engine is stopped if it writes nothing for this long")
@@ -150,7 +154,7 @@ def _check_length(table: RunTable, case: Case, cycles: int, settling: int, cycle
     if cycles - settling < 2:
         raise unusable("run.settling_cycles", f"expected at most cycles - 2 = {cycles - 2}")
     if case.walkers and cycles // cycles_per_sample <= -(-settling // cycles_per_sample):
-        told = f"expected more: one frame in {cycles_per_sample} cycles leaves none after {settling} settling ones"
+        told = f"expected more: at one frame in {cycles_per_sample} cycles, none is left after {settling} settling ones"
         raise unusable("run.frames_per_second", told)
 
 
@@ -204,10 +208,10 @@ def _until_steady(table: RunTable, case: Case, cycles_per_sample: int) -> bool:
     given = [key for key in ("cycles", "duration", "settling_cycles", "segment") if getattr(table, key) is not None]
     if given and asked:
         raise unusable(
-            f"run.{given[0]}", f"expected none where run.{asked[0]} lets walkers run until their velocity is constant"
+            f"run.{given[0]}", f"expected none: with run.{asked[0]}, walkers run until their velocity is constant"
         )
     if asked and not case.apart:
-        raise unusable(f"run.{asked[0]}", "expected run.duration: only walkers apart can be steady")
+        raise unusable(f"run.{asked[0]}", "expected run.duration: a run until steady needs independent walkers")
     if not case.apart or given or table.ranks != 1 or cycles_per_sample != 1:
         return False
     # A few cycles may show how walkers walk that are asymmetric dimers which start near the axis.

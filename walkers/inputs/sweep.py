@@ -175,7 +175,7 @@ def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) ->
             document = {**document, "set": {**settings_in(document.get("set", {})), **changes}}
         name = _name_with(name, changes)
     made = expand(document, source=str(sweep), name=name, folder=path.parent)
-    told = "varies in this sweep: it cannot be set as well"
+    told = "varies in this sweep and cannot be set"
     if problems := [Problem(key, f'"{value}"', told) for key, value in (changes or {}).items() if key in made.keys]:
         raise InputError(str(sweep), problems)
     return made

@@ -142,7 +142,7 @@ def _by_pint(symbol: str, kind: Kind) -> float:
     if kind.unit == FILE_SIZE.unit and root != "bit":
         raise ValueError(kind.expectation)
     if kind.unit == FREQUENCY.unit and "radian" in root:
-        raise ValueError(kind.expectation + " (cycles a second, not an angular frequency)")
+        raise ValueError(kind.expectation + " (cycles per second, not an angular frequency)")
     return factor
 
 
@@ -185,7 +185,7 @@ KINEMATIC_VISCOSITY = Kind("kinematic viscosity", "m^2/s", "5 mm^2/s", 10.0, sig
 DYNAMIC_VISCOSITY = Kind("dynamic viscosity", "Pa*s", "4.6 mPa*s", 1e4, sign=NOT_NEGATIVE)
 MODULUS = Kind("modulus", "Pa", "50 MPa", 1e13, 1e3, POSITIVE)
 TEMPERATURE = Kind("temperature", "K", "20 degC", 373.15, 273.15)
-FILE_SIZE = Kind("size of a file", "byte", "64 MB", 1e15, 1.0, POSITIVE)
+FILE_SIZE = Kind("file size", "byte", "64 MB", 1e15, 1.0, POSITIVE)
 
 Length = Annotated[float, LENGTH]
 Radius = Annotated[float, replace(LENGTH, largest=0.02, smallest=1e-6)]

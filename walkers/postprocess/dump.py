@@ -126,7 +126,7 @@ class BinaryDump:
         values = np.concatenate(parts).reshape(frame.rows, len(self.columns))
         if not np.isfinite(values).all():
             column = self.columns[int(np.flatnonzero(~np.isfinite(values).all(axis=0))[0])]
-            raise NoNumberError(f"{self.path}: {column} is no number at step {frame.step}")
+            raise NoNumberError(f"{self.path}: {column} is not a number at step {frame.step}")
         return values
 
     def stack(self) -> FloatArray:
@@ -194,7 +194,7 @@ def local_frames(path: Path, columns: tuple[str, ...]) -> Iterator[tuple[int, Fl
             try:
                 values = np.fromstring(b"".join(body), dtype=np.float64, sep=" ")
             except ValueError as error:
-                raise DumpError(f"{path}: no number in the frame of step {step} ({error})") from error
+                raise DumpError(f"{path}: not a number in the frame of step {step} ({error})") from error
             if len(values) != count * len(columns):
                 raise DumpError(f"{path}: expected {len(columns)} columns in the frame of step {step}")
             if not np.isfinite(values).all():

@@ -167,15 +167,17 @@ def gait_panels(group: Group) -> list[Panel]:
         for number in range(len(names))
     ]
     x, title = (
-        "time (cycles of the drive), the last two",
-        f"walker {first.walker}; a bead rolls without sliding where its curve is on the walker's",
+        "time (cycles of the drive, last two)",
+        f"walker {first.walker}; a bead rolls without sliding where its curve coincides with the walker's",
     )
     y = "velocity; beads:\n−R dφ/dt (mm/s)"
     panels = [Panel(title, x, y, lines, zero=True, height=2.5, least=_LEAST_SPEED)]
     shaken = group.motion.substrate_velocity[last] @ np.array(group.case.drive.direction)
     if np.any(shaken):  # faster than its walkers by far: in their panel it would make them all flat
         line = Line(phase, first.facing * shaken * 1e3, colour=_GREY, dashed=True)
-        panels.append(Panel("substrate, positive as for the walker", x, "velocity\n(mm/s)", [line], zero=True))
+        panels.append(
+            Panel("substrate, positive along the walker's start direction", x, "velocity\n(mm/s)", [line], zero=True)
+        )
     return panels
 
 
@@ -184,7 +186,7 @@ def pile_panels(tables: Mapping[str, Columns]) -> list[Panel]:
 
     Of the tables of a pile (`walkers.postprocess.analysis.tables_of`).
     """
-    bed, x = tables["bed"], "time from the begin of the drive (s)"
+    bed, x = tables["bed"], "time since the start of the drive (s)"
     time = bed["time"]
     surface = Line(time, 1e3 * bed["surface"], "surface, median", _GREY)
     low, high = (
@@ -196,8 +198,8 @@ def pile_panels(tables: Mapping[str, Columns]) -> list[Panel]:
     joined = {"bridges": "bridges", "contacts": "contacts"}
     for title, y, columns in (
         ("Segregation: (z of large − z of small) / their sum", "Brazil-nut\nindex", segregation),
-        ("Bridges and contacts with other beads", "how many a bead,\nto other beads", joined),
-        ("Agitation, once a cycle", "mean square\nvelocity, strobed\n(m²/s²)", {"mean_square_velocity": ""}),
+        ("Bridges and contacts with other beads", "number\nper bead", joined),
+        ("Mean square velocity, once per cycle", "mean square\nvelocity\n(m²/s²)", {"mean_square_velocity": ""}),
     ):
         named = enumerate(columns.items())
         lines = [Line(time, bed[name], told, 2 * number, dashed=number > 0) for number, (name, told) in named]
@@ -233,7 +235,7 @@ def assembly_panels(tables: Mapping[str, Columns]) -> list[Panel]:
         return []
     track = min(first, key=lambda number: float(clusters["qualified"][number]))
     own = {name: column[past["track"] == clusters["track"][track]] for name, column in past.items()}
-    x, heights = "time from the begin of the drive (s)", []
+    x, heights = "time since the start of the drive (s)", []
     for number, bead in enumerate(np.unique(own["bead"])):
         time, height, joined = (own[name][own["bead"] == bead] for name in ("time", "height", "joined"))
         leads = ", leads" if bead == clusters["leader"][track] else ""
@@ -250,8 +252,8 @@ def assembly_panels(tables: Mapping[str, Columns]) -> list[Panel]:
     seen = (bed["time"] >= times[0]) & (bed["time"] <= times[-1])
     heights.insert(0, Line(bed["time"][seen], 1e3 * bed["surface"][seen], "surface of the pile", _GREY))
     return [
-        Panel("The beads of the first climb, thick where they are joined", x, "height (mm)", heights, height=2.0),
-        Panel("How many of them are", x, "beads", numbers, zero=True),
+        Panel("Beads of the first climb; thick: joined to most of the others", x, "height (mm)", heights, height=2.0),
+        Panel("Number of these beads that are", x, "beads", numbers, zero=True),
     ]
 
 
@@ -361,7 +363,7 @@ def _draw_strobe(axes: Axes, group: Group) -> None:
         told = [f"{time}\n{one:.1f} mm" for time, one in zip(told, way, strict=True)]
     edges = float((along - radii).min() - radii.max()), float((along + radii).max() + radii.max())
     ends = -pitch * (len(shown) - 0.4), 0.6 * pitch
-    title, name = f"walker {group.walkers[0].walker}", "from its middle (mm)" if long else "along the drive axis (mm)"
+    title, name = f"walker {group.walkers[0].walker}", "from the midpoint (mm)" if long else "along the drive axis (mm)"
     if uphill:
         axes.set(xlim=(-ends[1], -ends[0]), ylim=edges, ylabel=name if long else "uphill (mm)")
         axes.set_xticks(pitch * np.arange(len(shown)), told, rotation=90)

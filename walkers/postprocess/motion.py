@@ -317,7 +317,7 @@ def read_motion(directory: str | Path) -> Motion:
         return _motion(case, segments)
     except NoNumberError as error:
         finished = (directory / MANIFEST_NAME).is_file()  # then it was tabulated, without such numbers
-        told = "the dump was damaged since the run was finished" if finished else "the beads' motion blew up"
+        told = "the dump was damaged after the run was finished" if finished else "the simulation blew up"
         raise DumpError(f"{error}: {told}") from error
 
 

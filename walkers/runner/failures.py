@@ -54,14 +54,18 @@ class EngineDiffers(EngineFailure):
     """A worker of a sweep has another engine than the one that the sweep was started with."""
 
     def __init__(self, found: Path) -> None:
-        super().__init__(f"the engine on {platform.node()}, {found}, is not the one that this sweep was started with")
+        super().__init__(
+            f"the engine on {platform.node()}, {found}, is not the engine that this sweep was started with"
+        )
 
 
 class ProgramDiffers(EngineFailure):
     """A worker of a sweep names runs otherwise than where it was started: resolved cases or decks differ."""
 
     def __init__(self) -> None:
-        super().__init__(f"on {platform.node()} this program is another version than where the sweep was started")
+        super().__init__(
+            f"the program on {platform.node()} has another version than the program that started the sweep"
+        )
 
 
 class EngineNeverStarted(EngineFailure):
@@ -139,7 +143,7 @@ class AuditFailed(EngineFailure):
     def __init__(self, failures: Sequence[str]) -> None:
         super().__init__(
             f"this engine failed its audit in {len(failures)} line(s), first: {failures[0]}; "
-            "see it with: walkers check engine (--allow-failed-audit runs all the same)"
+            "for details: walkers check engine (--allow-failed-audit runs anyway)"
         )
 
 

@@ -113,7 +113,7 @@ def check_unchanged(directory: Path, names: Collection[str]) -> bool:
     wanted = {name: sums[name] for name in names if name in sums}
     for name, now in checksums(directory, wanted).items():
         if now != wanted[name]:
-            told = "is not what it was when the run was finished; what else is not: walkers check files"
+            told = "has changed since the run was finished; list all changes with: walkers check files"
             raise FileChanged(f"{directory / name} {told} {directory}")
     return len(wanted) == len(names)
 

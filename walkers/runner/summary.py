@@ -190,7 +190,7 @@ def describe(summary: dict[str, Any]) -> str:
     """The summary as text."""
     beads, drive, dimer = summary["beads"], summary["drive"], summary.get("dimer")
     ratio = beads["stiffness_ratio"]
-    softened = f"; {1 / ratio:.3g} times softer than their material" if ratio else ""
+    softened = f"; Young's modulus reduced by a factor of {1 / ratio:.0f}" if ratio else ""
     lines = [
         *_text_of_case(summary["case"]),
         f"beads      {beads['small']} small and {beads['large']} large, {beads['mass'] * 1e6:.4g} mg, "

@@ -220,7 +220,7 @@ def _other_changes(written: str, now: str, given: Collection[str]) -> list[str]:
         for text in (written, now)
     )
     others = [line for line in after if line not in before] or [line for line in before if line not in after]
-    return [f"{len(others)} other line(s), of which no account is taken here, first: {others[0]}"] if others else []
+    return [f"{len(others)} other line(s), which are not part of the case, first: {others[0]}"] if others else []
 
 
 def _origins(case: Case, edited: Mapping[str, float]) -> tuple[Origin, ...]:

@@ -83,7 +83,7 @@ def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
     """Refuse an engine whose audit failed (`AuditFailed`), unless told otherwise; warn once of one that had none."""
     audit = read_audit(engine.sha256)
     if audit is None and is_new(engine.sha256):
-        message = "this engine was never audited; check what it computes with: walkers check engine (said once)"
+        message = "this engine was never audited; check its forces with: walkers check engine (shown once)"
         warnings.warn(message, UnauditedEngineWarning, stacklevel=3)
     elif audit is not None and not audit.passed and not allow_failed_audit:
         raise AuditFailed(audit.failures)
@@ -346,7 +346,7 @@ def _read_segment(directory: Path) -> dict[str, Any]:
             return record
         raise ValueError("begin, end or drive_from make no sense")
     except (OSError, ValueError, KeyError, TypeError) as error:
-        message = f"{directory} is damaged ({error}): delete {directory.parent.parent} to have the run made again"
+        message = f"{directory} is damaged ({error}): delete {directory.parent.parent} and repeat the run"
         raise DamagedSegment(message) from error
 
 

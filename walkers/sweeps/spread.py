@@ -112,7 +112,7 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
         raise refused(case.name, "was changed after it was read; expected a case from load_case(name, changes)")
     varied = [one for one in case.origins if one.range is not None]
     if not varied:
-        told = "nothing here is uncertain: give ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
+        told = "no value is uncertain: give ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
         raise refused(case.name, told)
     with blaming(case.name, case.document):
         ranges = {one.key: _range_of(one) for one in varied}
@@ -198,13 +198,13 @@ def describe(spread: Spread) -> str:
     """A spread in a few lines: mm, mm/s."""
     units = {key: unit for one in analyses() for key, (unit, _) in one.columns.items()}
     points = max((band.points for band in spread.bands.values()), default=0)
-    lines = [f"  spread     {points} independent draws of each value from its range; median: the case's value:"]
+    lines = [f"  spread     {points} draws; values drawn independently from their ranges, median: value of the case"]
     lines += [
         f"             {one.key} {one.text} ({one.range[0]} to {one.range[1]})" for one in spread.varied if one.range
     ]
     if spread.held:
         told = ", ".join(f"{one.key} {one.text}" for one in spread.held)
-        lines.append(f"    as given {told}: add ranges in [uncertain] to draw them too")
+        lines.append(f"    fixed    {told}; to vary these values, add ranges in [uncertain]")
     for name, band in spread.bands.items():
         unit, factor = SHOWN_UNITS.get(units[name], (units[name], 1.0))
         low, middle, high, smallest, largest = (
@@ -213,9 +213,9 @@ def describe(spread: Spread) -> str:
         ends = f"{low} to {high} {unit} (5 to 95 %), median {middle}; smallest {smallest}, largest {largest}"
         lines.append(f"    {name:8} {ends}")
         ranks = ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items())
-        told = f"depends most on {ranks} (rank correlation)" if ranks else "depends clearly on none of them"
+        told = f"strongest dependence: {ranks} (rank correlation)" if ranks else "no clear dependence on any of them"
         if band.points < LEAST_PER_VALUE * len(spread.varied):
-            told = "too few draws for rank correlations; the band is rough"
+            told = "too few draws for rank correlations; the band is approximate"
         lines.append(f"{'':13}{told}")
     found = [f"{count} {_WORDS[name]}" for name, count in spread.counts.items() if count]
     found += [f"{len(spread.failures)} failed"] if spread.failures else []

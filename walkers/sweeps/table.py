@@ -49,12 +49,12 @@ _DRIVE = {
     "peak_velocity": ("m/s", "peak velocity of the boundary"),
     "amplitude": ("m", "amplitude of the boundary's displacement"),
 }
-"""Columns that every case has."""
+"""Columns of every sweep."""
 STATE = {
     "status": ("", "finished, failed, running or missing"),
     "lost": ("", "number of beads that left the simulation box; a run that loses beads has no result"),
     "reason": ("", "name of the failure, or empty"),
-    "run": ("", "run directory, relative to the folder where the table was made"),
+    "run": ("", "run directory, relative to the folder in which the table was written"),
 }
 _RESULTS = ("velocity", "climbs")
 SIDES = ("right_facing", "left_facing")
@@ -283,7 +283,7 @@ def result_in(directory: Path) -> dict[str, Any]:
     try:
         return current_result(directory)
     except (OSError, ValueError, KeyError, TypeError, IndexError, WalkersError) as error:
-        raise DamagedRunError(f"{directory} is damaged ({error}): delete it to have it made again") from error
+        raise DamagedRunError(f"{directory} is damaged ({error}): delete it and repeat the run") from error
 
 
 # --- the table --------------------------------------------------------------------------------------------------------
@@ -449,7 +449,7 @@ def thresholds(directory: str | Path) -> pd.DataFrame:
     record = read_record(directory)
     descent = record.descent
     if descent is None:
-        raise refused(directory, "the sweep has no descent, hence no thresholds")
+        raise refused(directory, "the sweep has no descent and therefore no thresholds")
     frame = load(directory)
     others = [name for name in varied_columns(frame) if name != descent.key]
     rows = []

@@ -35,26 +35,30 @@ _APPROACHES = {
     "side": (pi / 3.0, "60° to 120° apart"),
     "head_on": (2.0 * pi / 3.0, "more than 120° apart"),
 }
-"""By the angle between the headings of two that meet: from which on, and its words."""
+"""Classes of meetings by the angle between the headings: lower bound (rad) and description."""
 _FATES = {
-    "parted": "have parted",
+    "parted": "have separated",
     "walking": "are joined at the end and move",
     "resting": "are joined at the end and are slow",
 }
 _SLOW = 0.1
-"""Of a free walker's speed; what is slower is called slow."""
+"""Walkers below this fraction of the speed of free walkers are slow."""
 _END = 0.1
-"""Of the drive; its last part, over which the end is measured."""
+"""Final fraction of the drive, over which the end is measured."""
 _NUMBERS = {
     "meeting_rate": ("meeting rate", "1/s", "number of meetings of a walker per second"),
     "pair_lifetime": (
         "mean lifetime of a pair",
         "s",
-        "pair_time over the number of partings: the mean lifetime if pairs part at random; NaN without a parting",
+        "pair_time over the number of separations: mean lifetime if pairs separate at random; NaN without separations",
     ),
-    "pair_time": ("total time of pairs", "s", "time for which pairs are joined, summed over all meetings"),
+    "pair_time": ("total time of pairs", "s", "total time for which pairs are joined, over all meetings"),
     "clustered_share": ("walkers in clusters", "share", "share of walkers joined to others in the last frame"),
-    "largest_cluster": ("walkers in the largest cluster", "", "number in the last frame; 1 if none are joined"),
+    "largest_cluster": (
+        "walkers in the largest cluster",
+        "",
+        "number of walkers in the largest cluster of the last frame; 1 if none are joined",
+    ),
     "held_share": (
         "walkers held by side walls",
         "share",
@@ -63,21 +67,25 @@ _NUMBERS = {
     "nematic_order": (
         "nematic order along the drive axis",
         "",
-        "mean of cos 2θ over all walkers and the last tenth of the drive, θ from the drive axis to the heading: 1 all "
-        "along the axis, 0 random, -1 all across it",
+        "mean of cos 2θ over all walkers and the last tenth of the drive, θ: angle from the drive axis to the heading; "
+        "1 if all are along the axis, 0 if random, -1 if all are across it",
     ),
     "polar_order": (
         "polar order",
         "",
-        "length of the mean heading of all walkers, averaged over the last tenth of the drive: 1 all one way, "
-        "0.89/√N for N random headings",
+        "length of the mean heading vector of all walkers, averaged over the last tenth of the drive: 1 if all "
+        "headings are equal, 0.89/√N for N random headings",
     ),
     "free_speed": (
         "speed of free walkers",
         "m/s",
-        "mean speed, from cycle to cycle, of walkers joined to no other walker and no side wall",
+        "mean speed, from cycle to cycle, of walkers that are not joined to another walker or a side wall",
     ),
-    "joined_speed": ("speed of joined walkers", "m/s", "the same for walkers in clusters that no side wall holds"),
+    "joined_speed": (
+        "speed of joined walkers",
+        "m/s",
+        "mean speed, from cycle to cycle, of walkers in clusters that are not joined to a side wall",
+    ),
     "speed_ratio": ("speed of joined walkers over speed of free walkers", "", "joined_speed over free_speed"),
     "slow_share": (
         "slow walkers at the end",
@@ -85,7 +93,7 @@ _NUMBERS = {
         "share of walkers whose net speed over the last tenth of the drive is below a tenth of free_speed",
     ),
 }
-"""Of each number of the result that has a column: its label in reports, its unit, what it is."""
+"""Numbers of the result that have a column: label in reports, unit, meaning."""
 
 
 @dataclass(frozen=True)
@@ -94,17 +102,19 @@ class Meeting:
 
     time: Annotated[float, "s", "time since the start of the drive"]
     event: Annotated[str, "", "merged: the first bridge between two walkers forms; parted: the last one breaks"]
-    walker: Annotated[int, "", "number of one walker"]
-    other: Annotated[int, "", "number of the other walker"]
-    size: Annotated[int, "", "number of walkers in the cluster of the first one after the event"]
+    walker: Annotated[int, "", "index of one walker"]
+    other: Annotated[int, "", "index of the other walker"]
+    size: Annotated[int, "", "number of walkers in the cluster of `walker` after the event"]
     angle: Annotated[float, "rad", "angle between the two headings at the event: 0 parallel, pi opposite"]
 
 
 @dataclass(frozen=True)
 class Course:
-    """W walkers in K frames, at least one a cycle: time, s, shape (K,); mass centre, m, and heading, shape (K, W, 2).
+    """W walkers in K frames, at least one per cycle.
 
-    And how many walkers are joined with each, itself too, and whether a side wall holds it or one of these, (K, W).
+    ``time`` (s) has the shape (K,), ``centre`` (centre of mass, m) and ``heading`` have the shape (K, W, 2). ``size``,
+    the number of joined walkers including the walker itself, and ``held``, whether the group is joined to a side wall,
+    have the shape (K, W).
     """
 
     time: FloatArray
@@ -115,7 +125,7 @@ class Course:
 
 
 class Meetings(Analysis):
-    """Who met whom, how long they stuck, how many were together."""
+    """Meetings of walkers: partners, duration, size of groups."""
 
     order = 1
     name = "meetings"
@@ -184,11 +194,11 @@ class Meetings(Analysis):
         }
 
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
-        """How often and what of it, how many together, how they stand, how they are slowed down."""
+        """Numbers and outcomes of meetings, sizes of clusters, orientational order, speeds."""
         del result
         label = "meetings of walkers"
-        yield Quantity("merged", f"{label}: merged", "", "merged", "number of times that two walkers joined")
-        yield Quantity("parted", f"{label}: parted", "", "parted", "number of times that two walkers parted")
+        yield Quantity("merged", f"{label}: merged", "", "merged", "number of events in which two walkers merge")
+        yield Quantity("parted", f"{label}: parted", "", "parted", "number of events in which two walkers separate")
         told = "largest number of walkers joined by bridges at any time"
         yield Quantity("largest_group", "largest group of walkers", "", "largest_group", told)
         for name, (label, unit, told) in _NUMBERS.items():
@@ -201,12 +211,12 @@ class Meetings(Analysis):
                 yield Quantity(f"{approach}.{fate}", "", "", f"{approach}_{fate}", told)
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
-        """How often, and who is together at the end."""
+        """Numbers of meetings, and the groups at the end."""
         together = "; ".join(", ".join(map(str, group)) for group in result["groups_at_end"])
         slow = result["slow_share"]
         return [
-            f"  meetings   {result['merged']} merged, {result['parted']} parted, at most {result['largest_group']} "
-            f"together; at the end {f'joined: {together}' if together else 'none are joined'}",
+            f"  meetings   {result['merged']} merged, {result['parted']} parted, largest group "
+            f"{result['largest_group']}; at the end {f'joined: {together}' if together else 'none are joined'}",
             f"             at the end {100.0 * result['clustered_share']:.0f} % in clusters"
             f"{'' if slow is None else f', {100.0 * slow:.0f} % slow'}; nematic order {result['nematic_order']:.2f}, "
             f"polar order {result['polar_order']:.2f}",

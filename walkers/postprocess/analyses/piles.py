@@ -50,31 +50,33 @@ class Bed:
     """``bed.parquet``: one row per frame of a pile."""
 
     time: Annotated[float, "s", "time since the start of the drive; negative while the pile settles"]
-    surface: Annotated[float, "m", "height of the bulk's surface: median over x-y cells of the top of the highest bead"]
-    surface_low: Annotated[float, "m", "the same, 10th percentile"]
-    surface_high: Annotated[float, "m", "the same, 90th percentile"]
+    surface: Annotated[float, "m", "surface of the bulk: median over x-y cells of the height of the topmost bead"]
+    surface_low: Annotated[float, "m", "10th percentile of these heights"]
+    surface_high: Annotated[float, "m", "90th percentile of these heights"]
     brazil_nut: Annotated[float, "", "Brazil-nut index (z_large - z_small)/(z_large + z_small) of mean heights"]
-    brazil_nut_of_bulk: Annotated[float, "", "the same for the beads of the bulk"]
+    brazil_nut_of_bulk: Annotated[float, "", "Brazil-nut index of the beads of the bulk"]
     mean_square_velocity: Annotated[
         float, "m^2/s^2", "mean square velocity of the beads relative to the container, at the drive phase of the frame"
     ]
     contacts: Annotated[
         float,
         "",
-        "touching beads per bead: twice the bridges between touching beads over the number of beads; no walls",
+        "touching beads per bead, without walls: twice the number of touching pairs over the number of beads",
     ]
     bridges: Annotated[
-        float, "", "bridges per bead: twice the bridges between beads over the number of beads; no walls"
+        float, "", "bridges per bead, without walls: twice the number of bridges between beads over the number of beads"
     ]
-    touching: Annotated[int, "", "number of bridges between beads that touch"]
-    opened: Annotated[int, "", "number of bridges between beads that do not touch"]
+    touching: Annotated[int, "", "number of bridges between touching beads"]
+    opened: Annotated[int, "", "number of open bridges between beads (the beads do not touch)"]
     mean_force: Annotated[float, "N", "mean normal force of the bridges between beads, positive for attraction"]
     liquid_in_bridges: Annotated[float, "m^3", "total volume of all bridges, including those to walls"]
     bulk: Annotated[int, "", "number of beads in the bulk"]
     at_wall: Annotated[int, "", "number of beads with a bridge to a side wall"]
     large_at_wall: Annotated[int, "", "number of large beads with a bridge to a side wall"]
     clusters: Annotated[int, "", "number of clusters free of the bulk and held by a side wall"]
-    highest: Annotated[float, "m", "height of the topmost bead of these clusters; of the surface if there is none"]
+    highest: Annotated[
+        float, "m", "height of the topmost bead of these clusters; height of the surface if there are none"
+    ]
 
 
 @dataclass(frozen=True)
@@ -88,17 +90,17 @@ class Profile:
 
 @dataclass(frozen=True)
 class Member:
-    """``members.parquet``: one row per bead of a cluster that is free and held, and frame."""
+    """``members.parquet``: one row per frame and bead of a cluster that is free of the bulk and held by a side wall."""
 
     time: Annotated[float, "s", "time since the start of the drive"]
-    track: Annotated[int, "", "number of the cluster"]
-    bead: Annotated[int, "", "number of the bead, from 0"]
+    track: Annotated[int, "", "index of the cluster"]
+    bead: Annotated[int, "", "index of the bead, from 0"]
     large: Annotated[bool, "", "whether the bead is large"]
     height: Annotated[float, "m", "height of the bead's centre"]
 
 
 class Pile(Analysis):
-    """What loose beads in a container do: the bed, and the clusters that climb."""
+    """Piles of loose beads in a container: the bed, and the clusters that climb."""
 
     order = 2
     name = "pile"
@@ -115,7 +117,7 @@ class Pile(Analysis):
     derived: ClassVar[Described] = {
         "beads": ("", "number of beads"),
         "large": ("", "number of large beads"),
-        "duration": ("s", "shaken"),
+        "duration": ("s", "duration of the drive"),
     }
 
     def applies(self, case: Case) -> bool:
@@ -184,21 +186,21 @@ class Pile(Analysis):
 
             return folded
 
-        yield Quantity("climbs", "", "", "climbs", "clusters that climbed a wall", of=lambda one: len(one["climbs"]))
-        yield Quantity("climbs", "", "s", "onset", "when the first climb began", of=of_climbs(min, "onset"))
+        yield Quantity("climbs", "", "", "climbs", "number of climbs", of=lambda one: len(one["climbs"]))
+        yield Quantity("climbs", "", "s", "onset", "start of the first climb", of=of_climbs(min, "onset"))
         mean = of_climbs(lambda speeds: sum(speeds) / len(speeds), "speed")
         yield Quantity("climbs", "", "m/s", "speed", "mean speed of the climbs", of=mean)
         highest = of_climbs(max, "height")
-        yield Quantity("climbs", "", "m", "highest", "greatest height of a climb", of=highest)
+        yield Quantity("climbs", "", "m", "highest", "largest height of a climb", of=highest)
         told, led = "number of climbs led by a large bead", of_climbs(sum, "leader_large")
         yield Quantity("climbs", "", "", "led_by_large", told, of=led)
         yield Quantity("beads", "beads")
         yield Quantity("large", "large beads")
-        yield Quantity("driven", "time shaken", "s")
-        told = "number of clusters that came free of the pile, held by a wall"
+        yield Quantity("driven", "time of shaking", "s")
+        told = "number of clusters that are free of the pile and held by a wall"
         yield Quantity("clusters", "clusters free of the pile and held by a wall", "", "clusters", told)
         for event in result.get("events", ()):
-            yield Quantity(f"events.{event}", f"of them {event}")
+            yield Quantity(f"events.{event}", f"clusters {event}")
         yield Quantity("surface.start", "height of the surface at the start", "m")
         label = "height of the surface at the end"
         yield Quantity("surface.end", label, "m", "surface_end", "height of the pile's surface at the end")
@@ -219,7 +221,7 @@ class Pile(Analysis):
             yield Quantity(f"{place}.size", f"{name}: beads")
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
-        """Did it climb, when, how fast, who led."""
+        """The bed, and the climbs with their times, speeds and leaders."""
         surface, nuts, bridges = result["surface"], result["brazil_nut"], result["coordination"]
         rest, inner, shaken = bridges["rest"], bridges["rest_inner"], bridges["shaken"]
         alone, early = "", result["driven"] < _WHOLE * result["duration"]

@@ -39,13 +39,13 @@ _MOST_NAMED = 6  # walkers for which the legend beside the panel has room; of mo
 class Work:
     """``work.parquet``: one row per walker and cycle."""
 
-    walker: Annotated[IntArray, "", "number of the walker, from 0"]
-    cycle: Annotated[IntArray, "", "number of the cycle of the drive, from 0"]
+    walker: Annotated[IntArray, "", "index of the walker, from 0"]
+    cycle: Annotated[IntArray, "", "index of the cycle of the drive, from 0"]
     work: Annotated[FloatArray, "J", "work of the drive on the walker in this cycle"]
 
 
 class Working(Analysis):
-    """What the drive spends on walkers."""
+    """Work of the drive on walkers."""
 
     name = "work"
     version = 2
@@ -73,7 +73,7 @@ class Working(Analysis):
         del result
         told = "work of the drive on a walker per cycle, mean over the walkers"
         yield Quantity("work", "of the drive per cycle", "J", "work", told)
-        told = "power of the drive over the power to lift a walker at its walking speed, mean over the walkers"
+        told = "power of the drive over weight times walking speed, mean over the walkers"
         yield Quantity("cost_of_transport", "cost of transport", "", "cost_of_transport", told)
 
     def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
