@@ -95,7 +95,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     (at(["0 mm", "0 mm"], ["-1 mm", "0 mm"]), "this bead is not connected to the first"),
     (at(["0 mm", "0 mm"]), "expected a place for each"),
     (at(["0 mm", "0 mm"], ["0.1 mm", "0 mm"]), "clusters[0].at[1]"),
-    (at(["0 mm", "0.3 mm"], ["0 mm", "-0.3 mm"], radii=("0.3 mm", "0.3 mm")), "this has no heading"),
+    (at(["0 mm", "0.3 mm"], ["0 mm", "-0.3 mm"], radii=("0.3 mm", "0.3 mm")), "this walker has no heading"),
     ({"dimers": {"radii": ["0.5 mm", "0.2 mm"]}, "boundary": {"shape": "groove", "opening": "30 deg"}},
      "the radii differ too much: the beads do not touch"),
     ({"boundary": {"shape": "groove", **GLASS}}, "boundary.opening: missing"),

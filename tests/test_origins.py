@@ -264,7 +264,7 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     with pytest.raises(InputError, match=r"uncertain.contact.restitution.*: expected a range that holds"):
         spread_sweep(resolve_case({**GLASS, "uncertain": {"contact.restitution": [0.4, 0.8]}}, name="beside"))
     # A case of which all is given has none.
-    with pytest.raises(InputError, match="nothing here is uncertain"):
+    with pytest.raises(InputError, match="no value is uncertain"):
         run_spread(resolve_case(REFERENCE), runs_folder, Options(2))
 
 

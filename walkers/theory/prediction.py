@@ -1,4 +1,4 @@
-"""Predictions of the theory for cases: the paper's model, motion under Coulomb's law, detachment, alignment."""
+"""Predictions of the theory for cases: model of the paper, motion with Coulomb friction, detachment, alignment."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ PAPER = f"theory: paper's fit, κ = {FRICTION_OF_THE_PAPER * 1e-3:g} s/mm"
 """Coulomb friction with the resistance of bridges (`motion_of`); the paper's own model, of what its friction was fitted
 to (`walkers.theory.quasistatic.mean_velocity`)."""
 _BEADS, _BOUNDARIES, _LIQUIDS = "ruby", ("chromium-coated glass", "glass"), ("Si AK5", "Si AK10")
-"""Of the paper's walkers on a level substrate (its Figs. 2 to 4)."""
+"""Beads, boundaries and liquids of the paper's walkers on a level substrate (Figs. 2 to 4)."""
 LARGEST_GAMMA0, LARGEST_ACCELERATION, FREQUENCIES = 3.5, 98.0, (60.0, 90.0)
-"""Up to which Γ0 and peak acceleration (m/s²), and at which frequencies (Hz), the paper measured velocities."""
+"""Range of the paper's measurements: largest Γ0 and peak acceleration (m/s²), frequencies (Hz)."""
 
 
 def motion_of(*cases: Case, viscous: bool = True) -> Motion:
@@ -49,7 +49,7 @@ def motion_of(*cases: Case, viscous: bool = True) -> Motion:
 
 
 def check_applies(*cases: Case) -> None:
-    """Raise ``ValueError`` for cases that the theory is not one of: the key at fault, and what the theory is one of."""
+    """Raise ``ValueError`` with the key and the reason if the theory does not apply to a case."""
     for case in cases:
         if len(case.walkers) != 1 or len(case.walkers[0].radii) != 2 or case.loose:
             raise ValueError("bodies: the theory is for dimers")
@@ -114,7 +114,7 @@ def predict(case: Case) -> dict[str, Any]:
 
 
 def why_not_the_paper(case: Case) -> str | None:
-    """Why the paper's fit, of a friction that was fitted to its walkers, says nothing of a case; None if it does."""
+    """Reason why the fit of the paper does not apply to a case; None if it applies."""
     same = case.material == _BEADS and case.boundary.material in _BOUNDARIES and case.liquid.name in _LIQUIDS
     if same and case.axial_gravity == 0.0:
         return None
@@ -122,7 +122,7 @@ def why_not_the_paper(case: Case) -> str | None:
 
 
 def outside_of_the_paper(case: Case) -> str | None:
-    """A sentence on how a case is outside the range in which the paper measured velocities; None if it is within.
+    """How a case lies outside the range in which the paper measured velocities; None if it lies within.
 
     Of a case that is no dimer's nothing is said.
     """
@@ -170,7 +170,7 @@ def pendulum_of(case: Case) -> Alignment:
 
 
 def alignment_of(case: Case) -> dict[str, Any]:
-    """Whether a case's dimer, driven along the substrate, keeps to the axis, and if not how soon it has turned over.
+    """Whether the dimer of a case stays aligned with the axis, and otherwise the time until it turns over.
 
     Returns
     -------
@@ -198,7 +198,7 @@ def alignment_of(case: Case) -> dict[str, Any]:
 
 
 def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
-    """A prediction as text, beside the engine's result where there is one; speeds in mm/s."""
+    """A prediction as text, with the result of the engine if it exists; velocities in mm/s."""
     paper, end, mathieu = prediction["paper"], prediction["detachment"], prediction["alignment"]
     lines = [
         f"Γ0 = {prediction['gamma0']:.3g}, sin δ = {prediction['sin_delta']:.3g}",
@@ -229,7 +229,7 @@ def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
 
 
 def describe_alignment(found: dict[str, Any]) -> list[str]:
-    """`alignment_of` as lines of text; a second one where something pulls along the axis."""
+    """`alignment_of` as lines of text; with a second line if a force acts along the axis."""
     stays = "small angles stay small if the beads roll" if found["stable"] else "small angles grow if the beads roll"
     if found["v"] == found["u"] == 0.0:
         stays = "no torque toward the axis"
@@ -264,7 +264,7 @@ def _details(model: dict[str, Any]) -> str:
 
 
 def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, FloatArray], dict[str, int]]:
-    """What the models predict for a column of the table of a sweep of N cases.
+    """Predictions of the models for a column of the table of a sweep of N cases.
 
     Parameters
     ----------
@@ -305,7 +305,7 @@ def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, Floa
 
 
 def _why_not(case: Case, column: str) -> str | None:
-    """Why the theory says nothing of a case's column."""
+    """Reason why the theory does not predict a column of a case."""
     try:
         check_applies(case)
     except ValueError as error:

@@ -28,11 +28,11 @@ import numpy as np
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
 
 SMALLEST = 1e-3
-"""Attraction at which it is left out, over that at contact."""
+"""Cut-off: smallest attraction, relative to that at contact."""
 
 
 def law(surfaces: Surfaces, hamaker_constant: float = 6.5e-20, cutoff: float = 0.165e-9) -> Curve:
-    """Hamaker's attraction of two spheres, or of a sphere and a plane, in Derjaguin's limit of small gaps.
+    """Hamaker attraction of two spheres, or of a sphere and a plane, in the Derjaguin limit of small gaps.
 
     Parameters
     ----------
