@@ -1,4 +1,4 @@
-"""Clusters that are free of the pile, followed through time, what became of them, and what counts as a climb.
+"""Clusters that are free of the pile: tracks through time, events, and climbs.
 
 A *cluster* is a connected component of the beads' bridges (touching or open) of at least two beads that is *free*
 of the pile's bulk: the component of most beads, and all that is bridged to the floor. It is *held* if a bridge joins
@@ -31,29 +31,29 @@ Cluster = tuple[frozenset[int], frozenset[int]]
 """The beads of a cluster in a frame and the side walls that hold it."""
 
 Joined = tuple[IntArray, BoolArray]
-"""Of a frame the pairs of beads that bridges join, shape (K, 2), and which beads they join to a side wall, (N,)."""
+"""Bridges of a frame: pairs of joined beads, shape (K, 2), and beads joined to a side wall, shape (N,)."""
 
 _FEWEST_BEADS = 2
 _FEWEST_FRAMES = 3
 _MOST_BLOCKS, _FEWEST_BLOCKS = 10, 4
-"""Parts of a climb from whose speeds the error of its speed is taken."""
+"""Number of parts of a climb for the standard error of its speed."""
 
 
 @dataclass(frozen=True)
 class ClimbCriteria:
-    """Thresholds of what a climb is."""
+    """Definition of a climb by thresholds."""
 
     min_rise: float = 2e-3
-    """Height, m, that a cluster must gain: about two diameters of the paper's large beads."""
+    """Smallest rise of a climb, m: about two diameters of the paper's large beads."""
     max_gap: float = 0.1
-    """Seconds for which a cluster may touch the pile or lose the wall and still be the same."""
+    """Longest time, s, for which a cluster may touch the pile or lose the wall within a track."""
     min_overlap: float = 0.5
-    """Share of the smaller one's beads that two clusters must have in common to be one."""
+    """Smallest share of common beads (of the smaller cluster) of two clusters of one track."""
 
 
 @dataclass
 class Track:
-    """A cluster through time: the frames in which it was free and held, its beads and the side walls in each of them.
+    """A cluster through time: frames in which it is free and held, with its beads and side walls.
 
     And the number of the track that took over its beads, and the frame in which it did; None if none did.
     """
@@ -66,7 +66,7 @@ class Track:
 
 
 def connected(count: int, pairs: IntArray) -> IntArray:
-    """Number of the connected component of each of so many, shape (count,), given joined pairs, shape (K, 2)."""
+    """Index of the connected component of each item, shape (count,), from joined pairs, shape (K, 2)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -76,7 +76,7 @@ def connected(count: int, pairs: IntArray) -> IntArray:
 
 
 def bulk_of(labels: IntArray, bridges: Bridges, *, heap: bool = True) -> BoolArray:
-    """Which beads belong to the component of most beads or to one that is bridged to the floor, shape (N,).
+    """Beads of the bulk, shape (N,): the largest component and all components bridged to the floor.
 
     Without a ``heap``, where beads were placed one by one, the component of most beads may be a cluster on a wall: then
     the floor alone decides.
@@ -98,7 +98,7 @@ def held_clusters(labels: IntArray, bridges: Bridges, bulk: BoolArray) -> Iterat
 
 
 def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]], definition: ClimbCriteria) -> list[Track]:
-    """Follow the clusters of each frame (`held_clusters`; time in s, shape (F,)); tracks by their births."""
+    """Track the clusters of all frames (`held_clusters`; time in s, shape (F,)), in the order of their first frames."""
     tracks: list[Track] = []
     alive: list[int] = []
     for frame, found in enumerate(clusters):
@@ -137,7 +137,7 @@ def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]], definition: 
 
 @dataclass(frozen=True)
 class Beads:
-    """What is known of a pile's beads: times (s, shape (F,)), heights (m, shape (F, N)) and which are large.
+    """Beads of a pile: times (s, shape (F,)), heights (m, shape (F, N)), and which beads are large.
 
     And of each frame the height of the bulk's surface, and which beads are of the bulk; the first frame of the drive;
     names of walls, by their numbers. Heights are needed of the members of clusters alone.
@@ -235,7 +235,7 @@ def classify(number: int, track: Track, beads: Beads, definition: ClimbCriteria)
 
 
 def _qualified(gained: FloatArray, min_rise: float) -> tuple[int, int] | None:
-    """Where what makes a track a climb begins, and the first place up to which it is one; None if it never is.
+    """Begin of the rise that makes a track a climb, and the frame at which it qualifies; None if there is none.
 
     There it is farther above its lowest than ever before, by enough, and that took frames enough: a hop between two
     frames is none.
@@ -249,7 +249,7 @@ def _qualified(gained: FloatArray, min_rise: float) -> tuple[int, int] | None:
 
 
 def _gained(track: Track, time: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Height gained since a track's first frame (m) and the seconds in which it was, shape (frames of the track,).
+    """Rise since the first frame of a track (m) and its duration (s), shape (frames of the track,).
 
     What is gained while it is no cluster does not count, nor does the time; what is lost then does.
     """
@@ -264,7 +264,7 @@ def _gained(track: Track, time: FloatArray, height: FloatArray) -> tuple[FloatAr
 
 
 def _speed(seconds: FloatArray, gained: FloatArray) -> tuple[float, float]:
-    """Gain over time, and its standard error from those of equal numbers of frames; NaN where there are too few."""
+    """Gain over time, and its standard error from equal parts; NaN with too few frames."""
     whole = seconds[-1] - seconds[0]
     if len(gained) < _FEWEST_FRAMES or whole == 0.0:
         return np.nan, np.nan
@@ -380,7 +380,7 @@ def events_of(tracks: Sequence[Track], climbs: Sequence[Climb], beads: Beads, de
 
 
 def _parent(tracks: Sequence[Track], number: int, time: FloatArray, definition: ClimbCriteria) -> int | None:
-    """The track that held most of another one's beads shortly before it began."""
+    """The track that contained most beads of another track shortly before its begin."""
     first, members = tracks[number].frames[0], tracks[number].members[0]
     best, most = None, definition.min_overlap * len(members)
     for other, track in enumerate(tracks):

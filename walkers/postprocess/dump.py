@@ -23,15 +23,15 @@ BoolArray = npt.NDArray[np.bool_]
 _HEADER = struct.Struct("=qqi6i6dii")
 _COUNT = struct.Struct("=i")
 _LINES = 9
-"""Of the head of a frame of bridges."""
+"""Lines of the header of a frame of bridges."""
 
 
 class DumpError(WalkersError):
-    """A file that is no binary dump, or one of other columns than expected."""
+    """A file that is not a binary dump, or has unexpected columns."""
 
 
 class NoNumberError(DumpError):
-    """A dump with a NaN or an infinity: the engine goes on with them and says nothing, and a disk can make them."""
+    """A dump with NaN or infinity, from a blow-up that the engine does not report or from a damaged disk."""
 
 
 class _Frame(NamedTuple):
@@ -44,7 +44,7 @@ class _Frame(NamedTuple):
 
 
 class BinaryDump:
-    """The frames of a binary dump with columns of such names.
+    """Frames of a binary dump with named columns.
 
     Attributes
     ----------

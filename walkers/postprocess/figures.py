@@ -1,6 +1,6 @@
 """Figures of a run: panels with lines, drawn by matplotlib here and by Bokeh in reports.
 
-Where walkers went and turned, and their gait; what a pile did.
+Path, orientation and gait of walkers; climbs of piles.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 MOST_NAMED = 12  # walkers, or climbs, in a legend
 _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
-"""How events are marked (`walkers.postprocess.clusters.Event`)."""
+"""Markers of events (`walkers.postprocess.clusters.Event`)."""
 _HEIGHT = 1.6  # inches of a panel
 _LEAST_DISTANCE, _LEAST_ANGLE, _LEAST_SPEED = 0.01, 0.1, 0.01
-"""mm, ° and mm/s that axes show at least: rounding is no motion."""
+"""Smallest ranges of axes in mm, ° and mm/s, so that rounding errors do not look like motion."""
 _SHOWN, _LONG = 8, 4.0  # images of a walker; lengths of a walker from which on they are centred on it
 _GREY, _PALE, _OTHERS = "#5b6770", "#b4bec5", "#c78a2c"
 
@@ -54,7 +54,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Panel:
-    """A plot: title, labels of its axes, lines from the lowest to the uppermost, and what is grey behind them.
+    """A plot: title, labels of its axes, lines from bottom to top, and grey background intervals.
 
     ``band`` are two lines of the same x with grey between them, ``settled`` the x up to which it is grey, ``log`` says
     that y is logarithmic, ``zero`` that it is shown where y is zero, ``least`` the smallest range of y that is shown,
@@ -74,7 +74,7 @@ class Panel:
 
     @property
     def limits(self) -> tuple[float, float] | None:
-        """What y is to go from and to, where what is shown of it would be less than is to be; else None."""
+        """Limits of y if its range is below the smallest range, otherwise None."""
         shown = [np.zeros(int(self.zero)), *(np.asarray(line.y)[np.isfinite(line.y)] for line in self.lines)]
         values = np.concatenate(shown)
         if not len(values) or np.ptp(values) >= self.least:
@@ -84,12 +84,12 @@ class Panel:
 
 
 def nested_widths(count: int, largest: float = 3.0) -> list[float]:
-    """Widths of lines (points), the lowest first, so that of those that coincide each is seen."""
+    """Widths of lines (points), the lowest line first, so that coinciding lines are all visible."""
     return [1.1] if count < 2 else np.linspace(min(1.1 + 2.2 * (count - 1), largest), 1.1, count).tolist()
 
 
 def told_velocity(value: float) -> str:
-    """A velocity (mm/s) with three digits, but no more than three decimals: a smaller one is none."""
+    """A velocity (mm/s) as text with three digits and at most three decimals."""
     return "0" if abs(value) < 5e-4 else f"{value:.3g}" if abs(value) >= 0.1 else f"{value:.3f}"
 
 
@@ -132,7 +132,7 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
 
 
 def velocity_panel(case: Case, walkers: Columns) -> Panel:
-    """The velocity of each walker, of the table of the walkers, with the standard error of its fit."""
+    """Velocity of each walker with the standard error of its fit."""
     velocity, error, lines = 1e3 * walkers["velocity"], 1e3 * walkers["standard_error"], []
     for way, told in zip((1, -1), ways(uphill=case.goes_uphill), strict=True):
         label, colour, marker = f"started facing {told}", int(way < 0), "o" if way > 0 else "s"
@@ -208,7 +208,7 @@ def pile_panels(tables: Mapping[str, Columns]) -> list[Panel]:
 
 
 def _leaders(tables: Mapping[str, Columns]) -> Iterator[Line]:
-    """The height of each cluster's leader, thick where it climbed."""
+    """Height of the leader of each cluster; thick lines for climbs."""
     clusters, members = tables["clusters"], tables["members"]
     named = np.cumsum(clusters["climbed"])
     for track, (climbed, leader) in enumerate(zip(clusters["climbed"], clusters["leader"], strict=True)):
@@ -224,7 +224,7 @@ def _leaders(tables: Mapping[str, Columns]) -> Iterator[Line]:
 
 
 def assembly_panels(tables: Mapping[str, Columns]) -> list[Panel]:
-    """The past of the beads of the first climb out of a pile, from rest until it counted as a climb.
+    """History of the beads of the first climb out of a pile, from rest until it qualifies.
 
     Heights, thick from where bridges join a bead to the others; how many are joined, and how many are at a wall. Of the
     tables of a pile; none where nothing climbed out of it.
@@ -258,7 +258,7 @@ def assembly_panels(tables: Mapping[str, Columns]) -> list[Panel]:
 
 
 def _events(events: Columns) -> Iterator[Line]:
-    """A mark where something happened to a cluster, at the height of its leader."""
+    """Markers of events of clusters at the height of the leader."""
     for kind, marker in _MARKS.items():
         these = events["event"] == kind
         if these.any():
@@ -306,7 +306,7 @@ def stacked(panels: Sequence[Panel], case: Case) -> Figure:
 
 
 def draw_panel(axes: Axes, panel: Panel) -> None:
-    """A panel without its title and what is below it."""
+    """A panel without its title and the legend below."""
     for line in panel.lines:
         colour = f"C{line.colour}" if isinstance(line.colour, int) else line.colour
         look: dict[str, Any] = {"marker": line.marker, "mfc": "none"} if line.marker else {}

@@ -134,7 +134,7 @@ def parse_time(option: str, text: str) -> float:
 
 
 def _check_format(path: Path, options: FilmOptions) -> None:
-    """Refuse what a format cannot hold."""
+    """Raise `InputError` for options that a format does not support."""
     suffix, (wide, tall), fps = path.suffix.lower(), options.size, options.fps
     check_place(path, ".mp4", ".gif")
     if suffix == ".mp4" and (wide % 2 or tall % 2):
@@ -158,7 +158,7 @@ def _shown(motion: Motion, walker: int | None) -> Motion:
 
 
 class FilmTimes(NamedTuple):
-    """The moments of a film, of K pictures.
+    """Times of the K pictures of a film.
 
     ``time`` is physical (s); ``frame`` the number of the frame of the motion, between two a fraction where the motion
     between them is known. The film is ``slowdown`` times slower than in reality; if it is ``stroboscopic`` all pictures
@@ -172,7 +172,7 @@ class FilmTimes(NamedTuple):
 
 
 def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
-    """Spread the pictures of a film over a motion while it is driven.
+    """Distribute the pictures of a film over the drive.
 
     Pictures that are half a cycle apart or more are moved to whole cycles, as a stroboscope would show them; else the
     shaking would beat with the pictures. Where frames are so rare that they do not follow a cycle each picture is the
@@ -204,7 +204,7 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
 def _captions(
     scene: Scene, times: FilmTimes, pixels_per_mm: float, size: tuple[int, int]
 ) -> Callable[[Picture, int], Picture]:
-    """What writes time, way, slow motion, drive, tilt, a scale bar and the way of gravity into a picture."""
+    """A function that draws time, distance, slow motion, drive, tilt, scale bar and gravity into a picture."""
     from matplotlib import get_data_path
     from PIL import Image, ImageDraw, ImageFont
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Columns: TypeAlias = dict[str, npt.NDArray[Any]]
 NUMBERED = "numbered"
-"""Of a column that stands for several, one for each bead or contact: ``rotation_1``, ``rotation_2``, …"""
+"""Marks a field that stands for several columns, one per bead or contact: ``rotation_1``, ``rotation_2``, …"""
 
 
 def described(table: type) -> dict[str, tuple[str, str]]:
@@ -46,7 +46,7 @@ def columns_of(table: Any) -> Columns:
 
 
 def columns_of_rows(table: type, rows: Sequence[Any]) -> Columns:
-    """The columns of a table of which each row is given; there may be none."""
+    """Columns of a table from its rows; there may be no rows."""
     kinds = get_type_hints(table)
     return {name: np.array([getattr(row, name) for row in rows], dtype=kinds[name]) for name in described(table)}
 
@@ -96,7 +96,7 @@ def _arrow(values: npt.NDArray[Any]) -> Any:
 
 
 def intact(directory: Path, names: Iterable[str]) -> bool:
-    """Whether tables of a run directory are there and whole: parquet begins and ends with the same four bytes."""
+    """Whether the tables of a run directory exist and are complete (parquet magic bytes at both ends)."""
     for name in names:
         path = directory / f"{name}.parquet"
         if not path.is_file() or path.stat().st_size < 12:
@@ -138,7 +138,7 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
 
 
 def read_columns(directory: Path, name: str) -> Columns:
-    """The same as arrays, which takes no pandas."""
+    """Like `read_table`, as arrays without pandas."""
     table = _read(directory, name)
     return {column: table[column].to_numpy() for column in table.column_names}
 

@@ -1,4 +1,4 @@
-"""The analysis of walkers that are meant to meet: who meets whom, what becomes of them, whether they cluster or jam.
+"""Analysis of walkers that may meet: meetings and their outcome, clustering and jamming.
 
 Walkers are *joined* if bridges lead from one to the other, directly or by others; those that are joined are a cluster.
 A cluster, or a walker by itself, is *held* if a bridge joins one of its beads to a side wall. A walker is *free* if it
@@ -98,7 +98,7 @@ _NUMBERS = {
 
 @dataclass(frozen=True)
 class Meeting:
-    """``meetings.parquet``: one row per event between two walkers that are meant to meet."""
+    """``meetings.parquet``: one row per event between two walkers that may meet."""
 
     time: Annotated[float, "s", "time since the start of the drive"]
     event: Annotated[str, "", "merged: the first bridge between two walkers forms; parted: the last one breaks"]
@@ -140,18 +140,18 @@ class Meetings(Analysis):
     }
 
     def applies(self, case: Case) -> bool:
-        """Where walkers are meant to meet."""
+        """Cases whose walkers may meet."""
         return case.meets
 
     def derived_of(self, case: Case) -> dict[str, float]:
-        """Coverage, to three digits, so that trays that were meant to have the same are drawn together."""
+        """Coverage, rounded to three digits so that equal trays form one group in figures."""
         boundary, spacing = case.boundary, max(one.spacing for one in case.walkers)
         cell = spacing * (spacing if isinf(boundary.width) else boundary.width)
         floor = boundary.cross_section if boundary.closed else cell * sum(one.replicates for one in case.walkers)
         return {"coverage": float(f"{pi * sum(radius**2 for radius in case.all_radii) / floor:.3g}")}
 
     def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
-        """Events from one recorded frame of bridges to the next; who stands together from the first has merged then."""
+        """Events between recorded frames of bridges; walkers joined in the first frame have merged at that time."""
         rows: list[Meeting] = []
         before: frozenset[tuple[int, int]] = frozenset()
         centre, heading = _places(motion)
@@ -227,13 +227,13 @@ class Meetings(Analysis):
         return {"paths": [_paths(run.motion)]}
 
     def draw(self, name: str, panels: Sequence[Panel], run: Measured) -> Figure:
-        """The paths, and the beads at the end, both axes to the same scale."""
+        """Paths of the walkers and their beads at the end, with equal scales on both axes."""
         del name
         return _drawn(panels[0], run.motion)
 
 
 def _paths(motion: Motion) -> Panel:
-    """Where the mass centres of all walkers went while they were driven, once a cycle, and the edge of the floor."""
+    """Paths of the centres of mass during the drive, once per cycle, and the edge of the floor."""
     from walkers.postprocess.figures import MOST_NAMED, Line, Panel
     from walkers.postprocess.scene import walls_of
 
@@ -252,7 +252,7 @@ def _paths(motion: Motion) -> Panel:
 
 
 def _colours(count: int) -> list[str]:
-    """Of so many walkers, all different."""
+    """Distinct colours for a number of walkers."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
@@ -261,7 +261,7 @@ def _colours(count: int) -> list[str]:
 
 @styled
 def _drawn(panel: Panel, motion: Motion) -> Figure:
-    """A panel of paths with the beads as they stand at the end."""
+    """A panel of paths with the beads at the end."""
     from matplotlib.patches import Circle
 
     from walkers.postprocess.figures import MOST_NAMED, draw_panel
@@ -284,7 +284,7 @@ def _drawn(panel: Panel, motion: Motion) -> Figure:
 
 
 def _places(motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Mass centres (m) and headings of all walkers, by their numbers, in all frames, seen from above: (F, W, 2)."""
+    """Centres of mass (m) and headings of all walkers in the plane of the floor, shape (F, W, 2)."""
     centre, heading = (np.zeros((len(motion.time), len(motion.walkers), 2)) for _ in range(2))
     for number, make in enumerate(motion.case.walkers):
         group = Group(motion, make, [walker for walker in motion.walkers if walker.make == number])
@@ -294,7 +294,7 @@ def _places(motion: Motion) -> tuple[FloatArray, FloatArray]:
 
 
 def collective(course: Course, meetings: Sequence[Meeting], axis: FloatArray) -> dict[str, Any]:
-    """What a result says of walkers as many, from their course and their meetings; None for what is unknown.
+    """Collective quantities of a result, from the course and the meetings; None for undefined quantities.
 
     ``axis`` is the unit vector of the drive. See the columns of `Meetings` for what each number is.
     """
@@ -304,7 +304,7 @@ def collective(course: Course, meetings: Sequence[Meeting], axis: FloatArray) ->
     speed = np.linalg.norm(np.diff(course.centre, axis=0), axis=-1) / steps
 
     def mean_speed(there: BoolArray) -> float:
-        """Of what is so at both ends of an interval."""
+        """Mean speed over the intervals at both ends of which a condition holds."""
         found = speed[there[:-1] & there[1:]]
         return float(found.mean()) if found.size else nan
 

@@ -1,4 +1,4 @@
-"""The analysis of loose beads in a container: what the bed did, which clusters came free of it and climbed."""
+"""Analysis of loose beads in a container: the bed, and the clusters that leave it and climb."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from walkers.postprocess.figures import Panel
 
 _WHOLE = 1.0 - 1e-6
-"""Of its duration: a run that was shaken for less ended early."""
+"""Fraction of the duration below which a run ended early."""
 _LAYERS = 0.5
 """Thickness of the layers of the packing profile, in diameters of the largest bead."""
 
@@ -121,11 +121,11 @@ class Pile(Analysis):
     }
 
     def applies(self, case: Case) -> bool:
-        """Of loose beads in a container."""
+        """Cases with loose beads in a container."""
         return case.loose and case.boundary.closed
 
     def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
-        """The bed, the clusters, what happened to them, and the packing."""
+        """Tables and result: bed, clusters, events, packing."""
         case, first, definition = motion.case, motion.first_driven, ClimbCriteria()
         rows, wet, bulks, held, joined = [], [], [], [], []
         inner: dict[str, float | None] = {}
@@ -175,10 +175,10 @@ class Pile(Analysis):
         }
 
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
-        """Of the climbs, the bed, and each climb."""
+        """Quantities of all climbs, of the bed, and of each climb."""
 
         def of_climbs(fold: Callable[[list[Any]], Any], key: str) -> Callable[[Mapping[str, Any]], Any]:
-            """What is made of a number of all climbs that have it; NaN where there is none."""
+            """A function that reduces a number of all climbs; NaN without climbs."""
 
             def folded(result: Mapping[str, Any]) -> Any:
                 values = [climb[key] for climb in result["climbs"] if climb[key] is not None]
@@ -276,13 +276,13 @@ class Pile(Analysis):
 
 
 def _late(motion: Motion) -> BoolArray:
-    """Which frames are those of the second half of the drive; the last one where it has not begun."""
+    """Frames of the second half of the drive; the last frame if the drive has not begun."""
     late: BoolArray = motion.time >= min(motion.time[motion.first_driven :].mean(), motion.time[-1])
     return late
 
 
 def _bed_result(motion: Motion, bed: Columns, inner: Mapping[str, float | None]) -> dict[str, Any]:
-    """What a result says of the bed; ``inner`` are the beads at no wall, just before the drive."""
+    """The bed in a result; ``inner``: beads away from walls, just before the drive."""
     first, end = motion.first_driven, motion.time[-1]
     rest = max(int(np.searchsorted(motion.time, 0.0, side="right")) - 1, 0)
     ends = ("surface", "brazil_nut")
@@ -303,7 +303,7 @@ def _bed_result(motion: Motion, bed: Columns, inner: Mapping[str, float | None])
 
 
 def _told_climb(climb: Climb) -> dict[str, Any]:
-    """What a result says of a climb."""
+    """A climb in a result."""
     names = ("begin", "end", "onset", "qualified", "gain", "speed", "standard_error", "leader_large", "height")
     known = {name: getattr(climb, name) for name in (*names, "size", "large")}
     told = {name: value if np.isfinite(value) else None for name, value in known.items()}
@@ -311,7 +311,7 @@ def _told_climb(climb: Climb) -> dict[str, Any]:
 
 
 def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
-    """Which cluster, free and held, each bead of a pile is in, -1 for none, and whether that climbs; shape (F, N)."""
+    """Track of each bead of a pile, -1 for none, and whether it climbs; shape (F, N)."""
     tables = tables_of(motion.directory)
     members, climbed = tables["members"], tables["clusters"]["climbed"]
     track = np.full(motion.position.shape[:2], -1, dtype=np.int64)
@@ -322,7 +322,7 @@ def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
 
 
 def climbs_by(tables: Mapping[str, Columns], definition: ClimbCriteria) -> list[Climb]:
-    """What climbs in a pile by another definition, from its tables; neither walls nor the bulk are told."""
+    """Climbs in a pile by another definition, from its tables; without walls and bulk."""
     time, members = tables["bed"]["time"], tables["members"]
     frame, bead = np.searchsorted(time, members["time"]), members["bead"]
     height = np.full((len(time), bead.max(initial=0) + 1), nan)
@@ -361,7 +361,7 @@ def _leader(climb: Mapping[str, Any]) -> str:
 
 
 def _joined(bridges: Bridges, count: int) -> Joined:
-    """What the bridges of a frame join, of so many beads."""
+    """Beads and walls that the bridges of a frame join."""
     at_wall = np.zeros(count, dtype=np.bool_)
     at_wall[bridges.wall_beads[bridges.walls != FLOOR]] = True
     return bridges.beads.astype(np.int32), at_wall
@@ -401,7 +401,7 @@ def _bed(
 
 
 def coordination_of_inner(bridges: Bridges, count: int) -> dict[str, float | None]:
-    """Contacts and bridges, to other beads, of those of so many beads that are bridged to no wall and not to the floor.
+    """Contacts and bridges per bead to other beads, for beads without a bridge to a wall or the floor.
 
     Beads at a wall have fewer neighbours among the beads than those within, which a small pile has few of. Told are
     ``beads``, how many they are, and their mean ``contacts`` and ``bridges``; None where there is none.

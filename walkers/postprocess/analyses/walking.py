@@ -47,24 +47,24 @@ if TYPE_CHECKING:
     from walkers.postprocess.figures import Panel
 
 NEAR = 1.5
-"""Walkers whose centres of mass come closer than this multiple of their length have met."""
+"""Walkers whose mass centres come within this many lengths of one have met."""
 
-_CONTACTS = "contacts: beads with the wall, in order, then pairs of beads that touch at the start"
+_CONTACTS = "contacts: each bead with the wall, in order, then the pairs of beads in contact at the start"
 _ROTATION = "rotation velocity -R dphi/dt of a bead"
 _SLIDING = f"sliding velocity; {_CONTACTS}"
 _OPEN = f"fraction of the time during which the contact is open; {_CONTACTS}"
-_SEPARATED = "fraction of the samples in which two beads are farther apart than the rupture distance of a bridge"
+_SEPARATED = "fraction of the samples in which two beads are farther apart than a bridge can reach"
 
 
 @dataclass(frozen=True)
 class Trajectory:
     """``trajectory.parquet``: one row per sample and walker."""
 
-    walker: Annotated[IntArray, "", "index of the walker, from 0"]
+    walker: Annotated[IntArray, "", "number of the walker, from 0"]
     time: Annotated[FloatArray, "s", "time since the start of the drive"]
     cycle: Annotated[FloatArray, "", "time in cycles of the drive"]
-    x: Annotated[FloatArray, "m", "x of the centre of mass relative to the substrate"]
-    y: Annotated[FloatArray, "m", "y of the centre of mass relative to the substrate"]
+    x: Annotated[FloatArray, "m", "centre of mass relative to the substrate"]
+    y: Annotated[FloatArray, "m", "centre of mass relative to the substrate"]
     z: Annotated[FloatArray, "m", "height of the centre of mass above the substrate"]
     orientation: Annotated[FloatArray, "rad", "angle between the heading and the direction given by facing"]
     velocity: Annotated[
@@ -81,9 +81,9 @@ class Trajectory:
 class WalkerRows:
     """``walkers.parquet``: one row per walker; means are over the cycles after the settling ones."""
 
-    walker: Annotated[IntArray, "", "index of the walker, from 0"]
-    make: Annotated[IntArray, "", "index of the walker's make (body of the case), from 0: dimers, then clusters"]
-    facing: Annotated[IntArray, "", "direction at the start: 1 along the drive axis (right), -1 opposite (left)"]
+    walker: Annotated[IntArray, "", "number of the walker, from 0"]
+    make: Annotated[IntArray, "", "number of the walker's make (body of the case), from 0: dimers, then clusters"]
+    facing: Annotated[IntArray, "", "given direction at the start: 1 along the drive axis (right), -1 opposite (left)"]
     start_angle: Annotated[FloatArray, "rad", "orientation at the start"]
     velocity: Annotated[
         FloatArray, "m/s", "velocity along the heading after the settling cycles, positive toward the large beads"
@@ -110,21 +110,21 @@ class BridgeRows:
     """``bridges.parquet``: one row per bridge and frame."""
 
     time: Annotated[FloatArray, "s", "time since the start of the drive"]
-    walker: Annotated[IntArray, "", "index of the walker, from 0"]
+    walker: Annotated[IntArray, "", "number of the walker, from 0"]
     contact: Annotated[
-        IntArray, "", "index of the contact, from 1: beads with walls, then pairs of beads; 0 for other bridges"
+        IntArray, "", "number of the contact, from 1: beads with walls, then pairs of beads; 0 for other bridges"
     ]
-    bead_1: Annotated[IntArray, "", "index of the bead in the run, from 0"]
-    bead_2: Annotated[IntArray, "", "index of the other bead, -1 for a wall"]
-    wall: Annotated[IntArray, "", "index of the wall, 0 for the floor if there is one, -1 for none"]
-    other_walker: Annotated[IntArray, "", "index of the walker at the other end, -1 for none"]
+    bead_1: Annotated[IntArray, "", "number of the bead in the run, from 0"]
+    bead_2: Annotated[IntArray, "", "number of the other bead, -1 for a wall"]
+    wall: Annotated[IntArray, "", "number of the wall, 0 for the floor if there is one, -1 for none"]
+    other_walker: Annotated[IntArray, "", "number of the walker at the other end, -1 for none"]
     gap: Annotated[FloatArray, "m", "gap, negative for overlap"]
     touching: Annotated[BoolArray, "", "whether the surfaces touch"]
     normal_force: Annotated[FloatArray, "N", "net normal force (capillary, viscous, elastic), positive for attraction"]
 
 
 class Walking(Analysis):
-    """Velocity, rotation, sliding and orientation of walkers."""
+    """How walkers walk."""
 
     order = 0
     name = "walking"
@@ -134,9 +134,9 @@ class Walking(Analysis):
     derived: ClassVar[Described] = {
         "gamma0": ("", "dimensionless peak force Γ0 = a0 M/(4πγR̄) of dimers"),
         "sin_delta": ("", "asymmetry parameter (R1 - R2)/(R1 + R2) of dimers"),
-        "mass_asymmetry": ("", "mass asymmetry μ = (m1 - m2)/M of dimers"),
-        "radius_1": ("m", "radius of bead 1"),
-        "radius_2": ("m", "radius of bead 2"),
+        "mass_asymmetry": ("", "μ = (m1 - m2)/M of dimers"),
+        "radius_1": ("m", "of bead 1"),
+        "radius_2": ("m", "of bead 2"),
     }
 
     def applies(self, case: Case) -> bool:
@@ -190,7 +190,7 @@ class Walking(Analysis):
         label = "along the heading, positive toward the large bead"
         yield Quantity("velocity", f"velocity {label}", "m/s", "velocity", f"mean velocity of the walkers, {label}")
         yield Quantity("velocity.smallest", "", "m/s", "smallest", "velocity of the slowest walker")
-        told = "velocity of the fastest walker; the error bars of the paper are largest minus smallest"
+        told = "velocity of the fastest walker; the paper's error bar is largest minus smallest"
         yield Quantity("velocity.largest", "", "m/s", "largest", told)
         told = "standard deviation of the velocities of the copies; not an error of the mean"
         yield Quantity("velocity.scatter", "", "m/s", "scatter", told)
@@ -212,9 +212,9 @@ class Walking(Analysis):
         for (family, (label, unit, told)), (contact, name) in product(families.items(), contacts.items()):
             column = f"{family}_{contact.partition('_')[2]}"
             yield Quantity(f"{family}.{contact}", f"{label}, {name}", unit, column, told)
-        label = "beads farther apart than the rupture distance"
+        label = "beads farther apart than a bridge reaches"
         yield Quantity("separated_fraction", label, "share", "separated_fraction", _SEPARATED)
-        told = "mean orientation at the end of the run"
+        told = "mean orientation at the end"
         yield Quantity("orientation_end", "orientation at the end", "rad", "orientation_end", told)
         for number, make in enumerate(result.get("makes", [])):
             yield Quantity(f"makes.{number}.velocity", f"velocity of walkers with radii {_radii(make)} mm", "m/s")
@@ -223,7 +223,7 @@ class Walking(Analysis):
         yield Quantity("steady", label, column="steady", meaning=f"number of {label}")
         told = "number of walkers that turned by more than 90 degrees"
         yield Quantity("turned_round", "walkers that turned by more than 90°", column="turned_round", meaning=told)
-        told = "on a slope: number of walkers that end within 15° of their start direction and do not tilt further"
+        told = "on a slope: number of walkers that end in the given direction and tilt no further"
         yield Quantity("posture.upright", "walkers that are upright", column="upright", meaning=told)
         yield from (Quantity(f"posture.{one}", f"walkers that are {one}") for one in POSTURES[1:])
         yield Quantity("cycles", "cycles driven", column="cycles", meaning="cycles of the drive, including settling")
@@ -274,7 +274,7 @@ class Walking(Analysis):
             warnings.append(f"{told}: the velocity depends on the length of the run")
         if (share := result["separated_fraction"] or 0.0) > SEPARATED:
             told = f"for {100.0 * share:.0f} % of the time"
-            warnings.append(f"beads of walkers are farther apart than the rupture distance {told}")
+            warnings.append(f"beads of walkers are farther apart than a bridge reaches {told}")
         if result["walkers_met"] and not result["meet"]:
             warnings.append("walkers came close to each other and are not independent: increase the spacing")
         return warnings

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _PACKAGE = "walkers.postprocess.report"
 NAME = "report.html"
 LARGEST = 5_000_000
-"""Bytes that a report may have: what any mail takes along."""
+"""Largest size of a report in bytes, small enough for mail."""
 COLOURS = ("#b0203c", "#1f3b73", "#3f7f93", "#c78a2c", "#5b6770", "#7a4a8c", "#4c8c4a", "#1d2429")
 _MARKERS = {"o": "circle", "s": "square", "^": "triangle", "v": "inverted_triangle", "D": "diamond", "x": "x"}
 """What Bokeh calls them; others are diamonds."""
@@ -42,7 +42,7 @@ _MOST_POINTS = 600
 
 
 def check_report(path: Path) -> None:
-    """Refuse a place for a report that is no .html file in a folder that there is by an InputError."""
+    """Raise `InputError` unless a path is an .html file in an existing folder."""
     check_place(path, ".html", ".htm")
     if not path.absolute().parent.is_dir():
         raise refused("--to", f"{path.absolute().parent}: there is no such folder")
@@ -144,7 +144,7 @@ def with_legend(plot: Figure) -> Figure:
 
 
 def error_bars(plot: Figure, x: Sequence[Any] | FloatArray, y: FloatArray, error: FloatArray) -> None:
-    """Whiskers as long as an error to either side."""
+    """Error bars."""
     from bokeh.models import ColumnDataSource
     from bokeh.models.annotations import Whisker
 

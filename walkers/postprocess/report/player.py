@@ -1,4 +1,4 @@
-"""The beads of a run in three dimensions, to be played and turned: a K3D plot for reports and for notebooks.
+"""Interactive 3-D player of the beads of a run: a K3D plot for reports and notebooks.
 
 Lengths are in mm, in the frame of the boundary; where a walker walks far the view moves along with it. Beads are beach
 balls, which shows how they roll, but for those whose spins are recorded too seldom to be added up
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import k3d
 
 MOST_PLACES = 8000
-"""Beads times instants of a plot, for the size of its file."""
+"""Largest number of beads times frames in a plot, which limits its file size."""
 _FLOOR, _LINES = 0xDFE5E8, 0x9AA6AE
 _AROUND = 1.15  # extent of the view over that of the beads
 _VIEW, _ASPECT = 30.0, 1.5  # degrees, of the camera's view; width of a picture over its height, at least
@@ -46,7 +46,7 @@ _GRID = 2.0**-13
 
 @dataclass(frozen=True)
 class Player:
-    """A K3D plot (in notebooks a widget), its first and last instant (s), and what is to be said beside it.
+    """A K3D plot (a widget in notebooks), its first and last time (s), and captions.
 
     ``cameras`` are where one may look from, by name: place, target and upward direction of a camera, mm.
     """
