@@ -1,4 +1,4 @@
-"""What a user calls a run, a sweep or a case, and what there is of it: in this way all commands find things."""
+"""Find a run, a sweep or a case by the name that a user gives, in the same way for all commands."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ NOT_A_RUN = {
 
 
 class Place(NamedTuple):
-    """Where something is that a user named; what it is (of `RECORDS`, ``archive`` or ``folder``); by which case.
+    """Place of a named object: path, kind (of `RECORDS`, ``archive`` or ``folder``), and case.
 
     A run need not be finished: its place is where it belongs.
     """
@@ -155,7 +155,7 @@ def find(what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Mappin
 
 
 class IncompleteRunWarning(UserWarning):
-    """The dump of a finished run is shorter than its layout says: somebody cut it since."""
+    """The dump of a finished run is shorter than its layout: it was truncated later."""
 
 
 def check_run(directory: Path, *, dumps: bool = True) -> None:

@@ -25,7 +25,7 @@ from walkers.completion import offering
 _INTERRUPTED = 130
 _STDOUT = "standard output"
 _ENGINE_SECONDS = 10.0
-"""How long the engine may take to say what it is."""
+"""Longest time, s, for the engine to print its version."""
 
 
 class _Stream(FileIO):
@@ -211,7 +211,7 @@ def describe_version() -> str:
 
 
 def _told(stop: BaseException) -> int:
-    """Tell why the program stopped; the exit status of that."""
+    """Print why the program stopped, and return its exit status."""
     from walkers.inputs.errors import InputError, WalkersError
 
     known = ((InputError, 2), (WalkersError, 1), (KeyboardInterrupt, _INTERRUPTED), (typer.Abort, _INTERRUPTED))

@@ -1,4 +1,4 @@
-"""Figures of sweeps, from Python and for ``walkers plot SWEEP``: the table, and beside it what the theory predicts."""
+"""Figures of sweeps, in Python and for ``walkers plot SWEEP``: the table and predictions of the theory."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def _figure_of(
 def _curves(
     cases: Sequence[Case], column: str, size: float, rows: npt.NDArray[np.int64], x: Factor, places: FloatArray
 ) -> dict[str, FloatArray]:
-    """What the theory predicts where a key of some of the cases has other values; nothing where it would take long.
+    """Predictions of the theory between the points of a key; empty if they would take long.
 
     Cases of another shape of their bridges are solved for a quarter of a second each.
     """

@@ -1,4 +1,4 @@
-"""Calibration files: which parameters of a case are free, and which published numbers they are to give.
+"""Calibration files: free parameters of a case, and the published numbers to reproduce.
 
 case = "fig1b"
 
@@ -43,12 +43,12 @@ QUANTITIES: dict[str, Kind] = {
     **dict.fromkeys(get_args(Speed), SPEED),
     "misalignment": ANGLE,
 }
-"""What an observation may be of: a column of a sweep's table, or the largest angle of a walker to the drive axis."""
+"""Quantities of observations: columns of the table of a sweep, or the largest angle to the drive axis."""
 Names = Annotated[list[str], Field(min_length=1)]
 
 
 class ParameterTable(Table):
-    """``[parameters.NAME]``: keys of the case that take its value, its range, and what is assumed beforehand.
+    """``[parameters.NAME]``: keys of the case that take the value, range, and prior.
 
     Numbers are in its ``unit``, if it has one; those of a ``log`` range, and its median, are above zero.
     """
@@ -113,7 +113,7 @@ class Observation(Table):
 
 
 class SharedError(Table):
-    """``[shared_errors.NAME]``: observations whose published values are wrong together, and by how much of the whole.
+    """``[shared_errors.NAME]``: observations with correlated errors, and the shared part of the variance.
 
     ``share`` of the variance of each is shared: so large is the correlation of any two of them.
     """
@@ -148,7 +148,7 @@ class CalibrationFile(Table):
 
 @dataclass(frozen=True)
 class Calibration:
-    """A calibration, read.
+    """A calibration, read from its file.
 
     Attributes
     ----------
@@ -171,7 +171,7 @@ class Calibration:
 
     @property
     def observations(self) -> tuple[Observation, ...]:
-        """What the parameters are to give."""
+        """The observations to reproduce."""
         return tuple(self.file.observations)
 
     @property
@@ -219,7 +219,7 @@ def read_calibration(document: Mapping[str, Any], *, source: str, name: str, fol
 
 
 def _unknown_names(file: CalibrationFile) -> Iterator[Problem]:
-    """Names of what the file does not have."""
+    """References to names that the file does not define."""
     observations, groups = ([getattr(one, key) for one in file.observations] for key in ("name", "group"))
     named: list[tuple[str, Collection[str], Collection[str], str]] = []
     for label, parameter in file.parameters.items():
@@ -243,7 +243,7 @@ def _unknown_names(file: CalibrationFile) -> Iterator[Problem]:
 
 
 def _contradictions(file: CalibrationFile) -> Iterator[Problem]:
-    """What is there twice, is missing or contradicts something else."""
+    """Duplicates, missing entries and contradictions."""
     names = [one.name for one in file.observations]
     for number, one in enumerate(file.observations):
         if names.index(one.name) != number:

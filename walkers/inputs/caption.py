@@ -1,4 +1,4 @@
-"""The words of a case in headlines, titles and captions: its bodies, surfaces, liquid, drive and tilt."""
+"""Text of a case for titles and captions: bodies, surfaces, liquid, drive and tilt."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from walkers.inputs.case import Case
 
 
 def caption(case: Case) -> str:
-    """A case in a line: what is on which surface with which liquid, how it is driven, and how it is tilted.
+    """A case in one line: bodies, surface, liquid, drive and tilt.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What a case or a command can name, with where it is from: what ``walkers library`` and the documentation list."""
+"""Names for cases and commands, with their origin; ``walkers library`` and the documentation list them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Entry:
 
 
 def catalogue(*, of_others: bool = True) -> list[Entry]:
-    """All that can be named: the program's, that of the library in the working directory, and that of packages.
+    """All names: of the program, of the library in the working directory, and of packages.
 
     Raises `InputError` if that library cannot be used. What is wrong with a package is a warning.
     """
@@ -77,7 +77,7 @@ def _summary(law: str) -> str:
 
 
 def describe(found: Sequence[Entry]) -> str:
-    """Everything that has a name, as tables; what is not of the program is marked with its file or package."""
+    """All names as tables; names of other files and packages are marked."""
     lines = []
     for kind, columns in _COLUMNS.items():
         if kind == "not measured":
@@ -94,7 +94,7 @@ def describe(found: Sequence[Entry]) -> str:
 
 
 def _cell(numbers: Mapping[str, Known], column: str) -> str:
-    """A number with its range; of a viscosity the one that is known."""
+    """A number with its range; the known one of the two viscosities."""
     known = next((one for key, one in numbers.items() if f"_{key}".endswith(f"_{column}")), None)
     if known is None:
         return "-"
@@ -103,7 +103,7 @@ def _cell(numbers: Mapping[str, Known], column: str) -> str:
 
 
 def describe_one(found: Sequence[Entry], name: str) -> str:
-    """All that is known by a name: numbers with their sources, titles and files; `InputError` if there is nothing."""
+    """All entries of a name: numbers with sources, titles and files; `InputError` if there is none."""
     wanted = [one for one in found if one.name.casefold() == name.casefold()]
     if not wanted:
         names = [one.name for one in found]

@@ -67,7 +67,7 @@ class Known:
 
 @dataclass(frozen=True)
 class Unmeasured:
-    """What nobody measures and a case may leave out: what is usual then, and its range.
+    """Unmeasured value that a case may leave out: default and range.
 
     ``logarithmic`` says whether the range is of magnitudes; ``range`` is as a case would write it.
     """
@@ -135,7 +135,7 @@ class Library:
         raise KeyError(name)
 
     def surface_pair(self, first: str | None, second: str | None) -> Mapping[str, Known]:
-        """How two wet surfaces touch; empty where there is no value for them.
+        """Contact parameters of two wet surfaces; empty if there are none.
 
         ``friction``, ``rolling_friction`` and, where they are known, ``minimum_separation_ratio``, ``viscosity_ratio``,
         ``contact_angle`` (rad), ``volume_fraction`` and ``restitution``.
@@ -155,7 +155,7 @@ def _contents() -> dict[str, Any]:
 
 @cache
 def _of_packages() -> Sequence[Collection]:
-    """What packages bring; one that is broken is left out with a warning."""
+    """Collections of packages; broken packages are left out with a warning."""
     found = []
     for offer in offers("walkers.materials").values():
         try:
@@ -249,7 +249,7 @@ def _check_pairs(tables: Mapping[str, Any], source: str) -> None:
 
 @cache
 def unmeasured() -> Mapping[str, Unmeasured]:
-    """What nobody measures, by the keys of a case."""
+    """Unmeasured values by keys of a case."""
     found = {}
     for key, entry in _contents()["unmeasured"].items():
         usual = _known(key, {"value": entry["usual"]}, Collection("library", "", {}))
@@ -258,12 +258,12 @@ def unmeasured() -> Mapping[str, Unmeasured]:
 
 
 def expected_of(word: str, known: Iterable[str]) -> str:
-    """``expected one of …``, with the known name that the word is close to, if it is to one."""
+    """``expected one of …``, with a suggestion if a known name is similar."""
     names = list(known)
     return f"expected one of {', '.join(names)}{suggestion(word, names)}"
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """``; did you mean "…"?`` where a known name is close to the word, else nothing."""
+    """``; did you mean "…"?`` if a known name is similar, otherwise empty."""
     close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
     return f'; did you mean "{close[0]}"?' if close else ""

@@ -1,4 +1,4 @@
-"""The values of a case as people read them: by a case file's keys, in the usual units; and by which cases differ."""
+"""Values of a case in usual units by the keys of a case file; differences between cases."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers as they are printed for people: at most four significant digits, in the usual units."""
+"""Rounding of printed numbers: at most four significant digits, in usual units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a case file may say: keys, types, defaults and bounds, as models of pydantic's and as classes of the case.
+"""Schema of a case file: keys, types, defaults and bounds, as pydantic models and classes of the case.
 
 A quantity is written as a string with its unit and held here as a number in SI units. What the library of materials
 and liquids supplies (`walkers.inputs.resolving.SUPPLIED`) has been filled in before.

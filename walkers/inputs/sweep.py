@@ -1,4 +1,4 @@
-"""Sweep files: a base case and what to vary, read as TOML and expanded into points.
+"""Sweep files: a base case and the values to vary, read from TOML and expanded into points.
 
 case = "fig1b"
 
@@ -99,7 +99,7 @@ class SweepFile(Table):
 
 @dataclass(frozen=True)
 class Descent:
-    """The last axis of a sweep is followed downward and left when the walkers are slower than ``until_below`` (m/s).
+    """Descent along the last axis of a sweep until the walkers are slower than ``until_below`` (m/s).
 
     ``steps`` is the number of its points; consecutive points of the sweep, so many at a time, are one descent.
     """
@@ -109,7 +109,7 @@ class Descent:
     until_below: float
 
     def at_rest(self, velocity: float) -> bool:
-        """Whether walkers of a mean velocity (m/s) count as at rest; never where there is none (NaN)."""
+        """Whether walkers with a mean velocity (m/s) count as at rest; false for NaN."""
         return abs(velocity) < self.until_below
 
 

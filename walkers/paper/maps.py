@@ -1,4 +1,4 @@
-"""Figures beside the paper's own: how dimers align, in which modes they walk, what climbs a wall, what trays do."""
+"""Figures beyond the paper: alignment of dimers, modes of motion, climbing, trays."""
 
 from __future__ import annotations
 
@@ -332,7 +332,7 @@ def _draw_cluster(axes: Axes, group: Group) -> None:
 
 @styled
 def fig_trays(sources: Sources) -> Figure:
-    """Whether walkers on closed trays cluster, align and jam, against acceleration; a column for each coverage."""
+    """Clustering, alignment and jamming of walkers on closed trays against acceleration; one column per coverage."""
     from matplotlib.lines import Line2D
 
     table = sources.finished("tray-phases")

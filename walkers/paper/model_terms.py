@@ -1,4 +1,4 @@
-"""Which physics is missing: published numbers from the theory, with one term after the other, each fitted anew.
+"""Further terms of the theory, each fitted to the published numbers.
 
 The engine knows Coulomb's friction and the bridges' resistance to sliding and rolling. The theory integrates under any
 law of friction, thousands of walkers a second, so that for every term all parameters can be searched for what they give

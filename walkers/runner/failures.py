@@ -1,4 +1,4 @@
-"""Every way in which a run is known to fail, and what it is called.
+"""Failures of runs.
 
 The engine's own signs are unreliable (an ERROR line without an exit status, an exit status without a line, silence), so
 each failure is recognised by what it leaves behind, mostly in `walkers.runner.launch`.
@@ -81,15 +81,15 @@ class EngineKilled(EngineFailure):
 
 
 class EngineSilent(EngineFailure):
-    """The engine wrote nothing for too long, neither into its log nor into its dump, and was ended."""
+    """The engine wrote nothing to its log and dump for too long, and was stopped."""
 
 
 class LogTooLong(EngineFailure):
-    """The engine's log grew beyond all that a deck has it write, and the engine was ended. The log is cut there."""
+    """The engine's log exceeded its limit, and the engine was stopped. The log is truncated there."""
 
 
 class MissingFrames(EngineFailure):
-    """The engine ended without complaint but a dump is short."""
+    """The engine ended normally, but a dump is too short."""
 
 
 class BeadsLost(EngineFailure):
@@ -101,7 +101,7 @@ class BeadsOverTheTop(BeadsLost):
 
 
 class BlowUp(EngineFailure):
-    """A bead is faster than the drive can make it, or its speed is no number: most often too large a time step."""
+    """A bead is faster than the drive can make it, or its speed is NaN; usually the time step is too long."""
 
 
 class TimeLimitExceeded(EngineFailure):
@@ -117,7 +117,7 @@ class DiskFull(EngineFailure):
 
 
 class OutputGone(EngineFailure):
-    """Somebody removed the directory of a run, or of a sweep, while it was made."""
+    """The directory of a run or a sweep was removed during the run."""
 
     def __init__(self, directory: Path) -> None:
         super().__init__(f"{directory} was removed while it was written")

@@ -1,4 +1,4 @@
-"""Manifests: what made a finished run, and what its files were when it was finished."""
+"""Manifests: provenance of finished runs, and checksums of their files."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def checksum(path: Path) -> str:
 
 
 class FileChanged(WalkersError, ValueError):
-    """A file of a finished run is not what it was."""
+    """A file of a finished run has changed."""
 
 
 def check_unchanged(directory: Path, names: Collection[str]) -> bool:

@@ -1,4 +1,4 @@
-"""What a case amounts to before it is run: its numbers in SI, its forces, its time step and its cost.
+"""Summary of a case before it is run: values in SI units, forces, time step and cost.
 
 The cost is predicted from measurements of CPU time on one core of a 2020s x86 server
 (docs/explanation/performance.md).
@@ -87,7 +87,7 @@ def pairs_of_beads(case: Case) -> int:
 
 
 def notes(case: Case) -> list[str]:
-    """What is to be said of a pile before it is shaken, if anything: beads of one size, low walls."""
+    """Notes on a pile before it is run: beads of one size, low walls."""
     if not (case.loose and case.boundary.closed and case.mixture):
         return []
     numbers = {"large": case.large, "small": case.count - case.large}
@@ -168,7 +168,7 @@ def summarise(case: Case) -> dict[str, Any]:
 
 
 def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
-    """What the contacts of a walker carry at rest."""
+    """Loads of the contacts of a walker at rest."""
     loads, radii = contact_loads(case, walkers), walkers.radii
     names = [f"bead {bead} on substrate" for bead in range(1, len(radii) + 1)]
     names += [f"bead {other + 1} on bead {one + 1}" for one, other in walkers.pairs]
@@ -234,7 +234,7 @@ def _text_of_case(case: dict[str, Any]) -> list[str]:
 
 
 def _whence(one: dict[str, Any]) -> str:
-    """Where a value comes from, in a few words."""
+    """Origin of a value as text."""
     origin, source = str(one["origin"]), str(one["source"])
     ends = f", range {one['range'][0]} to {one['range'][1]}" if one["range"] else ""
     if one["uncertain"]:

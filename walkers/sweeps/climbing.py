@@ -1,4 +1,4 @@
-"""How often, how soon, how fast and led by whom: climbs over the runs of piles.
+"""Statistics of climbs over runs of piles: probability, waiting time, rate, speed and leaders.
 
 A run tells of its pile's first climb until it ends and of nothing after that: it is *right-censored*. The share of the
 piles that have climbed by a time is estimated from runs of any lengths by their survival (Kaplan and Meier 1958). A
@@ -57,7 +57,7 @@ class Condition:
 
     @property
     def label(self) -> str:
-        """What tells it from the others; empty where nothing does."""
+        """Label that distinguishes the condition from the others; empty if there is only one."""
         return ", ".join([self.source] * bool(self.source) + [f"{key} = {told}" for key, told in self.differs.items()])
 
 
@@ -81,7 +81,7 @@ def conditions_in(directories: Sequence[Path]) -> list[Condition]:
 
 
 def unfinished_points(directory: Path) -> str:
-    """How many points of a sweep are not finished, which no statistics can know of; empty where none, or no sweep."""
+    """Sentence with the number of unfinished points of a sweep; empty if there are none."""
     if not (directory / RECORD_NAME).exists():
         return ""
     found = [state.status for state in states(read_record(directory))]
@@ -217,7 +217,7 @@ def _rate(name: str, events: int, seconds: float) -> dict[str, Any]:
 
 
 def origins(run: Path, within: float | None = None) -> list[dict[str, Any]]:
-    """Where the beads of each climb of a run came from, that had qualified ``within`` (s), from the run's tables.
+    """Origin of the beads of each climb of a run that qualified ``within`` a time (s), from the run's tables.
 
     Returns
     -------
@@ -299,7 +299,7 @@ def describe_origins(found: Mapping[str, Any]) -> str:
 
 
 def leaders(climbs: Sequence[tuple[int, int, Sequence[Mapping[str, Any]]]]) -> dict[str, Any]:
-    """Whether climbs are led by large beads more often than by chance.
+    """Test whether large beads lead climbs more often than expected by chance.
 
     Parameters
     ----------
@@ -338,7 +338,7 @@ def leaders(climbs: Sequence[tuple[int, int, Sequence[Mapping[str, Any]]]]) -> d
 
 
 def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any]:
-    """The probability that what happens once has happened by a time, from records that end at different times.
+    """Probability that an event has happened by a time, from records of different lengths (Kaplan-Meier).
 
     Parameters
     ----------
@@ -421,7 +421,7 @@ VARIATIONS = {
 
 
 def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
-    """How the outcome depends on the thresholds of what counts as a climb.
+    """Dependence of the climb statistics on the thresholds of a climb.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Two runs, or two sweeps point by point, side by side: what differs in what was asked, and in what came out."""
+"""Comparison of two runs, or of two sweeps point by point: parameters and results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is in a folder of runs: runs, finished or not, and sweeps, as their files say; listed, and removed.
+"""Contents of a folder of runs: runs and sweeps with their status; listing and removal.
 
 Nothing is tabulated, no dump is opened and no table: a folder of ten thousand runs takes seconds.
 

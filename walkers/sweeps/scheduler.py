@@ -65,7 +65,7 @@ _LOOK_SECONDS = 0.25
 
 
 class ClusterFailed(WalkersError):
-    """The cluster's jobs end without having worked."""
+    """The jobs of the cluster end without doing any work."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Where a sweep runs: on this machine's cores, or on the cluster that a site file describes.
+"""Sites of sweeps: the cores of this machine, or the cluster of a site file.
 
     scheduler = "slurm"
     partition = "main"

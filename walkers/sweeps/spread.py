@@ -1,4 +1,4 @@
-"""What a result is worth: the case run again with all that nobody measured drawn from its ranges."""
+"""Spread of a result: the case with all unmeasured values drawn from their ranges."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Band:
 
 @dataclass(frozen=True)
 class Spread:
-    """What came out over the ranges, in a sweep's directory.
+    """Results of a spread, in the directory of its sweep.
 
     Values were ``varied``, each drawn from its range; others that nobody measured, but the case gives, were ``held``.
     Of the results that count, by the columns of the sweep's table, ``bands`` has what they were without walkers that
@@ -144,7 +144,7 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
 def run_spread(
     case: Case, out: Path, options: Options, *, points: int = POINTS, engine: str | None = None, **how: Any
 ) -> Spread:
-    """Run a case with all that nobody measured drawn from its ranges, and write the bands beside the sweep's record.
+    """Run a case with all unmeasured values drawn from their ranges, and write the bands beside the sweep's record.
 
     The case is as it was read from a file: its own values say what is uncertain. All else is as of
     `walkers.sweeps.scheduler.run_sweep`. Texts and reports of the case's run have the bands from then on.

@@ -58,9 +58,9 @@ STATE = {
 }
 _RESULTS = ("velocity", "climbs")
 SIDES = ("right_facing", "left_facing")
-"""Columns of velocities that are shown in place of their mean where `sides_differ`."""
+"""Velocity columns that replace the mean if `sides_differ`."""
 ERRORS = {"velocity": "scatter"}
-"""Columns with the scatter of others over copies."""
+"""Columns that contain the scatter of other columns over copies."""
 FORMATS = ("csv", "parquet", "json")
 _LEFT_OUT = {
     *("mass_asymmetry", "frequency", "peak_acceleration", "peak_velocity", "amplitude", "radius_1", "radius_2"),
@@ -204,7 +204,7 @@ def read_record(directory: str | Path) -> SweepRecord:
 
 @dataclass(frozen=True)
 class PointState:
-    """What has become of a point: finished, failed, running, missing, or not needed, below where a descent ended.
+    """State of a point: finished, failed, running, missing, or not needed (below the end of a descent).
 
     The directory is that of the finished run, or of what is left of the failed one; the rest is of a failure.
     """
@@ -217,7 +217,7 @@ class PointState:
 
 
 def states(record: SweepRecord) -> list[PointState]:
-    """What has become of each point, as the run directories say."""
+    """State of each point, from the run directories."""
     places = [record.out / run for run in record.runs]
     found = [
         PointState("finished", place) if finished_run(place) else unfinished_state(place, unfinished(place))
