@@ -153,7 +153,7 @@ def test_what_would_take_too_many_panels_is_not_told_apart() -> None:
     table = _table(dict.fromkeys(keys, ""), rows, [(key,) for key in keys])
     layout = layout_of(table, table)
     assert layout.panels is not None
-    assert (len(layout.panels.levels), len(layout.untold)) == (9, 1)
+    assert (len(layout.panels.levels), len(layout.undistinguished)) == (9, 1)
     assert layout_of(table, table, panels="none").panels is None
 
 

@@ -93,7 +93,7 @@ def _status(arguments: list[str] | None) -> int:
         outcome: Any = _program()(arguments, standalone_mode=False, prog_name="walkers")
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt, SystemExit, _Terminated) as stop:
-        return _told(stop)
+        return _report_stop(stop)
     if outcome == _INTERRUPTED:  # typer turns Ctrl-C into a status
         return _tell("interrupted", _INTERRUPTED)
     return outcome if isinstance(outcome, int) else 0
@@ -210,7 +210,7 @@ def describe_version() -> str:
     return f"{package}\n{version or 'an engine that does not name its version'}, {path}"
 
 
-def _told(stop: BaseException) -> int:
+def _report_stop(stop: BaseException) -> int:
     """Print why the program stopped, and return its exit status."""
     from walkers.inputs.errors import InputError, WalkersError
 

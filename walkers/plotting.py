@@ -98,7 +98,7 @@ def sweep_figure(
     -------
     Figure
         Means; bars are the scatter over copies where the table has it. What a key has for a unit in the sweep's file,
-        its axis has; other columns are in mm, mm/s, g (9.8 m/s²) and degrees. What is left out is told in a
+        its axis has; other columns are in mm, mm/s, g (9.8 m/s²) and degrees. What is left out is reported in a
         `LeftOutWarning`.
 
     Raises
@@ -124,8 +124,8 @@ def _figure_of(
     if empty := int(done[column].isna().sum()):
         _tell(f"{empty} of {len(done)} finished points have no {column}")
     laid_out = layout_of(table, done, **layout)
-    if laid_out.untold:
-        _tell(f"not distinguished: {'; '.join(laid_out.untold)}")
+    if laid_out.undistinguished:
+        _tell(f"not distinguished: {'; '.join(laid_out.undistinguished)}")
     predicted: dict[str, FloatArray] = {}
     cases: list[Case] = []
     if theory:
@@ -135,7 +135,7 @@ def _figure_of(
         predicted, reasons = predicted_column(cases, column)
         for reason, number in reasons.items():
             _tell(f"not drawn at {number} of {len(done)} points: {reason}")
-        if predicted and (beyond := [told for case in cases if (told := outside_of_the_paper(case))]):
+        if predicted and (beyond := [sentence for case in cases if (sentence := outside_of_the_paper(case))]):
             _tell(f"{len(beyond)} of {len(done)} points are {beyond[0]}" + (", …" if len(beyond) > 1 else ""))
     drawn = drawn_column(done, column, predicted)
     if predicted:

@@ -1,6 +1,6 @@
 """The description of an archive: an RO-Crate (researchobject.org) by the Process Run Crate profile, with rocrate.
 
-What made what is told in three actions a run, each with its program, what it read and what it gave: from the case to
+Three actions per run state the origin of the files, each with its program, input and output: from the case to
 the deck (this program), from the deck to the dumps (the engine), from the dumps to tables and result (this program).
 """
 
@@ -72,8 +72,8 @@ def describe_crate(contents: Contents, authors: Sequence[Author], licence: str) 
     for one in contents.sweep:
         made.file(one)
     for run in contents.runs:
-        told = f"Run directory of the case {run.manifest['name']}, finished {run.manifest['finished']}"
-        folder = made.crate.add_dataset(None, f"{run.place}/", properties={"name": run.name, "description": told})
+        text = f"Run directory of the case {run.manifest['name']}, finished {run.manifest['finished']}"
+        folder = made.crate.add_dataset(None, f"{run.place}/", properties={"name": run.name, "description": text})
         folder["hasPart"] = [made.file(one) for one in run.items]
     actions = [action for run in contents.runs for action in made.actions(run)]
     if contents.record is not None:
@@ -160,10 +160,10 @@ class _Crate:
             columns = properties["variableMeasured"] = []
             table, source = item.name.removesuffix(".parquet"), item.source
             for field in pq.read_schema(pa.BufferReader(source) if isinstance(source, bytes) else source):
-                told = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
-                column = {"name": field.name, "description": told.get("meaning", "")}
-                if told.get("unit"):
-                    column["unitText"] = told["unit"]
+                metadata = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
+                column = {"name": field.name, "description": metadata.get("meaning", "")}
+                if metadata.get("unit"):
+                    column["unitText"] = metadata["unit"]
                 columns.append(self.entity(f"#{quote(f'{table}.{field.name}')}", "PropertyValue", **column))
         # Without a source: the archive is written by ourselves, this is its description.
         entity = self.files[item.place] = self.crate.add_file(None, item.place, properties=properties)
@@ -236,8 +236,8 @@ class _Crate:
 
     def engine(self, engine: Mapping[str, Any]) -> Entity:
         """LIGGGHTS, by its binary."""
-        told = "Discrete element method. The SHA-256 combines those of the executable and libliggghts."
-        more = {"url": ENGINE_HOME, "sha256": engine["sha256"], "description": told}
+        text = "Discrete element method. The SHA-256 combines those of the executable and libliggghts."
+        more = {"url": ENGINE_HOME, "sha256": engine["sha256"], "description": text}
         return self._software(f"{ENGINE_HOME}#{engine['sha256'][:12]}", "LIGGGHTS", engine["version"], **more)
 
     def program(self, made_by: Mapping[str, Any]) -> Entity:

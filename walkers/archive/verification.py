@@ -42,27 +42,27 @@ _LONGEST_SHOWN = 300
 class Verification:
     """State of the files of a run or an archive, or of the points of a sweep; ``intact`` counts unchanged ones.
 
-    ``told`` are names of the others: ``changed`` and ``missing`` ones; those ``not listed``; what is ``doubtful``, with
-    the reason in brackets; and what was ``made since`` from the run (`_made_since`): no result rests on it.
+    ``findings`` are names of the others: ``changed`` and ``missing`` ones; those ``not listed``; what is ``doubtful``,
+    with the reason in brackets; and what was ``made since`` from the run (`_made_since`): no result rests on it.
     ``left_out`` is how many were left out of an archive on purpose.
     """
 
     name: str
     intact: int
-    told: Mapping[str, Sequence[str]]
+    findings: Mapping[str, Sequence[str]]
     left_out: int = 0
     of_points: bool = False
 
     @property
     def passed(self) -> bool:
         """Whether all listed files are unchanged and no unlisted file could influence a result."""
-        return not any(names for kind, names in self.told.items() if kind != "made since")
+        return not any(names for kind, names in self.findings.items() if kind != "made since")
 
     def describe(self) -> str:
         """The outcome, and one line for each file that has changed or is not listed."""
         told = f"{self.name}: {self.intact} {'points have a run' if self.of_points else 'files are unchanged'}"
         lines = [f"{told}, {self.left_out} left out of the archive" if self.left_out else told]
-        for kind, names in self.told.items():  # which a stranger chose, and may have put escape sequences into
+        for kind, names in self.findings.items():  # which a stranger chose, and may have put escape sequences into
             lines += [f"  {kind:<10} {printable(shortened(name, _LONGEST_SHOWN))}" for name in names]
         return "\n".join(lines)
 
@@ -123,7 +123,7 @@ def _verify_sweep(directory: Path) -> list[Verification]:
     # Bands are texts' only; the others are of an archive: nothing is read from them.
     beside = (SPREAD_NAME, f"{record.name}.toml", "table.parquet")
     files = _compared(record.name, {}, {}, there, lambda name: _made_since(name) or name in beside)
-    points = replace(files, intact=len(runs), told={**files.told, "missing": lacking}, of_points=True)
+    points = replace(files, intact=len(runs), findings={**files.findings, "missing": lacking}, of_points=True)
     return [points, *map(_verify_run, dict.fromkeys(runs))]
 
 
@@ -197,7 +197,7 @@ def _compared(
     made = (
         f"{folder}/ ({count[folder]} files)" if folder and count[folder] > 1 else one for one, folder in since.items()
     )
-    told = {
+    findings = {
         "changed": changed,
         "missing": [one for one in listed if one not in now and one not in left_out],
         "not listed": [one for one in others if one not in since],
@@ -205,7 +205,7 @@ def _compared(
         "made since": list(dict.fromkeys(made)),
     }
     absent = sum(one in listed and one not in now for one in left_out)
-    return Verification(name, len(now) - len(changed), told, left_out=absent)
+    return Verification(name, len(now) - len(changed), findings, left_out=absent)
 
 
 def _made_since(name: str) -> bool:

@@ -82,18 +82,18 @@ def write_archive(directory: str | Path, to: Path | None = None, options: Archiv
     _check(options)
     found = [one for one in verify(directory) if not one.of_points]  # `contents_of` asks for all points
     if not all(one.passed for one in found):
-        told = "\n".join(one.describe() for one in found if not one.passed)
-        raise ArchiveRefused(f"{directory} is not archived, files have changed:\n{told}")
+        message = "\n".join(one.describe() for one in found if not one.passed)
+        raise ArchiveRefused(f"{directory} is not archived, files have changed:\n{message}")
     contents = contents_of(directory, dumps=options.dumps)
     to = Path(f"{contents.name}.zip") if to is None else to
     if to.suffix != ".zip" or to.is_dir():
         raise refused("--output", f"expected the name of a .zip file, not {to}")
     metadata = json_bytes(describe_crate(contents, options.authors, options.licence))
-    described = [item(METADATA_NAME, metadata), item(PREVIEW_NAME, _preview(contents, options))]
-    sums = "".join(f"{one.sha256}  {one.place}\n" for one in [*contents.items, *described])
+    about = [item(METADATA_NAME, metadata), item(PREVIEW_NAME, _preview(contents, options))]
+    sums = "".join(f"{one.sha256}  {one.place}\n" for one in [*contents.items, *about])
     moment = time.strptime(contents.finished, "%Y-%m-%dT%H:%M:%SZ")[:6]  # of all files, for the same bytes again
     with beside(to) as new, zipfile.ZipFile(new, "w") as archive:
-        items = [*described, item(SUMS_NAME, sums.encode("utf-8")), *contents.items]
+        items = [*about, item(SUMS_NAME, sums.encode("utf-8")), *contents.items]
         folders = [f"{parent}/" for one in items for parent in reversed(Path(one.place).parents) if parent != Path()]
         for place in dict.fromkeys(folders):
             archive.writestr(_info(place, moment), b"")
@@ -104,8 +104,8 @@ def write_archive(directory: str | Path, to: Path | None = None, options: Archiv
 
 def _check(options: ArchiveOptions) -> None:
     if options.licence not in LICENCES:
-        told = f"expected one of {', '.join(LICENCES)}"
-        raise refused("--licence", f"{told}, not {options.licence}")
+        message = f"expected one of {', '.join(LICENCES)}"
+        raise refused("--licence", f"{message}, not {options.licence}")
     for author in options.authors:
         if not author.name.strip():
             raise refused("--author", "expected a name")
@@ -199,15 +199,15 @@ class Item:
         return len(self.source) if isinstance(self.source, bytes) else self.source.stat().st_size
 
 
-def item(place: str, source: Path | bytes, sha256: str | None = None, told: tuple[str, str] | None = None) -> Item:
-    """A file of an archive; by default, checksum, role and meaning (``told``) follow from contents and name."""
+def item(place: str, source: Path | bytes, sha256: str | None = None, about: tuple[str, str] | None = None) -> Item:
+    """A file of an archive; by default, checksum, role and meaning (``about``) follow from contents and name."""
     name = place.rpartition("/")[2]
     if name.endswith(".parquet"):
         table = name.removesuffix(".parquet")
-        told = told or ("table", f"table {table}; units and meanings of its columns are in the field metadata")
+        about = about or ("table", f"table {table}; units and meanings of its columns are in the field metadata")
     if sha256 is None:
         sha256 = hashlib.sha256(source).hexdigest() if isinstance(source, bytes) else checksum(source)
-    return Item(place, source, sha256, *_MEANINGS.get(name, told or _REST))
+    return Item(place, source, sha256, *_MEANINGS.get(name, about or _REST))
 
 
 @dataclass(frozen=True)
@@ -264,8 +264,8 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
     found = states(record)
     unfinished = sum(state.status not in ("finished", "not needed") for state in found)
     if unfinished:
-        told = f"{unfinished} of {len(found)} points are not finished; see: walkers list {directory}"
-        raise refused(directory, told)
+        message = f"{unfinished} of {len(found)} points are not finished; see: walkers list {directory}"
+        raise refused(directory, message)
     runs = list(dict.fromkeys(state.directory for state in found if state.directory is not None))
     name = name_of(record.directory.name)
     place, table = f"{RUNS}/{name}", load(record.directory)
@@ -273,7 +273,7 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
     items = [item(f"{place}/{RECORD_NAME}", record.directory / RECORD_NAME)]
     items += [item(f"{place}/table.{form}", encoded(table, form)) for form in ("csv", "parquet")]
     if record.file:
-        items.append(item(f"{place}/{name}.toml", _toml(record.file), told=_SWEEP))
+        items.append(item(f"{place}/{name}.toml", _toml(record.file), about=_SWEEP))
     return Contents(name, record.title, [_packed(run, dumps) for run in runs], items, record)
 
 
@@ -288,7 +288,7 @@ def _packed(directory: Path, dumps: bool) -> PackedRun:
     if left_out - before:
         manifest["left_out"] = sorted(left_out)
         said = json_bytes(manifest)
-    items = [item(f"{place}/{name_of(case.name)}.toml", _toml(case.document), told=_GIVEN)] if case.document else []
+    items = [item(f"{place}/{name_of(case.name)}.toml", _toml(case.document), about=_GIVEN)] if case.document else []
     items += [item(f"{place}/{MANIFEST_NAME}", said), *(one for name, one in named.items() if name not in left_out)]
     return PackedRun(directory.resolve(), place, manifest, items)
 

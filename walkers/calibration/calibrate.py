@@ -186,8 +186,8 @@ def calibrate(
             failures[sweep.name] = wave.failures
         undone = [failure for failure in wave.failures if failure.reason not in FINAL]
         if undone or not wave.table["status"].isin(("finished", "failed")).all():
-            told = undone[0].message if undone else "another process is running them"
-            raise CalibrationStopped(f"{sweep.name}: points are missing ({told}); call again to continue")
+            message = undone[0].message if undone else "another process is running them"
+            raise CalibrationStopped(f"{sweep.name}: points are missing ({message}); call again to continue")
         return wave
 
     unit, outcome = np.zeros((0, space.dimensions)), np.zeros((0, len(calibration.observations)))
@@ -232,9 +232,9 @@ def _check_ranges(calibration: Calibration) -> None:
         problem = error.problems[0]
         for one in calibration.parameters:
             if problem.key in one.keys:
-                told = f"{problem.key} = {problem.value}: {problem.expected}"
+                message = f"{problem.key} = {problem.value}: {problem.expected}"
                 key, value = f"parameters.{one.name}.range", f"[{one.range[0]:g}, {one.range[1]:g}]"
-                raise InputError(calibration.source, [Problem(key, value, told)]) from error
+                raise InputError(calibration.source, [Problem(key, value, message)]) from error
         raise
 
 
@@ -264,15 +264,13 @@ def _kept(path: Path, determinants: dict[str, Any], make: Callable[[], FloatArra
             raise refused(path, f"cannot be read ({error}); delete it") from error
         for key, now in determinants.items():
             if key not in kept:
-                raise InputError(
-                    str(path), [Problem(key, None, "missing: the file is of an earlier version; delete it")]
-                )
+                raise InputError(str(path), [Problem(key, None, "missing (earlier version): delete the file")])
             if kept[key] != now:
-                told = (
+                message = (
                     f"was drawn with other {key} than in the calibration file; delete this and later waves "
                     "to draw them again (matching runs are kept), undo the change, or choose another --out"
                 )
-                raise InputError(str(path), [Problem(key, None, told)])
+                raise InputError(str(path), [Problem(key, None, message)])
         return unit
     unit = make()
     write_json(path, {**determinants, "unit": unit.tolist()})

@@ -46,8 +46,8 @@ def write_outcome(found: Outcome, to: Path) -> list[Path]:
     write_bytes(files[0], samples.to_parquet(index=False))
     write_json(files[1], record)
     discrepancies = np.percentile(posterior.discrepancy, (5.0, 50.0, 95.0), axis=0).T.tolist()
-    told = {"samples": len(found.predictive.unit), "least": LEAST_SAMPLES, "narrow": _NARROW}
-    page = rendered("walkers.calibration", "report.md.j2", found=record, discrepancies=discrepancies, **told)
+    more = {"samples": len(found.predictive.unit), "least": LEAST_SAMPLES, "narrow": _NARROW}
+    page = rendered("walkers.calibration", "report.md.j2", found=record, discrepancies=discrepancies, **more)
     write_text(files[2], page)
     sources = [Path(run).name for run in found.predictive.table["run"]]
     for name, figure in figures_of(found, record["observations"]).items():

@@ -214,9 +214,8 @@ def _along_the_plane(curves: Curves) -> Iterator[Line]:
     slides = x > 7.0
     # 5/2 (1+e) times half of the overlap over the radius
     arm = 2.5 * STEEL.on_plane().depth(speed) / STEEL.radius
-    yield largest(
-        "5: surface in gross sliding: largest deviation from s/(μ v_n) - 7", x[slides] - 7.0, surface[slides], arm
-    )
+    expected = x[slides] - 7.0
+    yield largest("5: surface in gross sliding: largest deviation from s/(μ v_n) - 7", expected, surface[slides], arm)
     yield largest("5: spin in gross sliding: largest deviation from -5", -5.0, turn[slides], arm)
 
 
@@ -243,8 +242,8 @@ def farthest_point(what: str, points: FloatArray, curve: tuple[FloatArray, Float
     """The point that is farthest from a curve; its error is the distance divided by the axis."""
     away = np.interp(points[:, 0], *curve) - points[:, 1]
     worst = int(np.argmax(np.abs(away)))
-    told = f"{what}: largest deviation, at {points[worst, 0]:g}, over the axis"
-    return Line(told, 0.0, float(away[worst]) / axis, READING)
+    words = f"{what}: largest deviation, at {points[worst, 0]:g}, over the axis"
+    return Line(words, 0.0, float(away[worst]) / axis, READING)
 
 
 def published() -> dict[str, Any]:

@@ -82,10 +82,10 @@ class Law(NamedTuple):
 def _shipped() -> Iterator[Law]:
     """The laws of `walkers.physics.laws` that were published as a pull (modules with ``PUBLISHED``)."""
     for name in laws.LAWS:
-        told = vars(import_module(laws.by_name(name).__module__))
-        if "PUBLISHED" in told:
-            given = {key: told[key] for key in ("pull", "rupture") if key in told}
-            yield Law(told["PUBLISHED"], error=told.get("ERROR", inf), **given)
+        contents = vars(import_module(laws.by_name(name).__module__))
+        if "PUBLISHED" in contents:
+            given = {key: contents[key] for key in ("pull", "rupture") if key in contents}
+            yield Law(contents["PUBLISHED"], error=contents.get("ERROR", inf), **given)
 
 
 LAWS = (

@@ -28,13 +28,13 @@ PAGE = "validation.md"
 
 
 class Verdict(StrEnum):
-    """Outcome of a line: ``ERROR`` if it could not be measured, ``TOLD`` if nothing judges it."""
+    """Outcome of a line: ``ERROR`` if it could not be measured, ``NOT_JUDGED`` without a tolerance."""
 
     PASS = "pass"
     FAIL = "FAIL"
     ERROR = "ERROR"
     SKIPPED = "skipped"
-    TOLD = "-"
+    NOT_JUDGED = "-"
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Line:
     def verdict(self) -> Verdict:
         """Pass or fail by the tolerance; an error that is no number fails."""
         if self.given or self.tolerance == inf:
-            return self.given or Verdict.TOLD
+            return self.given or Verdict.NOT_JUDGED
         return Verdict.PASS if self.error <= self.tolerance else Verdict.FAIL
 
     @property
@@ -136,10 +136,10 @@ def count(chapters: Iterable[Chapter], verdict: Verdict) -> int:
 def outcome(chapters: Sequence[Chapter]) -> str:
     """Number of lines that pass, as text."""
     passed, failed = count(chapters, Verdict.PASS), count(chapters, Verdict.FAIL)
-    told = f"{failed} of {passed + failed} lines fail" if failed else f"all {passed} lines pass"
+    sentence = f"{failed} of {passed + failed} lines fail" if failed else f"all {passed} lines pass"
     for other, words in ((Verdict.ERROR, "could not be measured"), (Verdict.SKIPPED, "skipped")):
-        told += f", {number} {words}" if (number := count(chapters, other)) else ""
-    return told
+        sentence += f", {number} {words}" if (number := count(chapters, other)) else ""
+    return sentence
 
 
 def as_dict(chapters: Sequence[Chapter], **more: Any) -> dict[str, Any]:

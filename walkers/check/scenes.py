@@ -240,7 +240,7 @@ class Setting:
                 "torque": farthest(series.forces[1:, :, 3:], forces[..., 3:]),
             }
         for what, error in found.items():
-            yield Line(f"{name}: {what}, second engine", 0.0, error, EQUAL)
+            yield Line(f"{name}: {what}, both engines", 0.0, error, EQUAL)
 
 
 def in_walls(case: Case, series: Measured) -> FloatArray:
@@ -344,12 +344,7 @@ def restart_lines(bench: Bench) -> Iterator[Line]:
     carry = bench.run(first).directory / "half.restart"
     second = replace(first, recording=replace(recording(1000), begin=500), checkpoint=Checkpoint(read="half.restart"))
     forces = bench.run(second, carry).forces[1:, :, :3]
-    kept = (
-        ("a spring at a wall", 0),
-        ("a spring of a pair", 1),
-        ("an open bridge to a wall", 3),
-        ("an open bridge of a pair", 5),
-    )
+    kept = ("wall spring", 0), ("pair spring", 1), ("open wall bridge", 3), ("open pair bridge", 5)
     for what, number in kept:
         error = farthest(forces[:, number], whole.forces[501:, number, :3])
         yield Line(f"{what}: with and without a restart", 0.0, error, EQUAL)

@@ -79,14 +79,14 @@ def values_of(key: str, axis: object) -> list[Value]:
         unit_of(key, axis)
         return axis
     if not (isinstance(axis, Mapping) and len(axis) == 1 and (kind := next(iter(axis))) in _SPACINGS):
-        told = "expected a list of values, { linspace = [first, last, number] } or { geomspace = [...] }"
-        raise unusable(key, told, axis)
+        message = "expected a list of values, { linspace = [first, last, number] } or { geomspace = [...] }"
+        raise unusable(key, message, axis)
     import numpy as np
 
     given = axis[kind]
     if not (isinstance(given, list) and len(given) == 3 and type(given[2]) is int and 1 <= given[2] <= MOST_POINTS):
-        told = f'expected first value, last value and number, such as {{ {kind} = ["0.5 g", "10 g", 20] }}'
-        raise unusable(key, told, axis)
+        message = f'expected first value, last value and number, such as {{ {kind} = ["0.5 g", "10 g", 20] }}'
+        raise unusable(key, message, axis)
     first, last, unit = _range(key, given[:2], positive=kind == "geomspace")
     numbers = [written(float(one), unit) for one in getattr(np, kind)(first, last, given[2])]
     # Between whole numbers whole ones stay whole: seeds, cycles, replicates.
@@ -169,8 +169,8 @@ def zipped(table: Mapping[str, Any]) -> Axis:
     lengths = {key: len(values) for key, values in columns.items()}
     if len(set(lengths.values())) > 1:
         *_, (key, values) = columns.items()
-        told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        raise unusable(key, f"expected as many values for each key of a zip: {told}", values)
+        message = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        raise unusable(key, f"expected as many values for each key of a zip: {message}", values)
     return Axis.of(columns)
 
 

@@ -29,11 +29,11 @@ def conditions(case: Case) -> str:
 
     Pictures have the drive axis to the right: what faces right goes up where that is the steepest way up.
     """
-    told = [case.drive.described()]
+    parts = [case.drive.described()]
     if case.boundary.tilted:
         up = "right is up" if case.goes_uphill else f"up is at {degrees(case.boundary.uphill):.4g}° from x toward y"
-        told += [case.boundary.tilted, up]
-    return ", ".join(told)
+        parts += [case.boundary.tilted, up]
+    return ", ".join(parts)
 
 
 def liquid_text(case: Case) -> str:

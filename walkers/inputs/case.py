@@ -30,7 +30,7 @@ FIRST_ATTEMPTS = (12, 24)
 BOUNDS = ("silence", "log_limit")
 """Fields of `Run` that limit the engine and do not change the result."""
 
-_TOLD = ("document", "told")
+_SOURCES = ("document", "find_origins")
 
 
 def settling_of(cycles: int) -> int:
@@ -137,7 +137,7 @@ class Case:
     """Bodies on a boundary under a drive, resolved.
 
     Attributes are SI (``density`` of the beads in kg/m³, ``gravity`` in m/s²). ``seed`` is that of all that is drawn at
-    the start. ``document`` (the tables that the case was read from) and ``told`` (of which `origins` are made) are
+    the start. ``document`` (the tables that the case was read from) and ``find_origins`` (which gives `origins`) are
     part of no comparison, and are lost where `dataclasses.replace` changes the case: they would tell of another one.
 
     Raises
@@ -161,7 +161,7 @@ class Case:
     seed: int
     run: Run
     document: Mapping[str, Any] = field(default_factory=dict, init=False, compare=False, repr=False)
-    told: Callable[[], tuple[Origin, ...]] = field(default=tuple, init=False, compare=False, repr=False)
+    find_origins: Callable[[], tuple[Origin, ...]] = field(default=tuple, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """Refuse a drive that does not match time step and sampling."""
@@ -180,22 +180,22 @@ class Case:
     @cached_property
     def origins(self) -> tuple[Origin, ...]:
         """Origins of the values; empty for a case that was not read or was changed afterwards."""
-        return self.told()
+        return self.find_origins()
 
-    def read_from(self, document: Mapping[str, Any], told: Callable[[], tuple[Origin, ...]]) -> Case:
+    def read_from(self, document: Mapping[str, Any], find_origins: Callable[[], tuple[Origin, ...]]) -> Case:
         """The same case with the tables from which it was read and notes on origins."""
         case = replace(self)
         object.__setattr__(case, "document", document)
-        object.__setattr__(case, "told", told)
+        object.__setattr__(case, "find_origins", find_origins)
         return case
 
     def renamed(self, name: str) -> Case:
         """The same case under another name."""
-        return replace(self, name=name).read_from(self.document, self.told)
+        return replace(self, name=name).read_from(self.document, self.find_origins)
 
     def for_cycles(self, cycles: int) -> Case:
         """The same case with a fixed number of cycles in one segment."""
-        return replace(self, run=self.run.for_cycles(cycles)).read_from(self.document, self.told)
+        return replace(self, run=self.run.for_cycles(cycles)).read_from(self.document, self.find_origins)
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -305,7 +305,7 @@ class Case:
 
     def determinants(self) -> dict[str, Any]:
         """All values that determine the results, as plain JSON types: without names and limits of the engine."""
-        no_names: dict[str, Any] = {**dict.fromkeys(("name", "title", "material", *_TOLD), True), "run": set(BOUNDS)}
+        no_names: dict[str, Any] = {**dict.fromkeys(("name", "title", "material", *_SOURCES), True), "run": set(BOUNDS)}
         without = {**no_names, "boundary": {"material"}, "liquid": {"name"}}
         if self.liquid.law in LAWS:  # none of which asks for the density; one of a user's own may
             without["liquid"] = {"name", "density"}
@@ -314,16 +314,16 @@ class Case:
 
     def as_dict(self) -> dict[str, Any]:
         """The whole case as plain JSON types, SI units, with the tables it was read from and its values' origins."""
-        told: dict[str, Any] = to_jsonable_python({"document": self.document, "origins": self.origins})
-        return {**_adapter().dump_python(self, mode="json", exclude=set(_TOLD)), **told}
+        about: dict[str, Any] = to_jsonable_python({"document": self.document, "origins": self.origins})
+        return {**_adapter().dump_python(self, mode="json", exclude=set(_SOURCES)), **about}
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Case:
         """Rebuild a case from `as_dict` (a run directory's ``case.json``); raises `ValueError` if it is none."""
         try:
             case = _adapter().validate_python(values, by_alias=False, by_name=True)
-            told = values.get("document", {}), values.get("origins", ())
-            document, origins = _told_adapter().validate_python(told)
+            about = values.get("document", {}), values.get("origins", ())
+            document, origins = _origins_adapter().validate_python(about)
             return case.read_from(document, partial(tuple, origins))
         except ValidationError as error:
             first = error.errors()[0]
@@ -336,5 +336,5 @@ def _adapter() -> TypeAdapter[Case]:
 
 
 @cache
-def _told_adapter() -> TypeAdapter[tuple[dict[str, Any], tuple[Origin, ...]]]:
+def _origins_adapter() -> TypeAdapter[tuple[dict[str, Any], tuple[Origin, ...]]]:
     return TypeAdapter(tuple[dict[str, Any], tuple[Origin, ...]])

@@ -108,8 +108,8 @@ def describe_one(found: Sequence[Entry], name: str) -> str:
     if not wanted:
         names = [one.name for one in found]
         near = [one for one in names if name.casefold() in one.casefold()]
-        told = f"; expected one of {', '.join(near)}" if near else suggestion(name, names)
-        raise refused(name, f"not in the library{told or '; walkers library lists it'}")
+        message = f"; expected one of {', '.join(near)}" if near else suggestion(name, names)
+        raise refused(name, f"not in the library{message or '; walkers library lists it'}")
     # A material, and the pairs that it is part of.
     wanted += [one for one in found if one.kind == "surface pairs" and wanted[0].name in one.name.split(" on ")]
     lines = []

@@ -139,9 +139,7 @@ def common_frequency(frequencies: list[float]) -> float:
     ratios = [Fraction(one / first).limit_denominator(LARGEST_RATIO) for one in frequencies]
     for one, ratio in zip(frequencies, ratios, strict=True):
         if not isclose(float(ratio) * first, one, rel_tol=1e-9) or ratio.numerator > LARGEST_RATIO:
-            raise ValueError(
-                f"the ratio of {one:g} Hz to {first:g} Hz is not a ratio of whole numbers up to {LARGEST_RATIO}"
-            )
+            raise ValueError(f"{one:g} Hz / {first:g} Hz is not a ratio of whole numbers up to {LARGEST_RATIO}")
     below = lcm(*(ratio.denominator for ratio in ratios))
     numerators = [int(ratio * below) for ratio in ratios]
     common = gcd(*numerators)

@@ -183,16 +183,16 @@ def check_library(tables: object, source: str) -> None:
     if not isinstance(tables, Mapping):
         raise refused(source, "expected the tables of a library: materials, liquids, surface_pairs")
     validated(LibraryFile, tables, source, "a library")
-    shipped, told = _contents(), "is in the library of the program; expected "
+    shipped, text = _contents(), "is in the library of the program; expected "
     again = [
-        Problem(f"{kind}.{name}", None, f"{told}another name")
+        Problem(f"{kind}.{name}", None, f"{text}another name")
         for kind in ("materials", "liquids")
         for name in tables.get(kind, ())
         if name in shipped[kind]
     ]
     pairs = [sorted(one["materials"]) for one in shipped["surface_pairs"]]
     again += [
-        Problem(f"surface_pairs[{number}]", " on ".join(pair["materials"]), f"{told}its numbers in the case instead")
+        Problem(f"surface_pairs[{number}]", " on ".join(pair["materials"]), f"{text}its numbers in the case instead")
         for number, pair in enumerate(tables.get("surface_pairs", ()))
         if sorted(pair["materials"]) in pairs
     ]
@@ -238,10 +238,10 @@ def _check_pairs(tables: Mapping[str, Any], source: str) -> None:
     """Refuse surface pairs of materials that are in no library."""
     library = Library(tables)
     unknown = [
-        Problem(f"surface_pairs[{number}].materials", shown(name), f"not in the library; {told}")
+        Problem(f"surface_pairs[{number}].materials", shown(name), f"not in the library; {message}")
         for number, pair in enumerate(tables.get("surface_pairs", ()))
         for name in pair["materials"]
-        if not library.has("materials", name) and (told := expected_of(name, library.names("materials")))
+        if not library.has("materials", name) and (message := expected_of(name, library.names("materials")))
     ]
     if unknown:
         raise InputError(source, unknown)

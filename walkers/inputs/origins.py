@@ -1,6 +1,6 @@
 """Origin of each value of a case: the case, the library, a calibration, a default, or other values.
 
-What nobody measures (friction, how strongly bridges drag, how much liquid there is) is told apart from what is known,
+Unmeasured values (friction, drag of the bridges, volume of liquid) are distinguished from known values,
 with the range in which it may lie: a speed that rests on such values is worth no more than they are.
 """
 
@@ -60,7 +60,7 @@ class Origin:
 class Notes(dict[str, Origin]):
     """Where values come from that a case leaves out, by their keys, noted as they are filled in.
 
-    One without a text is told as its value, in the unit of its key.
+    Without a text, the value itself is shown in the unit of its key.
     """
 
     def derived(self, key: str, value: Any, source: str) -> None:

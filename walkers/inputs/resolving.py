@@ -70,8 +70,8 @@ def supplied(document: Mapping[str, Any], known_to: Library, notes: Notes) -> di
         ("boundary.material", wall, "materials", described),
     ):
         if name is not None and not says_all and not known_to.has(kind, name):
-            told = "not in the library, nor in a library.toml beside the case"
-            raise unusable(key, f"{told}; {expected_of(name, known_to.names(kind))}")
+            message = "not in the library, nor in a library.toml beside the case"
+            raise unusable(key, f"{message}; {expected_of(name, known_to.names(kind))}")
     known, settings = _known(known_to, bead, wall, liquid, _mixture(document, liquid, notes)), {}
     # What was calibrated was so with one law of the bridges: with another it is a guess.
     calibrated = liquid if said["liquid.law"] in (MISSING, DEFAULT_LAW) else None
@@ -190,8 +190,8 @@ def _liquid_of(table: Liquid, notes: Notes) -> Liquid:
     """The liquid of the bridges and their law; raises `InputError` if its viscosity is missing or said twice."""
     dynamic, kinematic = table.dynamic_viscosity, table.kinematic_viscosity
     if not isnan(dynamic) and kinematic is not None:
-        told = "expected either kinematic_viscosity or dynamic_viscosity, not both"
-        raise unusable("liquid.dynamic_viscosity", told)
+        message = "expected either kinematic_viscosity or dynamic_viscosity, not both"
+        raise unusable("liquid.dynamic_viscosity", message)
     if kinematic is not None:
         assert table.density is not None
         dynamic = float(f"{kinematic * table.density:.15g}")
@@ -209,8 +209,8 @@ def _liquid_of(table: Liquid, notes: Notes) -> Liquid:
 def _walkers_of(key: str, table: Walkers, boundary: Boundary, notes: Notes) -> Walkers:
     """The walkers of a table, which stands under a key."""
     if table.facing in ("up", "down") and (not boundary.tilt or boundary.uphill):
-        told = "on a plane that is tilted along the drive alone walkers face up or down"
-        raise unusable(f"{key}.facing", f'expected "both", "right" or "left": {told}')
+        message = "on a plane that is tilted along the drive alone walkers face up or down"
+        raise unusable(f"{key}.facing", f'expected "both", "right" or "left": {message}')
     if table.gap is None:
         notes.derived(f"{key}.gap", "auto", "where the forces at rest balance")
     of_others = ("arrangement", "places") if key == "dimers" else ("mean_radius", "sin_delta")
@@ -224,8 +224,8 @@ def _walkers_of(key: str, table: Walkers, boundary: Boundary, notes: Notes) -> W
     if not 2 <= len(table.radii) <= 100:
         raise unusable(f"{key}.radii", "expected radii of 2 to 100 beads")
     if bool(table.arrangement) == bool(table.places):
-        told = f"expected either an arrangement ({', '.join(ARRANGEMENTS)}) or places (at)"
-        raise unusable(f"{key}.arrangement", told)
+        message = f"expected either an arrangement ({', '.join(ARRANGEMENTS)}) or places (at)"
+        raise unusable(f"{key}.arrangement", message)
     return _arranged(walkers, key) if table.arrangement else _at_places(walkers, key)
 
 
@@ -235,8 +235,8 @@ def _radii(table: Walkers, notes: Notes) -> tuple[float, ...]:
         if len(table.radii) != 2:
             raise unusable("dimers.radii", 'expected two radii, such as ["0.3 mm", "0.2 mm"]')
         if given:
-            told = "expected either the radii or mean_radius and sin_delta, not both"
-            raise unusable(f"dimers.{next(iter(given))}", told)
+            message = "expected either the radii or mean_radius and sin_delta, not both"
+            raise unusable(f"dimers.{next(iter(given))}", message)
         return table.radii
     assert table.mean_radius is not None
     assert table.sin_delta is not None
@@ -330,8 +330,8 @@ def _spaced(case: Case, key: str, walkers: Walkers, notes: Notes) -> Walkers:
     # Beads of different walkers may touch, but not overlap, if they are meant to meet.
     least = (1.0 if walkers.meet else 1.5) * walkers.length
     if walkers.spacing < least and sum(one.replicates for one in case.walkers) > 1:
-        told = f'neighbouring walkers would touch or overlap; expected at least {1e3 * least:.3g} mm, or "auto"'
-        raise unusable(f"{key}.spacing", told)
+        message = f'neighbouring walkers would touch or overlap; expected at least {1e3 * least:.3g} mm, or "auto"'
+        raise unusable(f"{key}.spacing", message)
     return walkers
 
 
@@ -386,8 +386,8 @@ def _check_places(case: Case, keys: list[str]) -> None:
         least = (1.0 - _OVERLAP) * radius
         beside = clearance < least
         if number < walking and beside:
-            told = f"the walkers do not fit between the walls of the {boundary.shape}"
-            raise unusable(f"{key}.replicates", told)
+            message = f"the walkers do not fit between the walls of the {boundary.shape}"
+            raise unusable(f"{key}.replicates", message)
         if number < walking and z + radius > boundary.height:
             raise unusable("boundary.height", f"too low for the walkers of {key}")
         if number >= walking and (beside or z < least or z + radius > boundary.height):

@@ -51,8 +51,8 @@ def resolve_drive(table: DriveTable, boundary: Boundary, dimer: Dimer | None, no
     drive = Drive(harmonics, table.frame or "container")
     notes.default("drive.frame", drive.frame)
     if table.frame == "lab" and not drive.is_plain:
-        told = "several harmonics, or one with a phase, are driven in the container's frame"
-        raise unusable("drive.frame", f'expected "container": {told}')
+        message = "several harmonics, or one with a phase, are driven in the container's frame"
+        raise unusable("drive.frame", f'expected "container": {message}')
     return drive
 
 
@@ -98,8 +98,8 @@ def resolve_run(table: RunTable, case: Case, notes: Notes) -> Run:
     _check_length(table, case, cycles, settling, cycles_per_sample)
     most = MOST_STEPS // steps - (ceil((rest + 1.0) * frequency) if rest else 0)
     if cycles > most:
-        key, told = ("cycles", f"expected at most {most}") if table.duration is None else ("duration", "too long")
-        raise unusable(f"run.{key}", f"{told}: the engine counts steps up to 2^31")
+        key, message = ("cycles", f"expected at most {most}") if table.duration is None else ("duration", "too long")
+        raise unusable(f"run.{key}", f"{message}: the engine counts steps up to 2^31")
     segment = table.segment if table.segment is not None else _SEGMENT_SECONDS if loose else inf
     # Segments end with a sample, so that each begins where the last one ended.
     samples_of_segment = max(1, round(min(segment * frequency, cycles) / cycles_per_sample))
@@ -135,11 +135,7 @@ def _note_run(run: Run, table: RunTable, case: Case, notes: Notes) -> None:
         notes.default("run.longest_settling", run.longest_settling, "of loose beads")
     if run.rests:
         notes.default("run.settled_below", run.settled_below)
-    notes.derived(
-        "run.time_step",
-        run.time_step,
-        "auto: a fraction of the stability limits, with a whole number of steps per cycle",
-    )
+    notes.derived("run.time_step", run.time_step, "auto: a fraction of the limits, a whole number of steps per cycle")
     notes.derived("run.cycles", cycles, whence)
     notes.derived("run.settling_cycles", run.settling_cycles, "a third of the cycles, at most 20")
     notes.derived("run.silence", silence, "the engine is stopped if it writes nothing for this long")
@@ -154,8 +150,8 @@ def _check_length(table: RunTable, case: Case, cycles: int, settling: int, cycle
     if cycles - settling < 2:
         raise unusable("run.settling_cycles", f"expected at most cycles - 2 = {cycles - 2}")
     if case.walkers and cycles // cycles_per_sample <= -(-settling // cycles_per_sample):
-        told = f"expected more: at one frame in {cycles_per_sample} cycles, none is left after {settling} settling ones"
-        raise unusable("run.frames_per_second", told)
+        message = f"expected more: one frame in {cycles_per_sample} cycles leaves none after {settling} settling cycles"
+        raise unusable("run.frames_per_second", message)
 
 
 def _largest_time_step(table: RunTable, case: Case) -> float:
@@ -165,8 +161,8 @@ def _largest_time_step(table: RunTable, case: Case) -> float:
         return limits.recommended(loose=case.loose)
     if (exceeded := limits.exceeded_by(given)) and not table.allow_unstable:
         allowed = f"{min(limits.as_dict().values()) * 1e6:.3g} us"
-        told = f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed}, "
-        raise unusable("run.time_step", f'{told}"auto", or allow_unstable = true')
+        message = f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed}, "
+        raise unusable("run.time_step", f'{message}"auto", or allow_unstable = true')
     return given
 
 

@@ -55,8 +55,8 @@ def _ranges(value: object) -> object:
         found = ranges_of(ranges)
     except InputError as error:
         (problem,) = error.problems
-        told = problem.expected.replace("{ uniform = [low, high] }", "[low, high]")
-        raise ValueError(f"{problem.key}: {told}") from error
+        message = problem.expected.replace("{ uniform = [low, high] }", "[low, high]")
+        raise ValueError(f"{problem.key}: {message}") from error
     for key, one in found.items():
         if one.median is not None:
             raise ValueError(f"{key}: expected [low, high]: the case's own value is the median")

@@ -127,8 +127,8 @@ def fig2(sources: Sources) -> Figure:
     above.set_xlabel(r"dimensionless peak force $\Gamma_0$")
     engine.plot([], [], color="0.2", lw=0.9, label="lines: Coulomb friction, bridges")
     engine.plot([], [], color="0.45", lw=2.0, marker="*", ms=8, label="paper's fit, κ = 0.033 s/mm")
-    told = "mean and range of 6 walkers" if seen else "mean of 6 walkers, their range is smaller"
-    legend_below(engine, ncols=3, title=f"symbols: engine, {told}; in (c) of 2")
+    text = "mean and range of 6 walkers" if seen else "mean of 6 walkers, their range is smaller"
+    legend_below(engine, ncols=3, title=f"symbols: engine, {text}; in (c) of 2")
     legend_below(dry, ncols=4, columnspacing=1.0, handlelength=1.8, handletextpad=0.4)
     _threshold(axes["threshold"], sources)
     letter_panels((engine, dry, axes["threshold"]))
@@ -176,8 +176,8 @@ def fig3(sources: Sources) -> Figure:
     same = motion_of(*[of_radii(case, radii, gamma0) for radii in pairs]).velocity * 1e3
     axes.plot(table["sin_delta"], same, "x", color="0.1", ms=6, label="Coulomb friction, bridges, these beads")
     seen = _range_seen(table)
-    told = "engine, mean and range" if seen else "engine, mean (the range is smaller than the symbol)"
-    _errorbars(axes, table["sin_delta"], table, seen=seen, fmt="s", color="C2", ms=5, label=told)
+    text = "engine, mean and range" if seen else "engine, mean (the range is smaller than the symbol)"
+    _errorbars(axes, table["sin_delta"], table, seen=seen, fmt="s", color="C2", ms=5, label=text)
     # The beads stand above the axes, where they meet no symbol; upright, for some asymmetries are nearly the same.
     above = axes.secondary_xaxis("top")
     above.set_xticks(table["sin_delta"], [f"{one * 1e3:g}/{other * 1e3:g}" for one, other in pairs], rotation=90)
@@ -324,9 +324,9 @@ def _tornado(axes: Axes, found: pd.DataFrame, key: str) -> None:
     for place, name in enumerate(PARAMETERS):
         ends = found[found["parameter"] == name].sort_values("value")[key]
         for end, offset, colour, label in zip(ends, (-0.17, 0.17), ("0.75", "0.35"), ("lower", "higher"), strict=True):
-            told = label if place == 0 else None
+            shown_label = label if place == 0 else None
             if known:
-                axes.barh(place + offset, end - shipped, 0.32, shipped, fc=colour, ec="0.1", lw=0.5, label=told)
+                axes.barh(place + offset, end - shipped, 0.32, shipped, fc=colour, ec="0.1", lw=0.5, label=shown_label)
             else:  # bars have nothing to begin at
                 axes.plot(end, place + offset, "o", color=colour, mec="0.1", ms=6)
     together = found[found["parameter"] == _TOGETHER][key]

@@ -193,8 +193,8 @@ def fit(
     parameters, values = outcome(found.x)
     apart = np.abs(residuals(values))
     missed = [wanted[place].fitted for place in np.argsort(apart)[::-1] if apart[place] > 1.0]
-    told = {key: value if isfinite(value) else None for key, value in values.items()}
-    return Fit(name, parameters, told, len(wanted) - len(missed), missed, float(found.fun))
+    finite = {key: value if isfinite(value) else None for key, value in values.items()}
+    return Fit(name, parameters, finite, len(wanted) - len(missed), missed, float(found.fun))
 
 
 def try_model_terms(to: Path) -> list[Fit]:

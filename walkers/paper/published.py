@@ -180,7 +180,7 @@ def described(case: Case) -> str:
 # --- the sweeps that figures are made from ----------------------------------------------------------------------------
 
 ProgressOf = Callable[[str], AbstractContextManager[Callable[[SweepProgress], None]]]
-"""Gives, for the name of a sweep, a context whose value is told of its progress."""
+"""Gives, for the name of a sweep, a context whose value is called with its progress."""
 
 
 class NothingFinishedError(WalkersError):

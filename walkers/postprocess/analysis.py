@@ -26,7 +26,7 @@ from walkers.runner.directory import SEGMENT_NAME, case_of, files_of_segments, s
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import MANIFEST_NAME, FileChanged, check_unchanged, forget_tables, record_tables
 
-if TYPE_CHECKING:  # how far a sweep is can be told without numpy
+if TYPE_CHECKING:  # the progress of a sweep needs no numpy
     from matplotlib.figure import Figure
 
     from walkers.postprocess.figures import Panel
@@ -194,15 +194,17 @@ class Analysis(ABC):
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """The result as text; by default the numbers of reports in mm, mm/s, degrees."""
         rows = (one.row(result) for one in self.quantities(result) if one.label)
-        told = [f"{one.name} {one.text}" for one in rows if one.value is not None]
-        return [f"  {self.name:10} {'; '.join(told) or '-'}"]
+        parts = [f"{one.name} {one.text}" for one in rows if one.value is not None]
+        return [f"  {self.name:10} {'; '.join(parts) or '-'}"]
 
     def uncertainty(self, result: Mapping[str, Any]) -> list[str]:
         """Uncertainty of the main numbers in sentences; default: the band of a spread, or the uncertain parameters."""
         if not self.headlines:
             return []
         units = {name: self.columns[name][0] for name in self.headlines}
-        return [told] if (told := bands_text(result, units, self.row(result))) else not_known(result["rests_on"])
+        return (
+            [sentence] if (sentence := bands_text(result, units, self.row(result))) else not_known(result["rests_on"])
+        )
 
     @property
     def columns(self) -> Described:
@@ -306,8 +308,8 @@ def _measured(directory: Path) -> tuple[dict[str, Any], dict[str, Columns]]:
         "truncated": motion.truncated,
         "rests_on": rests_on(case.origins),
     }
-    if told := read_json(segment_directories(directory)[-1] / SEGMENT_NAME).get("by_hand"):
-        result["by_hand"] = told
+    if notes := read_json(segment_directories(directory)[-1] / SEGMENT_NAME).get("by_hand"):
+        result["by_hand"] = notes
     tables: dict[str, Columns] = {}
     for one in analyses_of(case):
         found, summary = one.of(motion)
@@ -362,7 +364,7 @@ def current_result(directory: str | Path) -> dict[str, Any]:
     """The result of a finished run; recomputed if files are missing, damaged or of an earlier version of an analysis.
 
     What cannot be written, as where all is read-only, is not. Without dumps a result of an earlier method stays what it
-    is, if it has all that is told of one today.
+    is, if it has all current quantities.
 
     Raises
     ------

@@ -74,7 +74,7 @@ def letter_panels(panels: Iterable[Axes]) -> None:
 def series_look(number: int) -> dict[str, Any]:
     """Colour, dashes and marker of a series of many, as options of `matplotlib.axes.Axes.plot`.
 
-    The first 120 differ; the first 15 differ in dashes or marker, so that they can be told apart without colours.
+    The first 120 differ; the first 15 differ in dashes or marker, so that they can be distinguished without colours.
     """
     return {
         "color": f"C{number}",

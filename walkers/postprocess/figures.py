@@ -88,7 +88,7 @@ def nested_widths(count: int, largest: float = 3.0) -> list[float]:
     return [1.1] if count < 2 else np.linspace(min(1.1 + 2.2 * (count - 1), largest), 1.1, count).tolist()
 
 
-def told_velocity(value: float) -> str:
+def velocity_text(value: float) -> str:
     """A velocity (mm/s) as text with three digits and at most three decimals."""
     return "0" if abs(value) < 5e-4 else f"{value:.3g}" if abs(value) >= 0.1 else f"{value:.3f}"
 
@@ -107,8 +107,8 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
         way = (group.mass_centre[::strobe] - group.mass_centre[0]) * 1e3
         for place, walker in enumerate(group.walkers):
             number = walker.walker
-            told = f"{number}: {facing[int(walker.facing < 0)]}, {told_velocity(slope[place] * 1e3)} mm/s"
-            look: dict[str, Any] = {"label": told if number < MOST_NAMED else "", "colour": number}
+            text = f"{number}: {facing[int(walker.facing < 0)]}, {velocity_text(slope[place] * 1e3)} mm/s"
+            look: dict[str, Any] = {"label": text if number < MOST_NAMED else "", "colour": number}
             look["width"] = widths[len(walked)]
             walked.append(Line(time, distance[:, place] * 1e3, **look))
             turned.append(Line(time, np.degrees(group.orientation[::strobe, place]), **look))
@@ -134,8 +134,8 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
 def velocity_panel(case: Case, walkers: Columns) -> Panel:
     """Velocity of each walker with the standard error of its fit."""
     velocity, error, lines = 1e3 * walkers["velocity"], 1e3 * walkers["standard_error"], []
-    for way, told in zip((1, -1), ways(uphill=case.goes_uphill), strict=True):
-        label, colour, marker = f"started facing {told}", int(way < 0), "o" if way > 0 else "s"
+    for way, direction in zip((1, -1), ways(uphill=case.goes_uphill), strict=True):
+        label, colour, marker = f"started facing {direction}", int(way < 0), "o" if way > 0 else "s"
         these = walkers["facing"] == way
         if not these.any():
             continue
@@ -160,7 +160,7 @@ def gait_panels(group: Group) -> list[Panel]:
     names = ["walker", *(f"bead {bead + 1}" for bead in range(motion.rotation.shape[-1]))]
     values = 1e3 * np.column_stack([motion.velocity[last, 0], motion.rotation[last, 0]])
     means = 1e3 * np.array([walk(group).velocity[0], *averages(group).rotation[0]])
-    labels = [f"{name} (mean {told_velocity(mean)} mm/s)" for name, mean in zip(names, means, strict=True)]
+    labels = [f"{name} (mean {velocity_text(mean)} mm/s)" for name, mean in zip(names, means, strict=True)]
     widths, colours = nested_widths(len(names), 6.0), [_PALE, *range(1, len(names))]
     lines = [
         Line(phase, values[:, number], labels[number], colours[number], width=widths[number])
@@ -175,9 +175,7 @@ def gait_panels(group: Group) -> list[Panel]:
     shaken = group.motion.substrate_velocity[last] @ np.array(group.case.drive.direction)
     if np.any(shaken):  # faster than its walkers by far: in their panel it would make them all flat
         line = Line(phase, first.facing * shaken * 1e3, colour=_GREY, dashed=True)
-        panels.append(
-            Panel("substrate, positive along the walker's start direction", x, "velocity\n(mm/s)", [line], zero=True)
-        )
+        panels.append(Panel("substrate, along the start direction", x, "velocity\n(mm/s)", [line], zero=True))
     return panels
 
 
@@ -202,7 +200,7 @@ def pile_panels(tables: Mapping[str, Columns]) -> list[Panel]:
         ("Mean square velocity, once per cycle", "mean square\nvelocity\n(m²/s²)", {"mean_square_velocity": ""}),
     ):
         named = enumerate(columns.items())
-        lines = [Line(time, bed[name], told, 2 * number, dashed=number > 0) for number, (name, told) in named]
+        lines = [Line(time, bed[name], label, 2 * number, dashed=number > 0) for number, (name, label) in named]
         panels.append(Panel(title, x, y, lines, log=len(lines) == 1, zero=columns is joined))
     return panels
 
@@ -214,8 +212,8 @@ def _leaders(tables: Mapping[str, Columns]) -> Iterator[Line]:
     for track, (climbed, leader) in enumerate(zip(clusters["climbed"], clusters["leader"], strict=True)):
         own = (members["track"] == track) & (members["bead"] == leader)
         leads, speed = "large" if clusters["leader_large"][track] else "small", clusters["speed"][track] * 1e3
-        told = f"{clusters['size'][track]} beads climb, led by a\n{leads} one: {speed:.1f} mm/s"
-        label = told if climbed and named[track] <= MOST_NAMED else ""
+        text = f"{clusters['size'][track]} beads climb, led by a\n{leads} one: {speed:.1f} mm/s"
+        label = text if climbed and named[track] <= MOST_NAMED else ""
         colour, width = (2, 1.6) if climbed else (_OTHERS, 0.6)
         yield Line(members["time"][own], members["height"][own] * 1e3, label, colour, width=width)
     if len(named) and named[-1] > MOST_NAMED:
@@ -239,14 +237,14 @@ def assembly_panels(tables: Mapping[str, Columns]) -> list[Panel]:
     for number, bead in enumerate(np.unique(own["bead"])):
         time, height, joined = (own[name][own["bead"] == bead] for name in ("time", "height", "joined"))
         leads = ", leads" if bead == clusters["leader"][track] else ""
-        told = f"{'large' if own['large'][own['bead'] == bead][0] else 'small'} bead {bead}{leads}"
+        text = f"{'large' if own['large'][own['bead'] == bead][0] else 'small'} bead {bead}{leads}"
         heights.append(Line(time, 1e3 * height, "", number, width=0.6))
-        heights.append(Line(time, 1e3 * np.where(joined, height, np.nan), told, number, width=2.0))
+        heights.append(Line(time, 1e3 * np.where(joined, height, np.nan), text, number, width=2.0))
     times, at = np.unique(own["time"], return_inverse=True)
     counts = {"joined to most of them": "joined", "in the pile's bulk": "in_bulk", "at a side wall": "at_wall"}
     numbers = [
-        Line(times, np.bincount(at, own[name]).astype(float), told, 2 * number, dashed=number > 0)
-        for number, (told, name) in enumerate(counts.items())
+        Line(times, np.bincount(at, own[name]).astype(float), text, 2 * number, dashed=number > 0)
+        for number, (text, name) in enumerate(counts.items())
     ]
     bed = tables["bed"]
     seen = (bed["time"] >= times[0]) & (bed["time"] <= times[-1])
@@ -282,8 +280,8 @@ def walk_figure(groups: list[Group], walked: Panel, turned: Panel) -> Figure:
     letter_panels(axes.values())
     more = f" (the first {MOST_NAMED})" if sum(len(group.walkers) for group in groups) > MOST_NAMED else ""
     handles = axes["walked"].get_legend_handles_labels()
-    told = f"walker: facing at the start, velocity{more}"
-    figure.legend(*handles, loc="outside lower center", ncols=4, title=told)
+    text = f"walker: facing at the start, velocity{more}"
+    figure.legend(*handles, loc="outside lower center", ncols=4, title=text)
     return figure
 
 
@@ -358,20 +356,20 @@ def _draw_strobe(axes: Axes, group: Group) -> None:
         place = (along[row, bead], across[row, bead])
         look: dict[str, Any] = {"fc": "0.45" if bead == 0 else "0.75", "ec": "0.2", "lw": 0.6}
         axes.add_patch(Circle((-place[1], place[0]) if uphill else place, float(radii[bead]), **look))
-    told = even_labels(group.time[shown])
+    labels = even_labels(group.time[shown])
     if long:
-        told = [f"{time}\n{one:.1f} mm" for time, one in zip(told, way, strict=True)]
+        labels = [f"{time}\n{one:.1f} mm" for time, one in zip(labels, way, strict=True)]
     edges = float((along - radii).min() - radii.max()), float((along + radii).max() + radii.max())
     ends = -pitch * (len(shown) - 0.4), 0.6 * pitch
     title, name = f"walker {group.walkers[0].walker}", "from the midpoint (mm)" if long else "along the drive axis (mm)"
     if uphill:
         axes.set(xlim=(-ends[1], -ends[0]), ylim=edges, ylabel=name if long else "uphill (mm)")
-        axes.set_xticks(pitch * np.arange(len(shown)), told, rotation=90)
+        axes.set_xticks(pitch * np.arange(len(shown)), labels, rotation=90)
         arrow: dict[str, Any] = {"arrowprops": {"arrowstyle": "-|>", "color": "black"}, "fontsize": 7, "ha": "center"}
         axes.annotate(group.case.boundary.pull, (1.1, 0.2), (1.1, 0.7), "axes fraction", **arrow)
     else:
         axes.set(xlim=edges, ylim=ends, yticks=[], xlabel=name)
-        for row, time in enumerate(told):
+        for row, time in enumerate(labels):
             axes.annotate(time, (1.01, -row * pitch), xycoords=("axes fraction", "data"), fontsize=7, va="center")
     axes.set(aspect="equal", title=title)
     axes.set_anchor("N")

@@ -181,8 +181,8 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
     last, begin = float(motion.time[-1]), options.begin
     end = last if options.end is None else min(options.end, last)
     if not 0.0 <= begin < end:
-        told = f"nothing to show: expected times within the drive, 0 to {last:.4g} s, --from before --until"
-        raise refused("--from, --until", told)
+        message = f"nothing to show: expected times within the drive, 0 to {last:.4g} s, --from before --until"
+        raise refused("--from, --until", message)
     follows, slowdown = motion.follows_cycles, options.slowdown
     if slowdown is None:
         largest = _SECONDS / (end - begin)
@@ -214,7 +214,7 @@ def _captions(
     large, small = (ImageFont.truetype(font, round(share * edge)) for share in (1.2, 0.85))
     # All pictures may be of one frame, where frames are rarer than pictures.
     decimals = max(0, ceil(-log10(float(np.diff(times.time).max(initial=0.0)) or 1.0) - 1e-9))
-    speed = told_speed(times.slowdown) + (", stroboscopic" if times.stroboscopic else "")
+    speed = speed_text(times.slowdown) + (", stroboscopic" if times.stroboscopic else "")
     drive = f"{case.drive.frequency:g} Hz, {case.drive.peak_acceleration:.3g} m/s²"
     bar = round_below(wide / 5.0 / pixels_per_mm)
     left, right, level, thick = wide - edge - bar * pixels_per_mm, wide - edge, tall - edge, max(2, edge // 8)
@@ -241,7 +241,7 @@ def _captions(
     return written
 
 
-def told_speed(slowdown: float) -> str:
+def speed_text(slowdown: float) -> str:
     """The slow motion in words: ``20 × slower``."""
     if slowdown == 1.0:
         return "real time"

@@ -317,8 +317,8 @@ def read_motion(directory: str | Path) -> Motion:
         return _motion(case, segments)
     except NoNumberError as error:
         finished = (directory / MANIFEST_NAME).is_file()  # then it was tabulated, without such numbers
-        told = "the dump was damaged after the run was finished" if finished else "the simulation blew up"
-        raise DumpError(f"{error}: {told}") from error
+        message = "the dump was damaged after the run was finished" if finished else "the simulation blew up"
+        raise DumpError(f"{error}: {message}") from error
 
 
 def _opened(segment: Path) -> tuple[dict[str, Any], Layout, BinaryDump]:

@@ -30,7 +30,7 @@ def described(table: type) -> dict[str, tuple[str, str]]:
     `NUMBERED`; those that are get ``_*`` after their names. It holds arrays, all of the table, or a row of it.
     """
     found = {name: hint.__metadata__ for name, hint in get_type_hints(table, include_extras=True).items()}
-    return {f"{name}_*" if told[2:] else name: told[:2] for name, told in found.items()}
+    return {f"{name}_*" if one[2:] else name: one[:2] for name, one in found.items()}
 
 
 def columns_of(table: Any) -> Columns:
@@ -64,12 +64,12 @@ def write_table(directory: Path, name: str, table: type, columns: Columns) -> No
 
     declared = described(table)
     numbered = {key: f"{key.rpartition('_')[0]}_*" for key in columns}
-    told = {key: one for key, one in declared.items() if not key.endswith("_*")}
-    told |= {key: declared[name] for key, name in numbered.items() if name in declared}
-    arrays = [_arrow(columns[key]) for key in told]
+    present = {key: one for key, one in declared.items() if not key.endswith("_*")}
+    present |= {key: declared[name] for key, name in numbered.items() if name in declared}
+    arrays = [_arrow(columns[key]) for key in present]
     fields = [
         pa.field(key, array.type, metadata={"unit": unit, "meaning": meaning})
-        for (key, (unit, meaning)), array in zip(told.items(), arrays, strict=True)
+        for (key, (unit, meaning)), array in zip(present.items(), arrays, strict=True)
     ]
     reals = [field.name for field in fields if pa.types.is_floating(field.type)]
     with beside(directory / f"{name}.parquet") as new:

@@ -46,9 +46,9 @@ def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
     """The uncertain values of a result (`rests_on`) as text: guessed, given by the case alone, calibrated."""
 
     def listed(head: str, chosen: Iterable[Mapping[str, Any]]) -> list[str]:
-        told = ", ".join(f"{one['key'].partition('.')[2]} {one['value']}" for one in chosen)
+        text = ", ".join(f"{one['key'].partition('.')[2]} {one['value']}" for one in chosen)
         wrapper = textwrap.TextWrapper(_WIDTH, f"  {head:10} ", " " * 13, break_on_hyphens=False)
-        return wrapper.wrap(told) if told else []
+        return wrapper.wrap(text) if text else []
 
     lines = listed("guessed", [one for one in rests if one["guessed"]])
     whence = {"given": "given", "calibrated": "calibrated", "library": "own library", "package": "package"}
@@ -115,6 +115,6 @@ def bands_text(result: Mapping[str, Any], units: Mapping[str, str], own: Mapping
     bands = {name: band for name in units if (band := band_of(result, name, own.get(name)))}
     if not bands:
         return ""
-    told = "; ".join(f"{name} {band_text(band, units[name])}" for name, band in bands.items())
+    text = "; ".join(f"{name} {band_text(band, units[name])}" for name, band in bands.items())
     points = max(result["bands"][name]["points"] for name in bands)
-    return f"{told} {_OVER} (5 to 95 % of {points} draws)"
+    return f"{text} {_OVER} (5 to 95 % of {points} draws)"

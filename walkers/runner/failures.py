@@ -29,8 +29,8 @@ class EngineMissing(EngineFailure):
     """There is no liggghts to run. Seen before anything is written."""
 
     def __init__(self, wanted: str) -> None:
-        told = "is not an executable file on this machine; install it with: sudo apt-get install liggghts"
-        super().__init__(f"no engine: {wanted} {told}")
+        text = "is not an executable file on this machine; install it with: sudo apt-get install liggghts"
+        super().__init__(f"no engine: {wanted} {text}")
 
 
 class OtherEngine(EngineFailure):
@@ -54,18 +54,14 @@ class EngineDiffers(EngineFailure):
     """A worker of a sweep has another engine than the one that the sweep was started with."""
 
     def __init__(self, found: Path) -> None:
-        super().__init__(
-            f"the engine on {platform.node()}, {found}, is not the engine that this sweep was started with"
-        )
+        super().__init__(f"the engine on {platform.node()}, {found}, is not the engine that started this sweep")
 
 
 class ProgramDiffers(EngineFailure):
     """A worker of a sweep names runs otherwise than where it was started: resolved cases or decks differ."""
 
     def __init__(self) -> None:
-        super().__init__(
-            f"the program on {platform.node()} has another version than the program that started the sweep"
-        )
+        super().__init__(f"the program on {platform.node()} has another version than the one that started the sweep")
 
 
 class EngineNeverStarted(EngineFailure):

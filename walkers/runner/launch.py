@@ -320,11 +320,11 @@ class _Watch:
         # A bead that has left the box since the last line was at least as fast as this.
         if clearance is not None and clearance / seconds > fastest:
             return self._blow_up(clearance / seconds)
-        told = (
+        sentence = (
             f"{lost} bead(s) left the simulation box before step {step}: walkers left its sides (increase "
             "dimers.spacing or shorten the run), or climbers rose above its top, at twice boundary.height"
         )
-        return (failures.BeadsOverTheTop if over else failures.BeadsLost)(told, self.directory, lost=lost)
+        return (failures.BeadsOverTheTop if over else failures.BeadsLost)(sentence, self.directory, lost=lost)
 
     def _blow_up(self, speed: float) -> failures.BlowUp:
         seen = f"moves at {speed:.3g} m/s" if math.isfinite(speed) else "has a speed or position that is not a number"
@@ -344,14 +344,16 @@ class _Watch:
         if self.failure is not None:
             raise self.failure
         if self.read > deck.log_limit:
-            told = f"the engine's log grew beyond {deck.log_limit / 1e6:g} MB (run.log_limit) {after}; it was stopped"
-            raise failures.LogTooLong(told, self.directory)
+            message = (
+                f"the engine's log grew beyond {deck.log_limit / 1e6:g} MB (run.log_limit) {after}; it was stopped"
+            )
+            raise failures.LogTooLong(message, self.directory)
         if self.silent > deck.silence:
-            told = f"the engine wrote nothing for {deck.silence:g} s (run.silence) {after} of {self.layout.steps}"
-            raise failures.EngineSilent(f"{told}; it was stopped", self.directory)
+            message = f"the engine wrote nothing for {deck.silence:g} s (run.silence) {after} of {self.layout.steps}"
+            raise failures.EngineSilent(f"{message}; it was stopped", self.directory)
         if self.elapsed > self.time_limit:
-            told = f"time limit of {self.time_limit:g} s reached at step {self.step} of {self.layout.steps}"
-            raise failures.TimeLimitExceeded(told, self.directory)
+            message = f"time limit of {self.time_limit:g} s reached at step {self.step} of {self.layout.steps}"
+            raise failures.TimeLimitExceeded(message, self.directory)
         missing = self.layout.bead_dump_bytes - self.written
         free = shutil.disk_usage(self.directory).free
         if missing > 0 and free < _SPARE_BYTES:
@@ -381,8 +383,8 @@ class _Watch:
         frames_of_bridges = [(_complete_frames(self.directory / name), layout.bridge_frames) for name in dumps]
         for frames, expected in [(frames_of_beads, layout.frames), *frames_of_bridges]:
             if frames != expected:
-                told = f"the engine wrote {int(frames)} of {expected} frames and reported no error"
-                raise failures.MissingFrames(told, self.directory)
+                message = f"the engine wrote {int(frames)} of {expected} frames and reported no error"
+                raise failures.MissingFrames(message, self.directory)
         return EngineReport(self.version or "unknown", wall_seconds, self.loop_seconds, layout.steps)
 
 

@@ -113,8 +113,8 @@ def check_unchanged(directory: Path, names: Collection[str]) -> bool:
     wanted = {name: sums[name] for name in names if name in sums}
     for name, now in checksums(directory, wanted).items():
         if now != wanted[name]:
-            told = "has changed since the run was finished; list all changes with: walkers check files"
-            raise FileChanged(f"{directory / name} {told} {directory}")
+            message = "has changed since the run was finished; list all changes with: walkers check files"
+            raise FileChanged(f"{directory / name} {message} {directory}")
     return len(wanted) == len(names)
 
 

@@ -91,13 +91,13 @@ def notes(case: Case) -> list[str]:
     if not (case.loose and case.boundary.closed and case.mixture):
         return []
     numbers = {"large": case.large, "small": case.count - case.large}
-    told = [f"no {name} beads; in the paper, large beads lead small ones" for name, one in numbers.items() if not one]
+    lines = [f"no {name} beads; in the paper, large beads lead small ones" for name, one in numbers.items() if not one]
     room = 2.0 * case.boundary.height - _volume(case) / (_LOOSE_PACKING * case.boundary.cross_section)
     if (fastest := room / case.duration) < _FASTEST_CLIMB:
-        told.append(
+        lines.append(
             f"climbers faster than {fastest * 1e3:.1f} mm/s rise above twice boundary.height, and end the run early"
         )
-    return told
+    return lines
 
 
 def _volume(case: Case) -> float:
@@ -217,8 +217,8 @@ def describe(summary: dict[str, Any]) -> str:
             f"{f'{limit * 1e6:.4g} µN' if limit else '-':>12} {contact['bridge_volume'] * 1e12:8.3g} nL "
             f"{contact['rupture_distance'] * 1e6:6.3g} µm {contact['overlap_at_rest'] * 1e9:10.4g} nm"
         )
-    told = [f"note       {note}" for note in summary["notes"]]
-    return "\n".join([*lines, *_text_of_run(summary["time_step"], summary["run"]), *told])
+    notes = [f"note       {note}" for note in summary["notes"]]
+    return "\n".join([*lines, *_text_of_run(summary["time_step"], summary["run"]), *notes])
 
 
 def _text_of_case(case: dict[str, Any]) -> list[str]:

@@ -294,7 +294,7 @@ def describe_origins(found: Mapping[str, Any]) -> str:
         f"{found['share_of_bridges']:.0%} of the climbers' bridges existed then\n"
         f"             the last bead joined {found['whole_before']:.2f} s before the cluster came free (median)\n"
         f"             {found['leaders_at_wall']} leaders were at a wall at rest, as were {found['share_at_wall']:.0%} "
-        f"of all beads of their size class ({_told_p(found['p_at_wall'])})"
+        f"of all beads of their size class ({_p_text(found['p_at_wall'])})"
     )
 
 
@@ -465,7 +465,7 @@ def describe_sensitivity(rows: Sequence[dict[str, Any]]) -> str:
         told = "as defined" if row["value"] is None else f"{row['threshold']} = {row['value']:g}"
         speed = "-" if row["median_speed"] is None else f"{row['median_speed'] * 1e3:.2f} mm/s"
         lines.append(
-            f"  {told:20} {row['climbed']} of {row['runs']} runs, {_told_rate(row)}, {row['led_by_large']} led by "
+            f"  {told:20} {row['climbed']} of {row['runs']} runs, {_rate_text(row)}, {row['led_by_large']} led by "
             f"a large bead, median {speed}"
         )
     return "\n".join(lines)
@@ -492,16 +492,16 @@ def describe_climbs(found: Mapping[str, Any]) -> str:
         + (f", {found['ended']} ended before without a climb" if found["ended"] else "")
         + f": probability {found['probability']:.2f}{_interval(found['interval'], '.2f')}",
         f"  waiting    median {half}; {found['censored']} of {found['runs']} runs ended without a climb",
-        f"  climbs     {_told_rate(found)}"
+        f"  climbs     {_rate_text(found)}"
         + ("" if found["dispersion"] is None else f"; dispersion {found['dispersion']:.1f} (Poisson: 1)"),
     ]
     if found["climbs"]:
         sizes = ", ".join(f"{size}: {found['sizes'].count(size)}" for size in sorted(set(found["sizes"])))
         lines += [
-            *(f"    {name.replace('_', ' '):15} {_told_rate(found[name])}" for name in _PARTS),
+            *(f"    {name.replace('_', ' '):15} {_rate_text(found[name])}" for name in _PARTS),
             f"  leader     large in {found['led_by_large']} of {found['climbs']} climbs (random bead of the pile, "
-            f"{found['share_of_large']:.0%} large: {_told_p(found['p_among_beads'])}; random bead of the cluster: "
-            f"{_told_p(found['p_among_own'])})",
+            f"{found['share_of_large']:.0%} large: {_p_text(found['p_among_beads'])}; random bead of the cluster: "
+            f"{_p_text(found['p_among_own'])})",
             f"  first one  begins after {_range(found['onsets'])} s, counts after {_range(found['times'])} s",
             f"  beads      {sizes} (beads: climbs)",
             f"  height     {_range(np.array(found['heights']) * 1e3)} mm",
@@ -512,11 +512,11 @@ def describe_climbs(found: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _told_p(value: float) -> str:
+def _p_text(value: float) -> str:
     return f"p = {value:.2g}" if value > 1.5 / _DRAWS else f"p < {2 / _DRAWS:g}"
 
 
-def _told_rate(found: Mapping[str, Any]) -> str:
+def _rate_text(found: Mapping[str, Any]) -> str:
     rate = "-" if found["rate"] is None else f"{found['rate']:.3g} per run and second"
     return f"{found['climbs']}: {rate}{_interval(found['rate_interval'])}"
 

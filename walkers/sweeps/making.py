@@ -80,7 +80,7 @@ class DamagedSegment(WalkersError):
 
 
 def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
-    """Refuse an engine whose audit failed (`AuditFailed`), unless told otherwise; warn once of one that had none."""
+    """Refuse an engine whose audit failed (`AuditFailed`), unless allowed; warn once of an engine without audit."""
     audit = read_audit(engine.sha256)
     if audit is None and is_new(engine.sha256):
         message = "this engine was never audited; check its forces with: walkers check engine (shown once)"

@@ -91,8 +91,8 @@ class Options:
         """The same for decks of so many MPI processes each: fewer of them at once, so that each has its cores."""
         site = replace(self.site, ranks=ranks) if self.site else None
         if site is not None and ranks > site.file.cores:
-            told = f"a deck has {ranks} MPI processes (run.ranks), more than the {site.file.cores} cores of a node"
-            raise refused("cores", told)
+            text = f"a deck has {ranks} MPI processes (run.ranks), more than the {site.file.cores} cores of a node"
+            raise refused("cores", text)
         return replace(self, workers=max(1, self.workers // ranks), site=site)
 
 
@@ -247,13 +247,13 @@ class SweepPlan:
         apart = sum(predicted_seconds(self.cases[point]) * self.cases[point].run.ranks for point in missing)
         # Python works for one deck at a time, while the engines of others run.
         until = max(makespan((deck.seconds for deck in self.decks), at_once) + PROGRAM_SECONDS, besides)
-        told = ", ".join(f"{count} {status}" for status, count in sorted(Counter(self.statuses).items()))
+        text = ", ".join(f"{count} {status}" for status, count in sorted(Counter(self.statuses).items()))
         keys = ", ".join(with_unit(key, unit) for key, unit in record.units.items())
         at_most = "at most " if record.descent else ""
         lines = [
             f"{record.name}: {record.title}".rstrip(": "),
             f"  varied     {keys or 'nothing'}",
-            f"  points     {len(record.runs)}: {told}",
+            f"  points     {len(record.runs)}: {text}",
             f"  to do      {at_most}{len(missing)} points in {len(self.decks)} decks",
             f"  predicted  {at_most}{seconds + besides:.0f} core-seconds ({apart + besides:.0f} without shared decks), "
             f"{until:.0f} s with {at_once} decks in parallel",
@@ -415,9 +415,9 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[Callable[..., Fu
     try:
         kernel = parsl.DataFlowKernel(pilots(options.site, folder))
     except Exception as error:  # whatever Parsl raises: an address that this machine does not have, ports in use
-        told = " ".join(str(error).split())
-        told = f"Parsl cannot start ({told}); see {folder}, and [executor] address in the site file"
-        raise ClusterFailed(told) from error
+        text = " ".join(str(error).split())
+        text = f"Parsl cannot start ({text}); see {folder}, and [executor] address in the site file"
+        raise ClusterFailed(text) from error
     try:
         yield partial(parsl.python_app(work, data_flow_kernel=kernel), None)
     finally:
@@ -455,7 +455,7 @@ class _Scheduler:
 
     def run(self, on_progress: Callable[[SweepProgress], None]) -> list[Failure]:
         """Until every point is settled."""
-        told = 0.0
+        shown = 0.0
         for group in range(len(self.batches)):
             self._advance(group)
         while self.groups_of:
@@ -464,8 +464,8 @@ class _Scheduler:
                 group = self.groups_of.pop(deck)
                 self._take_in(deck, group, future)
                 self._advance(group)
-            if time.perf_counter() - told > _LOOK_SECONDS:
-                told = time.perf_counter()
+            if time.perf_counter() - shown > _LOOK_SECONDS:
+                shown = time.perf_counter()
                 on_progress(self._progress())
         on_progress(self._progress())
         return sorted(self.failures, key=lambda failure: failure.point)

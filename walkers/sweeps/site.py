@@ -135,8 +135,8 @@ def load_site(path: str | Path) -> Site:
     try:
         pilots(site, Path("parsl"))
     except Exception as error:  # whatever Parsl's classes raise about what they are given
-        told = " ".join(str(error).split())
-        raise refused(path, f"Parsl cannot use it: {told}") from error
+        message = " ".join(str(error).split())
+        raise refused(path, f"Parsl cannot use it: {message}") from error
     return site
 
 

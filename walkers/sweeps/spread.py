@@ -34,7 +34,7 @@ POINTS = 32
 """Enough for 5 and 95 %, and for ranks that tell what matters most; a power of two, as Sobol's sequence likes it."""
 _SEEDS = range(1, 65)
 """Of the scrambling, of which the one is taken whose columns hang together least: of few points in many dimensions some
-do by 0.7, and which of two values matters could not be told."""
+do by 0.7, and their influences could not be separated."""
 _AT_REST = 2e-5  # m/s: below, walkers are at rest, as in the sweeps that look for the threshold of motion
 _WORDS = {
     "forward": "walk toward the large bead",
@@ -76,9 +76,9 @@ class Spread:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types, SI units."""
-        told = asdict(self) | {"directory": str(self.directory), "failed": len(self.failures)}
-        del told["failures"]
-        return told
+        contents = asdict(self) | {"directory": str(self.directory), "failed": len(self.failures)}
+        del contents["failures"]
+        return contents
 
 
 def _range_of(one: Origin) -> dict[str, list[Any]]:
@@ -95,8 +95,8 @@ def _range_of(one: Origin) -> dict[str, list[Any]]:
     except ValueError:  # one that the case leaves to the program, such as a time step
         return {name: [low, high]}
     if not ends.low * (1.0 - 1e-9) <= own <= ends.high * (1.0 + 1e-9):
-        told = f"expected a range that holds the case's own value, {one.text}"
-        raise unusable(f"uncertain.{one.key}", told, [low, high])
+        message = f"expected a range that holds the case's own value, {one.text}"
+        raise unusable(f"uncertain.{one.key}", message, [low, high])
     return {name: [low, written(min(max(own, ends.low), ends.high), ends.unit), high]}
 
 
@@ -112,8 +112,8 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
         raise refused(case.name, "was changed after it was read; expected a case from load_case(name, changes)")
     varied = [one for one in case.origins if one.range is not None]
     if not varied:
-        told = "no value is uncertain: give ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
-        raise refused(case.name, told)
+        message = "no value is uncertain: give ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
+        raise refused(case.name, message)
     with blaming(case.name, case.document):
         ranges = {one.key: _range_of(one) for one in varied}
 
@@ -203,8 +203,8 @@ def describe(spread: Spread) -> str:
         f"             {one.key} {one.text} ({one.range[0]} to {one.range[1]})" for one in spread.varied if one.range
     ]
     if spread.held:
-        told = ", ".join(f"{one.key} {one.text}" for one in spread.held)
-        lines.append(f"    fixed    {told}; to vary these values, add ranges in [uncertain]")
+        text = ", ".join(f"{one.key} {one.text}" for one in spread.held)
+        lines.append(f"    fixed    {text}; to vary these values, add ranges in [uncertain]")
     for name, band in spread.bands.items():
         unit, factor = SHOWN_UNITS.get(units[name], (units[name], 1.0))
         low, middle, high, smallest, largest = (
@@ -213,10 +213,10 @@ def describe(spread: Spread) -> str:
         ends = f"{low} to {high} {unit} (5 to 95 %), median {middle}; smallest {smallest}, largest {largest}"
         lines.append(f"    {name:8} {ends}")
         ranks = ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items())
-        told = f"strongest dependence: {ranks} (rank correlation)" if ranks else "no clear dependence on any of them"
+        text = f"strongest dependence: {ranks} (rank correlation)" if ranks else "no clear dependence on any of them"
         if band.points < LEAST_PER_VALUE * len(spread.varied):
-            told = "too few draws for rank correlations; the band is approximate"
-        lines.append(f"{'':13}{told}")
+            text = "too few draws for rank correlations; the band is approximate"
+        lines.append(f"{'':13}{text}")
     found = [f"{count} {_WORDS[name]}" for name, count in spread.counts.items() if count]
     found += [f"{len(spread.failures)} failed"] if spread.failures else []
     lines += [f"    draws    {', '.join(found)}"] if found else []

@@ -120,12 +120,12 @@ class SweepRecord:
 
 def derived_columns(names: Sequence[str]) -> Described:
     """Columns that follow from a case, of the analyses of these names: unit and meaning."""
-    return {**{key: told for one in analyses() if one.name in names for key, told in one.derived.items()}, **_DRIVE}
+    return {**{key: column for one in analyses() if one.name in names for key, column in one.derived.items()}, **_DRIVE}
 
 
 def result_columns(names: Sequence[str]) -> Described:
     """Columns that a run gives, of the analyses of these names: unit and meaning."""
-    return {key: told for one in analyses() if one.name in names for key, told in one.columns.items()}
+    return {key: column for one in analyses() if one.name in names for key, column in one.columns.items()}
 
 
 def row_of(result: Mapping[str, Any]) -> dict[str, Any]:
@@ -371,8 +371,8 @@ def find_name(option: str, wanted: str, names: Iterable[str]) -> str:
     found = [name for name in known if name == wanted] or [name for name in known if name.endswith(f".{wanted}")]
     if len(found) == 1:
         return found[0]
-    told = f"expected one of {', '.join(found or known)}{'' if found else suggestion(wanted, known)}"
-    raise refused(option, f'"{wanted}": {told}')
+    text = f"expected one of {', '.join(found or known)}{'' if found else suggestion(wanted, known)}"
+    raise refused(option, f'"{wanted}": {text}')
 
 
 def with_unit(words: str, unit: str | None) -> str:
@@ -476,8 +476,8 @@ def describe_status(directory: Path) -> str:
     record = read_record(directory)
     found = states(record)
     count = {status: sum(state.status == status for state in found) for status in _STATUSES}
-    told = ", ".join(f"{number} {status}" for status, number in count.items() if number)
-    lines = [f"{record.name}: {len(found)} points, {told or 'none'}"]
+    text = ", ".join(f"{number} {status}" for status, number in count.items() if number)
+    lines = [f"{record.name}: {len(found)} points, {text or 'none'}"]
     failed = [(number, state) for number, state in enumerate(found) if state.status == "failed"]
     lines += [f"  failed     point {number}: {state.message}" for number, state in failed[:_MOST_FAILURES]]
     if len(failed) > _MOST_FAILURES:

@@ -105,8 +105,8 @@ def predict(case: Case) -> dict[str, Any]:
             "velocity": _number(linear),
             "reason": reason,
         },
-        "coulomb": _told(case, viscous=False),
-        "viscous": _told(case, viscous=True),
+        "coulomb": _predicted(case, viscous=False),
+        "viscous": _predicted(case, viscous=True),
         "detachment": {"gamma": float(end.gamma), "contact": CONTACTS[int(end.contact)]},
         "alignment": alignment_of(case),
         "outside": outside_of_the_paper(case),
@@ -137,11 +137,11 @@ def outside_of_the_paper(case: Case) -> str | None:
         > (1.0 + 1e-9) * LARGEST_ACCELERATION,
         f"{drive.frequency:g} Hz ({low:g} to {high:g} Hz)": not low <= drive.frequency <= high,
     }
-    beyond = [told for told, outside in found.items() if outside]
+    beyond = [one for one, outside in found.items() if outside]
     return f"outside the paper's measurements: {', '.join(beyond)}; no model is tested there" if beyond else None
 
 
-def _told(case: Case, *, viscous: bool) -> dict[str, Any]:
+def _predicted(case: Case, *, viscous: bool) -> dict[str, Any]:
     motion, reason = motion_of(case, viscous=viscous), None
     if not motion.solved[0]:
         reason = "the forces have no solution"
@@ -239,15 +239,15 @@ def describe_alignment(found: dict[str, Any]) -> list[str]:
     steep = f"Mathieu U = {found['u']:.3g}, V = {found['v']:.3g}, β = {found['damping']:.3g}: {stays}"
     rate = found["rate"]
     if rate is None:
-        told = "not known: the axial motion is not periodic"
+        text = "not known: the axial motion is not periodic"
     elif not found["stands"]:
         after = f"turns over after about {found['turns_over_after']:.2g} s"
-        told = f"{after} (from 1° to 90°; small angles grow by {rate:.3g}/s)"
+        text = f"{after} (from 1° to 90°; small angles grow by {rate:.3g}/s)"
     elif rate < -GROWS:
-        told = f"stands: small angles decay by {-rate:.3g}/s"
+        text = f"stands: small angles decay by {-rate:.3g}/s"
     else:
-        told = "stands: small angles stay small"
-    return [f"  alignment   {steep}", f"  with slip   {told}"]
+        text = "stands: small angles stay small"
+    return [f"  alignment   {steep}", f"  with slip   {text}"]
 
 
 def _speed(model: dict[str, Any]) -> str:
@@ -258,9 +258,9 @@ def _speed(model: dict[str, Any]) -> str:
 
 def _details(model: dict[str, Any]) -> str:
     rotation = ", ".join(with_decimals(value * 1e3, 2) for value in model["rotation"])
-    told = f"; bead rotation {rotation}, sliding of the large bead {with_decimals(model['sliding'][0] * 1e3, 2)} mm/s"
+    text = f"; bead rotation {rotation}, sliding of the large bead {with_decimals(model['sliding'][0] * 1e3, 2)} mm/s"
     gamma = model.get("threshold")
-    return told + (f"; threshold Γc = {gamma:.3f}" if gamma is not None else "")
+    return text + (f"; threshold Γc = {gamma:.3f}" if gamma is not None else "")
 
 
 def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, FloatArray], dict[str, int]]:

@@ -54,11 +54,7 @@ _NUMBERS = {
     ),
     "pair_time": ("total time of pairs", "s", "total time for which pairs are joined, over all meetings"),
     "clustered_share": ("walkers in clusters", "share", "share of walkers joined to others in the last frame"),
-    "largest_cluster": (
-        "walkers in the largest cluster",
-        "",
-        "number of walkers in the largest cluster of the last frame; 1 if none are joined",
-    ),
+    "largest_cluster": ("walkers in the largest cluster", "", "cluster size in the last frame; 1 if none are joined"),
     "held_share": (
         "walkers held by side walls",
         "share",
@@ -199,16 +195,16 @@ class Meetings(Analysis):
         label = "meetings of walkers"
         yield Quantity("merged", f"{label}: merged", "", "merged", "number of events in which two walkers merge")
         yield Quantity("parted", f"{label}: parted", "", "parted", "number of events in which two walkers separate")
-        told = "largest number of walkers joined by bridges at any time"
-        yield Quantity("largest_group", "largest group of walkers", "", "largest_group", told)
-        for name, (label, unit, told) in _NUMBERS.items():
-            yield Quantity(name, label, unit, name, told)
+        text = "largest number of walkers joined by bridges at any time"
+        yield Quantity("largest_group", "largest group of walkers", "", "largest_group", text)
+        for name, (label, unit, text) in _NUMBERS.items():
+            yield Quantity(name, label, unit, name, text)
         for approach, (_, angle) in _APPROACHES.items():
-            told = f"meetings of two walkers with headings {angle}"
-            yield Quantity(f"{approach}.met", "", "", f"{approach}_met", told)
+            text = f"meetings of two walkers with headings {angle}"
+            yield Quantity(f"{approach}.met", "", "", f"{approach}_met", text)
             for fate, words in _FATES.items():
-                told = f"number of pairs of {approach}_met that {words}"
-                yield Quantity(f"{approach}.{fate}", "", "", f"{approach}_{fate}", told)
+                text = f"number of pairs of {approach}_met that {words}"
+                yield Quantity(f"{approach}.{fate}", "", "", f"{approach}_{fate}", text)
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """Numbers of meetings, and the groups at the end."""

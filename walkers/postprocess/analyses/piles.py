@@ -160,7 +160,7 @@ class Pile(Analysis):
             **_bed_result(motion, bed, inner),
             "clusters": len(tracks),
             "events": dict(Counter(event.event for event in events)),
-            "climbs": [_told_climb(climb) for climb in climbs if climb.climbed],
+            "climbs": [_climb_row(climb) for climb in climbs if climb.climbed],
             "rim": case.boundary.height,
             "duration": case.duration,
             "definition": vars(definition),
@@ -192,13 +192,13 @@ class Pile(Analysis):
         yield Quantity("climbs", "", "m/s", "speed", "mean speed of the climbs", of=mean)
         highest = of_climbs(max, "height")
         yield Quantity("climbs", "", "m", "highest", "largest height of a climb", of=highest)
-        told, led = "number of climbs led by a large bead", of_climbs(sum, "leader_large")
-        yield Quantity("climbs", "", "", "led_by_large", told, of=led)
+        text, led = "number of climbs led by a large bead", of_climbs(sum, "leader_large")
+        yield Quantity("climbs", "", "", "led_by_large", text, of=led)
         yield Quantity("beads", "beads")
         yield Quantity("large", "large beads")
         yield Quantity("driven", "time of shaking", "s")
-        told = "number of clusters that are free of the pile and held by a wall"
-        yield Quantity("clusters", "clusters free of the pile and held by a wall", "", "clusters", told)
+        text = "number of clusters that are free of the pile and held by a wall"
+        yield Quantity("clusters", "clusters free of the pile and held by a wall", "", "clusters", text)
         for event in result.get("events", ()):
             yield Quantity(f"events.{event}", f"clusters {event}")
         yield Quantity("surface.start", "height of the surface at the start", "m")
@@ -209,9 +209,9 @@ class Pile(Analysis):
         yield Quantity("brazil_nut.end", label, "", "brazil_nut_end", label)
         yield Quantity("settling", "settling time", "s", "settling", "settling time before the drive")
         whens = {"rest": "at rest", "rest_inner": "at rest, beads away from walls", "shaken": "while shaken"}
-        for when, told in whens.items():
+        for when, text in whens.items():
             for what in ("contacts", "bridges"):
-                yield Quantity(f"coordination.{when}.{what}", f"{what} per bead, {told}")
+                yield Quantity(f"coordination.{when}.{what}", f"{what} per bead, {text}")
         for number, climb in enumerate(result.get("climbs", ())):
             place = f"climbs.{number}"
             name = f"climb {number + 1} ({' '.join(climb['walls'])}, led by a {_leader(climb)} bead)"
@@ -234,10 +234,10 @@ class Pile(Analysis):
             f"  surface    {surface['start'] * 1e3:.2f} mm at the start, {surface['end'] * 1e3:.2f} mm at the end",
             f"  segregation (z_large - z_small)/(z_large + z_small): {nuts['start']:.3f} at the start, "
             f"{nuts['end']:.3f} at the end",
-            f"  bridges    between beads, at rest: {_told_bridges(rest)}{alone}",
+            f"  bridges    between beads, at rest: {_bridges_text(rest)}{alone}",
         ]
         if shaken:
-            lines.append(f"             while shaken: {_told_bridges(shaken)}")
+            lines.append(f"             while shaken: {_bridges_text(shaken)}")
         lines += [
             f"  clusters   {result['clusters']} came free of the pile, held by a wall"
             + "".join(f", {count} {kind}" for kind, count in result["events"].items()),
@@ -302,12 +302,12 @@ def _bed_result(motion: Motion, bed: Columns, inner: Mapping[str, float | None])
     }
 
 
-def _told_climb(climb: Climb) -> dict[str, Any]:
+def _climb_row(climb: Climb) -> dict[str, Any]:
     """A climb in a result."""
     names = ("begin", "end", "onset", "qualified", "gain", "speed", "standard_error", "leader_large", "height")
     known = {name: getattr(climb, name) for name in (*names, "size", "large")}
-    told = {name: value if np.isfinite(value) else None for name, value in known.items()}
-    return {**told, "leader": climb.leader, "walls": climb.wall_names.split(), "out_of_pile": climb.out_of_pile}
+    finite = {name: value if np.isfinite(value) else None for name, value in known.items()}
+    return {**finite, "leader": climb.leader, "walls": climb.wall_names.split(), "out_of_pile": climb.out_of_pile}
 
 
 def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
@@ -352,7 +352,7 @@ def _members(tracks: Sequence[Track], beads: Beads) -> list[Member]:
     ]
 
 
-def _told_bridges(counts: Mapping[str, Any]) -> str:
+def _bridges_text(counts: Mapping[str, Any]) -> str:
     return f"{counts['bridges']:.2f} per bead, {counts['contacts']:.2f} of them in contact"
 
 

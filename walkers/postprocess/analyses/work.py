@@ -71,10 +71,10 @@ class Working(Analysis):
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
         """Work per cycle and cost of transport."""
         del result
-        told = "work of the drive on a walker per cycle, mean over the walkers"
-        yield Quantity("work", "of the drive per cycle", "J", "work", told)
-        told = "power of the drive over weight times walking speed, mean over the walkers"
-        yield Quantity("cost_of_transport", "cost of transport", "", "cost_of_transport", told)
+        text = "work of the drive on a walker per cycle, mean over the walkers"
+        yield Quantity("work", "of the drive per cycle", "J", "work", text)
+        text = "power of the drive over weight times walking speed, mean over the walkers"
+        yield Quantity("cost_of_transport", "cost of transport", "", "cost_of_transport", text)
 
     def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
         """The work on each walker, cycle by cycle."""

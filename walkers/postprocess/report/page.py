@@ -86,10 +86,10 @@ def drawn(panel: Panel) -> Figure:
     """A panel as an interactive plot (Bokeh)."""
     from bokeh.models.annotations import BoxAnnotation
 
-    told = [line.error for line in panel.lines if line.error is not None]
+    errors = [line.error for line in panel.lines if line.error is not None]
     values = np.concatenate([[0.0] if panel.zero else [], *(line.y for line in panel.lines)])
-    seen = bool(told) and errors_seen(np.concatenate(told), values)
-    title = panel.title + (", with standard errors" if seen else f"; {UNSEEN}" if told else "")
+    seen = bool(errors) and errors_seen(np.concatenate(errors), values)
+    title = panel.title + (", with standard errors" if seen else f"; {UNSEEN}" if errors else "")
     options: dict[str, Any] = {"y_range": panel.limits} if panel.limits else {}
     scale = "log" if panel.log else "linear"
     plot = new_plot(title, panel.x, panel.y.replace("\n", " "), y_axis_type=scale, **options)
