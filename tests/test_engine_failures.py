@@ -143,7 +143,7 @@ BAD_DECKS: dict[str, tuple[dict[str, object], Callable[[str], str], type[failure
     "half of the steps": ({"run": SHORT}, _half, failures.MissingFrames, "31 of 61 frames"),
     "beads that are lost": (FAST, _narrow, failures.BeadsLost, "left the simulation box"),
     "a large time step": (UNSTABLE, str, failures.BlowUp, "time step"),
-    "no numbers": ({"run": SHORT}, lambda text: re.sub("fix +motion", INFINITE, text), failures.BlowUp, "no number"),
+    "no numbers": ({"run": SHORT}, lambda text: re.sub("fix +motion", INFINITE, text), failures.BlowUp, "not a number"),
     "a long one": ({"run": LONG}, str, failures.TimeLimitExceeded, r"0\.6 s"),
 }
 
@@ -176,7 +176,7 @@ STRANGE_ENGINES = {
     ),
     "stops saying anything": (
         "liggghts -log none -in walker.lig; exec sleep 4711",
-        *(failures.EngineSilent, r"step (\d+) of \1,"),
+        *(failures.EngineSilent, r"step (\d+) of \1;"),
     ),
     "writes a line without end": ("exec tr '\\0' x < /dev/zero", failures.LogTooLong, r"2 MB \(run\.log_limit\)"),
     "writes lines without end": ("trap '' TERM; yes | tee -i /dev/null", failures.LogTooLong, "beyond 2 MB"),

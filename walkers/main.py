@@ -234,7 +234,7 @@ def _report_stop(stop: BaseException) -> int:
 
 
 def _drop_stdout() -> None:
-    """Let what is left to be printed go nowhere, that the interpreter's end is no failure of its own."""
+    """Discard the remaining output, so that the end of the interpreter raises no further error."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 

@@ -1,6 +1,6 @@
 """The benchmark tests of Chung and Ooi for contact models: the second engine and the published points.
 
-What each line is judged by: closed forms (Hertz, sliding all the way), to the time step (a thousandth of the contact)
+What each line is judged by: closed forms (Hertz, gross sliding), to the time step (a thousandth of the contact)
 or, where surfaces turn, to the overlap over the radius, by which the arm of a force is shorter; published points, to
 two per cent of the axis that they were read from.
 
@@ -267,7 +267,7 @@ def point_lines(curves: Curves) -> Iterator[Line]:
 
 
 def chapter(out: Path, *, quick: bool = False) -> Chapter:
-    """The benchmarks by the second engine; they take seconds, however ``quick`` it is to be, and no runs."""
+    """The benchmarks with the second engine, which take seconds with or without ``quick``."""
     del out, quick
     (lines, curves), panels = measure(), published()
     lines += point_lines(curves)

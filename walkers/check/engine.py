@@ -71,7 +71,7 @@ class SecondEngine:
         self._advance(self.clock, (self.clock, 1), np.empty((0, len(self.radius), 9)))
 
     def run(self, steps: int, every: int) -> FloatArray:
-        """Move on for so many steps: position, velocity and spin after each ``every``, shape (steps // every, N, 9)."""
+        """Integrate: position, velocity and spin after each ``every`` steps, shape (steps // every, N, 9)."""
         begin, end = self.clock, self.clock + steps
         frames = np.empty((steps // every, len(self.radius), 9))
         while self.clock < end:

@@ -143,7 +143,7 @@ def outcome(chapters: Sequence[Chapter]) -> str:
 
 
 def as_dict(chapters: Sequence[Chapter], **more: Any) -> dict[str, Any]:
-    """Plain JSON types of all chapters, and of what is said beside them."""
+    """Plain JSON types of all chapters and of further values."""
     passed = not any(chapter.failures for chapter in chapters)
     return {**more, "passed": passed, "checks": [chapter.as_dict() for chapter in chapters]}
 

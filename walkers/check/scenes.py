@@ -1,6 +1,6 @@
 """Scenes of a few beads: what moves, which law, and what is compared between the engine and the second engine.
 
-Most beads are moved on prescribed ways by the engine, and put where it had them by the second engine: forces and
+The engine moves most beads along prescribed paths, and the second engine follows their positions: forces and
 torques of each step are compared, over the largest of the scene. Others move freely from the same start in both, and
 their ways and spins are compared. Most scenes have `law`, whose pull and resistances are all there, and have nothing to
 do with each other; each law that comes with the program has two more.
@@ -102,7 +102,7 @@ def bench_case(**changes: Mapping[str, Any]) -> Case:
 
 
 def full_case(**changes: Mapping[str, Any]) -> Case:
-    """Friction, rolling friction, damping and the law of this module, but for some changes."""
+    """A case with friction, rolling friction, damping and the law of this module, with changes."""
     return bench_case(**{table: {**_FULL.get(table, {}), **changes.get(table, {})} for table in {**_FULL, **changes}})
 
 

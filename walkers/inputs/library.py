@@ -176,7 +176,7 @@ def _known(key: str, entry: Mapping[str, Any], of: Collection, liquids: tuple[st
 
 
 def check_library(tables: object, source: str) -> None:
-    """Refuse what is no library: raises `InputError` with ``source`` and the keys at fault."""
+    """Check a library: raises `InputError` with ``source`` and the keys at fault."""
     from walkers.inputs.library_file import LibraryFile
     from walkers.inputs.messages import validated
 

@@ -1,4 +1,4 @@
-"""From what a case file says to a resolved case: what it leaves out is the library's, usual, or follows from the rest.
+"""Resolve a case file: missing values come from the library, from defaults, or from other values.
 
 First what beads, liquid and contacts are made of, then the bodies and the checks that they fit into the boundary and
 beside each other.
@@ -48,7 +48,7 @@ _OF_SURFACES = (
 _VISCOSITIES = ("liquid.kinematic_viscosity", "liquid.dynamic_viscosity")
 _OF_LIQUIDS = ("liquid.surface_tension", "liquid.density", *_VISCOSITIES)
 SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_OF_SURFACES)
-"""Keys that a case may leave out because the library has them, or says what is usual."""
+"""Keys that a case may leave out because the library has values or defaults."""
 
 
 def supplied(document: Mapping[str, Any], known_to: Library, notes: Notes) -> dict[str, Any]:
@@ -336,7 +336,7 @@ def _spaced(case: Case, key: str, walkers: Walkers, notes: Notes) -> Walkers:
 
 
 def _check_bodies(case: Case, file: CaseFile) -> None:
-    """Refuse bodies for which there is no room within the boundary or beside each other."""
+    """Refuse bodies that do not fit into the boundary or beside each other."""
     boundary, mixture = case.boundary, case.mixture
     if case.run.ranks > 1 and not boundary.closed:
         raise unusable("run.ranks", "expected 1: walkers on a plane run slower on several processes")

@@ -15,12 +15,12 @@ SHOWN_UNITS = {
 }
 """For units of a result, those that are shown, and how many of them one is."""
 NOISE = {"": 1e-9, "mm/s": 1e-4, "mm": 1e-6, "°": 1e-3, "deg": 1e-3, "%": 1e-3, "nJ": 1e-6}
-"""In the units that are shown: what is smaller is rounding, and printed as 0."""
+"""In displayed units: smaller values are rounding errors and are printed as 0."""
 _LARGEST_WRITTEN_OUT = 1e7
 
 
 def rounded(value: float, unit: str = "") -> str:
-    """A number for people: at most four significant digits; 0 for what is rounding in a unit; a dash for none.
+    """A number as text: at most four significant digits; 0 for rounding errors in a unit; a dash for None.
 
     Examples
     --------

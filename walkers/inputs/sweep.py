@@ -182,7 +182,7 @@ def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) ->
 
 
 def _name_with(name: str, changes: Mapping[str, Value]) -> str:
-    """Name of a sweep with changes: another one, so that its table stands beside that of the sweep without."""
+    """Name of a sweep with changes, different from that of the sweep without changes."""
     text = ",".join(f"{key}={value}" for key, value in changes.items())
     full = re.sub(r"[^\w.+=,-]+", "_", f"{name},{text}")
     encoded = full.encode("utf-8", "surrogateescape")

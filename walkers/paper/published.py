@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 GRAVITY = 9.8
-"""The paper's g, m/s²."""
+"""The value of g in the paper, m/s²."""
 FIG4_PEAKS = (2.0, 10.0)
 """Fig. 4a and b: peak acceleration, g."""
 _DEVIATION = 0.15
@@ -74,7 +74,7 @@ class Point(NamedTuple):
 
 @dataclass(frozen=True)
 class Observation:
-    """Something that the paper says of walkers, most often a number, and of which walkers.
+    """A published observation, usually a number, and its walkers.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ def _read(given: dict[str, Any], reasons: Mapping[str, str]) -> Observation:
 
 _FILE = tomllib.loads(Path(__file__).with_name("published.toml").read_text("utf-8"))
 OBSERVATIONS = {given["key"]: _read(given, _FILE["reasons"]) for given in _FILE["numbers"]}
-"""All that the paper says of walkers, and what follows from it, by key."""
+"""All published observations, and quantities derived from them, by key."""
 FIT = {float(g): OBSERVATIONS[f"fig2_{g}g"].si for g in range(2, 7)}
 """Fig. 2: the paper's fitted curve below the plateau, m/s, at peak accelerations in g."""
 FIG3_FIT = {one.of[0].radii: one.si for key, one in OBSERVATIONS.items() if key.startswith("fig3_") and one.value}
@@ -184,7 +184,7 @@ ProgressOf = Callable[[str], AbstractContextManager[Callable[[SweepProgress], No
 
 
 class NothingFinishedError(WalkersError):
-    """A sweep of which nothing is there to be shown."""
+    """A sweep without finished points."""
 
 
 class Sources:

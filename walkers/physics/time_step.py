@@ -24,8 +24,8 @@ AUTO_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.2, "hertz": 0.1, "viscous":
 """Share of each limit that ``"auto"`` stays under where beads are loose: at 0.4 of the viscous limit (2 µs for
 glycerol) the climber and the pile were converged."""
 WALKER_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.4, "hertz": 0.2, "viscous": 0.4}
-"""The same where there are walkers alone, which do not heat each other: at 0.4 of Rayleigh their speeds are within
-0.25 % of those at 0.05 (Figs. 1b, 2, 3, 4a, 4b); between 0.59 and 0.71 of it they go wrong."""
+"""The same for cases with only walkers, which do not collide with each other: at 0.4 of the Rayleigh limit, velocities
+are within 0.25 % of those at 0.05 (Figs. 1b, 2, 3, 4a, 4b); between 0.59 and 0.71 of the limit they become wrong."""
 LONGEST_WALKER_STEP = 4e-6
 """s; longest step of walkers, independent of their stiffness."""
 Bridged = Sequence[tuple[float, Sequence[float]]]

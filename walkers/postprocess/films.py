@@ -1,4 +1,4 @@
-"""Films of runs: beads that are seen to roll, with the physical time, the slow motion and a scale in the picture.
+"""Films of runs with rolling beads, physical time, slow motion and a scale bar.
 
 The camera rests in the laboratory, so that the boundary is seen to shake; where the path of the beads is long it moves
 along with them. Films whose pictures are half a cycle apart or more show one phase of the drive, as a stroboscope does.

@@ -101,7 +101,7 @@ class Motion:
         return self.select(slice(self.first_driven, None)) if self.first_driven else self
 
     def select(self, frames: slice = slice(None), beads: IntArray | None = None, **changes: Any) -> Motion:
-        """Some of the frames and beads, with changes; beads are numbered anew, walkers keep their numbers."""
+        """Selected frames and beads, with changes; beads are renumbered, walkers keep their numbers."""
         parts: dict[str, Any] = {
             name: None if (one := getattr(self, name)) is None else one[frames] for name in _OF_FRAMES
         }

@@ -15,15 +15,15 @@ from walkers.inputs.rounding import SHOWN_UNITS, rounded
 from walkers.runner.files import read_json
 
 SPREAD_NAME = "spread.json"
-"""In the directory of a spread (`spread_of`): its bands."""
+"""File of the bands in the directory of a spread (`spread_of`)."""
 LEAST_PER_VALUE = 3
-"""Draws for each value that a spread varies, below which its band is rough and ranks are chance."""
+"""Draws per varied value below which the band is approximate and rank correlations are not significant."""
 _OVER = "over the ranges of uncertain values"
 _WIDTH = 110
 
 
 def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
-    """What a result rests on that nobody measured, and what the case calls uncertain.
+    """Unmeasured values of a result, and values that the case calls uncertain.
 
     Each has a ``key``, ``value`` (as a case file would say it), ``origin`` (``given``, ``library``, ``calibrated`` or
     ``default``), ``range`` (both ends, or None), ``logarithmic``, and whether it is ``guessed``.

@@ -125,12 +125,12 @@ def _sums(contents: dict[str, Any], directory: Path) -> dict[str, str]:
 
 
 def forget_tables(directory: Path, names: Collection[str]) -> None:
-    """Say no more in the manifest of a finished run what files are that are about to be made anew."""
+    """Remove files that will be recomputed from the manifest of a finished run."""
     _change(directory, names, anew=False)
 
 
 def record_tables(directory: Path, names: Collection[str]) -> None:
-    """Say in the manifest of a finished run that files were made anew from its dumps: by what, when, what they are now.
+    """Record in the manifest of a finished run that files were recomputed from its dumps: program, time, checksums.
 
     Between `forget_tables` and this, the manifest says nothing of them: who is killed there leaves no false alarm.
     """

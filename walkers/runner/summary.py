@@ -65,7 +65,7 @@ def predicted_seconds(case: Case, walkers: int | None = None) -> float:
 
 
 def predicted_overhead(cases: Iterable[Case]) -> float:
-    """CPU time in s of what is done for runs besides the engine's work: bridges are solved, motions are measured."""
+    """CPU time in s besides the engine: solving bridges and measuring motions."""
     from walkers.physics.bridge import Surfaces
     from walkers.physics.laws.young_laplace import unsolved
 

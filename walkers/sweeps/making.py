@@ -1,4 +1,4 @@
-"""Make runs: one by decks of its own, segment by segment, or several at once by a shared deck.
+"""Make runs: single runs segment by segment, or several at once in a shared deck.
 
 A run is made in ``NAME-HASH.incomplete``, its segments in ``segments/0000``, ``segments/0001``, … there, each from a
 restart file to the next. A segment that is being made is called ``0003.new`` and gets its name when it is whole; an
@@ -76,7 +76,7 @@ _Tell = Callable[[Progress], None]
 
 
 class DamagedSegment(WalkersError):
-    """A segment of an unfinished run that cannot be gone on from."""
+    """A segment of an unfinished run from which the run cannot continue."""
 
 
 def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
@@ -193,7 +193,7 @@ def _are_constant(directory: Path) -> bool:
 
 @dataclass
 class OpenRun:
-    """A run that is being made, or gone on with, in a directory of its own beside its final place (`open_locked`).
+    """A run in progress, in a directory beside its final place (`open_locked`).
 
     ``done`` is what the segments that are whole say of themselves, ``ended`` why there are not more, if not all are.
     """
@@ -243,7 +243,7 @@ class OpenRun:
                 return
 
     def _next_segment(self, case: Case) -> Segment | None:
-        """The segment that is to be made next, of the run or an attempt at it; None after the last one."""
+        """The next segment of the run or of an attempt; None after the last one."""
         if not self.done:
             return first_segment(case)
         begin, start = int(self.done[-1]["end"]), drive_from(self.case, self.done)

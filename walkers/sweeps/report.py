@@ -1,4 +1,4 @@
-"""The report of a sweep: its table, a plot of it, and as many whole runs as fit."""
+"""Report of a sweep: table, plot, and as many complete runs as fit."""
 
 from __future__ import annotations
 

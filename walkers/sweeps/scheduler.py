@@ -70,7 +70,7 @@ class ClusterFailed(WalkersError):
 
 @dataclass(frozen=True)
 class Options:
-    """How a sweep is run: by so many decks at once on this machine, or on a cluster (whose own number counts).
+    """Options of a sweep: number of parallel decks on this machine, or a cluster (which sets the number).
 
     A point that failed is tried again ``retries`` times, but not after failures of the names ``final``, not by a later
     call either: the engine would meet them again. ``time_limit`` is the wall time in s that an engine may take.
@@ -140,7 +140,7 @@ class PlannedDeck:
 
 
 def pack(cases: Mapping[int, Case], workers: int, longest_seconds: float = LONGEST_SECONDS) -> list[PlannedDeck]:
-    """Pack points, by their numbers, into decks for so many workers; the longest first, as they are to be started.
+    """Pack points, by number, into decks for a number of workers; the longest decks first.
 
     No deck of several points may exceed a predicted time.
     """
@@ -225,7 +225,7 @@ def _missing_decks(
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """What a sweep would do: its points with their statuses, the decks that are missing, what is not run again.
+    """Plan of a sweep: points with their status, missing decks, runs that are not repeated.
 
     Of a sweep with a descent these are all decks down to its bottom: it may end earlier.
     """
@@ -263,7 +263,7 @@ class SweepPlan:
 
 
 def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = None) -> SweepPlan:
-    """Resolve a sweep's points and see what is missing; nothing is written.
+    """Resolve the points of a sweep and find the missing ones; nothing is written.
 
     What it is given, and raises, is as of `run_sweep`.
     """
@@ -343,7 +343,7 @@ def run_sweep(
 
 @dataclass(frozen=True)
 class Report:
-    """What became of a deck: velocities (m/s) of its finished runs (others are busy elsewhere), or its failure.
+    """Outcome of a deck: velocities (m/s) of its finished runs, or its failure.
 
     A failure has the name of its class, what it says, and where its remains are.
     """

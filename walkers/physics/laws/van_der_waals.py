@@ -8,7 +8,7 @@ It is that of smooth surfaces, 0.12 mN for a bead of 0.3 mm on a plane, as much 
 nanometres leave a hundredth of it or less (take a larger ``cutoff``). It changes within nanometres, of which a step of
 a simulation must be a small part.
 
-A law of one's own takes another constant, in a file of its own, by its name there (`walkers.physics.laws`):
+For another constant, define a law in a file of your own (`walkers.physics.laws`):
 
     law = functools.partial(walkers.physics.laws.van_der_waals.law, hamaker_constant=15e-20)
 

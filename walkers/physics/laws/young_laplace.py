@@ -26,8 +26,8 @@ from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Surfaces
 
 NODES = (24, 48, 96)
-"""Gaps at which the equation is solved: as many as the last coefficients tell, of which the largest suffices for
-errors below 1e-7 of the pull at contact at volumes above 1e-6 R³."""
+"""Numbers of gaps at which the equation is solved, increased until the last coefficients are small; the largest one
+suffices for errors below 1e-7 of the pull at contact at volumes above 1e-6 R³."""
 _Shape = tuple[float, float, float]
 _SMALL = 1e-9
 """Of the pull at contact: the last coefficients of a polynomial that is fine enough."""

@@ -1,4 +1,4 @@
-"""One HTML file that carries all that it shows: libraries, plots and players, packed; no network, no other file.
+"""Self-contained HTML file: libraries, plots and players are packed into it; no network, no other file.
 
 A page is a list of sections, one of which is shown at a time where there is JavaScript; without it all of their tables
 can be read.
@@ -38,7 +38,7 @@ COLOURS = ("#b0203c", "#1f3b73", "#3f7f93", "#c78a2c", "#5b6770", "#7a4a8c", "#4
 _MARKERS = {"o": "circle", "s": "square", "^": "triangle", "v": "inverted_triangle", "D": "diamond", "x": "x"}
 """What Bokeh calls them; others are diamonds."""
 _MOST_POINTS = 600
-"""Of a line; what is longer is thinned out."""
+"""Largest number of points of a line; longer lines are thinned out."""
 
 
 def check_report(path: Path) -> None:

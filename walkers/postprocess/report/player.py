@@ -59,7 +59,7 @@ class Player:
 
 
 def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: int = 480) -> Player:
-    """The player of a run directory or the motion in it, so many pixels high.
+    """The player of a run directory or of its motion, with a height in pixels.
 
     Beads times instants are so many ``places`` at most: instants are left out evenly, and walkers if they are many.
     """
