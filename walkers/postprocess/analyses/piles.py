@@ -50,7 +50,7 @@ class Bed:
     """``bed.parquet``: one row per frame of a pile."""
 
     time: Annotated[float, "s", "time since the start of the drive; negative while the pile settles"]
-    surface: Annotated[float, "m", "surface of the bulk: median over x-y cells of the height of the topmost bead"]
+    surface: Annotated[float, "m", "height of the bulk surface: median over x-y cells of the top of the highest bead"]
     surface_low: Annotated[float, "m", "10th percentile of these heights"]
     surface_high: Annotated[float, "m", "90th percentile of these heights"]
     brazil_nut: Annotated[float, "", "Brazil-nut index (z_large - z_small)/(z_large + z_small) of mean heights"]
