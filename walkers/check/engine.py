@@ -54,7 +54,7 @@ class SecondEngine:
         without: Collection[str] = (),
     ) -> None:
         if unknown := set(without) - set(TERMS):
-            raise ValueError(f"without {unknown}: expected some of {', '.join(TERMS)}")
+            raise ValueError(f"without {unknown}: expected any of {', '.join(TERMS)}")
         self.clock, self.radius = clock, np.ascontiguousarray(radius, dtype=np.float64)
         self.constants = _constants(case, self.radius, walls or case.boundary.walls, without)
         place, velocity, spin = (np.array(start[:, one : one + 3], dtype=np.float64, order="C") for one in (0, 3, 6))

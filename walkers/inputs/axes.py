@@ -156,7 +156,7 @@ def listed(key: str, given: object) -> Axis:
     for value in values:
         same = repr([_quantity(part) or part for part in (value if isinstance(value, list) else [value])])
         if same in known:
-            raise unusable(key, "expected different values: this one is there twice", value)
+            raise unusable(key, "expected different values: this one occurs twice", value)
         known.add(same)
     return Axis.of({key: values})
 

@@ -296,5 +296,5 @@ def _problems_of_keys(file: CalibrationFile) -> Iterator[Problem]:
                     yield Problem(f"parameters.{name}.keys", None, text)
     for key, having in taken.items():
         if lacking := [experiment for experiment in file.experiments if experiment not in having]:
-            text = f"no parameter gives {key} to {', '.join(lacking)}: all experiments have it or none"
+            text = f"no parameter sets {key} for {', '.join(lacking)}: expected it for all experiments or none"
             yield Problem("parameters", None, text)

@@ -215,7 +215,7 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
             tables = changed(read_case(base, folder), settings)
             changed(tables, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:
-        raise refused(source, "has tables within tables without end") from error
+        raise refused(source, "has infinitely nested tables") from error
     descend = file.descend
     return Sweep(
         name=name,

@@ -43,7 +43,7 @@ def by_name(name: str) -> BridgeLaw:
         place, function = f"{__name__}.{name.replace('-', '_')}", "law"
     elif offer := offers("walkers.bridge_laws").get(name):
         if not callable(law := offer.load(call=False)):
-            raise offer.broken("it is no function")
+            raise offer.broken("it is not a function")
         return law  # type: ignore[no-any-return]
     if not place or not function:
         names = ", ".join([*LAWS, *offers("walkers.bridge_laws")])
