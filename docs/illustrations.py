@@ -149,6 +149,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     "pile-starts": _of_climbs("pile-starts", assembly=_ASSEMBLES),
     "pile-controls": _of_climbs("pile-controls", "pile-starts"),
     "pile-needs": _of_climbs("pile-needs"),
+    "pile-map": _of_climbs("pile-map"),
     "pile-calibrated": _of_climbs("pile-calibrated"),
     "pile-cylinder": _of_climbs("pile-cylinder"),
     "pile-film": _of_run(

@@ -497,14 +497,14 @@ def test_the_shipped_climber_comes_upright_and_climbs(upright: Path) -> None:
 
 
 def test_posture_is_that_of_the_whole_run(upright: Path) -> None:
-    """Of the same motion, turned: leaning from 15° on, turned over from 90°, whatever comes after."""
+    """The same motion, turned: leaning from 15° on, turned over from 90° after the start, whatever comes after."""
     group = read_motion(upright).groups[0]
     assert postures(group) == ["upright"] * 6
     assert np.isnan(turned_over_at(group)).all()
     tilting = np.linspace(0.0, np.radians(20.0), len(group.time))[:, None]
     over = np.where(group.time == group.time[9], np.radians(100.0), 0.0)[:, None]
-    low, high = (np.full((len(group.time), 1), np.radians(angle)) for angle in (14.0, 16.0))
-    turns = ((low, "upright"), (high, "leaning"), (tilting, "leaning"), (0.5 * tilting, "leaning"))
+    low, high, back = (np.full((len(group.time), 1), np.radians(angle)) for angle in (14.0, 16.0, 150.0))
+    turns = ((low, "upright"), (high, "leaning"), (back, "leaning"), (tilting, "leaning"), (0.5 * tilting, "leaning"))
     for turn, expected in (*turns, (over, "turned over")):
         turned = replace(group)
         turned.__dict__["orientation"] = np.broadcast_to(turn, group.orientation.shape)

@@ -49,6 +49,7 @@ def test_values_know_where_they_come_from() -> None:
     )
     friction = found["contact.friction.bead_wall"]
     assert friction.origin == "calibrated"
+    assert found["contact.restitution"].source.startswith("assumed in the calibration")
     assert friction.range is not None
     assert friction.range[0] < float(friction.text) < friction.range[1]
     assert found["dimers.replicates"] == Origin("dimers.replicates", "6", "default")

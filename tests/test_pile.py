@@ -37,7 +37,8 @@ from walkers.runner.failures import EngineError, EngineKilled, RunBusy
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.runner.summary import notes
-from walkers.sweeps.climbing import conditions_in, describe_climbs, leaders, summarise_climbs, survival
+from walkers.sweeps.climbing import Condition, conditions_in, describe_climbs, leaders, summarise_climbs, survival
+from walkers.sweeps.climbing_figure import climbs_figure
 from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep
 from walkers.sweeps.site import Site, SiteFile
 from walkers.sweeps.table import load
@@ -512,8 +513,19 @@ def test_of_runs_that_begin_alike_the_longest_counts(tmp_path: Path, monkeypatch
     monkeypatch.setattr("walkers.sweeps.climbing.finished_run", cases.get)
     monkeypatch.setattr(Pile, "applies", lambda self, case: True)
     usual, other = conditions_in([tmp_path])
-    assert (usual.label, usual.runs) == ("", [tmp_path / "b-2", tmp_path / "c-3"])
+    assert (usual.label, usual.runs) == ("deck version = 7", [tmp_path / "b-2", tmp_path / "c-3"])
     assert (other.label, other.runs) == ("deck version = 6", [tmp_path / "e-5"])
+
+
+def test_two_keys_make_a_map_of_rates(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each value of one key with each of the other; a pair less, and the conditions are listed."""
+    found = summed_up(monkeypatch, as_results(np.array([9.0]), np.array([4.0]), takes=1.0))
+    grid = [Condition("", {}, {"a": a, "b": b}, []) for a, b in product(("10 g", "2 g"), ("1", "3", "2"))]
+    (drawn, _) = climbs_figure(grid, [found] * 6).axes
+    assert [tick.get_text() for tick in drawn.get_xticklabels()] == ["2 g", "10 g"]
+    assert [tick.get_text() for tick in drawn.get_yticklabels()] == ["1", "2", "3"]
+    assert [one.get_text() for one in drawn.texts] == ["0 (0 to 0.92)\n0/1"] * 6
+    assert len(climbs_figure(grid[1:], [found] * 5).axes) == 4
 
 
 def test_runs_that_climbers_ended_tell_of_later_times() -> None:

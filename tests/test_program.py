@@ -146,7 +146,7 @@ def test_the_library_lists_what_can_be_named_and_says_where_each_number_is_from(
     for name in ("fig1b", "fig3", "ruby", "young-laplace"):
         assert any(line.startswith(f"{name} ") and len(line.split()) > 4 for line in listed), "a title"
     assert "walkers run fig1b" in call("library", "fig1b", check=True).stdout
-    assert "typical data-sheet value" in call("library", "pmma", check=True).stdout
+    assert "PLEXIGLAS GS data sheet" in call("library", "pmma", check=True).stdout
     done = call("library", "steel")
     assert (done.returncode, "expected one of stainless steel, chrome steel" in done.stderr) == (2, True)
 

@@ -18,6 +18,7 @@ from walkers.inputs.errors import InputError
 from walkers.inputs.numerical import STIFFER, measured, numerical_error
 from walkers.inputs.readable import kind_of
 from walkers.inputs.rounding import rounded
+from walkers.paper.published import outside_of_the_paper
 from walkers.physics.units import parse_quantity
 from walkers.pipeline import find_side
 from walkers.postprocess.analysis import describe_result
@@ -26,7 +27,7 @@ from walkers.postprocess.uncertainty import band_text
 from walkers.sweeps.comparison import compare_runs
 from walkers.sweeps.folder import as_text, inventory
 from walkers.sweeps.table import default_column, row_of
-from walkers.theory.prediction import describe, outside_of_the_paper, predict
+from walkers.theory.prediction import describe, predict
 
 
 def test_numerical_errors_are_those_of_the_shipped_cases_alone() -> None:
@@ -158,7 +159,8 @@ def test_theory_says_where_the_paper_measured_nothing(changes: dict[str, str], t
     case = load_case("fig1b", changes)
     found = outside_of_the_paper(case)
     assert found is None if told is None else told in (found or "")
-    assert ("outside the paper's measurements" in describe(predict(case), None)) == (told is not None)
+    described = describe({**predict(case), "outside": found}, None)
+    assert ("outside the paper's measurements" in described) == (told is not None)
 
 
 def test_theory_says_nothing_of_the_papers_fit_to_other_beads() -> None:

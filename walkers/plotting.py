@@ -129,7 +129,8 @@ def _figure_of(
     predicted: dict[str, FloatArray] = {}
     cases: list[Case] = []
     if theory:
-        from walkers.theory.prediction import outside_of_the_paper, predicted_column
+        from walkers.paper.published import outside_of_the_paper
+        from walkers.theory.prediction import predicted_column
 
         cases = [case_of(Path(run)) for run in done["run"]]
         predicted, reasons = predicted_column(cases, column)

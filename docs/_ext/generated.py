@@ -191,6 +191,7 @@ def _columns() -> str:
 def _library() -> str:
     """The library of materials and liquids with its sources, as ``walkers library`` has it."""
     text = "# Library\n\nThe library of the program. A case can override each number. `walkers library` prints it.\n"
+    text += "\nSources of liquids give the temperature. Densities and moduli of a grade differ by several per cent.\n"
     found = catalogue(of_others=False)
     for kind in ("materials", "liquids", "surface pairs"):
         text += f"\n## {kind.capitalize()}\n"

@@ -72,12 +72,13 @@ def show(
         print_as(as_json, lambda: summary, lambda: describe(summary))
         return
     from walkers.inputs.errors import InputError, Problem
+    from walkers.paper.published import outside_of_the_paper
     from walkers.pipeline import load_run
     from walkers.runner.failures import EngineMissing
     from walkers.theory import prediction
 
     try:
-        predicted = prediction.predict(loaded)
+        predicted = {**prediction.predict(loaded), "outside": outside_of_the_paper(loaded)}
     except ValueError as error:
         key, _, why = str(error).partition(": ")
         raise InputError(case, [Problem(key, None, why)]) from error

@@ -26,7 +26,7 @@ _HEADS = {"youngs_modulus": "Young's modulus", "poissons_ratio": "Poisson's rati
 COMMANDS = {"cases": "run", "sweeps": "sweep", "calibrations": "calibrate"}
 NOT_KNOWN = """\
 The friction between other pairs of wet surfaces and the values below have not been measured. A case that does not give
-them uses these defaults. walkers run --spread varies them within their ranges."""
+them uses these defaults, and walkers run --spread varies them within these ranges. Both are assumptions."""
 
 
 @dataclass(frozen=True)

@@ -170,7 +170,7 @@ def _of_packages() -> Sequence[Collection]:
 def _known(key: str, entry: Mapping[str, Any], of: Collection, liquids: tuple[str, ...] = ()) -> Known:
     kind, value = _KINDS.get(key.rpartition(".")[2]), entry["value"]
     number = units.parse_quantity(value, kind) if kind else float(value)
-    source = f"calibrated with {' and '.join(liquids)}" if liquids else entry.get("source", "")
+    source = entry.get("source", f"calibrated with {' and '.join(liquids)}" if liquids else "")
     ends = (entry["range"][0], entry["range"][1]) if "range" in entry else None
     return Known(number, value, ", ".join(filter(None, (of.place, source))), ends, liquids, of.origin)
 

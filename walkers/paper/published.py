@@ -21,6 +21,7 @@ from walkers.inputs.drive import Drive, Harmonic
 from walkers.inputs.errors import WalkersError
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
+from walkers.physics.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.motion import Group, read_motion
 from walkers.sweeps.scheduler import SweepProgress
 from walkers.sweeps.table import load
@@ -28,10 +29,8 @@ from walkers.sweeps.table import load
 if TYPE_CHECKING:
     import pandas as pd
 
-GRAVITY = 9.8
+GRAVITY = ACCELERATION_OF_ONE_G
 """The value of g in the paper, m/s²."""
-FIG4_PEAKS = (2.0, 10.0)
-"""Fig. 4a and b: peak acceleration, g."""
 _DEVIATION = 0.15
 
 
@@ -142,6 +141,31 @@ FIT = {float(g): OBSERVATIONS[f"fig2_{g}g"].si for g in range(2, 7)}
 """Fig. 2: the paper's fitted curve below the plateau, m/s, at peak accelerations in g."""
 FIG3_FIT = {one.of[0].radii: one.si for key, one in OBSERVATIONS.items() if key.startswith("fig3_") and one.value}
 """Fig. 3: the same curve at Γ0 = 0.5, m/s, by the radii in mm."""
+FIG4_PEAKS = tuple(OBSERVATIONS[f"fig4{letter}_velocity"].of[0].peak or 0.0 for letter in "ab")
+"""Fig. 4a and b: peak acceleration, g."""
+
+
+def outside_of_the_paper(case: Case) -> str | None:
+    """How a case lies outside the range in which the paper measured velocities; None if it lies within.
+
+    Of a case that is no dimer's nothing is said.
+    """
+    if not case.walkers or len(case.walkers[0].radii) != 2:
+        return None
+    points = [point for one in OBSERVATIONS.values() for point in one.of]
+    most = max(one.value or 0.0 for one in OBSERVATIONS.values() if one.quantity == "gamma0")
+    strongest = max(point.peak or 0.0 for point in points)
+    frequencies = [point.frequency for point in points if point.frequency is not None]
+    low, high = min(frequencies), max(frequencies)
+    peak, frequency = case.drive.peak_acceleration / GRAVITY, case.drive.frequency
+    gamma0 = dimer_of(case).gamma0(case.drive.peak_acceleration)
+    found = {
+        f"Γ0 = {gamma0:.3g} (measured up to {most:g})": gamma0 > most,
+        f"{peak:.3g} g (up to {strongest:g} g)": peak > (1.0 + 1e-9) * strongest,
+        f"{frequency:g} Hz ({low:g} to {high:g} Hz)": not low <= frequency <= high,
+    }
+    beyond = [one for one, outside in found.items() if outside]
+    return f"outside the paper's measurements: {', '.join(beyond)}; no model is tested there" if beyond else None
 
 
 # --- its walkers as cases, with the shipped parameters ----------------------------------------------------------------

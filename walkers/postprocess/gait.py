@@ -292,19 +292,19 @@ def settled_samples(group: Group) -> slice:
 
 
 def turned_over_at(group: Group) -> FloatArray:
-    """When each walker was first off by more than a right angle at the end of a cycle, s; NaN if never, shape (W,)."""
+    """End of the cycle in which a walker first turned by more than 90° from its start, s; NaN if none; shape (W,)."""
     strobe = group.case.run.samples_per_cycle
-    over = np.abs(group.orientation[::strobe]) > np.pi / 2.0
+    over = np.abs(group.orientation[::strobe] - group.orientation[0]) > np.pi / 2.0
     return np.where(over.any(axis=0), group.time[::strobe][over.argmax(axis=0)], np.nan)
 
 
 def postures(group: Group) -> list[str]:
-    """What became of each walker on a slope or a wall, of `POSTURES`.
+    """Posture of each walker on a slope or a wall, one of `POSTURES`.
 
-    A walker that leads uphill with its large bead stands on its head, as a pendulum would; a velocity says nothing of
-    it unless it is known whether it still does. Judged once a cycle, by the angle from where it was to face: one has
-    turned over that was off by more than a right angle at some time; one is upright that ends within 15° and is tilting
-    no more (in the second half of the run it came nearer, or went off by less than half a degree).
+    A walker with its large bead uphill can tip over like an inverted pendulum; its velocity has a meaning only as long
+    as it does not. Evaluated once per cycle. A walker has turned over if it turned by more than 90° from its start. It
+    is upright if it ends within 15° of the direction given by facing and no longer tilts: in the second half of the run
+    the angle decreased, or increased by less than half a degree. All others lean.
     """
     off = np.abs(group.orientation[:: group.case.run.samples_per_cycle])
     end, middle = off[-1], off[len(off) // 2]
@@ -348,7 +348,7 @@ def _is_constant(group: Group) -> bool:
 
 
 def on_axis(walkers: pd.DataFrame) -> pd.Series[bool]:
-    """Whether walkers of a table ``walkers`` end near the direction that they started to face."""
+    """Whether walkers of a table ``walkers`` end near the direction given by facing."""
     return walkers["orientation_end"].abs() < ASTRAY
 
 

@@ -46,8 +46,8 @@ _ALIKE = 1e-6  # lengths of runs that differ by less, relatively, are the same
 class Condition:
     """Finished runs of piles that differ by their seeds and lengths alone.
 
-    ``source`` is the sweep or folder, where there are several; ``usual`` has the value of each key that most conditions
-    of it have, ``differs`` those of this one that are others.
+    ``source`` is the sweep or folder, where there are several; ``usual`` has the most common value of each key, if one
+    value is more common than any other; ``differs`` has the other values of this condition.
     """
 
     source: str
@@ -72,10 +72,11 @@ def conditions_in(directories: Sequence[Path]) -> list[Condition]:
         groups = _groups(directory)
         known = [values for values, _ in groups]
         keys = list(dict.fromkeys(key for values in known for key in values))
-        usual = {key: Counter(values.get(key, "") for values in known).most_common(1)[0][0] for key in keys}
+        counts = {key: Counter(values.get(key, "") for values in known).most_common(2) for key in keys}
+        usual = {key: most[0][0] for key, most in counts.items() if len({number for _, number in most}) == len(most)}
         source = directory.name if len(directories) > 1 else ""
         for values, runs in groups:
-            differs = {key: values[key] for key in keys if key in values and values[key] != usual[key]}
+            differs = {key: values[key] for key in keys if key in values and values[key] != usual.get(key)}
             found.append(Condition(source, usual, differs, runs))
     return found
 

@@ -31,11 +31,16 @@ def climbs_figure(conditions: Sequence[Condition], found: Sequence[Mapping[str, 
     The first row is of the first condition that differs by nothing, else of the first one: the share of piles that have
     climbed by a time (Kaplan and Meier's estimate), speeds against sizes, rates. Below is a panel for each key that
     varies: the rates against its values, of conditions that differ by nothing else, and how many of the piles climbed.
-    Where conditions differ by several keys, or come from several sweeps, a single panel lists them all.
+    Where conditions differ otherwise by several keys, or come from several sweeps, a single panel lists them all. If
+    they are all pairs of values of two keys, the figure is a map of the rates.
     """
     usual = next((number for number, one in enumerate(conditions) if not one.differs), 0)
     keys = list(dict.fromkeys(key for one in conditions for key in one.differs))
     first = ["survival", "climbs", "rates"]
+    if grid := _grid(conditions, keys):
+        figure, axes = new_figure(TWO_COLUMNS, _ROW * (0.3 + 0.35 * len(grid[1])), mosaic=[["map"]])
+        _draw_map(axes["map"], keys, grid, found)
+        return figure
     if any(len(one.differs) > 1 or one.source for one in conditions):
         mosaic, heights = [first, ["conditions"] * _ACROSS], [1.0, 0.3 + len(conditions) / 6.0]
     else:
@@ -74,14 +79,31 @@ def _at(conditions: Sequence[Condition], key: str) -> tuple[list[str], list[int]
         if not set(one.differs) - {key}
     }
 
-    def size(text: str) -> tuple[float, str]:
-        try:
-            return float(text.partition(" ")[0].partition("/")[0]), text
-        except ValueError:
-            return float("inf"), text
-
-    labels = sorted(alone, key=size)
+    labels = sorted(alone, key=_by_number)
     return labels, [alone[label] for label in labels]
+
+
+def _by_number(text: str) -> tuple[float, str]:
+    try:
+        return float(text.partition(" ")[0].partition("/")[0]), text
+    except ValueError:
+        return float("inf"), text
+
+
+def _grid(conditions: Sequence[Condition], keys: Sequence[str]) -> tuple[list[str], list[str], list[list[int]]] | None:
+    """Values of the first and of the second key, and the numbers of their conditions, a row for each of the second.
+
+    None if not two keys vary, or not every pair of values is a condition.
+    """
+    at = {
+        tuple(one.differs.get(key, one.usual.get(key, "")) for key in keys): number
+        for number, one in enumerate(conditions)
+    }
+    columns, rows = ([*dict.fromkeys(pair[place] for pair in at)] for place in (0, 1)) if len(keys) == 2 else ([], [])
+    if not len(at) == len(conditions) == len(columns) * len(rows) or min(len(columns), len(rows)) < 2:
+        return None
+    columns, rows = sorted(columns, key=_by_number), sorted(rows, key=_by_number)
+    return columns, rows, [[at[column, row] for column in columns] for row in rows]
 
 
 def _draw_survival(panel: Axes, found: Mapping[str, Any]) -> None:
@@ -119,6 +141,28 @@ def _draw_rates(
         crowded = sum(map(len, told)) > _MOST_LETTERS
         panel.set_xticks(places, told, rotation=30 if crowded else 0, ha="right" if crowded else "center")
         panel.set(ylabel=_RATE, ylim=(0.0, None), xlim=sides)
+
+
+def _draw_map(
+    panel: Axes,
+    keys: Sequence[str],
+    grid: tuple[list[str], list[str], list[list[int]]],
+    found: Sequence[Mapping[str, Any]],
+) -> None:
+    """Rates over two keys: in each cell the rate with its interval, and how many of the piles climbed."""
+    columns, rows, numbers = grid
+    rates = np.array([[found[number]["rate"] for number in row] for row in numbers], dtype=float)
+    shown = panel.imshow(rates, cmap="Blues", vmin=0.0, aspect="auto", origin="lower")
+    for place, number in np.ndenumerate(np.array(numbers)):
+        one, ends = found[number], found[number]["rate_interval"] or (np.nan, np.nan)
+        text = f"{one['rate']:.2g} ({ends[0]:.2g} to {ends[1]:.2g})\n{one['climbed']}/{one['runs']}"
+        colour = "w" if rates[place] > 0.6 * np.nanmax(rates) else "k"
+        panel.text(place[1], place[0], text, ha="center", va="center", color=colour)
+    panel.set_xticks(range(len(columns)), list(map(plain_text, columns)))
+    panel.set_yticks(range(len(rows)), list(map(plain_text, rows)))
+    panel.set(xlabel=plain_text(keys[0]), ylabel=plain_text(keys[1]))
+    panel.grid(visible=False)
+    panel.figure.colorbar(shown, ax=panel, label=_RATE)
 
 
 _COLUMNS = (

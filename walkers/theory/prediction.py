@@ -12,7 +12,6 @@ import numpy as np
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.rounding import with_decimals
-from walkers.physics.units import ACCELERATION_OF_ONE_G
 from walkers.theory.mathieu import Alignment, alignment, largest_stable_v, time_to_turn, turning_rate
 from walkers.theory.motion import Friction, Motion, Walker, walk
 from walkers.theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, FloatArray, detachment, mean_velocity
@@ -29,8 +28,6 @@ PAPER = f"theory: paper's fit, κ = {FRICTION_OF_THE_PAPER * 1e-3:g} s/mm"
 to (`walkers.theory.quasistatic.mean_velocity`)."""
 _BEADS, _BOUNDARIES, _LIQUIDS = "ruby", ("chromium-coated glass", "glass"), ("Si AK5", "Si AK10")
 """Beads, boundaries and liquids of the paper's walkers on a level substrate (Figs. 2 to 4)."""
-LARGEST_GAMMA0, LARGEST_ACCELERATION, FREQUENCIES = 3.5, 98.0, (60.0, 90.0)
-"""Range of the paper's measurements: largest Γ0 and peak acceleration (m/s²), frequencies (Hz)."""
 
 
 def motion_of(*cases: Case, viscous: bool = True) -> Motion:
@@ -86,7 +83,7 @@ def threshold(case: Case, *, viscous: bool = True) -> float:
 
 
 def predict(case: Case) -> dict[str, Any]:
-    """Everything that ``walkers show --theory`` prints, SI units; None where the model does not hold, with the reason.
+    """What ``walkers show --theory`` prints of a case, SI units; None where the model does not hold, with the reason.
 
     Errors as for `check_applies`.
     """
@@ -109,7 +106,6 @@ def predict(case: Case) -> dict[str, Any]:
         "viscous": _predicted(case, viscous=True),
         "detachment": {"gamma": float(end.gamma), "contact": CONTACTS[int(end.contact)]},
         "alignment": alignment_of(case),
-        "outside": outside_of_the_paper(case),
     }
 
 
@@ -119,26 +115,6 @@ def why_not_the_paper(case: Case) -> str | None:
     if same and case.axial_gravity == 0.0:
         return None
     return f"the fit is to {_BEADS} on level {' or '.join(_BOUNDARIES)} in {' or '.join(_LIQUIDS)}"
-
-
-def outside_of_the_paper(case: Case) -> str | None:
-    """How a case lies outside the range in which the paper measured velocities; None if it lies within.
-
-    Of a case that is no dimer's nothing is said.
-    """
-    drive, (low, high) = case.drive, FREQUENCIES
-    if not case.walkers or len(case.walkers[0].radii) != 2:
-        return None
-    gamma0 = dimer_of(case).gamma0(drive.peak_acceleration)
-    found = {
-        f"Γ0 = {gamma0:.3g} (measured up to {LARGEST_GAMMA0:g})": gamma0 > LARGEST_GAMMA0,
-        f"{drive.peak_acceleration / ACCELERATION_OF_ONE_G:.3g} g "
-        f"(up to {LARGEST_ACCELERATION / ACCELERATION_OF_ONE_G:g} g)": drive.peak_acceleration
-        > (1.0 + 1e-9) * LARGEST_ACCELERATION,
-        f"{drive.frequency:g} Hz ({low:g} to {high:g} Hz)": not low <= drive.frequency <= high,
-    }
-    beyond = [one for one, outside in found.items() if outside]
-    return f"outside the paper's measurements: {', '.join(beyond)}; no model is tested there" if beyond else None
 
 
 def _predicted(case: Case, *, viscous: bool) -> dict[str, Any]:
@@ -202,7 +178,7 @@ def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
     paper, end, mathieu = prediction["paper"], prediction["detachment"], prediction["alignment"]
     lines = [
         f"Γ0 = {prediction['gamma0']:.3g}, sin δ = {prediction['sin_delta']:.3g}",
-        *([f"  {prediction['outside']}"] if prediction["outside"] else []),
+        *([f"  {outside}"] if (outside := prediction.get("outside")) else []),
         f"  paper's fit, κ = {paper['friction'] * 1e-3:g} s/mm        {_speed(paper)}",
         f"  Coulomb friction               {_speed(prediction['coulomb'])}{_details(prediction['coulomb'])}",
         f"  Coulomb friction and drag      {_speed(prediction['viscous'])}{_details(prediction['viscous'])}",

@@ -97,7 +97,7 @@ class WalkerRows:
     orientation_mean: Annotated[FloatArray, "rad", "mean orientation after the settling cycles"]
     orientation_end: Annotated[FloatArray, "rad", "orientation at the end"]
     turned_at: Annotated[
-        FloatArray, "s", "end of the first cycle with an orientation beyond 90 degrees; NaN if there is none"
+        FloatArray, "s", "end of the first cycle with the heading more than 90° from that at the start; NaN if none"
     ]
     separated_fraction: Annotated[FloatArray, "", _SEPARATED]
     rotation: Annotated[FloatArray, "m/s", _ROTATION, NUMBERED]
@@ -128,7 +128,7 @@ class Walking(Analysis):
 
     order = 0
     name = "walking"
-    version = 6
+    version = 7
     tables: ClassVar[Mapping[str, type]] = {"trajectory": Trajectory, "walkers": WalkerRows, "bridges": BridgeRows}
     headlines = ("velocity",)
     derived: ClassVar[Described] = {
@@ -221,7 +221,7 @@ class Walking(Analysis):
         yield Quantity("walkers", "walkers", column="walkers", meaning="number of walkers")
         label = f"steady walkers: both halves agree within {percent(STEADY_DIFFERENCE)}"
         yield Quantity("steady", label, column="steady", meaning=f"number of {label}")
-        told = "number of walkers that turned by more than 90 degrees"
+        told = "number of walkers that turned by more than 90° since their start"
         yield Quantity("turned_round", "walkers that turned by more than 90°", column="turned_round", meaning=told)
         told = "on a slope: number of walkers that end in the given direction and tilt no further"
         yield Quantity("posture.upright", "walkers that are upright", column="upright", meaning=told)
