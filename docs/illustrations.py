@@ -178,12 +178,12 @@ def digest(cases: Iterable[Case]) -> str:
     """Twelve hex digits over cases, deck version and versions of analyses; the engine binary does not count."""
     cases = list(cases)
     shown = [one for one in analyses() if one.name in _SHOWN and any(map(one.applies, cases))]
-    told = {
+    contents = {
         "cases": [case.determinants() for case in cases],
         "decks": CONTENT_VERSION,
         "analyses": {one.name: one.version for one in shown},
     }
-    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:12]
+    return hashlib.sha256(json.dumps(contents, sort_keys=True).encode()).hexdigest()[:12]
 
 
 def _recorded(docs: Path) -> dict[str, str]:

@@ -270,7 +270,7 @@ def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
         assert load_case(place / "base.toml") == resolve_case(document(run=SHORT, dimers={"angle": angle}), name="base")
     assert (there / "angles.toml").read_text().startswith('case = "base.toml"\n')
     actions = [action["name"].split()[0] for action in ROCrate(unpacked).root_dataset["mentions"]]
-    assert actions == [*("Deck", "Engine's", "Tables"), *("Deck", "Engine's", "Tables"), "Table"]
+    assert actions == [*("Deck", "Simulation", "Tables"), *("Deck", "Simulation", "Tables"), "Table"]
 
     assert _verified(there)[0].startswith("angles: 2 points have")
     (there / "sweep.old.json").write_text("{}")

@@ -103,7 +103,7 @@ QUICK = "the sign of the coupling"
 @pytest.mark.parametrize("wrong", [QUICK, *(pytest.param(one, marks=pytest.mark.slow) for one in [*WRONG][1:])])
 def test_a_wrong_contact_model_is_found(wrong: str, own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if wrong == QUICK:
-        monkeypatch.setattr("walkers.check.scenes.SCENES", {"two beads part": SCENES["two beads part"]})
+        monkeypatch.setattr("walkers.check.scenes.SCENES", {"two beads separate": SCENES["two beads separate"]})
     sources = own_cache / "engine"
     shutil.copytree(binary.SOURCES, sources)
     right, other = WRONG[wrong]
@@ -125,7 +125,7 @@ def test_the_scenes_cover_contacts_and_bridges_closed_and_open_with_all_terms(tm
     curve = law(Surfaces.of(3e-4, 2e-4, full_case().liquid, 0.01))
     assert np.all(curve.forces(np.linspace(0.0, curve.rupture, 50)).columns() != 0.0)
     bench, seen = Bench(find_engine(), tmp_path), set()
-    for name in ("a bead comes to the floor", "a bead leaves the floor", "two beads part", "two beads meet"):
+    for name in ("a bead approaches the floor", "a bead leaves the floor", "two beads separate", "two beads approach"):
         case, scene = full_case(), standing(SCENES[name].beads)
         engine = second_engine(case, scene)
         for frame in in_walls(case, bench.run(prescribed(case, scene)))[::20]:

@@ -292,12 +292,12 @@ def _law(**changes: object) -> Curve:
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
-        ({"pull": lambda gaps: np.log(gaps - 1e-5)}, "the pull is no number at a gap of 0 m"),
+        ({"pull": lambda gaps: np.log(gaps - 1e-5)}, "the pull is not a number at a gap of 0 m"),
         ({"normal": lambda gaps: 1.0 - gaps / 5e-5}, "the normal resistance is negative"),
-        ({"coupling": lambda gaps: 2.0 + gaps}, "sliding and rolling together give energy"),
+        ({"coupling": lambda gaps: 2.0 + gaps}, "sliding and rolling together generate energy"),
         (
             {"pull": lambda gaps: np.where(gaps < 3.3e-5, 1.0, 0.0)},
-            "the finest table, of 256 cells an octave",
+            "the finest table, of 256 cells per octave",
         ),
         ({"rupture": 0.0}, "the bridge breaks at a gap of 0 m"),
         ({"rupture": inf}, "the bridge breaks at a gap of inf m"),

@@ -437,7 +437,7 @@ _BOTH = {"observations": ["slow", "fast"], "share": 0.5}
         ("parameters/drag/rang", [0.0, 1.0], r"parameters\.drag\.rang.*range"),
         ("parameters/drag/keys", ["contact.friction.bead_wall"], r"set by friction already"),
         ("parameters/drag/experiments", [], r"parameters\.drag\.experiments"),
-        ("parameters/drag/experiments", ["slow"], r"no parameter gives liquid\.viscosity_ratio to fast, strong"),
+        ("parameters/drag/experiments", ["slow"], r"no parameter sets liquid\.viscosity_ratio for fast, strong"),
         ("observations/0/of", ["slo"], r'observations\[0\]\.of.*"slow"'),
         ("observations/3/over", ["fast"], r"observations\[3\]\.over: expected other experiments"),
         ("observations/0/value", 1.0, r"observations\[0\]\.value.*speed"),

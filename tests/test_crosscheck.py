@@ -145,7 +145,7 @@ def test_a_bridge_forms_on_touch_and_breaks_at_rupture() -> None:
 
 def test_the_forces_of_a_pair_conserve_momentum_and_angular_momentum() -> None:
     """With friction, rolling friction, and all resistances of a bridge."""
-    engine = second_engine(full_case(), standing(SCENES["two beads part"].beads))
+    engine = second_engine(full_case(), standing(SCENES["two beads separate"].beads))
     for _ in range(300):
         engine.run(1, 1)
         force, torque, places = engine.state.force, engine.state.torque, engine.state.position
@@ -214,7 +214,7 @@ def test_piles_agree_until_they_are_chaotic(in_folder: Path) -> None:
     *means, first, second = [line["what"] for line in told["lines"]]
     seed = load_case("pile-ci").seed
     assert (first.startswith(f"start {seed}, same"), second.startswith(f"start {seed + 1}, same")) == (True, True)
-    assert [what.split(",")[0] for what in means][::2] == ["height of the beads", "touching pairs a bead"]
+    assert [what.split(" (")[0] for what in means][::2] == ["height of the beads", "touching pairs per bead"]
 
 
 def test_command(in_folder: Path) -> None:

@@ -143,7 +143,7 @@ BAD_DECKS: dict[str, tuple[dict[str, object], Callable[[str], str], type[failure
     "half of the steps": ({"run": SHORT}, _half, failures.MissingFrames, "31 of 61 frames"),
     "beads that are lost": (FAST, _narrow, failures.BeadsLost, "left the simulation box"),
     "a large time step": (UNSTABLE, str, failures.BlowUp, "time step"),
-    "no numbers": ({"run": SHORT}, lambda text: re.sub("fix +motion", INFINITE, text), failures.BlowUp, "no number"),
+    "no numbers": ({"run": SHORT}, lambda text: re.sub("fix +motion", INFINITE, text), failures.BlowUp, "not a number"),
     "a long one": ({"run": LONG}, str, failures.TimeLimitExceeded, r"0\.6 s"),
 }
 
@@ -169,14 +169,14 @@ STRANGE_ENGINES = {
     "is killed": ('liggghts "$@" & sleep 0.3; kill -KILL $$', failures.EngineKilled, "SIGKILL"),
     "cuts a dump": ('liggghts "$@" && truncate -s -5 bridges.pairs.txt', failures.MissingFrames, r"wrote \d+ of"),
     "empties a dump": ('liggghts "$@" && truncate -s 0 bridges.walls.txt', failures.MissingFrames, "wrote 0 of"),
-    "ends without a word": ("exit 7", failures.EngineFailure, "exit status 7, without a word"),
+    "ends without a word": ("exit 7", failures.EngineFailure, "exit status 7, without output"),
     "says nothing": (
         "trap '' TERM; while :; do sleep 0.1; done",
         *(failures.EngineSilent, r"nothing for 0\.5 s \(run\.silence\) after step 0 of \d+"),
     ),
     "stops saying anything": (
         "liggghts -log none -in walker.lig; exec sleep 4711",
-        *(failures.EngineSilent, r"step (\d+) of \1,"),
+        *(failures.EngineSilent, r"step (\d+) of \1;"),
     ),
     "writes a line without end": ("exec tr '\\0' x < /dev/zero", failures.LogTooLong, r"2 MB \(run\.log_limit\)"),
     "writes lines without end": ("trap '' TERM; yes | tee -i /dev/null", failures.LogTooLong, "beyond 2 MB"),
@@ -193,7 +193,7 @@ def test_strange_engines_are_ended_and_told(front: Front, tmp_path: Path, name: 
     case = make_case(run={**SHORT, "silence": "0.5 s", "log_limit": "2 MB"})
     with pytest.raises(kind, match=told) as failure:
         run_case(case, tmp_path / "runs", engine=front(script), time_limit=PATIENCE)
-    assert "last words" not in str(failure.value)
+    assert "last line" not in str(failure.value)
     wait_for(lambda: not processes_in(tmp_path))
     assert _reason(tmp_path / "runs") == type(failure.value).__name__
     (log,) = tmp_path.glob("runs/*/segments/*/engine.log")

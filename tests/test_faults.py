@@ -76,12 +76,12 @@ def test_a_dump_that_holds_no_number_is_not_tabulated(run_directory: Callable[..
     shutil.copytree(run_directory(dimers={"replicates": 2}, run=SHORT), directory)
     dump = (directory / FIRST_SEGMENT / "beads.bin").read_bytes()
     (directory / FIRST_SEGMENT / "beads.bin").write_bytes(dump[:-8] + struct.pack("=d", np.nan))
-    with pytest.raises(FileChanged, match=r"beads\.bin is not what it was"):
+    with pytest.raises(FileChanged, match=r"beads\.bin has changed"):
         tabulate(directory)
-    with pytest.raises(DumpError, match=r"beads\.bin: .* is no number at step .*: the dump was damaged since"):
+    with pytest.raises(DumpError, match=r"beads\.bin: .* is not a number at step .*: the dump was damaged after"):
         read_motion(directory)
     (directory / "manifest.json").unlink()
-    with pytest.raises(DumpError, match=r"beads\.bin: .* is no number at step .*: the beads' motion blew up"):
+    with pytest.raises(DumpError, match=r"beads\.bin: .* is not a number at step .*: the simulation blew up"):
         tabulate(directory)
 
 
@@ -204,16 +204,16 @@ DAMAGES: dict[str, tuple[Callable[[Path], object], str]] = {
     "a case that was cut": (lambda run: os.truncate(run / "case.json", 800), "case.json"),
     "an edited case": (
         _edited("case.json", lambda case: case["drive"]["harmonics"][0].update(frequency=81.0)),
-        "case.json is not what it was",
+        "case.json has changed",
     ),
     "a manifest that was cut": (lambda run: os.truncate(run / "manifest.json", 100), "manifest.json"),
     "a manifest that is no table": (lambda run: (run / "manifest.json").write_text("[]"), "manifest.json"),
     "a layout that was cut": (lambda run: os.truncate(run / FIRST_SEGMENT / "layout.json", 100), "layout.json"),
     "an edited result": (
         _edited("result.json", lambda result: result["velocity"].update(mean=99.0)),
-        "result.json is not what it was",
+        "result.json has changed",
     ),
-    "a damaged dump": (_tampered_dump, "beads.bin is not what it was"),
+    "a damaged dump": (_tampered_dump, "beads.bin has changed"),
 }
 READERS = (
     *("run short.toml", "run {run}", "plot {run}", "report {run} --to out.html"),

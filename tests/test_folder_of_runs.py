@@ -274,7 +274,7 @@ def test_clean_leaves_what_somebody_put_into_a_sweeps_directory(out: Path) -> No
         (sweep / name).write_text(text)
     told = call("clean", "grid", "--dry-run", check=True).stdout
     assert f"1 sweep to remove, {bytes_text(written)}" in told
-    assert "stays, walkers did not write it: measured.csv, notes, sliding_1.png" in told
+    assert "kept, not written by walkers: measured.csv, notes, sliding_1.png" in told
     call("clean", "grid", "--yes", check=True)
     assert {str(path.relative_to(sweep)): path.read_text() for path in sweep.rglob("*.*")} == theirs
 

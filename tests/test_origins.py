@@ -238,7 +238,7 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     spread = run_spread(case, runs_folder, Options(2), points=4)
     assert {one.key for one in spread.varied} == {one.key for one in case.origins if one.guessed}
     assert {one.key for one in spread.held} == {"contact.friction.bead_bead", "contact.rolling_friction"}
-    assert "constant contact.friction.bead_bead 0.3" in describe(spread)
+    assert "fixed    contact.friction.bead_bead 0.3" in describe(spread)
     assert "too few draws for rank correlations" in describe(spread)
     assert spread.depends == {"velocity": {}}
     table = walkers.load(spread.directory).table()
@@ -257,15 +257,15 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     assert (low, high) == (band.low, band.high)
     own = done.result["velocity"]["mean"]
     assert f"({band_text((min(low, own), max(high, own)), 'm/s')}, 5 to 95 % of {band.points} draws" in done.describe()
-    assert "uncertain:" not in done.describe()
+    assert "uncertain parameters:" not in done.describe()
     unspread = walkers.run(resolve_case({**GLASS, "run": {"cycles": 5}}, name="guessed"), runs_folder)
-    assert "uncertain: volume fraction, viscosity ratio, contact angle, friction, restitution" in " ".join(
+    assert "uncertain parameters: volume fraction, viscosity ratio, contact angle, friction, restitution" in " ".join(
         unspread.describe().split()
     )
     with pytest.raises(InputError, match=r"uncertain.contact.restitution.*: expected a range that holds"):
         spread_sweep(resolve_case({**GLASS, "uncertain": {"contact.restitution": [0.4, 0.8]}}, name="beside"))
     # A case of which all is given has none.
-    with pytest.raises(InputError, match="nothing here is uncertain"):
+    with pytest.raises(InputError, match="no value is uncertain"):
         run_spread(resolve_case(REFERENCE), runs_folder, Options(2))
 
 

@@ -204,7 +204,7 @@ def test_long_runs_are_thinned_out_and_say_so(walked_run: Path, pile_run: Path) 
     pile, motion = player_of(pile_run), read_motion(pile_run).driven
     points = next(one for one in pile.plot.objects if one.name == "beads")
     np.testing.assert_allclose(points.positions[f"{motion.time[-1]:.6f}"], 1e3 * motion.position[-1], atol=1e-3)
-    assert any("do not show how they roll" in caption for caption in pile.captions)
+    assert any("rolling of the beads is not shown" in caption for caption in pile.captions)
 
 
 def test_words_and_numbers() -> None:

@@ -112,9 +112,9 @@ def test_what_settles_slowly_runs_in_full_and_numbers_are_obeyed() -> None:
 @pytest.mark.parametrize(
     ("key", "run", "expected"),
     [
-        ("run.cycles", {"cycles": 30, "most_cycles": 60}, "expected none where run.most_cycles"),
-        ("run.settling_cycles", {"cycles": "auto", "settling_cycles": 5}, "expected none where run.cycles"),
-        ("run.segment", {"most_cycles": 60, "segment": "0.1 s"}, "expected none where run.most_cycles"),
+        ("run.cycles", {"cycles": 30, "most_cycles": 60}, "expected none: with run.most_cycles"),
+        ("run.settling_cycles", {"cycles": "auto", "settling_cycles": 5}, "expected none: with run.cycles"),
+        ("run.segment", {"most_cycles": 60, "segment": "0.1 s"}, "expected none: with run.most_cycles"),
     ],
 )
 def test_a_length_said_twice_is_refused(key: str, run: dict[str, Any], expected: str) -> None:

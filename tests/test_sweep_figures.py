@@ -87,7 +87,7 @@ def test_axes_go_along_x_into_colours_and_into_panels_of_the_same_scales(looked_
 
 def test_what_goes_where_can_be_chosen(looked_through: Path) -> None:
     chosen = {"x": "frequency", "hue": "bead_wall", "panels": "none", "y": "sliding_2"}
-    with pytest.warns(LeftOutWarning, match="not told apart: peak acceleration"):
+    with pytest.warns(LeftOutWarning, match="not distinguished: peak acceleration"):
         figure = walkers.load(looked_through / "three").figure(**chosen)
     (axes,) = _panels(figure)
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("frequency (Hz)", "sliding 2 (mm/s)")
@@ -153,7 +153,7 @@ def test_what_would_take_too_many_panels_is_not_told_apart() -> None:
     table = _table(dict.fromkeys(keys, ""), rows, [(key,) for key in keys])
     layout = layout_of(table, table)
     assert layout.panels is not None
-    assert (len(layout.panels.levels), len(layout.untold)) == (9, 1)
+    assert (len(layout.panels.levels), len(layout.undistinguished)) == (9, 1)
     assert layout_of(table, table, panels="none").panels is None
 
 

@@ -163,7 +163,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"descend": {"from": "1 g", "to": "0 g", "step": "1e-320 g", "until_below": "1 um/s"}}, "must not be below"),
     ({"axes": {"drive": {"frequency": ["60 Hz"]}, "drive.frequency": ["70 Hz"]}}, "drive.frequency: is given twice"),
     ({"axes": {"dimers.radii": [["0.3 mm", "0.2 mm"]], "dimers.radii[1]": ["0.1 mm"]}}, "radii.*varies on two axes"),
-    ({"axes": {".": [1]}}, "is no key of a case"),
+    ({"axes": {".": [1]}}, "is not a key of a case"),
     ({"case": ""}, 'case = "": no such file'),
     ({"sample": {"points": 4}}, r"sample = .*\[\[name\]\]"),
     ({"axis": {}}, 'unknown key; a sweep takes .*did you mean "axes"'),

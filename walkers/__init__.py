@@ -23,7 +23,7 @@ __all__ = ["FilmOptions", "Run", "Sweep", "load", "load_case", "run", "start", "
 
 DEFAULT_OUT = Path("runs")
 RECORDS = {"run": "manifest.json", "sweep": "sweep.json", "calibration": "calibration.json"}
-"""Files by which directories are known, without the imports of those that write them."""
+"""Files that identify directories; named here to avoid imports."""
 _PACKAGES = (
     *("physics", "inputs", "templates", "runner", "postprocess"),
     *("sweeps", "archive", "check", "theory", "paper", "calibration"),
@@ -44,5 +44,5 @@ def __dir__() -> list[str]:
 
 
 def __getattr__(name: str) -> Any:
-    """The public names and the packages, imported when they are first asked for."""
+    """The public names and the packages, imported on first use."""
     return import_module(f"walkers.{name}") if name in _PACKAGES else _exported(name)

@@ -1,4 +1,4 @@
-"""What a user calls a run, a sweep or a case, and what there is of it: in this way all commands find things."""
+"""Find a run, a sweep or a case by the name that a user gives, in the same way for all commands."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ NOT_A_RUN = {
 
 
 class Place(NamedTuple):
-    """Where something is that a user named; what it is (of `RECORDS`, ``archive`` or ``folder``); by which case.
+    """Place of a named object: path, kind (of `RECORDS`, ``archive`` or ``folder``), and case.
 
     A run need not be finished: its place is where it belongs.
     """
@@ -112,11 +112,11 @@ def case_at(
         raise refused(what, "is a folder without a run")
     if there is None or there.kind != "run":
         return load_case(what, changes), out
-    with _told(there.path, "the case of the run cannot be read"):
+    with _refusing_damage(there.path, "the case of the run cannot be read"):
         case = case_of(files_of(there.path))
     if changes and not case.as_read and is_deck_folder(there.path):
-        told = "its deck was edited and run by hand: --set is for cases, and for runs of unedited ones"
-        raise refused(what, told)
+        reason = "its deck was edited and run by hand: --set is for cases, and for runs of unedited ones"
+        raise refused(what, reason)
     return with_changes(case, changes), there.path.parent
 
 
@@ -155,7 +155,7 @@ def find(what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Mappin
 
 
 class IncompleteRunWarning(UserWarning):
-    """The dump of a finished run is shorter than its layout says: somebody cut it since."""
+    """The dump of a finished run is shorter than its layout: it was truncated later."""
 
 
 def check_run(directory: Path, *, dumps: bool = True) -> None:
@@ -164,16 +164,16 @@ def check_run(directory: Path, *, dumps: bool = True) -> None:
 
     run = FinishedRun(directory)
     for name in ("manifest", "case", "layout"):
-        with _told(directory, f"the run's {name}.json cannot be read"):
+        with _refusing_damage(directory, f"the run's {name}.json cannot be read"):
             getattr(run, name)
     if dumps:
         _check_dumps(run)
-    with _told(directory, "the run cannot be read"):
+    with _refusing_damage(directory, "the run cannot be read"):
         current_result(directory)
 
 
 @contextmanager
-def _told(directory: Path, message: str) -> Iterator[None]:
+def _refusing_damage(directory: Path, message: str) -> Iterator[None]:
     """Turn what a damaged file leads to into one message of bad input."""
     try:
         yield
@@ -192,5 +192,5 @@ def _check_dumps(run: FinishedRun) -> None:
         if not dump.is_file():
             raise refused(run.directory, f"the run's {layout.bead_dump} is missing")
         if len(run.segments) == 1 and dump.stat().st_size < layout.bead_dump_bytes:
-            told = f"{dump} is incomplete: what is drawn or written ends early"
-            warnings.warn(told, IncompleteRunWarning, stacklevel=5)
+            text = f"{dump} is incomplete: what is drawn or written ends early"
+            warnings.warn(text, IncompleteRunWarning, stacklevel=5)

@@ -121,8 +121,8 @@ class Run:
         if (status := self.status) == "running":
             return f"running{f': {progress}' if (progress := self.progress) else ''}"
         failure = self._files / FAILURE_NAME
-        told = f": {read_json(failure).get('message')}" if failure.is_file() else ""
-        return f"{status}{told}; continue it with: walkers run {self.directory}"
+        text = f": {read_json(failure).get('message')}" if failure.is_file() else ""
+        return f"{status}{text}; continue it with: walkers run {self.directory}"
 
     @property
     def case(self) -> Case:

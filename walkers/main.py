@@ -25,7 +25,7 @@ from walkers.completion import offering
 _INTERRUPTED = 130
 _STDOUT = "standard output"
 _ENGINE_SECONDS = 10.0
-"""How long the engine may take to say what it is."""
+"""Longest time, s, for the engine to print its version."""
 
 
 class _Stream(FileIO):
@@ -93,7 +93,7 @@ def _status(arguments: list[str] | None) -> int:
         outcome: Any = _program()(arguments, standalone_mode=False, prog_name="walkers")
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt, SystemExit, _Terminated) as stop:
-        return _told(stop)
+        return _report_stop(stop)
     if outcome == _INTERRUPTED:  # typer turns Ctrl-C into a status
         return _tell("interrupted", _INTERRUPTED)
     return outcome if isinstance(outcome, int) else 0
@@ -212,8 +212,8 @@ def describe_version() -> str:
     return f"{package}\n{version or 'an engine that does not name its version'}, {path}"
 
 
-def _told(stop: BaseException) -> int:
-    """Tell why the program stopped; the exit status of that."""
+def _report_stop(stop: BaseException) -> int:
+    """Print why the program stopped, and return its exit status."""
     from walkers.inputs.errors import InputError, WalkersError
 
     known = ((InputError, 2), (WalkersError, 1), (KeyboardInterrupt, _INTERRUPTED), (typer.Abort, _INTERRUPTED))
@@ -236,7 +236,7 @@ def _told(stop: BaseException) -> int:
 
 
 def _drop_stdout() -> None:
-    """Let what is left to be printed go nowhere, that the interpreter's end is no failure of its own."""
+    """Discard the remaining output, so that the end of the interpreter raises no further error."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 

@@ -1,4 +1,4 @@
-"""What installed packages bring by entry points: materials, cases and laws of bridges.
+"""Entry points of installed packages: materials, cases and bridge laws.
 
 A package is imported when something that it brings is asked for; its names are known before.
 """
@@ -18,7 +18,7 @@ Group = Literal["walkers.materials", "walkers.cases", "walkers.bridge_laws"]
 
 
 class BrokenPackageWarning(UserWarning):
-    """What a package brings cannot be used; everything else can."""
+    """An entry point of a package cannot be used and is left out."""
 
 
 @dataclass(frozen=True)

@@ -83,8 +83,8 @@ def run(
     for one in (out.absolute(), case.name):
         check_utf8(one)
     if exceeded := [] if case.as_read else limits_of(case).exceeded_by(case.run.time_step):
-        told = f"beyond the {' and the '.join(exceeded)} limit of the case as changed: use load_case(name, changes)"
-        raise InputError(case.name, [Problem("run.time_step", f"{case.run.time_step:.3g} s", told)])
+        message = f"beyond the {' and the '.join(exceeded)} limit of the case as changed: use load_case(name, changes)"
+        raise InputError(case.name, [Problem("run.time_step", f"{case.run.time_step:.3g} s", message)])
     binary = find_engine(engine)
     place = run_place(case, binary, out)
     if finished_run(place) is not None and not force:

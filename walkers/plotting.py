@@ -1,4 +1,4 @@
-"""Figures of sweeps, from Python and for ``walkers plot SWEEP``: the table, and beside it what the theory predicts."""
+"""Figures of sweeps, in Python and for ``walkers plot SWEEP``: the table and predictions of the theory."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _OF_SHAPE = ("radii", "volume_fraction", "contact_angle")
 
 
 class LeftOutWarning(UserWarning):
-    """Something is not in a figure: points without a result, keys that are not told apart, a theory's prediction."""
+    """Something is not in a figure: points without a result, keys that are not distinguished, a theory's prediction."""
 
 
 def plot_sweep(directory: str | Path, to: str | Path | None = None, **choices: Any) -> Path:
@@ -98,7 +98,7 @@ def sweep_figure(
     -------
     Figure
         Means; bars are the scatter over copies where the table has it. What a key has for a unit in the sweep's file,
-        its axis has; other columns are in mm, mm/s, g (9.8 m/s²) and degrees. What is left out is told in a
+        its axis has; other columns are in mm, mm/s, g (9.8 m/s²) and degrees. What is left out is reported in a
         `LeftOutWarning`.
 
     Raises
@@ -124,8 +124,8 @@ def _figure_of(
     if empty := int(done[column].isna().sum()):
         _tell(f"{empty} of {len(done)} finished points have no {column}")
     laid_out = layout_of(table, done, **layout)
-    if laid_out.untold:
-        _tell(f"not told apart: {'; '.join(laid_out.untold)}")
+    if laid_out.undistinguished:
+        _tell(f"not distinguished: {'; '.join(laid_out.undistinguished)}")
     predicted: dict[str, FloatArray] = {}
     cases: list[Case] = []
     if theory:
@@ -136,7 +136,7 @@ def _figure_of(
         predicted, reasons = predicted_column(cases, column)
         for reason, number in reasons.items():
             _tell(f"not drawn at {number} of {len(done)} points: {reason}")
-        if predicted and (beyond := [told for case in cases if (told := outside_of_the_paper(case))]):
+        if predicted and (beyond := [sentence for case in cases if (sentence := outside_of_the_paper(case))]):
             _tell(f"{len(beyond)} of {len(done)} points are {beyond[0]}" + (", …" if len(beyond) > 1 else ""))
     drawn = drawn_column(done, column, predicted)
     if predicted:
@@ -147,7 +147,7 @@ def _figure_of(
 def _curves(
     cases: Sequence[Case], column: str, size: float, rows: npt.NDArray[np.int64], x: Factor, places: FloatArray
 ) -> dict[str, FloatArray]:
-    """What the theory predicts where a key of some of the cases has other values; nothing where it would take long.
+    """Predictions of the theory between the points of a key; empty if they would take long.
 
     Cases of another shape of their bridges are solved for a quarter of a second each.
     """

@@ -47,7 +47,7 @@ def _table(heads: Sequence[str], rows: Iterator[Sequence[str]]) -> str:
 
 
 def _described(columns: Mapping[str, tuple[str, str]]) -> str:
-    return _table(["column", "unit", "meaning"], ((f"`{key}`", unit, told) for key, (unit, told) in columns.items()))
+    return _table(["column", "unit", "meaning"], ((f"`{key}`", unit, text) for key, (unit, text) in columns.items()))
 
 
 # --- keys of a case file ----------------------------------------------------------------------------------------------
@@ -75,12 +75,12 @@ def _expected(hint: Any) -> str:
             for name, sign in _BOUNDS.items()
             if isinstance(getattr(one, name, None), (int, float))
         )
-        told = next(
+        expected = next(
             (_refusal(note) for note in notes if isinstance(note, (BeforeValidator, Kind)) and note != AUTO), None
         )
-        told = told or _expected(inner)
-        told += ', or `"auto"`' if AUTO in notes or AUTO_FAR in notes else ""
-        return f"{told}; {bounds}" if bounds else told
+        expected = expected or _expected(inner)
+        expected += ', or `"auto"`' if AUTO in notes or AUTO_FAR in notes else ""
+        return f"{expected}; {bounds}" if bounds else expected
     if get_origin(hint) is Literal:
         return "one of " + ", ".join(f'`"{one}"`' for one in get_args(hint))
     if get_origin(hint) in (Union, types.UnionType):
@@ -184,7 +184,7 @@ def _columns() -> str:
         text += f"### Analysis {one.name}\n\n{_described(columns)}\n" if columns else ""
     names = [one.name for one in analyses()]
     known = {key for one in analyses() for key in one.derived} | set(result_columns(names))
-    common = {key: told for key, told in derived_columns(names).items() if key not in known}
+    common = {key: column for key, column in derived_columns(names).items() if key not in known}
     return text + f"### All sweeps\n\n{_described({**common, **STATE})}"
 
 

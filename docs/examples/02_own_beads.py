@@ -42,7 +42,7 @@ run = walkers.run(file)
 print(run.describe())
 
 # %%
-# The result lists the values that nobody has measured: here friction and the drag of the bridges. See
+# The result lists the values that have not been measured: here friction and the drag of the bridges. See
 # :doc:`/how-to/own-beads` for the uncertainty that these values cause.
 
 picture = run.render("runs/steel.png", images=3)[0]

@@ -1,6 +1,6 @@
 """The description of an archive: an RO-Crate (researchobject.org) by the Process Run Crate profile, with rocrate.
 
-What made what is told in three actions a run, each with its program, what it read and what it gave: from the case to
+Three actions per run state the origin of the files, each with its program, input and output: from the case to
 the deck (this program), from the deck to the dumps (the engine), from the dumps to tables and result (this program).
 """
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 METADATA_NAME = "ro-crate-metadata.json"
 PREVIEW_NAME = "ro-crate-preview.html"
 VERSION = "1.1"
-"""Of RO-Crate: the one that the profile extends."""
+"""Version of RO-Crate that the profile extends."""
 PROFILE = "https://w3id.org/ro/wfrun/process/0.5"
 ENGINE_HOME = "https://github.com/CFDEMproject/LIGGGHTS-PUBLIC"
 PAPER = "https://doi.org/10.48550/arXiv.1003.1623"
@@ -44,7 +44,7 @@ LICENCES = {
     ),
     "BSD-3-Clause": ("https://opensource.org/license/bsd-3-clause", 'BSD 3-Clause "New" or "Revised" License'),
 }
-"""By their SPDX identifiers: addresses and names."""
+"""Addresses and names of licences, by SPDX identifier."""
 _MEDIA = {
     ".json": "application/json",
     ".toml": "application/toml",
@@ -57,7 +57,7 @@ _MEDIA = {
 
 @dataclass(frozen=True)
 class Author:
-    """Somebody who made the runs: name, and ORCID (``0000-0002-1825-0097``) or None."""
+    """Author of the runs: name, and ORCID (``0000-0002-1825-0097``) or None."""
 
     name: str
     orcid: str | None = None
@@ -72,8 +72,8 @@ def describe_crate(contents: Contents, authors: Sequence[Author], licence: str) 
     for one in contents.sweep:
         made.file(one)
     for run in contents.runs:
-        told = f"Run directory of the case {run.manifest['name']}, finished {run.manifest['finished']}"
-        folder = made.crate.add_dataset(None, f"{run.place}/", properties={"name": run.name, "description": told})
+        text = f"Run directory of the case {run.manifest['name']}, finished {run.manifest['finished']}"
+        folder = made.crate.add_dataset(None, f"{run.place}/", properties={"name": run.name, "description": text})
         folder["hasPart"] = [made.file(one) for one in run.items]
     actions = [action for run in contents.runs for action in made.actions(run)]
     if contents.record is not None:
@@ -81,7 +81,7 @@ def describe_crate(contents: Contents, authors: Sequence[Author], licence: str) 
         table = made.action(
             f"#{contents.name}-table",
             f"Table of the sweep {contents.name}",
-            "The results of the runs, put into one table, one row per point.",
+            "The results of the runs in one table, one row per point.",
             made.program(contents.runs[-1].manifest),
             [*(one for one in contents.sweep if one.role != "table"), *results],
             [one for one in contents.sweep if one.role == "table"],
@@ -101,7 +101,7 @@ def _moment(iso: str) -> str:
 
 
 class _Crate:
-    """A crate that is being described: its entities, of which files and people are referred to."""
+    """A crate under construction, with the entities to which others refer (files, people)."""
 
     def __init__(self, authors: Sequence[Author]) -> None:
         from rocrate.rocrate import ROCrate
@@ -123,7 +123,7 @@ class _Crate:
         return there if there is not None else self.crate.add(made)
 
     def describe_root(self, contents: Contents, licence: str) -> None:
-        """What the archive is, under which licence, by whom, and after which paper."""
+        """Describe the archive: title, licence, authors and the cited paper."""
         runs = "A run" if contents.record is None else f"The {len(contents.runs)} runs of a sweep"
         left_out = any("left_out" in run.manifest for run in contents.runs)
         address, name = LICENCES[licence]
@@ -133,15 +133,15 @@ class _Crate:
         root["name"] = f"{contents.name}: {contents.title}".rstrip(": ")
         root["description"] = (
             f"{runs} of wet granular walkers, simulated by the discrete element method with LIGGGHTS through {PROJECT}"
-            ": cases, decks, what the engine wrote, and the tables and results made from that."
-            + (" The dumps that the tables were made from are left out." if left_out else "")
+            ": cases, decks, output of the engine, and the tables and results computed from it."
+            + (" The dumps, from which the tables were computed, are left out." if left_out else "")
         )
         root["license"] = self.entity(address, "CreativeWork", name=name, identifier=licence)
         root["conformsTo"] = self.entity(PROFILE, "CreativeWork", **profile)
         root["citation"] = self.entity(PAPER, "ScholarlyArticle", **_PAPER_PROPERTIES)
         if self.people:
             root["author"] = list(self.people)
-        about = {"name": "What this is, for people", "encodingFormat": "text/html", "about": {"@id": "./"}}
+        about = {"name": "Description for readers", "encodingFormat": "text/html", "about": {"@id": "./"}}
         self.entity(PREVIEW_NAME, "CreativeWork", **about)
 
     def file(self, item: Item) -> Entity:
@@ -160,17 +160,17 @@ class _Crate:
             columns = properties["variableMeasured"] = []
             table, source = item.name.removesuffix(".parquet"), item.source
             for field in pq.read_schema(pa.BufferReader(source) if isinstance(source, bytes) else source):
-                told = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
-                column = {"name": field.name, "description": told.get("meaning", "")}
-                if told.get("unit"):
-                    column["unitText"] = told["unit"]
+                metadata = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
+                column = {"name": field.name, "description": metadata.get("meaning", "")}
+                if metadata.get("unit"):
+                    column["unitText"] = metadata["unit"]
                 columns.append(self.entity(f"#{quote(f'{table}.{field.name}')}", "PropertyValue", **column))
         # Without a source: the archive is written by ourselves, this is its description.
         entity = self.files[item.place] = self.crate.add_file(None, item.place, properties=properties)
         return entity
 
     def actions(self, run: PackedRun) -> list[Entity]:
-        """What made the files of a run."""
+        """The actions that produced the files of a run."""
         manifest, name = run.manifest, run.name
         began, ended, again = manifest["started"], manifest["finished"], manifest.get("tabulated")
         cases, decks = run.with_role("case"), run.with_role("deck")
@@ -181,7 +181,7 @@ class _Crate:
             self.action(
                 f"#{name}-deck",
                 f"Deck of {name}",
-                f"The case resolved, and the deck of it rendered{company}.",
+                f"Resolving the case and writing its deck{company}.",
                 self.program(manifest),
                 cases,
                 decks,
@@ -189,8 +189,8 @@ class _Crate:
             ),
             self.action(
                 f"#{name}-engine",
-                f"Engine's run of {name}",
-                "The engine's run of the deck: the motion of the beads, step by step.",
+                f"Simulation of {name}",
+                "The engine runs the deck and integrates the motion of the beads.",
                 self.engine(manifest["engine"]),
                 decks,
                 run.with_role("dump", "output"),
@@ -199,7 +199,7 @@ class _Crate:
             self.action(
                 f"#{name}-tables",
                 f"Tables of {name}",
-                "The dumps analysed: tables and result.",
+                "Analysis of the dumps: tables and result.",
                 self.program(again or manifest),
                 [*cases, *run.with_role("dump"), *layouts],
                 run.with_role("table", "result"),
@@ -217,7 +217,7 @@ class _Crate:
         gave: Sequence[Item],
         times: tuple[str | None, str],
     ) -> Entity:
-        """What a program read and gave, and when (begin, if known, and end)."""
+        """An action: input and output files of a program, begin (if known) and end."""
         began, ended = times
         properties: dict[str, Any] = {
             "name": name,
@@ -236,12 +236,12 @@ class _Crate:
 
     def engine(self, engine: Mapping[str, Any]) -> Entity:
         """LIGGGHTS, by its binary."""
-        told = "Discrete element method. The SHA-256 is over those of the executable and its libliggghts."
-        more = {"url": ENGINE_HOME, "sha256": engine["sha256"], "description": told}
+        text = "Discrete element method. The SHA-256 combines those of the executable and libliggghts."
+        more = {"url": ENGINE_HOME, "sha256": engine["sha256"], "description": text}
         return self._software(f"{ENGINE_HOME}#{engine['sha256'][:12]}", "LIGGGHTS", engine["version"], **more)
 
     def program(self, made_by: Mapping[str, Any]) -> Entity:
-        """Our own, with Python and the packages, as a manifest names them."""
+        """The program, Python and the packages, as listed in a manifest."""
         version, commit, python = (made_by[key] for key in ("granular_walkers", "commit", "python"))
         home, needed = "https://www.python.org/", []
         for name, one in made_by["packages"].items():

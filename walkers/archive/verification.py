@@ -1,4 +1,4 @@
-"""Whether a run, the runs of a sweep, or an archive are what they were.
+"""Check whether the files of a run, a sweep or an archive are unchanged.
 
 Archives come from strangers: none is unpacked to be verified, and no file of one is read whole but its list.
 """
@@ -24,11 +24,11 @@ from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.sweeps.table import PARSL, RECORD_NAME, read_record, states
 
 SUMS_NAME = "sha256sums.txt"
-"""In an archive: as ``sha256sum -c`` reads it."""
+"""List of checksums in an archive, in the format of ``sha256sum -c``."""
 _MOST_TIMES = 100
 """A zip file that unpacks to more than this many times its size is refused; those of runs to some five times."""
 _MOST_ANYWAY = 1 << 28
-"""Bytes: what unpacks to less is read in a second."""
+"""Bytes; smaller archives are always accepted, because reading takes a second."""
 _SHOWN = (
     *(".png", ".pdf", ".svg", ".gif", ".mp4", ".html", ".htm"),
     *(".vtp", ".vtm", ".vtu", ".pvd", ".py", ".xyz", ".lammpstrj", ".csv"),
@@ -40,29 +40,29 @@ _LONGEST_SHOWN = 300
 
 @dataclass(frozen=True)
 class Verification:
-    """What has become of the files of a run or an archive, or of the points of a sweep: how many are ``intact``.
+    """State of the files of a run or an archive, or of the points of a sweep; ``intact`` counts unchanged ones.
 
-    ``told`` are names of the others: ``changed`` and ``missing`` ones; those ``not listed``; what is ``doubtful``, with
-    the reason in brackets; and what was ``made since`` from the run (`_made_since`): no result rests on it.
+    ``findings`` are names of the others: ``changed`` and ``missing`` ones; those ``not listed``; what is ``doubtful``,
+    with the reason in brackets; and what was ``made since`` from the run (`_made_since`): no result rests on it.
     ``left_out`` is how many were left out of an archive on purpose.
     """
 
     name: str
     intact: int
-    told: Mapping[str, Sequence[str]]
+    findings: Mapping[str, Sequence[str]]
     left_out: int = 0
     of_points: bool = False
 
     @property
     def passed(self) -> bool:
-        """Whether all that is listed is what it was, and nothing else is there that a result could rest on."""
-        return not any(names for kind, names in self.told.items() if kind != "made since")
+        """Whether all listed files are unchanged and no unlisted file could influence a result."""
+        return not any(names for kind, names in self.findings.items() if kind != "made since")
 
     def describe(self) -> str:
-        """The outcome, and a line for each file that is not what it was, or is not listed."""
+        """The outcome, and one line for each file that has changed or is not listed."""
         told = f"{self.name}: {self.intact} {'points have a run' if self.of_points else 'files are unchanged'}"
         lines = [f"{told}, {self.left_out} left out of the archive" if self.left_out else told]
-        for kind, names in self.told.items():  # which a stranger chose, and may have put escape sequences into
+        for kind, names in self.findings.items():  # which a stranger chose, and may have put escape sequences into
             lines += [f"  {kind:<10} {printable(shortened(name, _LONGEST_SHOWN))}" for name in names]
         return "\n".join(lines)
 
@@ -94,7 +94,7 @@ def verify(path: Path) -> list[Verification]:
 
 
 def _verify_run(directory: Path) -> Verification:
-    """Compare with its manifest; what has none that can be read does not pass."""
+    """Compare a run with its manifest; a run without a readable manifest does not pass."""
     name = directory.resolve().name
     try:
         contents = read_json(directory / MANIFEST_NAME)
@@ -123,7 +123,7 @@ def _verify_sweep(directory: Path) -> list[Verification]:
     # Bands are texts' only; the others are of an archive: nothing is read from them.
     beside = (SPREAD_NAME, f"{record.name}.toml", "table.parquet")
     files = _compared(record.name, {}, {}, there, lambda name: _made_since(name) or name in beside)
-    points = replace(files, intact=len(runs), told={**files.told, "missing": lacking}, of_points=True)
+    points = replace(files, intact=len(runs), findings={**files.findings, "missing": lacking}, of_points=True)
     return [points, *map(_verify_run, dict.fromkeys(runs))]
 
 
@@ -149,7 +149,7 @@ def _verify_archive(
     opened: Callable[[str], IO[bytes]],
     added: Callable[[str], bool],
 ) -> Verification:
-    """Compare what is in an archive, of which some are files that can be opened, with its checksums."""
+    """Compare the contents of an archive with its checksums."""
     if SUMS_NAME not in files:
         raise refused(path, f"no archive of runs: it has no {SUMS_NAME}")
     with opened(SUMS_NAME) as file:
@@ -168,7 +168,7 @@ def _verify_archive(
 
 
 def _checksum(opened: Callable[[str], IO[bytes]], place: str) -> str:
-    """SHA-256 of a file; none if what a zip file has of it is damaged."""
+    """SHA-256 of a file; None if it is damaged in the zip file."""
     try:
         with opened(place) as file:
             return hashlib.file_digest(file, "sha256").hexdigest()  # type: ignore[arg-type]
@@ -197,7 +197,7 @@ def _compared(
     made = (
         f"{folder}/ ({count[folder]} files)" if folder and count[folder] > 1 else one for one, folder in since.items()
     )
-    told = {
+    findings = {
         "changed": changed,
         "missing": [one for one in listed if one not in now and one not in left_out],
         "not listed": [one for one in others if one not in since],
@@ -205,11 +205,11 @@ def _compared(
         "made since": list(dict.fromkeys(made)),
     }
     absent = sum(one in listed and one not in now for one in left_out)
-    return Verification(name, len(now) - len(changed), told, left_out=absent)
+    return Verification(name, len(now) - len(changed), findings, left_out=absent)
 
 
 def _made_since(name: str) -> bool:
-    """Whether what no list has counts as made from a run: by its relative path it is nothing that a result rests on.
+    """Whether an unlisted file (relative path) was made from a run and cannot influence a result.
 
     These are what `_SHOWN` says and hidden files. Nothing in ``segments`` is among them: each folder there is taken for
     a part of the run.
@@ -220,7 +220,7 @@ def _made_since(name: str) -> bool:
 
 
 def _files_below(folder: Path) -> list[str]:
-    """Relative paths of all that is in a folder: files, folders that are empty (with a slash), links to folders."""
+    """Relative paths of all files, empty folders (with a slash) and links to folders in a folder."""
     found = []
     for path in folder.rglob("*"):
         name = path.relative_to(folder).as_posix()

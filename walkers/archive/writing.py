@@ -1,6 +1,4 @@
-"""Write an archive: one zip with the files of a run or a sweep, their checksums, what they are for machines, and for
-people.
-"""
+"""Write an archive: one zip file with the files of a run or a sweep, checksums and descriptions."""
 
 from __future__ import annotations
 
@@ -26,44 +24,44 @@ from walkers.runner.manifest import MANIFEST_NAME, checksum
 from walkers.sweeps.table import RECORD_NAME, SweepRecord, read_record, states
 
 _STORED = ("/", ".parquet", ".png", ".mp4")
-"""Ends of names that are not compressed: folders, and what is already."""
+"""Suffixes of names that are not compressed: folders and compressed files."""
 _CHUNK_BYTES = 1 << 20
 RUNS = "runs"
-"""Folder of the run directories in an archive: there, the program finds them as it does elsewhere."""
+"""Folder of the run directories in an archive, where the program finds them."""
 _MEANINGS = {
     CASE_NAME: ("case", "the resolved case: every number that determines the run, SI units"),
-    MANIFEST_NAME: ("record", "what made the run, what that took, and what its files were when it was finished"),
-    RECORD_NAME: ("record", "the points of the sweep: what varied, what follows from it, the names of the runs"),
-    "result.json": ("result", "what the run gave, SI units"),
-    "walker.lig": ("deck", "the deck: what the engine was told"),
+    MANIFEST_NAME: ("record", "provenance: versions, machine, times, and checksums of all files"),
+    RECORD_NAME: ("record", "the points of the sweep: varied keys, derived quantities, names of the runs"),
+    "result.json": ("result", "the result of the run, SI units"),
+    "walker.lig": ("deck", "the deck: input script of the engine"),
     "bridges.txt": ("deck", "forces of each bridge against its gap, which the engine reads"),
-    "loads.txt": ("deck", "gravity and drive of each bead, where beads have their own"),
-    "run.sh": ("deck", "runs the deck by hand"),
+    "loads.txt": ("deck", "gravity and drive of each bead, if they differ between beads"),
+    "run.sh": ("deck", "script that runs the deck by hand"),
     "layout.json": ("deck", "columns of the dumps; which bead belongs to which walker"),
-    "engine.log": ("output", "what the engine said"),
-    "segment.json": ("output", "from which step to which the segment went, and what it took"),
+    "engine.log": ("output", "the log of the engine"),
+    "segment.json": ("output", "first and last step of the segment, and its cost"),
     "beads.bin": (
         "dump",
-        "places, velocities and spins of the beads, in LIGGGHTS's binary format; columns in layout.json",
+        "positions, velocities and spins of the beads, LIGGGHTS binary dump; columns in layout.json",
     ),
     "bridges.pairs.txt": ("dump", "bridges between beads, frame by frame, text"),
     "bridges.walls.txt": ("dump", "bridges between beads and walls, frame by frame, text"),
-    "state.restart": ("dump", "where the next segment goes on, the engine's own format"),
-    "table.csv": ("table", "the table of the sweep, one row per point, units in the head"),
+    "state.restart": ("dump", "restart file of the engine, from which the next segment continues"),
+    "table.csv": ("table", "the table of the sweep, one row per point, units in the header"),
     "table.parquet": ("table", "the table of the sweep, one row per point, units and meanings in the field metadata"),
 }
-_GIVEN = ("case", "the case as it was given, with the values that were put beside it")
-_SWEEP = ("record", "the sweep as it was given")
-_REST = ("output", "what else the engine wrote")
+_GIVEN = ("case", "the case file, including changes by --set")
+_SWEEP = ("record", "the original sweep file")
+_REST = ("output", "other output of the engine")
 
 
 class ArchiveRefused(WalkersError):
-    """A run whose files are not what they were when it was finished."""
+    """A run whose files have changed since it was finished."""
 
 
 @dataclass(frozen=True)
 class ArchiveOptions:
-    """Options of an archive: whether it has the engine's dumps, its authors, its licence (one of `LICENCES`).
+    """Options of an archive: with or without dumps, authors, licence (one of `LICENCES`).
 
     It always has the tables and results.
     """
@@ -84,18 +82,18 @@ def write_archive(directory: str | Path, to: Path | None = None, options: Archiv
     _check(options)
     found = [one for one in verify(directory) if not one.of_points]  # `contents_of` asks for all points
     if not all(one.passed for one in found):
-        told = "\n".join(one.describe() for one in found if not one.passed)
-        raise ArchiveRefused(f"{directory} is not archived, files have changed:\n{told}")
+        message = "\n".join(one.describe() for one in found if not one.passed)
+        raise ArchiveRefused(f"{directory} is not archived, files have changed:\n{message}")
     contents = contents_of(directory, dumps=options.dumps)
     to = Path(f"{contents.name}.zip") if to is None else to
     if to.suffix != ".zip" or to.is_dir():
         raise refused("--output", f"expected the name of a .zip file, not {to}")
     metadata = json_bytes(describe_crate(contents, options.authors, options.licence))
-    described = [item(METADATA_NAME, metadata), item(PREVIEW_NAME, _preview(contents, options))]
-    sums = "".join(f"{one.sha256}  {one.place}\n" for one in [*contents.items, *described])
+    about = [item(METADATA_NAME, metadata), item(PREVIEW_NAME, _preview(contents, options))]
+    sums = "".join(f"{one.sha256}  {one.place}\n" for one in [*contents.items, *about])
     moment = time.strptime(contents.finished, "%Y-%m-%dT%H:%M:%SZ")[:6]  # of all files, for the same bytes again
     with beside(to) as new, zipfile.ZipFile(new, "w") as archive:
-        items = [*described, item(SUMS_NAME, sums.encode("utf-8")), *contents.items]
+        items = [*about, item(SUMS_NAME, sums.encode("utf-8")), *contents.items]
         folders = [f"{parent}/" for one in items for parent in reversed(Path(one.place).parents) if parent != Path()]
         for place in dict.fromkeys(folders):
             archive.writestr(_info(place, moment), b"")
@@ -106,8 +104,8 @@ def write_archive(directory: str | Path, to: Path | None = None, options: Archiv
 
 def _check(options: ArchiveOptions) -> None:
     if options.licence not in LICENCES:
-        told = f"expected one of {', '.join(LICENCES)}"
-        raise refused("--licence", f"{told}, not {options.licence}")
+        message = f"expected one of {', '.join(LICENCES)}"
+        raise refused("--licence", f"{message}, not {options.licence}")
     for author in options.authors:
         if not author.name.strip():
             raise refused("--author", "expected a name")
@@ -134,7 +132,7 @@ def _info(place: str, moment: tuple[int, ...]) -> zipfile.ZipInfo:
 
 
 def _write(archive: zipfile.ZipFile, item: Item, moment: tuple[int, ...]) -> None:
-    """Write a file, and see that it is what it was when it was summed."""
+    """Write a file, and check that it still has its checksum."""
     digest = hashlib.sha256()
     source = io.BytesIO(item.source) if isinstance(item.source, bytes) else item.source.open("rb")
     with source, archive.open(_info(item.place, moment), "w", force_zip64=item.size >= zipfile.ZIP64_LIMIT) as file:
@@ -146,7 +144,7 @@ def _write(archive: zipfile.ZipFile, item: Item, moment: tuple[int, ...]) -> Non
 
 
 def _preview(contents: Contents, options: ArchiveOptions) -> bytes:
-    """What people read first."""
+    """The HTML page for readers."""
     from walkers.postprocess.analysis import describe_result, read_result
     from walkers.sweeps.table import load, short_text
 
@@ -201,20 +199,20 @@ class Item:
         return len(self.source) if isinstance(self.source, bytes) else self.source.stat().st_size
 
 
-def item(place: str, source: Path | bytes, sha256: str | None = None, told: tuple[str, str] | None = None) -> Item:
-    """A file of an archive; its checksum, role and meaning (``told``) if left out by its contents and its name."""
+def item(place: str, source: Path | bytes, sha256: str | None = None, about: tuple[str, str] | None = None) -> Item:
+    """A file of an archive; by default, checksum, role and meaning (``about``) follow from contents and name."""
     name = place.rpartition("/")[2]
     if name.endswith(".parquet"):
         table = name.removesuffix(".parquet")
-        told = told or ("table", f"table {table}; units and meanings of its columns are in the field metadata")
+        about = about or ("table", f"table {table}; units and meanings of its columns are in the field metadata")
     if sha256 is None:
         sha256 = hashlib.sha256(source).hexdigest() if isinstance(source, bytes) else checksum(source)
-    return Item(place, source, sha256, *_MEANINGS.get(name, told or _REST))
+    return Item(place, source, sha256, *_MEANINGS.get(name, about or _REST))
 
 
 @dataclass(frozen=True)
 class PackedRun:
-    """A run as it goes into an archive: from where, to which folder, the manifest as it is there, and the files."""
+    """A run in an archive: source, folder in the archive, manifest in the archive, and files."""
 
     directory: Path
     place: str
@@ -227,13 +225,13 @@ class PackedRun:
         return self.directory.name
 
     def with_role(self, *roles: str) -> list[Item]:
-        """Its files that are any of these."""
+        """The files with one of some roles."""
         return [item for item in self.items if item.role in roles]
 
 
 @dataclass(frozen=True)
 class Contents:
-    """All that goes into an archive: name and title, runs, and of a sweep its own files and its record."""
+    """Contents of an archive: name, title, runs, and for a sweep its own files and its record."""
 
     name: str
     title: str
@@ -248,12 +246,12 @@ class Contents:
 
     @property
     def finished(self) -> str:
-        """When the last of the runs was finished, ISO 8601."""
+        """Time at which the last run was finished, ISO 8601."""
         return max(str(run.manifest["finished"]) for run in self.runs)
 
 
 def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
-    """What the archive of a finished run or of a sweep holds; with ``dumps`` false not what tables were made from.
+    """Contents of the archive of a finished run or a sweep; without the engine's dumps if ``dumps`` is false.
 
     `InputError` if points of a sweep are not finished.
     """
@@ -266,8 +264,8 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
     found = states(record)
     unfinished = sum(state.status not in ("finished", "not needed") for state in found)
     if unfinished:
-        told = f"{unfinished} of {len(found)} points are not finished; see: walkers list {directory}"
-        raise refused(directory, told)
+        message = f"{unfinished} of {len(found)} points are not finished; see: walkers list {directory}"
+        raise refused(directory, message)
     runs = list(dict.fromkeys(state.directory for state in found if state.directory is not None))
     name = name_of(record.directory.name)
     place, table = f"{RUNS}/{name}", load(record.directory)
@@ -275,12 +273,12 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
     items = [item(f"{place}/{RECORD_NAME}", record.directory / RECORD_NAME)]
     items += [item(f"{place}/table.{form}", encoded(table, form)) for form in ("csv", "parquet")]
     if record.file:
-        items.append(item(f"{place}/{name}.toml", _toml(record.file), told=_SWEEP))
+        items.append(item(f"{place}/{name}.toml", _toml(record.file), about=_SWEEP))
     return Contents(name, record.title, [_packed(run, dumps) for run in runs], items, record)
 
 
 def _packed(directory: Path, dumps: bool) -> PackedRun:
-    """The files that a manifest names, the manifest, and the case as it was given, if that is known."""
+    """The files of a manifest, the manifest, and the case file, if it is known."""
     run = FinishedRun(directory)
     manifest, case, place = run.manifest, run.case, f"{RUNS}/{directory.resolve().name}"
     before, sums = set(manifest.get("left_out", ())), manifest["sha256"]
@@ -290,7 +288,7 @@ def _packed(directory: Path, dumps: bool) -> PackedRun:
     if left_out - before:
         manifest["left_out"] = sorted(left_out)
         said = json_bytes(manifest)
-    items = [item(f"{place}/{name_of(case.name)}.toml", _toml(case.document), told=_GIVEN)] if case.document else []
+    items = [item(f"{place}/{name_of(case.name)}.toml", _toml(case.document), about=_GIVEN)] if case.document else []
     items += [item(f"{place}/{MANIFEST_NAME}", said), *(one for name, one in named.items() if name not in left_out)]
     return PackedRun(directory.resolve(), place, manifest, items)
 

@@ -1,4 +1,4 @@
-"""Parameters that nobody published, from numbers that somebody did: designs, emulators, posterior, predictions.
+"""Calibration of unpublished parameters to published numbers: designs, emulators, posterior, predictions.
 
 It stands on the sweeps; the physics is in the calibration file (`walkers.inputs.calibration`) and in the engine alone.
 """

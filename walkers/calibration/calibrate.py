@@ -1,6 +1,6 @@
-"""A calibration from its file to its outcome: waves, emulators, posterior, and the engine's word on what it says.
+"""A calibration from its file to its outcome: waves, emulators, posterior, and predictive check by the engine.
 
-A wave is sets of the free parameters run through all experiments: a sweep like any other.
+A wave is a sweep that runs several parameter sets in all experiments.
 """
 
 from __future__ import annotations
@@ -39,23 +39,23 @@ if TYPE_CHECKING:
 _DIGITS = 9
 _LEAST_SPEED = 5e-5
 _PARENTS, _NEAR, _TRIED = 5, 0.06, 4000
-"""How many of the best sets a wave looks around, how far (of the ranges), and how many sets it thinks of."""
+"""Number of best sets around which a wave samples, its radius (share of the ranges), and number of candidates."""
 MISSING_MISFIT = float(np.log1p(30.0**2))
-"""ln(1 + r²) of an observation that cannot be made: as of one that is 30 deviations off."""
+"""ln(1 + r²) of an observation that does not exist: a residual r of 30 standard deviations."""
 _END = 0.005
-"""Of a range: a set that is so near an end of it is not taken for the best, for what is better may lie beyond."""
+"""Share of a range: sets closer to its ends are never the best set, since a better one may lie outside."""
 _QUANTILES = norm.ppf((np.arange(5) + 0.5) / 5.0)
 FINAL = frozenset(failure.__name__ for failure in (BeadsLost, BlowUp))
-"""Failures of a set's own making: calling again would bring the same."""
+"""Failures that the parameters cause: a repetition would fail again."""
 
 
 class CalibrationStopped(WalkersError):
-    """Points of a wave are missing, for no fault of their parameters: what follows would be built on sand."""
+    """Points of a wave are missing for reasons other than their parameters; later steps would be unreliable."""
 
 
 @dataclass(frozen=True)
 class Wave:
-    """P parameter sets and what the engine made of them."""
+    """P parameter sets and the results of the engine."""
 
     unit: FloatArray  # the sets, in the unit cube, shape (P, D)
     outcome: FloatArray  # each observation, shape (P, K); NaN where there is none
@@ -98,7 +98,7 @@ def wave_sweep(
 
 
 def run_wave(calibration: Calibration, unit: FloatArray, sweep: Sweep, out: Path, options: Options, **how: Any) -> Wave:
-    """Run what is missing of the sweep of a wave (P, D); the rest is as for `walkers.sweeps.scheduler.run_sweep`."""
+    """Run the missing points of a wave (P, D); other parameters as for `walkers.sweeps.scheduler.run_sweep`."""
     record, failures = run_sweep(sweep, out, options, **how)
     table, labels = load(record.directory), list(calibration.experiments)
     seen = _seen(table, len(labels))
@@ -134,7 +134,7 @@ def _seen(table: pd.DataFrame, experiments: int) -> dict[str, FloatArray]:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came out of a calibration."""
+    """Outcome of a calibration."""
 
     calibration: Calibration
     space: Space
@@ -150,7 +150,7 @@ class Outcome:
 def calibrate(
     calibration: Calibration, out: Path, options: Options, *, progress_of: ProgressOf | None = None, **how: Any
 ) -> Outcome:
-    """Calibrate, or go on with it: what is finished is not run again.
+    """Start or continue a calibration; finished runs are not repeated.
 
     Parameters
     ----------
@@ -186,8 +186,8 @@ def calibrate(
             failures[sweep.name] = wave.failures
         undone = [failure for failure in wave.failures if failure.reason not in FINAL]
         if undone or not wave.table["status"].isin(("finished", "failed")).all():
-            told = undone[0].message if undone else "another process is running them"
-            raise CalibrationStopped(f"{sweep.name}: points are missing ({told}); call again to go on")
+            message = undone[0].message if undone else "another process is running them"
+            raise CalibrationStopped(f"{sweep.name}: points are missing ({message}); call again to continue")
         return wave
 
     unit, outcome = np.zeros((0, space.dimensions)), np.zeros((0, len(calibration.observations)))
@@ -219,7 +219,7 @@ def _posterior(calibration: Calibration, emulators: Emulators, held_out: Collect
 
 
 def _check_ranges(calibration: Calibration) -> None:
-    """Refuse parameters whose ranges go beyond what a case takes, before anything is written or run.
+    """Refuse parameters whose ranges exceed those of a case, before anything is written or run.
 
     Cases are made at either end of all ranges and at the guesses.
     """
@@ -232,9 +232,9 @@ def _check_ranges(calibration: Calibration) -> None:
         problem = error.problems[0]
         for one in calibration.parameters:
             if problem.key in one.keys:
-                told = f"{problem.key} = {problem.value}: {problem.expected}"
+                message = f"{problem.key} = {problem.value}: {problem.expected}"
                 key, value = f"parameters.{one.name}.range", f"[{one.range[0]:g}, {one.range[1]:g}]"
-                raise InputError(calibration.source, [Problem(key, value, told)]) from error
+                raise InputError(calibration.source, [Problem(key, value, message)]) from error
         raise
 
 
@@ -243,14 +243,14 @@ def _guesses(calibration: Calibration) -> FloatArray:
 
 
 def _determinants(calibration: Calibration, wave: int) -> dict[str, Any]:
-    """What the parameter sets of a wave (from 1) were drawn from, beside what the engine said before."""
+    """Inputs that determine the parameter sets of a wave (from 1), besides earlier results of the engine."""
     parameters = {one.name: [*one.range, one.log, one.unit] for one in calibration.parameters}
     seed, guesses = calibration.design.seed, [list(guess) for guess in calibration.guesses]
     return {"parameters": parameters, "seed": seed, "guesses": guesses, "waves": calibration.design.waves[:wave]}
 
 
 def _kept(path: Path, determinants: dict[str, Any], make: Callable[[], FloatArray]) -> FloatArray:
-    """The parameter sets of a wave, as written down before, or made and written down.
+    """The parameter sets of a wave, read from its file, or drawn and written.
 
     A calibration that goes on must not depend on whether the libraries would draw the same points again.
     """
@@ -259,18 +259,18 @@ def _kept(path: Path, determinants: dict[str, Any], make: Callable[[], FloatArra
             kept = read_json(path)
             unit = np.array(kept["unit"], dtype=np.float64)
             if unit.ndim != 2 or unit.shape[1] != len(kept["parameters"]) or not ((unit >= 0.0) & (unit <= 1.0)).all():
-                raise ValueError("no points of the unit cube")
+                raise ValueError("points outside of the unit cube")
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise refused(path, f"cannot be read ({error}); delete it") from error
         for key, now in determinants.items():
             if key not in kept:
-                raise InputError(str(path), [Problem(key, None, "missing: of an earlier version; delete the file")])
+                raise InputError(str(path), [Problem(key, None, "missing (earlier version): delete the file")])
             if kept[key] != now:
-                told = (
-                    f"was drawn with other {key} than the file has now; delete it and the waves after it to have them "
-                    "drawn again (runs that fit are kept), take the change back, or give another --out"
+                message = (
+                    f"was drawn with other {key} than in the calibration file; delete this and later waves "
+                    "to draw them again (matching runs are kept), undo the change, or choose another --out"
                 )
-                raise InputError(str(path), [Problem(key, None, told)])
+                raise InputError(str(path), [Problem(key, None, message)])
         return unit
     unit = make()
     write_json(path, {**determinants, "unit": unit.tolist()})
@@ -278,7 +278,7 @@ def _kept(path: Path, determinants: dict[str, Any], make: Callable[[], FloatArra
 
 
 def next_wave(calibration: Calibration, unit: FloatArray, outcome: FloatArray, points: int, filling: int) -> FloatArray:
-    """Sets (P, D) of a wave: the guesses and sets that fill the ranges, or where the posterior and the best sets are.
+    """Parameter sets (P, D) of a wave: guesses and a space-filling design, or samples near posterior and best sets.
 
     Parameters
     ----------
@@ -322,7 +322,7 @@ def _expected_misfit(emulators: Emulators, unit: FloatArray) -> FloatArray:
 
 
 def ranking(calibration: Calibration, outcome: FloatArray) -> npt.NDArray[np.int64]:
-    """Places of sets by their outcome (P, K): those first that give most observations within their deviations.
+    """Order of sets by their outcome (P, K): first those with most observations within their deviations.
 
     Those that are derived from others do not count. Of several sets that with the least misfit Σ ln(1 + r²), r in
     standard deviations; the logarithm keeps an observation that none of them gives from deciding. One that could not be
@@ -338,7 +338,7 @@ def ranking(calibration: Calibration, outcome: FloatArray) -> npt.NDArray[np.int
 
 
 def _finer_and_longer(calibration: Calibration, values: FloatArray) -> dict[str, dict[str, dict[str, Any]]]:
-    """What the runs of a set have beside it: nothing; half of their time steps; twice their cycles."""
+    """Changes of a parameter set: none; half the time step; twice the cycles."""
     cases = wave_sweep(calibration, values, "check").cases()
     runs = {label: case.run for label, case in zip(calibration.experiments, cases, strict=True)}
     finer = {label: {"run.time_step": f"{run.time_step / 2.0 * 1e6:.6g} us"} for label, run in runs.items()}

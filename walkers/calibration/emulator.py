@@ -1,4 +1,4 @@
-"""Emulators: what the engine would give between parameter sets that were run, with an error, and where it would."""
+"""Emulators of the engine between parameter sets: predictions with errors, and probabilities of feasibility."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _UNKNOWN = 3.0
 either way, and the same for all parameters."""
 _EXTREME = 3.0
 LARGEST = 12.0
-"""Of the transformed residuals: beyond, sinh overflows and nobody asks."""
+"""Largest transformed residual; sinh overflows beyond."""
 
 
 @dataclass(frozen=True)
 class Space:
-    """D free parameters, in the order of the coordinates of the unit cube; logarithms where a parameter says so."""
+    """D free parameters as coordinates of the unit cube, on a logarithmic scale where the parameter demands it."""
 
     parameters: tuple[Parameter, ...]
 
@@ -65,7 +65,7 @@ class Space:
 
     @cached_property
     def priors(self) -> list[Any]:
-        """Distributions of scipy's, over the unit interval, of what is assumed of each coordinate beforehand."""
+        """Prior distributions (scipy) of each coordinate on the unit interval."""
         found = []
         for one, low, width in zip(self.parameters, self._ends[0], self._ends[1] - self._ends[0], strict=True):
             if one.normal is None:
@@ -77,7 +77,7 @@ class Space:
         return found
 
     def log_prior(self, unit: FloatArray) -> FloatArray:
-        """Logarithm of their density at points of the unit cube, shape (...); -inf outside."""
+        """Logarithm of the prior density at points of the unit cube, shape (...); -inf outside."""
         return np.asarray(np.sum([one.logpdf(unit[..., place]) for place, one in enumerate(self.priors)], axis=0))
 
     def design(self, points: int, seed: int) -> FloatArray:
@@ -87,7 +87,7 @@ class Space:
 
 
 def spread_out(candidates: FloatArray, points: int, taken: FloatArray) -> FloatArray:
-    """So many of some candidates (C, D), each the farthest from those before it and from points that are taken."""
+    """A number of candidates (C, D), each one farthest from the earlier ones and from the given points."""
     distance = cdist(candidates, taken).min(axis=1, initial=np.inf)
     chosen: list[int] = []
     for _ in range(min(points, len(candidates))):
@@ -128,7 +128,7 @@ class Emulator:
         return mean, deviation * self.error_inflation
 
     def draw(self, unit: FloatArray, normal: FloatArray) -> FloatArray:
-        """The observation as it may be at points (N, D), SI units and degrees; ``normal`` are N standard numbers."""
+        """Samples of the observation at points (N, D), SI units and degrees; ``normal``: N standard normal numbers."""
         mean, deviation = self.predict(unit)
         residual = np.sinh(np.clip(mean + deviation * normal, -LARGEST, LARGEST))
         return np.asarray(self.observation.value + self.observation.deviation * residual)
@@ -136,7 +136,7 @@ class Emulator:
 
 @dataclass(frozen=True)
 class Emulators:
-    """The engine, as far as sets that were run tell of it: K observations, and whether they can be made.
+    """Emulators of K observations, and of their feasibility.
 
     Observations that are missing in the same sets are one of E events: they need the same walkers.
     """
@@ -169,7 +169,7 @@ class Emulators:
         return np.asarray(log_expit(latent))
 
     def feasible(self, unit: FloatArray) -> FloatArray:
-        """Probabilities that each observation can be made, at points (N, D), shape (N, K)."""
+        """Probabilities that each observation exists, at points (N, D), shape (N, K)."""
         return np.asarray(np.exp(self.log_probabilities(unit))[:, self.event])
 
     def needed(self, places: Sequence[int]) -> list[int]:
@@ -190,7 +190,7 @@ class Emulators:
 def fit_emulators(
     unit: FloatArray, outcome: FloatArray, observations: Sequence[Observation], seed: int, filling: int = 0
 ) -> Emulators:
-    """Fit values where there are some, and where there are none.
+    """Fit emulators to the values, and classifiers to their existence.
 
     Parameters
     ----------
@@ -251,7 +251,7 @@ def _fitted(
 
 
 def _classifier(unit: FloatArray, made: BoolArray, seed: int) -> Any:
-    """Of an event that came about in some sets."""
+    """Classifier of an event that occurs in some parameter sets."""
     from sklearn.gaussian_process import GaussianProcessClassifier
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 

@@ -1,4 +1,4 @@
-"""What the observations say of the parameters: points of the prior, each with the weight of its likelihood."""
+"""Posterior of the parameters: points of the prior, weighted by their likelihood."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from walkers.calibration.emulator import LARGEST, Emulators, FloatArray, Space
 from walkers.inputs.calibration import Observation, SharedError
 
 LEAST_SAMPLES = 400.0
-"""A posterior is known well enough if its points are worth more than so many independent samples."""
+"""Smallest effective sample size of a converged posterior."""
 _ROUNDS = 8
 _WIDER, _TEMPERED = 1.5, 150.0
 """How much wider than the weighted points before them those of a later round are, and what these are to be worth, which
@@ -24,7 +24,7 @@ _DISCREPANCY = 0.5
 """Scale of the half-Cauchy prior about a group's discrepancy, in standard deviations of its observations: most groups
 have little, but one may have much without bending all parameters toward it."""
 _MOST = 0.998
-"""Probability of the prior beyond which a discrepancy, then of 160 deviations, does not grow."""
+"""Largest cumulative prior probability of a discrepancy, which is then 160 deviations."""
 _NEWTON_STEPS, _CONVERGED = 40, 1e-4
 _LEAST_DEVIATION = 1e-3
 
@@ -81,7 +81,7 @@ def log_likelihood(
 
 
 def _mode(mean: FloatArray, of_numbers: FloatArray, of_engine: FloatArray) -> FloatArray:
-    """Where ψ is least, by Newton's steps.
+    """Minimum of ψ by Newton's method.
 
     They are of one at most, which is what Newton's are where sinh is an exponential, and take of the curvature what is
     positive, so that all are downhill.
@@ -123,7 +123,7 @@ class Posterior:
 
     @property
     def converged(self) -> bool:
-        """Whether enough of the points weigh something to say something of the posterior."""
+        """Whether the effective sample size is large enough."""
         return self.effective_samples > LEAST_SAMPLES
 
 
@@ -172,7 +172,7 @@ class Density:
 
 
 def sample_posterior(density: Density, points: int, seed: int) -> Posterior:
-    """Weigh points by importance: those of the prior first, then, while few of them weigh anything, others nearer.
+    """Sample the posterior by adaptive importance sampling, starting from the prior.
 
     Later rounds (``points`` in each) are normal with the mean and covariance of the points weighed so far; all points
     are weighed over the mixture of what all rounds were drawn from (Cornuet et al. 2012, doi

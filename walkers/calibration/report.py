@@ -1,4 +1,4 @@
-"""What a calibration found, as tables and figures: observations beside predictions, and the posterior."""
+"""Tables and figures of a calibration: observations, predictions and the posterior."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 RECORD_NAME = "calibration.json"
 _SIGMAS = 2.0
 _NARROW, _NARROWER = 1.0 / 3.0, 2.0 / 3.0
-"""A parameter is identified if the posterior's interval is less than a third of the prior's and it has converged."""
+"""A parameter is identified if its posterior interval is below a third of the prior's (narrowed: two thirds)."""
 
 # --- tables -----------------------------------------------------------------------------------------------------------
 
@@ -46,8 +46,8 @@ def write_outcome(found: Outcome, to: Path) -> list[Path]:
     write_bytes(files[0], samples.to_parquet(index=False))
     write_json(files[1], record)
     discrepancies = np.percentile(posterior.discrepancy, (5.0, 50.0, 95.0), axis=0).T.tolist()
-    told = {"samples": len(found.predictive.unit), "least": LEAST_SAMPLES, "narrow": _NARROW}
-    page = rendered("walkers.calibration", "report.md.j2", found=record, discrepancies=discrepancies, **told)
+    more = {"samples": len(found.predictive.unit), "least": LEAST_SAMPLES, "narrow": _NARROW}
+    page = rendered("walkers.calibration", "report.md.j2", found=record, discrepancies=discrepancies, **more)
     write_text(files[2], page)
     sources = [Path(run).name for run in found.predictive.table["run"]]
     for name, figure in figures_of(found, record["observations"]).items():
@@ -56,7 +56,7 @@ def write_outcome(found: Outcome, to: Path) -> list[Path]:
 
 
 def record_of(found: Outcome) -> dict[str, Any]:
-    """What ``calibration.json`` holds; observations in mm/s and degrees."""
+    """Contents of ``calibration.json``; observations in mm/s and degrees."""
     calibration, posterior, emulators = found.calibration, found.posterior, found.emulators
     names = [one.name for one in found.space.parameters]
     rows = [_row(found, place) for place in range(len(emulators.each))]
@@ -105,7 +105,7 @@ def record_of(found: Outcome) -> dict[str, Any]:
 
 
 def _row(found: Outcome, place: int) -> dict[str, Any]:
-    """An observation, and what is predicted of it: by the engine and the emulator at the best set and over samples."""
+    """An observation, and its predictions by engine and emulator, at the best set and over samples."""
     emulator = found.emulators.each[place]
     observation, best = emulator.observation, found.checks["best"].unit
     speed = QUANTITIES[observation.quantity] is SPEED
@@ -156,9 +156,9 @@ def _labelled(parameter: Parameter) -> str:
 
 
 def words_of(share: float, *, converged: bool) -> str:
-    """What may be said of a parameter whose interval is so much of the prior's."""
+    """Verdict on a parameter, given the ratio of its posterior interval to that of the prior."""
     if not converged:
-        return "not said: the posterior has not converged"
+        return "undetermined: the posterior has not converged"
     return "identified" if share < _NARROW else "narrowed" if share < _NARROWER else "not identified"
 
 

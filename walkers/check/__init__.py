@@ -1,4 +1,4 @@
-"""Checks: the engine beside a second engine, written from the published formulas, and that one beside the literature.
+"""Checks: the engine against a second engine from published formulas, and the second engine against the literature.
 
 `audit` compares forces on small decks, `comparison` whole runs; `benchmarks` and `bridges` have published numbers and
 exact solutions. The second engine is `engine` and its formulas, `kernels`: of the bridges it takes the law

@@ -1,4 +1,4 @@
-"""``walkers check engine``: run the checks on an engine, two decks at a time, and tell what they gave."""
+"""``walkers check engine``: run the checks on an engine, two decks at a time, and report the results."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from walkers.runner.binary import AuditRecord, Engine, find_engine, write_audit
 
 @dataclass(frozen=True)
 class AuditReport:
-    """What an audit found."""
+    """Results of an audit."""
 
     engine: Engine
     version: str
@@ -32,8 +32,8 @@ class AuditReport:
 
     def as_text(self) -> str:
         """A table for each check, and the outcome."""
-        told = f"{self.version}, binary and contact model {self.engine.sha256[:12]}: {outcome(self.chapters)}"
-        return "\n\n".join([*(chapter.as_text() for chapter in self.chapters), told])
+        text = f"{self.version}, binary and contact model {self.engine.sha256[:12]}: {outcome(self.chapters)}"
+        return "\n\n".join([*(chapter.as_text() for chapter in self.chapters), text])
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types."""
@@ -55,7 +55,7 @@ def run_audit(
     engine: Engine | None = None,
     on_done: Callable[[Chapter], None] | None = None,
 ) -> AuditReport:
-    """Run some of the `CHECKS` on an engine, the installed one if None is given; ``on_done`` is told of each."""
+    """Run some of the `CHECKS` on an engine, the installed one if None is given; ``on_done`` is called after each."""
     binary = engine or find_engine()
     with tempfile.TemporaryDirectory(prefix="walkers-audit-") as folder:
         bench = Bench(binary, Path(folder))

@@ -1,6 +1,6 @@
-"""The benchmark tests of Chung and Ooi for contact models, by the second engine, beside their points.
+"""The benchmark tests of Chung and Ooi for contact models: the second engine and the published points.
 
-What each line is judged by: closed forms (Hertz, sliding all the way), to the time step (a thousandth of the contact)
+What each line is judged by: closed forms (Hertz, gross sliding), to the time step (a thousandth of the contact)
 or, where surfaces turn, to the overlap over the radius, by which the arm of a force is shorter; published points, to
 two per cent of the axis that they were read from.
 
@@ -43,7 +43,7 @@ Curves = dict[str, tuple[FloatArray, FloatArray]]
 
 
 class Sphere(NamedTuple):
-    """What a sphere is made of: Young's modulus (Pa), Poisson's ratio, density (kg/m³), and its radius (m)."""
+    """Young's modulus (Pa), Poisson's ratio, density (kg/m³) and radius (m) of a sphere."""
 
     youngs_modulus: float
     poissons_ratio: float
@@ -56,7 +56,7 @@ class Sphere(NamedTuple):
         return Impact(mass, self.radius, 2.0 * reduced_modulus(self.youngs_modulus, self.poissons_ratio))
 
     def on_equal(self) -> Impact:
-        """Its impact on another one like it."""
+        """Impact on an identical sphere."""
         plane = self.on_plane()
         return Impact(plane.mass / 2.0, self.radius / 2.0, plane.modulus / 2.0)
 
@@ -101,12 +101,12 @@ class Speeds(NamedTuple):
 
     @property
     def sliding(self) -> FloatArray:
-        """Of the surfaces at the contact, m/s."""
+        """Sliding velocity of the surfaces at the contact, m/s."""
         return self.tangential - self.rolling
 
 
 def onto_plane(sphere: Sphere, before: Speeds, restitution: float = 1.0, friction: float = 0.0) -> Speeds:
-    """Send spheres onto a rigid plane, each by itself: their speeds afterwards."""
+    """Speeds of spheres after an impact on a rigid plane, one sphere at a time."""
     zeros, radius, impact = np.zeros_like(before.normal), sphere.radius, sphere.on_plane()
     places = [4.0 * radius * np.arange(len(zeros)), zeros, zeros + radius]
     velocities = [before.tangential, zeros, -before.normal]
@@ -175,7 +175,7 @@ def _hertz(curves: Curves) -> Iterator[Line]:
 
 
 def _damped(_: Curves) -> Iterator[Line]:
-    """Test 3: the restitution is the one that was given; test 7: spheres that spin without sliding go on so."""
+    """Test 3: the restitution is that of the case; test 7: spheres that spin without sliding keep their spin."""
     for name, sphere in (("oxide", OXIDE), ("cast iron", CAST_IRON)):
         for given in (0.2, 0.4, 0.6, 0.8, 1.0):
             after = onto_plane(sphere, Speeds(np.array([3.9]), np.zeros(1), np.zeros(1)), given)
@@ -200,7 +200,7 @@ def _at_an_angle(curves: Curves) -> Iterator[Line]:
         curves[f"{name}-spin"] = angle, -after.rolling / sphere.radius
         curves[f"{name}-rebound"] = angle, np.degrees(np.arctan(after.sliding / after.normal))
         expected = 1.0 - 0.092 * (1.0 + after.normal / before.normal) / np.tan(turn)
-        what = f"4: {name}, e_t in gross sliding, 1 - μ(1+e)/tan θ"
+        what = f"4: {name}, e_t in gross sliding: largest deviation from 1 - μ(1+e)/tan θ"
         yield largest(what, expected[slides], kept[slides], STEP)
 
 
@@ -214,8 +214,9 @@ def _along_the_plane(curves: Curves) -> Iterator[Line]:
     slides = x > 7.0
     # 5/2 (1+e) times half of the overlap over the radius
     arm = 2.5 * STEEL.on_plane().depth(speed) / STEEL.radius
-    yield largest("5: surface velocity in gross sliding, s/(μ v_n) - 7", x[slides] - 7.0, surface[slides], arm)
-    yield largest("5: spin in gross sliding, -5", -5.0, turn[slides], arm)
+    expected = x[slides] - 7.0
+    yield largest("5: surface in gross sliding: largest deviation from s/(μ v_n) - 7", expected, surface[slides], arm)
+    yield largest("5: spin in gross sliding: largest deviation from -5", -5.0, turn[slides], arm)
 
 
 def _spinning(curves: Curves) -> Iterator[Line]:
@@ -227,7 +228,7 @@ def _spinning(curves: Curves) -> Iterator[Line]:
     beta = -after.sliding / before.sliding
     curves["spin"] = x, beta
     slides = x < 0.9
-    yield largest("6: -s'/s in gross sliding, x - 1", x[slides] - 1.0, beta[slides], SLIP)
+    yield largest("6: -s'/s in gross sliding: largest deviation from x - 1", x[slides] - 1.0, beta[slides], SLIP)
     yield largest("6: restitution", 0.5, after.normal / before.normal, 0.005)
 
 
@@ -238,11 +239,11 @@ def largest(what: str, expected: FloatArray | float, measured: FloatArray, toler
 
 
 def farthest_point(what: str, points: FloatArray, curve: tuple[FloatArray, FloatArray], axis: float) -> Line:
-    """The one of some points that is farthest from a curve; judged by the distance over the axis."""
+    """The point that is farthest from a curve; its error is the distance divided by the axis."""
     away = np.interp(points[:, 0], *curve) - points[:, 1]
     worst = int(np.argmax(np.abs(away)))
-    told = f"{what}: farthest point, at {points[worst, 0]:g}, over the axis"
-    return Line(told, 0.0, float(away[worst]) / axis, READING)
+    words = f"{what}: largest deviation, at {points[worst, 0]:g}, over the axis"
+    return Line(words, 0.0, float(away[worst]) / axis, READING)
 
 
 def published() -> dict[str, Any]:
@@ -255,7 +256,7 @@ def published() -> dict[str, Any]:
 
 
 def point_lines(curves: Curves) -> Iterator[Line]:
-    """The published points that are judged, beside the curves."""
+    """Comparison of the published points with the curves."""
     for key, panel in published().items():
         for series in panel["series"]:
             points, between = series["points"], series.get("judged", [-np.inf, np.inf])
@@ -266,7 +267,7 @@ def point_lines(curves: Curves) -> Iterator[Line]:
 
 
 def chapter(out: Path, *, quick: bool = False) -> Chapter:
-    """The benchmarks by the second engine; they take seconds, however ``quick`` it is to be, and no runs."""
+    """The benchmarks with the second engine, which take seconds with or without ``quick``."""
     del out, quick
     (lines, curves), panels = measure(), published()
     lines += point_lines(curves)

@@ -1,4 +1,4 @@
-"""Published laws of bridges beside the Young–Laplace equation, and walkers by other laws.
+"""Published bridge laws compared with the Young–Laplace equation, and velocities of walkers with other laws.
 
 A published law gives the pull over the surface tension, F/γ, of a bridge of constant volume at gaps, in Derjaguin's
 way (`walkers.physics.capillary.derjaguin_radius`) where it was made for equal spheres. Those that the program has are
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COMPARED = ("fig1b", "climber-dimer")
-"""With whose bridges, of the walkers' liquid and of the piles', laws are compared."""
+"""Cases whose bridges are compared: the liquid of the walkers and that of the piles."""
 WALKED, WALKED_BY = ("fig1b", "fig4a"), ("young-laplace", "willett", "rabinovich", "soulie")
 """Cases and laws of the velocities."""
 _FRACTIONS, _ANGLES = (0.01, 0.05, 0.25), (0.0, radians(40.0))
@@ -80,12 +80,12 @@ class Law(NamedTuple):
 
 
 def _shipped() -> Iterator[Law]:
-    """Those of `walkers.physics.laws` that were published as a pull: files that say as whose."""
+    """The laws of `walkers.physics.laws` that were published as a pull (modules with ``PUBLISHED``)."""
     for name in laws.LAWS:
-        told = vars(import_module(laws.by_name(name).__module__))
-        if "PUBLISHED" in told:
-            given = {key: told[key] for key in ("pull", "rupture") if key in told}
-            yield Law(told["PUBLISHED"], error=told.get("ERROR", inf), **given)
+        contents = vars(import_module(laws.by_name(name).__module__))
+        if "PUBLISHED" in contents:
+            given = {key: contents[key] for key in ("pull", "rupture") if key in contents}
+            yield Law(contents["PUBLISHED"], error=contents.get("ERROR", inf), **given)
 
 
 LAWS = (
@@ -115,7 +115,7 @@ def shape_of(surfaces: Surfaces) -> tuple[float, float, float, float]:
 
 
 def exact(surfaces: Surfaces) -> tuple[FloatArray, FloatArray]:
-    """Gaps from contact to rupture, m, and Young–Laplace's F/γ there, m."""
+    """Gaps from contact to rupture, m, and F/γ of Young–Laplace at these gaps, m."""
     curve = young_laplace.law(surfaces)
     gaps = _even(curve.rupture)
     return gaps, curve.forces(gaps).pull / surfaces.liquid.surface_tension
@@ -126,7 +126,7 @@ def _even(rupture: float) -> FloatArray:
 
 
 class Deviation(NamedTuple):
-    """A law over Young–Laplace: pull at contact, work from contact to rupture, each to its own, and largest gap."""
+    """Ratios of a law to Young–Laplace: pull at contact, work from contact to rupture, rupture distance."""
 
     pull: float
     work: float
@@ -134,7 +134,7 @@ class Deviation(NamedTuple):
 
 
 def deviation(law: Law, surfaces: Surfaces) -> Deviation:
-    """A law over Young–Laplace for a bridge."""
+    """Ratios of a law to Young–Laplace for a bridge."""
     shape, (places, true) = shape_of(surfaces), exact(surfaces)
     gaps = _even(law.rupture(*shape))
     forces = law.pull(*shape, gaps)
@@ -143,15 +143,15 @@ def deviation(law: Law, surfaces: Surfaces) -> Deviation:
 
 
 def chapter(out: Path, *, quick: bool = False) -> Chapter:
-    """Published laws beside the Young–Laplace equation, and, unless ``quick``, walkers by other laws."""
+    """Published laws compared with Young–Laplace, and, unless ``quick``, velocities of walkers with other laws."""
     compared = shapes(COMPARED)
     published = {law: {key: deviation(law, one) for key, one in compared.items()} for law in LAWS}
     lines = []
     for law, found in published.items():
         for key, one in found.items():
             what = f"{law.name}, {key}"
-            lines.append(Line(f"{what}: pull at contact over Young–Laplace's", 1.0, one.pull, law.error))
-            lines.append(Line(f"{what}: work over Young–Laplace's", 1.0, one.work))
+            lines.append(Line(f"{what}: pull at contact relative to Young–Laplace", 1.0, one.pull, law.error))
+            lines.append(Line(f"{what}: work relative to Young–Laplace", 1.0, one.work))
     velocities: dict[str, dict[str, float]] = {}
     for name in () if quick else WALKED_BY:
         runs = {case: run(load_case(case, {"liquid.law": name}), out) for case in WALKED}
@@ -176,14 +176,14 @@ def chapter(out: Path, *, quick: bool = False) -> Chapter:
 
 
 def _walls() -> list[Surfaces]:
-    """Bridges at a wall of little and much liquid that wets well and badly."""
+    """Bridges at a wall with small and large volumes and contact angles."""
     case = load_case(COMPARED[0])
     liquids = [replace(case.liquid, volume_fraction=part, contact_angle=one) for part in _FRACTIONS for one in _ANGLES]
     return [Surfaces.of(1.0, inf, liquid, case.contact.minimum_separation_ratio) for liquid in liquids]
 
 
 def _coverage(name: str) -> dict[str, float]:
-    """How far bridges at contact reach around the beads of a dimer, rad, and the room between wall and other bead."""
+    """Angles over which bridges extend around the beads of a dimer at contact, and the angles available, rad."""
     beads, wall = shapes((name,)).values()
     (small, large), (at_wall, _) = (
         force_curve(*shape_of(one), [0.0]).bridges[0, :2] / (one.radius, one.other_radius) for one in (beads, wall)
@@ -206,8 +206,8 @@ def figure(compared: dict[str, Surfaces]) -> Figure:
         panel.plot(1.0, true[-1] / true[0], "ko", ms=5)
         panel.set(
             title=f"{name}: liquid {surfaces.liquid.volume_fraction:g}, {degrees(shape[3]):.3g}°",
-            xlabel="gap / rupture distance\nby Young–Laplace",
-            ylabel="pull / pull at contact\nby Young–Laplace",
+            xlabel="gap / rupture distance\n(Young–Laplace)",
+            ylabel="pull / pull at contact\n(Young–Laplace)",
         )
         panel.label_outer()
     axes[0, 0].set_ylim(0.0, None)

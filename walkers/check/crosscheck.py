@@ -1,4 +1,4 @@
-"""A finished run of LIGGGHTS beside the second engine: the same start, the same samples, the same analysis.
+"""Compare a finished run of LIGGGHTS with the second engine: the same start, samples and analysis.
 
 `crosscheck` compares a case, `chapter` cases of all kinds for docs/explanation/validation.md.
 """
@@ -34,13 +34,13 @@ SPEED, GAIT, ORIENTATION = 1e-4, 1e-3, 0.1
 """How far the second engine may differ: relative, of walkers' velocities; of rotation and sliding, relative to the
 fastest of them (of small differences these are, where contacts open); at the end, in degrees."""
 SPEED_FLOOR = 2e-3
-"""mm/s, of walkers that hardly move: differences that are always allowed."""
+"""mm/s; smaller differences are always accepted, for walkers that hardly move."""
 ONE = 0.01
-"""Of the smallest radius: places that are no farther apart are those of one motion."""
+"""Fraction of the smallest radius within which both motions count as the same."""
 SIGNIFICANCE = 0.01
-"""Distributions differ if a Kolmogorov-Smirnov test says so with a smaller p …"""
+"""p value of a Kolmogorov-Smirnov test below which distributions differ …"""
 FEWEST = 5
-"""… which it can from so many starts on."""
+"""… and the smallest number of starts for this test."""
 
 
 @dataclass(frozen=True)
@@ -52,29 +52,29 @@ class Start:
 
     @cached_property
     def apart(self) -> FloatArray:
-        """Largest distance of a bead in one from itself in the other, m, of each frame."""
+        """Largest distance between the positions of a bead in both motions, m, for each frame."""
         return np.asarray(np.linalg.norm(self.first.position - self.second.position, axis=-1).max(axis=1))
 
     @property
     def together(self) -> float | None:
-        """Cycles of the drive after which they are no longer one; None if they are to the end."""
+        """Cycles of the drive during which both motions agree; None if they agree to the end."""
         over = np.flatnonzero(self.apart > ONE * float(self.first.radius.min()))
         return float(self.first.time[over[0]]) * self.first.case.drive.frequency if len(over) else None
 
     def line(self) -> Line:
-        """How they part; piles, which are chaotic, fail if they do in the first cycle."""
+        """When the motions diverge; piles, which are chaotic, fail if they diverge in the first cycle."""
         case, cycles = self.first.case, self.together
-        told = "same motion to the end" if cycles is None else f"same motion until cycle {cycles:.1f}"
+        agreement = "same motion to the end" if cycles is None else f"same motion until cycle {cycles:.1f}"
         name = f"start {case.seed}, " if case.mixture is not None else ""
         early = case.mixture is not None and cycles is not None and cycles < 1.0
         farthest = 1e6 * float(self.apart.max())
         given = Verdict.FAIL if early else None
-        return Line(f"{name}{told}; largest distance of beads", 0.0, farthest, unit="µm", given=given)
+        return Line(f"{name}{agreement}; largest distance of a bead", 0.0, farthest, unit="µm", given=given)
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A case in both engines: lines, the one to look at first (of a pile means over the starts), and the runs."""
+    """A case in both engines: lines (for a pile, means over the starts first) and the runs."""
 
     case: Case
     without: tuple[str, ...]
@@ -82,10 +82,10 @@ class Comparison:
     starts: tuple[Start, ...]
 
     def chapter(self) -> Chapter:
-        """What is printed."""
+        """The comparison as a chapter."""
         case = self.case
-        laws = f"without {', '.join(self.without)}" if self.without else "with the decks' laws"
-        title = f"{case.drive.described()}, {case.run.cycles} cycles; LIGGGHTS, and the second engine {laws}"
+        laws = f"without {', '.join(self.without)}" if self.without else "with the same laws"
+        title = f"{case.drive.described()}, {case.run.cycles} cycles; LIGGGHTS and the second engine {laws}"
         return Chapter(case.name, title, (*self.lines, *(start.line() for start in self.starts)))
 
 
@@ -97,7 +97,7 @@ def crosscheck(
     seeds: int = 1,
     make: Callable[[Case, Path], Run] = run,
 ) -> Comparison:
-    """Compare a case's run, and of a pile those of so many ``seeds`` from its own on, with the second engine.
+    """Compare the run of a case with the second engine; for a pile, runs with a number of ``seeds``.
 
     ``out`` is the folder of the run directories, ``without`` terms that the second engine leaves out
     (`walkers.check.engine.TERMS`), ``make`` makes the run of a case if it is missing. `EngineFailure` if the engine
@@ -126,7 +126,7 @@ def compare(motions: Sequence[Motion], without: Sequence[str] = ()) -> Compariso
 
 
 def shortened(case: Case, cycles: int) -> Case:
-    """The case for so many cycles at a stretch, a third of them to settle.
+    """The case with a number of cycles in one segment, a third of them for settling.
 
     ``ValueError`` if samples are taken more rarely, or there would be too few.
     """
@@ -177,7 +177,7 @@ def _advanced(engine: SecondEngine, motion: Motion) -> Iterator[tuple[FloatArray
 
 
 def _drift(first: Motion, second: Motion) -> Iterator[Line]:
-    """Mean velocity of the mass centre of beads that are no walkers'."""
+    """Mean velocity of the centre of mass of loose beads."""
     weights = first.radius**3 / np.sum(first.radius**3)
     speeds = [1e3 * weights @ (one.position[-1] - one.position[0]) / np.ptp(one.time) for one in (first, second)]
     allowed = max(GAIT * float(np.linalg.norm(speeds[0])), SPEED_FLOOR)
@@ -209,13 +209,13 @@ def _walker_lines(first: Group, second: Group, label: str) -> Iterator[Line]:
 
 
 def _pile_lines(starts: Sequence[Start]) -> Iterator[Line]:
-    """Means of piles over the second half of the drive, and whether they are distributed alike over the starts."""
+    """Means of piles over the second half of the drive, and tests of their distributions over the starts."""
     measures: dict[str, tuple[str, Callable[[Motion], Any]]] = {
         "height of the beads": ("mm", lambda motion: 1e3 * motion.position[..., 2].mean()),
         "root mean square velocity": (
             "mm/s", lambda motion: 1e3 * np.sqrt(np.mean(np.sum(motion.velocity**2, axis=-1))),
         ),
-        "touching pairs a bead": ("", _touching),
+        "touching pairs per bead": ("", _touching),
     }  # fmt: skip
 
     def later(motion: Motion) -> Motion:
@@ -228,13 +228,13 @@ def _pile_lines(starts: Sequence[Start]) -> Iterator[Line]:
             warnings.simplefilter("ignore", RuntimeWarning)  # where nothing differs there is no exact p
             p = float(ks_2samp(*values.T).pvalue)
         verdict = Verdict.PASS if p >= SIGNIFICANCE else Verdict.FAIL
-        told = f"{name}, p = {p:.2g} by Kolmogorov and Smirnov"
+        label = f"{name} (p = {p:.2g})"
         one, two = values.mean(axis=0).tolist()
-        yield Line(told, one, two, unit=unit, given=verdict if len(starts) >= FEWEST else None)
+        yield Line(label, one, two, unit=unit, given=verdict if len(starts) >= FEWEST else None)
 
 
 def _touching(motion: Motion) -> float:
-    """Pairs of beads that touch, over beads."""
+    """Touching pairs per bead."""
     reach, radius, found = 2.0 * float(motion.radius.max()), motion.radius, 0
     for place in motion.position:
         near = cKDTree(place).query_pairs(reach, output_type="ndarray")

@@ -1,4 +1,4 @@
-"""The second engine: beads between walls that move on from where they are put, or are put anew step by step."""
+"""The second engine: beads between walls that move freely, or follow a given motion step by step."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TERMS = ("capillary", "lubrication", "damping", "friction", "rolling-friction", 
 """What may be left out: pull and resistances of the bridges, damping of Hertz's contact and of the spring along the
 surfaces, all of the tangential contact force, the torque against rolling, weight, the inertial force of the frame."""
 _SKIN = 0.4
-"""Of the smallest radius: neighbours are listed anew when a bead has gone nearly half as far."""
+"""Fraction of the smallest radius; neighbour lists are rebuilt when a bead has moved nearly half of it."""
 
 
 class SecondEngine:
@@ -54,7 +54,7 @@ class SecondEngine:
         without: Collection[str] = (),
     ) -> None:
         if unknown := set(without) - set(TERMS):
-            raise ValueError(f"without {unknown}: expected some of {', '.join(TERMS)}")
+            raise ValueError(f"without {unknown}: expected any of {', '.join(TERMS)}")
         self.clock, self.radius = clock, np.ascontiguousarray(radius, dtype=np.float64)
         self.constants = _constants(case, self.radius, walls or case.boundary.walls, without)
         place, velocity, spin = (np.array(start[:, one : one + 3], dtype=np.float64, order="C") for one in (0, 3, 6))
@@ -71,7 +71,7 @@ class SecondEngine:
         self._advance(self.clock, (self.clock, 1), np.empty((0, len(self.radius), 9)))
 
     def run(self, steps: int, every: int) -> FloatArray:
-        """Move on for so many steps: position, velocity and spin after each ``every``, shape (steps // every, N, 9)."""
+        """Integrate: position, velocity and spin after each ``every`` steps, shape (steps // every, N, 9)."""
         begin, end = self.clock, self.clock + steps
         frames = np.empty((steps // every, len(self.radius), 9))
         while self.clock < end:
@@ -80,7 +80,7 @@ class SecondEngine:
         return frames
 
     def follow(self, frame: FloatArray) -> FloatArray:
-        """Put the beads where another engine had them in the next step: forces (N) and torques (N m) there, (N, 6).
+        """Move the beads to the given state of the next step and return forces (N) and torques (N m), (N, 6).
 
         ``frame`` is of shape (N, 9); its velocities are those that the forces are to be evaluated with.
         """
@@ -97,7 +97,7 @@ class SecondEngine:
         return kernels.advance(self.constants, self.state, self.pairs, self._listed, self._skin, clock, frames)
 
     def bridges(self) -> list[tuple[int, int]]:
-        """What a bridge holds together: numbers of two beads, or of a bead and, after the beads', a wall."""
+        """Indices of the surfaces of each bridge: two beads, or a bead and a wall (numbered after the beads)."""
         held = self.pairs.bridged
         return list(zip(self.pairs.first[held].tolist(), self.pairs.second[held].tolist(), strict=True))
 

@@ -53,7 +53,7 @@ class Bridges(NamedTuple):
 
 
 class Constants(NamedTuple):
-    """What does not change: N beads, W walls (``hollow``: radii of cylinders, 0 of planes), H harmonics; SI units.
+    """Constants: N beads, W walls (``hollow``: radii of cylinders, 0 for planes), H harmonics; SI units.
 
     ``harmonics``, of shape (H, 6), have directions, ω, accelerations and phases; moduli are E* and G*, ``damping`` is
     β; friction is that between beads and at walls, ``rolling`` both's.
@@ -87,7 +87,7 @@ class State(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """P pairs of beads near each other, and of each bead with each wall, whose numbers come after the beads'.
+    """P pairs: beads near each other, and each bead with each wall (numbered after the beads).
 
     They are sorted by their numbers. ``spring``, of shape (P, 3), has tangential displacements, m.
     """
@@ -99,7 +99,7 @@ class Pairs(NamedTuple):
 
 
 class Meeting(NamedTuple):
-    """How two surfaces meet: number of the bridge, gap, reduced radius and mass, friction, normal, and velocities.
+    """State of a pair: index of the bridge, gap, reduced radius and mass, friction, normal, and velocities.
 
     ``order`` is -1 where the first is the larger bead, for which a law's coupling has the other sign; ``apart`` is the
     velocity of the centres along the normal, ``slide`` that of the surfaces along each other (m/s), ``turn`` the
@@ -275,7 +275,7 @@ def forces(c: Constants, state: State, pairs: Pairs, clock: int, moves: bool) ->
 
 @compiled
 def kick(c: Constants, state: State) -> None:
-    """Half a step of velocities."""
+    """Advance the velocities by half a step."""
     half = 0.5 * c.step
     for bead in range(c.radius.shape[0]):
         speed = half / c.mass[bead]

@@ -1,4 +1,4 @@
-"""What checks give: chapters of lines, each with what is expected, what was measured, and a verdict.
+"""Results of checks: chapters of lines with expected value, measured value and verdict.
 
 ``walkers check literature`` makes a page of chapters.
 """
@@ -23,18 +23,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 CHAPTERS = ("benchmarks", "bridges", "crosscheck")
-"""In the order of the page; each the function ``chapter`` of a module of `walkers.check`."""
+"""Chapters in the order of the page; each is the function ``chapter`` of a module of `walkers.check`."""
 PAGE = "validation.md"
 
 
 class Verdict(StrEnum):
-    """Outcome of a line: ``ERROR`` if it could not be measured, ``TOLD`` if nothing judges it."""
+    """Outcome of a line: ``ERROR`` if it could not be measured, ``NOT_JUDGED`` without a tolerance."""
 
     PASS = "pass"
     FAIL = "FAIL"
     ERROR = "ERROR"
     SKIPPED = "skipped"
-    TOLD = "-"
+    NOT_JUDGED = "-"
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Line:
 
     @classmethod
     def without_number(cls, what: str, verdict: Verdict) -> Line:
-        """Of what could not be measured."""
+        """A line without a measured value."""
         return cls(what, nan, nan, given=verdict)
 
     @property
@@ -68,12 +68,12 @@ class Line:
     def verdict(self) -> Verdict:
         """Pass or fail by the tolerance; an error that is no number fails."""
         if self.given or self.tolerance == inf:
-            return self.given or Verdict.TOLD
+            return self.given or Verdict.NOT_JUDGED
         return Verdict.PASS if self.error <= self.tolerance else Verdict.FAIL
 
     @property
     def failed(self) -> bool:
-        """Whether it is not as expected, or could not be measured."""
+        """Whether the line fails or could not be measured."""
         return self.verdict in (Verdict.FAIL, Verdict.ERROR)
 
     def as_dict(self) -> dict[str, Any]:
@@ -129,21 +129,21 @@ def _number(value: float) -> str:
 
 
 def count(chapters: Iterable[Chapter], verdict: Verdict) -> int:
-    """How many lines have a verdict."""
+    """Number of lines with a verdict."""
     return sum(line.verdict is verdict for chapter in chapters for line in chapter.lines)
 
 
 def outcome(chapters: Sequence[Chapter]) -> str:
-    """How many lines pass, in words."""
+    """Number of lines that pass, as text."""
     passed, failed = count(chapters, Verdict.PASS), count(chapters, Verdict.FAIL)
-    told = f"{failed} of {passed + failed} lines fail" if failed else f"all {passed} lines pass"
+    sentence = f"{failed} of {passed + failed} lines fail" if failed else f"all {passed} lines pass"
     for other, words in ((Verdict.ERROR, "could not be measured"), (Verdict.SKIPPED, "skipped")):
-        told += f", {number} {words}" if (number := count(chapters, other)) else ""
-    return told
+        sentence += f", {number} {words}" if (number := count(chapters, other)) else ""
+    return sentence
 
 
 def as_dict(chapters: Sequence[Chapter], **more: Any) -> dict[str, Any]:
-    """Plain JSON types of all chapters, and of what is said beside them."""
+    """Plain JSON types of all chapters and of further values."""
     passed = not any(chapter.failures for chapter in chapters)
     return {**more, "passed": passed, "checks": [chapter.as_dict() for chapter in chapters]}
 
@@ -160,7 +160,7 @@ class Validation:
 
     @property
     def failed(self) -> list[str]:
-        """What was expected to hold and does not, with the chapter's name before it."""
+        """Lines that fail, with the name of their chapter."""
         return [f"{chapter.name}: {line.what}" for chapter in self.chapters for line in chapter.failures]
 
 
@@ -173,7 +173,7 @@ def validate(
     jobs: int = 1,
     on_done: Callable[[Chapter], None] | None = None,
 ) -> Validation:
-    """Make chapters, so many ``jobs`` at once, and write the page and its pictures.
+    """Compute the chapters with a number of parallel ``jobs``, and write the page and its pictures.
 
     Parameters
     ----------
@@ -212,9 +212,9 @@ def validate(
 
 
 def _chapter(name: str, out: Path, quick: bool) -> Chapter:
-    """A chapter, or what kept it from being made: the others are made all the same."""
+    """A chapter, or the error that prevented it: the other chapters are computed anyway."""
     try:
         chapter: Chapter = import_module(f"walkers.check.{name}").chapter(out, quick=quick)
     except WalkersError as error:
-        return Chapter(name, name, (Line.without_number(f"could not be made: {error}", Verdict.ERROR),))
+        return Chapter(name, name, (Line.without_number(f"could not be computed: {error}", Verdict.ERROR),))
     return chapter

@@ -1,6 +1,6 @@
 """Scenes of a few beads: what moves, which law, and what is compared between the engine and the second engine.
 
-Most beads are moved on prescribed ways by the engine, and put where it had them by the second engine: forces and
+The engine moves most beads along prescribed paths, and the second engine follows their positions: forces and
 torques of each step are compared, over the largest of the scene. Others move freely from the same start in both, and
 their ways and spins are compared. Most scenes have `law`, whose pull and resistances are all there, and have nothing to
 do with each other; each law that comes with the program has two more.
@@ -42,19 +42,19 @@ from walkers.templates.layout import BEAD_COLUMNS, FORCE_COLUMNS
 from walkers.templates.scene import Bead, Scene
 
 EQUAL = 1e-6
-"""Of the largest force, torque or way: how far two engines may differ, each with its own interpolation of the law."""
+"""Tolerance between the engines, relative to the largest force, torque or displacement (interpolation errors)."""
 DRY = {"law": f"{__name__}:dry"}
-"""Of a case's liquid, where there are to be no bridges."""
+"""Liquid of a case without bridges."""
 FLOOR = BOTTOM
 R, S = 3e-4, 2e-4
 DEEP = 1.7123e-6
-"""m; overlap of what touches."""
+"""m; overlap of touching beads."""
 STILL: Vector = (0.0, 0.0, 0.0)
 WAY, SPIN = (0.031, -0.023, 0.053), (61.0, -83.0, 47.0)
 
 
 def dry(surfaces: Surfaces) -> Curve:
-    """The law of no liquid."""
+    """A law without forces."""
     return Curve(lambda gaps: Forces(*[np.zeros_like(gaps)] * 5), rupture=surfaces.closest)
 
 
@@ -102,18 +102,18 @@ def bench_case(**changes: Mapping[str, Any]) -> Case:
 
 
 def full_case(**changes: Mapping[str, Any]) -> Case:
-    """Friction, rolling friction, damping and the law of this module, but for some changes."""
+    """A case with friction, rolling friction, damping and the law of this module, with changes."""
     return bench_case(**{table: {**_FULL.get(table, {}), **changes.get(table, {})} for table in {**_FULL, **changes}})
 
 
 def over(wall: Flat, gap: float, radius: float, velocity: Vector = STILL, spin: Vector = SPIN, x: float = 0.0) -> Bead:
-    """A bead at a gap (m) from a wall, so far along x (m) from its point."""
+    """A bead at a gap (m) from a wall, at a distance along x (m) from the point of the wall."""
     centre = [at + (radius + gap) * n for at, n in zip(wall.point, wall.normal, strict=True)]
     return Bead(0, (centre[0] + x, centre[1], centre[2]), radius, velocity, spin)
 
 
 def within(wall: Round, gap: float, radius: float, turn: float, velocity: Vector) -> Bead:
-    """A bead at a gap (m) from a round wall, toward an azimuth (rad); its velocity is outward, along and upward."""
+    """A bead at a gap (m) from a cylindrical wall at an azimuth (rad); velocity: radial, azimuthal, axial."""
     out, (away, along, up) = wall.radius - radius - gap, velocity
     x, y = cos(turn), sin(turn)
     return Bead(0, (out * x, out * y, 10.0 * turn * R), radius, (away * x - along * y, away * y + along * x, up), SPIN)
@@ -122,7 +122,7 @@ def within(wall: Round, gap: float, radius: float, turn: float, velocity: Vector
 def pair(
     gap: float, apart: float, slide: Vector, spins: tuple[Vector, Vector] = (SPIN, (-29.0, 53.0, 19.0))
 ) -> list[Bead]:
-    """Two beads of unlike size in mid-air, at a gap (m), with a velocity apart (m/s) and another one besides."""
+    """Two free beads of different sizes at a gap (m), with a separation velocity and a common velocity (m/s)."""
     n = np.array([0.48, 0.6, 0.64])
     first, second = np.array([-3e-3, 1e-3, 4e-3]), apart * n + np.array(slide)
     place = first + (R + S + gap) * n
@@ -133,7 +133,7 @@ def pair(
 
 
 def standing(beads: Sequence[Bead], walls: Sequence[Wall] = (FLOOR,)) -> Scene:
-    """Beads, which are numbered here, between walls in a box of 2 cm about the origin."""
+    """A scene of beads between walls in a box of 2 cm around the origin."""
     numbered = tuple(replace(bead, id=number) for number, bead in enumerate(beads, 1))
     return Scene(numbered, tuple(walls), (-0.01,) * 3, (0.01,) * 3)
 
@@ -175,7 +175,7 @@ class Measured:
 class Bench:
     """Runs decks of an engine in a folder of its own.
 
-    ``engine`` is the binary on trial, ``stop`` is set to end the engines that run, ``version`` is what they told.
+    ``engine`` is the binary on trial, ``stop`` is set to end the engines that run, ``version`` is what they print.
     """
 
     engine: Engine
@@ -221,7 +221,7 @@ class Setting:
     freely: int = 0
 
     def lines(self, name: str, bench: Bench) -> Iterator[Line]:
-        """Run it in both engines, and compare them."""
+        """Run the scene in both engines and compare the results."""
         case, scene = full_case(**self.changes), standing(self.beads, self.walls)
         engine = second_engine(case, scene)
         if self.freely:
@@ -229,8 +229,8 @@ class Setting:
             series = bench.run(Plan(case, scene, recording(self.freely, every)))
             start, frames = series.frames[0, :, :3], engine.run(self.freely, every)
             found = {
-                "ways": farthest(series.frames[1:, :, :3] - start, frames[..., :3] - start),
-                "spins": farthest(series.frames[1:, :, 6:], frames[..., 6:]),
+                "displacement": farthest(series.frames[1:, :, :3] - start, frames[..., :3] - start),
+                "spin": farthest(series.frames[1:, :, 6:], frames[..., 6:]),
             }
         else:
             series = bench.run(prescribed(case, scene))
@@ -240,11 +240,11 @@ class Setting:
                 "torque": farthest(series.forces[1:, :, 3:], forces[..., 3:]),
             }
         for what, error in found.items():
-            yield Line(f"{name}: {what} beside the second engine's", 0.0, error, EQUAL)
+            yield Line(f"{name}: {what}, both engines", 0.0, error, EQUAL)
 
 
 def in_walls(case: Case, series: Measured) -> FloatArray:
-    """Frames after the first as seen from the walls, with the velocities that the forces were evaluated with."""
+    """Frames after the first in the frame of the walls, with the velocities used for the forces."""
     frames = series.frames[1:].copy()
     frames[..., :3] -= prescribed_motion(case.drive, series.time[1:])[0][:, None]
     # Beads had theirs half a step ago, when walls had that of half a step ago.
@@ -273,30 +273,30 @@ _FAST = {"frequency": "300 Hz", "peak_acceleration": "8 g"}
 
 SCENES: dict[str, Setting] = {
     "a bead leaves the floor": Setting([_LEAVING, over(FLOOR, 2e-5, S, WAY, x=2e-3)]),
-    "a bead comes to the floor": Setting([over(FLOOR, 9e-5, R, (0.031, 0.023, -0.053))]),
+    "a bead approaches the floor": Setting([over(FLOOR, 9e-5, R, (0.031, 0.023, -0.053))]),
     "a bead slides": Setting([over(FLOOR, -DEEP, R, (0.02, 0.013, 0.0), STILL)]),
     "a bead rolls": Setting([over(FLOOR, -DEEP, R, (0.03, 0.0, 0.0), _ROLL)]),
-    "a bead spins where it is": Setting([over(FLOOR, -DEEP, R), over(FLOOR, 2e-6, S, x=2e-3)]),
-    "a bead leaves a leaning wall": Setting([over(_LEANING, -DEEP, R, WAY)], [_LEANING]),
-    "beads leave a round wall": Setting(
+    "a bead spins in place": Setting([over(FLOOR, -DEEP, R), over(FLOOR, 2e-6, S, x=2e-3)]),
+    "a bead leaves a tilted wall": Setting([over(_LEANING, -DEEP, R, WAY)], [_LEANING]),
+    "beads leave a cylindrical wall": Setting(
         [within(_ROUND, -DEEP, size, turn, (-0.05, 0.03, 0.02)) for size, turn in ((R, 0.7), (S, 3.0))], [_ROUND]
     ),
-    "beads move along a round wall": Setting(
+    "beads move along a cylindrical wall": Setting(
         [within(_ROUND, -DEEP, R, 0.3, (-0.02, 0.3, 0.0)), within(_ROUND, 1e-5, S, 2.0, (0.0, -0.4, 0.1))],
         [FLOOR, _ROUND],
     ),
     "a bead in a corner": Setting(
         [Bead(0, (1e-4, 6.0e-4 - R + DEEP, R - DEEP), R, (0.031, -0.043, 0.037), SPIN)], [FLOOR, _SIDE]
     ),
-    "two beads part": Setting(_PARTING),
-    "two beads part, the smaller first": Setting(_PARTING[::-1]),
-    "two beads meet": Setting(pair(4.1e-5, -0.023, (0.004, -0.003, 0.002))),
+    "two beads separate": Setting(_PARTING),
+    "two beads separate, the smaller first": Setting(_PARTING[::-1]),
+    "two beads approach": Setting(pair(4.1e-5, -0.023, (0.004, -0.003, 0.002))),
     "two beads roll on each other": Setting(pair(-DEEP, 0.0, STILL)),
     "three beads on the floor": Setting(CLIMBING),
-    "the floor moves to and fro": Setting(
+    "the floor oscillates horizontally": Setting(
         [over(FLOOR, -DEEP, R), over(FLOOR, -5e-7, S, spin=STILL, x=2e-3)], changes={"drive": {**_FAST, "frame": "lab"}}
     ),
-    "the floor moves up and down": Setting(
+    "the floor oscillates vertically": Setting(
         [over(FLOOR, -DEEP, R), over(FLOOR, 3e-6, S, spin=_ROLL, x=2e-3)],
         changes={"drive": {**_FAST, "frame": "lab", "peak_acceleration": "25 g", "axis": "z"}},
     ),
@@ -305,25 +305,25 @@ SCENES: dict[str, Setting] = {
         changes={"drive": {**_FAST, "axis": "z"}, "environment": _WEIGHT},
     ),
 }
-"""Those of prescribed ways."""
+"""Scenes with prescribed motion."""
 for _name in LAWS:
     _liquid = {"liquid": {"law": _name, "contact_angle": "10 deg"}}
     SCENES[f"a bead leaves the floor ({_name})"] = Setting([_LEAVING], changes=_liquid)
-    SCENES[f"two beads part ({_name})"] = Setting(_PARTING, changes=_liquid)
+    SCENES[f"two beads separate ({_name})"] = Setting(_PARTING, changes=_liquid)
 
 FREE: dict[str, Setting] = {
     "thrown beads": Setting(_THROWN, (FLOOR,), {"environment": _WEIGHT, "drive": {"peak_acceleration": "4 g"}}, 6000),
-    "a bead in the air": Setting(
+    "a bead in free flight": Setting(
         [Bead(0, (0.0, 0.0, 5e-3), R, (0.1, 0.2, 0.0), (1.0, 2.0, 3.0))],
         changes={"environment": _WEIGHT, "drive": {"peak_acceleration": "4 g", "axis": "x"}},
         freely=10_000,
     ),
 }
-"""Those of beads that move freely."""
+"""Scenes with beads that move freely."""
 
 
 def scene_lines(bench: Bench) -> Iterator[Line]:
-    """Beads on prescribed ways beside the second engine."""
+    """Forces on beads with prescribed motion, compared with the second engine."""
     for name, setting in SCENES.items():
         yield from setting.lines(name, bench)
 
@@ -335,7 +335,7 @@ def thrown_lines(bench: Bench) -> Iterator[Line]:
 
 
 def restart_lines(bench: Bench) -> Iterator[Line]:
-    """Springs and open bridges, of pairs and at walls, go on from a restart file as without one."""
+    """Springs and open bridges of pairs and walls continue from a restart file as in an uninterrupted run."""
     beads = [over(FLOOR, -DEEP, R, (0.002, 0.001, 0.0), STILL), *pair(-DEEP, 0.001, (0.001, -0.002, 0.001))]
     gone = replace(over(FLOOR, -DEEP, S, WAY), centre=(3e-3, 0.0, S - DEEP))
     scene = standing([*beads, gone, *(_moved(bead, 0.0, 3e-3) for bead in pair(-DEEP, 0.04, STILL))])
@@ -344,14 +344,14 @@ def restart_lines(bench: Bench) -> Iterator[Line]:
     carry = bench.run(first).directory / "half.restart"
     second = replace(first, recording=replace(recording(1000), begin=500), checkpoint=Checkpoint(read="half.restart"))
     forces = bench.run(second, carry).forces[1:, :, :3]
-    kept = ("a spring at a wall", 0), ("a spring of a pair", 1), ("an open bridge to a wall", 3), ("one of a pair", 5)
+    kept = ("wall spring", 0), ("pair spring", 1), ("open wall bridge", 3), ("open pair bridge", 5)
     for what, number in kept:
         error = farthest(forces[:, number], whole.forces[501:, number, :3])
-        yield Line(f"{what} after a restart beside one without", 0.0, error, EQUAL)
+        yield Line(f"{what}: with and without a restart", 0.0, error, EQUAL)
 
 
 def _moved(bead: Bead, x: float, y: float, speed: float = 0.0) -> Bead:
-    """A bead elsewhere (m), so much faster along x (m/s)."""
+    """A bead shifted by x and y (m), with an additional velocity along x (m/s)."""
     centre, velocity = np.add(bead.centre, (x, y, 0.0)).tolist(), np.add(bead.velocity, (speed, 0.0, 0.0)).tolist()
     return replace(bead, centre=tuple(centre), velocity=tuple(velocity))
 
@@ -366,12 +366,12 @@ def rank_lines(bench: Bench) -> Iterator[Line]:
     rows = (0.0, (first, last)), (2e-3, (last, first))
     scene = standing([*CLIMBING, *(_moved(bead, 2.6e-3, y, 0.9) for y, beads in rows for bead in beads)])
     one, two = (bench.run(prescribed(full_case(), scene, 1000, ranks=ranks)).forces for ranks in (1, 2))
-    yield Line("forces on two MPI ranks beside one", 0.0, farthest(two[..., :3], one[..., :3]), 1e-9)
-    yield Line("torques on two MPI ranks beside one", 0.0, farthest(two[..., 3:], one[..., 3:]), 1e-9)
+    yield Line("forces: two MPI ranks and one", 0.0, farthest(two[..., :3], one[..., :3]), 1e-9)
+    yield Line("torques: two MPI ranks and one", 0.0, farthest(two[..., 3:], one[..., 3:]), 1e-9)
 
 
 def stock_lines(bench: Bench) -> Iterator[Line]:
-    """Two beads that part by Debian's own ``cohesion easo/capillary/viscous``, against the contact model's Soulié."""
+    """Two beads separate: Debian's own ``cohesion easo/capillary/viscous`` against the contact model's Soulié law."""
     liquid = {"dynamic_viscosity": "4.6 mPa*s", "contact_angle": "20 deg", "law": "soulie"}
     bare = bench_case(liquid=liquid, contact={"restitution": 0.5})
     scene = standing(pair(-DEEP, 0.05, STILL, (STILL, STILL)))
@@ -385,17 +385,17 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
     text = rendered("walkers.check", "stock.lig.j2", case=bare, scene=scene, layout=deck.layout, angle=angle)
     theirs = bench.run(replace(deck, text=text))
     error = farthest(ours.forces[..., :3], theirs.forces[..., :3])
-    yield Line("two beads part: force beside that of Debian's model of bridges", 0.0, error, 1e-9)
+    yield Line("two beads separate: force, Debian's own bridge model", 0.0, error, 1e-9)
 
 
 def _walker(cycles: int) -> Case:
-    """The walker of Fig. 1b, alone, for so many cycles."""
+    """A single walker of Fig. 1b for a number of cycles."""
     case = load_case("fig1b", {"dimers.replicates": 1})
     return replace(case, run=replace(case.run, cycles=cycles, cycles_per_segment=cycles, until_steady=False))
 
 
 def company_lines(bench: Bench) -> Iterator[Line]:
-    """A walker among others of its deck, driven otherwise or not, beside the same one alone; and a rerun."""
+    """A walker in a shared deck against the same walker in a deck of its own; and a repeated run."""
     alone = _walker(10)
     alone = replace(alone, contact=replace(alone.contact, rolling_friction=0.0))  # which amplifies rounding
     other = replace(alone, drive=alone.drive.with_peak(2.0 * alone.drive.peak_acceleration))
@@ -409,13 +409,13 @@ def company_lines(bench: Bench) -> Iterator[Line]:
     first, again, together = ran(alone), ran(alone), ran(other, alone, sloping)
     ways = [series.frames[..., :3] - series.frames[0, :, :3] for series in (first, together)]
     error = farthest(ways[1][:, 2:4], ways[0][:, :2])
-    yield Line("a walker's way among others beside that alone, off by", 0.0, error, 1e-9)
+    yield Line("displacement of a walker: shared deck and own deck", 0.0, error, 1e-9)
     same = (first.directory / "beads.bin").read_bytes() == (again.directory / "beads.bin").read_bytes()
-    yield Line("a rerun is the same to the last bit: 0", 0.0, float(not same), 0.0)
+    yield Line("a repeated run is bit-identical (0: yes)", 0.0, float(not same), 0.0)
 
 
 def step_lines(bench: Bench) -> Iterator[Line]:
-    """A walker's way in four cycles, with the step that ``auto`` takes, its half and its quarter."""
+    """The displacement of a walker in four cycles, with the time step of ``auto``, its half and its quarter."""
     case, ways = _walker(4), []
     for finer in (1, 2, 4):
         cycle = case.run.steps_per_cycle * finer
@@ -426,8 +426,8 @@ def step_lines(bench: Bench) -> Iterator[Line]:
         frames = bench.run(replace(plan, recording=recording(steps, steps))).frames
         ways.append(frames[-1, :, :3] - frames[0, :, :3])
     coarse, fine = farthest(ways[0], ways[2]), farthest(ways[1], ways[2])
-    yield Line("a walker's way with half a step, off that with a quarter by", 0.0, fine, 2e-3)
-    yield Line("the same with a whole step", 0.0, coarse, 5e-3)
+    yield Line("displacement of a walker: half and quarter time step", 0.0, fine, 2e-3)
+    yield Line("displacement of a walker: full and quarter time step", 0.0, coarse, 5e-3)
 
 
 CHECKS: Mapping[str, Callable[[Bench], Iterable[Line]]] = {
@@ -439,6 +439,6 @@ CHECKS: Mapping[str, Callable[[Bench], Iterable[Line]]] = {
     "company": company_lines,
     "step": step_lines,
 }
-"""Each runs decks on a bench and gives lines; its docstring is its title."""
+"""Checks by name; each runs decks on a bench and returns lines; its docstring is its title."""
 LONG = ("step",)
-"""Those that ``--quick`` leaves out."""
+"""Checks that ``--quick`` skips."""

@@ -1,4 +1,4 @@
-"""Cases: what is shaken, in physical units, read from TOML and validated.
+"""Cases in physical units, read from TOML and validated.
 
 It stands on the laws alone (`walkers.physics`) and knows nothing of the engine's language.
 """

@@ -1,4 +1,4 @@
-"""Axes of a sweep: lists, spaced values, values that go together, and samplers.
+"""Axes of a sweep: lists, spaced values, zipped values, and samplers.
 
 An axis is a set of keys with, for each of its points, one value a key, which a case file could say. To add a way of
 writing an axis, add it to `values_of`.
@@ -28,7 +28,7 @@ _DISTRIBUTIONS = ("uniform", "loguniform")
 
 @dataclass(frozen=True)
 class Range:
-    """Between which ends a number is drawn, in a unit (None: a plain number), uniformly or of its magnitude.
+    """Range of a random number, in a unit (None: a plain number), uniform or log-uniform.
 
     With a ``median``, half of the draws are below it and half above, each half spread over its side of the range.
     """
@@ -40,7 +40,7 @@ class Range:
     median: float | None = None
 
     def at(self, shares: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """The numbers below which these shares of the draws are."""
+        """Quantiles of the range."""
         import numpy as np
 
         quantiles = np.array([self.low, self.high] if self.median is None else [self.low, self.median, self.high])
@@ -52,14 +52,14 @@ class Range:
 
 @dataclass(frozen=True)
 class Axis:
-    """Keys that vary together: ``rows`` has for each point of the axis one value a key."""
+    """Keys that vary together: ``rows`` has one value per key for each point of the axis."""
 
     keys: tuple[str, ...]
     rows: tuple[tuple[Value, ...], ...]
 
     @classmethod
     def of(cls, columns: Mapping[str, Sequence[Value]]) -> Axis:
-        """An axis of the values of each key."""
+        """Make an axis from the values of each key."""
         return cls(tuple(columns), tuple(zip(*columns.values(), strict=True)))
 
 
@@ -79,14 +79,14 @@ def values_of(key: str, axis: object) -> list[Value]:
         unit_of(key, axis)
         return axis
     if not (isinstance(axis, Mapping) and len(axis) == 1 and (kind := next(iter(axis))) in _SPACINGS):
-        told = "expected a list of values, { linspace = [first, last, number] } or { geomspace = [...] }"
-        raise unusable(key, told, axis)
+        message = "expected a list of values, { linspace = [first, last, number] } or { geomspace = [...] }"
+        raise unusable(key, message, axis)
     import numpy as np
 
     given = axis[kind]
     if not (isinstance(given, list) and len(given) == 3 and type(given[2]) is int and 1 <= given[2] <= MOST_POINTS):
-        told = f'expected first value, last value and number, such as {{ {kind} = ["0.5 g", "10 g", 20] }}'
-        raise unusable(key, told, axis)
+        message = f'expected first value, last value and number, such as {{ {kind} = ["0.5 g", "10 g", 20] }}'
+        raise unusable(key, message, axis)
     first, last, unit = _range(key, given[:2], positive=kind == "geomspace")
     numbers = [written(float(one), unit) for one in getattr(np, kind)(first, last, given[2])]
     # Between whole numbers whole ones stay whole: seeds, cycles, replicates.
@@ -105,7 +105,7 @@ def _range(key: str, given: list[Value], *, positive: bool) -> tuple[float, floa
 
 
 def _quantity(value: Value) -> tuple[float, str | None] | None:
-    """A value as number and unit (None: a plain number), or None if it is no finite number."""
+    """A value as number and unit (None: a plain number), or None if it is not a finite number."""
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         return None
     try:
@@ -116,7 +116,7 @@ def _quantity(value: Value) -> tuple[float, str | None] | None:
 
 
 def number_of(key: str, value: Value) -> float:
-    """The number of a value, without its unit; raises `InputError` if it is no finite number."""
+    """The number of a value, without its unit; raises `InputError` if it is not a finite number."""
     if (found := _quantity(value)) is None:
         raise unusable(key, "expected a number, or a number with its unit in quotes", value)
     return found[0]
@@ -129,7 +129,7 @@ def plain(value: Value) -> Any:
 
 
 def written(number: float, unit: str | None) -> Value:
-    """A number as a case file has it, rounded to twelve digits so that 0.1 + 0.2 reads 0.3."""
+    """A number as written in a case file, rounded to twelve digits so that 0.1 + 0.2 gives 0.3."""
     rounded = float(f"{number:.12g}")
     return rounded if unit is None else f"{rounded!r} {unit}"
 
@@ -150,32 +150,32 @@ def unit_of(key: str, values: Sequence[Value]) -> str | None:
 
 
 def listed(key: str, given: object) -> Axis:
-    """An axis of one key, whose values differ: else points would be there twice."""
+    """An axis of one key with different values, so that no point occurs twice."""
     values = values_of(key, given)
     known: set[str] = set()
     for value in values:
         same = repr([_quantity(part) or part for part in (value if isinstance(value, list) else [value])])
         if same in known:
-            raise unusable(key, "expected different values: this one is there twice", value)
+            raise unusable(key, "expected different values: this one occurs twice", value)
         known.add(same)
     return Axis.of({key: values})
 
 
 def zipped(table: Mapping[str, Any]) -> Axis:
-    """Keys whose values go together, the first with the first."""
+    """An axis of keys that vary together, first value with first value."""
     columns = {key: values_of(key, axis) for key, axis in flatten(table, is_axis).items()}
     if not columns:
         raise unusable("zip", "expected keys and their values", dict(table))
     lengths = {key: len(values) for key, values in columns.items()}
     if len(set(lengths.values())) > 1:
         *_, (key, values) = columns.items()
-        told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        raise unusable(key, f"expected as many values for each key of a zip: {told}", values)
+        message = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        raise unusable(key, f"expected as many values for each key of a zip: {message}", values)
     return Axis.of(columns)
 
 
 def one_at_a_time(table: Mapping[str, Any]) -> Axis:
-    """The first value of every key; then each other value of a key, with the first ones of the others."""
+    """The first values of all keys, then each other value of one key with the first values of the others."""
     columns = {key: listed(key, axis).rows for key, axis in flatten(table, is_axis).items()}
     usual = {key: rows[0][0] for key, rows in columns.items()}
     changes = [{}, *({key: value} for key, rows in columns.items() for (value,) in rows[1:])]
@@ -235,7 +235,7 @@ def unit_cube(method: str, dimensions: int, points: int, seed: int) -> npt.NDArr
 
 
 def combinations(axes: Sequence[Axis]) -> tuple[tuple[str, ...], list[tuple[Value, ...]]]:
-    """The keys of all axes, and for each combination of their points, the last axis running fastest, one value a key.
+    """The keys of all axes, and one row of values for each combination of points; the last axis varies fastest.
 
     Raises `InputError` if a key is on two axes, or there are too many combinations.
     """

@@ -1,4 +1,4 @@
-"""Case files to begin with."""
+"""Commented case files as starting points."""
 
 from __future__ import annotations
 

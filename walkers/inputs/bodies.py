@@ -1,4 +1,4 @@
-"""The beads of a case: walkers that stand on the boundary, a mixture that is poured, beads placed one by one.
+"""Beads of a case: walkers on the boundary, a poured mixture, beads placed one by one.
 
 Each knows how to place itself (`stand`) and which of its beads bridges join; nothing else asks what it is. How the
 beads of a cluster stand beside each other is one of `ARRANGEMENTS`: in the cluster's own frame, seen from above, whose
@@ -33,12 +33,12 @@ _LEAST_LEVER = 0.1
 """Of a cluster's extent: large and small beads whose centroids are nearer than that give no heading."""
 _TOUCHING = 0.02
 """Radii by which beads that are given places may be apart and still touch."""
-_TOO_SMALL = "a bead is too small to touch two that touch each other"
+_TOO_SMALL = "a bead is too small to touch two beads that touch each other"
 
 
 @dataclass(frozen=True)
 class Arrangement:
-    """Which beads touch, of so many (``fewest`` to ``most``), and where they stand, given their radii and `Apart`."""
+    """Arrangement of ``fewest`` to ``most`` beads: touching pairs, and positions from radii and `Apart`."""
 
     pairs: Callable[[int], Pairs]
     places: Callable[[Sequence[float], Apart], Places]
@@ -72,7 +72,7 @@ def _fan(radii: Sequence[float], apart: Apart) -> Places:
             raise ValueError(_TOO_SMALL)
         turns.append(turns[-1] + acos(cosine))
     if turns[-1] + turns[-1] / max(len(turns) - 1, 1) > 2.0 * pi * (1.0 + 1e-9):
-        raise ValueError("so many beads do not fit around the first one")
+        raise ValueError("too many beads to fit around the first one")
     front = apart(0, 1) * radii[0] / (radii[0] + radii[1])
     behind = [(apart(0, bead), pi - turns[-1] / 2.0 + turn) for bead, turn in enumerate(turns, 1)]
     return [(front, 0.0), *((front + away * cos(turn), away * sin(turn)) for away, turn in behind)]
@@ -110,7 +110,7 @@ def _ring(radii: Sequence[float], apart: Apart) -> Places:
         return [2.0 * asin(min(chord / (2.0 * radius), 1.0)) for chord in chords]
 
     if sum(turns(low)) < 2.0 * pi:
-        raise ValueError("these beads close no ring")
+        raise ValueError("these beads do not form a closed ring")
     for _ in range(200):
         middle = (low + high) / 2.0
         low, high = (middle, high) if sum(turns(middle)) > 2.0 * pi else (low, middle)
@@ -122,7 +122,7 @@ def _ring(radii: Sequence[float], apart: Apart) -> Places:
 
 
 def touching(places: Sequence[tuple[float, float]], radii: Sequence[float], slack: float) -> Pairs:
-    """The beads at given places on a plane that are nearer to each other than a share of their radii."""
+    """Pairs of beads at given positions whose gap is below a fraction of their radii."""
     found = []
     for (one, (x, y)), (other, (to_x, to_y)) in combinations(enumerate(places), 2):
         gap = hypot(x - to_x, y - to_y, radii[one] - radii[other]) - radii[one] - radii[other]
@@ -144,7 +144,7 @@ def _neighbours(number: int) -> Pairs:
 
 def _raft(radii: Sequence[float], apart: Apart) -> Places:
     if len(set(radii)) > 1:
-        raise ValueError("a raft takes beads of one radius")
+        raise ValueError("expected the same radius for all beads of a raft")
     size = apart(0, 1)
     return [(size * (0.5 + along), size * aside) for along, aside in _sites(len(radii))]
 
@@ -156,7 +156,7 @@ ARRANGEMENTS: Mapping[str, Arrangement] = {
     "ring": Arrangement(_closed, _ring, 3, "in a ring, the first in front"),
     "raft": Arrangement(_neighbours, _raft, 3, "of one radius, on a hexagonal lattice, the first in the middle"),
 }
-"""By the names that case files use."""
+"""Arrangements by their names in case files."""
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ class StandingBead:
 
 @dataclass(frozen=True)
 class Standing:
-    """Beads that start together, relative to the walker's place, which the deck chooses, or else to the boundary.
+    """Beads that start together; positions relative to the walker's place (chosen by the deck) or to the boundary.
 
     ``facing`` is +1 along the drive axis or −1, and ``angle`` that to it (rad); 0 and 0 of what is no walker.
     """
@@ -184,7 +184,7 @@ class Standing:
 
 @dataclass(frozen=True, kw_only=True)
 class Walkers:
-    """``[dimers]`` or one of ``[[clusters]]``: walkers of one make, how many there are and how each begins.
+    """``[dimers]`` or one of ``[[clusters]]``: walkers of one make, their number and initial state.
 
     ``meet = true`` says that they may stand and come as near as they like; without it they are replicates. They face
     along the drive axis (right, up a slope), against it (left, down), or every other one (both), but for an ``angle``.
@@ -211,7 +211,7 @@ class Walkers:
 
     @property
     def count(self) -> int:
-        """How many beads there are."""
+        """Number of beads."""
         return len(self.radii) * self.replicates
 
     @property
@@ -228,7 +228,7 @@ class Walkers:
 
     @property
     def bridged(self) -> list[tuple[float, list[float]]]:
-        """The radius of each bead of a walker and the radii of those that touch it, m."""
+        """Radius of each bead of a walker and radii of the beads that touch it, m."""
         neighbours: list[list[float]] = [[] for _ in self.radii]
         for one, other in self.pairs:
             neighbours[one].append(self.radii[other])
@@ -237,7 +237,7 @@ class Walkers:
 
     @cached_property
     def design(self) -> Places:
-        """Where the beads stand, in the walker's own frame, were they rigid and on a plane, m."""
+        """Positions of rigid beads on a plane in the frame of the walker, m."""
         return list(self.places) or ARRANGEMENTS[self.arrangement].places(self.radii, self._rigid)
 
     def _rigid(self, one: int, other: int) -> float:
@@ -247,7 +247,7 @@ class Walkers:
 
     @cached_property
     def length(self) -> float:
-        """From the outermost point of one bead to that of another, seen from above, m."""
+        """Length of the walker seen from above, m."""
         known = {} if self.places else {pair: self._rigid(*pair) for pair in self.pairs}
         extents = []
         for one, other in combinations(range(len(self.radii)), 2):
@@ -257,7 +257,7 @@ class Walkers:
 
     @cached_property
     def front(self) -> tuple[float, ...]:
-        """Weight of each bead's place in the vector to where a walker was to face; their sum is zero."""
+        """Weights of bead positions in the vector along the start direction; their sum is zero."""
         along = [place[0] for place in self.design]
         middle = sum(along) / len(along)
         largest = max(abs(place - middle) for place in along)
@@ -267,7 +267,7 @@ class Walkers:
 
     @cached_property
     def toward_large(self) -> tuple[float, ...]:
-        """Weight of each bead's place in the heading, from the centroid of the small beads to that of the large ones.
+        """Weights of bead positions in the heading, from the centroid of the small beads to that of the large beads.
 
         Where all beads are alike, or the two centroids nearly coincide, the heading is where the walker was to face.
         """
@@ -283,7 +283,7 @@ class Walkers:
         return weights if hypot(*lever) > _LEAST_LEVER * self.length else self.front
 
     def stand(self, case: Case, first: int) -> list[Standing]:
-        """Each walker about the point over which its first two beads touch; ``first`` is the first one's number.
+        """Place each walker around the contact of its first two beads; ``first``: index of the first walker.
 
         Its angle and contacts are drawn from a stream of its own, whoever shares the deck.
         """
@@ -309,7 +309,7 @@ class Walkers:
         return standing
 
     def _places(self, heights: Sequence[float], overlaps: Sequence[float]) -> Places:
-        """Where the beads of a walker stand, in its own frame, given their heights and the overlaps of contacts, m."""
+        """Positions of the beads of a walker in its frame, from heights and overlaps, m."""
         if self.places:
             return list(self.places)
         known = {pair: overlaps[len(self.radii) + number] for number, pair in enumerate(self.pairs)}
@@ -317,7 +317,7 @@ class Walkers:
         def apart(one: int, other: int) -> float:
             between = self.radii[one] + self.radii[other] - known[min(one, other), max(one, other)]
             if between < abs(heights[one] - heights[other]):
-                raise ValueError("so unlike beads rest at heights at which they do not touch each other")
+                raise ValueError("the radii differ too much: the beads do not touch when they rest on the boundary")
             return sqrt(between**2 - (heights[one] - heights[other]) ** 2)
 
         return ARRANGEMENTS[self.arrangement].places(self.radii, apart)
@@ -338,7 +338,7 @@ def _beside(one: float, other: float) -> list[tuple[float, list[float]]]:
 
 @dataclass(frozen=True)
 class Mixture:
-    """Beads of two size classes, mixed and poured: the radii of either class, m, and the number of its beads.
+    """Poured beads of two size classes: radii of each class, m, and numbers of beads.
 
     Each of its radii occurs equally often (the engine is given no distributions).
     """
@@ -349,7 +349,7 @@ class Mixture:
 
     @property
     def count(self) -> int:
-        """How many beads there are."""
+        """Number of beads."""
         return sum(self.counts)
 
     @property
@@ -373,12 +373,12 @@ class Mixture:
         return [sizes[number % len(sizes)] for sizes, count in classes for number in range(count)]
 
     def level(self, boundary: Boundary) -> float:
-        """Height of the layers from which the beads are poured, m; infinite where there is no place for one."""
+        """Height of the layers from which beads are poured, m; infinite if there is no room."""
         places = len(boundary.layer(max(self.radii)).places)
         return -(-self.count // places) * 2.0 * LOOSE * max(self.radii) if places else inf
 
     def stand(self, case: Case, first: int) -> list[Standing]:
-        """On a loose lattice, the sizes shuffled and the places jittered by the case's seed, to fall and settle."""
+        """Beads on a loose lattice with random order and displacements (seed of the case); they fall and settle."""
         del first
         from numpy.random import default_rng
 
@@ -403,7 +403,7 @@ class Placed:
 
     @property
     def count(self) -> int:
-        """How many beads there are."""
+        """Number of beads."""
         return len(self.beads)
 
     @property
@@ -422,10 +422,10 @@ class Placed:
         return _beside(self.radii[-1], self.radii[0])
 
     def stand(self, case: Case, first: int) -> list[Standing]:
-        """As they are placed."""
+        """The beads at their given positions."""
         del case, first
         return [Standing(tuple(StandingBead(*bead) for bead in self.beads))]
 
 
 Body = Walkers | Mixture | Placed
-"""The bodies that there are."""
+"""Kinds of bodies."""

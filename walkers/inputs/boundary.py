@@ -1,4 +1,4 @@
-"""What beads stand on and lie in: planes, channels, containers.
+"""Boundaries: planes, channels, grooves, containers.
 
 Most have a floor, the plane z = 0 in their own frame, and may have side walls. To add one, name it in `Shape` and
 `SIZES`, and give it `Boundary.walls` and `Boundary.room`.
@@ -32,7 +32,7 @@ _RIM = 2e-4
 
 @dataclass(frozen=True)
 class Flat:
-    """A plane: a point of it (m), its unit normal into the space where the beads are, its name."""
+    """A plane: point (m), unit normal toward the beads, name."""
 
     point: Vector
     normal: Vector
@@ -50,7 +50,7 @@ class Flat:
 
 @dataclass(frozen=True)
 class Round:
-    """The inside of an upright cylinder about the origin: its radius (m), its name."""
+    """Inside of a vertical cylinder around the origin: radius (m), name."""
 
     radius: float
     name: str = "side"
@@ -68,12 +68,12 @@ class Round:
 
 Wall = Flat | Round
 BOTTOM = Flat((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-"""The floor of every boundary that has one."""
+"""The floor of all boundaries with a floor."""
 
 
 @dataclass(frozen=True)
 class Span:
-    """What the beads need of room, m: half the extent of their ways, their height, a margin, the largest radius."""
+    """Room that the beads need, m: half the extent of their paths, height, margin, largest radius."""
 
     half_x: float
     half_y: float
@@ -88,14 +88,14 @@ Room = tuple[Vector, Vector]
 
 @dataclass(frozen=True)
 class Layer:
-    """A layer of places from which beads are poured: the places (m), their pitch (m), and how far beads may stray."""
+    """A layer of positions from which beads are poured: positions (m), pitch (m), and largest displacement."""
 
     places: Sequence[tuple[float, float]]
     pitch: float
     tight: bool = False
 
     def play(self, radius: float, largest: float) -> float:
-        """How far a bead of a radius may be moved from its place, m."""
+        """Largest displacement of a bead from its position, m."""
         return (LOOSE * largest - radius) / 2.0 if self.tight else self.pitch / 2.0 - radius
 
 
@@ -106,7 +106,7 @@ SIZES: Mapping[str, Collection[str]] = {
     "groove": ("opening",),
     **dict.fromkeys(("box", "cylinder", "octagon"), ("width", "height")),
 }
-"""Which sizes a shape has."""
+"""Size keys of each shape."""
 _AREAS = {"box": 1.0, "cylinder": pi / 4.0, "octagon": 2.0 * (sqrt(2.0) - 1.0)}
 """Of the cross-sections of containers, in squares of their width."""
 _CORNERS = {"+x+y": (1.0, 1.0), "+x-y": (1.0, -1.0), "-x+y": (-1.0, 1.0), "-x-y": (-1.0, -1.0)}
@@ -120,7 +120,7 @@ _Size = Annotated[units.Length, Field(exclude_if=isinf)]
 
 @dataclass(frozen=True, kw_only=True)
 class Boundary:
-    """``[boundary]``: what the beads stand on and lie in.
+    """``[boundary]``: the walls.
 
     A plane, a channel (a floor and two upright walls, a ``width`` apart), a groove (two walls that meet in the x axis,
     their angle the ``opening``), or a container open above, its floor about the origin (``width`` is its inner side or
@@ -139,27 +139,27 @@ class Boundary:
 
     @property
     def closed(self) -> bool:
-        """Whether it is a container, into which beads can be poured."""
+        """Whether the boundary is a container for poured beads."""
         return self.shape in _AREAS
 
     @property
     def bare(self) -> bool:
-        """Whether it is a floor without any side walls."""
+        """Whether the boundary is a floor without side walls."""
         return self.shape == "plane"
 
     @property
     def tilted(self) -> str:
-        """How it is tilted, in words: ``plane tilted by 60°``; empty if it is level."""
+        """The tilt as text: ``plane tilted by 60°``; empty if level."""
         return f"{self.shape} tilted by {degrees(self.tilt):.4g}°" if self.tilt else ""
 
     @property
     def pull(self) -> str:
-        """The part of gravity down a slope, in words: ``g sin 60°``; of a wall ``g``."""
+        """Component of gravity down the slope, as text: ``g sin 60°``; ``g`` for a wall."""
         return "g" if self.tilt > 1.57 else f"g sin {degrees(self.tilt):.4g}°"
 
     @property
     def drive_axis(self) -> Literal["x", "z"]:
-        """Along which it is shaken if a case does not say."""
+        """Default axis of the drive."""
         return "z" if self.closed else "x"
 
     @property
@@ -182,7 +182,7 @@ class Boundary:
         return tuple(walls)
 
     def room(self, span: Span) -> Room:
-        """The simulation box for beads that need so much; in a container climbers may rise above the rim."""
+        """The simulation box for a `Span`; in a container, climbers may rise above the rim."""
         x, y = span.half_x + 2.0 * span.margin, span.half_y + 2.0 * span.margin
         top, below = span.height + 2.0 * span.margin, 4.0 * span.largest
         if self.shape == "plane":
@@ -222,7 +222,7 @@ class Boundary:
 
     @property
     def cross_section(self) -> float:
-        """Inner area of a container, m²."""
+        """Inner cross-section of a container, m²."""
         return self.width**2 * _AREAS[self.shape]
 
     def layer(self, largest: float) -> Layer:

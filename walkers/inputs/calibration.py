@@ -1,4 +1,4 @@
-"""Calibration files: which parameters of a case are free, and which published numbers they are to give.
+"""Calibration files: free parameters of a case, and the published numbers to reproduce.
 
 case = "fig1b"
 
@@ -43,12 +43,12 @@ QUANTITIES: dict[str, Kind] = {
     **dict.fromkeys(get_args(Speed), SPEED),
     "misalignment": ANGLE,
 }
-"""What an observation may be of: a column of a sweep's table, or the largest angle of a walker to the drive axis."""
+"""Quantities of observations: columns of the table of a sweep, or the largest angle to the drive axis."""
 Names = Annotated[list[str], Field(min_length=1)]
 
 
 class ParameterTable(Table):
-    """``[parameters.NAME]``: keys of the case that take its value, its range, and what is assumed beforehand.
+    """``[parameters.NAME]``: keys of the case that take the value, range, and prior.
 
     Numbers are in its ``unit``, if it has one; those of a ``log`` range, and its median, are above zero.
     """
@@ -82,7 +82,7 @@ class Parameter(ParameterTable):
 class Observation(Table):
     """``[[observations]]``: a mean over experiments, or its ratio to the mean over others.
 
-    One that is ``derived`` follows from others: it is told of, but does not weigh in the posterior a second time.
+    A ``derived`` observation follows from others: it is reported, but has no weight in the posterior.
     ``value`` and ``deviation`` are in SI units, angles in degrees; a file has them with their unit, but of a ratio.
     """
 
@@ -113,7 +113,7 @@ class Observation(Table):
 
 
 class SharedError(Table):
-    """``[shared_errors.NAME]``: observations whose published values are wrong together, and by how much of the whole.
+    """``[shared_errors.NAME]``: observations with correlated errors, and the shared part of the variance.
 
     ``share`` of the variance of each is shared: so large is the correlation of any two of them.
     """
@@ -148,7 +148,7 @@ class CalibrationFile(Table):
 
 @dataclass(frozen=True)
 class Calibration:
-    """A calibration, read.
+    """A calibration, read from its file.
 
     Attributes
     ----------
@@ -171,7 +171,7 @@ class Calibration:
 
     @property
     def observations(self) -> tuple[Observation, ...]:
-        """What the parameters are to give."""
+        """The observations to reproduce."""
         return tuple(self.file.observations)
 
     @property
@@ -219,7 +219,7 @@ def read_calibration(document: Mapping[str, Any], *, source: str, name: str, fol
 
 
 def _unknown_names(file: CalibrationFile) -> Iterator[Problem]:
-    """Names of what the file does not have."""
+    """References to names that the file does not define."""
     observations, groups = ([getattr(one, key) for one in file.observations] for key in ("name", "group"))
     named: list[tuple[str, Collection[str], Collection[str], str]] = []
     for label, parameter in file.parameters.items():
@@ -243,14 +243,14 @@ def _unknown_names(file: CalibrationFile) -> Iterator[Problem]:
 
 
 def _contradictions(file: CalibrationFile) -> Iterator[Problem]:
-    """What is there twice, is missing or contradicts something else."""
+    """Duplicates, missing entries and contradictions."""
     names = [one.name for one in file.observations]
     for number, one in enumerate(file.observations):
         if names.index(one.name) != number:
             yield Problem(f"observations[{number}].name", f'"{one.name}"', "expected a name of its own")
         if one.over and set(one.over) == set(one.of):
-            told = "expected other experiments than in of: the ratio would be 1"
-            yield Problem(f"observations[{number}].over", None, told)
+            text = "expected other experiments than in of: the ratio would be 1"
+            yield Problem(f"observations[{number}].over", None, text)
     if all(one.derived for one in file.observations):
         yield Problem("observations", None, "expected one that is not derived")
     for label, error in file.shared_errors.items():
@@ -259,8 +259,8 @@ def _contradictions(file: CalibrationFile) -> Iterator[Problem]:
     for name in names:
         having = {label: error.share for label, error in file.shared_errors.items() if name in error.observations}
         if (whole := sum(having.values())) >= 1.0:
-            told = f"expected {name} to have an error of its own: the shares of {', '.join(having)} are {whole:g} of it"
-            yield Problem("shared_errors", None, told)
+            text = f"expected {name} to have an error of its own: the shares of {', '.join(having)} are {whole:g} of it"
+            yield Problem("shared_errors", None, text)
     weighed = {one.group for one in file.observations if not one.derived}
     for label, held in file.held_out.items():
         if set(held) >= weighed:
@@ -275,8 +275,8 @@ def _problems_of_guesses(file: CalibrationFile) -> Iterator[Problem]:
             if label not in guess:
                 yield Problem(place, None, "missing; a guess has all parameters")
             elif not low <= guess[label] <= high:
-                told = f"expected a number within the parameter's range, {low:g} to {high:g}"
-                yield Problem(place, f"{guess[label]:g}", told)
+                text = f"expected a number within the parameter's range, {low:g} to {high:g}"
+                yield Problem(place, f"{guess[label]:g}", text)
 
 
 def _problems_of_keys(file: CalibrationFile) -> Iterator[Problem]:
@@ -284,17 +284,17 @@ def _problems_of_keys(file: CalibrationFile) -> Iterator[Problem]:
     first, *others = [(label, set(flatten(table))) for label, table in file.experiments.items()]
     for label, keys in others:
         for key in sorted(keys ^ first[1]):
-            told = f"expected the same keys in every experiment; {first[0]} and {label} differ in {key}"
-            yield Problem(f"experiments.{label}", None, told)
+            text = f"expected the same keys in every experiment; {first[0]} and {label} differ in {key}"
+            yield Problem(f"experiments.{label}", None, text)
     taken: dict[str, dict[str, str]] = {}
     for name, table in file.parameters.items():
         for key in table.keys:
             for experiment in table.experiments or file.experiments:
                 other = taken.setdefault(key, {}).setdefault(experiment, name)
                 if other != name:
-                    told = f"{key} of the experiment {experiment} is set by {other} already"
-                    yield Problem(f"parameters.{name}.keys", None, told)
+                    text = f"{key} of the experiment {experiment} is set by {other} already"
+                    yield Problem(f"parameters.{name}.keys", None, text)
     for key, having in taken.items():
         if lacking := [experiment for experiment in file.experiments if experiment not in having]:
-            told = f"no parameter gives {key} to {', '.join(lacking)}: all experiments have it or none"
-            yield Problem("parameters", None, told)
+            text = f"no parameter sets {key} for {', '.join(lacking)}: expected it for all experiments or none"
+            yield Problem("parameters", None, text)

@@ -1,4 +1,4 @@
-"""The words of a case in headlines, titles and captions: its bodies, surfaces, liquid, drive and tilt."""
+"""Text of a case for titles and captions: bodies, surfaces, liquid, drive and tilt."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from walkers.inputs.case import Case
 
 
 def caption(case: Case) -> str:
-    """A case in a line: what is on which surface with which liquid, how it is driven, and how it is tilted.
+    """A case in one line: bodies, surface, liquid, drive and tilt.
 
     Examples
     --------
@@ -29,11 +29,11 @@ def conditions(case: Case) -> str:
 
     Pictures have the drive axis to the right: what faces right goes up where that is the steepest way up.
     """
-    told = [case.drive.described()]
+    parts = [case.drive.described()]
     if case.boundary.tilted:
         up = "right is up" if case.goes_uphill else f"up is at {degrees(case.boundary.uphill):.4g}° from x toward y"
-        told += [case.boundary.tilted, up]
-    return ", ".join(told)
+        parts += [case.boundary.tilted, up]
+    return ", ".join(parts)
 
 
 def liquid_text(case: Case) -> str:

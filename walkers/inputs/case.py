@@ -1,4 +1,4 @@
-"""A resolved case: every number in SI units, nothing left to look up.
+"""A resolved case: all numbers in SI units.
 
 This is what the deck is rendered from, what a run directory stores as ``case.json`` and what its hash is made of.
 """
@@ -28,13 +28,13 @@ _LOG_BYTES_PER_CYCLE = 1e4  # … and a cycle some 500 bytes
 FIRST_ATTEMPTS = (12, 24)
 """Cycles after which it is asked whether velocities are constant. After 36 hardly any are that were not after 24."""
 BOUNDS = ("silence", "log_limit")
-"""Of `Run`: upon these depends whether a run ends, not what it gives."""
+"""Fields of `Run` that limit the engine and do not change the result."""
 
-_TOLD = ("document", "told")
+_SOURCES = ("document", "find_origins")
 
 
 def settling_of(cycles: int) -> int:
-    """Cycles that walkers are given to settle, of so many, where a case does not say: a third, at most 20."""
+    """Default number of settling cycles of walkers: a third of the cycles, at most 20."""
     return min(20, cycles // 3)
 
 
@@ -47,7 +47,7 @@ A walker is called steady at a looser criterion, that of `walkers.postprocess.ga
 
 @dataclass(frozen=True)
 class Run:
-    """How long, how fine and in which segments; a cycle is a whole multiple of the sampling interval.
+    """Duration, time step, sampling and segments; a cycle is a whole multiple of the sampling interval.
 
     Before the drive loose beads rest until their root mean square velocity is below `settled_below` (m/s), or for
     `longest_settling` (s; 0 of walkers, which stand from the first). Beads are recorded `samples_per_cycle` times a
@@ -78,7 +78,7 @@ class Run:
 
     @property
     def period(self) -> float:
-        """Of a cycle, s."""
+        """Period of a cycle, s."""
         return self.time_step * self.steps_per_cycle
 
     @property
@@ -93,7 +93,7 @@ class Run:
 
     @property
     def settled_strobes(self) -> int:
-        """Stroboscopic samples, one a cycle or rarer, before velocities are measured."""
+        """Number of stroboscopic samples before velocities are measured."""
         return -(-self.settling_cycles // self.cycles_per_sample)
 
     @property
@@ -107,14 +107,14 @@ class Run:
         return self.steps_per_cycle * sum(one for one in self.attempts if one <= cycles)
 
     def for_cycles(self, cycles: int) -> Run:
-        """The same for so many cycles at a stretch, of a run that ends when its velocities are constant."""
+        """The same run with a fixed number of cycles in one segment."""
         if not self.until_steady:
             return self
         settling = settling_of(cycles)
         return replace(self, cycles=cycles, settling_cycles=settling, until_steady=False, cycles_per_segment=cycles)
 
     def longest_silence(self, beads: int) -> float:
-        """How long an engine with so many beads may write nothing, neither into its log nor into its dump, s."""
+        """Longest time, s, for which an engine with a number of beads may write nothing to log and dump."""
         if self.silence is not None:
             return self.silence
         # It writes once a sample, and several times a cycle.
@@ -122,7 +122,7 @@ class Run:
 
     @property
     def most_log(self) -> float:
-        """How large the engine's log may become, bytes."""
+        """Largest size of the engine's log, bytes."""
         return self.log_limit or max(_LOG_BYTES, self.cycles * _LOG_BYTES_PER_CYCLE)
 
     @property
@@ -132,7 +132,7 @@ class Run:
 
     @property
     def in_one(self) -> bool:
-        """Whether one deck makes all of the run."""
+        """Whether the run has a single segment."""
         return not self.rests and self.cycles_per_segment >= self.cycles
 
 
@@ -141,7 +141,7 @@ class Case:
     """Bodies on a boundary under a drive, resolved.
 
     Attributes are SI (``density`` of the beads in kg/m³, ``gravity`` in m/s²). ``seed`` is that of all that is drawn at
-    the start. ``document`` (the tables that the case was read from) and ``told`` (of which `origins` are made) are
+    the start. ``document`` (the tables that the case was read from) and ``find_origins`` (which gives `origins`) are
     part of no comparison, and are lost where `dataclasses.replace` changes the case: they would tell of another one.
 
     Raises
@@ -165,10 +165,10 @@ class Case:
     seed: int
     run: Run
     document: Mapping[str, Any] = field(default_factory=dict, init=False, compare=False, repr=False)
-    told: Callable[[], tuple[Origin, ...]] = field(default=tuple, init=False, compare=False, repr=False)
+    find_origins: Callable[[], tuple[Origin, ...]] = field(default=tuple, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Refuse a drive that was changed alone: its step and sampling would be another's."""
+        """Refuse a drive that does not match time step and sampling."""
         period, frequency = self.run.period, self.drive.frequency
         if period and not isclose(period * frequency, 1.0, rel_tol=1e-9):
             raise ValueError(
@@ -178,28 +178,28 @@ class Case:
 
     @property
     def as_read(self) -> bool:
-        """Whether it is what its document says: it was read, and not changed since."""
+        """Whether the case equals its document, that is, was not changed after reading."""
         return bool(self.document)
 
     @cached_property
     def origins(self) -> tuple[Origin, ...]:
-        """Where its values come from; nothing of a case that was not read, or was changed since."""
-        return self.told()
+        """Origins of the values; empty for a case that was not read or was changed afterwards."""
+        return self.find_origins()
 
-    def read_from(self, document: Mapping[str, Any], told: Callable[[], tuple[Origin, ...]]) -> Case:
-        """The same with the tables that it was read from, and what tells where its values come from."""
+    def read_from(self, document: Mapping[str, Any], find_origins: Callable[[], tuple[Origin, ...]]) -> Case:
+        """The same case with the tables from which it was read and notes on origins."""
         case = replace(self)
         object.__setattr__(case, "document", document)
-        object.__setattr__(case, "told", told)
+        object.__setattr__(case, "find_origins", find_origins)
         return case
 
     def renamed(self, name: str, title: str | None = None) -> Case:
         """The same case under another name, or another title too."""
-        return replace(self, name=name, title=title or self.title).read_from(self.document, self.told)
+        return replace(self, name=name, title=title or self.title).read_from(self.document, self.find_origins)
 
     def for_cycles(self, cycles: int) -> Case:
-        """The same for so many cycles at a stretch, of a case whose run ends when its velocities are constant."""
-        return replace(self, run=self.run.for_cycles(cycles)).read_from(self.document, self.told)
+        """The same case with a fixed number of cycles in one segment."""
+        return replace(self, run=self.run.for_cycles(cycles)).read_from(self.document, self.find_origins)
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -218,12 +218,12 @@ class Case:
 
     @property
     def large(self) -> int:
-        """How many of them are large."""
+        """Number of large beads."""
         return sum(radius > self.border for radius in self.all_radii)
 
     @property
     def duration(self) -> float:
-        """How long it is shaken, s; what runs until velocities are constant, at most."""
+        """Duration of the drive, s; an upper limit if the run ends at constant velocities."""
         return self.run.cycles / self.drive.frequency
 
     @property
@@ -233,12 +233,12 @@ class Case:
 
     @property
     def loose(self) -> bool:
-        """Whether there are beads that are no walkers' but may form clusters."""
+        """Whether there are loose beads, which may form clusters."""
         return self.mixture is not None or self.placed is not None
 
     @property
     def border(self) -> float:
-        """A radius between those of the small and of the large beads, m; infinite where there is but one class."""
+        """A radius between those of small and large beads, m; infinite for a single class."""
         if self.mixture is not None:
             return (max(self.mixture.small) + min(self.mixture.large)) / 2.0
         sizes = sorted(self.radii)
@@ -258,14 +258,14 @@ class Case:
             first += len(stood)
 
     def tops_of_others(self, body: Body) -> float:
-        """Height up to which the other bodies reach at the start, m."""
+        """Largest height of the other bodies at the start, m."""
         walkers = [2.0 * max(one.radii) for one in self.walkers if one is not body]
         placed = self.placed.beads if self.placed is not None and self.placed is not body else ()
         return max([*walkers, *(z + radius for _, _, z, radius in placed)], default=0.0)
 
     @property
     def apart(self) -> bool:
-        """Whether there are walkers alone, which are to be independent of each other."""
+        """Whether the case has only walkers that are independent of each other."""
         return bool(self.walkers) and not self.loose and not self.meets
 
     @property
@@ -275,19 +275,19 @@ class Case:
 
     @property
     def meets(self) -> bool:
-        """Whether walkers are meant to meet."""
+        """Whether walkers may meet."""
         return any(walkers.meet for walkers in self.walkers)
 
     @property
     def drive_axis(self) -> Vector:
-        """Direction from which orientations are measured: the drive's within the floor, or x where it has none."""
+        """Reference direction of orientations: the drive in the plane of the floor, or x if it has none there."""
         x, y, _ = self.drive.direction
         length = hypot(x, y)
         return (x / length, y / length, 0.0) if length else AXES["x"]
 
     @property
     def goes_uphill(self) -> bool:
-        """Whether the drive axis is the steepest way up a tilted floor: right is up then, and left down."""
+        """Whether the drive axis points uphill on a tilted floor; then right is up, and left is down."""
         x, y, _ = self.drive_axis
         uphill = (cos(self.boundary.uphill), sin(self.boundary.uphill))
         return bool(self.boundary.tilt) and x * uphill[0] + y * uphill[1] > 1.0 - 1e-9
@@ -299,17 +299,17 @@ class Case:
 
     @property
     def pressing_gravity(self) -> float:
-        """The part of gravity that presses the beads to the floor, m/s²."""
+        """Component of gravity normal to the floor, m/s²."""
         return -self.gravity_vector[2]
 
     @property
     def axial_gravity(self) -> float:
-        """The part of gravity that pulls them back along the drive axis, m/s²."""
+        """Component of gravity against the drive axis, m/s²."""
         return -sum(one * along for one, along in zip(self.gravity_vector, self.drive_axis, strict=True))
 
     def determinants(self) -> dict[str, Any]:
-        """Everything that the run's outcome depends on, as plain JSON types: no names, and no bound of the engine's."""
-        no_names: dict[str, Any] = {**dict.fromkeys(("name", "title", "material", *_TOLD), True), "run": set(BOUNDS)}
+        """All values that determine the results, as plain JSON types: without names and limits of the engine."""
+        no_names: dict[str, Any] = {**dict.fromkeys(("name", "title", "material", *_SOURCES), True), "run": set(BOUNDS)}
         without = {**no_names, "boundary": {"material"}, "liquid": {"name"}}
         if self.liquid.law in LAWS:  # none of which asks for the density; one of a user's own may
             without["liquid"] = {"name", "density"}
@@ -318,16 +318,16 @@ class Case:
 
     def as_dict(self) -> dict[str, Any]:
         """The whole case as plain JSON types, SI units, with the tables it was read from and its values' origins."""
-        told: dict[str, Any] = to_jsonable_python({"document": self.document, "origins": self.origins})
-        return {**_adapter().dump_python(self, mode="json", exclude=set(_TOLD)), **told}
+        about: dict[str, Any] = to_jsonable_python({"document": self.document, "origins": self.origins})
+        return {**_adapter().dump_python(self, mode="json", exclude=set(_SOURCES)), **about}
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Case:
         """Rebuild a case from `as_dict` (a run directory's ``case.json``); raises `ValueError` if it is none."""
         try:
             case = _adapter().validate_python(values, by_alias=False, by_name=True)
-            told = values.get("document", {}), values.get("origins", ())
-            document, origins = _told_adapter().validate_python(told)
+            about = values.get("document", {}), values.get("origins", ())
+            document, origins = _origins_adapter().validate_python(about)
             return case.read_from(document, partial(tuple, origins))
         except ValidationError as error:
             first = error.errors()[0]
@@ -340,5 +340,5 @@ def _adapter() -> TypeAdapter[Case]:
 
 
 @cache
-def _told_adapter() -> TypeAdapter[tuple[dict[str, Any], tuple[Origin, ...]]]:
+def _origins_adapter() -> TypeAdapter[tuple[dict[str, Any], tuple[Origin, ...]]]:
     return TypeAdapter(tuple[dict[str, Any], tuple[Origin, ...]])

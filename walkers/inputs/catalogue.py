@@ -1,4 +1,4 @@
-"""What a case or a command can name, with where it is from: what ``walkers library`` and the documentation list."""
+"""Names for cases and commands, with their origin; ``walkers library`` and the documentation list them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _COLUMNS: Mapping[str, tuple[str, ...]] = {
 _HEADS = {"youngs_modulus": "Young's modulus", "poissons_ratio": "Poisson's ratio"}
 COMMANDS = {"cases": "run", "sweeps": "sweep", "calibrations": "calibrate"}
 NOT_KNOWN = """\
-Nobody has measured the friction between other pairs of wet surfaces, nor the values below. A case that does not give
+The friction between other pairs of wet surfaces and the values below have not been measured. A case that does not give
 them uses these defaults, and walkers run --spread varies them within these ranges. Both are assumptions."""
 
 
@@ -42,7 +42,7 @@ class Entry:
 
 
 def catalogue(*, of_others: bool = True) -> list[Entry]:
-    """All that can be named: the program's, that of the library in the working directory, and that of packages.
+    """All names: of the program, of the library in the working directory, and of packages.
 
     Raises `InputError` if that library cannot be used. What is wrong with a package is a warning.
     """
@@ -77,7 +77,7 @@ def _summary(law: str) -> str:
 
 
 def describe(found: Sequence[Entry]) -> str:
-    """Everything that has a name, as tables; what is not of the program is marked with its file or package."""
+    """All names as tables; names of other files and packages are marked."""
     lines = []
     for kind, columns in _COLUMNS.items():
         if kind == "not measured":
@@ -94,7 +94,7 @@ def describe(found: Sequence[Entry]) -> str:
 
 
 def _cell(numbers: Mapping[str, Known], column: str) -> str:
-    """A number with its range; of a viscosity the one that is known."""
+    """A number with its range; the known one of the two viscosities."""
     known = next((one for key, one in numbers.items() if f"_{key}".endswith(f"_{column}")), None)
     if known is None:
         return "-"
@@ -103,13 +103,13 @@ def _cell(numbers: Mapping[str, Known], column: str) -> str:
 
 
 def describe_one(found: Sequence[Entry], name: str) -> str:
-    """All that is known by a name: numbers with their sources, titles and files; `InputError` if there is nothing."""
+    """All entries of a name: numbers with sources, titles and files; `InputError` if there is none."""
     wanted = [one for one in found if one.name.casefold() == name.casefold()]
     if not wanted:
         names = [one.name for one in found]
         near = [one for one in names if name.casefold() in one.casefold()]
-        told = f"; expected one of {', '.join(near)}" if near else suggestion(name, names)
-        raise refused(name, f"not in the library{told or '; walkers library lists it'}")
+        message = f"; expected one of {', '.join(near)}" if near else suggestion(name, names)
+        raise refused(name, f"not in the library{message or '; walkers library lists it'}")
     # A material, and the pairs that it is part of.
     wanted += [one for one in found if one.kind == "surface pairs" and wanted[0].name in one.name.split(" on ")]
     lines = []
@@ -123,5 +123,7 @@ def describe_one(found: Sequence[Entry], name: str) -> str:
             for key, known in one.numbers.items()
         ]
     if wanted[0].kind == "materials":
-        lines.append(f"Friction of {wanted[0].name} on other wet surfaces has not been measured: see walkers library.")
+        lines.append(
+            f"The friction of {wanted[0].name} on other wet surfaces has not been measured; see walkers library."
+        )
     return "\n".join(filter(None, lines))

@@ -1,4 +1,4 @@
-"""Dotted keys, such as ``drive.harmonics[1].phase``, and values put under them beside a case file's own.
+"""Dotted keys, such as ``drive.harmonics[1].phase``, and values that replace those of a case file.
 
 They come from the command line (``drive.frequency=70Hz``), a mapping in Python, or a sweep's points.
 """

@@ -1,4 +1,4 @@
-"""How the boundary is shaken: harmonics A sin(2π f t + φ), each along a direction of its own.
+"""Drive of the boundary: harmonics A sin(2π f t + φ), each with its own direction.
 
 The cycle of a drive is the common period of its harmonics; its peak acceleration, and Γ0, are those of the largest.
 """
@@ -15,7 +15,7 @@ Vector = tuple[float, float, float]
 Frame = Literal["lab", "container"]
 AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 LARGEST_RATIO = 24
-"""Of the frequencies of two harmonics, as a fraction: 24/1 and 23/24 are taken, 25/1 is not."""
+"""Largest integer in the ratio of two frequencies: 24/1 and 23/24 are accepted, 25/1 is not."""
 WAVEFORMS: Mapping[str, tuple[tuple[int, float], ...]] = {
     "sine": ((1, 1.0),),
     "triangle": tuple((k, 8.0 / pi**2 / k**2 * (-1.0) ** (k // 2)) for k in range(1, 10, 2)),
@@ -24,7 +24,7 @@ WAVEFORMS: Mapping[str, tuple[tuple[int, float], ...]] = {
 """Of the acceleration: multiples of the frequency and shares of the peak. A triangle's series is cut at 0.96 of it."""
 _FEW = 3
 MOST_PERIODS = 1000
-"""Of the fastest harmonic in a cycle."""
+"""Largest number of periods of the fastest harmonic in a cycle."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Harmonic:
 
 @dataclass(frozen=True)
 class Drive:
-    """A sum of harmonics, and the engine's frame: the walls move, or the beads feel the inertial force."""
+    """A sum of harmonics, and the frame: moving walls, or an inertial force on the beads."""
 
     harmonics: tuple[Harmonic, ...]
     frame: Frame
@@ -82,7 +82,7 @@ class Drive:
 
     @property
     def is_plain(self) -> bool:
-        """Whether it is one sine that begins at its zero: only such a one moves the walls in the laboratory frame."""
+        """Whether the drive is a single sine without phase, which the laboratory frame requires."""
         return len(self.harmonics) == 1 and self.harmonics[0].phase == 0.0
 
     @property
@@ -139,12 +139,12 @@ def common_frequency(frequencies: list[float]) -> float:
     ratios = [Fraction(one / first).limit_denominator(LARGEST_RATIO) for one in frequencies]
     for one, ratio in zip(frequencies, ratios, strict=True):
         if not isclose(float(ratio) * first, one, rel_tol=1e-9) or ratio.numerator > LARGEST_RATIO:
-            raise ValueError(f"{one:g} Hz and {first:g} Hz are in no ratio of whole numbers up to {LARGEST_RATIO}")
+            raise ValueError(f"{one:g} Hz / {first:g} Hz is not a ratio of whole numbers up to {LARGEST_RATIO}")
     below = lcm(*(ratio.denominator for ratio in ratios))
     numerators = [int(ratio * below) for ratio in ratios]
     common = gcd(*numerators)
     if max(numerators) > MOST_PERIODS * common:
-        raise ValueError(f"their common period is more than {MOST_PERIODS} of the shortest one")
+        raise ValueError(f"their common period is longer than {MOST_PERIODS} times the shortest period")
     return first * common / below
 
 

@@ -27,12 +27,12 @@ class WalkersError(Exception):
 
 
 class Stopped(WalkersError):
-    """Somebody stopped what was going on: no failure."""
+    """The user stopped the run; not a failure."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong with an input.
+    """One error of an input.
 
     ``key`` is dotted, such as ``drive.frequency``, and empty for the file as a whole; ``value`` as the user wrote it,
     None where there is none to quote; ``expected`` says what would have been right.
@@ -49,7 +49,7 @@ class Problem:
 
 
 class InputError(WalkersError):
-    """An input that cannot be used: names the file (or other source), and all that is wrong with it, at least one."""
+    """An unusable input: file (or other source), and all of its errors, at least one."""
 
     def __init__(self, source: str, problems: Sequence[Problem]) -> None:
         self.source = source
@@ -59,12 +59,12 @@ class InputError(WalkersError):
 
 
 def refused(source: object, expected: str) -> InputError:
-    """A file, an option or another source that cannot be used as a whole, and what was expected of it."""
+    """An error for an unusable file, option or other source, with the expectation."""
     return InputError(str(source), [Problem("", None, expected)])
 
 
 def unusable(key: str, expected: str, value: object = None) -> InputError:
-    """What cannot be used under a key; who reads the file adds its name and the value there (`messages.blaming`)."""
+    """An error for an unusable value of a key; the reader adds file name and value (`messages.blaming`)."""
     return InputError("", [Problem(key, None if value is None else shown(value), expected)])
 
 

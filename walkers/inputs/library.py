@@ -67,7 +67,7 @@ class Known:
 
 @dataclass(frozen=True)
 class Unmeasured:
-    """What nobody measures and a case may leave out: what is usual then, and its range.
+    """Unmeasured value that a case may leave out: default and range.
 
     ``logarithmic`` says whether the range is of magnitudes; ``range`` is as a case would write it.
     """
@@ -135,7 +135,7 @@ class Library:
         raise KeyError(name)
 
     def surface_pair(self, first: str | None, second: str | None) -> Mapping[str, Known]:
-        """How two wet surfaces touch; empty where there is no value for them.
+        """Contact parameters of two wet surfaces; empty if there are none.
 
         ``friction``, ``rolling_friction`` and, where they are known, ``minimum_separation_ratio``, ``viscosity_ratio``,
         ``contact_angle`` (rad), ``volume_fraction`` and ``restitution``.
@@ -155,7 +155,7 @@ def _contents() -> dict[str, Any]:
 
 @cache
 def _of_packages() -> Sequence[Collection]:
-    """What packages bring; one that is broken is left out with a warning."""
+    """Collections of packages; broken packages are left out with a warning."""
     found = []
     for offer in offers("walkers.materials").values():
         try:
@@ -176,23 +176,23 @@ def _known(key: str, entry: Mapping[str, Any], of: Collection, liquids: tuple[st
 
 
 def check_library(tables: object, source: str) -> None:
-    """Refuse what is no library: raises `InputError` with ``source`` and the keys at fault."""
+    """Check a library: raises `InputError` with ``source`` and the keys at fault."""
     from walkers.inputs.library_file import LibraryFile
     from walkers.inputs.messages import validated
 
     if not isinstance(tables, Mapping):
         raise refused(source, "expected the tables of a library: materials, liquids, surface_pairs")
     validated(LibraryFile, tables, source, "a library")
-    shipped, told = _contents(), "is in the library of the program; expected "
+    shipped, text = _contents(), "is in the library of the program; expected "
     again = [
-        Problem(f"{kind}.{name}", None, f"{told}another name")
+        Problem(f"{kind}.{name}", None, f"{text}another name")
         for kind in ("materials", "liquids")
         for name in tables.get(kind, ())
         if name in shipped[kind]
     ]
     pairs = [sorted(one["materials"]) for one in shipped["surface_pairs"]]
     again += [
-        Problem(f"surface_pairs[{number}]", " on ".join(pair["materials"]), f"{told}its numbers in the case instead")
+        Problem(f"surface_pairs[{number}]", " on ".join(pair["materials"]), f"{text}its numbers in the case instead")
         for number, pair in enumerate(tables.get("surface_pairs", ()))
         if sorted(pair["materials"]) in pairs
     ]
@@ -238,10 +238,10 @@ def _check_pairs(tables: Mapping[str, Any], source: str) -> None:
     """Refuse surface pairs of materials that are in no library."""
     library = Library(tables)
     unknown = [
-        Problem(f"surface_pairs[{number}].materials", shown(name), f"not in the library; {told}")
+        Problem(f"surface_pairs[{number}].materials", shown(name), f"not in the library; {message}")
         for number, pair in enumerate(tables.get("surface_pairs", ()))
         for name in pair["materials"]
-        if not library.has("materials", name) and (told := expected_of(name, library.names("materials")))
+        if not library.has("materials", name) and (message := expected_of(name, library.names("materials")))
     ]
     if unknown:
         raise InputError(source, unknown)
@@ -249,7 +249,7 @@ def _check_pairs(tables: Mapping[str, Any], source: str) -> None:
 
 @cache
 def unmeasured() -> Mapping[str, Unmeasured]:
-    """What nobody measures, by the keys of a case."""
+    """Unmeasured values by keys of a case."""
     found = {}
     for key, entry in _contents()["unmeasured"].items():
         usual = _known(key, {"value": entry["usual"]}, Collection("library", "", {}))
@@ -258,13 +258,13 @@ def unmeasured() -> Mapping[str, Unmeasured]:
 
 
 def expected_of(word: str, known: Iterable[str]) -> str:
-    """``expected one of …``, with the known name that the word is close to, if it is to one."""
+    """``expected one of …``, with a suggestion if a known name is similar."""
     names = list(known)
     return f"expected one of {', '.join(names)}{suggestion(word, names)}"
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """``; did you mean "…"?`` where a known name is close to the word, else nothing."""
+    """``; did you mean "…"?`` if a known name is similar, otherwise empty."""
     names = list(known)
     begun = [name for name in names if len(word) > 2 and name.startswith(word)]
     close = begun or difflib.get_close_matches(word, names, n=1, cutoff=0.6)

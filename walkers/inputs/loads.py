@@ -1,4 +1,4 @@
-"""What the contacts of a walker carry at rest, and the room that walkers need."""
+"""Loads of the contacts of a walker at rest, and the room that walkers need."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def contact_loads(case: Case, walkers: Walkers | None = None) -> ContactLoads:
 
 
 def reach(case: Case) -> float:
-    """How far from its start a walker is given room to go, m.
+    """Room around the start of a walker, m.
 
     Walkers move at a few per cent of the substrate's peak velocity (0.14 of it was the fastest seen, at Γ0 = 0.76
     and friction 0.5); 0.3 of it through the whole run leaves room for those that hop, and sideways as well.

@@ -94,33 +94,33 @@ def validated(
 
 def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[BaseModel], whole: str) -> Problem:
     location, kind, context = details["loc"], details["type"], details.get("ctx", {})
-    told = details["msg"]
+    message = details["msg"]
     for pydantics, ours in _WORDS.items():
-        told = told.replace(pydantics, ours)
+        message = message.replace(pydantics, ours)
     short_list = kind == "missing" and isinstance(location[-1], int)
     key = joined(location[:-1] if short_list else location)
     example = _EXAMPLES.get(re.sub(r"\[\d+\]", "", key)) or _EXAMPLES.get(f"*.{location[-1]}")
     if kind == "missing":
-        told = (
+        message = (
             f"too short; expected {example or 'two numbers'}"
             if short_list
             else f"missing; expected {example or 'a value'}"
         )
     elif kind == "too_long":
         most = context["max_length"]
-        told = f"too long; expected {example or ('two numbers' if most == 2 else f'at most {most} entries')}"
+        message = f"too long; expected {example or ('two numbers' if most == 2 else f'at most {most} entries')}"
     elif kind == "value_error":
-        told = str(context["error"])
+        message = str(context["error"])
     elif kind in ("extra_forbidden", "unexpected_keyword_argument"):
-        told = _unknown_key([str(part) for part in location if isinstance(part, str)], file, whole)
+        message = _unknown_key([str(part) for part in location if isinstance(part, str)], file, whole)
     elif kind == "literal_error":
-        told += suggestion(str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"])))
+        message += suggestion(str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"])))
     elif kind in ("model_type", "dict_type", "model_attributes_type", "dataclass_type"):
         a_number = str(context.get("class_name", "")).startswith("Sourced")
-        told = 'expected { value = ..., source = "..." }' if a_number else f"expected a table [{key}]"
+        message = 'expected { value = ..., source = "..." }' if a_number else f"expected a table [{key}]"
     elif example:
-        told = f"{told}, {example}" if told.startswith("expected") else f"expected {example}"
-    return Problem(key, quoted(document, parts_of(key)), told)
+        message = f"{message}, {example}" if message.startswith("expected") else f"expected {example}"
+    return Problem(key, quoted(document, parts_of(key)), message)
 
 
 def _table_in(annotation: Any) -> tuple[type | None, str]:
@@ -150,7 +150,7 @@ def check_key(key: str) -> None:
     """Refuse a key that no case has; raises `InputError` if it is one."""
     parts, known = re.sub(r"\[\d+\]", "", key).split("."), keys_of(CaseFile)
     if "" in parts:
-        raise unusable(key, "is no key of a case")
+        raise unusable(key, "is not a key of a case")
     if ".".join(parts) not in known:
         raise unusable(key, _unknown_key(parts, CaseFile, "a case"))
     if known[".".join(parts)]:

@@ -31,9 +31,9 @@ def missing_keys(tables: Mapping[str, Any]) -> list[Problem]:
     """The keys that are missing of the tables of a case, which are checked by their models as well."""
     problems = [Problem(key, None, f"missing; expected {_EXPECTED[key.rpartition('.')[2]]}") for key in _keys(tables)]
     if not any(body in tables for body in _BODIES):
-        told = f"missing; expected bodies: {', '.join(f'[[{one}]]' for one in _BODIES)}"
-        told = told.replace("[[dimers]]", "[dimers]").replace("[[mixture]], ", "[mixture] or ")
-        problems.insert(0, Problem("dimers", None, told))
+        message = f"missing; expected bodies: {', '.join(f'[[{one}]]' for one in _BODIES)}"
+        message = message.replace("[[dimers]]", "[dimers]").replace("[[mixture]], ", "[mixture] or ")
+        problems.insert(0, Problem("dimers", None, message))
     return problems
 
 

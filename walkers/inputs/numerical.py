@@ -1,4 +1,4 @@
-"""The numerical error of a velocity: measured for shipped cases, by a shorter time step and by harder beads.
+"""Numerical error of velocities, measured for shipped cases with a shorter time step and stiffer beads.
 
 Beads in a simulation are softer than their material, and the time step is finite. The table ``numerical_errors.toml``
 has, for shipped cases, how much the velocity changes at half the time step, and with beads that are `STIFFER` times as

@@ -1,6 +1,6 @@
-"""Where each value of a case comes from: the case itself, the library, a calibration, what is usual, or the others.
+"""Origin of each value of a case: the case, the library, a calibration, a default, or other values.
 
-What nobody measures (friction, how strongly bridges drag, how much liquid there is) is told apart from what is known,
+Unmeasured values (friction, drag of the bridges, volume of liquid) are distinguished from known values,
 with the range in which it may lie: a speed that rests on such values is worth no more than they are.
 """
 
@@ -23,7 +23,7 @@ _LEFT_OUT = ("title", "uncertain", "placed")
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a value of a case comes from.
+    """Origin of a value of a case.
 
     Attributes
     ----------
@@ -53,14 +53,14 @@ class Origin:
 
     @property
     def guessed(self) -> bool:
-        """Whether it is a default of what nobody measures, or the case calls it uncertain."""
+        """Whether the value is a default of an unmeasured quantity, or uncertain in the case."""
         return self.uncertain or (self.range is not None and self.origin == "default")
 
 
 class Notes(dict[str, Origin]):
     """Where values come from that a case leaves out, by their keys, noted as they are filled in.
 
-    One without a text is told as its value, in the unit of its key.
+    Without a text, the value itself is shown in the unit of its key.
     """
 
     def derived(self, key: str, value: Any, source: str) -> None:
@@ -73,7 +73,7 @@ class Notes(dict[str, Origin]):
 
 
 def origins_of(file: CaseFile, document: Mapping[str, Any], notes: Mapping[str, Origin]) -> tuple[Origin, ...]:
-    """Where the values of a case come from, in the order of a case file's tables.
+    """Origins of the values of a case, in the order of the tables of a case file.
 
     Parameters
     ----------

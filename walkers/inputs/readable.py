@@ -1,4 +1,4 @@
-"""The values of a case as people read them: by a case file's keys, in the usual units; and by which cases differ."""
+"""Values of a case in usual units by the keys of a case file; differences between cases."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ class FlatCase(dict[str, Any]):
 
 def flattened(case: Mapping[str, Any]) -> FlatCase:
     """The values of a case, as `walkers.inputs.case.Case.as_dict` or a run directory's ``case.json`` has it."""
-    told = [one for one in case.get("origins", ()) if one["value"] is not None and one["key"] not in _NOT_COMPARED]
-    if not told:
+    recorded = [one for one in case.get("origins", ()) if one["value"] is not None and one["key"] not in _NOT_COMPARED]
+    if not recorded:
         values = {key: value for key, value in case.items() if key not in _NOT_COMPARED}
         return FlatCase((key, value) for key, value in dotted(values) if key not in _NOT_COMPARED)
-    flat = FlatCase((one["key"], one["value"]) for one in told)
-    if placed := case.get("placed"):  # of which no origins are told, for there may be hundreds
+    flat = FlatCase((one["key"], one["value"]) for one in recorded)
+    if placed := case.get("placed"):  # which have no origins, because there may be hundreds
         flat["placed"] = placed["beads"]
-    flat.given = frozenset(["placed", *(one["key"] for one in told if one["origin"] == "given")])
+    flat.given = frozenset(["placed", *(one["key"] for one in recorded if one["origin"] == "given")])
     return flat
 
 

@@ -91,7 +91,7 @@ def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
 
 
 def with_changes(case: Case, changes: Mapping[str, Any] | None = None) -> Case:
-    """A case with values put in place of those that it was read with, as by `load_case`."""
+    """A case with changed values, as by `load_case`."""
     if not changes:
         return case
     if not case.as_read:
@@ -158,7 +158,7 @@ def _file_of(offer: Offer) -> Path:
 
 
 def _kind_of(path: Path) -> str | None:
-    """The kind of what is at a path, or shipped under that name; None where it is not known."""
+    """Kind of the file at a path or of a shipped name; None if unknown."""
     with suppress(OSError, InputError):
         if path.is_dir():
             return next((file for file in ("sweep.json", "case.json") if (path / file).is_file()), None)

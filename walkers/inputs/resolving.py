@@ -1,4 +1,4 @@
-"""From what a case file says to a resolved case: what it leaves out is the library's, usual, or follows from the rest.
+"""Resolve a case file: missing values come from the library, from defaults, or from other values.
 
 First what beads, liquid and contacts are made of, then the bodies and the checks that they fit into the boundary and
 beside each other.
@@ -48,7 +48,7 @@ _OF_SURFACES = (
 _VISCOSITIES = ("liquid.kinematic_viscosity", "liquid.dynamic_viscosity")
 _OF_LIQUIDS = ("liquid.surface_tension", "liquid.density", *_VISCOSITIES)
 SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_OF_SURFACES)
-"""Keys that a case may leave out because the library has them, or says what is usual."""
+"""Keys that a case may leave out because the library has values or defaults."""
 
 
 def supplied(document: Mapping[str, Any], known_to: Library, notes: Notes) -> dict[str, Any]:
@@ -70,8 +70,8 @@ def supplied(document: Mapping[str, Any], known_to: Library, notes: Notes) -> di
         ("boundary.material", wall, "materials", described),
     ):
         if name is not None and not says_all and not known_to.has(kind, name):
-            told = "not in the library, nor in a library.toml beside the case"
-            raise unusable(key, f"{told}; {expected_of(name, known_to.names(kind))}")
+            message = "not in the library, nor in a library.toml beside the case"
+            raise unusable(key, f"{message}; {expected_of(name, known_to.names(kind))}")
     known, settings = _known(known_to, bead, wall, liquid, _mixture(document, liquid, notes)), {}
     # What was calibrated was so with one law of the bridges: with another it is a guess.
     calibrated = liquid if said["liquid.law"] in (MISSING, DEFAULT_LAW) else None
@@ -190,8 +190,8 @@ def _liquid_of(table: Liquid, notes: Notes) -> Liquid:
     """The liquid of the bridges and their law; raises `InputError` if its viscosity is missing or said twice."""
     dynamic, kinematic = table.dynamic_viscosity, table.kinematic_viscosity
     if not isnan(dynamic) and kinematic is not None:
-        told = "expected either kinematic_viscosity or dynamic_viscosity, not both"
-        raise unusable("liquid.dynamic_viscosity", told)
+        message = "expected either kinematic_viscosity or dynamic_viscosity, not both"
+        raise unusable("liquid.dynamic_viscosity", message)
     if kinematic is not None:
         assert table.density is not None
         dynamic = float(f"{kinematic * table.density:.15g}")
@@ -209,8 +209,8 @@ def _liquid_of(table: Liquid, notes: Notes) -> Liquid:
 def _walkers_of(key: str, table: Walkers, boundary: Boundary, notes: Notes) -> Walkers:
     """The walkers of a table, which stands under a key."""
     if table.facing in ("up", "down") and (not boundary.tilt or boundary.uphill):
-        told = "on a plane that is tilted along the drive alone walkers face up or down"
-        raise unusable(f"{key}.facing", f'expected "both", "right" or "left": {told}')
+        message = "on a plane that is tilted along the drive alone walkers face up or down"
+        raise unusable(f"{key}.facing", f'expected "both", "right" or "left": {message}')
     if table.gap is None:
         notes.derived(f"{key}.gap", "auto", "where the forces at rest balance")
     of_others = ("arrangement", "places") if key == "dimers" else ("mean_radius", "sin_delta")
@@ -224,8 +224,8 @@ def _walkers_of(key: str, table: Walkers, boundary: Boundary, notes: Notes) -> W
     if not 2 <= len(table.radii) <= 100:
         raise unusable(f"{key}.radii", "expected radii of 2 to 100 beads")
     if bool(table.arrangement) == bool(table.places):
-        told = f"expected either an arrangement ({', '.join(ARRANGEMENTS)}) or places (at)"
-        raise unusable(f"{key}.arrangement", told)
+        message = f"expected either an arrangement ({', '.join(ARRANGEMENTS)}) or places (at)"
+        raise unusable(f"{key}.arrangement", message)
     return _arranged(walkers, key) if table.arrangement else _at_places(walkers, key)
 
 
@@ -235,8 +235,8 @@ def _radii(table: Walkers, notes: Notes) -> tuple[float, ...]:
         if len(table.radii) != 2:
             raise unusable("dimers.radii", 'expected two radii, such as ["0.3 mm", "0.2 mm"]')
         if given:
-            told = "expected either the radii or mean_radius and sin_delta, not both"
-            raise unusable(f"dimers.{next(iter(given))}", told)
+            message = "expected either the radii or mean_radius and sin_delta, not both"
+            raise unusable(f"dimers.{next(iter(given))}", message)
         return table.radii
     assert table.mean_radius is not None
     assert table.sin_delta is not None
@@ -273,12 +273,12 @@ def _at_places(walkers: Walkers, key: str) -> Walkers:
     if overlapping := touching(places, walkers.radii, -_OVERLAP):
         raise unusable(f"{key}[{overlapping[0][1]}]", f"overlaps with {key}[{overlapping[0][0]}]")
     if not any(walkers.front):
-        raise unusable(key, "expected some beads ahead of others: this has no heading")
+        raise unusable(key, "expected some beads ahead of others: this walker has no heading")
     joined = {0}
     for _ in everyone:
         joined |= {bead for pair in walkers.pairs if joined & {*pair} for bead in pair}
     if alone := everyone - joined:
-        raise unusable(f"{key}[{min(alone)}]", "expected beads that touch: nothing joins this one to the first")
+        raise unusable(f"{key}[{min(alone)}]", "expected beads that touch: this bead is not connected to the first")
     return walkers
 
 
@@ -318,7 +318,7 @@ def _spaced(case: Case, key: str, walkers: Walkers, notes: Notes) -> Walkers:
     """Settle the spacing of the walkers under a key and refuse starts in which beads overlap."""
     gap = walkers.gap
     if gap is not None and gap > 0.0:
-        raise unusable(f"{key}.gap", "expected zero or less: a bridge forms on contact, beads apart have none")
+        raise unusable(f"{key}.gap", "expected zero or less: a bridge forms on contact, so beads with a gap have none")
     overlaps = contact_loads(case, walkers).overlaps if gap is None else (-gap,)
     if max(overlaps) * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):
         blamed = f"{key}.gap" if gap is not None else "contact.youngs_modulus"
@@ -330,18 +330,18 @@ def _spaced(case: Case, key: str, walkers: Walkers, notes: Notes) -> Walkers:
     # Beads of different walkers may touch, but not overlap, if they are meant to meet.
     least = (1.0 if walkers.meet else 1.5) * walkers.length
     if walkers.spacing < least and sum(one.replicates for one in case.walkers) > 1:
-        told = f'neighbouring walkers would touch or overlap; expected at least {1e3 * least:.3g} mm, or "auto"'
-        raise unusable(f"{key}.spacing", told)
+        message = f'neighbouring walkers would touch or overlap; expected at least {1e3 * least:.3g} mm, or "auto"'
+        raise unusable(f"{key}.spacing", message)
     return walkers
 
 
 def _check_bodies(case: Case, file: CaseFile) -> None:
-    """Refuse bodies for which there is no room within the boundary or beside each other."""
+    """Refuse bodies that do not fit into the boundary or beside each other."""
     boundary, mixture = case.boundary, case.mixture
     if case.run.ranks > 1 and not boundary.closed:
-        raise unusable("run.ranks", "expected 1: walkers on a plane are slower on several")
+        raise unusable("run.ranks", "expected 1: walkers on a plane run slower on several processes")
     if not case.walkers and mixture is None and "seed" in file.run.model_fields_set:
-        raise unusable("run.seed", "expected none where the beads are placed: every start would be the same")
+        raise unusable("run.seed", "expected none with placed beads: every start would be the same")
     if mixture is not None:
         _check_pour(mixture, boundary, case.tops_of_others(mixture))
     if case.placed is not None or case.meets or (case.walkers and not boundary.bare):
@@ -386,8 +386,8 @@ def _check_places(case: Case, keys: list[str]) -> None:
         least = (1.0 - _OVERLAP) * radius
         beside = clearance < least
         if number < walking and beside:
-            told = f"so many walkers, or such, do not fit between the walls of the {boundary.shape}"
-            raise unusable(f"{key}.replicates", told)
+            message = f"the walkers do not fit between the walls of the {boundary.shape}"
+            raise unusable(f"{key}.replicates", message)
         if number < walking and z + radius > boundary.height:
             raise unusable("boundary.height", f"too low for the walkers of {key}")
         if number >= walking and (beside or z < least or z + radius > boundary.height):
@@ -402,5 +402,5 @@ def _check_places(case: Case, keys: list[str]) -> None:
         (key, place, first), (other_key, other_place, second) = beads[one], beads[other]
         if dist(place, other_place) < first + second - _OVERLAP * min(first, second):
             if other < walking:
-                raise unusable(f"{other_key}.spacing", "as they are turned, beads of two walkers would overlap")
+                raise unusable(f"{other_key}.spacing", "at their start angles, beads of two walkers would overlap")
             raise unusable(f"{other_key}.at", f"overlaps with {key if one >= walking else f'one of {key}'}")

@@ -1,4 +1,4 @@
-"""Numbers as they are printed for people: at most four significant digits, in the usual units."""
+"""Rounding of printed numbers: at most four significant digits, in usual units."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ SHOWN_UNITS = {
 }
 """For units of a result, those that are shown, and how many of them one is."""
 NOISE = {"": 1e-9, "mm/s": 1e-4, "mm": 1e-6, "°": 1e-3, "deg": 1e-3, "%": 1e-3, "nJ": 1e-6}
-"""In the units that are shown: what is smaller is rounding, and printed as 0."""
+"""In displayed units: smaller values are rounding errors and are printed as 0."""
 _LARGEST_WRITTEN_OUT = 1e7
 _LONGER = {"d": 86400.0, "h": 3600.0, "min": 60.0}
 
 
 def rounded(value: float, unit: str = "") -> str:
-    """A number for people: at most four significant digits; 0 for what is rounding in a unit; a dash for none.
+    """A number as text: at most four significant digits; 0 for rounding errors in a unit; a dash for None.
 
     Examples
     --------

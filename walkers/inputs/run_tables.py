@@ -51,8 +51,8 @@ def resolve_drive(table: DriveTable, boundary: Boundary, dimer: Dimer | None, no
     drive = Drive(harmonics, table.frame or "container")
     notes.default("drive.frame", drive.frame)
     if table.frame == "lab" and not drive.is_plain:
-        told = "several harmonics, or one with a phase, are driven in the container's frame"
-        raise unusable("drive.frame", f'expected "container": {told}')
+        message = "several harmonics, or one with a phase, are driven in the container's frame"
+        raise unusable("drive.frame", f'expected "container": {message}')
     return drive
 
 
@@ -98,8 +98,8 @@ def resolve_run(table: RunTable, case: Case, notes: Notes) -> Run:
     _check_length(table, case, cycles, settling, cycles_per_sample)
     most = MOST_STEPS // steps - (ceil((rest + 1.0) * frequency) if rest else 0)
     if cycles > most:
-        key, told = ("cycles", f"expected at most {most}") if table.duration is None else ("duration", "too long")
-        raise unusable(f"run.{key}", f"{told}: the engine counts steps up to 2^31")
+        key, message = ("cycles", f"expected at most {most}") if table.duration is None else ("duration", "too long")
+        raise unusable(f"run.{key}", f"{message}: the engine counts steps up to 2^31")
     segment = table.segment if table.segment is not None else _SEGMENT_SECONDS if loose else inf
     # Segments end with a sample, so that each begins where the last one ended.
     samples_of_segment = max(1, round(min(segment * frequency, cycles) / cycles_per_sample))
@@ -135,7 +135,7 @@ def _note_run(run: Run, table: RunTable, case: Case, notes: Notes) -> None:
         notes.default("run.longest_settling", run.longest_settling, "of loose beads")
     if run.rests:
         notes.default("run.settled_below", run.settled_below)
-    notes.derived("run.time_step", run.time_step, "auto: a fraction of the limits, whole steps per cycle")
+    notes.derived("run.time_step", run.time_step, "auto: a fraction of the limits, a whole number of steps per cycle")
     notes.derived("run.cycles", cycles, whence)
     notes.derived("run.settling_cycles", run.settling_cycles, "a third of the cycles, at most 20")
     notes.derived("run.silence", silence, "the engine is stopped if it writes nothing for this long")
@@ -150,8 +150,8 @@ def _check_length(table: RunTable, case: Case, cycles: int, settling: int, cycle
     if cycles - settling < 2:
         raise unusable("run.settling_cycles", f"expected at most cycles - 2 = {cycles - 2}")
     if case.walkers and cycles // cycles_per_sample <= -(-settling // cycles_per_sample):
-        told = f"expected more: one frame in {cycles_per_sample} cycles leaves none after {settling} settling ones"
-        raise unusable("run.frames_per_second", told)
+        message = f"expected more: one frame in {cycles_per_sample} cycles leaves none after {settling} settling cycles"
+        raise unusable("run.frames_per_second", message)
 
 
 def _largest_time_step(table: RunTable, case: Case) -> float:
@@ -161,8 +161,8 @@ def _largest_time_step(table: RunTable, case: Case) -> float:
         return limits.recommended(loose=case.loose)
     if (exceeded := limits.exceeded_by(given)) and not table.allow_unstable:
         allowed = f"{min(limits.as_dict().values()) * 1e6:.3g} us"
-        told = f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed}, "
-        raise unusable("run.time_step", f'{told}"auto", or allow_unstable = true')
+        message = f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed}, "
+        raise unusable("run.time_step", f'{message}"auto", or allow_unstable = true')
     return given
 
 
@@ -204,10 +204,10 @@ def _until_steady(table: RunTable, case: Case, cycles_per_sample: int) -> bool:
     given = [key for key in ("cycles", "duration", "settling_cycles", "segment") if getattr(table, key) is not None]
     if given and asked:
         raise unusable(
-            f"run.{given[0]}", f"expected none where run.{asked[0]} lets walkers run until their velocity is constant"
+            f"run.{given[0]}", f"expected none: with run.{asked[0]}, walkers run until their velocity is constant"
         )
     if asked and not case.apart:
-        raise unusable(f"run.{asked[0]}", "expected run.duration: only walkers apart can be steady")
+        raise unusable(f"run.{asked[0]}", "expected run.duration: a run until steady needs independent walkers")
     if not case.apart or given or table.ranks != 1 or cycles_per_sample != 1:
         return False
     # A few cycles may show how walkers walk that are asymmetric dimers which start near the axis.

@@ -1,4 +1,4 @@
-"""What a case file may say: keys, types, defaults and bounds, as models of pydantic's and as classes of the case.
+"""Schema of a case file: keys, types, defaults and bounds, as pydantic models and classes of the case.
 
 A quantity is written as a string with its unit and held here as a number in SI units. What the library of materials
 and liquids supplies (`walkers.inputs.resolving.SUPPLIED`) has been filled in before.
@@ -55,8 +55,8 @@ def _ranges(value: object) -> object:
         found = ranges_of(ranges)
     except InputError as error:
         (problem,) = error.problems
-        told = problem.expected.replace("{ uniform = [low, high] }", "[low, high]")
-        raise ValueError(f"{problem.key}: {told}") from error
+        message = problem.expected.replace("{ uniform = [low, high] }", "[low, high]")
+        raise ValueError(f"{problem.key}: {message}") from error
     for key, one in found.items():
         if one.median is not None:
             raise ValueError(f"{key}: expected [low, high]: the case's own value is the median")

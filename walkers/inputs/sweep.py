@@ -1,4 +1,4 @@
-"""Sweep files: a base case and what to vary, read as TOML and expanded into points.
+"""Sweep files: a base case and the values to vary, read from TOML and expanded into points.
 
 case = "fig1b"
 
@@ -70,8 +70,8 @@ class DescendTable(Table):
         start, to, step = (number_of(name, value) for name, value in given.items())
         unit = unit_of(self.key, list(given.values()))
         if not (start >= to and step > 0 and start - to < MOST_POINTS * step):
-            told = "`from` must not be below `to`, and `step` must be positive"
-            raise unusable("descend", told, f"{self.start} to {self.to}")
+            message = "`from` must not be below `to`, and `step` must be positive"
+            raise unusable("descend", message, f"{self.start} to {self.to}")
         number = int((start - to) / step + 1e-9) + 1
         return [written(start - step * count, unit) for count in range(number)]
 
@@ -99,7 +99,7 @@ class SweepFile(Table):
 
 @dataclass(frozen=True)
 class Descent:
-    """The last axis of a sweep is followed downward and left when the walkers are slower than ``until_below`` (m/s).
+    """Descent along the last axis of a sweep until the walkers are slower than ``until_below`` (m/s).
 
     ``steps`` is the number of its points; consecutive points of the sweep, so many at a time, are one descent.
     """
@@ -109,7 +109,7 @@ class Descent:
     until_below: float
 
     def at_rest(self, velocity: float) -> bool:
-        """Whether walkers of a mean velocity (m/s) count as at rest; never where there is none (NaN)."""
+        """Whether walkers with a mean velocity (m/s) count as at rest; false for NaN."""
         return abs(velocity) < self.until_below
 
 
@@ -148,13 +148,13 @@ class Sweep:
         """The case of each point, resolved; raises `InputError` if a point cannot be used; it says which."""
         for number, row in enumerate(self.rows):
             changes = dict(zip(self.keys, row, strict=True))
-            told = ", ".join(f"{key} = {value}" for key, value in changes.items())
-            where = f"{self.source}: point {number} ({told})" if told else self.source
+            text = ", ".join(f"{key} = {value}" for key, value in changes.items())
+            where = f"{self.source}: point {number} ({text})" if text else self.source
             with blaming(where):
                 document = changed(self.document, changes)
             case = resolve_case(document, source=where, name=self.case_name)
             # The base case's title may say what does not hold here.
-            yield case.renamed(case.name, f"{shortened(self.name)}: {shortened(told)}") if told else case
+            yield case.renamed(case.name, f"{shortened(self.name)}: {shortened(text)}") if text else case
 
 
 def shipped_sweeps() -> dict[str, Path]:
@@ -177,20 +177,20 @@ def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) ->
             document = {**document, "set": {**settings_in(document.get("set", {})), **changes}}
         name = _name_with(name, changes)
     made = expand(document, source=str(sweep), name=name, folder=path.parent)
-    told = "varies in this sweep: it cannot be set as well"
-    if problems := [Problem(key, f'"{value}"', told) for key, value in (changes or {}).items() if key in made.keys]:
+    text = "varies in this sweep and cannot be set"
+    if problems := [Problem(key, f'"{value}"', text) for key, value in (changes or {}).items() if key in made.keys]:
         raise InputError(str(sweep), problems)
     return made
 
 
 def _name_with(name: str, changes: Mapping[str, Value]) -> str:
-    """Name of a sweep with changes: another one, so that its table stands beside that of the sweep without."""
-    told = ",".join(f"{key}={value}" for key, value in changes.items())
-    full = re.sub(r"[^\w.+=,-]+", "_", f"{name},{told}")
+    """Name of a sweep with changes, different from that of the sweep without changes."""
+    text = ",".join(f"{key}={value}" for key, value in changes.items())
+    full = re.sub(r"[^\w.+=,-]+", "_", f"{name},{text}")
     encoded = full.encode("utf-8", "surrogateescape")
     if len(encoded) <= _LONGEST_NAME:
         return full
-    digest = hashlib.sha256(f"{name},{told}".encode("utf-8", "surrogateescape")).hexdigest()[:12]
+    digest = hashlib.sha256(f"{name},{text}".encode("utf-8", "surrogateescape")).hexdigest()[:12]
     return f"{encoded[: _LONGEST_NAME - 13].decode('utf-8', 'ignore')}~{digest}"  # with a hyphen it might be a run's
 
 
@@ -215,7 +215,7 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
             tables = changed(read_case(base, folder), settings)
             changed(tables, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:
-        raise refused(source, "has tables within tables without end") from error
+        raise refused(source, "has infinitely nested tables") from error
     descend = file.descend
     return Sweep(
         name=name,

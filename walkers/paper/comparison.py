@@ -1,4 +1,4 @@
-"""Every published number beside this project's: ``comparison.md`` and ``comparison.json``."""
+"""Comparison of all published numbers with this project: ``comparison.md`` and ``comparison.json``."""
 
 from __future__ import annotations
 

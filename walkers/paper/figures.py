@@ -87,7 +87,7 @@ def _errorbars(axes: Axes, x: pd.Series[float], rows: pd.DataFrame, *, seen: boo
 
 
 def _range_seen(rows: pd.DataFrame) -> bool:
-    """Whether the range of the walkers' velocities is anywhere larger than a symbol."""
+    """Whether any range of velocities exceeds the size of a symbol."""
     return errors_seen((rows["largest"] - rows["smallest"]) / 2.0, rows["velocity"])
 
 
@@ -127,8 +127,8 @@ def fig2(sources: Sources) -> Figure:
     above.set_xlabel(r"dimensionless peak force $\Gamma_0$")
     engine.plot([], [], color="0.2", lw=0.9, label="lines: Coulomb friction, bridges")
     engine.plot([], [], color="0.45", lw=2.0, marker="*", ms=8, label="paper's fit, κ = 0.033 s/mm")
-    told = "mean and range of 6 walkers" if seen else "mean of 6 walkers, their range is smaller"
-    legend_below(engine, ncols=3, title=f"symbols: engine, {told}; in (c) of 2")
+    text = "mean and range of 6 walkers" if seen else "mean of 6 walkers, their range is smaller"
+    legend_below(engine, ncols=3, title=f"symbols: engine, {text}; in (c) of 2")
     legend_below(dry, ncols=4, columnspacing=1.0, handlelength=1.8, handletextpad=0.4)
     _threshold(axes["threshold"], sources)
     letter_panels((engine, dry, axes["threshold"]))
@@ -176,8 +176,8 @@ def fig3(sources: Sources) -> Figure:
     same = motion_of(*[of_radii(case, radii, gamma0) for radii in pairs]).velocity * 1e3
     axes.plot(table["sin_delta"], same, "x", color="0.1", ms=6, label="Coulomb friction, bridges, these beads")
     seen = _range_seen(table)
-    told = "engine, mean and range" if seen else "engine, mean (the range is smaller than the symbol)"
-    _errorbars(axes, table["sin_delta"], table, seen=seen, fmt="s", color="C2", ms=5, label=told)
+    text = "engine, mean and range" if seen else "engine, mean (the range is smaller than the symbol)"
+    _errorbars(axes, table["sin_delta"], table, seen=seen, fmt="s", color="C2", ms=5, label=text)
     # The beads stand above the axes, where they meet no symbol; upright, for some asymmetries are nearly the same.
     above = axes.secondary_xaxis("top")
     above.set_xticks(table["sin_delta"], [f"{one * 1e3:g}/{other * 1e3:g}" for one, other in pairs], rotation=90)
@@ -225,7 +225,7 @@ def fig4(sources: Sources) -> Figure:
 
 
 def _draw_cycles(axes: Axes, trajectory: Group) -> None:
-    """The last cycles of the first walker, the theory's last cycle beside it."""
+    """Last cycles of the first walker, with the last cycle of the theory."""
     run, motion = trajectory.case.run, gait(trajectory)
     samples = run.samples_per_cycle
     last = slice((run.cycles - _CYCLES) * samples, run.cycles * samples + 1)
@@ -270,10 +270,10 @@ OBSERVED = {
     "fig3_0.4_0.2": "Fig. 3: v for 0.4/0.2 mm (mm/s)",
     "fig2_frequency": "Fig. 2: v(90 Hz)/v(60 Hz) at 6 g",
     "fig2_plateau": "plateau: v(10 g)/v(6 g) at 60 Hz",
-    "astray": "walkers astray at 60 Hz, 10 g (%)",
+    "astray": "walkers off the axis at 60 Hz, 10 g (%)",
     "angle_after_60": "angle after a start at 60° (°)",
 }
-"""Of `walkers.paper.published.OBSERVATIONS` those that are shown, and what they are of in the sweep."""
+"""The `walkers.paper.published.OBSERVATIONS` that are shown, with their labels."""
 _TOGETHER = "uncalibrated"
 _NO_RANGE = 1e-6
 
@@ -302,7 +302,7 @@ def sensitivities(sources: Sources) -> pd.DataFrame:
 
 @styled
 def fig_sensitivity(sources: Sources) -> Figure:
-    """A tornado plot: a panel an observation, a bar a parameter from its lower to its higher value."""
+    """Tornado plot: one panel per observation, one bar per parameter from its lower to its higher value."""
     found = sensitivities(sources)
     figure, axes = new_figure(TWO_COLUMNS, 7.4, nrows=2, ncols=len(OBSERVED) // 2, sharey=True)
     names = []
@@ -311,7 +311,7 @@ def fig_sensitivity(sources: Sources) -> Figure:
         names.append(f"{name}\n{low:.3g} … {high:.3g}")
     for panel, key in zip(axes.flat, OBSERVED, strict=True):
         _tornado(panel, found, key)
-    axes[0, 0].set_yticks(range(len(names) + 1), [*names, "friction 0.07,\nliquid as it is"])
+    axes[0, 0].set_yticks(range(len(names) + 1), [*names, "friction 0.07,\nuncalibrated"])
     axes[0, 0].invert_yaxis()
     letter_panels(axes.flat)
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
@@ -324,9 +324,9 @@ def _tornado(axes: Axes, found: pd.DataFrame, key: str) -> None:
     for place, name in enumerate(PARAMETERS):
         ends = found[found["parameter"] == name].sort_values("value")[key]
         for end, offset, colour, label in zip(ends, (-0.17, 0.17), ("0.75", "0.35"), ("lower", "higher"), strict=True):
-            told = label if place == 0 else None
+            shown_label = label if place == 0 else None
             if known:
-                axes.barh(place + offset, end - shipped, 0.32, shipped, fc=colour, ec="0.1", lw=0.5, label=told)
+                axes.barh(place + offset, end - shipped, 0.32, shipped, fc=colour, ec="0.1", lw=0.5, label=shown_label)
             else:  # bars have nothing to begin at
                 axes.plot(end, place + offset, "o", color=colour, mec="0.1", ms=6)
     together = found[found["parameter"] == _TOGETHER][key]
@@ -334,7 +334,7 @@ def _tornado(axes: Axes, found: pd.DataFrame, key: str) -> None:
     if known:
         axes.axvline(shipped, color="0.1", lw=1.0, label="shipped")
     else:
-        axes.set_title("shipped: none on the axis")
+        axes.set_title("shipped set: no walker on the axis")
     axes.axvline(OBSERVATIONS[key].value or 0.0, color="C1", ls="--", lw=1.4, label="published")
     axes.margins(x=0.08)
     low, high = axes.get_xlim()

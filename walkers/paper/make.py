@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FORMATS = ("png", "svg")
-"""In which figures are written if nothing else is asked for; of those of `walkers.postprocess.drawing`."""
+"""Default formats of figures, from `walkers.postprocess.drawing`."""
 
 
 class Drawing(NamedTuple):
-    """A figure: how it is drawn, from which sweeps, and what it is; and whether only if it is asked for by name."""
+    """A figure: function, sweeps, title, and whether it is drawn only on request."""
 
     draw: Callable[[Sources], Figure]
     sweeps: tuple[str, ...]
@@ -42,17 +42,17 @@ FIGURES = {
     "fig4": Drawing(fig4, ("fig4",), "Fig. 4: rotation of the beads through two cycles"),
     "alignment": Drawing(fig_alignment, ("alignment",), "Alignment with the shaking axis and across it"),
     "modes": Drawing(fig_modes, ("modes",), "Modes of motion"),
-    "sensitivity": Drawing(fig_sensitivity, ("sensitivity",), "What the disagreements depend on"),
-    "climbing": Drawing(fig_climbing, ("climb-friction", "climb-tilt"), "What stands on a wall and climbs it", True),
+    "sensitivity": Drawing(fig_sensitivity, ("sensitivity",), "Sensitivity of six observations to the parameters"),
+    "climbing": Drawing(fig_climbing, ("climb-friction", "climb-tilt"), "Stability and climbing on a wall", True),
     "zoo": Drawing(fig_zoo, ("zoo", "zoo-corner"), "Clusters on a wall and in a corner", True),
-    "tray-phases": Drawing(fig_trays, ("tray-phases",), "Whether walkers on a tray cluster, align or jam", True),
+    "tray-phases": Drawing(fig_trays, ("tray-phases",), "Clustering, alignment and jamming on trays", True),
 }
 COMPARISON = "comparison"
 COMPARED = ("fig2", "fig2-threshold", "fig3", "fig4", "alignment")
 
 
 class Made(NamedTuple):
-    """What was made: files; points that failed, by sweep; figures of which nothing could be drawn, and why.
+    """Written files, failed points by sweep, and figures that could not be drawn with the reasons.
 
     Of ``compared`` published numbers that test the engine so many ``agree``; none if they were not compared.
     """
@@ -75,7 +75,7 @@ def make_figures(  # noqa: PLR0913
     allow_failed_audit: bool = False,
     progress_of: ProgressOf | None = None,
 ) -> Made:
-    """Run what is missing, draw the figures and write the comparison.
+    """Make the missing runs, draw the figures and write the comparison.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def make_figures(  # noqa: PLR0913
 
 
 def draw_figure(name: str, out: Path, to: Path, formats: Sequence[str]) -> list[Path] | str:
-    """Draw one of `FIGURES` from finished sweeps; the files, or why nothing could be drawn."""
+    """Draw one of `FIGURES` from finished sweeps; return the files, or the reason why it cannot be drawn."""
     drawing, sources = FIGURES[name], Sources(out)
     try:
         runs = sources.runs(*drawing.sweeps)

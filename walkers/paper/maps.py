@@ -1,4 +1,4 @@
-"""Figures beside the paper's own: how dimers align, in which modes they walk, what climbs a wall, what trays do."""
+"""Figures beyond the paper: alignment of dimers, modes of motion, climbing, trays."""
 
 from __future__ import annotations
 
@@ -40,25 +40,25 @@ MODES = {
 }
 """With their markers and colours."""
 POSTURES = {"climbs upright": "^", "stays, upright": "o", "slides down upright": "v", "leans": "D", "turns over": "X"}
-"""What something does on a wall, with its marker."""
+"""Postures on a wall, with markers."""
 STAYS = 5e-5
-"""m/s; what is slower stays where it is: no more than a tenth of a radius in a second."""
+"""m/s; slower clusters count as at rest (a tenth of a radius per second)."""
 _SHAPES = {"chain": "dimer", "fan": "fan: large, two small", "diamond": "diamond: large, two small, small"}
 _MAPS = (
     ("climb-friction", "contact.friction.bead_wall", "friction, on a wall"),
     ("climb-tilt", "boundary.tilt", "tilt (°), friction 0.5"),
 )
-"""A row of maps each: the sweep, what is varied along x, and its label."""
+"""Rows of maps: sweep, key along x, and its label."""
 _SPEEDS = (-10.0, -3.0, -1.0, 0.0, 1.0, 3.0, 10.0)
 """mm/s, on the scale of colours."""
 _SIDE_BY_SIDE = 5
 """Clusters."""
 _OF_TRAYS = {
     "share in clusters": ("clustered_share",),
-    "share in the largest": ("largest_share",),
+    "share in the largest cluster": ("largest_share",),
     "order": ("nematic_order", "polar_order"),
-    "joined / free speed": ("speed_ratio",),
-    "share that is slow": ("slow_share",),
+    "speed, joined / free": ("speed_ratio",),
+    "share of slow walkers": ("slow_share",),
 }
 """Columns of a sweep's table that share a panel, solid and dashed, by its label."""
 _LARGEST_DRIVE = 10.0
@@ -239,7 +239,7 @@ def _draw_borders(axes: Axes, top: float) -> None:
 
 
 def postures(table: pd.DataFrame) -> npt.NDArray[np.int64]:
-    """What the walkers of each point of a sweep do, a place in `POSTURES`.
+    """Posture of the walkers of each point of a sweep, an index in `POSTURES`.
 
     Turns over if any of them does; leans if any does not end upright; else it climbs, slides down or is slower than
     `STAYS`.
@@ -288,7 +288,7 @@ def _draw_map(axes: Axes, table: pd.DataFrame, key: str) -> PathCollection:
 
 @styled
 def fig_zoo(sources: Sources) -> Figure:
-    """Each cluster as it is after a second, above its speed and what it does."""
+    """Each cluster after one second, with its velocity and posture."""
     entries = []
     for sweep in ("zoo", "zoo-corner"):
         table = sources.finished(sweep)
@@ -332,7 +332,7 @@ def _draw_cluster(axes: Axes, group: Group) -> None:
 
 @styled
 def fig_trays(sources: Sources) -> Figure:
-    """Whether walkers on closed trays cluster, align and jam, against acceleration; a column for each coverage."""
+    """Clustering, alignment and jamming of walkers on closed trays against acceleration; one column per coverage."""
     from matplotlib.lines import Line2D
 
     table = sources.finished("tray-phases")

@@ -1,4 +1,4 @@
-"""Which physics is missing: published numbers from the theory, with one term after the other, each fitted anew.
+"""Further terms of the theory, each fitted to the published numbers.
 
 The engine knows Coulomb's friction and the bridges' resistance to sliding and rolling. The theory integrates under any
 law of friction, thousands of walkers a second, so that for every term all parameters can be searched for what they give
@@ -41,7 +41,7 @@ TERMS: Mapping[str, Ranges] = {
     "drag in proportion to the load, the paper's κ (s/m)": KAPPA,
     "static friction above the kinetic": {"static_ratio": (1.0, 2.5), "log10_stribeck_velocity": (-4.0, -1.5)},
 }
-"""To be tried, one at a time and all together: their parameters."""
+"""Terms that are fitted one at a time and all together, with their parameters."""
 _WITHOUT = {
     "wall_bridge_factor": 1.0,
     "bead_bridge_factor": 1.0,
@@ -66,7 +66,7 @@ PAGE_NAME = "model_terms.md"
 
 @dataclass(frozen=True)
 class Fit:
-    """What terms give at best: with which parameters, and by what a number is called what comes out (m/s, or a ratio).
+    """Best fit with some terms: parameters, and values by the name of each number (m/s, or a ratio).
 
     So many are ``met``, within their deviations; of the others the names, the worst first. ``misfit`` is Σ ln(1 + r²),
     r in deviations.
@@ -81,7 +81,7 @@ class Fit:
 
 
 def _at_the_ends(points: Sequence[Point]) -> list[Point]:
-    """Of the range of frequencies."""
+    """Both ends of the range of frequencies."""
     return [one for one in points if one.frequency in _FREQUENCIES or len(points) == 1]
 
 
@@ -136,7 +136,7 @@ def speeds(parameters: Mapping[str, float]) -> dict[str, dict[Point, float]]:
 
 
 def values_of(parameters: Mapping[str, float], wanted: Sequence[Observation]) -> dict[str, float]:
-    """What some parameters give of published numbers, m/s or ratios, by what they are called here."""
+    """Predictions of the published numbers for given parameters, m/s or ratios, by name."""
     found = speeds(parameters)
     values = {}
     for number in wanted:
@@ -193,8 +193,8 @@ def fit(
     parameters, values = outcome(found.x)
     apart = np.abs(residuals(values))
     missed = [wanted[place].fitted for place in np.argsort(apart)[::-1] if apart[place] > 1.0]
-    told = {key: value if isfinite(value) else None for key, value in values.items()}
-    return Fit(name, parameters, told, len(wanted) - len(missed), missed, float(found.fun))
+    finite = {key: value if isfinite(value) else None for key, value in values.items()}
+    return Fit(name, parameters, finite, len(wanted) - len(missed), missed, float(found.fun))
 
 
 def try_model_terms(to: Path) -> list[Fit]:

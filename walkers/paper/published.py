@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 GRAVITY = ACCELERATION_OF_ONE_G
-"""The paper's g, m/s²."""
+"""The value of g in the paper, m/s²."""
 _DEVIATION = 0.15
 
 
@@ -73,7 +73,7 @@ class Point(NamedTuple):
 
 @dataclass(frozen=True)
 class Observation:
-    """Something that the paper says of walkers, most often a number, and of which walkers.
+    """A published observation, usually a number, and its walkers.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ def _read(given: dict[str, Any], reasons: Mapping[str, str]) -> Observation:
 
 _FILE = tomllib.loads(Path(__file__).with_name("published.toml").read_text("utf-8"))
 OBSERVATIONS = {given["key"]: _read(given, _FILE["reasons"]) for given in _FILE["numbers"]}
-"""All that the paper says of walkers, and what follows from it, by key."""
+"""All published observations, and quantities derived from them, by key."""
 FIT = {float(g): OBSERVATIONS[f"fig2_{g}g"].si for g in range(2, 7)}
 """Fig. 2: the paper's fitted curve below the plateau, m/s, at peak accelerations in g."""
 FIG3_FIT = {one.of[0].radii: one.si for key, one in OBSERVATIONS.items() if key.startswith("fig3_") and one.value}
@@ -146,7 +146,7 @@ FIG4_PEAKS = tuple(OBSERVATIONS[f"fig4{letter}_velocity"].of[0].peak or 0.0 for 
 
 
 def outside_of_the_paper(case: Case) -> str | None:
-    """A sentence on how a case is outside the range in which the paper measured velocities; None if it is within.
+    """How a case lies outside the range in which the paper measured velocities; None if it lies within.
 
     Of a case that is no dimer's nothing is said.
     """
@@ -164,7 +164,7 @@ def outside_of_the_paper(case: Case) -> str | None:
         f"{peak:.3g} g (up to {strongest:g} g)": peak > (1.0 + 1e-9) * strongest,
         f"{frequency:g} Hz ({low:g} to {high:g} Hz)": not low <= frequency <= high,
     }
-    beyond = [told for told, outside in found.items() if outside]
+    beyond = [one for one, outside in found.items() if outside]
     return f"outside the paper's measurements: {', '.join(beyond)}; no model is tested there" if beyond else None
 
 
@@ -204,11 +204,11 @@ def described(case: Case) -> str:
 # --- the sweeps that figures are made from ----------------------------------------------------------------------------
 
 ProgressOf = Callable[[str], AbstractContextManager[Callable[[SweepProgress], None]]]
-"""Gives, for the name of a sweep, a context whose value is told of its progress."""
+"""Gives, for the name of a sweep, a context whose value is called with its progress."""
 
 
 class NothingFinishedError(WalkersError):
-    """A sweep of which nothing is there to be shown."""
+    """A sweep without finished points."""
 
 
 class Sources:

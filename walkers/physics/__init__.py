@@ -1,4 +1,4 @@
-"""The laws that a deck stands on, one file a law, in plain numbers of SI units: its equation and source at the top.
+"""Physical laws, one file each, with equation and source, in plain numbers of SI units.
 
 The resolved case (forces at rest, the time step), the audit and the theory all take them from here.
 """

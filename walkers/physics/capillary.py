@@ -1,4 +1,4 @@
-"""Capillary bridges, whatever their law: their liquid, their rupture, and limits.
+"""Capillary bridges independent of the law: volumes, rupture distance, limits.
 
 References
 ----------
@@ -12,12 +12,12 @@ from math import cbrt, pi, sqrt
 
 
 def derjaguin_radius(radius_1: float, radius_2: float) -> float:
-    """Radius of the equal spheres whose surfaces part as these do, 2 R1 R2 / (R1 + R2); infinity is a plane."""
+    """Derjaguin radius 2 R1 R2 / (R1 + R2): radius of equal spheres with the same gap profile; plane: infinity."""
     return 2.0 / (1.0 / radius_1 + 1.0 / radius_2)
 
 
 def bridge_volume_between_beads(radius_1: float, radius_2: float, volume_fraction: float) -> float:
-    """Liquid in the bridge between two beads, m³, of radii in m and the liquid on a bead over the bead's volume.
+    """Volume of the bridge between two beads, m³, from the radii (m) and the ratio of liquid to bead volume.
 
     Each bead gives half of its liquid film that lies in the cap that the other one covers (Shi and McCarthy 2008).
     """
@@ -30,12 +30,12 @@ def bridge_volume_between_beads(radius_1: float, radius_2: float, volume_fractio
 
 
 def bridge_volume_at_wall(radius: float, volume_fraction: float) -> float:
-    """Liquid in the bridge between a bead and a wall, m³: half of the bead's liquid."""
+    """Volume of the bridge between a bead and a wall, m³: half of the bead's liquid."""
     return 0.5 * 4.0 / 3.0 * pi * radius**3 * volume_fraction
 
 
 def capillary_force_limit_at_wall(surface_tension: float, radius: float) -> float:
-    """Attraction of a sphere to a plane by a vanishing bridge that wets perfectly, 4πγR, N (McFarlane, Tabor 1950)."""
+    """Attraction of a sphere and a plane at perfect wetting, limit of small volume, 4πγR, N (McFarlane, Tabor 1950)."""
     return 4.0 * pi * surface_tension * radius
 
 

@@ -1,4 +1,4 @@
-"""Contacts of softened beads: Hertz's repulsion 4/3 E* √R* δ^(3/2), and his elastic impact.
+"""Contacts of softened beads: Hertz repulsion 4/3 E* √R* δ^(3/2), and the elastic Hertz impact.
 
 E* = E/(2(1 − ν²)) and G* = E/(4(1 + ν)(2 − ν)) (Mindlin 1949) of two bodies of the same modulus. A wall is a sphere
 without end: R* is the bead's radius and m* its mass. In an impact at a normal speed v_n
@@ -17,7 +17,7 @@ from math import sqrt
 from typing import NamedTuple
 
 _DURATION = 2.9432750
-"""Of Hertz's impact, over δ_max/v_n."""
+"""Duration of the Hertz impact in units of δ_max/v_n."""
 
 
 def reduced_modulus(youngs_modulus: float, poissons_ratio: float) -> float:
@@ -26,12 +26,12 @@ def reduced_modulus(youngs_modulus: float, poissons_ratio: float) -> float:
 
 
 def hertz_overlap(force: float, reduced_radius: float, reduced_modulus: float) -> float:
-    """Overlap (m) at which the repulsion carries a load (N), of R* in m and E* in Pa; a pull presses nothing."""
+    """Overlap (m) at which the repulsion balances a load (N), with R* in m and E* in Pa; zero for a tensile load."""
     return float((3.0 * max(force, 0.0) / (4.0 * reduced_modulus * sqrt(reduced_radius))) ** (2.0 / 3.0))
 
 
 class Impact(NamedTuple):
-    """What meets: reduced mass (kg), radius (m) and modulus (Pa); speeds are normal ones, m/s."""
+    """Impact of two bodies: reduced mass (kg), radius (m) and modulus (Pa); methods take the normal velocity, m/s."""
 
     mass: float
     radius: float
@@ -46,5 +46,5 @@ class Impact(NamedTuple):
         return float(4.0 / 3.0 * self.modulus * sqrt(self.radius) * self.depth(speed) ** 1.5)
 
     def duration(self, speed: float) -> float:
-        """How long it lasts, s."""
+        """Duration of the contact, s."""
         return _DURATION * self.depth(speed) / speed

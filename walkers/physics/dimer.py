@@ -1,4 +1,4 @@
-"""Two beads as the paper describes them: masses, asymmetry, Γ0."""
+"""Dimers in the notation of the paper: masses, asymmetry, Γ0."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from walkers.physics.capillary import capillary_force_limit_at_wall
 
 @dataclass(frozen=True)
 class Dimer:
-    """What follows from a case's two beads: the paper's symbols, SI units.
+    """Derived quantities of the two beads of a case: symbols of the paper, SI units.
 
     Bead 1 is the case's first. Khan et al.: sin δ = (R1 − R2)/(R1 + R2), μ = (m1 − m2)/M, R̄ = (R1 + R2)/2,
     Γ0 = a0 M/(4πγR̄) (their Eq. 1).

@@ -62,7 +62,7 @@ _TURNING = 1e-9
 
 
 class NoBridgeError(ValueError):
-    """There is no bridge as asked for, or none was found."""
+    """The requested bridge does not exist or was not found."""
 
 
 class ForceCurve(NamedTuple):
@@ -96,7 +96,7 @@ class _Solid:
         return np.asarray(arc * _sinc(self.curvature * arc))
 
     def rise(self, arc: Array) -> Array:
-        """Height of the cap that is wetted."""
+        """Height of the wetted cap."""
         return np.asarray(0.5 * self.curvature * arc**2 * _sinc(0.5 * self.curvature * arc) ** 2)
 
     def cap_volume(self, arc: Array) -> Array:
@@ -137,7 +137,7 @@ class _Family:
         return np.sqrt(squared), upright + 0.5 * pressure * (squared - start)
 
     def misfit(self, x: Array) -> Array:
-        """What vanishes for a bridge, shape (..., 4): it ends on the second solid, at its angle, with the volume."""
+        """Residuals of the boundary conditions, shape (..., 4): end on the second solid, contact angle, volume."""
         radius, upright = self.profile(x, _NODES)
         pressure, length = x[..., 2], x[..., 3]
         solids = ((self.first, x[..., 0]), (self.second, x[..., 1]))
@@ -221,13 +221,13 @@ def _family_of(radii: tuple[float, float], volume: float, contact_angle: float |
 
 
 def _shrunk(family: _Family, share: float) -> _Family:
-    """The same liquid between solids that are less curved by a factor."""
+    """The same liquid between solids whose curvature is reduced by a factor."""
     first, second = (_Solid(share * one.curvature, one.contact_angle) for one in (family.first, family.second))
     return _Family(first, second)
 
 
 def _touching(family: _Family) -> FloatArray:
-    """The bridge at contact, by way of flatter solids, on which it is the thin ring that `_toroid` takes it for.
+    """The bridge at contact, continued from flatter solids, for which `_toroid` is a good approximation.
 
     Raises
     ------
@@ -245,7 +245,7 @@ def _touching(family: _Family) -> FloatArray:
 
 @dataclass(frozen=True)
 class _Branch:
-    """Stable bridges, from contact to the one at the largest gap: x and dx/ds by the arc s of the family."""
+    """Stable bridges from contact to the largest gap: x and dx/ds against the arc length s of the family."""
 
     arcs: FloatArray
     bridges: FloatArray
@@ -285,7 +285,7 @@ def _branch(family: _Family) -> _Branch:
 def _onward(
     family: _Family, x: FloatArray, tangent: FloatArray, step: float, scale: FloatArray
 ) -> tuple[FloatArray, FloatArray] | None:
-    """The bridge a step along the family, and the family's direction there."""
+    """The bridge one step further along the family, and the tangent of the family there."""
     row = tangent / scale**2
     found = family.solve(x + step * tangent, row, float(row @ x) + step)
     return None if found is None else (found, family.tangent(found, tangent, scale))

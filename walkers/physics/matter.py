@@ -1,4 +1,4 @@
-"""What the laws take of a case: the liquid of the bridges and the film, and the contacts."""
+"""Inputs of the laws: liquid of the bridges and films, and contacts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DEFAULT_LAW = "young-laplace"
 
 @dataclass(frozen=True, kw_only=True)
 class Liquid:
-    """``[liquid]``: a name from the library, or its numbers, or both (the numbers win).
+    """``[liquid]``: a name from the library, numbers, or both (numbers take precedence).
 
     ``mass_fraction`` (of the glycerol) and ``temperature`` (20 °C if left out) are of the liquid ``water-glycerol``.
     ``volume_fraction`` is the liquid on a bead over the bead's volume, ``viscosity_ratio`` the viscosity of the bridges

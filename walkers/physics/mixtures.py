@@ -66,7 +66,7 @@ def _viscosity(share: float, celsius: float) -> float:
 
 
 def _density(share: float, celsius: float) -> float:
-    """Volumes add up, but for the contraction of Volk and Kähler, kg/m³."""
+    """Density with the volume contraction of Volk and Kähler, kg/m³."""
     glycerol, water = 1273.3 - 0.6121 * celsius, 1000.0 * (1.0 - abs((celsius - 3.98) / 615.0) ** 1.71)
     contraction = 1.78e-6 * celsius**2 - 1.82e-4 * celsius + 1.41e-2
     added = 1.0 / (share / glycerol + (1.0 - share) / water)

@@ -1,4 +1,4 @@
-"""Resistances of a bridge by the Reynolds equation in its wetted disc, the liquid's edge at ambient pressure.
+"""Resistances of a bridge from the Reynolds equation in the wetted disc, with ambient pressure at its edge.
 
 Between surfaces 1 and 2 (spheres of radii R1 ≤ R2, or a sphere and a plane; `walkers.physics.bridge` has the signs and
 the velocities w, s, q) the gap is H = h + r²/2R*. With κ = (1/R1 - 1/R2)/2, the curvature of the disc's mid-surface,
@@ -58,7 +58,7 @@ _THIN = 1e-5
 
 
 def curve(surfaces: Surfaces, pull: Callable[[FloatArray], FloatArray], rupture: float) -> Curve:
-    """A law of a pull and these resistances, for a bridge that forms on contact.
+    """The curve of a law with a given pull and Reynolds resistances, for a bridge that forms on contact.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def resistances(surfaces: Surfaces, gaps: FloatArray) -> tuple[FloatArray, Float
 
 
 def wetted_gap(surfaces: Surfaces, gaps: FloatArray) -> FloatArray:
-    """H_w, distance of the surfaces at the liquid's edge, m (Pitois et al. 2000, theirs for equal spheres)."""
+    """H_w, gap at the edge of the liquid, m (Pitois et al. 2000, for equal spheres)."""
     return np.sqrt(gaps**2 + surfaces.volume / (pi * surfaces.reduced_radius))
 
 

@@ -1,7 +1,7 @@
 """The time step: its limits, the step that ``"auto"`` takes, and its fit into the drive's cycle.
 
-Three limits hold at once. The first two are those of any granular simulation; the third is met by wet ones only, and
-passing it gives wrong speeds without a word (a glycerol climber: 10.9 mm/s at 1.2 of it, 1.8 converged).
+The time step has three limits. The first two apply to all granular simulations, the third only to wet ones. Above the
+third, velocities are wrong without any warning (a glycerol climber: 10.9 mm/s at 1.2 of the limit, 1.8 converged).
 
     Rayleigh    π R √(ρ/G)/(0.1631 ν + 0.8766) of the smallest bead
     Hertz       2.87 (m*²/(R* E*² v))^(1/5) for an impact at the substrate's peak velocity v
@@ -24,10 +24,10 @@ AUTO_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.2, "hertz": 0.1, "viscous":
 """Share of each limit that ``"auto"`` stays under where beads are loose: at 0.4 of the viscous limit (2 µs for
 glycerol) the climber and the pile were converged."""
 WALKER_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.4, "hertz": 0.2, "viscous": 0.4}
-"""The same where there are walkers alone, which do not heat each other: at 0.4 of Rayleigh their speeds are within
-0.25 % of those at 0.05 (Figs. 1b, 2, 3, 4a, 4b); between 0.59 and 0.71 of it they go wrong."""
+"""The same for cases with only walkers, which do not collide with each other: at 0.4 of the Rayleigh limit, velocities
+are within 0.25 % of those at 0.05 (Figs. 1b, 2, 3, 4a, 4b); between 0.59 and 0.71 of the limit they become wrong."""
 LONGEST_WALKER_STEP = 4e-6
-"""s; longest step of walkers, however soft they are."""
+"""s; longest step of walkers, independent of their stiffness."""
 Bridged = Sequence[tuple[float, Sequence[float]]]
 """Radius of each bead and the radii of those that bridges join to it, beside a wall, m."""
 
@@ -91,12 +91,12 @@ def _mass(radius: float, density: float) -> float:
 
 
 def _drag(reduced_radius: float, liquid: Liquid, contact: Contact) -> float:
-    """The largest of a bridge's normal drags by lubrication, N s/m."""
+    """Largest normal lubrication resistance of a bridge, N s/m."""
     return 6.0 * pi * liquid.dynamic_viscosity * reduced_radius / contact.minimum_separation_ratio
 
 
 def fit_into_cycle(largest_time_step: float, frequency: float, samples_per_cycle: int) -> tuple[float, int]:
-    """Largest step (s) not above the given one of which a cycle and each sampling interval hold a whole number.
+    """Largest step (s) up to the given one that divides the cycle and each sampling interval into whole steps.
 
     A cycle of 6250 steps sampled every 312 drifts through the phase and puts 3 % on a mean velocity. Returns the step
     and how many are a cycle, of a drive of this frequency (Hz).

@@ -1,4 +1,4 @@
-"""Physical quantities: a string with its unit in, a number in SI units out.
+"""Physical quantities: strings with units are read as numbers in SI units.
 
 Units are pint's. Two of its readings are wrong for this field and are caught here: its ``g`` is the gram, while the
 literature on shaken grains writes accelerations in g (the paper: 1 g = 9.8 m/s²); and it takes radians for pure
@@ -42,14 +42,14 @@ _USUAL: Mapping[str, tuple[str, float]] = {
     **{"kB": ("byte", 1e3), "MB": ("byte", 1e6), "GB": ("byte", 1e9)},
     **{"Pa": ("Pa", 1.0), "kPa": ("Pa", 1e3), "MPa": ("Pa", 1e6), "GPa": ("Pa", 1e9)},
 }
-"""What the usual units are in SI units, as pint has them too: a case that has no others need not wait for pint."""
+"""Usual units in SI units, as in pint; cases with only these units do not import pint."""
 _ZEROS: Mapping[str, float] = {"K": 0.0, "degC": 273.15, "°C": 273.15}
-"""Units of temperature and their zeros, K."""
+"""Zero points of temperature units, K."""
 
 
 @dataclass(frozen=True)
 class Kind:
-    """What a quantity is: its name, its SI unit, an example for messages, and physical bounds of its magnitude.
+    """Kind of a quantity: name, SI unit, example for messages, and physical bounds of its magnitude.
 
     The bounds are generous; they keep slips of the exponent out of formulas that would overflow. ``sign`` says what is
     accepted in files: ``more than zero``, ``zero or more``, or anything. As an annotation of a float it makes pydantic
@@ -106,7 +106,7 @@ def parse_quantity(text: str, kind: Kind) -> float:
 
 
 def _has_zero(symbol: str, kind: Kind) -> bool:
-    """Whether it is a unit of temperature, which has a zero of its own."""
+    """Whether the unit is a temperature with an offset."""
     return kind.unit == TEMPERATURE.unit and symbol in _ZEROS
 
 
@@ -126,7 +126,7 @@ def _registry() -> UnitRegistry[float]:
 
 @lru_cache(maxsize=1024)  # a sweep reads thousands of quantities in the same few units
 def _by_pint(symbol: str, kind: Kind) -> float:
-    """How many of the kind's SI unit a unit is that is not among the usual ones."""
+    """Conversion factor of an unusual unit to the SI unit of the kind."""
     if kind.unit == TEMPERATURE.unit:
         raise ValueError(kind.expectation)
     units = _registry()
@@ -142,12 +142,12 @@ def _by_pint(symbol: str, kind: Kind) -> float:
     if kind.unit == FILE_SIZE.unit and root != "bit":
         raise ValueError(kind.expectation)
     if kind.unit == FREQUENCY.unit and "radian" in root:
-        raise ValueError(kind.expectation + " (cycles a second, not an angular frequency)")
+        raise ValueError(kind.expectation + " (cycles per second, not an angular frequency)")
     return factor
 
 
 def split_quantity(text: str) -> tuple[float, str]:
-    """The number and the unit of a quantity, whatever the unit is; raises `ValueError` if it is none."""
+    """Number and unit of a quantity; raises `ValueError` if the text is not a quantity."""
     match = _NUMBER_AND_UNIT.fullmatch(text.strip())
     if match is None:
         raise ValueError(f"no quantity: {text!r}")
@@ -155,7 +155,7 @@ def split_quantity(text: str) -> tuple[float, str]:
 
 
 def quantity_text(value: float, kind: Kind) -> str:
-    """A number of SI units in the unit of the kind's example, as a case could say it."""
+    """A number in SI units as text in the unit of the kind's example."""
     unit = _NUMBER_AND_UNIT.fullmatch(kind.example)["unit"]  # type: ignore[index]
     return f"{(value - _ZEROS.get(unit, 0.0)) / _USUAL.get(unit, ('', 1.0))[1]:.6g} {unit}"
 
@@ -170,7 +170,7 @@ def kind_in(annotations: Iterable[Any]) -> Kind | None:
 
 POSITIVE, NOT_NEGATIVE = "more than zero", "zero or more"
 WRITTEN = "written"
-"""Context of the validation of what a user wrote, where a quantity without its unit is refused."""
+"""Context for the validation of user input, which refuses quantities without units."""
 
 LENGTH = Kind("length", "m", "0.3 mm", 1.0, 1e-9, POSITIVE)
 FREQUENCY = Kind("frequency", "Hz", "80 Hz", 1e6, 1e-2, POSITIVE)
@@ -185,7 +185,7 @@ KINEMATIC_VISCOSITY = Kind("kinematic viscosity", "m^2/s", "5 mm^2/s", 10.0, sig
 DYNAMIC_VISCOSITY = Kind("dynamic viscosity", "Pa*s", "4.6 mPa*s", 1e4, sign=NOT_NEGATIVE)
 MODULUS = Kind("modulus", "Pa", "50 MPa", 1e13, 1e3, POSITIVE)
 TEMPERATURE = Kind("temperature", "K", "20 degC", 373.15, 273.15)
-FILE_SIZE = Kind("size of a file", "byte", "64 MB", 1e15, 1.0, POSITIVE)
+FILE_SIZE = Kind("file size", "byte", "64 MB", 1e15, 1.0, POSITIVE)
 
 Length = Annotated[float, LENGTH]
 Radius = Annotated[float, replace(LENGTH, largest=0.02, smallest=1e-6)]
@@ -216,7 +216,7 @@ AUTO = BeforeValidator(lambda value: None if _is_auto(value) else value)
 AUTO_FAR = WrapValidator(lambda value, read: inf if _is_auto(value) else read(value))
 """… and as infinity."""
 ABSENT: Sequence[Any] = (None, "", [], (), inf, pi, nan)
-"""Defaults that stand for what is not there."""
+"""Defaults that represent missing values."""
 Whole = Annotated[int, Field(strict=True)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 """TOML's integers and floats only: neither "0.3" nor true is a coefficient."""

@@ -1,4 +1,4 @@
-"""What runs mean: tables, velocities, pictures, files for ParaView. Reads run directories, never starts the engine."""
+"""Analysis of runs: tables, velocities, pictures, ParaView files. Reads run directories, never starts the engine."""
 
 from __future__ import annotations
 

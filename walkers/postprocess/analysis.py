@@ -1,4 +1,4 @@
-"""What is measured of a run, and by what: analyses, each of which says for which cases it means something.
+"""Analyses of runs. Each analysis states the cases to which it applies.
 
 A class in a module of `walkers.postprocess.analyses` is one more. What runs have of tables, results, text, reports and
 figures, and sweeps of columns, follows from what it declares.
@@ -26,7 +26,7 @@ from walkers.runner.directory import SEGMENT_NAME, case_of, files_of_segments, s
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import MANIFEST_NAME, FileChanged, check_unchanged, forget_tables, record_tables
 
-if TYPE_CHECKING:  # how far a sweep is can be told without numpy
+if TYPE_CHECKING:  # the progress of a sweep needs no numpy
     from matplotlib.figure import Figure
 
     from walkers.postprocess.figures import Panel
@@ -35,12 +35,12 @@ if TYPE_CHECKING:  # how far a sweep is can be told without numpy
 
 RESULT_NAME = "result.json"
 Described = Mapping[str, tuple[str, str]]
-"""From the names of columns to their units and meanings."""
+"""Units and meanings of columns, by name."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number of a result, declared once: rows of reports and columns of sweeps' tables follow.
+    """A number of a result. Rows of reports and columns of tables of sweeps follow from it.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Quantity:
     of: Callable[[Mapping[str, Any]], Any] | None = None
 
     def value(self, result: Mapping[str, Any]) -> Any:
-        """What a sweep's table has of it; NaN where the result says that there is none."""
+        """Value in the table of a sweep; NaN if the result has none."""
         if self.of is not None:
             return self.of(result)
         value: Any = result
@@ -74,7 +74,7 @@ class Quantity:
         return nan if value is None else value
 
     def row(self, result: Mapping[str, Any]) -> Row:
-        """What a report has of it."""
+        """Row of a report."""
         keys = [self.path, self.error]
         if number_of(result, f"{self.path}.n") is not None:
             keys = [f"{self.path}.{what}" for what in ("mean", "scatter", "smallest", "largest")]
@@ -83,7 +83,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Number:
-    """A number at a place in a result, such as ``velocity.mean``, SI; the unit in which it is shown, and its factor."""
+    """A number of a result by its dotted key, such as ``velocity.mean``, SI; displayed unit and its factor."""
 
     key: str
     value: float
@@ -92,13 +92,13 @@ class Number:
 
     @property
     def text(self) -> str:
-        """The number in its unit, without it."""
+        """The number in the displayed unit, without the unit."""
         return rounded(self.value * self.factor, self.unit)
 
 
 @dataclass(frozen=True)
 class Row:
-    """What it is called, its number, and of several copies their scatter, the smallest and the largest.
+    """Label and number; for several copies also scatter, smallest and largest.
 
     The scatter is a standard deviation, or the standard error of a single number that has one (`Quantity`).
     """
@@ -111,7 +111,7 @@ class Row:
 
     @property
     def unit(self) -> str:
-        """In which all of them are shown."""
+        """Displayed unit of all numbers."""
         return next((one.unit for one in (self.value, self.smallest) if one is not None), "")
 
     @property
@@ -121,7 +121,7 @@ class Row:
 
 
 def number_of(result: Mapping[str, Any], key: str, unit: str = "") -> Number | None:
-    """The number at a place in a result; None where it has none."""
+    """The number at a dotted key of a result; None if it is missing."""
     value: Any = result
     for part in key.split("."):
         value = value[int(part)] if isinstance(value, list) else value.get(part) if isinstance(value, dict) else None
@@ -133,7 +133,7 @@ def number_of(result: Mapping[str, Any], key: str, unit: str = "") -> Number | N
 
 
 class Measured:
-    """A run whose figures are drawn: its motion and its tables (`tables_of`) are read when they are asked for, once."""
+    """A run for figures; motion and tables (`tables_of`) are read once, on first use."""
 
     def __init__(self, directory: Path) -> None:
         self.directory, self.case = directory, case_of(directory)
@@ -152,7 +152,7 @@ class Measured:
 
 
 class Analysis(ABC):
-    """Something that is measured of runs.
+    """An analysis of runs.
 
     Attributes
     ----------
@@ -175,7 +175,7 @@ class Analysis(ABC):
 
     @abstractmethod
     def applies(self, case: Case) -> bool:
-        """Whether it means something for a case."""
+        """Whether the analysis applies to a case."""
 
     @abstractmethod
     def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
@@ -189,33 +189,35 @@ class Analysis(ABC):
 
     @abstractmethod
     def quantities(self, result: Mapping[str, Any]) -> Iterable[Quantity]:
-        """What it finds, in the order of reports; of an empty result, with all that have a column."""
+        """Quantities in the order of reports; for an empty result, all quantities with a column."""
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
-        """What it found, as text: here the numbers that reports have, in mm, mm/s, degrees."""
+        """The result as text; by default the numbers of reports in mm, mm/s, degrees."""
         rows = (one.row(result) for one in self.quantities(result) if one.label)
-        told = [f"{one.name} {one.text}" for one in rows if one.value is not None]
-        return [f"  {self.name:10} {'; '.join(told) or '-'}"]
+        parts = [f"{one.name} {one.text}" for one in rows if one.value is not None]
+        return [f"  {self.name:10} {'; '.join(parts) or '-'}"]
 
     def uncertainty(self, result: Mapping[str, Any]) -> list[str]:
-        """What its main numbers are uncertain by, in sentences: here the band of a spread, or what is not known."""
+        """Uncertainty of the main numbers in sentences; default: the band of a spread, or the uncertain parameters."""
         if not self.headlines:
             return []
         units = {name: self.columns[name][0] for name in self.headlines}
-        return [told] if (told := bands_text(result, units, self.row(result))) else not_known(result["rests_on"])
+        return (
+            [sentence] if (sentence := bands_text(result, units, self.row(result))) else not_known(result["rests_on"])
+        )
 
     @property
     def columns(self) -> Described:
-        """Columns of a sweep's table that a point's run gives."""
+        """Columns of the table of a sweep that come from the result of a run."""
         units = {"share": ""}
         return {one.column: (units.get(one.unit, one.unit), one.meaning) for one in self.quantities({}) if one.column}
 
     def row(self, result: Mapping[str, Any]) -> dict[str, Any]:
-        """The columns `columns` of a result; NaN for what it has not."""
+        """Values of `columns` of a result; NaN for missing ones."""
         return {one.column: one.value(result) for one in self.quantities({}) if one.column}
 
     def can_show(self, result: Mapping[str, Any]) -> bool:
-        """Whether a result has all that it gives."""
+        """Whether a result contains all quantities of the analysis."""
         try:
             self.row(result)
             self.lines(result)
@@ -229,22 +231,22 @@ class Analysis(ABC):
         return {}
 
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
-        """What a reader of the result should know."""
+        """Warnings about the result."""
         del result
         return []
 
     def point_data(self, motion: Motion) -> Callable[[Bridges], Columns]:
-        """What gives, for a frame, further arrays of its beads for ParaView."""
+        """A function that returns further arrays of the beads in a frame for ParaView; None if there are none."""
         del motion
         return lambda _: {}
 
     def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
-        """What is plotted of a run, by the names of its figures' files; reports have all panels."""
+        """Panels by the names of figure files; reports contain all panels."""
         del run
         return {}
 
     def draw(self, name: str, panels: Sequence[Panel], run: Measured) -> Figure:
-        """A figure of its panels: here one below the other."""
+        """A figure of panels; by default one below the other."""
         from walkers.postprocess.figures import stacked
 
         del name
@@ -253,7 +255,7 @@ class Analysis(ABC):
 
 @cache
 def analyses() -> tuple[Analysis, ...]:
-    """All analyses, in the order in which results tell of them."""
+    """All analyses, in the order of results."""
     from walkers.postprocess.analyses import __name__ as package
     from walkers.postprocess.analyses import __path__ as place
 
@@ -263,12 +265,12 @@ def analyses() -> tuple[Analysis, ...]:
 
 
 def analyses_of(case: Case) -> list[Analysis]:
-    """Those that mean something for a case."""
+    """Analyses that apply to a case."""
     return [one for one in analyses() if one.applies(case)]
 
 
 def analyses_in(result: Mapping[str, Any]) -> list[Analysis]:
-    """Those that a result is of."""
+    """Analyses that a result contains."""
     return [one for one in analyses() if one.name in result["analyses"]]
 
 
@@ -306,8 +308,8 @@ def _measured(directory: Path) -> tuple[dict[str, Any], dict[str, Columns]]:
         "truncated": motion.truncated,
         "rests_on": rests_on(case.origins),
     }
-    if told := read_json(segment_directories(directory)[-1] / SEGMENT_NAME).get("by_hand"):
-        result["by_hand"] = told
+    if notes := read_json(segment_directories(directory)[-1] / SEGMENT_NAME).get("by_hand"):
+        result["by_hand"] = notes
     tables: dict[str, Columns] = {}
     for one in analyses_of(case):
         found, summary = one.of(motion)
@@ -329,7 +331,7 @@ def _write(directory: Path, result: Mapping[str, Any], tables: Mapping[str, Colu
 
 
 def tables_of(directory: Path) -> dict[str, Columns]:
-    """The tables of a run as they were written; of one that is not finished, as they would be now.
+    """Tables of a run from its files; for an unfinished run, computed from its dumps.
 
     Its errors are those of `current_result`.
     """
@@ -359,10 +361,10 @@ def read_result(directory: str | Path) -> dict[str, Any]:
 
 
 def current_result(directory: str | Path) -> dict[str, Any]:
-    """The result of a finished run; tabulated anew if it or a table is gone or damaged, or of an earlier method.
+    """The result of a finished run; recomputed if files are missing, damaged or of an earlier version of an analysis.
 
     What cannot be written, as where all is read-only, is not. Without dumps a result of an earlier method stays what it
-    is, if it has all that is told of one today.
+    is, if it has all current quantities.
 
     Raises
     ------
@@ -417,7 +419,7 @@ def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool 
 
 
 def warnings_of(result: Mapping[str, Any]) -> list[str]:
-    """What a reader of a result should know."""
+    """Warnings about a result."""
     warnings = [
         *result.get("by_hand", ()),
         *(warning for one in analyses_in(result) for warning in one.warnings(result)),
@@ -426,12 +428,12 @@ def warnings_of(result: Mapping[str, Any]) -> list[str]:
 
 
 def uncertainty_of(result: Mapping[str, Any]) -> list[str]:
-    """What the main numbers of a result are uncertain by, in sentences."""
+    """Uncertainty of the main numbers of a result, in sentences."""
     return [sentence for one in analyses_in(result) for sentence in one.uncertainty(result)]
 
 
 def quantities_of(result: Mapping[str, Any]) -> list[Row]:
-    """The numbers that a result has, as rows of a table."""
+    """The numbers of a result as rows of a table."""
     rows = (one.row(result) for found in analyses_in(result) for one in found.quantities(result) if one.label)
     return [row for row in rows if row.value is not None]
 

@@ -1,4 +1,4 @@
-"""Clusters that are free of the pile, followed through time, what became of them, and what counts as a climb.
+"""Clusters that are free of the pile: tracks through time, events, and climbs.
 
 A *cluster* is a connected component of the beads' bridges (touching or open) of at least two beads that is *free*
 of the pile's bulk: the component of most beads, and all that is bridged to the floor. It is *held* if a bridge joins
@@ -31,29 +31,29 @@ Cluster = tuple[frozenset[int], frozenset[int]]
 """The beads of a cluster in a frame and the side walls that hold it."""
 
 Joined = tuple[IntArray, BoolArray]
-"""Of a frame the pairs of beads that bridges join, shape (K, 2), and which beads they join to a side wall, (N,)."""
+"""Bridges of a frame: pairs of joined beads, shape (K, 2), and beads joined to a side wall, shape (N,)."""
 
 _FEWEST_BEADS = 2
 _FEWEST_FRAMES = 3
 _MOST_BLOCKS, _FEWEST_BLOCKS = 10, 4
-"""Parts of a climb from whose speeds the error of its speed is taken."""
+"""Number of parts of a climb for the standard error of its speed."""
 
 
 @dataclass(frozen=True)
 class ClimbCriteria:
-    """Thresholds of what a climb is."""
+    """Definition of a climb by thresholds."""
 
     min_rise: float = 2e-3
-    """Height, m, that a cluster must gain: about two diameters of the paper's large beads."""
+    """Smallest rise of a climb, m: about two diameters of the paper's large beads."""
     max_gap: float = 0.1
-    """Seconds for which a cluster may touch the pile or lose the wall and still be the same."""
+    """Longest time, s, for which a cluster may touch the pile or lose the wall within a track."""
     min_overlap: float = 0.5
-    """Share of the smaller one's beads that two clusters must have in common to be one."""
+    """Smallest share of common beads (of the smaller cluster) of two clusters of one track."""
 
 
 @dataclass
 class Track:
-    """A cluster through time: the frames in which it was free and held, its beads and the side walls in each of them.
+    """A cluster through time: frames in which it is free and held, with its beads and side walls.
 
     And the number of the track that took over its beads, and the frame in which it did; None if none did.
     """
@@ -66,7 +66,7 @@ class Track:
 
 
 def connected(count: int, pairs: IntArray) -> IntArray:
-    """Number of the connected component of each of so many, shape (count,), given joined pairs, shape (K, 2)."""
+    """Index of the connected component of each item, shape (count,), from joined pairs, shape (K, 2)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -76,7 +76,7 @@ def connected(count: int, pairs: IntArray) -> IntArray:
 
 
 def bulk_of(labels: IntArray, bridges: Bridges, *, heap: bool = True) -> BoolArray:
-    """Which beads belong to the component of most beads or to one that is bridged to the floor, shape (N,).
+    """Beads of the bulk, shape (N,): the largest component and all components bridged to the floor.
 
     Without a ``heap``, where beads were placed one by one, the component of most beads may be a cluster on a wall: then
     the floor alone decides.
@@ -98,7 +98,7 @@ def held_clusters(labels: IntArray, bridges: Bridges, bulk: BoolArray) -> Iterat
 
 
 def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]], definition: ClimbCriteria) -> list[Track]:
-    """Follow the clusters of each frame (`held_clusters`; time in s, shape (F,)); tracks by their births."""
+    """Track the clusters of all frames (`held_clusters`; time in s, shape (F,)), in the order of their first frames."""
     tracks: list[Track] = []
     alive: list[int] = []
     for frame, found in enumerate(clusters):
@@ -137,7 +137,7 @@ def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]], definition: 
 
 @dataclass(frozen=True)
 class Beads:
-    """What is known of a pile's beads: times (s, shape (F,)), heights (m, shape (F, N)) and which are large.
+    """Beads of a pile: times (s, shape (F,)), heights (m, shape (F, N)), and which beads are large.
 
     And of each frame the height of the bulk's surface, and which beads are of the bulk; the first frame of the drive;
     names of walls, by their numbers. Heights are needed of the members of clusters alone.
@@ -154,41 +154,46 @@ class Beads:
 
 @dataclass(frozen=True)
 class Climb:
-    """``clusters.parquet``: one row per cluster of a pile, what it did.
+    """``clusters.parquet``: one row per cluster of a pile.
 
-    Unlike ``begin``, ``onset`` and ``qualified`` do not depend on what comes later, so that a longer record has no
-    other climbs up to a time than a shorter one. The error of the speed is that of a mean over up to ten equal numbers
-    of frames (NaN with less than four). It is too small where the speed changes more slowly than a tenth of the climb
-    takes; that begin and end are those of the greatest gain makes the speed of a short and unsteady climb too large.
+    Unlike ``begin``, ``onset`` and ``qualified`` do not depend on later frames, so a longer record contains the same
+    climbs up to a given time as a shorter one. The standard error of the speed is that of a mean over up to ten equal
+    parts of the rise (NaN with less than four frames). It is too small if the speed changes more slowly than over a
+    tenth of the climb. The speed of a short and unsteady climb is too large, because begin and end are chosen for the
+    largest gain.
     """
 
-    track: Annotated[int, "", "number of the cluster, followed through time"]
-    first: Annotated[float, "s", "when it was first free of the bulk and held by a side wall"]
-    last: Annotated[float, "s", "when it was last free and held"]
-    begin: Annotated[float, "s", "start of its largest rise"]
-    end: Annotated[float, "s", "end of its largest rise"]
+    track: Annotated[int, "", "index of the cluster, followed through time"]
+    first: Annotated[float, "s", "first time at which the cluster is free of the bulk and held by a side wall"]
+    last: Annotated[float, "s", "last time at which the cluster is free of the bulk and held by a side wall"]
+    begin: Annotated[float, "s", "start of the largest rise"]
+    end: Annotated[float, "s", "end of the largest rise"]
     out_of_pile: Annotated[
-        bool, "", "whether most of its first beads were in the bulk for 0.1 s or longer after the drive began"
+        bool,
+        "",
+        "whether most of the cluster's first beads were in the bulk for 0.1 s or longer after the start of the drive",
     ]
-    onset: Annotated[float, "s", "start of the rise that first counts as a climb; NaN if none does"]
-    qualified: Annotated[float, "s", "when that rise reaches the height that counts as a climb; NaN if none does"]
-    gain: Annotated[float, "m", "height of its largest rise, from the mean height of its beads"]
+    onset: Annotated[float, "s", "start of the first rise that counts as a climb; NaN if there is none"]
+    qualified: Annotated[
+        float, "s", "time at which this rise reaches the minimum rise of a climb; NaN if there is none"
+    ]
+    gain: Annotated[float, "m", "largest rise: increase of the mean height of the cluster's beads"]
     speed: Annotated[float, "m/s", "gain over the duration of the rise"]
     standard_error: Annotated[float, "m/s", "standard error of the speed, from ten parts of the rise"]
-    climbed: Annotated[bool, "", "whether it ever counts as a climb"]
-    leader: Annotated[int, "", "number of the bead that is most often topmost during the rise, from 0"]
+    climbed: Annotated[bool, "", "whether a rise of the cluster counts as a climb"]
+    leader: Annotated[int, "", "index of the bead that is most often topmost during the rise, from 0"]
     leader_large: Annotated[bool, "", "whether the leader is large"]
     height: Annotated[float, "m", "height of the leader at the end of the rise"]
-    above_surface: Annotated[float, "m", "the same above the surface of the bulk"]
+    above_surface: Annotated[float, "m", "height of the leader above the surface of the bulk at the end of the rise"]
     size: Annotated[int, "", "number of beads at the end of the rise"]
     large: Annotated[int, "", "number of large beads at the end of the rise"]
-    walls: Annotated[int, "", "number of side walls that hold it at the end of the rise: two in a corner"]
-    wall_names: Annotated[str, "", "these walls: -x, +x, -y, +y; side for a cylinder"]
-    merged_into: Annotated[int, "", "number of the cluster that it merged into, -1 for none"]
+    walls: Annotated[int, "", "number of side walls that hold the cluster at the end of the rise: two in a corner"]
+    wall_names: Annotated[str, "", "names of these walls: -x, +x, -y, +y; side for a cylinder"]
+    merged_into: Annotated[int, "", "index of the cluster into which this cluster merged, -1 for none"]
 
 
 def classify(number: int, track: Track, beads: Beads, definition: ClimbCriteria) -> Climb:
-    """What a track of `follow` did, and whether it is a climb."""
+    """The largest rise of a track of `follow`, and whether the track is a climb."""
     time, height = beads.time, beads.height
     gained, seconds = _gained(track, time, height)
     risen = gained - np.minimum.accumulate(gained)
@@ -230,7 +235,7 @@ def classify(number: int, track: Track, beads: Beads, definition: ClimbCriteria)
 
 
 def _qualified(gained: FloatArray, min_rise: float) -> tuple[int, int] | None:
-    """Where what makes a track a climb begins, and the first place up to which it is one; None if it never is.
+    """Begin of the rise that makes a track a climb, and the frame at which it qualifies; None if there is none.
 
     There it is farther above its lowest than ever before, by enough, and that took frames enough: a hop between two
     frames is none.
@@ -244,7 +249,7 @@ def _qualified(gained: FloatArray, min_rise: float) -> tuple[int, int] | None:
 
 
 def _gained(track: Track, time: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Height gained since a track's first frame (m) and the seconds in which it was, shape (frames of the track,).
+    """Rise since the first frame of a track (m) and its duration (s), shape (frames of the track,).
 
     What is gained while it is no cluster does not count, nor does the time; what is lost then does.
     """
@@ -259,7 +264,7 @@ def _gained(track: Track, time: FloatArray, height: FloatArray) -> tuple[FloatAr
 
 
 def _speed(seconds: FloatArray, gained: FloatArray) -> tuple[float, float]:
-    """Gain over time, and its standard error from those of equal numbers of frames; NaN where there are too few."""
+    """Gain over time, and its standard error from equal parts; NaN with too few frames."""
     whole = seconds[-1] - seconds[0]
     if len(gained) < _FEWEST_FRAMES or whole == 0.0:
         return np.nan, np.nan
@@ -276,26 +281,28 @@ def _speed(seconds: FloatArray, gained: FloatArray) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Assembly:
-    """``assembly.parquet``: the past of each climb's beads, those it had when it qualified, from rest until then.
+    """``assembly.parquet``: history of the beads of each climb, from rest until the climb qualifies.
 
-    One row per climb, bead and frame.
+    One row per climb, bead and frame, for the beads of the cluster at that time.
     """
 
-    time: Annotated[float, "s", "time since the start of the drive; the first frame is the last one before the drive"]
-    track: Annotated[int, "", "number of the cluster that climbed"]
-    bead: Annotated[int, "", "number of the bead, from 0"]
+    time: Annotated[float, "s", "time since the start of the drive; the first frame is the last frame before the drive"]
+    track: Annotated[int, "", "index of the cluster that climbed"]
+    bead: Annotated[int, "", "index of the bead, from 0"]
     large: Annotated[bool, "", "whether the bead is large"]
     height: Annotated[float, "m", "height of the bead's centre"]
     in_bulk: Annotated[bool, "", "whether the bead belongs to the bulk"]
     at_wall: Annotated[bool, "", "whether the bead has a bridge to a side wall"]
-    neighbours: Annotated[int, "", "number of bridges to other beads of the later climber"]
-    joined: Annotated[bool, "", "whether bridges within the later climber connect the bead to most of the others"]
+    neighbours: Annotated[int, "", "number of bridges to other beads of the later climbing cluster"]
+    joined: Annotated[
+        bool, "", "whether bridges within the later climbing cluster connect the bead to most of the other beads"
+    ]
 
 
 def assembly_of(
     tracks: Sequence[Track], climbs: Sequence[Climb], beads: Beads, bridges: Sequence[Joined]
 ) -> list[Assembly]:
-    """Where the beads of each climb were, frame by frame, given what was joined in each frame of the motion."""
+    """State of the beads of each climb in each frame, from the bridges of each frame."""
     rows = []
     rest = max(beads.first - 1, 0)
     for climb in climbs:
@@ -329,16 +336,17 @@ def assembly_of(
 
 @dataclass(frozen=True)
 class Event:
-    """``events.parquet``: one row per event in the lives of a pile's clusters.
+    """``events.parquet``: one row per event of a pile's clusters.
 
-    Freed is what came free of the pile, or reached a wall, split what parted from another track, merged what went into
-    another one; rejoined is what went back to the pile, detached what let go of the walls or whose beads parted.
+    Events are ``freed`` (the cluster leaves the pile or reaches a wall), ``split`` (it separates from another cluster),
+    ``merged`` (it merges into another cluster), ``rejoined`` (it returns to the pile) and ``detached`` (it loses the
+    walls, or its beads separate).
     """
 
     time: Annotated[float, "s", "time since the start of the drive"]
     event: Annotated[str, "", "freed, split, merged, rejoined or detached"]
-    track: Annotated[int, "", "number of the cluster"]
-    other: Annotated[int, "", "number of the cluster that it split from or merged into, -1 for none"]
+    track: Annotated[int, "", "index of the cluster"]
+    other: Annotated[int, "", "index of the cluster from which it split or into which it merged, -1 for none"]
     height: Annotated[float, "m", "height of the cluster's leader at the event"]
 
 
@@ -372,7 +380,7 @@ def events_of(tracks: Sequence[Track], climbs: Sequence[Climb], beads: Beads, de
 
 
 def _parent(tracks: Sequence[Track], number: int, time: FloatArray, definition: ClimbCriteria) -> int | None:
-    """The track that held most of another one's beads shortly before it began."""
+    """The track that contained most beads of another track shortly before its begin."""
     first, members = tracks[number].frames[0], tracks[number].members[0]
     best, most = None, definition.min_overlap * len(members)
     for other, track in enumerate(tracks):

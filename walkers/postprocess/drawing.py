@@ -1,4 +1,4 @@
-"""What all figures share: style, widths, letters, legends; and how they are written, with what they were made from."""
+"""Common parts of figures: style, widths, letters, legends, and files with metadata."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ if TYPE_CHECKING:
 ONE_COLUMN, TWO_COLUMNS = 3.4, 7.0
 """Widths of figures in one and in two columns of a journal, inches."""
 FORMATS = ("png", "svg", "pdf")
-"""In which figures can be written."""
+"""Formats of figures."""
 _STYLE = Path(__file__).parent / "style.mplstyle"
 _DASHES = ("-", (0, (5, 1.5)), (0, (1, 1.2)))
 _MARKERS = "os^Dv"
 _MAKER = "granular-walkers"
 _LEAST_ERROR = 0.02  # of the range of values, about half of the height of a symbol
 UNSEEN = "error bars are smaller than the symbols"
-"""What is said where error bars are left out."""
+"""Note where error bars are left out."""
 _Given = ParamSpec("_Given")
 _Drawn = TypeVar("_Drawn")
 
 
 def styled(draw: Callable[_Given, _Drawn]) -> Callable[_Given, _Drawn]:
-    """Let a function draw in the project's style; the settings of whoever calls it are put back."""
+    """Decorator: draw in the style of the project and restore the settings of the caller."""
 
     @wraps(draw)
     def drawn(*given: _Given.args, **options: _Given.kwargs) -> _Drawn:
@@ -74,7 +74,7 @@ def letter_panels(panels: Iterable[Axes]) -> None:
 def series_look(number: int) -> dict[str, Any]:
     """Colour, dashes and marker of a series of many, as options of `matplotlib.axes.Axes.plot`.
 
-    The first 120 differ; the first 15 differ in dashes or marker, so that they can be told apart without colours.
+    The first 120 differ; the first 15 differ in dashes or marker, so that they can be distinguished without colours.
     """
     return {
         "color": f"C{number}",
@@ -85,7 +85,7 @@ def series_look(number: int) -> dict[str, Any]:
 
 
 def errors_seen(errors: Any, values: Any) -> bool:
-    """Whether error bars are longer than the symbols of points whose values are drawn from edge to edge."""
+    """Whether error bars exceed the symbols, if the values fill the axes."""
     import numpy as np
 
     known, shown = np.asarray(errors)[np.isfinite(errors)], np.asarray(values)[np.isfinite(values)]
@@ -102,14 +102,14 @@ def legend_below(axes: Axes, **options: Any) -> Legend:
 
 
 def check_formats(formats: Sequence[str]) -> None:
-    """Refuse formats that are none of `FORMATS` by an InputError."""
+    """Raise `InputError` for formats that are not in `FORMATS`."""
     for form in formats:
         if form not in FORMATS:
             raise refused("--format", f"{form!r}: expected one of {', '.join(FORMATS)}")
 
 
 def check_place(path: Path, *suffixes: str) -> None:
-    """Refuse a place for a file that is a folder or has none of these suffixes by an InputError."""
+    """Raise `InputError` if a path is a folder or has none of these suffixes."""
     if path.suffix.lower() not in suffixes or path.is_dir():
         expected = f"expected the name of a {' or '.join(suffixes)} file"
         raise refused("--to", f"{path}: {expected}")

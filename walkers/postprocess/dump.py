@@ -23,15 +23,15 @@ BoolArray = npt.NDArray[np.bool_]
 _HEADER = struct.Struct("=qqi6i6dii")
 _COUNT = struct.Struct("=i")
 _LINES = 9
-"""Of the head of a frame of bridges."""
+"""Lines of the header of a frame of bridges."""
 
 
 class DumpError(WalkersError):
-    """A file that is no binary dump, or one of other columns than expected."""
+    """A file that is not a binary dump, or has unexpected columns."""
 
 
 class NoNumberError(DumpError):
-    """A dump with a NaN or an infinity: the engine goes on with them and says nothing, and a disk can make them."""
+    """A dump with NaN or infinity, from a blow-up that the engine does not report or from a damaged disk."""
 
 
 class _Frame(NamedTuple):
@@ -44,7 +44,7 @@ class _Frame(NamedTuple):
 
 
 class BinaryDump:
-    """The frames of a binary dump with columns of such names.
+    """Frames of a binary dump with named columns.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ class BinaryDump:
         values = np.concatenate(parts).reshape(frame.rows, len(self.columns))
         if not np.isfinite(values).all():
             column = self.columns[int(np.flatnonzero(~np.isfinite(values).all(axis=0))[0])]
-            raise NoNumberError(f"{self.path}: {column} is no number at step {frame.step}")
+            raise NoNumberError(f"{self.path}: {column} is not a number at step {frame.step}")
         return values
 
     def stack(self) -> FloatArray:
@@ -194,7 +194,7 @@ def local_frames(path: Path, columns: tuple[str, ...]) -> Iterator[tuple[int, Fl
             try:
                 values = np.fromstring(b"".join(body), dtype=np.float64, sep=" ")
             except ValueError as error:
-                raise DumpError(f"{path}: no number in the frame of step {step} ({error})") from error
+                raise DumpError(f"{path}: not a number in the frame of step {step} ({error})") from error
             if len(values) != count * len(columns):
                 raise DumpError(f"{path}: expected {len(columns)} columns in the frame of step {step}")
             if not np.isfinite(values).all():

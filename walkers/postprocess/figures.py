@@ -1,6 +1,6 @@
 """Figures of a run: panels with lines, drawn by matplotlib here and by Bokeh in reports.
 
-Where walkers went and turned, and their gait; what a pile did.
+Path, orientation and gait of walkers; climbs of piles.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
 MOST_NAMED = 12  # walkers, or climbs, in a legend
 _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
-"""How events are marked (`walkers.postprocess.clusters.Event`)."""
+"""Markers of events (`walkers.postprocess.clusters.Event`)."""
 _HEIGHT = 1.6  # inches of a panel
 _LETTERS = 90  # of a line of a title
 _LEAST_DISTANCE, _LEAST_ANGLE, _LEAST_SPEED = 0.01, 0.1, 0.01
-"""mm, ° and mm/s that axes show at least: rounding is no motion."""
+"""Smallest ranges of axes in mm, ° and mm/s, so that rounding errors do not look like motion."""
 _SHOWN, _LONG = 8, 4.0  # images of a walker; lengths of a walker from which on they are centred on it
 _GREY, _PALE, _OTHERS = "#5b6770", "#b4bec5", "#c78a2c"
 
@@ -56,7 +56,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Panel:
-    """A plot: title, labels of its axes, lines from the lowest to the uppermost, and what is grey behind them.
+    """A plot: title, labels of its axes, lines from bottom to top, and grey background intervals.
 
     ``band`` are two lines of the same x with grey between them, ``settled`` the x up to which it is grey, ``log`` says
     that y is logarithmic, ``zero`` that it is shown where y is zero, ``least`` the smallest range of y that is shown,
@@ -76,7 +76,7 @@ class Panel:
 
     @property
     def limits(self) -> tuple[float, float] | None:
-        """What y is to go from and to, where what is shown of it would be less than is to be; else None."""
+        """Limits of y if its range is below the smallest range, otherwise None."""
         shown = [np.zeros(int(self.zero)), *(np.asarray(line.y)[np.isfinite(line.y)] for line in self.lines)]
         values = np.concatenate(shown)
         if not len(values) or np.ptp(values) >= self.least:
@@ -86,12 +86,12 @@ class Panel:
 
 
 def nested_widths(count: int, largest: float = 3.0) -> list[float]:
-    """Widths of lines (points), the lowest first, so that of those that coincide each is seen."""
+    """Widths of lines (points), the lowest line first, so that coinciding lines are all visible."""
     return [1.1] if count < 2 else np.linspace(min(1.1 + 2.2 * (count - 1), largest), 1.1, count).tolist()
 
 
-def told_velocity(value: float) -> str:
-    """A velocity (mm/s) with three digits, but no more than three decimals: a smaller one is none."""
+def velocity_text(value: float) -> str:
+    """A velocity (mm/s) as text with three digits and at most three decimals."""
     return "0" if abs(value) < 5e-4 else f"{value:.3g}" if abs(value) >= 0.1 else f"{value:.3f}"
 
 
@@ -109,8 +109,8 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
         way = (group.mass_centre[::strobe] - group.mass_centre[0]) * 1e3
         for place, walker in enumerate(group.walkers):
             number = walker.walker
-            told = f"{number}: {facing[int(walker.facing < 0)]}, {told_velocity(slope[place] * 1e3)} mm/s"
-            look: dict[str, Any] = {"label": told if number < MOST_NAMED else "", "colour": number}
+            text = f"{number}: {facing[int(walker.facing < 0)]}, {velocity_text(slope[place] * 1e3)} mm/s"
+            look: dict[str, Any] = {"label": text if number < MOST_NAMED else "", "colour": number}
             look["width"] = widths[len(walked)]
             walked.append(Line(time, distance[:, place] * 1e3, **look))
             turned.append(Line(time, np.degrees(group.orientation[::strobe, place]), **look))
@@ -140,10 +140,10 @@ def _named(groups: list[Group]) -> str:
 
 
 def velocity_panel(case: Case, walkers: Columns) -> Panel:
-    """The velocity of each walker, of the table of the walkers, with the standard error of its fit."""
+    """Velocity of each walker with the standard error of its fit."""
     velocity, error, lines = 1e3 * walkers["velocity"], 1e3 * walkers["standard_error"], []
-    for way, told in zip((1, -1), ways(uphill=case.goes_uphill), strict=True):
-        label, colour, marker = f"started facing {told}", int(way < 0), "o" if way > 0 else "s"
+    for way, direction in zip((1, -1), ways(uphill=case.goes_uphill), strict=True):
+        label, colour, marker = f"started facing {direction}", int(way < 0), "o" if way > 0 else "s"
         these = walkers["facing"] == way
         if not these.any():
             continue
@@ -168,22 +168,22 @@ def gait_panels(group: Group) -> list[Panel]:
     names = ["walker", *(f"bead {bead + 1}" for bead in range(motion.rotation.shape[-1]))]
     values = 1e3 * np.column_stack([motion.velocity[last, 0], motion.rotation[last, 0]])
     means = 1e3 * np.array([walk(group).velocity[0], *averages(group).rotation[0]])
-    labels = [f"{name} (mean {told_velocity(mean)} mm/s)" for name, mean in zip(names, means, strict=True)]
+    labels = [f"{name} (mean {velocity_text(mean)} mm/s)" for name, mean in zip(names, means, strict=True)]
     widths, colours = nested_widths(len(names), 6.0), [_PALE, *range(1, len(names))]
     lines = [
         Line(phase, values[:, number], labels[number], colours[number], width=widths[number])
         for number in range(len(names))
     ]
     x, title = (
-        "time (cycles of the drive), the last two",
-        f"walker {first.walker}; a bead rolls without sliding where its curve is on the walker's",
+        "time (cycles of the drive, last two)",
+        f"walker {first.walker}; a bead rolls without sliding where its curve coincides with the walker's",
     )
     y = "velocity; beads:\n−R dφ/dt (mm/s)"
     panels = [Panel(title, x, y, lines, zero=True, height=2.5, least=_LEAST_SPEED)]
     shaken = group.motion.substrate_velocity[last] @ np.array(group.case.drive.direction)
     if np.any(shaken):  # faster than its walkers by far: in their panel it would make them all flat
         line = Line(phase, first.facing * shaken * 1e3, colour=_GREY, dashed=True)
-        panels.append(Panel("substrate, positive as for the walker", x, "velocity\n(mm/s)", [line], zero=True))
+        panels.append(Panel("substrate, along the start direction", x, "velocity\n(mm/s)", [line], zero=True))
     return panels
 
 
@@ -192,7 +192,7 @@ def pile_panels(tables: Mapping[str, Columns]) -> list[Panel]:
 
     Of the tables of a pile (`walkers.postprocess.analysis.tables_of`).
     """
-    bed, x = tables["bed"], "time from the begin of the drive (s)"
+    bed, x = tables["bed"], "time since the start of the drive (s)"
     time = bed["time"]
     surface = Line(time, 1e3 * bed["surface"], "surface, median", _GREY)
     low, high = (
@@ -204,24 +204,24 @@ def pile_panels(tables: Mapping[str, Columns]) -> list[Panel]:
     joined = {"bridges": "bridges", "contacts": "contacts"}
     for title, y, columns in (
         ("Segregation: (z of large − z of small) / their sum", "Brazil-nut\nindex", segregation),
-        ("Bridges and contacts with other beads", "how many a bead,\nto other beads", joined),
-        ("Agitation, once a cycle", "mean square\nvelocity, strobed\n(m²/s²)", {"mean_square_velocity": ""}),
+        ("Bridges and contacts with other beads", "number\nper bead", joined),
+        ("Mean square velocity, once per cycle", "mean square\nvelocity\n(m²/s²)", {"mean_square_velocity": ""}),
     ):
         named = enumerate(columns.items())
-        lines = [Line(time, bed[name], told, 2 * number, dashed=number > 0) for number, (name, told) in named]
+        lines = [Line(time, bed[name], label, 2 * number, dashed=number > 0) for number, (name, label) in named]
         panels.append(Panel(title, x, y, lines, log=len(lines) == 1, zero=columns is joined))
     return panels
 
 
 def _leaders(tables: Mapping[str, Columns]) -> Iterator[Line]:
-    """The height of each cluster's leader, thick where it climbed."""
+    """Height of the leader of each cluster; thick lines for climbs."""
     clusters, members = tables["clusters"], tables["members"]
     named = np.cumsum(clusters["climbed"])
     for track, (climbed, leader) in enumerate(zip(clusters["climbed"], clusters["leader"], strict=True)):
         own = (members["track"] == track) & (members["bead"] == leader)
         leads, speed = "large" if clusters["leader_large"][track] else "small", clusters["speed"][track] * 1e3
-        told = f"{clusters['size'][track]} beads climb, led by a\n{leads} one: {speed:.1f} mm/s"
-        label = told if climbed and named[track] <= MOST_NAMED else ""
+        text = f"{clusters['size'][track]} beads climb, led by a\n{leads} one: {speed:.1f} mm/s"
+        label = text if climbed and named[track] <= MOST_NAMED else ""
         colour, width = (2, 1.6) if climbed else (_OTHERS, 0.6)
         yield Line(members["time"][own], members["height"][own] * 1e3, label, colour, width=width)
     if len(named) and named[-1] > MOST_NAMED:
@@ -230,7 +230,7 @@ def _leaders(tables: Mapping[str, Columns]) -> Iterator[Line]:
 
 
 def assembly_panels(tables: Mapping[str, Columns]) -> list[Panel]:
-    """The past of the beads of the first climb out of a pile, from rest until it counted as a climb.
+    """History of the beads of the first climb out of a pile, from rest until it qualifies.
 
     Heights, thick from where bridges join a bead to the others; how many are joined, and how many are at a wall. Of the
     tables of a pile; none where nothing climbed out of it.
@@ -241,30 +241,30 @@ def assembly_panels(tables: Mapping[str, Columns]) -> list[Panel]:
         return []
     track = min(first, key=lambda number: float(clusters["qualified"][number]))
     own = {name: column[past["track"] == clusters["track"][track]] for name, column in past.items()}
-    x, heights = "time from the begin of the drive (s)", []
+    x, heights = "time since the start of the drive (s)", []
     for number, bead in enumerate(np.unique(own["bead"])):
         time, height, joined = (own[name][own["bead"] == bead] for name in ("time", "height", "joined"))
         leads = ", leads" if bead == clusters["leader"][track] else ""
-        told = f"{'large' if own['large'][own['bead'] == bead][0] else 'small'} bead {bead}{leads}"
+        text = f"{'large' if own['large'][own['bead'] == bead][0] else 'small'} bead {bead}{leads}"
         heights.append(Line(time, 1e3 * height, "", number, width=0.6))
-        heights.append(Line(time, 1e3 * np.where(joined, height, np.nan), told, number, width=2.0))
+        heights.append(Line(time, 1e3 * np.where(joined, height, np.nan), text, number, width=2.0))
     times, at = np.unique(own["time"], return_inverse=True)
     counts = {"joined to most of them": "joined", "in the pile's bulk": "in_bulk", "at a side wall": "at_wall"}
     numbers = [
-        Line(times, np.bincount(at, own[name]).astype(float), told, 2 * number, dashed=number > 0)
-        for number, (told, name) in enumerate(counts.items())
+        Line(times, np.bincount(at, own[name]).astype(float), text, 2 * number, dashed=number > 0)
+        for number, (text, name) in enumerate(counts.items())
     ]
     bed = tables["bed"]
     seen = (bed["time"] >= times[0]) & (bed["time"] <= times[-1])
     heights.insert(0, Line(bed["time"][seen], 1e3 * bed["surface"][seen], "surface of the pile", _GREY))
     return [
-        Panel("The beads of the first climb, thick where they are joined", x, "height (mm)", heights, height=2.0),
-        Panel("How many of them are", x, "beads", numbers, zero=True),
+        Panel("Beads of the first climb; thick: joined to most of the others", x, "height (mm)", heights, height=2.0),
+        Panel("Number of these beads that are", x, "beads", numbers, zero=True),
     ]
 
 
 def _events(events: Columns) -> Iterator[Line]:
-    """A mark where something happened to a cluster, at the height of its leader."""
+    """Markers of events of clusters at the height of the leader."""
     for kind, marker in _MARKS.items():
         these = events["event"] == kind
         if these.any():
@@ -287,8 +287,8 @@ def walk_figure(groups: list[Group], walked: Panel, turned: Panel) -> Figure:
     axes["walked"].set_title("grey: settling")
     letter_panels(axes.values())
     handles = axes["walked"].get_legend_handles_labels()
-    told = f"walker: facing at the start, velocity{_named(groups)}"
-    figure.legend(*handles, loc="outside lower center", ncols=4, title=told)
+    text = f"walker: facing at the start, velocity{_named(groups)}"
+    figure.legend(*handles, loc="outside lower center", ncols=4, title=text)
     return figure
 
 
@@ -311,7 +311,7 @@ def stacked(panels: Sequence[Panel], case: Case) -> Figure:
 
 
 def draw_panel(axes: Axes, panel: Panel) -> None:
-    """A panel without its title and what is below it."""
+    """A panel without its title and the legend below."""
     for line in panel.lines:
         colour = f"C{line.colour}" if isinstance(line.colour, int) else line.colour
         look: dict[str, Any] = {"marker": line.marker, "mfc": "none"} if line.marker else {}
@@ -364,20 +364,20 @@ def _draw_strobe(axes: Axes, group: Group) -> None:
         place = (along[row, bead], across[row, bead])
         look: dict[str, Any] = {"fc": "0.45" if bead == 0 else "0.75", "ec": "0.2", "lw": 0.6}
         axes.add_patch(Circle((-place[1], place[0]) if uphill else place, float(radii[bead]), **look))
-    told = even_labels(group.time[shown])
+    labels = even_labels(group.time[shown])
     if long:
-        told = [f"{time}\n{one:.1f} mm" for time, one in zip(told, way, strict=True)]
+        labels = [f"{time}\n{one:.1f} mm" for time, one in zip(labels, way, strict=True)]
     edges = float((along - radii).min() - radii.max()), float((along + radii).max() + radii.max())
     ends = -pitch * (len(shown) - 0.4), 0.6 * pitch
-    title, name = f"walker {group.walkers[0].walker}", "from its middle (mm)" if long else "along the drive axis (mm)"
+    title, name = f"walker {group.walkers[0].walker}", "from the midpoint (mm)" if long else "along the drive axis (mm)"
     if uphill:
         axes.set(xlim=(-ends[1], -ends[0]), ylim=edges, ylabel=name if long else "uphill (mm)")
-        axes.set_xticks(pitch * np.arange(len(shown)), told, rotation=90)
+        axes.set_xticks(pitch * np.arange(len(shown)), labels, rotation=90)
         arrow: dict[str, Any] = {"arrowprops": {"arrowstyle": "-|>", "color": "black"}, "fontsize": 7, "ha": "center"}
         axes.annotate(group.case.boundary.pull, (1.1, 0.2), (1.1, 0.7), "axes fraction", **arrow)
     else:
         axes.set(xlim=edges, ylim=ends, yticks=[], xlabel=name)
-        for row, time in enumerate(told):
+        for row, time in enumerate(labels):
             axes.annotate(time, (1.01, -row * pitch), xycoords=("axes fraction", "data"), fontsize=7, va="center")
     axes.set(aspect="equal", title=title)
     axes.set_anchor("N")

@@ -1,4 +1,4 @@
-"""Films of runs: beads that are seen to roll, with the physical time, the slow motion and a scale in the picture.
+"""Films of runs with rolling beads, physical time, slow motion and a scale bar.
 
 The camera rests in the laboratory, so that the boundary is seen to shake; where the path of the beads is long it moves
 along with them. Films whose pictures are half a cycle apart or more show one phase of the drive, as a stroboscope does.
@@ -134,7 +134,7 @@ def parse_time(option: str, text: str) -> float:
 
 
 def _check_format(path: Path, options: FilmOptions) -> None:
-    """Refuse what a format cannot hold."""
+    """Raise `InputError` for options that a format does not support."""
     suffix, (wide, tall), fps = path.suffix.lower(), options.size, options.fps
     check_place(path, ".mp4", ".gif")
     if suffix == ".mp4" and (wide % 2 or tall % 2):
@@ -158,7 +158,7 @@ def _shown(motion: Motion, walker: int | None) -> Motion:
 
 
 class FilmTimes(NamedTuple):
-    """The moments of a film, of K pictures.
+    """Times of the K pictures of a film.
 
     ``time`` is physical (s); ``frame`` the number of the frame of the motion, between two a fraction where the motion
     between them is known. The film is ``slowdown`` times slower than in reality; if it is ``stroboscopic`` all pictures
@@ -172,7 +172,7 @@ class FilmTimes(NamedTuple):
 
 
 def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
-    """Spread the pictures of a film over a motion while it is driven.
+    """Distribute the pictures of a film over the drive.
 
     Pictures that are half a cycle apart or more are moved to whole cycles, as a stroboscope would show them; else the
     shaking would beat with the pictures. Where frames are so rare that they do not follow a cycle each picture is the
@@ -181,8 +181,8 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
     last, begin = float(motion.time[-1]), options.begin
     end = last if options.end is None else min(options.end, last)
     if not 0.0 <= begin < end:
-        told = f"nothing to show: expected times within the drive, 0 to {last:.4g} s, --from before --until"
-        raise refused("--from, --until", told)
+        message = f"nothing to show: expected times within the drive, 0 to {last:.4g} s, --from before --until"
+        raise refused("--from, --until", message)
     follows, slowdown = motion.follows_cycles, options.slowdown
     if slowdown is None:
         largest = _SECONDS / (end - begin)
@@ -204,7 +204,7 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
 def _captions(
     scene: Scene, times: FilmTimes, pixels_per_mm: float, size: tuple[int, int]
 ) -> Callable[[Picture, int], Picture]:
-    """What writes time, way, slow motion, drive, tilt, a scale bar and the way of gravity into a picture."""
+    """A function that draws time, distance, slow motion, drive, tilt, scale bar and gravity into a picture."""
     from matplotlib import get_data_path
     from PIL import Image, ImageDraw, ImageFont
 
@@ -214,7 +214,7 @@ def _captions(
     large, small = (ImageFont.truetype(font, round(share * edge)) for share in (1.2, 0.85))
     # All pictures may be of one frame, where frames are rarer than pictures.
     decimals = max(0, ceil(-log10(float(np.diff(times.time).max(initial=0.0)) or 1.0) - 1e-9))
-    speed = told_speed(times.slowdown) + (", stroboscopic" if times.stroboscopic else "")
+    speed = speed_text(times.slowdown) + (", stroboscopic" if times.stroboscopic else "")
     drive = f"{case.drive.frequency:g} Hz, {case.drive.peak_acceleration:.3g} m/s²"
     bar = round_below(wide / 5.0 / pixels_per_mm)
     left, right, level, thick = wide - edge - bar * pixels_per_mm, wide - edge, tall - edge, max(2, edge // 8)
@@ -241,7 +241,7 @@ def _captions(
     return written
 
 
-def told_speed(slowdown: float) -> str:
+def speed_text(slowdown: float) -> str:
     """The slow motion in words: ``20 × slower``."""
     if slowdown == 1.0:
         return "real time"

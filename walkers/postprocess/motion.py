@@ -29,9 +29,9 @@ from walkers.runner.manifest import MANIFEST_NAME
 from walkers.templates.layout import MEAN_SPIN_COLUMNS, Layout, PlacedWalker
 
 FLOOR = 0
-"""Number of the floor among the walls of a container; the others are the side walls."""
+"""Index of the floor among the walls of a container; the others are side walls."""
 LEAST_SAMPLES = 8
-"""A cycle, with which frames show what happens within one."""
+"""Smallest number of samples per cycle that resolves the motion within a cycle."""
 _LEFT_OUT = 0.02  # of a run, beyond the last of several even times
 _OF_FRAMES = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "frames", "mean_spin")
 _OF_BEADS = ("position", "velocity", "spin", "mean_spin")
@@ -39,7 +39,7 @@ _OF_BEADS = ("position", "velocity", "spin", "mean_spin")
 
 @dataclass(frozen=True, repr=False)
 class Motion:
-    """Places and velocities relative to the boundary; F frames of N beads, SI units.
+    """Positions and velocities relative to the boundary; F frames of N beads, SI units.
 
     Attributes
     ----------
@@ -87,12 +87,12 @@ class Motion:
 
     @property
     def first_driven(self) -> int:
-        """Number of the first frame of the drive; of the last one where it has not begun."""
+        """Index of the first frame of the drive; of the last frame if the drive has not begun."""
         return min(int(np.searchsorted(self.time, 0.0)), len(self.time) - 1)
 
     @property
     def follows_cycles(self) -> bool:
-        """Whether frames follow each other closely enough to show what happens within a cycle of the drive."""
+        """Whether the frames resolve the motion within a cycle of the drive."""
         return self.case.run.samples_per_cycle >= LEAST_SAMPLES
 
     @property
@@ -101,7 +101,7 @@ class Motion:
         return self.select(slice(self.first_driven, None)) if self.first_driven else self
 
     def select(self, frames: slice = slice(None), beads: IntArray | None = None, **changes: Any) -> Motion:
-        """Some of the frames and beads, with changes; beads are numbered anew, walkers keep their numbers."""
+        """Selected frames and beads, with changes; beads are renumbered, walkers keep their numbers."""
         parts: dict[str, Any] = {
             name: None if (one := getattr(self, name)) is None else one[frames] for name in _OF_FRAMES
         }
@@ -120,7 +120,7 @@ class Motion:
 
     @property
     def averaged(self) -> Motion:
-        """The F - 1 intervals between frames: mean places, velocities and spins.
+        """Means over the F - 1 intervals between frames: positions, velocities and spins.
 
         Velocities are displacements over time, which is the average over all steps, and so are spins where they were
         averaged; elsewhere they are the mean of both ends.
@@ -131,7 +131,7 @@ class Motion:
         return self.select(slice(1, None), position=position, velocity=velocity, spin=spin)
 
     def between(self, share: float) -> Motion:
-        """The F - 1 places at a share of the intervals between frames, by cubics through places and velocities."""
+        """Positions at a fraction of the F - 1 intervals between frames, by cubic Hermite interpolation."""
         interval = np.diff(self.time)[:, None, None]
         begin, end, left = self.position[:-1], self.position[1:], 1.0 - share
         position = left**2 * (1.0 + 2.0 * share) * begin + share**2 * (3.0 - 2.0 * share) * end
@@ -146,7 +146,7 @@ class Motion:
 
     @cached_property
     def walker_of(self) -> IntArray:
-        """Number of the walker that each bead belongs to, −1 for none, shape (N,)."""
+        """Index of the walker of each bead, −1 for none, shape (N,)."""
         owner = np.full(len(self.radius), -1, dtype=np.int64)
         for walker in self.walkers:
             owner[list(walker.beads)] = walker.walker
@@ -240,7 +240,7 @@ class Group:
 
     @cached_property
     def orientation(self) -> FloatArray:
-        """ψ, rad, shape (F, W): angle of the foremost beads from the way that the walker was to face, unwrapped."""
+        """ψ, rad, shape (F, W): angle from the start direction to the foremost beads, unwrapped."""
         arm = np.einsum("fwbx,b->fwx", self.position, np.array(self.make.front))
         facing = np.array([walker.facing for walker in self.walkers])
         angle = np.arctan2(facing * (arm @ self.across_axis), facing * (arm @ self.drive_axis))
@@ -267,14 +267,14 @@ def even_frames(motion: Motion, count: int) -> list[int]:
 
 
 def even_labels(time: FloatArray) -> list[str]:
-    """Even times (s) with as many decimals as show that they are even."""
+    """Evenly spaced times (s) as text with the required number of decimals."""
     between = float(time[-1] - time[0]) / max(len(time) - 1, 1)
     decimals = next((places for places in range(2, 6) if abs(round(between, places) - between) <= 0.01 * between), 6)
     return [f"{one:.{decimals}f} s" for one in time]
 
 
 def gathered(motion: Motion, lane: float = 2.0) -> Motion:
-    """Independent walkers near each other, to be looked at: on parallel lanes so many lengths apart.
+    """Independent walkers moved close together for pictures, on parallel lanes.
 
     Between walls there is no room for lanes: then the first walker alone. Everything else is left as it is.
     """
@@ -317,8 +317,8 @@ def read_motion(directory: str | Path) -> Motion:
         return _motion(case, segments)
     except NoNumberError as error:
         finished = (directory / MANIFEST_NAME).is_file()  # then it was tabulated, without such numbers
-        told = "the dump was damaged since the run was finished" if finished else "the beads' motion blew up"
-        raise DumpError(f"{error}: {told}") from error
+        message = "the dump was damaged after the run was finished" if finished else "the simulation blew up"
+        raise DumpError(f"{error}: {message}") from error
 
 
 def _opened(segment: Path) -> tuple[dict[str, Any], Layout, BinaryDump]:
@@ -424,7 +424,7 @@ def prescribed_motion(drive: Drive, time: FloatArray) -> tuple[FloatArray, Float
 
 
 def boundary_motion(drive: Drive, time: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Displacement and velocity of the boundary in the laboratory, m and m/s, each of shape (F, 3); before 0 s none."""
+    """Displacement and velocity of the boundary in the laboratory, m and m/s, shape (F, 3); zero before 0 s."""
     displacement, velocity = np.zeros((len(time), 3)), np.zeros((len(time), 3))
     driven = time >= 0.0
     for one in drive.harmonics:

@@ -123,7 +123,7 @@ def open_paraview(script: Path) -> None:
     """Start ParaView with a script, and do not wait for it; an InputError if there is none."""
     program = shutil.which("paraview")
     if program is None:
-        raise refused("--open", f"no program paraview is installed; {script} shows the run in one")
+        raise refused("--open", f"ParaView is not installed; open {script} in ParaView to show the run")
     subprocess.Popen([program, f"--script={script}"], start_new_session=True)
 
 
@@ -155,7 +155,7 @@ def _check_replaceable(place: Path) -> None:
     elif place.exists():
         held = "it is a file"
     if held:
-        expected = "expected a new or empty folder, or one that walkers export wrote before"
+        expected = "expected a new or empty folder, or a folder that walkers export has written"
         raise refused(place, f"{expected}; {held}")
 
 

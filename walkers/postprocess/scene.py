@@ -1,4 +1,4 @@
-"""The scene of a run: beads, walls, colours, what moves and from where one looks; drawn off-screen (PyVista).
+"""Scene of a run: beads, walls, colours, motion and camera; rendered off-screen (PyVista).
 
 Reports and notebooks (`walkers.postprocess.report.player`) and ParaView (`walkers.postprocess.paraview`) show the same.
 """
@@ -86,7 +86,7 @@ def turns_of(motion: Motion) -> Turns | None:
 
 @dataclass(frozen=True)
 class Scene:
-    """Beads and walls, and a view of them without perspective.
+    """Beads, walls and an orthographic view of them.
 
     ``axes`` are unit vectors to the right in the picture, up, and toward the camera, as rows; ``low`` and ``high`` what
     the camera takes in along them, mm. It rests in the laboratory if the boundary is seen ``shaken``, else on the
@@ -155,12 +155,12 @@ class Scene:
 
     @cached_property
     def turns(self) -> Turns | None:
-        """How beads turn; None where they are not to show it or it is not known."""
+        """Orientation of the beads; None if it is not shown or unknown."""
         return turns_of(self.motion) if self.rolling else None
 
     @cached_property
     def pointed_out(self) -> npt.NDArray[np.bool_]:
-        """Which beads are coloured in a frame: those of walkers, and of clusters that climb; shape (F, N)."""
+        """Highlighted beads in each frame: walkers and climbing clusters; shape (F, N)."""
         motion = self.motion
         chosen = np.tile(motion.walker_of >= 0, (len(motion.time), 1))
         return chosen | tracks_of(motion)[1] if Pile().applies(motion.case) else chosen
@@ -188,7 +188,7 @@ def path_of(motion: Motion, begin: int = 0) -> FloatArray:
 
 
 def against_gravity(motion: Motion) -> FloatArray:
-    """A unit vector against gravity in the boundary's frame; without gravity its normal."""
+    """Unit vector against gravity in the frame of the boundary; its normal without gravity."""
     against = -np.array(motion.case.gravity_vector)
     return against / np.linalg.norm(against) if against.any() else np.array([0.0, 0.0, 1.0])
 
@@ -283,7 +283,7 @@ def floor_lines(low: FloatArray, high: FloatArray, step: float) -> FloatArray:
 
 
 def round_below(value: float) -> float:
-    """The largest of …, 1, 2, 5, 10, … that is no larger."""
+    """Largest number of …, 1, 2, 5, 10, … up to a value."""
     decade = 10.0 ** np.floor(np.log10(value) + 1e-9)
     return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= value * (1.0 + 1e-9)))
 

@@ -1,4 +1,4 @@
-"""Views of a run, or of one walker, beside each other: containers from the side, planes along their normal.
+"""Time series of views of a run or one walker: containers from the side, planes along their normal.
 
 One walker is shown as in Fig. 1 of Khan et al.: strips of the floor below each other, one a time; beside each other
 where it walks up a slope. On a tilted plane up in the picture is uphill.

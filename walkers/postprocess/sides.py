@@ -1,4 +1,4 @@
-"""Walkers that started facing either way along the drive axis: where the mean over both is no walker's velocity."""
+"""Walkers by direction at the start: the mean over both directions may not be the velocity of any walker."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ STEADY_SPEED = 1e-5
 
 
 def ways(*, uphill: bool) -> tuple[str, str]:
-    """What the ways along the drive axis are called, the one that is positive first."""
+    """Names of the directions along the drive axis, the positive one first."""
     return ("up", "down") if uphill else ("right", "left")
 
 

@@ -1,4 +1,4 @@
-"""Part the output of a deck that several cases shared: to each its own dumps, as if it had run alone."""
+"""Split the output of a shared deck: each case gets its own dumps, as from a deck of its own."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Columns: TypeAlias = dict[str, npt.NDArray[Any]]
 NUMBERED = "numbered"
-"""Of a column that stands for several, one for each bead or contact: ``rotation_1``, ``rotation_2``, …"""
+"""Marks a field that stands for several columns, one per bead or contact: ``rotation_1``, ``rotation_2``, …"""
 
 
 def described(table: type) -> dict[str, tuple[str, str]]:
@@ -30,7 +30,7 @@ def described(table: type) -> dict[str, tuple[str, str]]:
     `NUMBERED`; those that are get ``_*`` after their names. It holds arrays, all of the table, or a row of it.
     """
     found = {name: hint.__metadata__ for name, hint in get_type_hints(table, include_extras=True).items()}
-    return {f"{name}_*" if told[2:] else name: told[:2] for name, told in found.items()}
+    return {f"{name}_*" if one[2:] else name: one[:2] for name, one in found.items()}
 
 
 def columns_of(table: Any) -> Columns:
@@ -46,7 +46,7 @@ def columns_of(table: Any) -> Columns:
 
 
 def columns_of_rows(table: type, rows: Sequence[Any]) -> Columns:
-    """The columns of a table of which each row is given; there may be none."""
+    """Columns of a table from its rows; there may be no rows."""
     kinds = get_type_hints(table)
     return {name: np.array([getattr(row, name) for row in rows], dtype=kinds[name]) for name in described(table)}
 
@@ -64,12 +64,12 @@ def write_table(directory: Path, name: str, table: type, columns: Columns) -> No
 
     declared = described(table)
     numbered = {key: f"{key.rpartition('_')[0]}_*" for key in columns}
-    told = {key: one for key, one in declared.items() if not key.endswith("_*")}
-    told |= {key: declared[name] for key, name in numbered.items() if name in declared}
-    arrays = [_arrow(columns[key]) for key in told]
+    present = {key: one for key, one in declared.items() if not key.endswith("_*")}
+    present |= {key: declared[name] for key, name in numbered.items() if name in declared}
+    arrays = [_arrow(columns[key]) for key in present]
     fields = [
         pa.field(key, array.type, metadata={"unit": unit, "meaning": meaning})
-        for (key, (unit, meaning)), array in zip(told.items(), arrays, strict=True)
+        for (key, (unit, meaning)), array in zip(present.items(), arrays, strict=True)
     ]
     reals = [field.name for field in fields if pa.types.is_floating(field.type)]
     with beside(directory / f"{name}.parquet") as new:
@@ -96,7 +96,7 @@ def _arrow(values: npt.NDArray[Any]) -> Any:
 
 
 def intact(directory: Path, names: Iterable[str]) -> bool:
-    """Whether tables of a run directory are there and whole: parquet begins and ends with the same four bytes."""
+    """Whether the tables of a run directory exist and are complete (parquet magic bytes at both ends)."""
     for name in names:
         path = directory / f"{name}.parquet"
         if not path.is_file() or path.stat().st_size < 12:
@@ -138,7 +138,7 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
 
 
 def read_columns(directory: Path, name: str) -> Columns:
-    """The same as arrays, which takes no pandas."""
+    """Like `read_table`, as arrays without pandas."""
     table = _read(directory, name)
     return {column: table[column].to_numpy() for column in table.column_names}
 

@@ -1,4 +1,4 @@
-"""What a result is uncertain by: what nobody measured, and the band of the result over its ranges."""
+"""Uncertainty of a result: unmeasured values, and the band of the result over their ranges."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from walkers.inputs.rounding import SHOWN_UNITS, rounded
 from walkers.runner.files import read_json
 
 SPREAD_NAME = "spread.json"
-"""In the directory of a spread (`spread_of`): its bands."""
+"""File of the bands in the directory of a spread (`spread_of`)."""
 LEAST_PER_VALUE = 3
-"""Draws for each value that a spread varies, below which its band is rough and ranks are chance."""
+"""Draws per varied value below which the band is approximate and rank correlations are not significant."""
 _OVER = "over the ranges of uncertain values"
 _WIDTH = 110
 
 
 def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
-    """What a result rests on that nobody measured, and what the case calls uncertain.
+    """Unmeasured values of a result, and values that the case calls uncertain.
 
     Each has a ``key``, ``value`` (as a case file would say it), ``origin`` (``given``, ``library``, ``calibrated`` or
     ``default``), ``range`` (both ends, or None), ``logarithmic``, and whether it is ``guessed``.
@@ -43,12 +43,12 @@ def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
 
 
 def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What a result rests on (`rests_on`) as text: guessed, only said by the case, calibrated."""
+    """The uncertain values of a result (`rests_on`) as text: guessed, given by the case alone, calibrated."""
 
     def listed(head: str, chosen: Iterable[Mapping[str, Any]]) -> list[str]:
-        told = ", ".join(f"{one['key'].partition('.')[2]} {one['value']}" for one in chosen)
+        text = ", ".join(f"{one['key'].partition('.')[2]} {one['value']}" for one in chosen)
         wrapper = textwrap.TextWrapper(_WIDTH, f"  {head:10} ", " " * 13, break_on_hyphens=False)
-        return wrapper.wrap(told) if told else []
+        return wrapper.wrap(text) if text else []
 
     lines = listed("guessed", [one for one in rests if one["guessed"]])
     whence = {"given": "given", "calibrated": "calibrated", "library": "own library", "package": "package"}
@@ -65,7 +65,7 @@ def wrapped(sentences: Iterable[str]) -> list[str]:
 
 
 def not_known(rests: Sequence[Mapping[str, Any]]) -> list[str]:
-    """A sentence on what a result rests on (`rests_on`) and is known as a range only; none where nothing is."""
+    """A sentence with the values of a result (`rests_on`) that are known as a range only, if there are any."""
     names = [
         one["key"].partition(".")[2].partition(".bead_")[0].replace("_", " ")
         for one in rests
@@ -73,7 +73,7 @@ def not_known(rests: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
     if not names:
         return []
-    return [f"uncertain: {', '.join(dict.fromkeys(names))}; run with --spread for the band over their ranges"]
+    return [f"uncertain parameters: {', '.join(dict.fromkeys(names))}; run with --spread to compute the resulting band"]
 
 
 def spread_of(directory: Path) -> Path:
@@ -91,10 +91,10 @@ def with_bands(directory: Path, result: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def band_of(result: Mapping[str, Any], name: str, own: float | None) -> tuple[float, float] | None:
-    """Both ends of the band of a quantity, SI, between which the result itself is; None if there is no band.
+    """Both ends of the band of a quantity, SI, which includes the result itself; None if there is no band.
 
-    A spread draws what nobody measured on either side of the case's own values, so that the case's own result is in the
-    band. Where it is not, as few draws have it by chance, the band goes up to it.
+    A spread draws half of the values below and half above those of the case, so the result of the case is usually in
+    the band. If it is not (few draws), the band is extended to it.
     """
     band = (result.get("bands") or {}).get(name)
     if band is None:
@@ -111,10 +111,10 @@ def band_text(band: tuple[float, float], unit: str) -> str:
 
 
 def bands_text(result: Mapping[str, Any], units: Mapping[str, str], own: Mapping[str, Any]) -> str:
-    """The bands of quantities of these units, whose own values are known, in a sentence; nothing if there is none."""
+    """The bands of several quantities in a sentence; empty if there is none."""
     bands = {name: band for name in units if (band := band_of(result, name, own.get(name)))}
     if not bands:
         return ""
-    told = "; ".join(f"{name} {band_text(band, units[name])}" for name, band in bands.items())
+    text = "; ".join(f"{name} {band_text(band, units[name])}" for name, band in bands.items())
     points = max(result["bands"][name]["points"] for name in bands)
-    return f"{told} {_OVER} (5 to 95 % of {points} draws)"
+    return f"{text} {_OVER} (5 to 95 % of {points} draws)"

@@ -1,4 +1,4 @@
-"""Runs: a deck launched in a directory of its own, watched, and finished or failed.
+"""Runs: decks in run directories, launched, watched, and finished or failed.
 
 Knows cases and decks (`inputs`, `templates`); knows nothing of what the dumps mean.
 """

@@ -1,4 +1,4 @@
-"""The engine: its binary and what exactly it is, the contact model that it loads, and what audits found of it.
+"""The engine: identity of its binary, the contact model that it loads, and records of audits.
 
 The contact model of decks is a shared library, compiled where it is first needed and kept in the user's cache, like the
 records of audits. The engine's binary interface is that of its very package: headers and library are those of this
@@ -182,11 +182,11 @@ class AuditRecord:
 
     @property
     def passed(self) -> bool:
-        """Whether no line failed."""
+        """Whether all lines pass."""
         return not self.failures
 
     def summary(self) -> Mapping[str, Any]:
-        """What a run's manifest says of it."""
+        """Summary for the manifest of a run."""
         return {name: getattr(self, name) for name in ("scope", "passed", "lines", "skipped", "date")}
 
 

@@ -1,8 +1,8 @@
-"""Run directories: one a run, named by the case and by the hash of all that determines the run.
+"""Run directories: one per run, named by the case and a hash of everything that determines the run.
 
 A run is made in ``<name>-<hash>.incomplete`` and renamed to ``<name>-<hash>`` when its manifest has been written, last:
 a directory without a manifest is not a run, and a run that is made anew replaces the old one only when it has finished.
-What the engine was given and wrote is in ``segments/0000``, ``segments/0001``, …; walkers have one unless their case
+Input and output of the engine are in ``segments/0000``, ``segments/0001``, …; walkers have one unless their case
 asks for more.
 
 While it is made, the file ``<name>-<hash>.lock`` is locked. The lock is the kernel's (``flock``): it ends with the last
@@ -150,7 +150,7 @@ def run_of(segment: Path) -> Path:
 
 
 def files_of_segments(directory: Path) -> list[str]:
-    """What engines were given and wrote for a run, as paths within its directory."""
+    """Input and output files of the engine for a run, as paths within its directory."""
     found = [path for segment in segment_directories(directory) for path in segment.iterdir() if path.is_file()]
     layouts = (layout_of(segment) for segment in segment_directories(directory)[:1])
     dumps = {name for one in layouts for name in (one.bead_dump, one.pair_bridge_dump, one.wall_bridge_dump)}
@@ -299,7 +299,7 @@ def _lock(file: Path, end: float) -> int | None:
 
 
 def is_locked(place: Path) -> bool:
-    """Whether somebody is making the run whose place this is."""
+    """Whether a process is making the run of this place."""
     try:
         with _lock_file(place).open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -311,12 +311,12 @@ def is_locked(place: Path) -> bool:
 
 
 def ask_to_stop(place: Path) -> None:
-    """Ask whoever makes a run to stop: by a word in the lock file, which goes with the lock."""
+    """Ask the process that makes a run to stop, by a word in the lock file."""
     if is_locked(place):
         with suppress(FileNotFoundError), _lock_file(place).open("r+b") as file:
             file.write(b"stop")
 
 
 def is_to_stop(descriptor: int) -> bool:
-    """Whether somebody asks to stop the run whose lock file one has open."""
+    """Whether a stop of the run with this open lock file was requested."""
     return os.fstat(descriptor).st_size > 0

@@ -1,4 +1,4 @@
-"""Every way in which a run is known to fail, and what it is called.
+"""Failures of runs.
 
 The engine's own signs are unreliable (an ERROR line without an exit status, an exit status without a line, silence), so
 each failure is recognised by what it leaves behind, mostly in `walkers.runner.launch`.
@@ -29,8 +29,8 @@ class EngineMissing(EngineFailure):
     """There is no liggghts to run. Seen before anything is written."""
 
     def __init__(self, wanted: str) -> None:
-        told = "is not an executable file on this machine; install it with: sudo apt-get install liggghts"
-        super().__init__(f"no engine: {wanted} {told}")
+        text = "is not an executable file on this machine; install it with: sudo apt-get install liggghts"
+        super().__init__(f"no engine: {wanted} {text}")
 
 
 class OtherEngine(EngineFailure):
@@ -54,14 +54,14 @@ class EngineDiffers(EngineFailure):
     """A worker of a sweep has another engine than the one that the sweep was started with."""
 
     def __init__(self, found: Path) -> None:
-        super().__init__(f"the engine on {platform.node()}, {found}, is not the one that this sweep was started with")
+        super().__init__(f"the engine on {platform.node()}, {found}, is not the engine that started this sweep")
 
 
 class ProgramDiffers(EngineFailure):
     """A worker of a sweep names runs otherwise than where it was started: resolved cases or decks differ."""
 
     def __init__(self) -> None:
-        super().__init__(f"on {platform.node()} this program is another version than where the sweep was started")
+        super().__init__(f"the program on {platform.node()} has another version than the one that started the sweep")
 
 
 class EngineNeverStarted(EngineFailure):
@@ -77,15 +77,15 @@ class EngineKilled(EngineFailure):
 
 
 class EngineSilent(EngineFailure):
-    """The engine wrote nothing for too long, neither into its log nor into its dump, and was ended."""
+    """The engine wrote nothing to its log and dump for too long, and was stopped."""
 
 
 class LogTooLong(EngineFailure):
-    """The engine's log grew beyond all that a deck has it write, and the engine was ended. The log is cut there."""
+    """The engine's log exceeded its limit, and the engine was stopped. The log is truncated there."""
 
 
 class MissingFrames(EngineFailure):
-    """The engine ended without complaint but a dump is short."""
+    """The engine ended normally, but a dump is too short."""
 
 
 class BeadsLost(EngineFailure):
@@ -97,7 +97,7 @@ class BeadsOverTheTop(BeadsLost):
 
 
 class BlowUp(EngineFailure):
-    """A bead is faster than the drive can make it, or its speed is no number: most often too large a time step."""
+    """A bead is faster than the drive can make it, or its speed is NaN; usually the time step is too long."""
 
 
 class TimeLimitExceeded(EngineFailure):
@@ -113,7 +113,7 @@ class DiskFull(EngineFailure):
 
 
 class OutputGone(EngineFailure):
-    """Somebody removed the directory of a run, or of a sweep, while it was made."""
+    """The directory of a run or a sweep was removed during the run."""
 
     def __init__(self, directory: Path) -> None:
         super().__init__(f"{directory} was removed while it was written")
@@ -139,7 +139,7 @@ class AuditFailed(EngineFailure):
     def __init__(self, failures: Sequence[str]) -> None:
         super().__init__(
             f"this engine failed its audit in {len(failures)} line(s), first: {failures[0]}; "
-            "see it with: walkers check engine (--allow-failed-audit runs all the same)"
+            "for details: walkers check engine (--allow-failed-audit runs anyway)"
         )
 
 

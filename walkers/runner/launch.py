@@ -324,20 +324,19 @@ class _Watch:
         # A bead that has left the box since the last line was at least as fast as this.
         if clearance is not None and clearance / seconds > fastest:
             return self._blow_up(clearance / seconds)
-        told = (
-            f"{lost} bead(s) left the simulation box before step {step}: walkers went further than the box is wide (a "
-            "larger dimers.spacing or a shorter run keeps them in), or climbers rose above the walls, which end at "
-            "twice boundary.height"
+        sentence = (
+            f"{lost} bead(s) left the simulation box before step {step}: walkers left its sides (increase "
+            "dimers.spacing or shorten the run), or climbers rose above its top, at twice boundary.height"
         )
-        return (failures.BeadsOverTheTop if over else failures.BeadsLost)(told, self.directory, lost=lost)
+        return (failures.BeadsOverTheTop if over else failures.BeadsLost)(sentence, self.directory, lost=lost)
 
     def _blow_up(self, speed: float) -> failures.BlowUp:
-        seen = f"moves at {speed:.3g} m/s" if math.isfinite(speed) else "has a speed or position that is no number"
+        seen = f"moves at {speed:.3g} m/s" if math.isfinite(speed) else "has a speed or position that is not a number"
         if speed <= self.deck.fastest:
             seen = "left the box at a time step beyond its limits"
         return failures.BlowUp(
-            f"blow-up: a bead {seen} after step {self.step}, the drive cannot give more than "
-            f"{self.deck.fastest:.3g} m/s; most often the time step is too large",
+            f"blow-up: a bead {seen} after step {self.step}; the drive accelerates beads to at most "
+            f"{self.deck.fastest:.3g} m/s; the most frequent cause is a time step that is too long",
             self.directory,
         )
 
@@ -349,14 +348,16 @@ class _Watch:
         if self.failure is not None:
             raise self.failure
         if self.read > deck.log_limit:
-            told = f"the engine's log grew beyond {deck.log_limit / 1e6:g} MB (run.log_limit) {after}, and it was ended"
-            raise failures.LogTooLong(told, self.directory)
+            message = (
+                f"the engine's log grew beyond {deck.log_limit / 1e6:g} MB (run.log_limit) {after}; it was stopped"
+            )
+            raise failures.LogTooLong(message, self.directory)
         if self.silent > deck.silence:
-            told = f"the engine wrote nothing for {deck.silence:g} s (run.silence) {after} of {self.layout.steps}"
-            raise failures.EngineSilent(f"{told}, and was ended", self.directory)
+            message = f"the engine wrote nothing for {deck.silence:g} s (run.silence) {after} of {self.layout.steps}"
+            raise failures.EngineSilent(f"{message}; it was stopped", self.directory)
         if self.elapsed > self.time_limit:
-            told = f"time limit of {self.time_limit:g} s reached at step {self.step} of {self.layout.steps}"
-            raise failures.TimeLimitExceeded(told, self.directory)
+            message = f"time limit of {self.time_limit:g} s reached at step {self.step} of {self.layout.steps}"
+            raise failures.TimeLimitExceeded(message, self.directory)
         missing = self.layout.bead_dump_bytes - self.written
         free = shutil.disk_usage(self.directory).free
         if missing > 0 and free < _SPARE_BYTES:
@@ -368,7 +369,7 @@ class _Watch:
         self.look()
         self._take_in(self.rest)  # the last line may lack its end
         self.check()
-        words = f", last words: {_text(self.last_line)}" if self.last_line else ", without a word"
+        words = f", last line: {_text(self.last_line)}" if self.last_line else ", without output"
         if status > 0 and self.version is None and not self.error.startswith(b"ERROR"):
             raise failures.EngineNeverStarted(f"the engine never started: exit status {status}{words}", self.directory)
         if POSITION_IS_NO_NUMBER.encode() in self.error:
@@ -378,7 +379,7 @@ class _Watch:
         if status < 0:
             known = -status in set(signal.Signals)
             name = signal.Signals(-status).name if known else f"signal {-status}"
-            raise failures.EngineKilled(f"the engine was ended by {name}", self.directory)
+            raise failures.EngineKilled(f"the engine was killed by {name}", self.directory)
         if status > 0:
             raise failures.EngineError(f"the engine stopped: exit status {status}{words}", self.directory)
         frames_of_beads = self.written / layout.bead_dump_bytes * layout.frames
@@ -386,8 +387,8 @@ class _Watch:
         frames_of_bridges = [(_complete_frames(self.directory / name), layout.bridge_frames) for name in dumps]
         for frames, expected in [(frames_of_beads, layout.frames), *frames_of_bridges]:
             if frames != expected:
-                told = f"the engine wrote {int(frames)} of {expected} frames and reported no error"
-                raise failures.MissingFrames(told, self.directory)
+                message = f"the engine wrote {int(frames)} of {expected} frames and reported no error"
+                raise failures.MissingFrames(message, self.directory)
         return EngineReport(self.version or "unknown", wall_seconds, self.loop_seconds, layout.steps)
 
 

@@ -1,4 +1,4 @@
-"""Manifests: what made a finished run, and what its files were when it was finished."""
+"""Manifests: provenance of finished runs, and checksums of their files."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def checksum(path: Path) -> str:
 
 
 class FileChanged(WalkersError, ValueError):
-    """A file of a finished run is not what it was."""
+    """A file of a finished run has changed."""
 
 
 def check_unchanged(directory: Path, names: Collection[str]) -> bool:
@@ -113,8 +113,8 @@ def check_unchanged(directory: Path, names: Collection[str]) -> bool:
     wanted = {name: sums[name] for name in names if name in sums}
     for name, now in checksums(directory, wanted).items():
         if now != wanted[name]:
-            told = "is not what it was when the run was finished; what else is not: walkers check files"
-            raise FileChanged(f"{directory / name} {told} {directory}")
+            message = "has changed since the run was finished; list all changes with: walkers check files"
+            raise FileChanged(f"{directory / name} {message} {directory}")
     return len(wanted) == len(names)
 
 
@@ -125,12 +125,12 @@ def _sums(contents: dict[str, Any], directory: Path) -> dict[str, str]:
 
 
 def forget_tables(directory: Path, names: Collection[str]) -> None:
-    """Say no more in the manifest of a finished run what files are that are about to be made anew."""
+    """Remove files that will be recomputed from the manifest of a finished run."""
     _change(directory, names, anew=False)
 
 
 def record_tables(directory: Path, names: Collection[str]) -> None:
-    """Say in the manifest of a finished run that files were made anew from its dumps: by what, when, what they are now.
+    """Record in the manifest of a finished run that files were recomputed from its dumps: program, time, checksums.
 
     Between `forget_tables` and this, the manifest says nothing of them: who is killed there leaves no false alarm.
     """

@@ -1,4 +1,4 @@
-"""Which program makes a run: its version and commit, Python's version and those of the packages that it needs.
+"""Software of a run: version and commit of the program, versions of Python and of required packages.
 
 Stands on Python alone: the build of a wheel (``setup.py``) runs this file to learn the commit.
 """

@@ -1,4 +1,4 @@
-"""What a case amounts to before it is run: its numbers in SI, its forces, its time step and its cost.
+"""Summary of a case before it is run: values in SI units, forces, time step and cost.
 
 The cost is predicted from measurements of CPU time on one core of a 2020s x86 server
 (docs/explanation/performance.md).
@@ -65,7 +65,7 @@ def predicted_seconds(case: Case, walkers: int | None = None) -> float:
 
 
 def predicted_overhead(cases: Iterable[Case]) -> float:
-    """CPU time in s of what is done for runs besides the engine's work: bridges are solved, motions are measured."""
+    """CPU time in s besides the engine: solving bridges and measuring motions."""
     from walkers.physics.bridge import Surfaces
     from walkers.physics.laws.young_laplace import unsolved
 
@@ -87,17 +87,17 @@ def pairs_of_beads(case: Case) -> int:
 
 
 def notes(case: Case) -> list[str]:
-    """What is to be said of a pile before it is shaken, if anything: beads of one size, low walls."""
+    """Notes on a pile before it is run: beads of one size, low walls."""
     if not (case.loose and case.boundary.closed and case.mixture):
         return []
     numbers = {"large": case.large, "small": case.count - case.large}
-    told = [f"no {name} beads; in the paper, large beads lead small ones" for name, one in numbers.items() if not one]
+    lines = [f"no {name} beads; in the paper, large beads lead small ones" for name, one in numbers.items() if not one]
     room = 2.0 * case.boundary.height - _volume(case) / (_LOOSE_PACKING * case.boundary.cross_section)
     if (fastest := room / case.duration) < _FASTEST_CLIMB:
-        told.append(
+        lines.append(
             f"climbers faster than {fastest * 1e3:.1f} mm/s rise above twice boundary.height, and end the run early"
         )
-    return told
+    return lines
 
 
 def _volume(case: Case) -> float:
@@ -168,7 +168,7 @@ def summarise(case: Case) -> dict[str, Any]:
 
 
 def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
-    """What the contacts of a walker carry at rest."""
+    """Loads of the contacts of a walker at rest."""
     loads, radii = contact_loads(case, walkers), walkers.radii
     names = [f"bead {bead} on substrate" for bead in range(1, len(radii) + 1)]
     names += [f"bead {other + 1} on bead {one + 1}" for one, other in walkers.pairs]
@@ -190,7 +190,8 @@ def describe(summary: dict[str, Any]) -> str:
     """The summary as text."""
     beads, drive, dimer = summary["beads"], summary["drive"], summary.get("dimer")
     ratio = beads["stiffness_ratio"]
-    softened = f"; {float(f'{1 / ratio:.2g}'):,.0f} times softer than their material" if ratio and ratio < 1 else ""
+    factor = f"{float(f'{1 / ratio:.2g}'):,.0f}" if ratio and ratio < 1 else ""
+    softened = f"; Young's modulus reduced by a factor of {factor}" if factor else ""
     lines = [
         *_text_of_case(summary["case"]),
         f"beads      {beads['small']} small and {beads['large']} large, {beads['mass'] * 1e6:.4g} mg, "
@@ -217,8 +218,8 @@ def describe(summary: dict[str, Any]) -> str:
             f"{f'{limit * 1e6:.4g} µN' if limit else '-':>12} {contact['bridge_volume'] * 1e12:8.3g} nL "
             f"{contact['rupture_distance'] * 1e6:6.3g} µm {contact['overlap_at_rest'] * 1e9:10.4g} nm"
         )
-    told = [f"note       {note}" for note in summary["notes"]]
-    return "\n".join([*lines, *_text_of_run(summary["time_step"], summary["run"]), *told])
+    notes = [f"note       {note}" for note in summary["notes"]]
+    return "\n".join([*lines, *_text_of_run(summary["time_step"], summary["run"]), *notes])
 
 
 def _text_of_case(case: dict[str, Any]) -> list[str]:
@@ -234,7 +235,7 @@ def _text_of_case(case: dict[str, Any]) -> list[str]:
 
 
 def _whence(one: dict[str, Any]) -> str:
-    """Where a value comes from, in a few words."""
+    """Origin of a value as text."""
     origin, source = str(one["origin"]), str(one["source"])
     ends = f", range {one['range'][0]} to {one['range'][1]}" if one["range"] else ""
     if one["uncertain"]:

@@ -103,10 +103,10 @@ def take_in(folder: Path) -> None:
         said = log.read_text(encoding="utf-8", errors="replace")
         ran, segment, changes = _as_run(case, written, now, said)
         deck = render_deck(ran, segment)
-        told = ["run by hand", *([f"the deck was edited: {'; '.join(changes)}"] if changes else [])]
+        notes = ["run by hand", *([f"the deck was edited: {'; '.join(changes)}"] if changes else [])]
         if (folder / DECK_NAME).stat().st_mtime_ns > log.stat().st_mtime_ns:
-            told.append(f"{DECK_NAME} is newer than {log.name}: if it was edited since, run it again")
-        _write(folder, ran, deck, segment, _judged(deck, folder, log), told)
+            notes.append(f"{DECK_NAME} is newer than {log.name}: if it was edited since, run it again")
+        _write(folder, ran, deck, segment, _judged(deck, folder, log), notes)
     except (OSError, ValueError, KeyError, TypeError, DumpError) as error:
         raise refused(folder, f"the deck that was run by hand cannot be read ({error})") from error
 
@@ -188,7 +188,7 @@ def _case_of(case: Case, values: Mapping[str, float], edited: Mapping[str, float
         contact=replace(case.contact, **contact),
         liquid=replace(case.liquid, name=None, **liquid) if liquid else case.liquid,
     )
-    # What was told of where values come from holds for a case that is the same.
+    # The origins of values remain valid for an unchanged case.
     return case if ran == case else ran.read_from({}, partial(_origins, case, edited))
 
 
@@ -220,7 +220,7 @@ def _other_changes(written: str, now: str, given: Collection[str]) -> list[str]:
         for text in (written, now)
     )
     others = [line for line in after if line not in before] or [line for line in before if line not in after]
-    return [f"{len(others)} other line(s), of which no account is taken here, first: {others[0]}"] if others else []
+    return [f"{len(others)} other line(s), which are not part of the case, first: {others[0]}"] if others else []
 
 
 def _origins(case: Case, edited: Mapping[str, float]) -> tuple[Origin, ...]:
@@ -231,13 +231,13 @@ def _origins(case: Case, edited: Mapping[str, float]) -> tuple[Origin, ...]:
     return (*kept, *(Origin(key, f"{value:.6g}{units[key]}", "given", value=value) for key, value in keys.items()))
 
 
-def _write(folder: Path, case: Case, deck: Deck, segment: Segment, report: EngineReport, told: list[str]) -> None:
+def _write(folder: Path, case: Case, deck: Deck, segment: Segment, report: EngineReport, notes: list[str]) -> None:
     """Write what a run directory has: case, layout, segment, tables, result, and last its manifest."""
     (folder / MANIFEST_NAME).unlink(missing_ok=True)
     write_json(folder / CASE_NAME, case.as_dict(), at_once=False)
     write_json(folder / LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
-    of_segment = {**vars(segment), "root_mean_square_velocity": None, **vars(report), "by_hand": told}
+    of_segment = {**vars(segment), "root_mean_square_velocity": None, **vars(report), "by_hand": notes}
     write_json(folder / SEGMENT_NAME, of_segment, at_once=False)
     tabulate(folder)
-    about: dict[str, Any] = {"drive_from": segment.drive_from, "segments": 1, "by_hand": told}
+    about: dict[str, Any] = {"drive_from": segment.drive_from, "segments": 1, "by_hand": notes}
     write_manifest(case, folder.name, None, report, started=time.time(), directory=folder, **about)

@@ -1,4 +1,4 @@
-"""How often, how soon, how fast and led by whom: climbs over the runs of piles.
+"""Statistics of climbs over runs of piles: probability, waiting time, rate, speed and leaders.
 
 A run tells of its pile's first climb until it ends and of nothing after that: it is *right-censored*. The share of the
 piles that have climbed by a time is estimated from runs of any lengths by their survival (Kaplan and Meier 1958). A
@@ -57,7 +57,7 @@ class Condition:
 
     @property
     def label(self) -> str:
-        """What tells it from the others; empty where nothing does."""
+        """Label that distinguishes the condition from the others; empty if there is only one."""
         return ", ".join([self.source] * bool(self.source) + [f"{key} = {told}" for key, told in self.differs.items()])
 
 
@@ -82,7 +82,7 @@ def conditions_in(directories: Sequence[Path]) -> list[Condition]:
 
 
 def unfinished_points(directory: Path) -> str:
-    """How many points of a sweep are not finished, which no statistics can know of; empty where none, or no sweep."""
+    """Sentence with the number of unfinished points of a sweep; empty if there are none."""
     if not (directory / RECORD_NAME).exists():
         return ""
     found = [state.status for state in states(read_record(directory))]
@@ -218,7 +218,7 @@ def _rate(name: str, events: int, seconds: float) -> dict[str, Any]:
 
 
 def origins(run: Path, within: float | None = None) -> list[dict[str, Any]]:
-    """Where the beads of each climb of a run came from, that had qualified ``within`` (s), from the run's tables.
+    """Origin of the beads of each climb of a run that qualified ``within`` a time (s), from the run's tables.
 
     Returns
     -------
@@ -295,12 +295,12 @@ def describe_origins(found: Mapping[str, Any]) -> str:
         f"{found['share_of_bridges']:.0%} of the climbers' bridges existed then\n"
         f"             the last bead joined {found['whole_before']:.2f} s before the cluster came free (median)\n"
         f"             {found['leaders_at_wall']} leaders were at a wall at rest, as were {found['share_at_wall']:.0%} "
-        f"of all beads of their size class ({_told_p(found['p_at_wall'])})"
+        f"of all beads of their size class ({_p_text(found['p_at_wall'])})"
     )
 
 
 def leaders(climbs: Sequence[tuple[int, int, Sequence[Mapping[str, Any]]]]) -> dict[str, Any]:
-    """Whether climbs are led by large beads more often than by chance.
+    """Test whether large beads lead climbs more often than expected by chance.
 
     Parameters
     ----------
@@ -339,7 +339,7 @@ def leaders(climbs: Sequence[tuple[int, int, Sequence[Mapping[str, Any]]]]) -> d
 
 
 def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any]:
-    """The probability that what happens once has happened by a time, from records that end at different times.
+    """Probability that an event has happened by a time, from records of different lengths (Kaplan-Meier).
 
     Parameters
     ----------
@@ -423,7 +423,7 @@ _UNITS = {"min_rise": " m", "max_gap": " s"}
 
 
 def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
-    """How the outcome depends on the thresholds of what counts as a climb.
+    """Dependence of the climb statistics on the thresholds of a climb.
 
     Returns
     -------
@@ -468,7 +468,7 @@ def describe_sensitivity(rows: Sequence[dict[str, Any]]) -> str:
         told = "as defined" if row["value"] is None else f"{row['threshold']} = {row['value']:g}{unit}"
         speed = f", median speed {row['median_speed'] * 1e3:.2f} mm/s" if row["climbs"] else ""
         lines.append(
-            f"  {told:20} {row['climbed']} of {row['runs']} runs climbed; climbs {_told_rate(row)}, "
+            f"  {told:20} {row['climbed']} of {row['runs']} runs climbed; climbs {_rate_text(row)}, "
             f"{row['led_by_large']} led by a large bead{speed}"
         )
     return "\n".join(lines)
@@ -495,16 +495,16 @@ def describe_climbs(found: Mapping[str, Any]) -> str:
         + (f", {found['ended']} ended before without a climb" if found["ended"] else "")
         + f": probability {found['probability']:.2f}{_interval(found['interval'], '.2f')}",
         f"  waiting    median {half}; {found['censored']} of {found['runs']} runs ended without a climb",
-        f"  climbs     {_told_rate(found)}"
+        f"  climbs     {_rate_text(found)}"
         + ("" if found["dispersion"] is None else f"; dispersion {found['dispersion']:.1f} (Poisson: 1)"),
     ]
     if found["climbs"]:
         sizes = ", ".join(f"{size}: {found['sizes'].count(size)}" for size in sorted(set(found["sizes"])))
         lines += [
-            *(f"    {name.replace('_', ' '):15} {_told_rate(found[name])}" for name in _PARTS),
+            *(f"    {name.replace('_', ' '):15} {_rate_text(found[name])}" for name in _PARTS),
             f"  leader     large in {found['led_by_large']} of {found['climbs']} climbs (random bead of the pile, "
-            f"{found['share_of_large']:.0%} large: {_told_p(found['p_among_beads'])}; random bead of the cluster: "
-            f"{_told_p(found['p_among_own'])})",
+            f"{found['share_of_large']:.0%} large: {_p_text(found['p_among_beads'])}; random bead of the cluster: "
+            f"{_p_text(found['p_among_own'])})",
             f"  first one  begins after {_range(found['onsets'])} s, counts after {_range(found['times'])} s",
             f"  beads      {sizes} (beads: climbs)",
             f"  height     {_range(np.array(found['heights']) * 1e3)} mm",
@@ -515,11 +515,11 @@ def describe_climbs(found: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _told_p(value: float) -> str:
+def _p_text(value: float) -> str:
     return f"p = {value:.2g}" if value > 1.5 / _DRAWS else f"p < {2 / _DRAWS:g}"
 
 
-def _told_rate(found: Mapping[str, Any]) -> str:
+def _rate_text(found: Mapping[str, Any]) -> str:
     rate = "-" if found["rate"] is None else f"{found['rate']:.3g} per run and second"
     return f"{found['climbs']}: {rate}{_interval(found['rate_interval'])}"
 

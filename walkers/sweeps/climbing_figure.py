@@ -1,4 +1,4 @@
-"""The figure of `walkers climb`: when piles climb, what climbs, and how that changes with the conditions."""
+"""Figure of `walkers climb`: waiting times and rates of climbs against the conditions."""
 
 from __future__ import annotations
 

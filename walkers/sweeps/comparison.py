@@ -1,4 +1,4 @@
-"""Two runs, or two sweeps point by point, side by side: what differs in what was asked, and in what came out."""
+"""Comparison of two runs, or of two sweeps point by point: parameters and results."""
 
 from __future__ import annotations
 
@@ -75,14 +75,14 @@ def _pair(
     numbers = zip(names, (*values, *scatters, difference, numerical), strict=True)
     contents = {"quantity": quantity, "unit": unit, **{name: one if isfinite(one) else None for name, one in numbers}}
     usual, size = readable_unit(unit)
-    told = [*(rounded(value / size, usual) for value in values), _difference(difference / size, usual)]
+    cells = [*(rounded(value / size, usual) for value in values), _difference(difference / size, usual)]
     both = " and ".join(_two_digits(one / size, usual) for one in scatters if isfinite(one))
-    return contents, [with_unit(quantity, usual), *told, both or "-", _two_digits(numerical / size, usual)]
+    return contents, [with_unit(quantity, usual), *cells, both or "-", _two_digits(numerical / size, usual)]
 
 
 def _difference(value: float, unit: str) -> str:
-    told = rounded(value, unit)
-    return told if told[:1] == "-" or told == "0" else f"+{told}"
+    text = rounded(value, unit)
+    return text if text[:1] == "-" or text == "0" else f"+{text}"
 
 
 def _two_digits(value: float, unit: str) -> str:
@@ -93,13 +93,13 @@ def compare_runs(first: Side, second: Side) -> Comparison:
     """Compare two runs, or cases that may not have been run; `DamagedRunError` if a run's result is lost."""
     sides = (first, second)
     names = [side.name for side in sides]
-    parameters, told = _different([side.case for side in sides], names)
+    parameters, differences = _different([side.case for side in sides], names)
     not_run = [side.name for side in sides if side.directory is None]
     pairs = [] if not_run else _pairs([side.directory for side in sides if side.directory])
-    text = [told or "the cases are the same"]
+    text = [differences or "the cases are the same"]
     if apart := [cells for one, cells in pairs if one["first"] != one["second"]]:
         text.append(aligned([["result", *names, "difference", "scatter of copies", "numerical error"], *apart]))
-        text += _told_errors([side.directory for side in sides if side.directory], names)
+        text += _errors_text([side.directory for side in sides if side.directory], names)
     if same := [one["quantity"] for one, _ in pairs if one["first"] == one["second"]]:
         text.append(f"the same in both: {', '.join(same)}" if apart else "all results are the same")
     text += [f"{name}: no finished run; only the parameters are compared" for name in not_run]
@@ -128,7 +128,7 @@ def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
     numerical = hypot(*map(_numerical_error, results))
     units = result_columns([name for result in results for name in result["analyses"]])
     if any(map(_up_and_down, results)):  # the mean over both is no walker's velocity
-        units = {name: told for name, told in units.items() if name != "velocity"}
+        units = {name: entry for name, entry in units.items() if name != "velocity"}
     uphill, pairs = all(result.get("goes_uphill") for result in results), []
     for name, (unit, _) in units.items():
         values = [_number_of(row.get(name)) for row in rows]
@@ -167,7 +167,7 @@ def _numerical_error(result: Mapping[str, Any]) -> float:
     return float((result.get("numerical_error") or {}).get("total", nan))
 
 
-def _told_errors(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
+def _errors_text(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
     """Sentences: what the difference of two velocities is against their numerical errors, and against their bands."""
     results = [with_bands(run, result_in(run)) for run in runs]
     if not all("velocity" in result for result in results):
@@ -177,7 +177,7 @@ def _told_errors(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
     lines, total = [], hypot(*errors)
     if isfinite(total + own[0] + own[1]) and total > 0.0:
         times = abs(own[1] - own[0]) / total
-        told = "less than" if times < 1.0 else f"{_two_digits(times, '')} times"
+        words = "less than" if times < 1.0 else f"{_two_digits(times, '')} times"
         shares = " and ".join(
             f"{percent(float(f'{error / abs(value):.2g}'))} of {name}"
             for name, error, value in zip(names, errors, own, strict=True)
@@ -188,7 +188,7 @@ def _told_errors(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
             if name_of == "velocity"
             else f"velocities of those facing {ways(uphill=all(one['goes_uphill'] for one in results))[0]}"
         )
-        lines.append(f"the {what} differ by {told} their numerical error ({shares})")
+        lines.append(f"the {what} differ by {words} their numerical error ({shares})")
     lines += [
         f"{name}: the numerical error is not measured for this case"
         for name, error in zip(names, errors, strict=True)
@@ -210,8 +210,8 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
     records, source = (read_record(first), read_record(second)), f"{first}, {second}"
     keys = [[with_unit(key, unit) for key, unit in one.units.items()] for one in records]
     if dict(records[0].units) != dict(records[1].units):
-        told = " and ".join(", ".join(one) or "nothing" for one in keys)
-        raise refused(source, f"expected sweeps that vary the same keys in the same units: {told}")
+        differences = " and ".join(", ".join(one) or "nothing" for one in keys)
+        raise refused(source, f"expected sweeps that vary the same keys in the same units: {differences}")
     tables = [load(directory) for directory in (first, second)]
     numbers = [name for name in tables[0].columns if name in tables[1] and tables[0][name].dtype.kind in "fiu"]
     default = default_column(max(tables, key=sides_differ))
@@ -221,7 +221,7 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
         raise refused(source, "have no finished point in common")
     names = [record.name for record in records]
     names = [str(first), str(second)] if names[0] == names[1] else names
-    parameters, told = _different([case_of(Path(both[f"run_{side}"].iloc[0])) for side in _SIDES], names)
+    parameters, differences = _different([case_of(Path(both[f"run_{side}"].iloc[0])) for side in _SIDES], names)
     points, lines = [], []
     for row in both.to_dict("records"):
         names_of = (column, ERRORS.get(column))
@@ -239,7 +239,7 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
         line += f"; left out: {unmatched[0]} of {names[0]}, {unmatched[1]} of {names[1]}"
     contents: dict[str, Any] = {**dict(zip(_SIDES, names, strict=True)), "keys": dict(records[0].units)}
     contents |= {"parameters": parameters, "points": points, "unmatched": unmatched}
-    return Comparison(contents, "\n\n".join(filter(None, [told, aligned([heads, *lines]), line])))
+    return Comparison(contents, "\n\n".join(filter(None, [differences, aligned([heads, *lines]), line])))
 
 
 def _matched(tables: Sequence[pd.DataFrame], keys: list[str]) -> pd.DataFrame:

@@ -28,7 +28,7 @@ _SEEDS = ("run.seed", "seed")
 _SYMBOLS = {"gamma0": "Γ0", "sin_delta": "sin δ", "mass_asymmetry": "μ"}
 _SYMBOLS |= {"right_facing": "velocity, facing right (up)", "left_facing": "velocity, facing left (down)"}
 _LEAST_ASYMMETRIES = 3  # different radii are shown by sin δ from so many on
-_MOST_PANELS = 12  # more combinations of what is left are not told apart by panels
+_MOST_PANELS = 12  # more combinations are not separated into panels
 _MARKERS = "osD^vXP<>*"
 _MODELS = (("--", "_"), (":", "+"))  # of each model the line, and the symbol where points are not joined
 _CURVE, _BEYOND = 61, 0.04  # points of a curve of a model; how far it goes beyond the points, over their range
@@ -73,7 +73,7 @@ class Factor:
         """A number; zero if it is but the rounding of the others."""
         return 0.0 if abs(level) < _ROUNDING * max(map(abs, self.levels)) else level
 
-    def told(self, level: Any, *, by_name: bool = False) -> str:
+    def text(self, level: Any, *, by_name: bool = False) -> str:
         """A level as text, with its unit; if so wanted a number with the factor's name."""
         text = f"{self.exact(level):.6g} {self.unit}".strip() if self.is_number else str(level)
         return f"{self.name} = {text}" if by_name and self.is_number else text
@@ -81,12 +81,12 @@ class Factor:
 
 @dataclass(frozen=True)
 class Layout:
-    """What is drawn along x (samples have a panel for each), in colours, in panels; names of what is not told apart."""
+    """Factors along x (samples have a panel for each), in colours and in panels; names of undistinguished keys."""
 
     x: Sequence[Factor]
     hue: Factor | None
     panels: Factor | None
-    untold: Sequence[str] = ()
+    undistinguished: Sequence[str] = ()
 
 
 Curves = Callable[[npt.NDArray[np.int64], Factor, FloatArray], Mapping[str, FloatArray]]
@@ -143,9 +143,9 @@ def _of_axis(columns: Mapping[str, list[Any]], units: Mapping[str, str]) -> list
     whole = _count(zip(*columns.values(), strict=True))
     shown = next(([key] for key, values in columns.items() if _count(values) == whole), list(columns))
     rest = [key for key in columns if key not in shown]
-    told = [[f"{value_text(value)} {units[key]}".strip() for value in columns[key]] for key in shown]
+    texts = [[f"{value_text(value)} {units[key]}".strip() for value in columns[key]] for key in shown]
     label = ", ".join(map(readable_key, shown)) + _with(rest)
-    return [Factor((*shown, *rest), label, [", ".join(row) for row in zip(*told, strict=True)], False)]
+    return [Factor((*shown, *rest), label, [", ".join(row) for row in zip(*texts, strict=True)], False)]
 
 
 def _count(values: Iterable[Any]) -> int:
@@ -217,7 +217,7 @@ def layout_of(
             left = [one for one in left if not _same(one, asked[option])]
     samples = [factor for factor in left if factor.is_sample]
     left = [factor for factor in left if not factor.is_sample]
-    untold = [one.name for one in samples] if "x" in asked else []
+    undistinguished = [one.name for one in samples] if "x" in asked else []
     along = [asked["x"]] if "x" in asked else samples
     if not along:
         along = [_along(left, rows) or _numbers(rows, "point", "--x")]
@@ -229,9 +229,9 @@ def layout_of(
         raise refused("--panels", "expected --x too: the samples have a panel for each key")
     if apart is None and panels is None and left and len(along) == 1:
         while prod(len(one.levels) for one in left) > _MOST_PANELS:
-            untold.append(left.pop(0 if len(left[0].levels) > _MOST_PANELS else -1).name)
+            undistinguished.append(left.pop(0 if len(left[0].levels) > _MOST_PANELS else -1).name)
         apart, left = _joined(left), []
-    return Layout(along, colours, apart, [*untold, *(one.name for one in left)])
+    return Layout(along, colours, apart, [*undistinguished, *(one.name for one in left)])
 
 
 def _same(one: Factor, other: Factor) -> bool:
@@ -261,7 +261,7 @@ def _joined(factors: Sequence[Factor]) -> Factor | None:
     """Several factors as one."""
     if len(factors) < 2:
         return next(iter(factors), None)
-    columns = [[one.told(level, by_name=not one.unit) for level in one.values] for one in factors]
+    columns = [[one.text(level, by_name=not one.unit) for level in one.values] for one in factors]
     keys = tuple(key for factor in factors for key in factor.keys)
     texts = [", ".join(row) for row in zip(*columns, strict=True)]
     return Factor(keys, ", ".join(factor.name for factor in factors), texts, False)
@@ -276,8 +276,8 @@ def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Fig
     if "x" in log and not all(one.is_number for one in layout.x):
         raise refused("--logx", f"{layout.x[0].label} has no numbers")
     parts = [(x, np.ones(len(drawn.values), dtype=bool), "") for x in layout.x]
-    if (told := layout.panels) is not None:
-        parts = [(layout.x[0], told.where(level), told.told(level, by_name=True)) for level in told.levels]
+    if (panels := layout.panels) is not None:
+        parts = [(layout.x[0], panels.where(level), panels.text(level, by_name=True)) for level in panels.levels]
     colours = _Colours(layout.hue, hollow=bool(drawn.theory))
     columns = min(len(parts), 2 if len(parts) in (2, 4) else 3)
     rows = ceil(len(parts) / columns)
@@ -418,7 +418,7 @@ def _legend(figure: Figure, grid: npt.NDArray[Any], colours: _Colours, drawn: Dr
     elif factor is not None:
         title = plain_text(factor.name)
         looks = zip(colours.levels, colours.looks, strict=True)
-        handles = [Line2D([], [], ls="none", label=plain_text(factor.told(level)), **look) for level, look in looks]
+        handles = [Line2D([], [], ls="none", label=plain_text(factor.text(level)), **look) for level, look in looks]
     lines = {line.get_linestyle() for axes in grid.flat for line in axes.lines}
     for number, model in enumerate(drawn.theory):
         handles.append(Line2D([], [], label=model, **_model_look(number, _MODELS[number][0] in lines, "0.3")))

@@ -1,4 +1,4 @@
-"""What is in a folder of runs: runs, finished or not, and sweeps, as their files say; listed, and removed.
+"""Contents of a folder of runs: runs and sweeps with their status; listing and removal.
 
 Nothing is tabulated, no dump is opened and no table: a folder of ten thousand runs takes seconds.
 
@@ -345,7 +345,7 @@ class Cleaning:
                 size, why = sum(weigh(path)[0] for path in own), ""
                 theirs = ", ".join(sorted(path.name for path in one.directory.iterdir() if path not in own))
                 if theirs:
-                    told.append(f"stays, walkers did not write it: {theirs} (in {one.directory})")
+                    told.append(f"kept, not written by walkers: {theirs} (in {one.directory})")
             kind = "sweep" if one.is_sweep else one.status
             rows.append([one.name, kind, duration_text(one.age), bytes_text(size), why])
             total += size
@@ -402,7 +402,7 @@ def plan_cleaning(
         elif entry.status == "finished" and sweeps:
             stay[f"finished, of the sweep {sweeps[0]} (give its name to remove it)"] += 1
         elif entry.directory.name.endswith(REPLACED) and not entry.place.exists():
-            stay["about to be put back in its place"] += 1
+            stay["about to be restored"] += 1
         else:
             remove.append(entry)
     going = {entry.name for entry in remove if entry.is_sweep}
@@ -430,7 +430,7 @@ def clean(cleaning: Cleaning) -> dict[Path, str]:
     for entry in cleaning.remove:
         with locked([] if entry.is_sweep else [entry.place]) as ours:
             if not (ours or entry.is_sweep):
-                left[entry.directory] = "a process has begun to make it, it stays"
+                left[entry.directory] = "kept: a process is computing it"
                 continue
             try:
                 _remove(entry)

@@ -1,4 +1,4 @@
-"""Make runs: one by decks of its own, segment by segment, or several at once by a shared deck.
+"""Make runs: single runs segment by segment, or several at once in a shared deck.
 
 A run is made in ``NAME-HASH.incomplete``, its segments in ``segments/0000``, ``segments/0001``, … there, each from a
 restart file to the next. A segment that is being made is called ``0003.new`` and gets its name when it is whole; an
@@ -76,14 +76,14 @@ _Tell = Callable[[Progress], None]
 
 
 class DamagedSegment(WalkersError):
-    """A segment of an unfinished run that cannot be gone on from."""
+    """A segment of an unfinished run from which the run cannot continue."""
 
 
 def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
-    """Refuse an engine whose audit failed (`AuditFailed`), unless told otherwise; warn once of one that had none."""
+    """Refuse an engine whose audit failed (`AuditFailed`), unless allowed; warn once of an engine without audit."""
     audit = read_audit(engine.sha256)
     if audit is None and is_new(engine.sha256):
-        message = "this engine was never audited; check what it computes with: walkers check engine (said once)"
+        message = "this engine was never audited; check its forces with: walkers check engine (shown once)"
         warnings.warn(message, UnauditedEngineWarning, stacklevel=3)
     elif audit is not None and not audit.passed and not allow_failed_audit:
         raise AuditFailed(audit.failures)
@@ -201,7 +201,7 @@ def _are_constant(directory: Path) -> bool:
 
 @dataclass
 class OpenRun:
-    """A run that is being made, or gone on with, in a directory of its own beside its final place (`open_locked`).
+    """A run in progress, in a directory beside its final place (`open_locked`).
 
     ``done`` is what the segments that are whole say of themselves, ``ended`` why there are not more, if not all are.
     """
@@ -251,7 +251,7 @@ class OpenRun:
                 return
 
     def _next_segment(self, case: Case) -> Segment | None:
-        """The segment that is to be made next, of the run or an attempt at it; None after the last one."""
+        """The next segment of the run or of an attempt; None after the last one."""
         if not self.done:
             return first_segment(case)
         begin, start = int(self.done[-1]["end"]), drive_from(self.case, self.done)
@@ -352,7 +352,7 @@ def _read_segment(directory: Path) -> dict[str, Any]:
             return record
         raise ValueError("begin, end or drive_from make no sense")
     except (OSError, ValueError, KeyError, TypeError) as error:
-        message = f"{directory} is damaged ({error}): delete {directory.parent.parent} to have the run made again"
+        message = f"{directory} is damaged ({error}): delete {directory.parent.parent} and repeat the run"
         raise DamagedSegment(message) from error
 
 

@@ -1,4 +1,4 @@
-"""The report of a sweep: its table, a plot of it, and as many whole runs as fit."""
+"""Report of a sweep: table, plot, and as many complete runs as fit."""
 
 from __future__ import annotations
 
@@ -141,8 +141,8 @@ def _overview(frame: pd.DataFrame) -> Model | None:
     known = frame[frame[result].notna()].sort_values(x, kind="stable")
     errors = known[ERRORS[result]].to_numpy(float) if result in ERRORS else np.empty(0)
     seen = errors_seen(errors, known[result].to_numpy(float))
-    told = ", bars: scatter of the copies" if seen else f"; {UNSEEN}" if len(errors) else ""
-    plot = new_plot(f"{label} against {readable_key(x)}{told}", along_x, label, height=380)
+    text = ", bars: scatter of the copies" if seen else f"; {UNSEEN}" if len(errors) else ""
+    plot = new_plot(f"{label} against {readable_key(x)}{text}", along_x, label, height=380)
     apart = known["point"].map(lambda _: "")
     if others:
         levels = [known[name].map(lambda level, unit=units[name]: _level(level, unit)) for name in others]

@@ -66,12 +66,12 @@ _LOOK_SECONDS = 0.25
 
 
 class ClusterFailed(WalkersError):
-    """The cluster's jobs end without having worked."""
+    """The jobs of the cluster end without doing any work."""
 
 
 @dataclass(frozen=True)
 class Options:
-    """How a sweep is run: by so many decks at once on this machine, or on a cluster (whose own number counts).
+    """Options of a sweep: number of parallel decks on this machine, or a cluster (which sets the number).
 
     A point that failed is tried again ``retries`` times, but not after failures of the names ``final``, not by a later
     call either: the engine would meet them again. ``time_limit`` is the wall time in s that an engine may take.
@@ -92,8 +92,8 @@ class Options:
         """The same for decks of so many MPI processes each: fewer of them at once, so that each has its cores."""
         site = replace(self.site, ranks=ranks) if self.site else None
         if site is not None and ranks > site.file.cores:
-            told = f"a deck has {ranks} MPI processes (run.ranks), more than the {site.file.cores} cores of a node"
-            raise refused("cores", told)
+            text = f"a deck has {ranks} MPI processes (run.ranks), more than the {site.file.cores} cores of a node"
+            raise refused("cores", text)
         return replace(self, workers=max(1, self.workers // ranks), site=site)
 
 
@@ -141,7 +141,7 @@ class PlannedDeck:
 
 
 def pack(cases: Mapping[int, Case], workers: int, longest_seconds: float = LONGEST_SECONDS) -> list[PlannedDeck]:
-    """Pack points, by their numbers, into decks for so many workers; the longest first, as they are to be started.
+    """Pack points, by number, into decks for a number of workers; the longest decks first.
 
     No deck of several points may exceed a predicted time.
     """
@@ -226,7 +226,7 @@ def _missing_decks(
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """What a sweep would do: its points with their statuses, the decks that are missing, what is not run again.
+    """Plan of a sweep: points with their status, missing decks, runs that are not repeated.
 
     Of a sweep with a descent these are all decks down to its bottom: it may end earlier.
     """
@@ -248,13 +248,13 @@ class SweepPlan:
         apart = sum(predicted_seconds(self.cases[point]) * self.cases[point].run.ranks for point in missing)
         # Python works for one deck at a time, while the engines of others run.
         until = max(makespan((deck.seconds for deck in self.decks), at_once) + PROGRAM_SECONDS, besides)
-        told = ", ".join(f"{count} {status}" for status, count in sorted(Counter(self.statuses).items()))
+        text = ", ".join(f"{count} {status}" for status, count in sorted(Counter(self.statuses).items()))
         keys = ", ".join(with_unit(key, unit) for key, unit in record.units.items())
         at_most = "at most " if record.descent else ""
         lines = [
             f"{record.name}: {record.title}".rstrip(": "),
             f"  varied     {keys or 'nothing'}",
-            f"  points     {len(record.runs)}: {told}",
+            f"  points     {len(record.runs)}: {text}",
             f"  to do      {at_most}{len(missing)} points in {len(self.decks)} decks",
             f"  predicted  {at_most}{seconds + besides:.0f} core-seconds ({apart + besides:.0f} without shared decks), "
             f"{duration_text(until)} with {at_once} decks in parallel",
@@ -264,7 +264,7 @@ class SweepPlan:
 
 
 def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = None) -> SweepPlan:
-    """Resolve a sweep's points and see what is missing; nothing is written.
+    """Resolve the points of a sweep and find the missing ones; nothing is written.
 
     What it is given, and raises, is as of `run_sweep`.
     """
@@ -344,7 +344,7 @@ def run_sweep(
 
 @dataclass(frozen=True)
 class Report:
-    """What became of a deck: velocities (m/s) of its finished runs (others are busy elsewhere), or its failure.
+    """Outcome of a deck: velocities (m/s) of its finished runs, or its failure.
 
     A failure has the name of its class, what it says, and where its remains are.
     """
@@ -416,9 +416,9 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[Callable[..., Fu
     try:
         kernel = parsl.DataFlowKernel(pilots(options.site, folder))
     except Exception as error:  # whatever Parsl raises: an address that this machine does not have, ports in use
-        told = " ".join(str(error).split())
-        told = f"Parsl cannot start ({told}); see {folder}, and [executor] address in the site file"
-        raise ClusterFailed(told) from error
+        text = " ".join(str(error).split())
+        text = f"Parsl cannot start ({text}); see {folder}, and [executor] address in the site file"
+        raise ClusterFailed(text) from error
     try:
         yield partial(parsl.python_app(work, data_flow_kernel=kernel), None)
     finally:
@@ -456,7 +456,7 @@ class _Scheduler:
 
     def run(self, on_progress: Callable[[SweepProgress], None]) -> list[Failure]:
         """Until every point is settled."""
-        told = 0.0
+        shown = 0.0
         for group in range(len(self.batches)):
             self._advance(group)
         while self.groups_of:
@@ -465,8 +465,8 @@ class _Scheduler:
                 group = self.groups_of.pop(deck)
                 self._take_in(deck, group, future)
                 self._advance(group)
-            if time.perf_counter() - told > _LOOK_SECONDS:
-                told = time.perf_counter()
+            if time.perf_counter() - shown > _LOOK_SECONDS:
+                shown = time.perf_counter()
                 on_progress(self._progress())
         on_progress(self._progress())
         return sorted(self.failures, key=lambda failure: failure.point)

@@ -1,4 +1,4 @@
-"""Where a sweep runs: on this machine's cores, or on the cluster that a site file describes.
+"""Sites of sweeps: the cores of this machine, or the cluster of a site file.
 
     scheduler = "slurm"
     partition = "main"
@@ -135,8 +135,8 @@ def load_site(path: str | Path) -> Site:
     try:
         pilots(site, Path("parsl"))
     except Exception as error:  # whatever Parsl's classes raise about what they are given
-        told = " ".join(str(error).split())
-        raise refused(path, f"Parsl cannot use it: {told}") from error
+        message = " ".join(str(error).split())
+        raise refused(path, f"Parsl cannot use it: {message}") from error
     return site
 
 

@@ -1,4 +1,4 @@
-"""What a result is worth: the case run again with all that nobody measured drawn from its ranges."""
+"""Spread of a result: the case with all unmeasured values drawn from their ranges."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ POINTS = 32
 """Enough for 5 and 95 %, and for ranks that tell what matters most; a power of two, as Sobol's sequence likes it."""
 _SEEDS = range(1, 65)
 """Of the scrambling, of which the one is taken whose columns hang together least: of few points in many dimensions some
-do by 0.7, and which of two values matters could not be told."""
+do by 0.7, and their influences could not be separated."""
 _AT_REST = 2e-5  # m/s: below, walkers are at rest, as in the sweeps that look for the threshold of motion
 _WORDS = {
     "forward": "walk toward the large bead",
@@ -58,7 +58,7 @@ class Band:
 
 @dataclass(frozen=True)
 class Spread:
-    """What came out over the ranges, in a sweep's directory.
+    """Results of a spread, in the directory of its sweep.
 
     Values were ``varied``, each drawn from its range; others that nobody measured, but the case gives, were ``held``.
     Of the results that count, by the columns of the sweep's table, ``bands`` has what they were without walkers that
@@ -76,9 +76,9 @@ class Spread:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types, SI units."""
-        told = asdict(self) | {"directory": str(self.directory), "failed": len(self.failures)}
-        del told["failures"]
-        return told
+        contents = asdict(self) | {"directory": str(self.directory), "failed": len(self.failures)}
+        del contents["failures"]
+        return contents
 
 
 def _range_of(one: Origin) -> dict[str, list[Any]]:
@@ -95,8 +95,8 @@ def _range_of(one: Origin) -> dict[str, list[Any]]:
     except ValueError:  # one that the case leaves to the program, such as a time step
         return {name: [low, high]}
     if not ends.low * (1.0 - 1e-9) <= own <= ends.high * (1.0 + 1e-9):
-        told = f"expected a range that holds the case's own value, {one.text}"
-        raise unusable(f"uncertain.{one.key}", told, [low, high])
+        message = f"expected a range that holds the case's own value, {one.text}"
+        raise unusable(f"uncertain.{one.key}", message, [low, high])
     return {name: [low, written(min(max(own, ends.low), ends.high), ends.unit), high]}
 
 
@@ -112,8 +112,8 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
         raise refused(case.name, "was changed after it was read; expected a case from load_case(name, changes)")
     varied = [one for one in case.origins if one.range is not None]
     if not varied:
-        told = "nothing here is uncertain: give ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
-        raise refused(case.name, told)
+        message = "no value is uncertain: give ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
+        raise refused(case.name, message)
     with blaming(case.name, case.document):
         ranges = {one.key: _range_of(one) for one in varied}
 
@@ -144,7 +144,7 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
 def run_spread(
     case: Case, out: Path, options: Options, *, points: int = POINTS, engine: str | None = None, **how: Any
 ) -> Spread:
-    """Run a case with all that nobody measured drawn from its ranges, and write the bands beside the sweep's record.
+    """Run a case with all unmeasured values drawn from their ranges, and write the bands beside the sweep's record.
 
     The case is as it was read from a file: its own values say what is uncertain. All else is as of
     `walkers.sweeps.scheduler.run_sweep`. Texts and reports of the case's run have the bands from then on.
@@ -198,13 +198,13 @@ def describe(spread: Spread) -> str:
     """A spread in a few lines: mm, mm/s."""
     units = {key: unit for one in analyses() for key, (unit, _) in one.columns.items()}
     points = max((band.points for band in spread.bands.values()), default=0)
-    lines = [f"  spread     {points} independent draws of each value from its range; median: the case's value:"]
+    lines = [f"  spread     {points} draws; values drawn independently from their ranges, median: value of the case"]
     lines += [
         f"             {one.key} {one.text} ({one.range[0]} to {one.range[1]})" for one in spread.varied if one.range
     ]
     if spread.held:
-        told = ", ".join(f"{one.key} {one.text}" for one in spread.held)
-        lines.append(f"    constant {told} (without a range in [uncertain])")
+        text = ", ".join(f"{one.key} {one.text}" for one in spread.held)
+        lines.append(f"    fixed    {text}; to vary these values, add ranges in [uncertain]")
     for name, band in spread.bands.items():
         unit, factor = SHOWN_UNITS.get(units[name], (units[name], 1.0))
         low, middle, high, smallest, largest = (
@@ -213,10 +213,10 @@ def describe(spread: Spread) -> str:
         ends = f"{low} to {high} {unit} (5 to 95 %), median {middle}; smallest {smallest}, largest {largest}"
         lines.append(f"    {name:8} {ends}")
         ranks = ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items())
-        told = f"depends most on {ranks} (rank correlation)" if ranks else "depends clearly on none of them"
+        text = f"strongest dependence: {ranks} (rank correlation)" if ranks else "no clear dependence on any of them"
         if band.points < LEAST_PER_VALUE * len(spread.varied):
-            told = "too few draws for rank correlations; the band is rough"
-        lines.append(f"{'':13}{told}")
+            text = "too few draws for rank correlations; the band is approximate"
+        lines.append(f"{'':13}{text}")
     found = [f"{count} {_WORDS[name]}" for name, count in spread.counts.items() if count]
     found += [f"{len(spread.failures)} failed"] if spread.failures else []
     lines += [f"    draws    {', '.join(found)}"] if found else []

@@ -49,18 +49,18 @@ _DRIVE = {
     "peak_velocity": ("m/s", "peak velocity of the boundary"),
     "amplitude": ("m", "amplitude of the boundary's displacement"),
 }
-"""Columns that every case has."""
+"""Columns of every sweep."""
 STATE = {
     "status": ("", "finished, failed, running or missing"),
     "lost": ("", "number of beads that left the simulation box; a run that loses beads has no result"),
     "reason": ("", "name of the failure, or empty"),
-    "run": ("", "run directory, relative to the folder where the table was made"),
+    "run": ("", "run directory, relative to the folder in which the table was written"),
 }
 _RESULTS = ("velocity", "climbs")
 SIDES = ("right_facing", "left_facing")
-"""Columns of velocities that are shown in place of their mean where `sides_differ`."""
+"""Velocity columns that replace the mean if `sides_differ`."""
 ERRORS = {"velocity": "scatter"}
-"""Columns with the scatter of others over copies."""
+"""Columns that contain the scatter of other columns over copies."""
 FORMATS = ("csv", "parquet", "json")
 _LEFT_OUT = {
     *("mass_asymmetry", "frequency", "peak_acceleration", "peak_velocity", "amplitude", "radius_1", "radius_2"),
@@ -120,12 +120,12 @@ class SweepRecord:
 
 def derived_columns(names: Sequence[str]) -> Described:
     """Columns that follow from a case, of the analyses of these names: unit and meaning."""
-    return {**{key: told for one in analyses() if one.name in names for key, told in one.derived.items()}, **_DRIVE}
+    return {**{key: column for one in analyses() if one.name in names for key, column in one.derived.items()}, **_DRIVE}
 
 
 def result_columns(names: Sequence[str]) -> Described:
     """Columns that a run gives, of the analyses of these names: unit and meaning."""
-    return {key: told for one in analyses() if one.name in names for key, told in one.columns.items()}
+    return {key: column for one in analyses() if one.name in names for key, column in one.columns.items()}
 
 
 def row_of(result: Mapping[str, Any]) -> dict[str, Any]:
@@ -204,7 +204,7 @@ def read_record(directory: str | Path) -> SweepRecord:
 
 @dataclass(frozen=True)
 class PointState:
-    """What has become of a point: finished, failed, running, missing, or not needed, below where a descent ended.
+    """State of a point: finished, failed, running, missing, or not needed (below the end of a descent).
 
     The directory is that of the finished run, or of what is left of the failed one; the rest is of a failure.
     """
@@ -217,7 +217,7 @@ class PointState:
 
 
 def states(record: SweepRecord) -> list[PointState]:
-    """What has become of each point, as the run directories say."""
+    """State of each point, from the run directories."""
     places = [record.out / run for run in record.runs]
     found = [
         PointState("finished", place) if finished_run(place) else unfinished_state(place, unfinished(place))
@@ -283,7 +283,7 @@ def result_in(directory: Path) -> dict[str, Any]:
     try:
         return current_result(directory)
     except (OSError, ValueError, KeyError, TypeError, IndexError, WalkersError) as error:
-        raise DamagedRunError(f"{directory} is damaged ({error}): delete it to have it made again") from error
+        raise DamagedRunError(f"{directory} is damaged ({error}): delete it and repeat the run") from error
 
 
 # --- the table --------------------------------------------------------------------------------------------------------
@@ -371,8 +371,8 @@ def find_name(option: str, wanted: str, names: Iterable[str]) -> str:
     found = [name for name in known if name == wanted] or [name for name in known if name.endswith(f".{wanted}")]
     if len(found) == 1:
         return found[0]
-    told = f"expected one of {', '.join(found or known)}{'' if found else suggestion(wanted, known)}"
-    raise refused(option, f'"{wanted}": {told}')
+    text = f"expected one of {', '.join(found or known)}{'' if found else suggestion(wanted, known)}"
+    raise refused(option, f'"{wanted}": {text}')
 
 
 def with_unit(words: str, unit: str | None) -> str:
@@ -449,7 +449,7 @@ def thresholds(directory: str | Path) -> pd.DataFrame:
     record = read_record(directory)
     descent = record.descent
     if descent is None:
-        raise refused(directory, "the sweep has no descent, hence no thresholds")
+        raise refused(directory, "the sweep has no descent and therefore no thresholds")
     frame = load(directory)
     others = [name for name in varied_columns(frame) if name != descent.key]
     rows = []
@@ -476,8 +476,8 @@ def describe_status(directory: Path) -> str:
     record = read_record(directory)
     found = states(record)
     count = {status: sum(state.status == status for state in found) for status in _STATUSES}
-    told = ", ".join(f"{number} {status}" for status, number in count.items() if number)
-    lines = [f"{record.name}: {len(found)} points, {told or 'none'}"]
+    text = ", ".join(f"{number} {status}" for status, number in count.items() if number)
+    lines = [f"{record.name}: {len(found)} points, {text or 'none'}"]
     failed = [(number, state) for number, state in enumerate(found) if state.status == "failed"]
     lines += [f"  failed     point {number}: {state.message}" for number, state in failed[:_MOST_FAILURES]]
     if len(failed) > _MOST_FAILURES:

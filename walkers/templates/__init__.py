@@ -1,7 +1,7 @@
-"""Decks: what LIGGGHTS is told, and why.
+"""Decks: the input scripts of LIGGGHTS.
 
-Knows the cases (`inputs`); knows nothing of processes, files on disk or results. Why decks look as they do is told in
-docs/explanation/engine.md.
+Knows the cases (`inputs`); knows nothing of processes, files on disk or results. docs/explanation/engine.md explains
+the form of the decks.
 """
 
 from walkers.templates.deck import Deck, render_deck

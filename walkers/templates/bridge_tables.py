@@ -91,8 +91,8 @@ def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) 
             return table
         cells *= 2
     raise UnusableLawError(
-        f"the finest table, of {_FINEST} cells an octave, is off by {worst:.1g} at a gap of {gap:g} m; expected a law "
-        f"that is smooth between contact, {scale:g} m and its rupture, {curve.rupture:g} m"
+        f"the finest table, of {_FINEST} cells per octave, has an error of {worst:.1g} at a gap of {gap:g} m; expected "
+        f"a law that is smooth between contact, {scale:g} m and its rupture, {curve.rupture:g} m"
     )
 
 
@@ -103,15 +103,15 @@ def _checked(curve: Curve, gaps: FloatArray) -> FloatArray:
     columns = np.array(np.broadcast_to(forces.columns(), (len(gaps), len(_COLUMNS))), dtype=np.float64)
     for name, column in zip(_COLUMNS, columns.T, strict=True):
         if not np.isfinite(column).all():
-            raise UnusableLawError(f"the {name} is no number at a gap of {gaps[~np.isfinite(column)][0]:g} m")
+            raise UnusableLawError(f"the {name} is not a number at a gap of {gaps[~np.isfinite(column)][0]:g} m")
         if name.endswith("resistance") and (column < 0.0).any():
             raise UnusableLawError(f"the {name} is negative at a gap of {gaps[column < 0.0][0]:g} m")
     _, _, sliding, coupling, rolling = columns.T
     gains = coupling**2 > (1.0 + 1e-9) * sliding * rolling
     if gains.any():
         raise UnusableLawError(
-            f"sliding and rolling together give energy at a gap of {gaps[gains][0]:g} m: the square of the "
-            "coupling is above the product of both resistances"
+            f"sliding and rolling together generate energy at a gap of {gaps[gains][0]:g} m: the square of the "
+            "coupling exceeds the product of both resistances"
         )
     return columns
 

@@ -74,7 +74,7 @@ _SKIN = 2e-4
 
 @dataclass(frozen=True)
 class Deck:
-    """A deck ready to run."""
+    """A deck that is ready to run."""
 
     text: str  # what LIGGGHTS reads
     files: Mapping[str, str]  # that it reads in turn, name to text

@@ -1,9 +1,9 @@
-"""How the engine is started: its version, and variables of its environment."""
+"""Start of the engine: version and environment variables."""
 
 from __future__ import annotations
 
 AUDITED_VERSION = "LIGGGHTS-PUBLIC 3.8.0"
-"""The version that all of this was measured on."""
+"""The audited version of the engine."""
 
 POSITION_IS_NO_NUMBER = "a bead's position is no number"
 """In the ERROR line of an engine that has met a bead whose position is no number."""

@@ -1,4 +1,4 @@
-"""What a deck writes and which bead is which: the contract between a deck and those who read its output."""
+"""Layout of the output of a deck: columns, frames, and the walker of each bead."""
 
 from __future__ import annotations
 

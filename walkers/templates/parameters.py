@@ -29,12 +29,12 @@ class Parameter:
     name: str
     value: str
     unit: str = ""
-    told: str = ""
+    note: str = ""
 
     @property
     def line(self) -> str:
         """The command, and a comment."""
-        about = ": ".join(text for text in (self.unit, self.told) if text)
+        about = ": ".join(text for text in (self.unit, self.note) if text)
         return f"{f'variable        {self.name} string {self.value}':55} {f'# {about}' if about else ''}".rstrip()
 
 
@@ -80,8 +80,8 @@ def of_drive(drive: Drive, *, amplitudes: bool) -> tuple[list[Parameter], list[P
         if len(drive.harmonics) > 1 or one.phase:
             given.append(Parameter(f"phase{end}", number(one.phase), "rad"))
     if len(drive.harmonics) > 1:
-        told = "of a cycle, the common period of all: to be changed with them"
-        given.append(Parameter("cycle_frequency", number(drive.frequency), "Hz", told))
+        words = "of a cycle, the common period of all: to be changed with them"
+        given.append(Parameter("cycle_frequency", number(drive.frequency), "Hz", words))
     return given, derived
 
 
@@ -99,15 +99,15 @@ def of_time(case: Case, drive_from: int | None, steps: int, stable: float) -> tu
     """
     run = case.run
     frequency = "frequency" if len(case.drive.harmonics) == 1 else "cycle_frequency"
-    told = f"a multiple of {run.samples_per_cycle} for which the time step is below {stable:.3g} s"
-    given = [Parameter("steps_per_cycle", str(run.steps_per_cycle), told=told)]
+    words = f"a multiple of {run.samples_per_cycle} for which the time step is below {stable:.3g} s"
+    given = [Parameter("steps_per_cycle", str(run.steps_per_cycle), note=words)]
     exact = 1.0 / (case.drive.frequency * run.steps_per_cycle) == run.time_step
     formula = f"$(1.0/(v_{frequency}*v_steps_per_cycle))"
     derived = [Parameter("time_step", formula if exact else number(run.time_step), "s")]
     if drive_from:
-        given.append(Parameter("rest_steps", str(drive_from), told="before the drive, in which the beads come to rest"))
+        given.append(Parameter("rest_steps", str(drive_from), note="before the drive, in which the beads come to rest"))
     if drive_from is not None and (steps - drive_from) % run.steps_per_cycle == 0:
-        given.append(Parameter("cycles", str((steps - drive_from) // run.steps_per_cycle), told="of the drive"))
+        given.append(Parameter("cycles", str((steps - drive_from) // run.steps_per_cycle), note="of the drive"))
     return given, derived
 
 

@@ -1,4 +1,4 @@
-"""What stands in the simulation box: beads and walls, of one case or of several that share a deck.
+"""Contents of the simulation box: beads and walls of one case, or of several cases that share a deck.
 
 An engine deck has one time step and shape of boundary, and walls that do not move where walkers of several
 cases stand on them. What may differ from walker to walker are the beads' radii, how they start, their surfaces
@@ -20,7 +20,7 @@ from walkers.physics.matter import Contact, Liquid
 from walkers.templates.layout import PlacedWalker
 
 Surface = tuple[Contact, Liquid]
-"""How beads touch each other and the walls: an atom type of a deck."""
+"""Contact parameters of beads: an atom type of a deck."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Bead:
 
 @dataclass(frozen=True)
 class Loading:
-    """What acts on a bead besides its contacts, in the frame of the boundary, m/s².
+    """Accelerations of a bead besides its contacts, in the frame of the boundary, m/s².
 
     Gravity, and the amplitude of the inertial acceleration of each harmonic of the drive.
     """
@@ -61,12 +61,12 @@ class Scene:
 
 
 def surface_of(case: Case) -> Surface:
-    """How the beads of a case touch each other and the walls."""
+    """Contact parameters of the beads of a case."""
     return case.contact, replace(case.liquid, name=None, density=None)
 
 
 def loading_of(case: Case) -> Loading:
-    """What the beads of a case feel."""
+    """Loads on the beads of a case."""
     amplitudes = [(one.peak_acceleration, one.direction) for one in case.drive.harmonics]
     inertia = tuple((a * x, a * y, a * z) for a, (x, y, z) in amplitudes)
     return Loading(case.gravity_vector, inertia)

@@ -1,4 +1,4 @@
-"""The walker's theory: the paper's model, what it leaves out (Coulomb friction, weight, detachment), and its alignment.
+"""Theory of walkers: the model of the paper, extensions (Coulomb friction, weight, detachment), and alignment.
 
 Knows cases (`inputs`) and nothing of the engine; what both say of a case is compared by others.
 """

@@ -1,4 +1,4 @@
-"""Alignment: whether a dimer on a substrate or a wall keeps to the axis of the drive.
+"""Alignment: whether a dimer on a substrate or a wall stays aligned with the axis of the drive.
 
 One that rolls sideways without sliding, about the line through its contacts with the substrate, turns by
 ψ̇ = Ω (R1 - R2)/L with L = 2√(R1 R2). Energy and the work of the inertial force give a Mathieu equation, with ϑ = πft,
@@ -36,7 +36,7 @@ from walkers.theory.quasistatic import FloatArray, inertia_matrix, normal_force_
 _NEUTRAL = 1e-6
 """A growth per unit of ϑ, or a multiplier less one, that is the error of what is zero."""
 _BANDS = 6
-"""So many intervals of stability are looked at, from the lowest."""
+"""Number of stability intervals that are examined, from the lowest."""
 _SLOWEST = 1e-4
 """A contact that slides more slowly, m/s, resists sideways sliding as much as one that slides at this."""
 _STEPS = 256
@@ -56,12 +56,12 @@ class Alignment:
 
     @property
     def stable(self) -> bool:
-        """Whether small angles stay small (if nothing damps them; what does lets them decay)."""
+        """Whether small angles stay small without damping; with damping they decay."""
         return bool(is_stable(self.u, self.v)) if self.damping == 0.0 else self.growth <= _NEUTRAL
 
     @property
     def growth(self) -> float:
-        """How fast (Floquet) small angles grow at most, per unit of ϑ; times πf per second."""
+        """Largest growth rate (Floquet exponent) of small angles per unit of ϑ; multiply by πf for 1/s."""
         steps = 128  # of a period of π, U - 4V cos 2ϑ constant in each
         theta = pi * (np.arange(steps) + 0.5) / steps
         slopes = np.zeros((steps, 2, 2))
@@ -105,7 +105,7 @@ def alignment(
 
 
 def _multipliers(slopes: FloatArray, step: float) -> npt.NDArray[np.complex128]:
-    """By what dx/dt = A(t) x grows in a period (Floquet's multipliers); A in each step, shape (steps, n, n)."""
+    """Floquet multipliers of dx/dt = A(t) x; A at each step, shape (steps, n, n)."""
     from scipy.linalg import expm
 
     period = np.eye(slopes.shape[-1])
@@ -126,14 +126,14 @@ def is_stable(u: npt.ArrayLike, v: npt.ArrayLike) -> npt.NDArray[np.bool_]:
 
 
 def largest_stable_v() -> float:
-    """V at which small angles begin to grow on a level substrate: 0.454."""
+    """Largest V with stable small angles on a level substrate: 0.454."""
     from scipy.optimize import brentq
 
     return float(brentq(lambda q: mathieu_b(1, q), 0.5, 1.5)) / 2.0
 
 
 def turning(parameters: Alignment, start: float, angles: npt.ArrayLike, phase: float = 0.0) -> FloatArray:
-    """Orientation of a dimer that begins at rest and rolls sideways without sliding, whatever its angle to the axis.
+    """Orientation of a dimer that starts at rest and rolls sideways without sliding, for any angle to the axis.
 
     The Mathieu equation with sin ψ instead of ψ, a damped parametric pendulum:
     d²ψ/dϑ² = -2β dψ/dϑ - [U - 4V cos(2ϑ + phase)] sin ψ.
@@ -166,7 +166,7 @@ def time_to_turn(rate: float) -> float:
 
 
 def turning_rate(case: Case) -> float | None:
-    """How fast small angles to the axis grow, 1/s; negative where they decay, None if the motion is not periodic.
+    """Growth rate of small angles to the axis, 1/s; negative for decay, None if the motion is not periodic.
 
     Each contact resists sideways sliding by c = μF/|v|, for friction is against the direction of sliding, which is the
     axis but for a small angle, and its bridge as it does along the axis. Rolling friction resists sideways rolling by

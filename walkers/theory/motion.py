@@ -1,4 +1,4 @@
-"""The equations of motion of a walker that stays in contact, integrated in time under any law of friction.
+"""Equations of motion of a walker that stays in contact, integrated in time with a general friction law.
 
     M dv/dt = -M a(t) (1, 1, 0) - G (F∥ + f + Hᵀm),    F = F0 + D (F∥ + f),    F∥ = law(v, F)
 
@@ -84,7 +84,7 @@ class Walker:
 
     @classmethod
     def of_dimer(cls, dimer: Dimer) -> Walker:
-        """The paper's walker: perfect wetting, no weight, dry."""
+        """The walker of the paper: perfect wetting, no weight, no viscous drag."""
         return cls(
             radii=np.array(dimer.radii)[:, None],
             scale=np.array([dimer.capillary_scale / dimer.total_mass]),
@@ -95,7 +95,7 @@ class Walker:
 
     @classmethod
     def of_case(cls, case: Case, *, viscous: bool = True) -> Walker:
-        """A case's walker: its weight, and the pulls and (if viscous) resistances of its bridges in the engine."""
+        """The walker of a case: weight, and pulls and (if viscous) resistances of its bridges as in the engine."""
         dimer = dimer_of(case)
         forces = np.array(contact_loads(case).capillary) + np.array([*dimer.masses, 0.0]) * case.pressing_gravity
         first, second = dimer.radii
@@ -107,13 +107,13 @@ class Walker:
 
     @classmethod
     def joined(cls, walkers: Sequence[Walker]) -> Walker:
-        """All walkers of several."""
+        """Concatenate several sets of walkers."""
         return cls(*(np.concatenate([getattr(one, field.name) for one in walkers], axis=-1) for field in fields(cls)))
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Means over the last cycle of N walkers, m/s; over the later half of all cycles where it does not repeat itself.
+    """Means of N walkers over the last cycle, m/s; over the second half of all cycles if the motion is not periodic.
 
     The velocity, positive toward the large bead, is NaN where a contact opened, for there the model does not hold, and
     where the forces have no solution (the paper's law does not beyond some Γ0).

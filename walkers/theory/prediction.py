@@ -1,4 +1,4 @@
-"""Predictions of the theory for cases: the paper's model, motion under Coulomb's law, detachment, alignment."""
+"""Predictions of the theory for cases: model of the paper, motion with Coulomb friction, detachment, alignment."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PAPER = f"theory: paper's fit, κ = {FRICTION_OF_THE_PAPER * 1e-3:g} s/mm"
 """Coulomb friction with the resistance of bridges (`motion_of`); the paper's own model, of what its friction was fitted
 to (`walkers.theory.quasistatic.mean_velocity`)."""
 _BEADS, _BOUNDARIES, _LIQUIDS = "ruby", ("chromium-coated glass", "glass"), ("Si AK5", "Si AK10")
-"""Of the paper's walkers on a level substrate (its Figs. 2 to 4)."""
+"""Beads, boundaries and liquids of the paper's walkers on a level substrate (Figs. 2 to 4)."""
 
 
 def motion_of(*cases: Case, viscous: bool = True) -> Motion:
@@ -46,7 +46,7 @@ def motion_of(*cases: Case, viscous: bool = True) -> Motion:
 
 
 def check_applies(*cases: Case) -> None:
-    """Raise ``ValueError`` for cases that the theory is not one of: the key at fault, and what the theory is one of."""
+    """Raise ``ValueError`` with the key and the reason if the theory does not apply to a case."""
     for case in cases:
         if len(case.walkers) != 1 or len(case.walkers[0].radii) != 2 or case.loose:
             raise ValueError("bodies: the theory is for dimers")
@@ -102,22 +102,22 @@ def predict(case: Case) -> dict[str, Any]:
             "velocity": _number(linear),
             "reason": reason,
         },
-        "coulomb": _told(case, viscous=False),
-        "viscous": _told(case, viscous=True),
+        "coulomb": _predicted(case, viscous=False),
+        "viscous": _predicted(case, viscous=True),
         "detachment": {"gamma": float(end.gamma), "contact": CONTACTS[int(end.contact)]},
         "alignment": alignment_of(case),
     }
 
 
 def why_not_the_paper(case: Case) -> str | None:
-    """Why the paper's fit, of a friction that was fitted to its walkers, says nothing of a case; None if it does."""
+    """Reason why the fit of the paper does not apply to a case; None if it applies."""
     same = case.material == _BEADS and case.boundary.material in _BOUNDARIES and case.liquid.name in _LIQUIDS
     if same and case.axial_gravity == 0.0:
         return None
     return f"the fit is to {_BEADS} on level {' or '.join(_BOUNDARIES)} in {' or '.join(_LIQUIDS)}"
 
 
-def _told(case: Case, *, viscous: bool) -> dict[str, Any]:
+def _predicted(case: Case, *, viscous: bool) -> dict[str, Any]:
     motion, reason = motion_of(case, viscous=viscous), None
     if not motion.solved[0]:
         reason = "the forces have no solution"
@@ -146,7 +146,7 @@ def pendulum_of(case: Case) -> Alignment:
 
 
 def alignment_of(case: Case) -> dict[str, Any]:
-    """Whether a case's dimer, driven along the substrate, keeps to the axis, and if not how soon it has turned over.
+    """Whether the dimer of a case stays aligned with the axis, and otherwise the time until it turns over.
 
     Returns
     -------
@@ -174,7 +174,7 @@ def alignment_of(case: Case) -> dict[str, Any]:
 
 
 def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
-    """A prediction as text, beside the engine's result where there is one; speeds in mm/s."""
+    """A prediction as text, with the result of the engine if it exists; velocities in mm/s."""
     paper, end, mathieu = prediction["paper"], prediction["detachment"], prediction["alignment"]
     lines = [
         f"Γ0 = {prediction['gamma0']:.3g}, sin δ = {prediction['sin_delta']:.3g}",
@@ -205,7 +205,7 @@ def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
 
 
 def describe_alignment(found: dict[str, Any]) -> list[str]:
-    """`alignment_of` as lines of text; a second one where something pulls along the axis."""
+    """`alignment_of` as lines of text; with a second line if a force acts along the axis."""
     stays = "small angles stay small if the beads roll" if found["stable"] else "small angles grow if the beads roll"
     if found["v"] == found["u"] == 0.0:
         stays = "no torque toward the axis"
@@ -215,15 +215,15 @@ def describe_alignment(found: dict[str, Any]) -> list[str]:
     steep = f"Mathieu U = {found['u']:.3g}, V = {found['v']:.3g}, β = {found['damping']:.3g}: {stays}"
     rate = found["rate"]
     if rate is None:
-        told = "not known: the axial motion is not periodic"
+        text = "not known: the axial motion is not periodic"
     elif not found["stands"]:
         after = f"turns over after about {found['turns_over_after']:.2g} s"
-        told = f"{after} (from 1° to 90°; small angles grow by {rate:.3g}/s)"
+        text = f"{after} (from 1° to 90°; small angles grow by {rate:.3g}/s)"
     elif rate < -GROWS:
-        told = f"stands: small angles decay by {-rate:.3g}/s"
+        text = f"stands: small angles decay by {-rate:.3g}/s"
     else:
-        told = "stands: small angles stay small"
-    return [f"  alignment   {steep}", f"  with slip   {told}"]
+        text = "stands: small angles stay small"
+    return [f"  alignment   {steep}", f"  with slip   {text}"]
 
 
 def _speed(model: dict[str, Any]) -> str:
@@ -234,13 +234,13 @@ def _speed(model: dict[str, Any]) -> str:
 
 def _details(model: dict[str, Any]) -> str:
     rotation = ", ".join(with_decimals(value * 1e3, 2) for value in model["rotation"])
-    told = f"; bead rotation {rotation}, sliding of the large bead {with_decimals(model['sliding'][0] * 1e3, 2)} mm/s"
+    text = f"; bead rotation {rotation}, sliding of the large bead {with_decimals(model['sliding'][0] * 1e3, 2)} mm/s"
     gamma = model.get("threshold")
-    return told + (f"; threshold Γc = {gamma:.3f}" if gamma is not None else "")
+    return text + (f"; threshold Γc = {gamma:.3f}" if gamma is not None else "")
 
 
 def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, FloatArray], dict[str, int]]:
-    """What the models predict for a column of the table of a sweep of N cases.
+    """Predictions of the models for a column of the table of a sweep of N cases.
 
     Parameters
     ----------
@@ -281,7 +281,7 @@ def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, Floa
 
 
 def _why_not(case: Case, column: str) -> str | None:
-    """Why the theory says nothing of a case's column."""
+    """Reason why the theory does not predict a column of a case."""
     try:
         check_applies(case)
     except ValueError as error:

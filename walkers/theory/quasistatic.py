@@ -65,27 +65,27 @@ def forces_at_rest(sin_delta: npt.ArrayLike) -> FloatArray:
 
 
 def translation(sliding: FloatArray) -> FloatArray:
-    """Velocity of the walker from its sliding velocities, the first axis of which is the contacts'."""
+    """Velocity of the walker from the sliding velocities (first axis: contacts)."""
     velocity: FloatArray = (sliding[0] + sliding[1] - sliding[2]) / 2.0
     return velocity
 
 
 def _under_a_steady_force(sin_delta: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """F∥ and D F∥ under a force of 1 along -x, shape (…, 3): inertia alone decides, whatever the friction law."""
+    """F∥ and D F∥ under a unit force along -x, shape (…, 3), which inertia alone determines."""
     along = np.broadcast_to([[-1.0], [-1.0], [0.0]], (*sin_delta.shape, 3, 1))
     parallel = np.linalg.solve(inertia_matrix(sin_delta), along)
     return parallel[..., 0], (normal_force_matrix(sin_delta) @ parallel)[..., 0]
 
 
 class Detachment(NamedTuple):
-    """Where the model ends: the force (unit 4πγR̄) at which a contact opens, and which one, a place in `CONTACTS`."""
+    """Limit of the model: force (unit 4πγR̄) at which a contact opens, and its index in `CONTACTS`."""
 
     gamma: FloatArray
     contact: npt.NDArray[np.int64]
 
 
 def detachment(sin_delta: npt.ArrayLike) -> Detachment:
-    """The smallest force along the axis, either way, that pulls a contact of beads of equal density open, shape (…).
+    """Smallest force along the axis, in either direction, that opens a contact (equal densities), shape (…).
 
     The friction forces that go with a steady force follow from inertia alone, so that this holds for any friction law
     that can give them.

@@ -1,4 +1,4 @@
-"""Laws of liquid bridges by name: those that come with the program, and a user's own.
+"""Laws of liquid bridges by name: built-in laws and laws of users.
 
 A law is a function `Surfaces → Curve` (`walkers.physics.bridge`). Those that come with the program are the functions
 ``law`` of the files beside this one, each with its equation and source, named as the file; another file there is
@@ -25,11 +25,11 @@ if TYPE_CHECKING:  # numpy is not needed to know a law by its name
     from walkers.physics.bridge import BridgeLaw
 
 LAWS = tuple(one.name.replace("_", "-") for one in iter_modules(__path__))
-"""Names of those that come with the program."""
+"""Names of the built-in laws."""
 
 
 def by_name(name: str) -> BridgeLaw:
-    """The law of a name: of `LAWS`, of an installed package, ``package.module:function`` or ``file.py:function``.
+    """Find a law by name: one of `LAWS`, of an installed package, ``package.module:function`` or ``file.py:function``.
 
     Files are those of the working directory.
 
@@ -43,7 +43,7 @@ def by_name(name: str) -> BridgeLaw:
         place, function = f"{__name__}.{name.replace('-', '_')}", "law"
     elif offer := offers("walkers.bridge_laws").get(name):
         if not callable(law := offer.load(call=False)):
-            raise offer.broken("it is no function")
+            raise offer.broken("it is not a function")
         return law  # type: ignore[no-any-return]
     if not place or not function:
         names = ", ".join([*LAWS, *offers("walkers.bridge_laws")])

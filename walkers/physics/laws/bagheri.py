@@ -1,7 +1,7 @@
 """The fit of Bagheri et al. (2024) to solutions of the Young–Laplace equation, a rational function of the gap.
 
-It was made for equal spheres of radius R; unequal ones and planes are taken in Derjaguin's way, R = 2R*
-(`walkers.physics.capillary.derjaguin_radius`). The gap counts in parts of Willett et al.'s distance of rupture
+It was made for equal spheres of radius R; unequal spheres and planes use the Derjaguin radius, R = 2R*
+(`walkers.physics.capillary.derjaguin_radius`). The gap is scaled by the rupture distance of Willett et al.
 (`walkers.physics.laws.willett.rupture`); the resistances are those of `walkers.physics.reynolds`. Coefficients are
 those in the source of MercuryDPM, by these authors.
 
@@ -23,7 +23,7 @@ from walkers.physics.laws.willett import rupture
 
 PUBLISHED = "Bagheri 2024"
 ERROR = 0.04
-"""Of the pull at contact, over Young–Laplace's."""
+"""Relative error of the pull at contact against Young–Laplace."""
 
 
 def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
@@ -42,6 +42,6 @@ def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, 
 
 
 def law(surfaces: Surfaces) -> Curve:
-    """Bagheri et al.'s pull, Willett et al.'s rupture, and Reynolds' resistances."""
+    """Pull of Bagheri et al., rupture distance of Willett et al., and Reynolds resistances."""
     bridge = (surfaces.radius, surfaces.other_radius, surfaces.volume, surfaces.liquid.contact_angle)
     return reynolds.curve(surfaces, lambda gaps: pull(*bridge, gaps), rupture(*bridge))

@@ -1,8 +1,8 @@
 """The closed form of Rabinovich et al. (2005): F = 2πRγ (cos θ / (1 + h/2d) + sin α sin(θ + α)), for small volumes.
 
-It was made for equal spheres of radius R; unequal ones and planes are taken in Derjaguin's way, R = 2R*
+It was made for equal spheres of radius R; unequal spheres and planes use the Derjaguin radius, R = 2R*
 (`walkers.physics.capillary.derjaguin_radius`). At a volume of 0.09 R³ on a plane its pull at contact is twice
-Young–Laplace's. They give no distance of rupture: that of Lian et al. (1993) is taken
+Young–Laplace's. They give no rupture distance; that of Lian et al. (1993) is used
 (`walkers.physics.capillary.rupture_distance`). The resistances are those of `walkers.physics.reynolds`. Numbers of
 equations are those in the source of YADE (its ViscElCapPhys).
 
@@ -47,6 +47,6 @@ def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, 
 
 
 def law(surfaces: Surfaces) -> Curve:
-    """Rabinovich et al.'s pull (their Eq. 19), Lian et al.'s rupture, and Reynolds' resistances."""
+    """Pull of Rabinovich et al. (Eq. 19), rupture distance of Lian et al., and Reynolds resistances."""
     bridge = (surfaces.radius, surfaces.other_radius, surfaces.volume, surfaces.liquid.contact_angle)
     return reynolds.curve(surfaces, lambda gaps: pull(*bridge, gaps), rupture_distance(*bridge[2:]))

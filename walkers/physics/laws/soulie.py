@@ -52,7 +52,7 @@ def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, 
 
 
 def law(surfaces: Surfaces) -> Curve:
-    """Pull and resistances as decks for the stock engine have them."""
+    """Pull and resistances of decks for the stock engine."""
     liquid, reduced, shape = surfaces.liquid, surfaces.reduced_radius, (surfaces.radius, surfaces.other_radius)
     stokes = 6.0 * pi * liquid.dynamic_viscosity * reduced
 

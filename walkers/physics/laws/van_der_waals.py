@@ -8,7 +8,7 @@ It is that of smooth surfaces, 0.12 mN for a bead of 0.3 mm on a plane, as much 
 nanometres leave a hundredth of it or less (take a larger ``cutoff``). It changes within nanometres, of which a step of
 a simulation must be a small part.
 
-A law of one's own takes another constant, in a file of its own, by its name there (`walkers.physics.laws`):
+For another constant, define a law in a file of your own (`walkers.physics.laws`):
 
     law = functools.partial(walkers.physics.laws.van_der_waals.law, hamaker_constant=15e-20)
 
@@ -28,11 +28,11 @@ import numpy as np
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
 
 SMALLEST = 1e-3
-"""Attraction at which it is left out, over that at contact."""
+"""Cut-off: smallest attraction, relative to that at contact."""
 
 
 def law(surfaces: Surfaces, hamaker_constant: float = 6.5e-20, cutoff: float = 0.165e-9) -> Curve:
-    """Hamaker's attraction of two spheres, or of a sphere and a plane, in Derjaguin's limit of small gaps.
+    """Hamaker attraction of two spheres, or of a sphere and a plane, in the Derjaguin limit of small gaps.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """The fit of Willett et al. (2000) to their solutions of the Young–Laplace equation, F = 2πRγ exp(f1 - f2 exp(…)).
 
 It was made for equal spheres of radius R, volumes of 0.1 to 10 per cent of R³ and contact angles up to 50°; unequal
-ones and planes are taken in Derjaguin's way, R = 2R* (`walkers.physics.capillary.derjaguin_radius`). The resistances
-are those of `walkers.physics.reynolds`. Coefficients are those in the source of YADE (its ViscElCapPhys).
+spheres and planes use the Derjaguin radius, R = 2R* (`walkers.physics.capillary.derjaguin_radius`). The resistances are
+those of `walkers.physics.reynolds`. Coefficients are those in the source of YADE (its ViscElCapPhys).
 
 References
 ----------
@@ -21,7 +21,7 @@ from walkers.physics.capillary import derjaguin_radius
 
 PUBLISHED = "Willett 2000"
 ERROR = 0.04
-"""Of the pull at contact, over Young–Laplace's."""
+"""Relative error of the pull at contact against Young–Laplace."""
 
 
 def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
@@ -66,6 +66,6 @@ def rupture(radius_1: float, radius_2: float, volume: float, contact_angle: floa
 
 
 def law(surfaces: Surfaces) -> Curve:
-    """Willett et al.'s pull (their appendix) and rupture (their Eq. 15), and Reynolds' resistances."""
+    """Pull (appendix) and rupture distance (Eq. 15) of Willett et al., and Reynolds resistances."""
     bridge = (surfaces.radius, surfaces.other_radius, surfaces.volume, surfaces.liquid.contact_angle)
     return reynolds.curve(surfaces, lambda gaps: pull(*bridge, gaps), rupture(*bridge))

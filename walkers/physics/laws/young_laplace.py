@@ -1,10 +1,10 @@
 """The Young–Laplace equation, solved numerically: force and rupture distance, with Reynolds' resistances.
 
 The pull is that of `walkers.physics.laplace`, its closed form, for the volume and the contact angle given, between
-beads and at a plane; the bridge breaks at the largest gap at which the equation has a solution. There the pull falls as
-the root of what is left of the gap, with a slope without bound; in t = √(1 - h/rupture) it is smooth, and a polynomial
-in t through a few dozen solutions is as good as the equation. Polynomials are kept in the user's cache, by the bridge's
-shape: half a second is saved each time.
+beads and at a plane; the bridge breaks at the largest gap at which the equation has a solution. Near rupture, the pull
+falls as the square root of the remaining gap, with an infinite slope. It is smooth in t = √(1 - h/rupture), and a
+polynomial in t through a few dozen solutions is as accurate as the equation. Polynomials are kept in the user's cache,
+by the bridge's shape: half a second is saved each time.
 
 The resistances are those of `walkers.physics.reynolds`.
 """
@@ -26,15 +26,15 @@ from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Surfaces
 
 NODES = (24, 48, 96)
-"""Gaps at which the equation is solved: as many as the last coefficients tell, of which the largest suffices for
-errors below 1e-7 of the pull at contact at volumes above 1e-6 R³."""
+"""Numbers of gaps at which the equation is solved, increased until the last coefficients are small; the largest one
+suffices for errors below 1e-7 of the pull at contact at volumes above 1e-6 R³."""
 _Shape = tuple[float, float, float]
 _SMALL = 1e-9
 """Of the pull at contact: the last coefficients of a polynomial that is fine enough."""
 
 
 def law(surfaces: Surfaces) -> Curve:
-    """Young–Laplace's pull and rupture, and Reynolds' resistances.
+    """Pull and rupture distance of the Young–Laplace equation, and Reynolds resistances.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def law(surfaces: Surfaces) -> Curve:
 
 
 def unsolved(bridges: Iterable[Surfaces]) -> int:
-    """How many shapes of bridges were never solved: each takes a quarter of a second."""
+    """Number of bridge shapes without a cached solution; each takes a quarter of a second."""
     return sum(not _place(shape).is_file() for shape in {_shape(one) for one in bridges})
 
 
@@ -65,14 +65,14 @@ def _shape(surfaces: Surfaces) -> _Shape:
 
 
 def _place(shape: _Shape) -> Path:
-    """Where the solution of a shape is kept."""
+    """Path of the cached solution of a shape."""
     name = sha256(_solver() + repr((NODES, _SMALL, shape)).encode()).hexdigest()[:24]
     return user_cache_path("granular-walkers") / "young-laplace" / f"{name}.npy"
 
 
 @cache
 def _solver() -> bytes:
-    """What is kept is of this solver."""
+    """Identifier of the solver for cached solutions."""
     return Path(__file__).parents[1].joinpath("laplace.py").read_bytes()
 
 

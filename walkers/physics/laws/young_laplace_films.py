@@ -18,7 +18,7 @@ def film(radius: float, volume_fraction: float) -> float:
 
 
 def law(surfaces: Surfaces) -> Curve:
-    """Young–Laplace's pull and rupture, Reynolds' resistances; formation at a gap of both films."""
+    """Pull and rupture of the Young–Laplace equation, Reynolds resistances; the bridge forms when the films touch."""
     curve = young_laplace.law(surfaces)
     beads = [surfaces.radius] if surfaces.at_wall else [surfaces.radius, surfaces.other_radius]
     films = sum(film(radius, surfaces.liquid.volume_fraction) for radius in beads)

@@ -1,1 +1,1 @@
-"""The analyses: each a class in a module of its own here, found by `walkers.postprocess.analysis`."""
+"""The analyses: one class per module, found by `walkers.postprocess.analysis`."""

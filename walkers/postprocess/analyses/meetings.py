@@ -1,4 +1,4 @@
-"""The analysis of walkers that are meant to meet: who meets whom, what becomes of them, whether they cluster or jam.
+"""Analysis of walkers that may meet: meetings and their outcome, clustering and jamming.
 
 Walkers are *joined* if bridges lead from one to the other, directly or by others; those that are joined are a cluster.
 A cluster, or a walker by itself, is *held* if a bridge joins one of its beads to a side wall. A walker is *free* if it
@@ -35,26 +35,26 @@ _APPROACHES = {
     "side": (pi / 3.0, "60° to 120° apart"),
     "head_on": (2.0 * pi / 3.0, "more than 120° apart"),
 }
-"""By the angle between the headings of two that meet: from which on, and its words."""
+"""Classes of meetings by the angle between the headings: lower bound (rad) and description."""
 _FATES = {
-    "parted": "have parted",
+    "parted": "have separated",
     "walking": "are joined at the end and move",
     "resting": "are joined at the end and are slow",
 }
 _SLOW = 0.1
-"""Of a free walker's speed; what is slower is called slow."""
+"""Walkers below this fraction of the speed of free walkers are slow."""
 _END = 0.1
-"""Of the drive; its last part, over which the end is measured."""
+"""Final fraction of the drive, over which the end is measured."""
 _NUMBERS = {
     "meeting_rate": ("meeting rate", "1/s", "number of meetings of a walker per second"),
     "pair_lifetime": (
         "mean lifetime of a pair",
         "s",
-        "pair_time over the number of partings: the mean lifetime if pairs part at random; NaN without a parting",
+        "pair_time over the number of separations: mean lifetime if pairs separate at random; NaN without separations",
     ),
-    "pair_time": ("total time of pairs", "s", "time for which pairs are joined, summed over all meetings"),
+    "pair_time": ("total time of pairs", "s", "total time for which pairs are joined, over all meetings"),
     "clustered_share": ("walkers in clusters", "share", "share of walkers joined to others in the last frame"),
-    "largest_cluster": ("walkers in the largest cluster", "", "number in the last frame; 1 if none are joined"),
+    "largest_cluster": ("walkers in the largest cluster", "", "cluster size in the last frame; 1 if none are joined"),
     "held_share": (
         "walkers held by side walls",
         "share",
@@ -63,21 +63,25 @@ _NUMBERS = {
     "nematic_order": (
         "nematic order along the drive axis",
         "",
-        "mean of cos 2θ over all walkers and the last tenth of the drive, θ from the drive axis to the heading: 1 all "
-        "along the axis, 0 random, -1 all across it",
+        "mean of cos 2θ over all walkers and the last tenth of the drive, θ: angle from the drive axis to the heading; "
+        "1 if all are along the axis, 0 if random, -1 if all are across it",
     ),
     "polar_order": (
         "polar order",
         "",
-        "length of the mean heading of all walkers, averaged over the last tenth of the drive: 1 all one way, "
-        "0.89/√N for N random headings",
+        "length of the mean heading vector of all walkers, averaged over the last tenth of the drive: 1 if all "
+        "headings are equal, 0.89/√N for N random headings",
     ),
     "free_speed": (
         "speed of free walkers",
         "m/s",
-        "mean speed, from cycle to cycle, of walkers joined to no other walker and no side wall",
+        "mean speed, from cycle to cycle, of walkers that are not joined to another walker or a side wall",
     ),
-    "joined_speed": ("speed of joined walkers", "m/s", "the same for walkers in clusters that no side wall holds"),
+    "joined_speed": (
+        "speed of joined walkers",
+        "m/s",
+        "mean speed, from cycle to cycle, of walkers in clusters that are not joined to a side wall",
+    ),
     "speed_ratio": ("speed of joined walkers over speed of free walkers", "", "joined_speed over free_speed"),
     "slow_share": (
         "slow walkers at the end",
@@ -85,26 +89,28 @@ _NUMBERS = {
         "share of walkers whose net speed over the last tenth of the drive is below a tenth of free_speed",
     ),
 }
-"""Of each number of the result that has a column: its label in reports, its unit, what it is."""
+"""Numbers of the result that have a column: label in reports, unit, meaning."""
 
 
 @dataclass(frozen=True)
 class Meeting:
-    """``meetings.parquet``: one row per event between two walkers that are meant to meet."""
+    """``meetings.parquet``: one row per event between two walkers that may meet."""
 
     time: Annotated[float, "s", "time since the start of the drive"]
     event: Annotated[str, "", "merged: the first bridge between two walkers forms; parted: the last one breaks"]
-    walker: Annotated[int, "", "number of one walker"]
-    other: Annotated[int, "", "number of the other walker"]
-    size: Annotated[int, "", "number of walkers in the cluster of the first one after the event"]
+    walker: Annotated[int, "", "index of one walker"]
+    other: Annotated[int, "", "index of the other walker"]
+    size: Annotated[int, "", "number of walkers in the cluster of `walker` after the event"]
     angle: Annotated[float, "rad", "angle between the two headings at the event: 0 parallel, pi opposite"]
 
 
 @dataclass(frozen=True)
 class Course:
-    """W walkers in K frames, at least one a cycle: time, s, shape (K,); mass centre, m, and heading, shape (K, W, 2).
+    """W walkers in K frames, at least one per cycle.
 
-    And how many walkers are joined with each, itself too, and whether a side wall holds it or one of these, (K, W).
+    ``time`` (s) has the shape (K,), ``centre`` (centre of mass, m) and ``heading`` have the shape (K, W, 2). ``size``,
+    the number of joined walkers including the walker itself, and ``held``, whether the group is joined to a side wall,
+    have the shape (K, W).
     """
 
     time: FloatArray
@@ -115,7 +121,7 @@ class Course:
 
 
 class Meetings(Analysis):
-    """Who met whom, how long they stuck, how many were together."""
+    """Meetings of walkers: partners, duration, size of groups."""
 
     order = 1
     name = "meetings"
@@ -130,18 +136,18 @@ class Meetings(Analysis):
     }
 
     def applies(self, case: Case) -> bool:
-        """Where walkers are meant to meet."""
+        """Cases whose walkers may meet."""
         return case.meets
 
     def derived_of(self, case: Case) -> dict[str, float]:
-        """Coverage, to three digits, so that trays that were meant to have the same are drawn together."""
+        """Coverage, rounded to three digits so that equal trays form one group in figures."""
         boundary, spacing = case.boundary, max(one.spacing for one in case.walkers)
         cell = spacing * (spacing if isinf(boundary.width) else boundary.width)
         floor = boundary.cross_section if boundary.closed else cell * sum(one.replicates for one in case.walkers)
         return {"coverage": float(f"{pi * sum(radius**2 for radius in case.all_radii) / floor:.3g}")}
 
     def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
-        """Events from one recorded frame of bridges to the next; who stands together from the first has merged then."""
+        """Events between recorded frames of bridges; walkers joined in the first frame have merged at that time."""
         rows: list[Meeting] = []
         before: frozenset[tuple[int, int]] = frozenset()
         centre, heading = _places(motion)
@@ -184,29 +190,29 @@ class Meetings(Analysis):
         }
 
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
-        """How often and what of it, how many together, how they stand, how they are slowed down."""
+        """Numbers and outcomes of meetings, sizes of clusters, orientational order, speeds."""
         del result
         label = "meetings of walkers"
-        yield Quantity("merged", f"{label}: merged", "", "merged", "number of times that two walkers joined")
-        yield Quantity("parted", f"{label}: parted", "", "parted", "number of times that two walkers parted")
-        told = "largest number of walkers joined by bridges at any time"
-        yield Quantity("largest_group", "largest group of walkers", "", "largest_group", told)
-        for name, (label, unit, told) in _NUMBERS.items():
-            yield Quantity(name, label, unit, name, told)
+        yield Quantity("merged", f"{label}: merged", "", "merged", "number of events in which two walkers merge")
+        yield Quantity("parted", f"{label}: parted", "", "parted", "number of events in which two walkers separate")
+        text = "largest number of walkers joined by bridges at any time"
+        yield Quantity("largest_group", "largest group of walkers", "", "largest_group", text)
+        for name, (label, unit, text) in _NUMBERS.items():
+            yield Quantity(name, label, unit, name, text)
         for approach, (_, angle) in _APPROACHES.items():
-            told = f"meetings of two walkers with headings {angle}"
-            yield Quantity(f"{approach}.met", "", "", f"{approach}_met", told)
+            text = f"meetings of two walkers with headings {angle}"
+            yield Quantity(f"{approach}.met", "", "", f"{approach}_met", text)
             for fate, words in _FATES.items():
-                told = f"number of pairs of {approach}_met that {words}"
-                yield Quantity(f"{approach}.{fate}", "", "", f"{approach}_{fate}", told)
+                text = f"number of pairs of {approach}_met that {words}"
+                yield Quantity(f"{approach}.{fate}", "", "", f"{approach}_{fate}", text)
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
-        """How often, and who is together at the end."""
+        """Numbers of meetings, and the groups at the end."""
         together = "; ".join(", ".join(map(str, group)) for group in result["groups_at_end"])
         slow = result["slow_share"]
         return [
-            f"  meetings   {result['merged']} merged, {result['parted']} parted, at most {result['largest_group']} "
-            f"together; at the end {f'joined: {together}' if together else 'none are joined'}",
+            f"  meetings   {result['merged']} merged, {result['parted']} parted, largest group "
+            f"{result['largest_group']}; at the end {f'joined: {together}' if together else 'none are joined'}",
             f"             at the end {100.0 * result['clustered_share']:.0f} % in clusters"
             f"{'' if slow is None else f', {100.0 * slow:.0f} % slow'}; nematic order {result['nematic_order']:.2f}, "
             f"polar order {result['polar_order']:.2f}",
@@ -217,13 +223,13 @@ class Meetings(Analysis):
         return {"paths": [_paths(run.motion)]}
 
     def draw(self, name: str, panels: Sequence[Panel], run: Measured) -> Figure:
-        """The paths, and the beads at the end, both axes to the same scale."""
+        """Paths of the walkers and their beads at the end, with equal scales on both axes."""
         del name
         return _drawn(panels[0], run.motion)
 
 
 def _paths(motion: Motion) -> Panel:
-    """Where the mass centres of all walkers went while they were driven, once a cycle, and the edge of the floor."""
+    """Paths of the centres of mass during the drive, once per cycle, and the edge of the floor."""
     from walkers.postprocess.figures import MOST_NAMED, Line, Panel
     from walkers.postprocess.scene import walls_of
 
@@ -242,7 +248,7 @@ def _paths(motion: Motion) -> Panel:
 
 
 def _colours(count: int) -> list[str]:
-    """Of so many walkers, all different."""
+    """Distinct colours for a number of walkers."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
@@ -251,7 +257,7 @@ def _colours(count: int) -> list[str]:
 
 @styled
 def _drawn(panel: Panel, motion: Motion) -> Figure:
-    """A panel of paths with the beads as they stand at the end."""
+    """A panel of paths with the beads at the end."""
     from matplotlib.patches import Circle
 
     from walkers.postprocess.figures import MOST_NAMED, draw_panel
@@ -274,7 +280,7 @@ def _drawn(panel: Panel, motion: Motion) -> Figure:
 
 
 def _places(motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Mass centres (m) and headings of all walkers, by their numbers, in all frames, seen from above: (F, W, 2)."""
+    """Centres of mass (m) and headings of all walkers in the plane of the floor, shape (F, W, 2)."""
     centre, heading = (np.zeros((len(motion.time), len(motion.walkers), 2)) for _ in range(2))
     for number, make in enumerate(motion.case.walkers):
         group = Group(motion, make, [walker for walker in motion.walkers if walker.make == number])
@@ -284,7 +290,7 @@ def _places(motion: Motion) -> tuple[FloatArray, FloatArray]:
 
 
 def collective(course: Course, meetings: Sequence[Meeting], axis: FloatArray) -> dict[str, Any]:
-    """What a result says of walkers as many, from their course and their meetings; None for what is unknown.
+    """Collective quantities of a result, from the course and the meetings; None for undefined quantities.
 
     ``axis`` is the unit vector of the drive. See the columns of `Meetings` for what each number is.
     """
@@ -294,7 +300,7 @@ def collective(course: Course, meetings: Sequence[Meeting], axis: FloatArray) ->
     speed = np.linalg.norm(np.diff(course.centre, axis=0), axis=-1) / steps
 
     def mean_speed(there: BoolArray) -> float:
-        """Of what is so at both ends of an interval."""
+        """Mean speed over the intervals at both ends of which a condition holds."""
         found = speed[there[:-1] & there[1:]]
         return float(found.mean()) if found.size else nan
 

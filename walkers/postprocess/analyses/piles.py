@@ -1,4 +1,4 @@
-"""The analysis of loose beads in a container: what the bed did, which clusters came free of it and climbed."""
+"""Analysis of loose beads in a container: the bed, and the clusters that leave it and climb."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from walkers.postprocess.figures import Panel
 
 _WHOLE = 1.0 - 1e-6
-"""Of its duration: a run that was shaken for less ended early."""
+"""Fraction of the duration below which a run ended early."""
 _LAYERS = 0.5
 """Thickness of the layers of the packing profile, in diameters of the largest bead."""
 
@@ -50,31 +50,33 @@ class Bed:
     """``bed.parquet``: one row per frame of a pile."""
 
     time: Annotated[float, "s", "time since the start of the drive; negative while the pile settles"]
-    surface: Annotated[float, "m", "height of the bulk's surface: median over x-y cells of the top of the highest bead"]
-    surface_low: Annotated[float, "m", "the same, 10th percentile"]
-    surface_high: Annotated[float, "m", "the same, 90th percentile"]
+    surface: Annotated[float, "m", "height of the bulk surface: median over x-y cells of the top of the highest bead"]
+    surface_low: Annotated[float, "m", "10th percentile of these heights"]
+    surface_high: Annotated[float, "m", "90th percentile of these heights"]
     brazil_nut: Annotated[float, "", "Brazil-nut index (z_large - z_small)/(z_large + z_small) of mean heights"]
-    brazil_nut_of_bulk: Annotated[float, "", "the same for the beads of the bulk"]
+    brazil_nut_of_bulk: Annotated[float, "", "Brazil-nut index of the beads of the bulk"]
     mean_square_velocity: Annotated[
         float, "m^2/s^2", "mean square velocity of the beads relative to the container, at the drive phase of the frame"
     ]
     contacts: Annotated[
         float,
         "",
-        "touching beads per bead: twice the bridges between touching beads over the number of beads; no walls",
+        "touching beads per bead, without walls: twice the number of touching pairs over the number of beads",
     ]
     bridges: Annotated[
-        float, "", "bridges per bead: twice the bridges between beads over the number of beads; no walls"
+        float, "", "bridges per bead, without walls: twice the number of bridges between beads over the number of beads"
     ]
-    touching: Annotated[int, "", "number of bridges between beads that touch"]
-    opened: Annotated[int, "", "number of bridges between beads that do not touch"]
+    touching: Annotated[int, "", "number of bridges between touching beads"]
+    opened: Annotated[int, "", "number of open bridges between beads (the beads do not touch)"]
     mean_force: Annotated[float, "N", "mean normal force of the bridges between beads, positive for attraction"]
     liquid_in_bridges: Annotated[float, "m^3", "total volume of all bridges, including those to walls"]
     bulk: Annotated[int, "", "number of beads in the bulk"]
     at_wall: Annotated[int, "", "number of beads with a bridge to a side wall"]
     large_at_wall: Annotated[int, "", "number of large beads with a bridge to a side wall"]
     clusters: Annotated[int, "", "number of clusters free of the bulk and held by a side wall"]
-    highest: Annotated[float, "m", "height of the topmost bead of these clusters; of the surface if there is none"]
+    highest: Annotated[
+        float, "m", "height of the topmost bead of these clusters; height of the surface if there are none"
+    ]
 
 
 @dataclass(frozen=True)
@@ -88,17 +90,17 @@ class Profile:
 
 @dataclass(frozen=True)
 class Member:
-    """``members.parquet``: one row per bead of a cluster that is free and held, and frame."""
+    """``members.parquet``: one row per frame and bead of a cluster that is free of the bulk and held by a side wall."""
 
     time: Annotated[float, "s", "time since the start of the drive"]
-    track: Annotated[int, "", "number of the cluster"]
-    bead: Annotated[int, "", "number of the bead, from 0"]
+    track: Annotated[int, "", "index of the cluster"]
+    bead: Annotated[int, "", "index of the bead, from 0"]
     large: Annotated[bool, "", "whether the bead is large"]
     height: Annotated[float, "m", "height of the bead's centre"]
 
 
 class Pile(Analysis):
-    """What loose beads in a container do: the bed, and the clusters that climb."""
+    """Piles of loose beads in a container: the bed, and the clusters that climb."""
 
     order = 2
     name = "pile"
@@ -115,15 +117,15 @@ class Pile(Analysis):
     derived: ClassVar[Described] = {
         "beads": ("", "number of beads"),
         "large": ("", "number of large beads"),
-        "duration": ("s", "shaken"),
+        "duration": ("s", "duration of the drive"),
     }
 
     def applies(self, case: Case) -> bool:
-        """Of loose beads in a container."""
+        """Cases with loose beads in a container."""
         return case.loose and case.boundary.closed
 
     def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
-        """The bed, the clusters, what happened to them, and the packing."""
+        """Tables and result: bed, clusters, events, packing."""
         case, first, definition = motion.case, motion.first_driven, ClimbCriteria()
         rows, wet, bulks, held, joined = [], [], [], [], []
         inner: dict[str, float | None] = {}
@@ -158,7 +160,7 @@ class Pile(Analysis):
             **_bed_result(motion, bed, inner),
             "clusters": len(tracks),
             "events": dict(Counter(event.event for event in events)),
-            "climbs": [_told_climb(climb) for climb in climbs if climb.climbed],
+            "climbs": [_climb_row(climb) for climb in climbs if climb.climbed],
             "rim": case.boundary.height,
             "duration": case.duration,
             "definition": vars(definition),
@@ -173,10 +175,10 @@ class Pile(Analysis):
         }
 
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
-        """Of the climbs, the bed, and each climb."""
+        """Quantities of all climbs, of the bed, and of each climb."""
 
         def of_climbs(fold: Callable[[list[Any]], Any], key: str) -> Callable[[Mapping[str, Any]], Any]:
-            """What is made of a number of all climbs that have it; NaN where there is none."""
+            """A function that reduces a number of all climbs; NaN without climbs."""
 
             def folded(result: Mapping[str, Any]) -> Any:
                 values = [climb[key] for climb in result["climbs"] if climb[key] is not None]
@@ -184,21 +186,21 @@ class Pile(Analysis):
 
             return folded
 
-        yield Quantity("climbs", "", "", "climbs", "clusters that climbed a wall", of=lambda one: len(one["climbs"]))
-        yield Quantity("climbs", "", "s", "onset", "when the first climb began", of=of_climbs(min, "onset"))
+        yield Quantity("climbs", "", "", "climbs", "number of climbs", of=lambda one: len(one["climbs"]))
+        yield Quantity("climbs", "", "s", "onset", "start of the first climb", of=of_climbs(min, "onset"))
         mean = of_climbs(lambda speeds: sum(speeds) / len(speeds), "speed")
         yield Quantity("climbs", "", "m/s", "speed", "mean speed of the climbs", of=mean)
         highest = of_climbs(max, "height")
-        yield Quantity("climbs", "", "m", "highest", "greatest height of a climb", of=highest)
-        told, led = "number of climbs led by a large bead", of_climbs(sum, "leader_large")
-        yield Quantity("climbs", "", "", "led_by_large", told, of=led)
+        yield Quantity("climbs", "", "m", "highest", "largest height of a climb", of=highest)
+        text, led = "number of climbs led by a large bead", of_climbs(sum, "leader_large")
+        yield Quantity("climbs", "", "", "led_by_large", text, of=led)
         yield Quantity("beads", "beads")
         yield Quantity("large", "large beads")
-        yield Quantity("driven", "time shaken", "s")
-        told = "number of clusters that came free of the pile, held by a wall"
-        yield Quantity("clusters", "clusters free of the pile and held by a wall", "", "clusters", told)
+        yield Quantity("driven", "time of shaking", "s")
+        text = "number of clusters that are free of the pile and held by a wall"
+        yield Quantity("clusters", "clusters free of the pile and held by a wall", "", "clusters", text)
         for event in result.get("events", ()):
-            yield Quantity(f"events.{event}", f"of them {event}")
+            yield Quantity(f"events.{event}", f"clusters {event}")
         yield Quantity("surface.start", "height of the surface at the start", "m")
         label = "height of the surface at the end"
         yield Quantity("surface.end", label, "m", "surface_end", "height of the pile's surface at the end")
@@ -207,9 +209,9 @@ class Pile(Analysis):
         yield Quantity("brazil_nut.end", label, "", "brazil_nut_end", label)
         yield Quantity("settling", "settling time", "s", "settling", "settling time before the drive")
         whens = {"rest": "at rest", "rest_inner": "at rest, beads away from walls", "shaken": "while shaken"}
-        for when, told in whens.items():
+        for when, text in whens.items():
             for what in ("contacts", "bridges"):
-                yield Quantity(f"coordination.{when}.{what}", f"{what} per bead, {told}")
+                yield Quantity(f"coordination.{when}.{what}", f"{what} per bead, {text}")
         for number, climb in enumerate(result.get("climbs", ())):
             place = f"climbs.{number}"
             name = f"climb {number + 1} ({' '.join(climb['walls'])}, led by a {_leader(climb)} bead)"
@@ -219,7 +221,7 @@ class Pile(Analysis):
             yield Quantity(f"{place}.size", f"{name}: beads")
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
-        """Did it climb, when, how fast, who led."""
+        """The bed, and the climbs with their times, speeds and leaders."""
         surface, nuts, bridges = result["surface"], result["brazil_nut"], result["coordination"]
         rest, inner, shaken = bridges["rest"], bridges["rest_inner"], bridges["shaken"]
         alone, early = "", result["driven"] < _WHOLE * result["duration"]
@@ -232,10 +234,10 @@ class Pile(Analysis):
             f"  surface    {surface['start'] * 1e3:.2f} mm at the start, {surface['end'] * 1e3:.2f} mm at the end",
             f"  segregation (z_large - z_small)/(z_large + z_small): {nuts['start']:.3f} at the start, "
             f"{nuts['end']:.3f} at the end",
-            f"  bridges    between beads, at rest: {_told_bridges(rest)}{alone}",
+            f"  bridges    between beads, at rest: {_bridges_text(rest)}{alone}",
         ]
         if shaken:
-            lines.append(f"             while shaken: {_told_bridges(shaken)}")
+            lines.append(f"             while shaken: {_bridges_text(shaken)}")
         lines += [
             f"  clusters   {result['clusters']} came free of the pile, held by a wall"
             + "".join(f", {count} {kind}" for kind, count in result["events"].items()),
@@ -274,13 +276,13 @@ class Pile(Analysis):
 
 
 def _late(motion: Motion) -> BoolArray:
-    """Which frames are those of the second half of the drive; the last one where it has not begun."""
+    """Frames of the second half of the drive; the last frame if the drive has not begun."""
     late: BoolArray = motion.time >= min(motion.time[motion.first_driven :].mean(), motion.time[-1])
     return late
 
 
 def _bed_result(motion: Motion, bed: Columns, inner: Mapping[str, float | None]) -> dict[str, Any]:
-    """What a result says of the bed; ``inner`` are the beads at no wall, just before the drive."""
+    """The bed in a result; ``inner``: beads away from walls, just before the drive."""
     first, end = motion.first_driven, motion.time[-1]
     rest = max(int(np.searchsorted(motion.time, 0.0, side="right")) - 1, 0)
     ends = ("surface", "brazil_nut")
@@ -300,16 +302,16 @@ def _bed_result(motion: Motion, bed: Columns, inner: Mapping[str, float | None])
     }
 
 
-def _told_climb(climb: Climb) -> dict[str, Any]:
-    """What a result says of a climb."""
+def _climb_row(climb: Climb) -> dict[str, Any]:
+    """A climb in a result."""
     names = ("begin", "end", "onset", "qualified", "gain", "speed", "standard_error", "leader_large", "height")
     known = {name: getattr(climb, name) for name in (*names, "size", "large")}
-    told = {name: value if np.isfinite(value) else None for name, value in known.items()}
-    return {**told, "leader": climb.leader, "walls": climb.wall_names.split(), "out_of_pile": climb.out_of_pile}
+    finite = {name: value if np.isfinite(value) else None for name, value in known.items()}
+    return {**finite, "leader": climb.leader, "walls": climb.wall_names.split(), "out_of_pile": climb.out_of_pile}
 
 
 def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
-    """Which cluster, free and held, each bead of a pile is in, -1 for none, and whether that climbs; shape (F, N)."""
+    """Track of each bead of a pile, -1 for none, and whether it climbs; shape (F, N)."""
     tables = tables_of(motion.directory)
     members, climbed = tables["members"], tables["clusters"]["climbed"]
     track = np.full(motion.position.shape[:2], -1, dtype=np.int64)
@@ -320,7 +322,7 @@ def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
 
 
 def climbs_by(tables: Mapping[str, Columns], definition: ClimbCriteria) -> list[Climb]:
-    """What climbs in a pile by another definition, from its tables; neither walls nor the bulk are told."""
+    """Climbs in a pile by another definition, from its tables; without walls and bulk."""
     time, members = tables["bed"]["time"], tables["members"]
     frame, bead = np.searchsorted(time, members["time"]), members["bead"]
     height = np.full((len(time), bead.max(initial=0) + 1), nan)
@@ -350,7 +352,7 @@ def _members(tracks: Sequence[Track], beads: Beads) -> list[Member]:
     ]
 
 
-def _told_bridges(counts: Mapping[str, Any]) -> str:
+def _bridges_text(counts: Mapping[str, Any]) -> str:
     return f"{counts['bridges']:.2f} per bead, {counts['contacts']:.2f} of them in contact"
 
 
@@ -359,7 +361,7 @@ def _leader(climb: Mapping[str, Any]) -> str:
 
 
 def _joined(bridges: Bridges, count: int) -> Joined:
-    """What the bridges of a frame join, of so many beads."""
+    """Beads and walls that the bridges of a frame join."""
     at_wall = np.zeros(count, dtype=np.bool_)
     at_wall[bridges.wall_beads[bridges.walls != FLOOR]] = True
     return bridges.beads.astype(np.int32), at_wall
@@ -399,7 +401,7 @@ def _bed(
 
 
 def coordination_of_inner(bridges: Bridges, count: int) -> dict[str, float | None]:
-    """Contacts and bridges, to other beads, of those of so many beads that are bridged to no wall and not to the floor.
+    """Contacts and bridges per bead to other beads, for beads without a bridge to a wall or the floor.
 
     Beads at a wall have fewer neighbours among the beads than those within, which a small pile has few of. Told are
     ``beads``, how many they are, and their mean ``contacts`` and ``bridges``; None where there is none.

@@ -1,4 +1,4 @@
-"""The analysis of the work that the drive does on walkers, and of what their way costs.
+"""Analysis of the work of the drive on walkers, and of their cost of transport.
 
 In the frame of the walls the shaking is an inertial force -M a(t) at a walker's mass centre, a being the walls'
 acceleration. Its work in a cycle, W = -M ∮ a · dx along the way x of the mass centre relative to the walls, is what
@@ -39,24 +39,24 @@ _MOST_NAMED = 6  # walkers for which the legend beside the panel has room; of mo
 class Work:
     """``work.parquet``: one row per walker and cycle."""
 
-    walker: Annotated[IntArray, "", "number of the walker, from 0"]
-    cycle: Annotated[IntArray, "", "number of the cycle of the drive, from 0"]
+    walker: Annotated[IntArray, "", "index of the walker, from 0"]
+    cycle: Annotated[IntArray, "", "index of the cycle of the drive, from 0"]
     work: Annotated[FloatArray, "J", "work of the drive on the walker in this cycle"]
 
 
 class Working(Analysis):
-    """What the drive spends on walkers."""
+    """Work of the drive on walkers."""
 
     name = "work"
     version = 2
     tables: ClassVar[Mapping[str, type]] = {"work": Work}
 
     def applies(self, case: Case) -> bool:
-        """Of walkers whose cycles are followed."""
+        """Cases of walkers with enough samples per cycle."""
         return bool(case.walkers) and case.run.samples_per_cycle >= LEAST_SAMPLES
 
     def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
-        """The work in each cycle; its mean over those after the settling ones, and what the way costs."""
+        """Work in each cycle, its mean after settling, and the cost of transport."""
         groups, settled = motion.groups, motion.case.run.settled_strobes
         works = [work_of(group) for group in groups]
         means = [work[settled:].mean(axis=0) for work in works]
@@ -69,12 +69,12 @@ class Working(Analysis):
         return {"work": columns_of(rows)}, summary
 
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
-        """Of a cycle, and of the way."""
+        """Work per cycle and cost of transport."""
         del result
-        told = "work of the drive on a walker per cycle, mean over the walkers"
-        yield Quantity("work", "of the drive per cycle", "J", "work", told)
-        told = "power of the drive over the power to lift a walker at its walking speed, mean over the walkers"
-        yield Quantity("cost_of_transport", "cost of transport", "", "cost_of_transport", told)
+        text = "work of the drive on a walker per cycle, mean over the walkers"
+        yield Quantity("work", "of the drive per cycle", "J", "work", text)
+        text = "power of the drive over weight times walking speed, mean over the walkers"
+        yield Quantity("cost_of_transport", "cost of transport", "", "cost_of_transport", text)
 
     def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
         """The work on each walker, cycle by cycle."""

@@ -1,4 +1,4 @@
-"""One HTML file that carries all that it shows: libraries, plots and players, packed; no network, no other file.
+"""Self-contained HTML file: libraries, plots and players are packed into it; no network, no other file.
 
 A page is a list of sections, one of which is shown at a time where there is JavaScript; without it all of their tables
 can be read.
@@ -33,16 +33,16 @@ if TYPE_CHECKING:
 _PACKAGE = "walkers.postprocess.report"
 NAME = "report.html"
 LARGEST = 5_000_000
-"""Bytes that a report may have: what any mail takes along."""
+"""Largest size of a report in bytes, small enough for mail."""
 COLOURS = ("#b0203c", "#1f3b73", "#3f7f93", "#c78a2c", "#5b6770", "#7a4a8c", "#4c8c4a", "#1d2429")
 _MARKERS = {"o": "circle", "s": "square", "^": "triangle", "v": "inverted_triangle", "D": "diamond", "x": "x"}
 """What Bokeh calls them; others are diamonds."""
 _MOST_POINTS = 600
-"""Of a line; what is longer is thinned out."""
+"""Largest number of points of a line; longer lines are thinned out."""
 
 
 def check_report(path: Path) -> None:
-    """Refuse a place for a report that is no .html file in a folder that there is by an InputError."""
+    """Raise `InputError` unless a path is an .html file in an existing folder."""
     check_place(path, ".html", ".htm")
     if not path.absolute().parent.is_dir():
         raise refused("--to", f"{path.absolute().parent}: there is no such folder")
@@ -86,10 +86,10 @@ def drawn(panel: Panel) -> Figure:
     """A panel as an interactive plot (Bokeh)."""
     from bokeh.models.annotations import BoxAnnotation
 
-    told = [line.error for line in panel.lines if line.error is not None]
+    errors = [line.error for line in panel.lines if line.error is not None]
     values = np.concatenate([[0.0] if panel.zero else [], *(line.y for line in panel.lines)])
-    seen = bool(told) and errors_seen(np.concatenate(told), values)
-    title = panel.title + (", with standard errors" if seen else f"; {UNSEEN}" if told else "")
+    seen = bool(errors) and errors_seen(np.concatenate(errors), values)
+    title = panel.title + (", with standard errors" if seen else f"; {UNSEEN}" if errors else "")
     options: dict[str, Any] = {"y_range": panel.limits} if panel.limits else {}
     scale = "log" if panel.log else "linear"
     plot = new_plot(title, panel.x, panel.y.replace("\n", " "), y_axis_type=scale, **options)
@@ -144,7 +144,7 @@ def with_legend(plot: Figure) -> Figure:
 
 
 def error_bars(plot: Figure, x: Sequence[Any] | FloatArray, y: FloatArray, error: FloatArray) -> None:
-    """Whiskers as long as an error to either side."""
+    """Error bars."""
     from bokeh.models import ColumnDataSource
     from bokeh.models.annotations import Whisker
 

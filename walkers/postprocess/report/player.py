@@ -1,4 +1,4 @@
-"""The beads of a run in three dimensions, to be played and turned: a K3D plot for reports and for notebooks.
+"""Interactive 3-D player of the beads of a run: a K3D plot for reports and notebooks.
 
 Lengths are in mm, in the frame of the boundary; where a walker walks far the view moves along with it. Beads are beach
 balls, which shows how they roll, but for those whose spins are recorded too seldom to be added up
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import k3d
 
 MOST_PLACES = 8000
-"""Beads times instants of a plot, for the size of its file."""
+"""Largest number of beads times frames in a plot, which limits its file size."""
 _FLOOR, _LINES = 0xDFE5E8, 0x9AA6AE
 _AROUND = 1.15  # extent of the view over that of the beads
 _VIEW, _ASPECT = 30.0, 1.5  # degrees, of the camera's view; width of a picture over its height, at least
@@ -46,7 +46,7 @@ _GRID = 2.0**-13
 
 @dataclass(frozen=True)
 class Player:
-    """A K3D plot (in notebooks a widget), its first and last instant (s), and what is to be said beside it.
+    """A K3D plot (a widget in notebooks), its first and last time (s), and captions.
 
     ``cameras`` are where one may look from, by name: place, target and upward direction of a camera, mm.
     """
@@ -59,7 +59,7 @@ class Player:
 
 
 def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: int = 480) -> Player:
-    """The player of a run directory or the motion in it, so many pixels high.
+    """The player of a run directory or of its motion, with a height in pixels.
 
     Beads times instants are so many ``places`` at most: instants are left out evenly, and walkers if they are many.
     """
@@ -74,13 +74,13 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
     if path is not None:
         path = path[::stride]
         shown = replace(shown, position=shown.position - 1e-3 * path[:, None])
-        captions.append("The view moves along with the beads.")
+        captions.append("The view follows the beads.")
     colours = scene.colours(np.any(scene.pointed_out[::stride], axis=0)).round() @ [0x10000, 0x100, 1]
     cameras = cameras_of(motion, scene.path)
     look: dict[str, Any] = {"grid_visible": False, "axes": ["x", "y", "z"], "background_color": 0xFFFFFF}
     plot = k3d.plot(height=height, name=motion.case.name, fps=30.0, camera_fov=_VIEW, camera_auto_fit=False, **look)
     if scene.turns is None:
-        captions.append("Beads do not show how they roll: their frames are too far apart for it.")
+        captions.append("The rolling of the beads is not shown: the frames are too far apart in time.")
         beads = [_points(shown, colours[0])]
     else:
         beads = _balls(shown, scene.turns.turned[::stride], colours)
@@ -145,7 +145,7 @@ def _thinned(motion: Motion, places: int) -> tuple[Motion, int, list[str]]:
         motion = motion.of_walkers(sorted(firsts.values(), key=lambda one: one.walker))
         if len(firsts) < count:
             each = "" if len(firsts) == 1 else " of each make"
-            captions.append(f"The first walker{each} is shown, of {count} in the run.")
+            captions.append(f"The view shows the first walker{each}; the run has {count} walkers.")
     stride, samples = ceil(len(motion.time) * len(motion.radius) / places), motion.case.run.samples_per_cycle
     # Of a divisor of the samples in a cycle, or of whole cycles, the phases are the same in each cycle.
     divisors = (number for number in range(stride, samples + 1) if samples % number == 0)
@@ -153,7 +153,7 @@ def _thinned(motion: Motion, places: int) -> tuple[Motion, int, list[str]]:
     if stride > 1:
         cycles = "each cycle" if stride <= samples else f"{stride // samples} cycles"
         captions.append(
-            f"Recorded instants shown: {max(samples // stride, 1)} in {cycles}, with interpolated ones between them."
+            f"Recorded frames shown: {max(samples // stride, 1)} in {cycles}, with interpolated frames between them."
         )
     return motion, stride, captions
 

@@ -1,4 +1,4 @@
-"""The report of a run: its parameters and where they come from, its numbers, its plots, and the beads to be played."""
+"""Report of a run: parameters with sources, results, plots, and a 3-D player."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
 
 Origins = tuple[Origin, ...] | None
-"""Where the values of a case come from; None: as the run recorded it."""
+"""Sources of the values of a case; None: as recorded in the run."""
 
 
 class RunReport:
-    """What a page shows of a run, for its template; what the page's scripts unpack is ``carried``.
+    """Contents of a page for its template; ``carried``: data that the scripts unpack.
 
     The page has it in a section of its own, and in its player so many places at most (`player_of`).
     """
@@ -78,7 +78,7 @@ def report_run(directory: Path, to: Path | None = None, origins: Origins = None)
 
 
 def shown_of(case: Case, result: dict[str, Any], origins: Origins = None) -> dict[str, Any]:
-    """Of a result the warnings, quantities, and what these are uncertain by; of a case a summary and the parameters.
+    """Warnings, quantities and uncertainties of a result; summary and parameters of a case.
 
     Of runs that did not keep where their values come from, the parameters are in SI units.
     """
@@ -99,7 +99,7 @@ def shown_of(case: Case, result: dict[str, Any], origins: Origins = None) -> dic
 
 
 def result_html(directory: Path, result: dict[str, Any], origins: Origins = None) -> str:
-    """A result as a piece of HTML: a table with errors and units, warnings, and the parameters folded in."""
+    """A result as an HTML fragment: table with errors and units, warnings, collapsed parameters."""
     result = with_bands(directory, result)
     headline = next((line for one in analyses_in(result) for line in one.lines(result)), result["case"])
     shown = shown_of(case_of(directory), result, origins)
