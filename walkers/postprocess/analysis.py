@@ -195,7 +195,7 @@ class Analysis(ABC):
         """The result as text; by default the numbers of reports in mm, mm/s, degrees."""
         rows = (one.row(result) for one in self.quantities(result) if one.label)
         parts = [f"{one.name} {one.text}" for one in rows if one.value is not None]
-        return [f"  {self.name:10} {'; '.join(parts) or '-'}"]
+        return [f"  {self.name:10} {'; '.join(parts).removeprefix(f'{self.name} ') or '-'}"]
 
     def uncertainty(self, result: Mapping[str, Any]) -> list[str]:
         """Uncertainty of the main numbers in sentences; default: the band of a spread, or the uncertain parameters."""

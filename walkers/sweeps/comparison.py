@@ -154,6 +154,8 @@ def _scatters(run: Path, result: Mapping[str, Any]) -> dict[str, float]:
 
     scatters = {name: _number_of(result[name]["scatter"]) for name in _VELOCITIES}
     walkers = read_table(run, "walkers")
+    if result.get("goes_uphill") and (walkers["facing"] > 0).any():
+        walkers = walkers[walkers["facing"] > 0]
     for name in walkers.columns:
         of_first = name.rpartition("_")[0] in _FIRST_MAKE
         rows = walkers[walkers["make"] == 0] if of_first else walkers

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import degrees, nan
+from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
@@ -153,9 +154,9 @@ class Walking(Analysis):
             "walkers": _stacked(rows),
             "bridges": _bridges(motion),
         }
-        known, makes = self.derived_of(case), [_summary(one) for one in rows]
+        known, makes = self.derived_of(case), [_summary(one, case) for one in rows]
         summary = {
-            **_summary(tables["walkers"]),
+            **_summary(tables["walkers"], case),
             # A contact's number means another one in another make: these are of the first.
             **{name: makes[0][name] for name in ("rotation", "sliding", "open")},
             "walkers_met": walkers_met(groups),
@@ -198,20 +199,21 @@ class Walking(Analysis):
             label = f"velocity of walkers that started facing {way}"
             told = f"mean velocity of the walkers that started facing {name}"
             yield Quantity(f"{name}_facing", label, "m/s", f"{name}_facing", told)
-        if result.get("turned_round"):
+        if _fell(result):
             yield Quantity("kept_heading", "velocity of walkers that kept their heading", "m/s")
         told = "mean velocity of the centres of mass along the drive axis; on a slope, uphill"
         yield Quantity("axial_velocity.mean", "velocity along the drive axis", "m/s", "axial_velocity", told)
         yield Quantity("lateral_velocity.mean", "velocity across the drive axis", "m/s")
+        these = ", walkers facing up" if result.get("goes_uphill") else ""
         for bead in result.get("rotation", ("bead_1", "bead_2")):
             number = bead.partition("_")[2]
-            label = f"rotation of bead {number}, −R dφ/dt"
+            label = f"rotation of bead {number}{these}, −R dφ/dt"
             yield Quantity(f"rotation.{bead}", label, "m/s", f"rotation_{number}", _ROTATION)
         contacts = result.get("contacts", {f"contact_{number}": "" for number in (1, 2, 3)})
         families = {"sliding": ("sliding", "m/s", _SLIDING), "open": ("contact open", "share", _OPEN)}
         for (family, (label, unit, told)), (contact, name) in product(families.items(), contacts.items()):
             column = f"{family}_{contact.partition('_')[2]}"
-            yield Quantity(f"{family}.{contact}", f"{label}, {name}", unit, column, told)
+            yield Quantity(f"{family}.{contact}", f"{label}, {name}{these}", unit, column, told)
         label = "beads farther apart than a bridge reaches"
         yield Quantity("separated_fraction", label, "share", "separated_fraction", _SEPARATED)
         told = "mean orientation at the end"
@@ -237,17 +239,18 @@ class Walking(Analysis):
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """Velocities, rotation, sliding and orientation of all walkers, and velocities of each make."""
         end, names, open_ones = result["orientation_end"], result["contacts"], result["open"]
-        drive, told = result["drive"], bool(_band(result)) and not result["turned_round"]  # the band, by the headline
+        drive, told = result["drive"], bool(_band(result)) and not _fell(result)  # the band, by the headline
         if None not in (result["gamma0"], result["sin_delta"]):
             drive += f", Γ0 = {result['gamma0']:.3g}, sin δ = {result['sin_delta']:.3g}"
         beads = ", ".join(f"bead {place} {_speed(one)}" for place, one in enumerate(result["rotation"].values(), 1))
         sliding = ", ".join(f"{name} {_speed(result['sliding'][contact])}" for contact, name in names.items())
+        these = "facing up: " if result["goes_uphill"] and result["right_facing"]["n"] < result["walkers"] else ""
         lines = [
-            *(_of_turned(result, drive) if result["turned_round"] else _of_walkers(result, drive)),
+            *(_of_fallen(result, drive) if _fell(result) else _of_walkers(result, drive)),
             *wrapped(self.uncertainty(result)[told:]),
             *_of_sides(result),
-            f"  rotation   {beads} mm/s",
-            f"  sliding    {sliding} mm/s",
+            fill(f"  rotation   {these}{beads} mm/s", 110, subsequent_indent=" " * 13),
+            fill(f"  sliding    {these}{sliding} mm/s", 110, subsequent_indent=" " * 13),
             f"  orientation at the end {_angle(end['smallest'])}° to {_angle(end['largest'])}°",
         ]
         if any(open_ones.values()):
@@ -383,20 +386,26 @@ def spread(values: FloatArray) -> dict[str, Any]:
     }
 
 
+def alike(facing: IntArray, case: Case) -> BoolArray:
+    """Which walkers means of gait and work include, shape (W,): on a slope those facing up, if there are any."""
+    up = facing > 0
+    return up if case.goes_uphill and up.any() else np.ones_like(up)
+
+
 def _mean(values: FloatArray) -> float | None:
     """Mean over those that have the number."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if len(known) else None
 
 
-def _summary(walkers: Columns) -> dict[str, Any]:
+def _summary(walkers: Columns, case: Case) -> dict[str, Any]:
     """What a result says of some rows of the table of walkers."""
     velocity, axial, facing = (walkers[name] for name in ("velocity", "axial_velocity", "facing"))
-    turned = np.isfinite(walkers["turned_at"])
+    turned, same = np.isfinite(walkers["turned_at"]), alike(facing, case)
 
     def means(family: str, named: str) -> dict[str, float | None]:
         columns = [name for name in walkers if name.rpartition("_")[0] == family]
-        return {f"{named}_{name.rpartition('_')[2]}": _mean(walkers[name]) for name in columns}
+        return {f"{named}_{name.rpartition('_')[2]}": _mean(walkers[name][same]) for name in columns}
 
     return {
         "velocity": spread(velocity),
@@ -460,29 +469,33 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
 
 
 def _of_sides(result: Mapping[str, Any]) -> list[str]:
-    """How fast walkers are that started facing either way, and how many are steady."""
-    if result["turned_round"]:
+    """How fast walkers are that started facing either way, how many turned, and how many are steady."""
+    if _fell(result):
         return []
     first, second = ways(uphill=result["goes_uphill"])
     right, left = (
         f"{_speed(side['mean'])} mm/s ({side['n']})" if side["n"] else "none"
         for side in (result["right_facing"], result["left_facing"])
     )
-    return wrapped([f"started facing {first} {right}, {second} {left}; {_steady(result)}"])
+    sentence = f"started facing {first} {right}, {second} {left}; {_steady(result)}"
+    turned = f"{result['turned_round']} of {result['walkers']} walkers turned by more than 90°"
+    return wrapped([sentence, turned] if result["turned_round"] else [sentence])
 
 
-def _of_turned(result: Mapping[str, Any], drive: str) -> list[str]:
-    """What became of walkers of which some turned by more than 90°: a velocity along their heading says nothing."""
-    axial, kept, tilted = result["axial_velocity"], result["kept_heading"], result["goes_uphill"]
-    first, second = ways(uphill=tilted)
-    right, left = (
+def _fell(result: Mapping[str, Any]) -> bool:
+    """Whether walkers turned over on a slope: a mean with them is no walker's velocity."""
+    return bool(result.get("goes_uphill") and result["turned_round"])
+
+
+def _of_fallen(result: Mapping[str, Any], drive: str) -> list[str]:
+    """Posture of walkers of which some turned over, their velocity up the slope, and that of the others."""
+    axial, kept = result["axial_velocity"], result["kept_heading"]
+    up, down = (
         "none" if speed is None else f"{_speed(speed)} mm/s" for speed in (axial["right_facing"], axial["left_facing"])
     )
-    round_ones = f"{result['turned_round']} of {result['walkers']} walkers turned round"
     return [
-        *_headlines(result, drive, f"{round_ones}, axial velocity {_speed(axial['mean'])} mm/s"),
-        f"  axial velocity, positive {'up' if tilted else 'to the right'}: started facing {first} "
-        f"{right}, {second} {left}; {_steady(result)}",
+        *_headlines(result, drive),
+        f"  axial velocity, positive up: started facing up {up}, down {down}; {_steady(result)}",
         f"  velocity   {_speed(kept['mean'])} mm/s along the heading, for the {kept['n']} that kept it"
         if kept["n"]
         else "  velocity   none: no walker kept its heading",
@@ -516,7 +529,7 @@ def _numerical(result: Mapping[str, Any]) -> str:
 def _scatter(result: Mapping[str, Any]) -> list[str]:
     """How alike the copies are, if there are several."""
     velocity, count = result["velocity"], result["velocity"]["n"]
-    if count < 2 or result["turned_round"]:
+    if count < 2 or _fell(result):
         return []
     what = "walkers" if result["meet"] or "makes" in result else "copies"
     if apart := sides_apart(result):  # what the sides differ by is no scatter
@@ -532,10 +545,11 @@ def _scatter(result: Mapping[str, Any]) -> list[str]:
     return [f"scatter of the {count} {what} {_error(velocity['scatter'])} (standard deviation{ends})"]
 
 
-def _headlines(result: Mapping[str, Any], drive: str, level: str = "") -> list[str]:
-    """The drive; before it, on a slope, whether walkers stay as they were to face, and what is to be said elsewhere."""
-    told = level if result["posture"] is None else _told_posture(result["posture"])
-    return [f"{result['case']}: {told}", f"  drive      {drive}"] if told else [f"{result['case']}: {drive}"]
+def _headlines(result: Mapping[str, Any], drive: str) -> list[str]:
+    """The drive; before it, on a slope, the posture of the walkers."""
+    if result["posture"] is None:
+        return [f"{result['case']}: {drive}"]
+    return [f"{result['case']}: {_told_posture(result['posture'])}", f"  drive      {drive}"]
 
 
 def _told_posture(summary: Mapping[str, Any]) -> str:

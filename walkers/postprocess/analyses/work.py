@@ -21,7 +21,7 @@ import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.physics.units import ACCELERATION_OF_ONE_G
-from walkers.postprocess.analyses.walking import spread
+from walkers.postprocess.analyses.walking import alike, spread
 from walkers.postprocess.analysis import Analysis, Measured, Quantity
 from walkers.postprocess.dump import FloatArray, IntArray
 from walkers.postprocess.figures import Line, Panel, nested_widths
@@ -48,7 +48,7 @@ class Working(Analysis):
     """Work of the drive on walkers."""
 
     name = "work"
-    version = 2
+    version = 3
     tables: ClassVar[Mapping[str, type]] = {"work": Work}
 
     def applies(self, case: Case) -> bool:
@@ -64,16 +64,18 @@ class Working(Analysis):
         walker, cycles = [one.walker for group in groups for one in group.walkers], len(works[0])
         each = np.concatenate(works, axis=1).T.reshape(-1)
         rows = Work(np.repeat(walker, cycles), np.tile(np.arange(cycles), len(walker)), each)
-        cost = np.concatenate(costs)
-        summary = {"work": spread(np.concatenate(means)), "cost_of_transport": spread(cost[np.isfinite(cost)])}
+        facing = np.array([one.facing for group in groups for one in group.walkers])
+        these = alike(facing, motion.case)
+        cost = np.concatenate(costs)[these]
+        summary = {"work": spread(np.concatenate(means)[these]), "cost_of_transport": spread(cost[np.isfinite(cost)])}
         return {"work": columns_of(rows)}, summary
 
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
         """Work per cycle and cost of transport."""
         del result
-        text = "work of the drive on a walker per cycle, mean over the walkers"
-        yield Quantity("work", "of the drive per cycle", "J", "work", text)
-        text = "power of the drive over weight times walking speed, mean over the walkers"
+        text = "work of the drive on a walker per cycle, mean over the walkers (on a slope, those facing up)"
+        yield Quantity("work", "work of the drive per cycle", "J", "work", text)
+        text = "power of the drive over weight times walking speed, mean over the walkers (on a slope, those facing up)"
         yield Quantity("cost_of_transport", "cost of transport", "", "cost_of_transport", text)
 
     def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
