@@ -200,7 +200,7 @@ def test_long_runs_are_thinned_out_and_say_so(walked_run: Path, pile_run: Path) 
     player = player_of(walked_run, places=200)
     beads = [one for one in player.plot.objects if one.name.startswith("bead")]
     assert sum(len(one.model_matrix) for one in beads) <= 200
-    assert any("instants shown" in caption for caption in player.captions)
+    assert any("frames shown" in caption for caption in player.captions)
     pile, motion = player_of(pile_run), read_motion(pile_run).driven
     points = next(one for one in pile.plot.objects if one.name == "beads")
     np.testing.assert_allclose(points.positions[f"{motion.time[-1]:.6f}"], 1e3 * motion.position[-1], atol=1e-3)
