@@ -1,6 +1,6 @@
-"""The analysis of walkers: their tables, their velocities, rotation and sliding, their orientation.
+"""Analysis of walkers: velocity, rotation, sliding, orientation.
 
-The result follows the paper's protocol: each velocity is the mean over copies, its error bar the largest minus the
+The result follows the protocol of the paper: each velocity is the mean over copies, its error bar the largest minus the
 smallest, with the walkers that face left and right also apart. The copies differ only in how they start: their scatter
 says how alike they are, not what the velocity is uncertain by.
 """
@@ -48,24 +48,24 @@ if TYPE_CHECKING:
     from walkers.postprocess.figures import Panel
 
 NEAR = 1.5
-"""Walkers whose mass centres come within this many lengths of one have met."""
+"""Walkers whose centres of mass come closer than this multiple of their length have met."""
 
-_CONTACTS = "contacts: each bead with the wall, in order, then the pairs of beads in contact at the start"
+_CONTACTS = "contacts: beads with the wall, in order, then pairs of beads that touch at the start"
 _ROTATION = "rotation velocity -R dphi/dt of a bead"
 _SLIDING = f"sliding velocity; {_CONTACTS}"
 _OPEN = f"fraction of the time during which the contact is open; {_CONTACTS}"
-_SEPARATED = "fraction of the samples in which two beads are farther apart than a bridge can reach"
+_SEPARATED = "fraction of the samples in which two beads are farther apart than the rupture distance of a bridge"
 
 
 @dataclass(frozen=True)
 class Trajectory:
     """``trajectory.parquet``: one row per sample and walker."""
 
-    walker: Annotated[IntArray, "", "number of the walker, from 0"]
+    walker: Annotated[IntArray, "", "index of the walker, from 0"]
     time: Annotated[FloatArray, "s", "time since the start of the drive"]
     cycle: Annotated[FloatArray, "", "time in cycles of the drive"]
-    x: Annotated[FloatArray, "m", "centre of mass relative to the substrate"]
-    y: Annotated[FloatArray, "m", "centre of mass relative to the substrate"]
+    x: Annotated[FloatArray, "m", "x of the centre of mass relative to the substrate"]
+    y: Annotated[FloatArray, "m", "y of the centre of mass relative to the substrate"]
     z: Annotated[FloatArray, "m", "height of the centre of mass above the substrate"]
     orientation: Annotated[FloatArray, "rad", "angle between the heading and the direction given by facing"]
     velocity: Annotated[
@@ -82,9 +82,9 @@ class Trajectory:
 class WalkerRows:
     """``walkers.parquet``: one row per walker; means are over the cycles after the settling ones."""
 
-    walker: Annotated[IntArray, "", "number of the walker, from 0"]
-    make: Annotated[IntArray, "", "number of the walker's make (body of the case), from 0: dimers, then clusters"]
-    facing: Annotated[IntArray, "", "given direction at the start: 1 along the drive axis (right), -1 opposite (left)"]
+    walker: Annotated[IntArray, "", "index of the walker, from 0"]
+    make: Annotated[IntArray, "", "index of the walker's make (body of the case), from 0: dimers, then clusters"]
+    facing: Annotated[IntArray, "", "direction at the start: 1 along the drive axis (right), -1 opposite (left)"]
     start_angle: Annotated[FloatArray, "rad", "orientation at the start"]
     velocity: Annotated[
         FloatArray, "m/s", "velocity along the heading after the settling cycles, positive toward the large beads"
@@ -111,21 +111,21 @@ class BridgeRows:
     """``bridges.parquet``: one row per bridge and frame."""
 
     time: Annotated[FloatArray, "s", "time since the start of the drive"]
-    walker: Annotated[IntArray, "", "number of the walker, from 0"]
+    walker: Annotated[IntArray, "", "index of the walker, from 0"]
     contact: Annotated[
-        IntArray, "", "number of the contact, from 1: beads with walls, then pairs of beads; 0 for other bridges"
+        IntArray, "", "index of the contact, from 1: beads with walls, then pairs of beads; 0 for other bridges"
     ]
-    bead_1: Annotated[IntArray, "", "number of the bead in the run, from 0"]
-    bead_2: Annotated[IntArray, "", "number of the other bead, -1 for a wall"]
-    wall: Annotated[IntArray, "", "number of the wall, 0 for the floor if there is one, -1 for none"]
-    other_walker: Annotated[IntArray, "", "number of the walker at the other end, -1 for none"]
+    bead_1: Annotated[IntArray, "", "index of the bead in the run, from 0"]
+    bead_2: Annotated[IntArray, "", "index of the other bead, -1 for a wall"]
+    wall: Annotated[IntArray, "", "index of the wall, 0 for the floor if there is one, -1 for none"]
+    other_walker: Annotated[IntArray, "", "index of the walker at the other end, -1 for none"]
     gap: Annotated[FloatArray, "m", "gap, negative for overlap"]
     touching: Annotated[BoolArray, "", "whether the surfaces touch"]
     normal_force: Annotated[FloatArray, "N", "net normal force (capillary, viscous, elastic), positive for attraction"]
 
 
 class Walking(Analysis):
-    """How walkers walk."""
+    """Velocity, rotation, sliding and orientation of walkers."""
 
     order = 0
     name = "walking"
@@ -135,17 +135,17 @@ class Walking(Analysis):
     derived: ClassVar[Described] = {
         "gamma0": ("", "dimensionless peak force Γ0 = a0 M/(4πγR̄) of dimers"),
         "sin_delta": ("", "asymmetry parameter (R1 - R2)/(R1 + R2) of dimers"),
-        "mass_asymmetry": ("", "μ = (m1 - m2)/M of dimers"),
-        "radius_1": ("m", "of bead 1"),
-        "radius_2": ("m", "of bead 2"),
+        "mass_asymmetry": ("", "mass asymmetry μ = (m1 - m2)/M of dimers"),
+        "radius_1": ("m", "radius of bead 1"),
+        "radius_2": ("m", "radius of bead 2"),
     }
 
     def applies(self, case: Case) -> bool:
-        """Of walkers."""
+        """Cases with walkers."""
         return bool(case.walkers)
 
     def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
-        """Tables of all walkers; the result is of all of them, its contacts of the first make, and of each make."""
+        """Tables and result of all walkers and of each make; contacts are those of the first make."""
         case, groups = motion.case, motion.groups
         gaits = [gait(group) for group in groups]
         rows = [columns_of(_rows(*one)) for one in zip(groups, gaits, strict=True)]
@@ -176,7 +176,7 @@ class Walking(Analysis):
         return tables, summary
 
     def derived_of(self, case: Case) -> dict[str, float]:
-        """Of dimers; NaN where walkers are larger clusters."""
+        """Derived columns of dimers; NaN for larger clusters."""
         first, second = case.walkers[0].radii[:2]
         known = {"radius_1": first, "radius_2": second}
         if len(case.walkers[0].radii) > 2:
@@ -186,12 +186,12 @@ class Walking(Analysis):
         return {"gamma0": dimer.gamma0(case.drive.peak_acceleration), **known}
 
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
-        """Of all walkers, their contacts, makes and postures; sweeps have the contacts of dimers."""
+        """Quantities of all walkers: velocities, contacts, makes, postures; sweeps have the contacts of dimers."""
         first, second = ways(uphill=result.get("goes_uphill", False))
         label = "along the heading, positive toward the large bead"
         yield Quantity("velocity", f"velocity {label}", "m/s", "velocity", f"mean velocity of the walkers, {label}")
         yield Quantity("velocity.smallest", "", "m/s", "smallest", "velocity of the slowest walker")
-        told = "velocity of the fastest walker; the paper's error bar is largest minus smallest"
+        told = "velocity of the fastest walker; the error bars of the paper are largest minus smallest"
         yield Quantity("velocity.largest", "", "m/s", "largest", told)
         told = "standard deviation of the velocities of the copies; not an error of the mean"
         yield Quantity("velocity.scatter", "", "m/s", "scatter", told)
@@ -214,9 +214,9 @@ class Walking(Analysis):
         for (family, (label, unit, told)), (contact, name) in product(families.items(), contacts.items()):
             column = f"{family}_{contact.partition('_')[2]}"
             yield Quantity(f"{family}.{contact}", f"{label}, {name}{these}", unit, column, told)
-        label = "beads farther apart than a bridge reaches"
+        label = "beads farther apart than the rupture distance"
         yield Quantity("separated_fraction", label, "share", "separated_fraction", _SEPARATED)
-        told = "mean orientation at the end"
+        told = "mean orientation at the end of the run"
         yield Quantity("orientation_end", "orientation at the end", "rad", "orientation_end", told)
         for number, make in enumerate(result.get("makes", [])):
             yield Quantity(f"makes.{number}.velocity", f"velocity of walkers with radii {_radii(make)} mm", "m/s")
@@ -225,7 +225,7 @@ class Walking(Analysis):
         yield Quantity("steady", label, column="steady", meaning=f"number of {label}")
         told = "number of walkers that turned by more than 90° since their start"
         yield Quantity("turned_round", "walkers that turned by more than 90°", column="turned_round", meaning=told)
-        told = "on a slope: number of walkers that end in the given direction and tilt no further"
+        told = "on a slope: number of walkers that end within 15° of the direction of facing and do not tilt further"
         yield Quantity("posture.upright", "walkers that are upright", column="upright", meaning=told)
         yield from (Quantity(f"posture.{one}", f"walkers that are {one}") for one in POSTURES[1:])
         yield Quantity("cycles", "cycles driven", column="cycles", meaning="cycles of the drive, including settling")
@@ -262,7 +262,7 @@ class Walking(Analysis):
         ]
 
     def uncertainty(self, result: Mapping[str, Any]) -> list[str]:
-        """Of the velocity: what nobody measured, the numerical error; and how alike the copies are."""
+        """Uncertainty of the velocity: unmeasured values, numerical error, and scatter of the copies."""
         known = super().uncertainty(result)
         if result.get("bands") and (apart := sides_apart(result)):
             told = bands_text(result, {"right_facing": "m/s"}, {"right_facing": next(iter(apart.values()))})
@@ -270,20 +270,20 @@ class Walking(Analysis):
         return [*known, _numerical(result), *_scatter(result)]
 
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
-        """What makes the velocity doubtful."""
+        """Reasons to doubt the velocity."""
         warnings = []
         if lacking := result["walkers"] - result["steady"]:
             told = f"{lacking} of {result['walkers']} walkers are not steady"
             warnings.append(f"{told}: the velocity depends on the length of the run")
         if (share := result["separated_fraction"] or 0.0) > SEPARATED:
             told = f"for {100.0 * share:.0f} % of the time"
-            warnings.append(f"beads of walkers are farther apart than a bridge reaches {told}")
+            warnings.append(f"beads of walkers are farther apart than the rupture distance {told}")
         if result["walkers_met"] and not result["meet"]:
             warnings.append("walkers came close to each other and are not independent: increase the spacing")
         return warnings
 
     def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
-        """Where they went and turned, how fast; and their gait if it was sampled often enough."""
+        """Panels of path, orientation and velocity; also of the gait if there are enough samples per cycle."""
         from walkers.postprocess.figures import gait_panels, velocity_panel, walk_panels
 
         groups = run.motion.groups
@@ -291,7 +291,7 @@ class Walking(Analysis):
         return {"walk": walked, "gait": gait_panels(groups[0])}
 
     def draw(self, name: str, panels: Sequence[Panel], run: Measured) -> Figure:
-        """How they walked beside a walker's beads, to scale."""
+        """Figure of the walk, with the beads of one walker to scale."""
         from walkers.postprocess.figures import walk_figure
 
         return walk_figure(run.motion.groups, *panels[:2]) if name == "walk" else super().draw(name, panels, run)
@@ -399,7 +399,7 @@ def _mean(values: FloatArray) -> float | None:
 
 
 def _summary(walkers: Columns, case: Case) -> dict[str, Any]:
-    """What a result says of some rows of the table of walkers."""
+    """Summary of rows of the table of walkers for a result."""
     velocity, axial, facing = (walkers[name] for name in ("velocity", "axial_velocity", "facing"))
     turned, same = np.isfinite(walkers["turned_at"]), alike(facing, case)
 
@@ -430,7 +430,7 @@ def _summary(walkers: Columns, case: Case) -> dict[str, Any]:
 
 
 def _posture(groups: Iterable[Group], walkers: Columns) -> dict[str, Any]:
-    """How many walkers are how, when the first and the last turned over (s), and how far off the others end (rad)."""
+    """Numbers of walkers by posture, times of turning over (s), and final deviation of the others (rad)."""
     counts = Counter(posture for group in groups for posture in postures(group))
     turned_at, end = walkers["turned_at"], np.abs(walkers["orientation_end"])
     over, kept = turned_at[np.isfinite(turned_at)], end[np.isnan(turned_at)]
@@ -442,7 +442,7 @@ def _posture(groups: Iterable[Group], walkers: Columns) -> dict[str, Any]:
 
 
 def _contact_names(group: Group) -> dict[str, str]:
-    """What the contacts of the first make are called."""
+    """Names of the contacts of the first make."""
     pairs = group.make.pairs
     names = [f"bead {bead + 1}" for bead in range(len(group.radii))]
     names += ["bead on bead"] if len(pairs) == 1 else [f"beads {one + 1}-{other + 1}" for one, other in pairs]
@@ -450,14 +450,14 @@ def _contact_names(group: Group) -> dict[str, str]:
 
 
 def walkers_met(groups: Iterable[Group]) -> bool:
-    """Whether two walkers came so near each other that they are no longer independent replicates."""
+    """Whether two walkers came so close that they are no longer independent replicates."""
     groups = list(groups)
     centre = np.concatenate([one.mass_centre[:: one.case.run.samples_per_cycle, :, :2] for one in groups], axis=1)
     return came_near(centre, NEAR * max(one.make.length for one in groups))
 
 
 def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
-    """How fast walkers are that kept their heading."""
+    """Velocity of walkers that kept their heading."""
     velocity = result["velocity"]
     toward = {0.0: "toward bead 1", None: "along the heading"}.get(result["sin_delta"], "toward the large bead")
     headline = f"{_speed(velocity['mean'])} mm/s{_band(result)}, positive {toward}"
@@ -469,7 +469,7 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
 
 
 def _of_sides(result: Mapping[str, Any]) -> list[str]:
-    """How fast walkers are that started facing either way, how many turned, and how many are steady."""
+    """Velocities by direction at the start, and the numbers of walkers that turned and that are steady."""
     if _fell(result):
         return []
     first, second = ways(uphill=result["goes_uphill"])
@@ -527,7 +527,7 @@ def _numerical(result: Mapping[str, Any]) -> str:
 
 
 def _scatter(result: Mapping[str, Any]) -> list[str]:
-    """How alike the copies are, if there are several."""
+    """Scatter of the copies, if there are several."""
     velocity, count = result["velocity"], result["velocity"]["n"]
     if count < 2 or _fell(result):
         return []
@@ -574,12 +574,12 @@ def _told_posture(summary: Mapping[str, Any]) -> str:
 
 
 def _radii(make: Mapping[str, Any]) -> str:
-    """Of the beads of a make, mm."""
+    """Radii of the beads of a make, mm."""
     return radii_text(make["radii"])
 
 
 def _steady(result: Mapping[str, Any]) -> str:
-    """How many are steady, and why the run ended, each with its criterion."""
+    """Number of steady walkers and reason for the end of the run, with criteria."""
     told = f"{result['steady']} of {result['walkers']} steady (both halves agree within {percent(STEADY_DIFFERENCE)})"
     if result.get("ended_early"):
         told += f"; ended after {result['cycles']} cycles (constant within {percent(CONSTANT)})"
