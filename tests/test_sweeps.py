@@ -9,6 +9,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -281,7 +282,9 @@ def test_interrupts_leave_no_engine_and_the_next_call_goes_on(
 
     def all_are_engines() -> bool:  # a process that is just started still has the name of its parent
         children = psutil.Process(program.pid).children()
-        return all(b"liggghts" in Path(f"/proc/{child.pid}/cmdline").read_bytes() for child in children)
+        with suppress(FileNotFoundError):  # one that has just ended
+            return all(b"liggghts" in Path(f"/proc/{child.pid}/cmdline").read_bytes() for child in children)
+        return False
 
     wait_for(all_are_engines)
     program.send_signal(number)
