@@ -49,6 +49,8 @@ _FACT = re.compile(r"<!--fact (?P<name>\S+)-->(?P<text>[^<]*)<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
 _ASSEMBLES = {"run.duration": "10 s", "run.seed": 10}
 """The pile whose first climber the page follows: it climbs a plain wall, and its beads were no neighbours at rest."""
+_PAPERS = {"run.ranks": 1, "run.seed": 1}
+"""Of the paper's pile, as the sweep pile-paper runs it."""
 _OF_CALIBRATION = ("corner", "predictions")
 
 
@@ -152,6 +154,12 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     "pile-map": _of_climbs("pile-map"),
     "pile-calibrated": _of_climbs("pile-calibrated"),
     "pile-cylinder": _of_climbs("pile-cylinder"),
+    "pile-paper": _of_climbs("pile-paper"),
+    "paper-pile": _of_run("pile-paper", "pile-fig1a", _PAPERS, apart=2.0),
+    "paper-pile-film": _of_run(
+        *("pile-paper", "pile-fig1a", _PAPERS),
+        film=FilmOptions(size=(360, 640), fps=10, slowdown=1.0, begin=4.0, end=10.0),
+    ),
     "pile-film": _of_run(
         *("pile", "pile-small", _ASSEMBLES),
         film=FilmOptions(size=(360, 640), fps=10, slowdown=1.0, begin=2.5, end=8.5),

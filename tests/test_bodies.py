@@ -170,7 +170,7 @@ def test_walkers_on_a_tray_meet_and_stick(tmp_path: Path) -> None:
     for row in merged.itertuples():
         joined = between[(between["walker"] == row.walker) & (between["other_walker"] == row.other)]
         assert joined["time"].min() == pytest.approx(row.time)
-    assert "together" in tray.describe()
+    assert "at the end joined" in tray.describe()
     assert "spacing" not in tray.describe()  # a meeting is no fault here
     group = tray.motion.groups[0]
     centre = group.mass_centre[:: group.case.run.samples_per_cycle]
@@ -324,7 +324,7 @@ def test_a_cycle_is_the_common_period(frequencies: list[float], common: float) -
 
 def test_frequencies_without_a_cycle_are_refused() -> None:
     for other in (80.0 * 25, 80.0 * 2**0.5, 81.3):
-        with pytest.raises(ValueError, match="no ratio of whole numbers"):
+        with pytest.raises(ValueError, match="not a ratio of whole numbers"):
             common_frequency([80.0, other])
     with pytest.raises(ValueError, match="common period"):
         common_frequency([1.0, 23 / 24, 22 / 23, 21 / 22, 19 / 20, 17 / 18])

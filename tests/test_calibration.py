@@ -229,7 +229,7 @@ def test_few_points_are_not_believed_and_more_are_drawn_where_they_weigh(known: 
     assert few.points == 800
     assert many.converged
     assert 2000 < many.points < 8 * 2000  # the prior alone does not do, and it stops as soon as it may
-    assert words_of(0.1, converged=False).startswith("not said")
+    assert words_of(0.1, converged=False).startswith("undetermined")
     shares = (0.1, 0.5, 0.9)
     assert [words_of(share, converged=True) for share in shares] == ["identified", "narrowed", "not identified"]
 

@@ -15,6 +15,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.reading import read_toml
 from walkers.postprocess import read_motion, read_result, read_table
 from walkers.postprocess.analyses.walking import Walking, walkers_met
+from walkers.postprocess.analyses.work import Working
 from walkers.postprocess.analysis import RESULT_NAME, current_result, describe_result
 from walkers.postprocess.gait import Averages, averages, fit_slopes, gait, gaps, settled_samples, steady_walkers, walk
 from walkers.postprocess.motion import Group
@@ -96,7 +97,7 @@ def test_a_result_of_before_is_made_anew_if_it_can_be(
     copy = tmp_path / directory.name
     shutil.copytree(directory, copy)
     known = read_result(copy)
-    assert known["analyses"] == {"walking": Walking.version, "work": 2}
+    assert known["analyses"] == {"walking": Walking.version, "work": Working.version}
     lacking = {key: value for key, value in known.items() if key not in ("separated_fraction", "analyses")}
     for old in ({**lacking, "analyses": {"walking": Walking.version - 1}}, lacking):
         write_json(copy / RESULT_NAME, old)
