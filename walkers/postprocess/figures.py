@@ -32,7 +32,7 @@ _HEIGHT = 1.6  # inches of a panel
 _LETTERS = 90  # of a line of a title
 _LEAST_DISTANCE, _LEAST_ANGLE, _LEAST_SPEED = 0.01, 0.1, 0.01
 """Smallest ranges of axes in mm, ° and mm/s, so that rounding errors do not look like motion."""
-_ASIDE = 10.0  # °, from which on a legend has the angle at the start
+_ASIDE, _WIDE = 10.0, 26  # °, from which on a legend has the angle at the start; letters of labels in three columns
 _SHOWN, _LONG = 8, 4.0  # images of a walker; lengths of a walker from which on they are centred on it
 _GREY, _PALE, _OTHERS = "#5b6770", "#b4bec5", "#c78a2c"
 
@@ -288,9 +288,10 @@ def walk_figure(groups: list[Group], walked: Panel, turned: Panel) -> Figure:
             line.set(**series_look(number), markevery=(0.02 * (number % 6), 0.12), linewidth=0.9)
     axes["walked"].set_title("grey: settling")
     letter_panels(axes.values())
-    handles = axes["walked"].get_legend_handles_labels()
+    lines, labels = axes["walked"].get_legend_handles_labels()
     text = f"walker: facing at the start, velocity{named_of(len(walked.lines))}"
-    figure.legend(*handles, loc="outside lower center", ncols=4, title=text)
+    columns = 4 if max(map(len, labels)) < _WIDE else 3
+    figure.legend(lines, labels, loc="outside lower center", ncols=columns, title=text)
     return figure
 
 

@@ -42,14 +42,14 @@
     async open() {
       if (this.instance) return;
       try {
-        if (!document.createElement("canvas").getContext("webgl2")) throw new Error("WebGL 2 is off");
+        this.find(".scene").replaceChildren();
         this.instance = await library().CreateK3DAndLoadBinarySnapshot(bytes(this.scene), this.find(".scene"));
         this.instance.setMenuVisibility(false);
         this.find(".play").disabled = false;
         this.find(".scene").dataset.ready = "yes";
         await this.show(this.now);
       } catch (error) {
-        this.find(".scene").textContent = `This browser shows no 3-D view, which needs WebGL 2: ${error.message ?? error}`;
+        this.find(".scene").textContent = `This browser shows no 3-D picture (it needs WebGL 2): ${error.message ?? error}`;
       }
     }
 
