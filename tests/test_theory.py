@@ -124,6 +124,15 @@ def test_the_papers_law_has_no_solution_at_strong_drives() -> None:
     assert np.isnan(found.velocity).tolist() == [False, True]
 
 
+def test_cycles_that_differ_by_the_error_of_the_steps_are_of_one_gait() -> None:
+    """Under 2 mm/s cycles alternate by 4 µm/s for ever."""
+    steel, pair = {"material": "chrome steel"}, {"radii": ["0.8 mm", "0.5 mm"]}
+    setup = {"beads": steel, "dimers": pair, "liquid": {"name": "ethylene glycol"}, "boundary": {"material": "PTFE"}}
+    motion = motion_of(*(make_case(**setup, drive={"peak_acceleration": f"{g} g"}) for g in (0.9, 0.95, 1.1, 1.25)))
+    assert motion.periodic.all()
+    assert (np.diff(motion.velocity) > 0.0).all()
+
+
 def test_many_walkers_are_what_each_is_alone() -> None:
     friction, walker, accelerations = Friction.coulomb(0.1, 0.05), Walker.of_dimer(RUBY), np.linspace(5.0, 80.0, 12)
     alone = [walk(walker, friction, 80.0, one, cycles=6).velocity[0] for one in accelerations]

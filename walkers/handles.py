@@ -62,6 +62,7 @@ class Run:
     directory: Path
     cached: bool = True
     origins: tuple[Origin, ...] | None = field(default=None, repr=False)
+    _last: list[Progress] = field(default_factory=list, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Take the name of a directory for the directory."""
@@ -79,10 +80,14 @@ class Run:
 
     @property
     def progress(self) -> Progress | None:
-        """Progress of a running run, whichever process runs it; None if unknown."""
+        """Progress of a running run, whichever process runs it, the last known between segments; None if unknown."""
         from walkers.sweeps.making import progress_at
 
-        return progress_at(self.directory) if is_locked(self.directory) else None
+        if not is_locked(self.directory):
+            return None
+        if found := progress_at(self.directory):
+            self._last[:] = [found]
+        return self._last[0] if self._last else None
 
     @property
     def last_frame(self) -> Motion:
@@ -306,7 +311,7 @@ class Sweep:
         return load(self.directory)
 
     def describe(self) -> str:
-        """The status of the points, their failures, and the table with velocities in mm/s."""
+        """The status of the points, their failures, and the table in mm, mm/s, nJ and degrees."""
         from walkers.sweeps.table import describe_status, short_text
 
         return f"{describe_status(self.directory)}\n\n{short_text(self.table())}"

@@ -127,6 +127,8 @@ def _figure_of(
     if laid_out.undistinguished:
         _tell(f"not distinguished: {'; '.join(laid_out.undistinguished)}")
     predicted: dict[str, FloatArray] = {}
+    reasons: dict[str, int] = {}
+    gaps: dict[str, int] = {}
     cases: list[Case] = []
     if theory:
         from walkers.paper.published import outside_of_the_paper
@@ -140,14 +142,24 @@ def _figure_of(
             _tell(f"{len(beyond)} of {len(done)} points are {beyond[0]}" + (", …" if len(beyond) > 1 else ""))
     drawn = drawn_column(done, column, predicted)
     if predicted:
-        drawn = replace(drawn, curves=partial(_curves, cases, column, readable_unit(done.attrs["units"][column])[1]))
-    return draw(laid_out, drawn, title=table.attrs["title"], log=log)
+        size = readable_unit(done.attrs["units"][column])[1]
+        drawn = replace(drawn, curves=partial(_curves, cases, column, size, gaps))
+    figure = draw(laid_out, drawn, title=table.attrs["title"], log=log)
+    for reason in gaps.keys() - reasons.keys():
+        _tell(f"the theory's curve has gaps: {reason}")
+    return figure
 
 
 def _curves(
-    cases: Sequence[Case], column: str, size: float, rows: npt.NDArray[np.int64], x: Factor, places: FloatArray
+    cases: Sequence[Case],
+    column: str,
+    size: float,
+    gaps: dict[str, int],
+    rows: npt.NDArray[np.int64],
+    x: Factor,
+    places: FloatArray,
 ) -> dict[str, FloatArray]:
-    """Predictions of the theory between the points of a key; empty if they would take long.
+    """Predictions of the theory between the points of a key; empty if they would take long. Adds why it has ``gaps``.
 
     Cases of another shape of their bridges are solved for a quarter of a second each.
     """
@@ -164,7 +176,9 @@ def _curves(
             between.append(resolve_case(changed(case.document, {key: value}), name=case.name))
             at.append(number)
     found: dict[str, FloatArray] = {}
-    for model, values in predicted_column(between, column)[0].items() if between else ():
+    predicted, reasons = predicted_column(between, column) if between else ({}, {})
+    gaps.update(reasons)
+    for model, values in predicted.items():
         found[model] = np.full(len(places), np.nan)
         found[model][at] = values / size
     return found

@@ -135,7 +135,8 @@ def _note_run(run: Run, table: RunTable, case: Case, notes: Notes) -> None:
         notes.default("run.longest_settling", run.longest_settling, "of loose beads")
     if run.rests:
         notes.default("run.settled_below", run.settled_below)
-    notes.derived("run.time_step", run.time_step, "auto: a fraction of the limits, a whole number of steps per cycle")
+    reason = limits_of(case).recommended(loose=case.loose)[1]
+    notes.derived("run.time_step", run.time_step, f"auto: {reason}, a whole number of steps per cycle")
     notes.derived("run.cycles", cycles, whence)
     notes.derived("run.settling_cycles", run.settling_cycles, "a third of the cycles, at most 20")
     notes.derived("run.silence", silence, "the engine is stopped if it writes nothing for this long")
@@ -158,7 +159,7 @@ def _largest_time_step(table: RunTable, case: Case) -> float:
     """The step that a case gives, which must be within the limits unless it insists, or that of ``"auto"``, s."""
     limits, given = limits_of(case), table.time_step
     if given is None:
-        return limits.recommended(loose=case.loose)
+        return limits.recommended(loose=case.loose)[0]
     if (exceeded := limits.exceeded_by(given)) and not table.allow_unstable:
         allowed = f"{min(limits.as_dict().values()) * 1e6:.3g} us"
         message = f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed}, "

@@ -49,10 +49,12 @@ class TimeStepLimits:
         """Name to limit in s."""
         return asdict(self)
 
-    def recommended(self, *, loose: bool) -> float:
-        """Largest step, in s, that respects every limit with margin, of beads that are loose or of walkers."""
-        shares, longest = auto_fractions(loose=loose), inf if loose else LONGEST_WALKER_STEP
-        return min(longest, *(shares[name] * limit for name, limit in self.as_dict().items()))
+    def recommended(self, *, loose: bool) -> tuple[float, str]:
+        """Largest step, in s, that respects every limit with margin, of loose beads or walkers; what determines it."""
+        shares = auto_fractions(loose=loose)
+        steps = [(shares[name] * at, f"{shares[name]:g} of the {name} limit") for name, at in self.as_dict().items()]
+        longest = LONGEST_WALKER_STEP
+        return min(steps if loose else [*steps, (longest, f"at most {longest * 1e6:g} us for walkers")])
 
     def exceeded_by(self, time_step: float) -> list[str]:
         """Names of the limits below ``time_step`` (s)."""

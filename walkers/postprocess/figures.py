@@ -32,6 +32,7 @@ _HEIGHT = 1.6  # inches of a panel
 _LETTERS = 90  # of a line of a title
 _LEAST_DISTANCE, _LEAST_ANGLE, _LEAST_SPEED = 0.01, 0.1, 0.01
 """Smallest ranges of axes in mm, ° and mm/s, so that rounding errors do not look like motion."""
+_ASIDE, _WIDE = 10.0, 26  # °, from which on a legend has the angle at the start; letters of labels in three columns
 _SHOWN, _LONG = 8, 4.0  # images of a walker; lengths of a walker from which on they are centred on it
 _GREY, _PALE, _OTHERS = "#5b6770", "#b4bec5", "#c78a2c"
 
@@ -109,14 +110,16 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
         way = (group.mass_centre[::strobe] - group.mass_centre[0]) * 1e3
         for place, walker in enumerate(group.walkers):
             number = walker.walker
-            text = f"{number}: {facing[int(walker.facing < 0)]}, {velocity_text(slope[place] * 1e3)} mm/s"
+            angle = float(np.degrees(group.orientation[0, place]))
+            at = f" at {angle:.0f}°" if abs(angle) > _ASIDE else ""
+            text = f"{number}: {facing[int(walker.facing < 0)]}{at}, {velocity_text(slope[place] * 1e3)} mm/s"
             look: dict[str, Any] = {"label": text if number < MOST_NAMED else "", "colour": number}
             look["width"] = widths[len(walked)]
             walked.append(Line(time, distance[:, place] * 1e3, **look))
             turned.append(Line(time, np.degrees(group.orientation[::strobe, place]), **look))
             along, across = way[:, place] @ group.drive_axis, way[:, place] @ group.across_axis
             paths.append(Line(-across, along, **look) if uphill else Line(along, across, **look))
-    begin, named = walked[-1].x[settled], _named(groups)
+    begin, named = walked[-1].x[settled], named_of(len(walked))
     names = ("across the slope (mm)", "uphill (mm)") if uphill else ("along the drive axis (mm)", "across it (mm)")
     seen = f"{case.boundary.tilted}, seen along its normal" if case.boundary.tilted else "seen from above"
     return [
@@ -133,9 +136,8 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
     ]
 
 
-def _named(groups: list[Group]) -> str:
+def named_of(count: int) -> str:
     """How many walkers a legend names, where these are not all."""
-    count = sum(len(group.walkers) for group in groups)
     return f" ({MOST_NAMED} of {count} walkers named)" if count > MOST_NAMED else ""
 
 
@@ -178,7 +180,7 @@ def gait_panels(group: Group) -> list[Panel]:
         "time (cycles of the drive, last two)",
         f"walker {first.walker}; a bead rolls without sliding where its curve coincides with the walker's",
     )
-    y = "velocity; beads:\n−R dφ/dt (mm/s)"
+    y = "velocity relative to the\nsubstrate; beads: −R dφ/dt (mm/s)"
     panels = [Panel(title, x, y, lines, zero=True, height=2.5, least=_LEAST_SPEED)]
     shaken = group.motion.substrate_velocity[last] @ np.array(group.case.drive.direction)
     if np.any(shaken):  # faster than its walkers by far: in their panel it would make them all flat
@@ -286,9 +288,10 @@ def walk_figure(groups: list[Group], walked: Panel, turned: Panel) -> Figure:
             line.set(**series_look(number), markevery=(0.02 * (number % 6), 0.12), linewidth=0.9)
     axes["walked"].set_title("grey: settling")
     letter_panels(axes.values())
-    handles = axes["walked"].get_legend_handles_labels()
-    text = f"walker: facing at the start, velocity{_named(groups)}"
-    figure.legend(*handles, loc="outside lower center", ncols=4, title=text)
+    lines, labels = axes["walked"].get_legend_handles_labels()
+    text = f"walker: facing at the start, velocity{named_of(len(walked.lines))}"
+    columns = 4 if max(map(len, labels)) < _WIDE else 3
+    figure.legend(lines, labels, loc="outside lower center", ncols=columns, title=text)
     return figure
 
 

@@ -121,7 +121,7 @@ def _views(motion: Motion, frames: Sequence[int]) -> Figure:
     high += 0.05 * (high - low) if sideways else 0.0
     scene = replace(scene, high=np.array([right, high, scene.high[2]]))
     window = Window(scene, _pixels(right - left, high - low))
-    figure, panels = _panels(len(frames), right - left, high - low)
+    figure, panels = _panels(len(frames), right - left, high - low, motion.case.title or motion.case.name)
     names = ("x", "height") if sideways else ("across the slope", "uphill") if boundary.tilt else ("x", "y")
     for panel, frame, time in zip(panels, frames, even_labels(motion.time[frames]), strict=True):
         panel.imshow(window.picture(frame), extent=(left, right, low, high), interpolation="antialiased")
@@ -251,8 +251,8 @@ def top_view(group: Group, walker: int, frame: int, along: tuple[float, float], 
     return picture
 
 
-def _panels(count: int, wide: float, tall: float) -> tuple[Figure, list[Axes]]:
-    """A figure with so many axes of one shape, given in mm, in as many rows as make them largest.
+def _panels(count: int, wide: float, tall: float, title: str) -> tuple[Figure, list[Axes]]:
+    """A figure with a title and so many axes of one shape, given in mm, in as many rows as make them largest.
 
     Their places are reckoned here: no layout of matplotlib's knows how large axes of a fixed aspect will be.
     """
@@ -266,9 +266,11 @@ def _panels(count: int, wide: float, tall: float) -> tuple[Figure, list[Axes]]:
     rows = max(range(1, count + 1), key=lambda rows: (inches(rows), -rows))
     columns = ceil(count / rows)
     across, up = inches(rows) * wide + _BESIDE, inches(rows) * tall + _BENEATH
-    size = (_EDGES[0] + columns * across, _EDGES[1] + rows * up)
+    lines = wrap(plain_text(title), round(13.0 * (_EDGES[0] + columns * across)))
+    size = (_EDGES[0] + columns * across, _EDGES[1] + 0.18 * len(lines) + rows * up)
     figure, axes = new_figure(*size, nrows=rows, ncols=columns, squeeze=False)
     figure.set_layout_engine("none")
+    figure.suptitle("\n".join(lines), y=1.0 - 0.08 / size[1], fontsize=10)
     for number, panel in enumerate(axes.flat):
         if number >= count:
             panel.remove()

@@ -118,8 +118,8 @@ def summarise(case: Case) -> dict[str, Any]:
     -------
     dict
         ``case`` (resolved), ``drive`` (its largest harmonic, the sum of all), ``beads`` (numbers, mass, liquid),
-        ``dimer`` (M, R̄, Γ0, sin δ, μ; of dimers), ``contacts`` (forces, bridges, overlaps of each make of walkers),
-        ``time_step`` (limits, None where one does not apply, the chosen step, its share of each and that of
+        ``dimer`` (M, R̄, Γ0, sin δ, mass asymmetry; of dimers), ``contacts`` (forces, bridges, overlaps of each make of
+        walkers), ``time_step`` (limits, None where one does not apply, the chosen step, its share of each and that of
         ``"auto"``), ``run`` (steps, samples, predicted seconds).
     """
     run, drive, limits = case.run, case.drive, limits_of(case).as_dict()
@@ -200,7 +200,8 @@ def describe(summary: dict[str, Any]) -> str:
     if dimer:
         lines.append(
             f"dimer      M = {dimer['total_mass'] * 1e6:.4g} mg, mean radius {dimer['mean_radius'] * 1e3:.4g} mm, "
-            f"sin δ = {dimer['sin_delta']:.4g}, μ = {dimer['mass_asymmetry']:.4g}, Γ0 = {dimer['gamma0']:.4g}"
+            f"sin δ = {dimer['sin_delta']:.4g}, mass asymmetry (m1 - m2)/M = {dimer['mass_asymmetry']:.4g}, "
+            f"Γ0 = {dimer['gamma0']:.4g}"
         )
         if dimer["sin_delta"] < 0:
             lines.append("           bead 1 is the smaller bead")
@@ -215,7 +216,7 @@ def describe(summary: dict[str, Any]) -> str:
         limit = contact["capillary_force_limit"]
         lines.append(
             f"  {contact['contact']:20} {contact['capillary_force'] * 1e6:11.4g} µN "
-            f"{f'{limit * 1e6:.4g} µN' if limit else '-':>12} {contact['bridge_volume'] * 1e12:8.3g} nL "
+            f"{f'{limit * 1e6:.4g} µN' if limit else 'planes only':>12} {contact['bridge_volume'] * 1e12:8.3g} nL "
             f"{contact['rupture_distance'] * 1e6:6.3g} µm {contact['overlap_at_rest'] * 1e9:10.4g} nm"
         )
     notes = [f"note       {note}" for note in summary["notes"]]

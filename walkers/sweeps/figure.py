@@ -25,7 +25,7 @@ FloatArray = npt.NDArray[np.float64]
 _NONE = "none"
 """Instead of a column: do not tell points apart so."""
 _SEEDS = ("run.seed", "seed")
-_SYMBOLS = {"gamma0": "Γ0", "sin_delta": "sin δ", "mass_asymmetry": "μ"}
+_SYMBOLS = {"gamma0": "Γ0", "sin_delta": "sin δ"}
 _SYMBOLS |= {"right_facing": "velocity, facing right (up)", "left_facing": "velocity, facing left (down)"}
 _LEAST_ASYMMETRIES = 3  # different radii are shown by sin δ from so many on
 _MOST_PANELS = 12  # more combinations are not separated into panels

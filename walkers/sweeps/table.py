@@ -26,7 +26,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.changes import flatten
 from walkers.inputs.errors import InputError, Problem, WalkersError, refused
 from walkers.inputs.library import suggestion
-from walkers.inputs.rounding import DIGITS, NOISE
+from walkers.inputs.rounding import DIGITS, NOISE, SHOWN_UNITS
 from walkers.postprocess.analysis import RESULT_NAME, Described, analyses, analyses_in, analyses_of, current_result
 from walkers.postprocess.sides import differ
 from walkers.runner.binary import Engine
@@ -419,16 +419,17 @@ def write_table_file(frame: pd.DataFrame, path: Path) -> None:
 
 
 def short_text(frame: pd.DataFrame) -> str:
-    """A table to look at: what varied, Γ0, sin δ, speeds in mm/s, status, run."""
+    """A table to look at: what varied, Γ0, sin δ, results in mm, mm/s, nJ and degrees, status, run."""
     import pandas as pd
 
     left_out = (_LEFT_OUT - set(SIDES)) | {"velocity"} if sides_differ(frame) else _LEFT_OUT
     shown = frame.drop(columns=[name for name in frame.columns if name in left_out])
     units = dict(frame.attrs.get("units", {}))
-    for name in shown.columns:
-        if units.get(name) == "m/s":
-            speeds = shown[name].astype(float) * 1e3
-            shown[name], units[name] = speeds.mask(speeds.abs() < NOISE["mm/s"], 0.0), "mm/s"
+    for name in shown.columns.difference(varied_columns(frame)):
+        if units.get(name) in SHOWN_UNITS:
+            units[name], factor = SHOWN_UNITS[units[name]]
+            values = shown[name].astype(float) * factor
+            shown[name] = values.mask(values.abs() < NOISE[units[name]], 0.0)
     shown.columns = pd.Index([with_unit(name, units.get(name)) for name in shown.columns])
     return str(shown.to_string(index=False, float_format=lambda value: f"{value:.{DIGITS}g}", na_rep="-"))
 

@@ -113,7 +113,7 @@ class Walker:
 
 @dataclass(frozen=True)
 class Motion:
-    """Means of N walkers over the last cycle, m/s; over the second half of all cycles if the motion is not periodic.
+    """Means of N walkers over the last cycle, m/s; over the second half of all cycles if the last two do not agree.
 
     The velocity, positive toward the large bead, is NaN where a contact opened, for there the model does not hold, and
     where the forces have no solution (the paper's law does not beyond some Γ0).
@@ -123,7 +123,7 @@ class Motion:
     rotation: FloatArray  # velocities -R dφ/dt of the beads, shape (2, N)
     sliding: FloatArray  # at the contacts, shape (3, N)
     smallest_normal_force: FloatArray  # of each contact in that cycle, in units of 4πγR̄, shape (3, N)
-    periodic: npt.NDArray[np.bool_]  # whether the last two cycles agree within 1 µm/s, shape (N,)
+    periodic: npt.NDArray[np.bool_]  # whether the cycles agree within the error of the steps, shape (N,)
     solved: npt.NDArray[np.bool_]  # whether forces that obey the law of friction were found all the way, shape (N,)
     series: FloatArray  # sliding velocities through that cycle, at the ends of its steps, shape (3, N, steps)
 

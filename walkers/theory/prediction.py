@@ -118,20 +118,25 @@ def why_not_the_paper(case: Case) -> str | None:
 
 
 def _predicted(case: Case, *, viscous: bool) -> dict[str, Any]:
-    motion, reason = motion_of(case, viscous=viscous), None
-    if not motion.solved[0]:
-        reason = "the forces have no solution"
-    elif not motion.periodic[0]:
-        reason = "the motion does not become periodic"
-    elif motion.opened[0]:
-        reason = f"{CONTACTS[int(np.argmin(motion.smallest_normal_force[:, 0]))]} would open"
+    motion = motion_of(case, viscous=viscous)
     return {
         "velocity": _number(float(motion.velocity[0])) if motion.periodic[0] else None,
         "rotation": motion.rotation[:, 0].tolist(),
         "sliding": motion.sliding[:, 0].tolist(),
-        "reason": reason,
+        "reason": _why_unknown(motion, 0),
         "threshold": _number(threshold(case, viscous=viscous)),
     }
+
+
+def _why_unknown(motion: Motion, of: int) -> str | None:
+    """Reason why a motion has no velocity; None if it has."""
+    if not motion.solved[of]:
+        return "the forces have no solution"
+    if not motion.periodic[of]:
+        return "the motion does not become periodic"
+    if motion.opened[of]:
+        return f"{CONTACTS[int(np.argmin(motion.smallest_normal_force[:, of]))]} would open"
+    return None
 
 
 def _number(value: float) -> float | None:
@@ -198,7 +203,8 @@ def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
     else:
         lines.append("  engine                         no run yet; do: walkers run CASE")
     lines += [
-        f"  detachment  {end['contact']} opens first, at a steady force of Γ = {end['gamma']:.3g}",
+        f"  detachment  {end['contact']} opens first, at Γ = {end['gamma']:.3g} of a steady pull "
+        "(the peak of an oscillating one may exceed it)",
         *describe_alignment(mathieu),
     ]
     return "\n".join(lines)
@@ -233,8 +239,12 @@ def _speed(model: dict[str, Any]) -> str:
 
 
 def _details(model: dict[str, Any]) -> str:
-    rotation = ", ".join(with_decimals(value * 1e3, 2) for value in model["rotation"])
-    text = f"; bead rotation {rotation}, sliding of the large bead {with_decimals(model['sliding'][0] * 1e3, 2)} mm/s"
+    text = ""
+    if model["velocity"] is not None:
+        rotation = ", ".join(with_decimals(value * 1e3, 2) for value in model["rotation"])
+        text = (
+            f"; bead rotation {rotation}, sliding of the large bead {with_decimals(model['sliding'][0] * 1e3, 2)} mm/s"
+        )
     gamma = model.get("threshold")
     return text + (f"; threshold Γc = {gamma:.3f}" if gamma is not None else "")
 
@@ -267,9 +277,9 @@ def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, Floa
     model, paper = np.full(len(cases), np.nan), np.full(len(cases), np.nan)
     motion = motion_of(*(cases[place] for place in able))
     values = motion.velocity if is_velocity else getattr(motion, family)[int(number) - 1]
-    known = motion.periodic & np.isfinite(motion.velocity)
-    model[able] = np.where(known, values, np.nan)
-    reasons += Counter({"a contact opens, or the motion is not periodic": int(np.sum(~known))})
+    unknown = [_why_unknown(motion, of) for of in range(len(able))]
+    model[able] = np.where([why is None for why in unknown], values, np.nan)
+    reasons += Counter(why for why in unknown if why)
     for place in able if is_velocity else ():
         case, dimer = cases[place], dimer_of(cases[place])
         if why := why_not_the_paper(case):

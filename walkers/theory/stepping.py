@@ -26,6 +26,8 @@ _COAST, _GAIN, _PRESS, _LIFT, _REST = 0, 3, 6, 9, 12
 _REPEATED = 1e-6
 _FAST = 3e-3
 """Mean sliding velocities of two cycles that differ by less than 1 µm/s (of each 3 mm/s) are those of one gait."""
+_SCATTER = 10.0
+"""The error of the steps, in the same unit. Cycles of one gait may differ by it for ever; their mean is the gait's."""
 
 
 @njit(cache=True)
@@ -51,8 +53,8 @@ def integrate(
     mean, least : ndarray, shape (3, N)
         Over the last cycle sliding velocities (m/s) in the mean, and the smallest normal forces.
     repeated, solved : ndarray of bool, shape (N,)
-        Whether the last two cycles agree (where they do not, means are over the later half of all), and whether
-        friction forces that obey the law were found at every step.
+        Whether the last two cycles agree, or the later half of all within the error of the steps (where the last two
+        do not, means are over that half), and whether friction forces that obey the law were found at every step.
     series : ndarray, shape (N, steps, 3)
         Sliding velocities through the last cycle.
     """
@@ -62,7 +64,7 @@ def integrate(
     series, work = np.zeros((count, steps, 3)), np.zeros((8, 3))
     for of in range(count):
         state, totals = np.zeros((4, 3)), np.full((2, 3), np.inf)
-        later = np.zeros(3)
+        same, later, low, high = 0.0, np.zeros(3), np.full(3, np.inf), np.full(3, -np.inf)
         for cycle in range(cycles):
             before = totals[0].copy()
             totals[0], totals[1] = 0.0, np.inf
@@ -75,10 +77,14 @@ def integrate(
                 break
             if cycle >= cycles // 2:
                 later += totals[0] / (cycles - cycles // 2)
-            if np.abs(totals[0] - before).max() < _REPEATED * max(1.0, np.abs(totals[0]).max() / _FAST):
+                for one in (before, totals[0]):
+                    low, high = np.minimum(low, one), np.maximum(high, one)
+            same = _REPEATED * max(1.0, np.abs(totals[0]).max() / _FAST)
+            if np.abs(totals[0] - before).max() < same:
                 repeated[of] = True
                 break
         means[:, of] = totals[0] if repeated[of] else later
+        repeated[of] |= solved[of] and (high - low).max() < _SCATTER * same
         leasts[:, of] = totals[1]
     return means, leasts, repeated, solved, series
 

@@ -230,7 +230,7 @@ class Meetings(Analysis):
 
 def _paths(motion: Motion) -> Panel:
     """Paths of the centres of mass during the drive, once per cycle, and the edge of the floor."""
-    from walkers.postprocess.figures import MOST_NAMED, Line, Panel
+    from walkers.postprocess.figures import MOST_NAMED, Line, Panel, named_of
     from walkers.postprocess.scene import walls_of
 
     centre = 1e3 * _places(motion.driven)[0][:: motion.case.run.samples_per_cycle]
@@ -244,7 +244,7 @@ def _paths(motion: Motion) -> Panel:
         lines.append(Line(x, y, f"walker {number}" if number < MOST_NAMED else "", colours[number]))
     x, y = centre[0].T
     lines.append(Line(x, y, "start", _GREY, "o", width=0.0))
-    return Panel("Paths of the walkers, seen from above", "x (mm)", "y (mm)", lines)
+    return Panel(f"Paths of the walkers, seen from above{named_of(centre.shape[1])}", "x (mm)", "y (mm)", lines)
 
 
 def _colours(count: int) -> list[str]:
@@ -260,7 +260,7 @@ def _drawn(panel: Panel, motion: Motion) -> Figure:
     """A panel of paths with the beads at the end."""
     from matplotlib.patches import Circle
 
-    from walkers.postprocess.figures import MOST_NAMED, draw_panel
+    from walkers.postprocess.figures import draw_panel
 
     reach = [np.concatenate([one.x for one in panel.lines]), np.concatenate([one.y for one in panel.lines])]
     wide, high = (float(np.ptp(one)) + 2e3 * motion.case.walkers[0].length for one in reach)
@@ -274,8 +274,7 @@ def _drawn(panel: Panel, motion: Motion) -> Figure:
     axes.set(xlabel=panel.x, aspect="equal", title=f"{panel.title}; beads at the end, to scale")
     axes.margins(0.08)
     figure.suptitle(plain_text(motion.case.title or motion.case.name))
-    more = f"the first {MOST_NAMED} walkers" if len(motion.walkers) > MOST_NAMED else None
-    figure.legend(loc="outside right upper", title=more)
+    figure.legend(loc="outside right upper")
     return figure
 
 

@@ -42,6 +42,7 @@
     async open() {
       if (this.instance) return;
       try {
+        this.find(".scene").replaceChildren();
         this.instance = await library().CreateK3DAndLoadBinarySnapshot(bytes(this.scene), this.find(".scene"));
         this.instance.setMenuVisibility(false);
         this.find(".play").disabled = false;
