@@ -19,7 +19,6 @@ from walkers.commands.arguments import (
     Set,
     changes_of,
     check_folder,
-    load_case,
     load_run,
     refuse,
     refuse_given,
@@ -69,14 +68,18 @@ def export(
         if form not in forms:
             refuse_given({option: value}, f"is for --to {', '.join(forms)}")
     if form == "deck":
-        from walkers.sweeps.by_hand import write_folder
+        from walkers.pipeline import find_side
+        from walkers.sweeps.by_hand import as_run, write_folder
         from walkers.templates.deck import RUN_NAME, render_deck, whole
 
-        case = load_case(what, settings, out)
+        side = find_side(what, out, changes_of(settings))
+        case = as_run(side.case, side.directory)
         if output is None:
             print(render_deck(case, whole(case)).text, end="")
         else:
             print(f"{write_folder(case, output)}    run it there with: sh {RUN_NAME}    then: walkers run {output}")
+        if case.run.continuation:
+            tell(f"{case.run.attempts[0]} cycles; {case.run.continuation}")
         return
     if form == "archive":
         from walkers.archive.crate import Author
