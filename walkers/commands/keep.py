@@ -27,10 +27,13 @@ from walkers.commands.arguments import (
 from walkers.completion import offering
 
 _FORM = (
-    "deck: the LIGGGHTS deck of the case. vtk: .vtp and .vtm files with a .pvd. paraview: the same, with a ParaView "
-    "script. xyz, lammps: the trajectory for OVITO, ASE, MDAnalysis. archive: an RO-Crate (.zip) to publish."
+    "Form, not a file (-o). deck: the LIGGGHTS deck of the case. vtk: .vtp and .vtm files with a .pvd. paraview: the "
+    "same, with a ParaView script. xyz, lammps: the trajectory for OVITO, ASE, MDAnalysis. archive: an RO-Crate (.zip) "
+    "to publish."
 )
-_OUTPUT = "File or folder to write. Default: in the run's folder; archives: the current folder; decks: printed."
+_OUTPUT = (
+    "File or folder (--to is the form). Default: in the run's folder; archives: the current folder; decks: printed."
+)
 _EVERY = "vtk, paraview, xyz, lammps: write every Nth sample; default: one per cycle, for xyz and lammps every sample."
 _AS_PLACED = "vtk, paraview: keep independent walkers at their places in the deck instead of side by side."
 _WITHOUT_DUMPS = "archive: leave out the engine's dumps; tables and results are included."

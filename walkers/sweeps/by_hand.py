@@ -137,7 +137,9 @@ def _judged(deck: Deck, folder: Path, log: Path) -> EngineReport:
     try:
         report = judge(deck, folder, log)
     except MissingFrames as failure:
-        raise refused(folder, f"the engine that was started by hand still runs, or was stopped: {failure}") from failure
+        ended = b"Loop time of" in log.read_bytes()
+        why = "its dump was cut later" if ended else "the engine that was started by hand still runs, or was stopped"
+        raise refused(folder, f"{why}: {failure}") from failure
     except EngineFailure as failure:
         raise refused(folder, f"the deck that was run by hand failed: {failure}") from failure
     return replace(report, wall_seconds=report.loop_seconds)
