@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import SHORT, call, make_case
+from tests.conftest import SHORT, call, document, make_case
 from walkers import load
-from walkers.inputs import InputError
+from walkers import run as run_case
+from walkers.inputs import InputError, resolve_case
 from walkers.sweeps.by_hand import take_in, write_folder
 
 
@@ -129,14 +130,31 @@ def test_a_run_by_hand_that_failed_is_told_in_one_message(name: str, folder: Pat
 
 
 LENGTHS = {
-    "fig1b": ("12", "stops here if the walkers are steady; if not, it runs again with 24, then 60 cycles"),
+    "fig1b": ("12", "# of the drive; walkers run continues to 60 if the velocities are not constant within 0.2 %"),
     "pile-ci": ("36", "below 0.005 m/s"),
 }
 
 
 @pytest.mark.parametrize("name", LENGTHS)
-def test_a_deck_says_how_a_run_would_go_on(name: str) -> None:
+def test_a_deck_says_how_a_run_would_go_on(name: str, tmp_path: Path) -> None:
     cycles, told = LENGTHS[name]
-    deck = call("export", "--to", "deck", name).stdout
+    deck = call("export", "--to", "deck", name, "--out", str(tmp_path)).stdout
     assert re.search(rf"^variable +cycles string {cycles} ", deck, re.MULTILINE)
     assert told in deck
+
+
+def test_a_deck_has_the_cycles_of_the_run_that_exists(tmp_path: Path) -> None:
+    """Otherwise those tried first, and what is read of it says so."""
+    turning = {"dimers": {"angle": "4 deg"}, "drive": {"peak_acceleration": "8 g"}, "run": {"most_cycles": 14}}
+    case = resolve_case({**document(**turning), "run": turning["run"]}, name="turning")
+    first = write_folder(case, tmp_path / "first").parent
+    made = run_case(case, tmp_path)
+    again = made.export("deck", tmp_path / "again").parent
+    for folder in (first, again):
+        _run(folder)
+    found, same = load(first), load(again)
+    assert found.result["cycles"] == 12
+    assert "not constant within 0.2 % after 12 cycles; walkers run continues to 14" in found.result["by_hand"][-1]
+    assert {**same.result, "by_hand": 0} == {**made.result, "by_hand": 0}
+    compared = call("compare", str(made.directory), str(first)).stdout
+    assert compared.startswith("the cases are the same, but ran 14 and 12 cycles\n")

@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import time
+import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -154,7 +155,10 @@ def test_damaged_tables_are_made_anew(tmp_path: Path) -> None:
         path.unlink()
         if contents is not None:
             path.write_bytes(contents)
-        assert run_case(case, tmp_path).result == result
+        with warnings.catch_warnings(record=True) as warned:
+            warnings.simplefilter("always")
+            assert run_case(case, tmp_path).result == result
+        assert any("recomputed from the dumps" in str(one.message) for one in warned) == (contents is not None)
         walkers.load(outcome.directory)
         assert path.stat().st_size > 100
 

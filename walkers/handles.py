@@ -252,9 +252,9 @@ class Run:
         """
         place = _path(to)
         if form == "deck":
-            from walkers.sweeps.by_hand import write_folder
+            from walkers.sweeps.by_hand import as_run, write_folder
 
-            return write_folder(self.case, place or Path(f"{self.directory.name}-deck"))
+            return write_folder(as_run(self.case, self.directory), place or Path(f"{self.directory.name}-deck"))
         if form == "archive":
             from walkers.archive.writing import ArchiveOptions, write_archive
 

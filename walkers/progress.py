@@ -40,7 +40,8 @@ def progress_of_sweep(name: str) -> Iterator[Callable[[SweepProgress], None]]:
 
         def advance(sweep: SweepProgress) -> None:
             made = sweep.done - sweep.found
-            words = f"{sweep.done} of {sweep.points} points done, {sweep.running} running, {sweep.failed} failed"
+            decks = f" in {sweep.decks} decks" if 1 < sweep.decks < sweep.running else ""
+            words = f"{sweep.done} of {sweep.points} points done, {sweep.running} running{decks}, {sweep.failed} failed"
             if made and (each := sweep.elapsed / made) < 10.0:
                 words += f", {60.0 / each:.0f} points per minute"
             elif made:

@@ -19,7 +19,6 @@ from walkers.commands.arguments import (
     Set,
     changes_of,
     check_folder,
-    load_case,
     load_run,
     refuse,
     refuse_given,
@@ -28,10 +27,13 @@ from walkers.commands.arguments import (
 from walkers.completion import offering
 
 _FORM = (
-    "deck: the LIGGGHTS deck of the case. vtk: .vtp and .vtm files with a .pvd. paraview: the same, with a ParaView "
-    "script. xyz, lammps: the trajectory for OVITO, ASE, MDAnalysis. archive: an RO-Crate (.zip) to publish."
+    "Form, not a file (-o). deck: the LIGGGHTS deck of the case. vtk: .vtp and .vtm files with a .pvd. paraview: the "
+    "same, with a ParaView script. xyz, lammps: the trajectory for OVITO, ASE, MDAnalysis. archive: an RO-Crate (.zip) "
+    "to publish."
 )
-_OUTPUT = "File or folder to write. Default: in the run's folder; archives: the current folder; decks: printed."
+_OUTPUT = (
+    "File or folder (--to is the form). Default: in the run's folder; archives: the current folder; decks: printed."
+)
 _EVERY = "vtk, paraview, xyz, lammps: write every Nth sample; default: one per cycle, for xyz and lammps every sample."
 _AS_PLACED = "vtk, paraview: keep independent walkers at their places in the deck instead of side by side."
 _WITHOUT_DUMPS = "archive: leave out the engine's dumps; tables and results are included."
@@ -69,14 +71,18 @@ def export(
         if form not in forms:
             refuse_given({option: value}, f"is for --to {', '.join(forms)}")
     if form == "deck":
-        from walkers.sweeps.by_hand import write_folder
+        from walkers.pipeline import find_side
+        from walkers.sweeps.by_hand import as_run, write_folder
         from walkers.templates.deck import RUN_NAME, render_deck, whole
 
-        case = load_case(what, settings, out)
+        side = find_side(what, out, changes_of(settings))
+        case = as_run(side.case, side.directory)
         if output is None:
             print(render_deck(case, whole(case)).text, end="")
         else:
             print(f"{write_folder(case, output)}    run it there with: sh {RUN_NAME}    then: walkers run {output}")
+        if case.run.continuation:
+            tell(f"{case.run.attempts[0]} cycles; {case.run.continuation}")
         return
     if form == "archive":
         from walkers.archive.crate import Author

@@ -18,6 +18,7 @@ from walkers.inputs.bodies import Body, Mixture, Placed, Standing, Walkers
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.drive import AXES, Drive, Vector
 from walkers.inputs.origins import Origin
+from walkers.inputs.rounding import percent
 from walkers.physics.laws import LAWS
 from walkers.physics.matter import Contact, Liquid
 
@@ -101,6 +102,14 @@ class Run:
         """Cycles for which the run is made, and made again from its begin if its walkers are not steady after them."""
         fewer = FIRST_ATTEMPTS if self.until_steady else ()
         return (*(cycles for cycles in fewer if cycles < self.cycles), self.cycles)
+
+    @property
+    def continuation(self) -> str:
+        """What `walkers run` does after the cycles tried first; empty for a fixed number of cycles."""
+        further = (
+            f"walkers run continues to {self.cycles} if the velocities are not constant within {percent(CONSTANT)}"
+        )
+        return f"{further}: then set cycles to {self.cycles}" if len(self.attempts) > 1 else ""
 
     def steps_until(self, cycles: int) -> int:
         """Steps of the attempts up to the one for so many cycles."""

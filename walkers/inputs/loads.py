@@ -21,7 +21,7 @@ def dimer_of(case: Case) -> Dimer:
     """The dimer of a case whose first walkers are such; raises `ValueError` if they are not."""
     radii = case.walkers[0].radii if case.walkers else ()
     if len(radii) != 2:
-        raise ValueError("bodies: expected dimers")
+        raise ValueError("bodies: expected dimers; the theory is for dimers only")
     return Dimer((radii[0], radii[1]), case.density, case.liquid.surface_tension)
 
 

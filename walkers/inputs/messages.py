@@ -34,6 +34,7 @@ _EXAMPLES = {
     "boundary": 'a [boundary] table, such as material = "chromium-coated glass"',
     "boundary.material": 'such as "chromium-coated glass"',
     "drive": "a [drive] table with a frequency and a peak_acceleration or gamma0",
+    "run.cycles": 'or "auto"',
     "walltime": 'hours, minutes and seconds, such as "02:00:00"',
     "case": 'a case file, or the name of a shipped case, such as "fig1b"',
     "descend.from": 'where the descent begins, such as "4 g"',

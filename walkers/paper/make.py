@@ -8,7 +8,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from walkers.inputs.errors import InputError, Problem, refused
+from walkers.inputs.errors import refused
 from walkers.inputs.extras import require
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.comparison import as_dict, as_markdown, compare, count
@@ -100,7 +100,7 @@ def make_figures(  # noqa: PLR0913
     chosen = list(only) or [name for name in known if name == COMPARISON or not FIGURES[name].only_asked]
     for name in chosen:
         if name not in known:
-            raise InputError("--only", [Problem("", name, f"expected one of {', '.join(known)}")])
+            raise refused("--only", f'no figure "{name}"; expected one of {", ".join(known)}')
     check_formats(formats)
     for option, folder in (("--out", out), ("--to", to)):
         if folder.exists() and not folder.is_dir():

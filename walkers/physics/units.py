@@ -101,7 +101,9 @@ def parse_quantity(text: str, kind: Kind) -> float:
     # Rounded: 4.0 g/cm³ is 4000 kg/m³, not 3999.9999999999995.
     value = float(f"{float(match['number']) * factor + _ZEROS.get(match['unit'], 0.0):.15g}")
     if value != 0.0 and not kind.smallest <= abs(value) <= kind.largest:
-        raise ValueError(f"{kind.expectation}; it must lie within {kind.smallest:g} and {kind.largest:g} {kind.unit}")
+        zero = _ZEROS.get(match["unit"], 0.0)
+        low, high = (f"{float(f'{(bound - zero) / factor:.4g}'):g}" for bound in (kind.smallest, kind.largest))
+        raise ValueError(f"{kind.expectation}; it must lie between {low} and {high} {match['unit']}")
     return value
 
 

@@ -7,6 +7,7 @@ figures, and sweeps of columns, follows from what it declares.
 from __future__ import annotations
 
 import errno
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -363,8 +364,8 @@ def read_result(directory: str | Path) -> dict[str, Any]:
 def current_result(directory: str | Path) -> dict[str, Any]:
     """The result of a finished run; recomputed if files are missing, damaged or of an earlier version of an analysis.
 
-    What cannot be written, as where all is read-only, is not. Without dumps a result of an earlier method stays what it
-    is, if it has all current quantities.
+    A warning tells of damage. What cannot be written, as where all is read-only, is not. Without dumps a result of an
+    earlier method stays what it is, if it has all current quantities.
 
     Raises
     ------
@@ -377,6 +378,7 @@ def current_result(directory: str | Path) -> dict[str, Any]:
 
     directory = Path(directory)
     kept: dict[str, Any] | None = None
+    damaged = False
     try:
         result = read_result(directory)
         wanted = analyses_of(case_of(directory))
@@ -386,15 +388,20 @@ def current_result(directory: str | Path) -> dict[str, Any]:
         there = analyses_in(result)  # without those that came later
         if bool(there) == bool(wanted) and all(one.can_show(result) for one in there):
             kept = result
-        whole = intact(directory, [name for one in wanted for name in one.tables])
+        names = [name for one in wanted for name in one.tables]
+        whole = intact(directory, names)
+        damaged = not intact(directory, [name for name in names if (directory / f"{name}.parquet").is_file()])
         if kept and whole and check_unchanged(directory, [RESULT_NAME]) and result["analyses"] == versions:
             return result
     except FileChanged:
         raise
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        pass
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        damaged = isinstance(error, ValueError)
     if kept is not None and not any(name.endswith(".bin") for name in files_of_segments(directory)):
         return kept
+    if damaged:
+        text = "the result or a table is incomplete or damaged; it is recomputed from the dumps"
+        warnings.warn(f"{directory}: {text}", stacklevel=2)
     result, tables = _measured(directory)
     try:
         _write(directory, result, tables)

@@ -326,7 +326,8 @@ class _Watch:
             return self._blow_up(clearance / seconds)
         sentence = (
             f"{lost} bead(s) left the simulation box before step {step}: walkers left its sides (increase "
-            "dimers.spacing or shorten the run), or climbers rose above its top, at twice boundary.height"
+            "dimers.spacing, shorten the run, or reduce the acceleration if beads fly off), or climbers rose above its "
+            "top, at twice boundary.height"
         )
         return (failures.BeadsOverTheTop if over else failures.BeadsLost)(sentence, self.directory, lost=lost)
 

@@ -15,16 +15,17 @@ from math import isclose, isfinite, nan, pi
 from pathlib import Path
 from typing import Any
 
-from walkers.inputs.case import Case, settling_of
+from walkers.inputs.case import CONSTANT, Case, Run, settling_of
 from walkers.inputs.drive import Harmonic
 from walkers.inputs.errors import refused
 from walkers.inputs.origins import Origin
 from walkers.inputs.readable import kind_of
+from walkers.inputs.rounding import percent
 from walkers.physics.matter import Contact
 from walkers.postprocess.analysis import tabulate
 from walkers.postprocess.dump import DumpError
 from walkers.runner.binary import find_engine, plugin_of, run_script
-from walkers.runner.directory import CASE_NAME, DECK_RECORD_NAME, SEGMENT_NAME, layout_of, write_deck
+from walkers.runner.directory import CASE_NAME, DECK_RECORD_NAME, SEGMENT_NAME, finished_run, layout_of, write_deck
 from walkers.runner.failures import EngineFailure, MissingFrames
 from walkers.runner.files import read_json, write_json
 from walkers.runner.launch import EngineReport, judge
@@ -73,12 +74,22 @@ def write_folder(case: Case, folder: Path) -> Path:
     try:
         folder.mkdir(parents=True)
     except OSError as error:
-        raise refused(folder, f"cannot make the folder ({error.strerror})") from error
+        raise refused(folder, f"cannot make the folder ({error.strerror}): expected the name of a new one") from error
     write_deck(deck, folder)
     (folder / SCALE_NAME).write_text(_SCALE, encoding="utf-8")
     (folder / RUN_NAME).write_text(run_script(plugin, deck.layout.ranks), encoding="utf-8")
     write_json(folder / DECK_RECORD_NAME, {"case": case.as_dict(), "deck": deck.text})
     return folder / DECK_NAME
+
+
+def as_run(case: Case, directory: Path | None) -> Case:
+    """The case with the number of cycles of its finished run, if there is one; `InputError` if it cannot be read."""
+    if not case.run.until_steady or directory is None or (finished := finished_run(directory)) is None:
+        return case
+    try:
+        return case.for_cycles(int(finished.manifest["steps"]) // case.run.steps_per_cycle)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise refused(directory, f"the run's {MANIFEST_NAME} cannot be read ({error})") from error
 
 
 def take_in(folder: Path) -> None:
@@ -106,7 +117,7 @@ def take_in(folder: Path) -> None:
         notes = ["run by hand", *([f"the deck was edited: {'; '.join(changes)}"] if changes else [])]
         if (folder / DECK_NAME).stat().st_mtime_ns > log.stat().st_mtime_ns:
             notes.append(f"{DECK_NAME} is newer than {log.name}: if it was edited since, run it again")
-        _write(folder, ran, deck, segment, _judged(deck, folder, log), notes)
+        _write(folder, ran, deck, segment, _judged(deck, folder, log), notes, case.run)
     except (OSError, ValueError, KeyError, TypeError, DumpError) as error:
         raise refused(folder, f"the deck that was run by hand cannot be read ({error})") from error
 
@@ -126,7 +137,9 @@ def _judged(deck: Deck, folder: Path, log: Path) -> EngineReport:
     try:
         report = judge(deck, folder, log)
     except MissingFrames as failure:
-        raise refused(folder, f"the engine that was started by hand still runs, or was stopped: {failure}") from failure
+        ended = b"Loop time of" in log.read_bytes()
+        why = "its dump was cut later" if ended else "the engine that was started by hand still runs, or was stopped"
+        raise refused(folder, f"{why}: {failure}") from failure
     except EngineFailure as failure:
         raise refused(folder, f"the deck that was run by hand failed: {failure}") from failure
     return replace(report, wall_seconds=report.loop_seconds)
@@ -231,13 +244,22 @@ def _origins(case: Case, edited: Mapping[str, float]) -> tuple[Origin, ...]:
     return (*kept, *(Origin(key, f"{value:.6g}{units[key]}", "given", value=value) for key, value in keys.items()))
 
 
-def _write(folder: Path, case: Case, deck: Deck, segment: Segment, report: EngineReport, notes: list[str]) -> None:
+def _write(
+    folder: Path, case: Case, deck: Deck, segment: Segment, report: EngineReport, notes: list[str], wanted: Run
+) -> None:
     """Write what a run directory has: case, layout, segment, tables, result, and last its manifest."""
+    from walkers.postprocess.gait import are_constant
+
     (folder / MANIFEST_NAME).unlink(missing_ok=True)
     write_json(folder / CASE_NAME, case.as_dict(), at_once=False)
     write_json(folder / LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
     of_segment = {**vars(segment), "root_mean_square_velocity": None, **vars(report), "by_hand": notes}
     write_json(folder / SEGMENT_NAME, of_segment, at_once=False)
+    if wanted.until_steady and case.run.cycles < wanted.cycles and not are_constant(folder):
+        reached = f"the velocities are not constant within {percent(CONSTANT)} after {case.run.cycles} cycles"
+        further = f"walkers run continues to {wanted.cycles}: set cycles to {wanted.cycles} and run the deck again"
+        notes.append(f"{reached}; {further}")
+        write_json(folder / SEGMENT_NAME, of_segment, at_once=False)
     tabulate(folder)
     about: dict[str, Any] = {"drive_from": segment.drive_from, "segments": 1, "by_hand": notes}
     write_manifest(case, folder.name, None, report, started=time.time(), directory=folder, **about)

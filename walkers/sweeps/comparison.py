@@ -96,7 +96,9 @@ def compare_runs(first: Side, second: Side) -> Comparison:
     parameters, differences = _different([side.case for side in sides], names)
     not_run = [side.name for side in sides if side.directory is None]
     pairs = [] if not_run else _pairs([side.directory for side in sides if side.directory])
-    text = [differences or "the cases are the same"]
+    lengths = [cells[1:3] for one, cells in pairs if one["quantity"] == "cycles" and one["first"] != one["second"]]
+    same_cases = "".join(["the cases are the same", *(f", but ran {' and '.join(one)} cycles" for one in lengths)])
+    text = [differences or same_cases]
     if apart := [cells for one, cells in pairs if one["first"] != one["second"]]:
         text.append(aligned([["result", *names, "difference", "scatter of copies", "numerical error"], *apart]))
         text += _errors_text([side.directory for side in sides if side.directory], names)

@@ -22,7 +22,7 @@ from stat import S_ISDIR
 from typing import Any, Literal
 
 from walkers.inputs.errors import InputError, Problem, refused
-from walkers.inputs.readable import agrees, check_wanted, differing, flattened, has_key, readable
+from walkers.inputs.readable import agrees, check_wanted, differing, flattened, has_key, kind_of, readable
 from walkers.inputs.rounding import duration_text, rounded
 from walkers.physics.units import Kind, parse_quantity
 from walkers.postprocess.sides import sides_apart
@@ -222,9 +222,10 @@ def select(
         if runs and not any(has_key(run.parameters, key) for run in runs):
             known = ", ".join(dict.fromkeys(one for run in runs for one in run.parameters))
             raise InputError("--where", [Problem(key, None, f"no run has such a key; they have {known}")])
-        for run in runs:
+        alike = {key: 0.0} if kind_of(key) and "/" not in value else {}  # where there are no runs to compare with
+        for parameters in [run.parameters for run in runs] or [alike]:
             try:
-                check_wanted(run.parameters, key, value)
+                check_wanted(parameters, key, value)
             except ValueError as error:
                 raise refused("--where", f'"{text}": {error}') from error
         conditions.append((key, value))

@@ -110,13 +110,14 @@ class Failure:
 
 @dataclass(frozen=True)
 class SweepProgress:
-    """How far a sweep is: numbers of points, wall time in s since the start, time left in s as far as one can say."""
+    """How far a sweep is: numbers of points and of running decks; seconds since the start and, if known, to the end."""
 
     points: int
     found: int
     done: int
     failed: int
     running: int
+    decks: int
     elapsed: float
     left: float | None
     worst_failure: Failure | None
@@ -255,12 +256,16 @@ class SweepPlan:
             f"{record.name}: {record.title}".rstrip(": "),
             f"  varied     {keys or 'nothing'}",
             f"  points     {len(record.runs)}: {text}",
-            f"  to do      {at_most}{len(missing)} points in {len(self.decks)} decks",
+            f"  to do      {at_most}{_of(len(missing), 'point')} in {_of(len(self.decks), 'deck')}",
             f"  predicted  {at_most}{seconds + besides:.0f} core-seconds ({apart + besides:.0f} without shared decks), "
-            f"{duration_text(until)} with {at_once} decks in parallel",
+            f"{duration_text(until)} with {_of(at_once, 'deck')} in parallel",
             f"  directory  {record.directory}",
         ]
         return "\n".join(lines)
+
+
+def _of(count: int, thing: str) -> str:
+    return f"{count} {thing}{'' if count == 1 else 's'}"
 
 
 def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = None) -> SweepPlan:
@@ -555,6 +560,7 @@ class _Scheduler:
             done=self.done,
             failed=len(self.failures),
             running=sum(len(deck.points) for deck in made),
+            decks=len(made),
             elapsed=elapsed,
             left=waiting / self.seconds_done * elapsed if self.seconds_done else None,
             worst_failure=min(self.failures, key=lambda one: _SEVERITY.get(one.reason, _SEVERITY[""]), default=None),

@@ -107,7 +107,8 @@ def of_time(case: Case, drive_from: int | None, steps: int, stable: float) -> tu
     if drive_from:
         given.append(Parameter("rest_steps", str(drive_from), note="before the drive, in which the beads come to rest"))
     if drive_from is not None and (steps - drive_from) % run.steps_per_cycle == 0:
-        given.append(Parameter("cycles", str((steps - drive_from) // run.steps_per_cycle), note="of the drive"))
+        note = f"of the drive; {run.continuation}" if run.continuation else "of the drive"
+        given.append(Parameter("cycles", str((steps - drive_from) // run.steps_per_cycle), note=note))
     return given, derived
 
 

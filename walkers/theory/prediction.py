@@ -49,7 +49,7 @@ def check_applies(*cases: Case) -> None:
     """Raise ``ValueError`` with the key and the reason if the theory does not apply to a case."""
     for case in cases:
         if len(case.walkers) != 1 or len(case.walkers[0].radii) != 2 or case.loose:
-            raise ValueError("bodies: the theory is for dimers")
+            raise ValueError("bodies: expected dimers; the theory is for dimers only")
         if not case.boundary.bare:
             raise ValueError("boundary.shape: the theory is for planes")
         if not case.drive.is_plain or case.drive.direction[2] != 0.0:
