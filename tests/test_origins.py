@@ -50,6 +50,7 @@ def test_values_know_where_they_come_from() -> None:
     friction = found["contact.friction.bead_wall"]
     assert friction.origin == "calibrated"
     assert found["contact.restitution"].source.startswith("assumed in the calibration")
+    assert found["contact.restitution"].origin == "assumed"
     assert friction.range is not None
     assert friction.range[0] < float(friction.text) < friction.range[1]
     assert found["dimers.replicates"] == Origin("dimers.replicates", "6", "default")
@@ -239,6 +240,7 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     assert {one.key for one in spread.varied} == {one.key for one in case.origins if one.guessed}
     assert {one.key for one in spread.held} == {"contact.friction.bead_bead", "contact.rolling_friction"}
     assert "fixed    contact.friction.bead_bead 0.3" in describe(spread)
+    assert "contact_angle 0 deg (0 deg to 60 deg; half of the draws at 0 deg)" in describe(spread)
     assert "too few draws for rank correlations" in describe(spread)
     assert spread.depends == {"velocity": {}}
     table = walkers.load(spread.directory).table()

@@ -429,7 +429,7 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     upper = 3.6889 / found["seconds"]  # of no event (Garwood 1936)
     assert found["rate_interval"] == pytest.approx([0.0, upper], rel=1e-4)
     printed = call("climb", record.name, "--null", str(out), "--out", str(out), check=True).stdout
-    assert printed.count(f"runs climbed; climbs 0: 0 per run and second (0 to {upper:.3g} with 95% confidence)") == 16
+    assert printed.count(f"runs climbed; climbs 0: 0 per run and second (0 to {upper:.2g} with 95% confidence)") == 16
     written = tmp_path / "climbs.csv"
     assert call("climb", str(out), "--to", str(written), check=True).stdout.count("0 of 2 runs climbed") == 1
     assert pd.read_csv(written)["rate_high"].to_list() == pytest.approx([upper] * 3, rel=1e-4)
@@ -497,6 +497,7 @@ def test_runs_of_different_lengths_tell_one_probability(monkeypatch: pytest.Monk
     assert found["censored"] == (begins > np.minimum(driven, 3.0)).sum()
     assert found["ended"] == (begins > driven)[driven < 3.0].sum()
     assert f"{found['ended']} ended before" in describe_climbs(found)
+    assert "95% confidence, Kaplan-Meier)" in describe_climbs(found)
     assert summed_up(monkeypatch, results, within=7.0)["probability"] is None
 
 
@@ -533,6 +534,8 @@ def test_runs_that_climbers_ended_tell_of_later_times() -> None:
     """Two piles have climbed, and their climbers left. A third has not by 2.5 s: nobody knows after that."""
     left = survival(np.array([1.0, 2.0]), np.array([3.0, 3.5]), 5.0)
     assert (left["probability"], left["interval"]) == (1.0, pytest.approx([0.025**0.5, 1.0]))
+    half = survival(np.array([1.0, np.inf]), np.array([1.5, 3.5]), 3.0)  # one of two, Clopper and Pearson
+    assert half["interval"] == pytest.approx([1.0 - 0.975**0.5, 0.975**0.5])
     assert survival(np.array([1.0, 2.0, np.inf]), np.array([3.0, 3.5, 2.5]), 5.0)["probability"] is None
 
 

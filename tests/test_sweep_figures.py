@@ -17,7 +17,7 @@ from tests.conftest import call
 from walkers.inputs.errors import InputError
 from walkers.inputs.reading import load_case
 from walkers.plotting import LeftOutWarning
-from walkers.postprocess.drawing import UNSEEN
+from walkers.postprocess.drawing import SCATTER
 from walkers.runner.directory import case_of
 from walkers.sweeps.figure import draw, drawn_column, factors_of, layout_of
 from walkers.theory.prediction import MODEL, PAPER, predict, predicted_column
@@ -56,7 +56,9 @@ def test_error_bars_that_symbols_would_hide_are_left_out_and_the_legend_says_so(
     figure = draw(layout_of(table, table), drawn_column(table, "velocity"))
     (panel,) = _panels(figure)
     assert sum(len(one.get_segments()) for one in panel.collections if isinstance(one, LineCollection)) == bars
-    assert [legend.get_title().get_text() for legend in figure.legends] == ([] if bars else [UNSEEN])
+    assert [legend.get_title().get_text() for legend in figure.legends] == [
+        SCATTER if bars else f"{SCATTER}, smaller than the symbols"
+    ]
 
 
 def test_axes_do_not_magnify_rounding() -> None:

@@ -21,7 +21,7 @@ from walkers.inputs.changes import MISSING, changed, parts_of, value_at
 from walkers.inputs.errors import unusable
 from walkers.inputs.library import Known, Library, expected_of
 from walkers.inputs.loads import contact_loads, reach
-from walkers.inputs.origins import Notes, Origin, origins_of
+from walkers.inputs.origins import Notes, Origin, Whence, origins_of
 from walkers.inputs.run_tables import resolve_drive, resolve_run
 from walkers.inputs.schema import (
     MOST_BEADS,
@@ -132,7 +132,8 @@ def _origin_of(key: str, known: Known, liquid: str | None) -> Origin:
         of_sizes = loose is not None and loose.logarithmic
         return Origin(key, text, known.origin, known.source, known.range, of_sizes, value=known.value)
     if liquid in known.calibrated_with:
-        return Origin(key, text, "calibrated", known.source, known.range, loose.logarithmic, value=known.value)
+        whence: Whence = "calibrated" if known.range else "assumed"
+        return Origin(key, text, whence, known.source, known.range, loose.logarithmic, value=known.value)
     return Origin(key, text, "default", known.source, loose.range, loose.logarithmic, value=known.value)
 
 

@@ -25,8 +25,8 @@ _WIDTH = 110
 def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
     """Unmeasured values of a result, and values that the case calls uncertain.
 
-    Each has a ``key``, ``value`` (as a case file would say it), ``origin`` (``given``, ``library``, ``calibrated`` or
-    ``default``), ``range`` (both ends, or None), ``logarithmic``, and whether it is ``guessed``.
+    Each has a ``key``, ``value`` (as a case file would say it), ``origin`` (``given``, ``library``, ``calibrated``,
+    ``assumed`` or ``default``), ``range`` (both ends, or None), ``logarithmic``, and whether it is ``guessed``.
     """
     return [
         {
@@ -51,7 +51,13 @@ def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
         return wrapper.wrap(text) if text else []
 
     lines = listed("guessed", [one for one in rests if one["guessed"]])
-    whence = {"given": "given", "calibrated": "calibrated", "library": "own library", "package": "package"}
+    whence = {
+        "given": "given",
+        "calibrated": "calibrated",
+        "assumed": "assumed",
+        "library": "own library",
+        "package": "package",
+    }
     for head, origin in whence.items():
         lines += listed(head, [one for one in rests if not one["guessed"] and one["origin"] == origin])
     return lines

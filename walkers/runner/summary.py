@@ -243,7 +243,7 @@ def _whence(one: dict[str, Any]) -> str:
         ends = f", given as uncertain{ends}"
     elif origin == "default" and ends:
         return f"guessed ({source or 'not measured'}){ends}"
-    elif origin in ("calibrated", "package"):
+    elif origin in ("calibrated", "assumed", "package"):
         return source + ends
     return (f"{origin}: {source}" if source else origin) + ends
 

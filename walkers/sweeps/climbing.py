@@ -358,9 +358,9 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
         long; ``median`` (s, the time by which it has in half, None where that is not reached), ``censored`` (records
         that ended without it).
 
-        The interval is that of Greenwood's variance of log(-log) of the survival, where it exists; where none or all
-        have climbed, the binomial one (Clopper and Pearson 1934) of the records that are so long, or in which it has
-        happened.
+        ``estimator`` says which interval: ``Clopper-Pearson`` (1934, exact, binomial) of the records that are so long,
+        or in which it has happened; ``Kaplan-Meier`` (Greenwood's variance of log(-log) of the survival) where records
+        ended before, if it exists: neither none nor all have climbed.
     """
     from scipy.stats import binomtest
 
@@ -370,18 +370,20 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
     share = _share(first, watched)
     half = np.flatnonzero(share.probabilities >= 0.5)
     probability = float(share.evaluate(at)) if watched_so_long.any() or not censored.any() else None
-    interval = None
-    if probability is not None and 0.0 < probability < 1.0:
-        interval = [float(end.evaluate(at)) for end in _ends(share)]
+    climbed, ended = int((~censored & (first <= at)).sum()), int((censored & ~watched_so_long).sum())
+    interval, estimator = None, "Clopper-Pearson"
+    if ended and probability is not None and 0.0 < probability < 1.0:
+        interval, estimator = [float(end.evaluate(at)) for end in _ends(share)], "Kaplan-Meier"
     elif probability is not None:
-        exact = binomtest(round(probability) * followed, followed).proportion_ci(_CONFIDENCE)
+        exact = binomtest(climbed, followed).proportion_ci(_CONFIDENCE)
         interval = [float(exact.low), float(exact.high)]
     return {
-        "climbed": int((~censored & (first <= at)).sum()),
-        "ended": int((censored & ~watched_so_long).sum()),
+        "climbed": climbed,
+        "ended": ended,
         "censored": int(censored.sum()),
         "probability": probability,
         "interval": interval,
+        "estimator": estimator,
         "median": float(share.quantiles[half[0]]) if len(half) else None,
     }
 
@@ -493,7 +495,7 @@ def describe_climbs(found: Mapping[str, Any]) -> str:
     lines = [
         f"{found['climbed']} of {found['runs']} runs climbed within {found['within']:.3g} s"
         + (f", {found['ended']} ended before without a climb" if found["ended"] else "")
-        + f": probability {found['probability']:.2f}{_interval(found['interval'], '.2f')}",
+        + f": probability {found['probability']:.2f}{_interval(found['interval'], '.2f', found['estimator'])}",
         f"  waiting    median {half}; {found['censored']} of {found['runs']} runs ended without a climb",
         f"  climbs     {_rate_text(found)}"
         + ("" if found["dispersion"] is None else f"; dispersion {found['dispersion']:.1f} (Poisson: 1)"),
@@ -520,12 +522,13 @@ def _p_text(value: float) -> str:
 
 
 def _rate_text(found: Mapping[str, Any]) -> str:
-    rate = "-" if found["rate"] is None else f"{found['rate']:.3g} per run and second"
+    rate = "-" if found["rate"] is None else f"{found['rate']:.2g} per run and second"
     return f"{found['climbs']}: {rate}{_interval(found['rate_interval'])}"
 
 
-def _interval(ends: Sequence[float] | None, digits: str = ".3g") -> str:
-    return "" if ends is None else f" ({ends[0]:{digits}} to {ends[1]:{digits}} with {_CONFIDENCE:.0%} confidence)"
+def _interval(ends: Sequence[float] | None, digits: str = ".2g", estimator: str = "") -> str:
+    text = ", ".join(filter(None, (f"{_CONFIDENCE:.0%} confidence", estimator)))
+    return "" if ends is None else f" ({ends[0]:{digits}} to {ends[1]:{digits}} with {text})"
 
 
 def _range(values: Sequence[float] | FloatArray) -> str:

@@ -167,7 +167,17 @@ def _draw_map(
 
 _COLUMNS = (
     *("condition", "where", "runs", "seconds", "within", "climbed", "probability", "probability_low"),
-    *("probability_high", "median", "climbs", "rate", "rate_low", "rate_high", "dispersion", "led_by_large"),
+    *(
+        "probability_high",
+        "estimator",
+        "median",
+        "climbs",
+        "rate",
+        "rate_low",
+        "rate_high",
+        "dispersion",
+        "led_by_large",
+    ),
     *("share_of_large", "p_among_beads", "p_among_own"),
 )
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from walkers.inputs.errors import refused
 from walkers.inputs.readable import readable_unit
-from walkers.postprocess.drawing import UNSEEN, errors_seen, letter_panels, new_figure, plain_text, styled
+from walkers.postprocess.drawing import SCATTER, errors_seen, letter_panels, new_figure, plain_text, styled
 from walkers.sweeps.table import ERRORS, find_name, value_text, varied_columns, with_unit
 
 if TYPE_CHECKING:
@@ -422,8 +422,9 @@ def _legend(figure: Figure, grid: npt.NDArray[Any], colours: _Colours, drawn: Dr
     lines = {line.get_linestyle() for axes in grid.flat for line in axes.lines}
     for number, model in enumerate(drawn.theory):
         handles.append(Line2D([], [], label=model, **_model_look(number, _MODELS[number][0] in lines, "0.3")))
-    if np.isfinite(drawn.errors).any() and not errors_seen(drawn.errors, drawn.values):
-        title = f"{title}; {UNSEEN}" if title else UNSEEN
+    if np.isfinite(drawn.errors).any():
+        bars = SCATTER + ("" if errors_seen(drawn.errors, drawn.values) else ", smaller than the symbols")
+        title = f"{title}; {bars}" if title else bars
         handles = handles or [Line2D([], [], ls="none", label=" ")]
     if handles:
         longest = max(len(str(handle.get_label())) for handle in handles)

@@ -12,7 +12,7 @@ import numpy as np
 from walkers.inputs.extras import require
 from walkers.inputs.readable import readable_unit
 from walkers.inputs.rounding import rounded
-from walkers.postprocess.drawing import UNSEEN, errors_seen
+from walkers.postprocess.drawing import SCATTER, errors_seen
 from walkers.postprocess.report.page import (
     COLOURS,
     LARGEST,
@@ -27,8 +27,19 @@ from walkers.postprocess.report.page import (
     write_page,
 )
 from walkers.postprocess.report.run import RunReport
+from walkers.postprocess.uncertainty import not_known
 from walkers.sweeps.figure import readable_key
-from walkers.sweeps.table import ERRORS, SIDES, load, main_columns, sides_differ, value_text, varied_columns, with_unit
+from walkers.sweeps.table import (
+    ERRORS,
+    SIDES,
+    load,
+    main_columns,
+    result_in,
+    sides_differ,
+    value_text,
+    varied_columns,
+    with_unit,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,6 +74,7 @@ def report_sweep(directory: Path, to: Path | None = None, *, largest: int = LARG
         "name": frame.attrs["sweep"],
         "points": frame["point"].tolist(),
         "has_plot": plot is not None,
+        "uncertain": _uncertain(frame),
         **_table(frame),
     }
     bare = fill("sweep.html.j2", "walkers.sweeps", runs={}, **values)
@@ -77,6 +89,13 @@ def report_sweep(directory: Path, to: Path | None = None, *, largest: int = LARG
         carried |= run.carried
     body = fill("sweep.html.j2", "walkers.sweeps", runs=dict(sorted(runs.items())), **values)
     return write_page(path, values["title"], body, carried)
+
+
+def _uncertain(frame: pd.DataFrame) -> list[str]:
+    """A sentence with the uncertain parameters of the finished points that the sweep does not vary."""
+    results = [result_in(Path(run)) for run in frame.loc[frame["status"] == "finished", "run"]]
+    rests = [one for result in results for one in result.get("rests_on", ()) if one["key"] not in frame.columns]
+    return [one.replace("run with", "run a point with") for one in not_known(rests)]
 
 
 def _spread_out(numbers: list[int]) -> list[int]:
@@ -141,7 +160,7 @@ def _overview(frame: pd.DataFrame) -> Model | None:
     known = frame[frame[result].notna()].sort_values(x, kind="stable")
     errors = known[ERRORS[result]].to_numpy(float) if result in ERRORS else np.empty(0)
     seen = errors_seen(errors, known[result].to_numpy(float))
-    text = ", bars: scatter of the copies" if seen else f"; {UNSEEN}" if len(errors) else ""
+    text = f"; {SCATTER}" + ("" if seen else ", smaller than the symbols") if len(errors) else ""
     plot = new_plot(f"{label} against {readable_key(x)}{text}", along_x, label, height=380)
     apart = known["point"].map(lambda _: "")
     if others:

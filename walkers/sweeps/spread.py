@@ -100,6 +100,12 @@ def _range_of(one: Origin) -> dict[str, list[Any]]:
     return {name: [low, written(min(max(own, ends.low), ends.high), ends.unit), high]}
 
 
+def _half(one: Origin) -> str:
+    """Half of the draws, if the case's own value, their median, is an end of its range."""
+    drawn = ranges_of({one.key: _range_of(one)})[one.key]
+    return f"; half of the draws at {one.text}" if drawn.median in (drawn.low, drawn.high) else ""
+
+
 def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> Sweep:
     """A sweep over all that is uncertain in a case: Sobol's sequence, scrambled so that its columns are least alike.
 
@@ -200,7 +206,9 @@ def describe(spread: Spread) -> str:
     points = max((band.points for band in spread.bands.values()), default=0)
     lines = [f"  spread     {points} draws; values drawn independently from their ranges, median: value of the case"]
     lines += [
-        f"             {one.key} {one.text} ({one.range[0]} to {one.range[1]})" for one in spread.varied if one.range
+        f"             {one.key} {one.text} ({one.range[0]} to {one.range[1]}{_half(one)})"
+        for one in spread.varied
+        if one.range
     ]
     if spread.held:
         text = ", ".join(f"{one.key} {one.text}" for one in spread.held)
