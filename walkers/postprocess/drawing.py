@@ -29,7 +29,7 @@ _MAKER = "granular-walkers"
 _LEAST_ERROR = 0.02  # of the range of values, about half of the height of a symbol
 UNSEEN = "error bars are smaller than the symbols"
 """Note where error bars are left out."""
-SCATTER = "bars: standard deviation of the copies without uncertain parameters"
+SCATTER = "bars: standard deviation of the copies (uncertain parameters not varied)"
 """What the error bars of a sweep are."""
 _Given = ParamSpec("_Given")
 _Drawn = TypeVar("_Drawn")
