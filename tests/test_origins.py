@@ -55,7 +55,7 @@ def test_values_know_where_they_come_from() -> None:
     assert friction.range[0] < float(friction.text) < friction.range[1]
     assert found["dimers.replicates"] == Origin("dimers.replicates", "6", "default")
     assert found["liquid.dynamic_viscosity"].text == "4.6 mPa*s"  # 5 mm²/s times 0.92 g/cm³, not that of the bridges
-    assert found["run.time_step"].origin == "derived"
+    assert found["run.time_step"].source.startswith("auto: 0.4 of the rayleigh limit, ")
     assert not any(one.guessed for one in found.values())
     # What was calibrated with other liquids, or another law, is a guess.
     assert origins(load_case("fig1b", {"liquid.name": "Si AK10"}))["liquid.volume_fraction"].origin == "calibrated"

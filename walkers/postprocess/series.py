@@ -10,7 +10,7 @@ import re
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from math import ceil
+from math import ceil, isclose
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
@@ -130,7 +130,7 @@ def _views(motion: Motion, frames: Sequence[int]) -> Figure:
         panel.locator_params(axis="x", nbins=4, steps=[1, 2, 5, 10])
         panel.spines["right"].set_visible(sideways)  # as the left one, a wall
         panel.grid(visible=False)
-        foremost = panel.get_position().x0 == panels[0].get_position().x0
+        foremost = isclose(panel.get_position().x0, panels[0].get_position().x0)
         panel.tick_params(labelleft=foremost)
         panel.set_ylabel(f"{names[1]} (mm)" if foremost else "")
     window.close()
