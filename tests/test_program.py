@@ -53,7 +53,10 @@ def test_two_beads_walk_toward_the_large_one(run_directory: Callable[..., Path])
 
 def test_show_tells_what_follows_from_a_case() -> None:
     shown = call("show", "fig1b", check=True).stdout
-    assert all(part in shown for part in ("Γ0 = 0.3811", "sin δ = 0.2", "μ = 0.5429", "4πγR limit", "rayleigh"))
+    assert all(
+        part in shown
+        for part in ("Γ0 = 0.3811", "sin δ = 0.2", "mass asymmetry (m1 - m2)/M = 0.5429", "4πγR limit", "rayleigh")
+    )
     summary = json.loads(call("show", "fig1b", "--json", check=True).stdout)
     assert summary["dimer"]["gamma0"] == pytest.approx(0.3811, abs=1e-4)
     shares = summary["time_step"]["share"]

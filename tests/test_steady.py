@@ -172,7 +172,7 @@ def test_an_interrupted_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
     with pytest.raises(Stopped):
         make_runs([case], tmp_path / "stopped", engine, on_progress=stop)
     assert shown == sorted(shown)  # the run begins again after 12 cycles, its progress does not
-    assert shown[-1] == pytest.approx(13 / sum(case.run.attempts), rel=0.1)
+    assert 13 < shown[-1] * sum(case.run.attempts) < 36
     dumps = []
     for folder in ("stopped", "at-a-stretch"):
         ((_, run),) = make_runs([case], tmp_path / folder, engine).runs.items()

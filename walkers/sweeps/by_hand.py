@@ -137,8 +137,7 @@ def _judged(deck: Deck, folder: Path, log: Path) -> EngineReport:
     try:
         report = judge(deck, folder, log)
     except MissingFrames as failure:
-        ended = b"Loop time of" in log.read_bytes()
-        why = "its dump was cut later" if ended else "the engine that was started by hand still runs, or was stopped"
+        why = "the engine that was started by hand still runs or was stopped, or its dump was cut later"
         raise refused(folder, f"{why}: {failure}") from failure
     except EngineFailure as failure:
         raise refused(folder, f"the deck that was run by hand failed: {failure}") from failure
