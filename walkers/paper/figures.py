@@ -269,8 +269,8 @@ OBSERVED = {
     "fig2_4g": "Fig. 2: v at 80 Hz, 4 g (mm/s)",
     "fig3_0.4_0.2": "Fig. 3: v for 0.4/0.2 mm (mm/s)",
     "fig2_frequency": "Fig. 2: v(90 Hz)/v(60 Hz) at 6 g",
-    "fig2_plateau": "plateau: v(10 g)/v(6 g) at 60 Hz",
-    "astray": "walkers off the axis at 60 Hz, 10 g (%)",
+    "fig2_plateau": "v(10 g)/v(6 g) at 60 Hz",
+    "astray": "off the axis, 60 Hz, 10 g (%)",
     "angle_after_60": "angle after a start at 60° (°)",
 }
 """The `walkers.paper.published.OBSERVATIONS` that are shown, with their labels."""
