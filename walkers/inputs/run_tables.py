@@ -87,7 +87,8 @@ def resolve_run(table: RunTable, case: Case, notes: Notes) -> Run:
     """
     frequency, loose = case.drive.frequency, case.loose
     samples, cycles_per_sample, samples_per_bridge_sample = _sampling(table, case)
-    time_step, steps = fit_into_cycle(_largest_time_step(table, case), frequency, samples)
+    largest, reason = _largest_time_step(table, case)
+    time_step, steps = fit_into_cycle(largest, frequency, samples)
     cycles, until_steady = _cycles(table, case, cycles_per_sample), _until_steady(table, case, cycles_per_sample)
     settling = table.settling_cycles
     if settling is None:
@@ -119,11 +120,11 @@ def resolve_run(table: RunTable, case: Case, notes: Notes) -> Run:
         silence=table.silence,
         log_limit=table.log_limit,
     )
-    _note_run(run, table, case, notes)
+    _note_run(run, table, case, notes, reason)
     return run
 
 
-def _note_run(run: Run, table: RunTable, case: Case, notes: Notes) -> None:
+def _note_run(run: Run, table: RunTable, case: Case, notes: Notes, reason: str) -> None:
     often = run.samples_per_cycle if run.cycles_per_sample == 1 else f"1 in {run.cycles_per_sample} cycles"
     cycles = f"until constant within {percent(CONSTANT)}, at most {run.cycles}" if run.until_steady else run.cycles
     whence = "from the duration" if table.duration else "checked after 12 and 24 cycles"
@@ -135,7 +136,6 @@ def _note_run(run: Run, table: RunTable, case: Case, notes: Notes) -> None:
         notes.default("run.longest_settling", run.longest_settling, "of loose beads")
     if run.rests:
         notes.default("run.settled_below", run.settled_below)
-    reason = limits_of(case).recommended(loose=case.loose)[1]
     notes.derived("run.time_step", run.time_step, f"auto: {reason}, a whole number of steps per cycle")
     notes.derived("run.cycles", cycles, whence)
     notes.derived("run.settling_cycles", run.settling_cycles, "a third of the cycles, at most 20")
@@ -155,16 +155,16 @@ def _check_length(table: RunTable, case: Case, cycles: int, settling: int, cycle
         raise unusable("run.frames_per_second", message)
 
 
-def _largest_time_step(table: RunTable, case: Case) -> float:
-    """The step that a case gives, which must be within the limits unless it insists, or that of ``"auto"``, s."""
+def _largest_time_step(table: RunTable, case: Case) -> tuple[float, str]:
+    """The largest step, s, and its reason: given (within the limits unless the case insists), or ``"auto"``."""
     limits, given = limits_of(case), table.time_step
     if given is None:
-        return limits.recommended(loose=case.loose)[0]
+        return limits.recommended(loose=case.loose)
     if (exceeded := limits.exceeded_by(given)) and not table.allow_unstable:
         allowed = f"{min(limits.as_dict().values()) * 1e6:.3g} us"
         message = f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed}, "
         raise unusable("run.time_step", f'{message}"auto", or allow_unstable = true')
-    return given
+    return given, "given"
 
 
 def _sampling(table: RunTable, case: Case) -> tuple[int, int, int]:

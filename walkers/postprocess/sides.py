@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from walkers.postprocess.dump import BoolArray, IntArray
 
 SAME = 0.05
 """Velocities of walkers that faced either way and differ by more than this share are printed apart …"""
@@ -19,6 +22,12 @@ def ways(*, uphill: bool) -> tuple[str, str]:
 def differ(one: float, other: float) -> bool:
     """Whether mean velocities (m/s) of walkers that faced either way differ; not if one is NaN."""
     return abs(one - other) > max(SAME * max(abs(one), abs(other)), STEADY_SPEED)
+
+
+def alike(facing: IntArray, *, uphill: bool) -> BoolArray:
+    """Which walkers means of gait and work include, shape (W,): on a slope those facing up, if there are any."""
+    up = facing > 0
+    return up if uphill and up.any() else up | True
 
 
 def sides_apart(result: Mapping[str, Any]) -> dict[str, float]:

@@ -155,7 +155,7 @@ def _draw_map(
     shown = panel.imshow(rates, cmap="Blues", vmin=0.0, aspect="auto", origin="lower")
     for place, number in np.ndenumerate(np.array(numbers)):
         one, ends = found[number], found[number]["rate_interval"] or (np.nan, np.nan)
-        text = f"{one['rate']:.2g} ({ends[0]:.2g} to {ends[1]:.2g})\n{one['climbed']}/{one['runs']}"
+        text = f"{rates[place]:.2g} ({ends[0]:.2g} to {ends[1]:.2g})\n{one['climbed']}/{one['runs']}"
         colour = "w" if rates[place] > 0.6 * np.nanmax(rates) else "k"
         panel.text(place[1], place[0], text, ha="center", va="center", color=colour)
     panel.set_xticks(range(len(columns)), list(map(plain_text, columns)))
@@ -167,18 +167,8 @@ def _draw_map(
 
 _COLUMNS = (
     *("condition", "where", "runs", "seconds", "within", "climbed", "probability", "probability_low"),
-    *(
-        "probability_high",
-        "estimator",
-        "median",
-        "climbs",
-        "rate",
-        "rate_low",
-        "rate_high",
-        "dispersion",
-        "led_by_large",
-    ),
-    *("share_of_large", "p_among_beads", "p_among_own"),
+    *("probability_high", "estimator", "median", "climbs", "rate", "rate_low", "rate_high", "dispersion"),
+    *("led_by_large", "share_of_large", "p_among_beads", "p_among_own"),
 )
 
 

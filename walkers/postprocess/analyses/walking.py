@@ -38,7 +38,7 @@ from walkers.postprocess.gait import (
     walk,
 )
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
-from walkers.postprocess.sides import STEADY_SPEED, sides_apart, ways
+from walkers.postprocess.sides import STEADY_SPEED, alike, sides_apart, ways
 from walkers.postprocess.tables import NUMBERED, Columns, columns_of
 from walkers.postprocess.uncertainty import LEAST_PER_VALUE, band_of, band_text, bands_text, wrapped
 
@@ -386,12 +386,6 @@ def spread(values: FloatArray) -> dict[str, Any]:
     }
 
 
-def alike(facing: IntArray, case: Case) -> BoolArray:
-    """Which walkers means of gait and work include, shape (W,): on a slope those facing up, if there are any."""
-    up = facing > 0
-    return up if case.goes_uphill and up.any() else np.ones_like(up)
-
-
 def _mean(values: FloatArray) -> float | None:
     """Mean over those that have the number."""
     known = values[np.isfinite(values)]
@@ -401,7 +395,7 @@ def _mean(values: FloatArray) -> float | None:
 def _summary(walkers: Columns, case: Case) -> dict[str, Any]:
     """Summary of rows of the table of walkers for a result."""
     velocity, axial, facing = (walkers[name] for name in ("velocity", "axial_velocity", "facing"))
-    turned, same = np.isfinite(walkers["turned_at"]), alike(facing, case)
+    turned, same = np.isfinite(walkers["turned_at"]), alike(facing, uphill=case.goes_uphill)
 
     def means(family: str, named: str) -> dict[str, float | None]:
         columns = [name for name in walkers if name.rpartition("_")[0] == family]

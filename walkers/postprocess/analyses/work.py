@@ -21,13 +21,13 @@ import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.physics.units import ACCELERATION_OF_ONE_G
-from walkers.postprocess.analyses.walking import alike, spread
+from walkers.postprocess.analyses.walking import spread
 from walkers.postprocess.analysis import Analysis, Measured, Quantity
 from walkers.postprocess.dump import FloatArray, IntArray
 from walkers.postprocess.figures import Line, Panel, nested_widths
 from walkers.postprocess.gait import walk
 from walkers.postprocess.motion import LEAST_SAMPLES, Group, Motion
-from walkers.postprocess.sides import STEADY_SPEED
+from walkers.postprocess.sides import STEADY_SPEED, alike
 from walkers.postprocess.tables import Columns, columns_of
 
 _PARTS = 10
@@ -65,7 +65,7 @@ class Working(Analysis):
         each = np.concatenate(works, axis=1).T.reshape(-1)
         rows = Work(np.repeat(walker, cycles), np.tile(np.arange(cycles), len(walker)), each)
         facing = np.array([one.facing for group in groups for one in group.walkers])
-        these = alike(facing, motion.case)
+        these = alike(facing, uphill=motion.case.goes_uphill)
         cost = np.concatenate(costs)[these]
         summary = {"work": spread(np.concatenate(means)[these]), "cost_of_transport": spread(cost[np.isfinite(cost)])}
         return {"work": columns_of(rows)}, summary
