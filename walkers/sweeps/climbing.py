@@ -373,7 +373,10 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
     climbed, ended = int((~censored & (first <= at)).sum()), int((censored & ~watched_so_long).sum())
     interval, estimator = None, "Clopper-Pearson"
     if ended and probability is not None and 0.0 < probability < 1.0:
-        interval, estimator = [float(end.evaluate(at)) for end in _ends(share)], "Kaplan-Meier"
+        with warnings.catch_warnings():  # at times at which all have climbed
+            warnings.filterwarnings("ignore", "The confidence interval is undefined", RuntimeWarning)
+            ends = share.confidence_interval(_CONFIDENCE, method="log-log")
+        interval, estimator = [float(ends.low.evaluate(at)), float(ends.high.evaluate(at))], "Kaplan-Meier"
     elif probability is not None:
         exact = binomtest(climbed, followed).proportion_ci(_CONFIDENCE)
         interval = [float(exact.low), float(exact.high)]
@@ -395,24 +398,12 @@ def _share(first: FloatArray, watched: FloatArray) -> Any:
     return ecdf(CensoredData.right_censored(np.minimum(first, watched), first > watched)).cdf
 
 
-def _ends(share: Any) -> tuple[Any, Any]:
-    """The lower and the upper end of its interval, as functions of time; NaN before the first event."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "The confidence interval is undefined", RuntimeWarning)
-        found = share.confidence_interval(_CONFIDENCE, method="log-log")
-    return found.low, found.high
-
-
 def survival_curve(first: FloatArray, watched: FloatArray) -> dict[str, list[float]]:
     """The share of `survival` at every time (s) at which it changes: ``time``, ``probability``, ``low``, ``high``."""
-    share = _share(first, watched)
-    time = np.array([0.0, *np.unique(share.quantiles)])
-    low, high = (end.evaluate(time) for end in _ends(share))
-    # There is no variance where none or all have climbed.
-    sides = {"low": np.fmax.accumulate(np.nan_to_num(low)), "high": np.where(time > 0.0, np.fmin(high, 1.0), 0.0)}
-    return {"time": time.tolist(), "probability": share.evaluate(time).tolist()} | {
-        name: side.tolist() for name, side in sides.items()
-    }
+    time = [0.0, *np.unique(_share(first, watched).quantiles).tolist()]
+    found = [survival(first, watched, at) for at in time]
+    low, high = zip(*(one["interval"] or (np.nan, np.nan) for one in found), strict=True)
+    return {"time": time, "probability": [one["probability"] for one in found], "low": [*low], "high": [*high]}
 
 
 VARIATIONS = {
