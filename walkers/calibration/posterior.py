@@ -51,7 +51,7 @@ def log_likelihood(
 
         ψ(z) = ½ sinh(z)ᵀ C⁻¹ sinh(z) + ½ (z − m)ᵀ Σ⁻¹ (z − m)
 
-    is least. A linearisation at m would favour hopeless parameters: no residual would exceed 1/deviation errors.
+    is least. A linearisation at m would favour wrong parameters: no residual would exceed 1/deviation errors.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def _diagonal(rows: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Posterior:
-    """S samples of equal weight, of points with other weights w."""
+    """S samples of equal weight, drawn from points with weights w."""
 
     unit: FloatArray  # in the unit cube, shape (S, D)
     discrepancy: FloatArray  # of each group, in deviations of its observations, shape (S, G)

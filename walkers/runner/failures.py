@@ -93,7 +93,7 @@ class BeadsLost(EngineFailure):
 
 
 class BeadsOverTheTop(BeadsLost):
-    """Beads left the simulation box after the last position nearest to it was at its top: they climbed out."""
+    """Beads left the simulation box at its top: before, the bead closest to its sides was the highest one."""
 
 
 class BlowUp(EngineFailure):

@@ -125,7 +125,7 @@ def _sums(contents: dict[str, Any], directory: Path) -> dict[str, str]:
 
 
 def forget_tables(directory: Path, names: Collection[str]) -> None:
-    """Remove the checksums of files that will be recomputed from the manifest of a finished run."""
+    """Remove from the manifest of a finished run the checksums of files that will be recomputed."""
     _change(directory, names, anew=False)
 
 

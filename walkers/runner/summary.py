@@ -119,8 +119,8 @@ def summarise(case: Case) -> dict[str, Any]:
     dict
         ``case`` (resolved), ``drive`` (its largest harmonic, the sum of all), ``beads`` (numbers, mass, liquid),
         ``dimer`` (M, R̄, Γ0, sin δ, mass asymmetry; of dimers), ``contacts`` (forces, bridges, overlaps of each make of
-        walkers), ``time_step`` (limits, None where one does not apply, the chosen step, its share of each and that of
-        ``"auto"``), ``run`` (steps, samples, predicted seconds).
+        walkers), ``time_step`` (limits, None if one does not apply; the chosen step; its shares of the limits and those
+        of ``"auto"``), ``run`` (steps, samples, predicted seconds).
     """
     run, drive, limits = case.run, case.drive, limits_of(case).as_dict()
     volume = _volume(case)

@@ -271,7 +271,7 @@ def compose(plan: Plan) -> Deck:
         pair_bridge_options=" ".join(PAIR_BRIDGES.values()),
         skin=skin,
         most_neighbours=most_neighbours,
-        # At most some ten thousand bins, none smaller than two beads (m).
+        # At most about ten thousand bins, none smaller than two beads (m).
         bin_size=None if plan.skin else max(4.0 * largest, (space / 2e4) ** (1.0 / 3.0)),
         wide=not plan.skin and space > _MOST_BINS * largest**3,
     )  # fmt: skip

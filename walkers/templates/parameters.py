@@ -19,7 +19,7 @@ from walkers.templates.scene import Surface
 
 STATUS_LINES_PER_CYCLE = 4
 PRINTED = "parameters:"
-"""Begin of the line in which the engine prints the parameters."""
+"""Start of the line in which the engine prints the parameters."""
 
 
 @dataclass(frozen=True)

@@ -156,11 +156,10 @@ def alignment_of(case: Case) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``u``, ``v``, ``damping`` (β, by the bridges) of the Mathieu equation, whether small angles are ``stable`` by it
-        and the ``largest_stable_v`` on a level substrate; ``rolling_rate``, at which they grow by it, 1/s; ``rate``, at
-        which they grow or (negative) decay where contacts may slide and beads spin, 1/s (at 1° if there is rolling
-        friction), None where the axial motion does not repeat itself; whether the dimer ``stands``;
-        ``turns_over_after``, s from 1° to 90°.
+        ``u``, ``v`` and ``damping`` (β, by the bridges) of the Mathieu equation; whether small angles are ``stable`` in
+        it; the ``largest_stable_v`` on a level substrate; ``rolling_rate``, the growth rate in it, 1/s; ``rate``, the
+        growth rate with sliding contacts and spinning beads, 1/s (negative: decay; at 1° if there is rolling friction),
+        None if the axial motion is not periodic; whether the dimer ``stands``; ``turns_over_after``, s from 1° to 90°.
     """
     drive = case.drive
     mathieu = pendulum_of(case)
