@@ -205,7 +205,7 @@ REFUSED: list[tuple[str, str]] = [
     ("export {run} --to deck --every 2", "--every: is for --to vtk, paraview, xyz, lammps"),
     ("export {run} --to paraview -o vtk --colour beauty", "expected one of bead, large, omega, radius"),
     *((f"export {{run}} --to archive {words}", told) for words, told in (
-        ("-o run.tar", "--output: expected the name of a .zip file"),
+        ("-o run.tar", "-o: expected the name of a .zip file"),
         ("-o nowhere/run.zip", "No such file"),
         ("--licence MINE", "--licence: expected one of CC-BY-4.0"),
         ("--author=", "--author: expected a name"),

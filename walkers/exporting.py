@@ -1,4 +1,4 @@
-"""Names that a package exports from modules which are imported when one is first asked for."""
+"""Names that a package exports from modules, which are imported on first use."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from typing import Any
 
 
 def exporting(package: str, **names: Sequence[str]) -> Callable[[str], Any]:
-    """The ``__getattr__`` of a package that exports, for each of its modules, some of what that holds.
+    """The ``__getattr__`` of a package that exports the given names of each of its modules.
 
-    Whoever needs one module of a package, such as its errors, does not wait for all the others, and for pydantic,
-    jinja2 and numpy with them.
+    The use of one module, such as the errors, does not import the others, and with them pydantic, jinja2 and numpy.
     """
     modules = {name: f"{package}.{module}" for module, exported in names.items() for name in exported}
 

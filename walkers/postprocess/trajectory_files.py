@@ -41,7 +41,7 @@ def write_trajectory(directory: Path, destination: Path, form: str, *, every: in
         If the name ends otherwise.
     """
     if destination.suffix.lower() not in SUFFIXES[form] or destination.is_dir():
-        raise refused("--output", f"{destination}: expected the name of a {' or '.join(SUFFIXES[form])} file")
+        raise refused("-o", f"{destination}: expected the name of a {' or '.join(SUFFIXES[form])} file")
     write = {"xyz": _write_xyz, "lammps": _write_lammps}[form]
     if form == "xyz":
         require("xyz")

@@ -1,6 +1,6 @@
-"""Runs: decks in run directories, launched, watched, and finished or failed.
+"""Run directories: write decks into them, launch and watch the engine, finish or fail the run.
 
-Knows cases and decks (`inputs`, `templates`); knows nothing of what the dumps mean.
+Uses cases and decks (`inputs`, `templates`); does not interpret the dumps.
 """
 
 from walkers.runner.binary import Engine, find_engine

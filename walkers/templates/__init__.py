@@ -1,7 +1,6 @@
 """Decks: the input scripts of LIGGGHTS.
 
-Knows the cases (`inputs`); knows nothing of processes, files on disk or results. docs/explanation/engine.md explains
-the form of the decks.
+Uses cases (`inputs`), not processes, files on disk or results. docs/explanation/engine.md explains the decks.
 """
 
 from walkers.templates.deck import Deck, render_deck
