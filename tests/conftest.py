@@ -24,11 +24,10 @@ from tomli_w import dumps as to_toml
 
 from walkers import run as run_case
 from walkers.archive.writing import write_archive
-from walkers.inputs import resolve_case
 from walkers.inputs.axes import is_axis
 from walkers.inputs.case import Case
 from walkers.inputs.changes import flatten
-from walkers.inputs.reading import read_toml, shipped_cases
+from walkers.inputs.reading import read_toml, resolve_case, shipped_cases
 from walkers.inputs.sweep import expand, shipped_sweeps
 from walkers.main import main
 from walkers.postprocess import series

@@ -11,10 +11,11 @@ import pytest
 
 from tests.conftest import call, document, make_case, to_toml
 from walkers.commands import MOVED
-from walkers.inputs import InputError, resolve_case
+from walkers.inputs.errors import InputError
+from walkers.inputs.reading import resolve_case
 from walkers.physics import units
 from walkers.physics.units import parse_quantity
-from walkers.templates import render_deck
+from walkers.templates.deck import render_deck
 
 GLASS = {"material": "glass"}
 WALKER = {"radii": ["0.3 mm", "0.2 mm"]}
@@ -430,7 +431,7 @@ def test_usual_units_are_read_as_pint_reads_them(symbol: str, monkeypatch: pytes
 def test_shipped_cases_do_not_wait_for_pint() -> None:
     script = """
 import sys
-from walkers.inputs import load_case, shipped_cases
+from walkers.inputs.reading import load_case, shipped_cases
 print([load_case(name).name for name in shipped_cases()] and "pint" in sys.modules)
 """
     told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)

@@ -14,12 +14,12 @@ import pytest
 
 import walkers
 from tests.conftest import REFERENCE, document, make_case
-from walkers.inputs import InputError, load_case, resolve_case
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Drive, Harmonic, common_frequency
+from walkers.inputs.errors import InputError
 from walkers.inputs.loads import contact_loads
-from walkers.inputs.reading import read_toml, shipped_cases
+from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped_cases
 from walkers.postprocess.analyses.meetings import Course, Meeting, collective
 from walkers.postprocess.analysis import describe_result, figures_of, read_result
 from walkers.postprocess.gait import postures, turned_over_at

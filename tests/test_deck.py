@@ -7,10 +7,9 @@ from hashlib import sha256
 import pytest
 
 from tests.conftest import document, make_case
-from walkers.inputs import load_case, resolve_case, shipped_cases
 from walkers.inputs.boundary import Boundary
-from walkers.templates import render_deck
-from walkers.templates.deck import CONTENT_VERSION, Deck, Segment, render_shared_deck, settling_steps
+from walkers.inputs.reading import load_case, resolve_case, shipped_cases
+from walkers.templates.deck import CONTENT_VERSION, Deck, Segment, render_deck, render_shared_deck, settling_steps
 from walkers.templates.scene import place
 
 

@@ -37,16 +37,14 @@ from tests.conftest import (
     wait_for_engines,
 )
 from walkers import run as run_case
-from walkers.inputs import resolve_case
 from walkers.inputs.case import Case
-from walkers.inputs.reading import read_toml, shipped_cases
-from walkers.runner import failures, find_engine, launch
-from walkers.runner.binary import plugin_of
+from walkers.inputs.reading import read_toml, resolve_case, shipped_cases
+from walkers.runner import failures
+from walkers.runner.binary import find_engine, plugin_of
 from walkers.runner.directory import write_deck
 from walkers.runner.failures import EngineNeverStarted
-from walkers.runner.launch import postponed_interrupts
-from walkers.templates import Deck
-from walkers.templates.deck import Segment, render_deck
+from walkers.runner.launch import launch, postponed_interrupts
+from walkers.templates.deck import Deck, Segment, render_deck
 from walkers.templates.engine import ALONE
 
 Front = Callable[[str], str]

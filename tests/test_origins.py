@@ -12,11 +12,12 @@ import pytest
 
 import walkers
 from tests.conftest import REFERENCE, call, document, make_case, to_toml
-from walkers.inputs import InputError, library, load_case, shipped_cases
+from walkers.inputs import library
 from walkers.inputs.case import Case
 from walkers.inputs.changes import changed, settings_of
+from walkers.inputs.errors import InputError
 from walkers.inputs.origins import Origin
-from walkers.inputs.reading import resolve_case
+from walkers.inputs.reading import load_case, resolve_case, shipped_cases
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.gait import SEPARATED
 from walkers.postprocess.uncertainty import SPREAD_NAME, band_of, band_text

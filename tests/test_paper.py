@@ -16,11 +16,10 @@ from PIL import Image
 
 from tests.conftest import call, run_shipped, shipped_sweep
 from tests.printed import letters, spoilt
-from walkers.inputs import load_case
 from walkers.inputs.axes import is_axis
 from walkers.inputs.changes import flatten
 from walkers.inputs.loads import dimer_of
-from walkers.inputs.reading import read_toml
+from walkers.inputs.reading import load_case, read_toml
 from walkers.inputs.sweep import shipped_sweeps
 from walkers.paper import model_terms, published
 from walkers.paper.comparison import as_dict, as_markdown, compare, count

@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 
 from tests.conftest import make_case
-from walkers.inputs import load_case
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
+from walkers.inputs.reading import load_case
 from walkers.physics.bridge import Surfaces
 from walkers.physics.laws import law_of
 from walkers.postprocess.gait import Walk, gait, settled_samples, walk
 from walkers.postprocess.motion import Group
-from walkers.runner import find_engine, launch
+from walkers.runner.binary import find_engine
 from walkers.runner.directory import write_deck
-from walkers.templates import render_deck
+from walkers.runner.launch import launch
+from walkers.templates.deck import render_deck
 
 Walked = Callable[..., Walk]
 Moved = Callable[..., Group]

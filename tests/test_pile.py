@@ -24,13 +24,14 @@ import pytest
 import walkers
 from tests.conftest import HALF, PROGRAM, call, engines_in, open_run, to_toml, wait_for
 from tests.printed import spoilt
-from walkers.inputs import Case, InputError, load_case, resolve_case, shipped_cases
+from walkers.inputs.case import Case
+from walkers.inputs.errors import InputError
+from walkers.inputs.reading import load_case, resolve_case, shipped_cases
 from walkers.inputs.sweep import expand
-from walkers.postprocess import current_result, read_motion, read_table, tabulate
 from walkers.postprocess.analyses.piles import Pile
-from walkers.postprocess.analysis import figures_of, tables_of
-from walkers.postprocess.motion import FLOOR, read_bridges
-from walkers.postprocess.tables import described
+from walkers.postprocess.analysis import current_result, figures_of, tables_of, tabulate
+from walkers.postprocess.motion import FLOOR, read_bridges, read_motion
+from walkers.postprocess.tables import described, read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place, segment_directories
 from walkers.runner.failures import EngineError, EngineKilled, RunBusy

@@ -22,9 +22,10 @@ from walkers.commands import GROUPS
 from walkers.inputs.reading import shipped_cases
 from walkers.main import _program
 from walkers.physics.time_step import WALKER_FRACTIONS
-from walkers.postprocess import read_result, read_table
-from walkers.runner import find_engine, finished_run
-from walkers.runner.directory import run_place
+from walkers.postprocess.analysis import read_result
+from walkers.postprocess.tables import read_table
+from walkers.runner.binary import find_engine
+from walkers.runner.directory import finished_run, run_place
 from walkers.runner.provenance import COMMIT_NAME, software
 
 ROOT = Path(__file__).parent.parent

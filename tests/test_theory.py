@@ -10,16 +10,15 @@ import numpy as np
 import pytest
 
 from tests.conftest import call, document, make_case, to_toml
-from walkers.inputs import load_case, resolve_case
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of, resistances_at_rest
-from walkers.inputs.reading import read_toml, shipped_cases
+from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped_cases
 from walkers.inputs.sweep import expand
 from walkers.physics.dimer import Dimer
-from walkers.postprocess import read_table
 from walkers.postprocess.analysis import read_result
 from walkers.postprocess.gait import gait
 from walkers.postprocess.motion import Group
+from walkers.postprocess.tables import read_table
 from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import thresholds
 from walkers.theory.mathieu import Alignment, alignment, is_stable, largest_stable_v, time_to_turn

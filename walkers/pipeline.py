@@ -47,7 +47,7 @@ def run(
     out
         Folder of the run directories.
     engine
-        Name or path of the binary; see `walkers.runner.find_engine`.
+        Name or path of the binary; see `walkers.runner.binary.find_engine`.
     force
         Run again. The old run is replaced when the new one is finished.
     progress

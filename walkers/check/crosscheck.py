@@ -22,9 +22,8 @@ from walkers.check.engine import TERMS, SecondEngine
 from walkers.check.kernels import FloatArray
 from walkers.check.report import Chapter, Line, Verdict
 from walkers.handles import Run
-from walkers.inputs import resolve_case
 from walkers.inputs.case import Case
-from walkers.inputs.reading import load_case, read_toml, shipped_cases, with_changes
+from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped_cases, with_changes
 from walkers.inputs.text import rendered
 from walkers.pipeline import run
 from walkers.postprocess.gait import averages, walk

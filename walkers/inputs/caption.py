@@ -13,7 +13,7 @@ def caption(case: Case) -> str:
 
     Examples
     --------
-    >>> from walkers.inputs import load_case
+    >>> from walkers.inputs.reading import load_case
     >>> caption(load_case("fig4a"))
     '6 walkers of R = 0.6 / 0.3 mm on a plane of glass, Si AK5; 80 Hz, a0 = 19.6 m/s²'
     """

@@ -2,7 +2,7 @@
 
 Lengths are in mm, velocities in mm/s, angular velocities in rad/s, times in s: the XYZ writer has eight decimals, which
 of a length in m would be 10 nm. Places and velocities are relative to the boundary, as in
-`walkers.postprocess.Motion`.
+`walkers.postprocess.motion.Motion`.
 """
 
 from __future__ import annotations

@@ -36,11 +36,9 @@ class EngineMissing(EngineFailure):
 class OtherEngine(EngineFailure):
     """The engine is another version than the one that the contact model was written for."""
 
-    def __init__(self, path: Path, version: str | None) -> None:
-        super().__init__(
-            f"{path} is {version or 'no LIGGGHTS that names its version'}: decks need a contact model that is written "
-            f"for {AUDITED_VERSION}, as Debian packages it"
-        )
+    def __init__(self, path: Path, version: str) -> None:
+        needed = f"decks need a contact model that is written for {AUDITED_VERSION}, as Debian packages it"
+        super().__init__(f"{path} is {version}: {needed}")
 
 
 class ContactModelMissing(EngineFailure):

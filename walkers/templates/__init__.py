@@ -3,8 +3,3 @@
 Knows the cases (`inputs`); knows nothing of processes, files on disk or results. docs/explanation/engine.md explains
 the form of the decks.
 """
-
-from walkers.templates.deck import Deck, render_deck
-from walkers.templates.layout import Layout, PlacedWalker
-
-__all__ = ["Deck", "Layout", "PlacedWalker", "render_deck"]

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.inputs.errors import refused
+from walkers.inputs.text import environment
 from walkers.postprocess.drawing import UNSEEN, check_place, errors_seen
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.figures import Panel
@@ -28,7 +29,6 @@ from walkers.runner.provenance import PROJECT, software
 if TYPE_CHECKING:
     from bokeh.models import Model
     from bokeh.plotting import figure as Figure  # noqa: N812
-    from jinja2 import Environment
 
 _PACKAGE = "walkers.postprocess.report"
 NAME = "report.html"
@@ -72,7 +72,7 @@ def overhead() -> int:
 
 def fill(template: str, package: str = _PACKAGE, **values: Any) -> str:
     """The HTML of a template; what is put in is escaped."""
-    return _environment(package).get_template(template).render(**values)
+    return environment(package, _PACKAGE, html=True).get_template(template).render(**values)
 
 
 def packed_plots(plots: Model) -> str:
@@ -169,24 +169,9 @@ def _library(name: str) -> str:
 
 
 def _scripts() -> list[str]:
-    """What unpacks and plays."""
     return [_text("k3d", "static/fflate.js"), _text(_PACKAGE, "player.js")]
 
 
 @cache
 def _text(package: str, name: str) -> str:
     return files(package).joinpath(name).read_text("utf-8")
-
-
-@cache
-def _environment(package: str) -> Environment:
-    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
-
-    return Environment(
-        loader=ChoiceLoader([PackageLoader(package, "."), PackageLoader(_PACKAGE, ".")]),
-        undefined=StrictUndefined,
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        auto_reload=False,
-    )
