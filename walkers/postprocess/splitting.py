@@ -1,4 +1,4 @@
-"""Split the output of a shared deck: each case gets its own dumps, as from a deck of its own."""
+"""Split the output of a shared deck: each case gets its dumps as if it had run alone."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from walkers.templates.layout import Layout
 def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) -> None:
     """Write the dumps and the layout of each case into its directory, and remove those of the shared deck.
 
-    Beads and walkers are numbered anew in each; they stay where they were in the shared deck.
+    Beads and walkers are renumbered; their positions are those in the shared deck.
 
     Parameters
     ----------
     directory, layout
-        Where the deck ran, and what it wrote.
+        Directory and layout of the deck.
     cases
-        From each case's directory to the case, in the order of the deck.
+        Cases by directory, in the order of the deck.
 
     Raises
     ------
     runner.failures.WalkersMet
-        If two walkers came near each other, so that they are not what they would be alone.
+        If two walkers came so close that they are not independent.
     postprocess.dump.DumpError
         If a dump cannot be read.
     """
