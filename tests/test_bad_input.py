@@ -56,6 +56,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"contact": {"friction": 0.1}}, "contact.friction = 0.1: expected a table"),
     ({"contact": {"restitution": 1.2}}, "contact.restitution = 1.2: expected at most 1"),
     ({"contact": {"restitution": 0}}, "expected more than 0.05"),
+    ({"contact": {"friction": {"bead_bead": -0.1}}}, "contact.friction.bead_bead = -0.1: expected "),
     ({"drive": {"axis": "w"}}, "drive.axis = \"w\": expected 'x', 'y' or 'z'"),
     ({"drive": {"frame": "labs"}}, 'did you mean "lab"'),
     ({"run": {"cycles": "allways"}}, 'run.cycles = "allways": expected a whole number, or "auto"'),
@@ -106,6 +107,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
      "do not fit between the walls"),
     ({"placed": [bead("1 mm", "9 mm"), bead("0.1 mm", "30 mm"), bead("0.5 mm", "10.4 mm")]}, "overlaps with placed[0]"),
     ({"placed": [bead("1 mm", "9 mm", "0.9 mm")]}, "expected a bead within the boundary"),
+    ({"dimers": None, "placed": [bead("1 mm", "9 mm")], "run": {"seed": 3}}, "run.seed = 3: expected none with placed"),
     # What is missing
     ({"dimers": None}, "dimers: missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]"),
     ({"beads": {"material": None}}, "beads.density: missing; expected such as"),

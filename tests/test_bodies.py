@@ -261,14 +261,6 @@ def test_a_dimer_in_a_groove_rolls_on_both_walls(tmp_path: Path) -> None:
     assert done.export("vtk").exists()
 
 
-def test_walkers_may_run_in_segments(tmp_path: Path) -> None:
-    """A walker of three segments walks as one in one does (restarts: 1e-3)."""
-    run = {"cycles": 24, "settling_cycles": 12, "segment": "0.1 s"}
-    done = walkers.run(of_tables(dimers=dimers(1), run=run), tmp_path)
-    assert [path.name for path in sorted((done.directory / "segments").iterdir())] == ["0000", "0001", "0002"]
-    assert done.result["velocity"]["mean"] == pytest.approx(FIG1B_SPEED, rel=2e-3)
-
-
 @pytest.mark.parametrize("frequency", ["73 Hz", "74 Hz"])
 def test_a_rest_before_the_drive_is_one(tmp_path: Path, frequency: str) -> None:
     """Whatever part of a cycle it takes: nothing moves meanwhile, the bridges drag as they do without it."""

@@ -19,7 +19,7 @@ def caption(case: Case) -> str:
     """
     bodies = [f"{make.replicates} walkers of R = {radii_text(make.radii)} mm" for make in case.walkers]
     if case.loose:
-        bodies.append(f"{case.count - sum(make.count for make in case.walkers)} loose beads")
+        bodies.append(f"{case.count - sum(len(make.all_radii) for make in case.walkers)} loose beads")
     boundary = f"in a {case.boundary.shape}" if case.boundary.closed else f"on a {case.boundary.shape}"
     return f"{', '.join(bodies)} {boundary} of {case.boundary.material}, {liquid_text(case)}; {conditions(case)}"
 

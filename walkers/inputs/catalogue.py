@@ -70,7 +70,6 @@ def _of_library(known_to: Library) -> Iterator[Entry]:
 
 
 def _summary(law: str) -> str:
-    """First line of the file of a law."""
     text = resources.files("walkers.physics.laws").joinpath(f"{law.replace('-', '_')}.py").read_text("utf-8")
     return text.split('"""')[1].splitlines()[0]
 

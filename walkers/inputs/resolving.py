@@ -203,7 +203,6 @@ def _liquid_of(table: Liquid, notes: Notes) -> Liquid:
 
 
 def _walkers_of(key: str, table: Walkers, boundary: Boundary, notes: Notes) -> Walkers:
-    """The walkers of a table, which stands under a key."""
     if table.facing in ("up", "down") and (not boundary.tilt or boundary.uphill):
         message = "on a plane that is tilted along the drive alone walkers face up or down"
         raise unusable(f"{key}.facing", f'expected "both", "right" or "left": {message}')
@@ -242,7 +241,6 @@ def _radii(table: Walkers, notes: Notes) -> tuple[float, ...]:
 
 
 def _arranged(walkers: Walkers, key: str) -> Walkers:
-    """A cluster in an arrangement."""
     name = walkers.arrangement
     known = ARRANGEMENTS.get(name)
     if known is None:

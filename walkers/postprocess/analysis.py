@@ -202,9 +202,8 @@ class Analysis(ABC):
         if not self.headlines:
             return []
         units = {name: self.columns[name][0] for name in self.headlines}
-        return (
-            [sentence] if (sentence := bands_text(result, units, self.row(result))) else not_known(result["rests_on"])
-        )
+        sentence = bands_text(result, units, self.row(result))
+        return [sentence] if sentence else not_known(result["rests_on"])
 
     @property
     def columns(self) -> Described:

@@ -110,11 +110,10 @@ def check_formats(formats: Sequence[str]) -> None:
             raise refused("--format", f"{form!r}: expected one of {', '.join(FORMATS)}")
 
 
-def check_place(path: Path, *suffixes: str) -> None:
-    """Raise `InputError` if a path is a folder or has none of these suffixes."""
+def check_place(path: Path, *suffixes: str, option: str = "--to") -> None:
+    """Raise `InputError` for an option whose path is a folder or has none of these suffixes."""
     if path.suffix.lower() not in suffixes or path.is_dir():
-        expected = f"expected the name of a {' or '.join(suffixes)} file"
-        raise refused("--to", f"{path}: {expected}")
+        raise refused(option, f"{path}: expected the name of a {' or '.join(suffixes)} file")
 
 
 def save_figure(

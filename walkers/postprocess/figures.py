@@ -119,15 +119,9 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
     begin, named = walked[-1].x[settled], named_of(len(walked))
     names = ("across the slope (mm)", "uphill (mm)") if uphill else ("along the drive axis (mm)", "across it (mm)")
     seen = f"{case.boundary.tilted}, seen along its normal" if case.boundary.tilted else "seen from above"
+    title, distance = f"Distance along the heading; grey: settling{named}", "distance walked (mm)"
     return [
-        Panel(
-            f"Distance along the heading; grey: settling{named}",
-            "time (s)",
-            "distance walked (mm)",
-            walked,
-            settled=begin,
-            least=_LEAST_DISTANCE,
-        ),
+        Panel(title, "time (s)", distance, walked, settled=begin, least=_LEAST_DISTANCE),
         Panel(f"Orientation{named}", "time (s)", "orientation ψ (°)", turned, settled=begin, least=_LEAST_ANGLE),
         Panel(f"Paths of the centres of mass, {seen}{named}", *names, paths, least=_LEAST_DISTANCE),
     ]
@@ -173,10 +167,8 @@ def gait_panels(group: Group) -> list[Panel]:
         Line(phase, values[:, number], labels[number], colours[number], width=widths[number])
         for number in range(len(names))
     ]
-    x, title = (
-        "time (cycles of the drive, last two)",
-        f"walker {first.walker}; a bead rolls without sliding where its curve coincides with the walker's",
-    )
+    x = "time (cycles of the drive, last two)"
+    title = f"walker {first.walker}; a bead rolls without sliding where its curve coincides with the walker's"
     y = "velocity relative to the\nsubstrate; beads: −R dφ/dt (mm/s)"
     panels = [Panel(title, x, y, lines, zero=True, height=2.5, least=_LEAST_SPEED)]
     shaken = group.motion.substrate_velocity[last] @ np.array(group.case.drive.direction)

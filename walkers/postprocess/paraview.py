@@ -9,7 +9,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,17 +74,16 @@ def write_vtk(
     try:
         beside.chmod(0o755)
         for frame, meshes in _frames(motion, every or motion.case.run.samples_per_cycle):
-            files = {kind: f"{kind}_{frame:06d}.vtp" for kind in meshes}
+            blocks: list[str] = []
             for kind, mesh in meshes.items():
-                _save(mesh, beside / files[kind])
-            write_text(beside / f"frame_{frame:06d}.vtm", _blocks(files))
+                _save(mesh, beside / f"{kind}_{frame:06d}.vtp")
+                blocks.append(f'    <DataSet index="{len(blocks)}" name="{kind}" file="{kind}_{frame:06d}.vtp"/>')
+            write_text(beside / f"frame_{frame:06d}.vtm", _listing("vtkMultiBlockDataSet", "1.0", blocks))
             time = float(motion.time[frame])
             entries.append(f'    <DataSet timestep="{time!r}" group="" part="0" file="frame_{frame:06d}.vtm" />')
             if vtu:
                 meshes["beads"].cast_to_unstructured_grid().save(beside / f"beads_{frame:06d}.vtu")
-        head = '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n  <Collection>'
-        lines = ["<?xml version='1.0' encoding='utf-8'?>", head, *entries, "  </Collection>", "</VTKFile>"]
-        write_text(beside / _COLLECTION, "\n".join(lines))
+        write_text(beside / _COLLECTION, _listing("Collection", "0.1", entries))
         if place.exists():
             shutil.rmtree(place)
         beside.rename(place)
@@ -157,13 +156,10 @@ def _check_replaceable(place: Path) -> None:
         raise refused(place, f"{expected}; {held}")
 
 
-def _blocks(files: Mapping[str, str]) -> str:
-    """Text of a VTK file that joins files as named blocks."""
-    lines = [
-        f'    <DataSet index="{at}" name="{kind}" file="{file}"/>' for at, (kind, file) in enumerate(files.items())
-    ]
-    head = '<VTKFile type="vtkMultiBlockDataSet" version="1.0" byte_order="LittleEndian">\n  <vtkMultiBlockDataSet>'
-    return "\n".join(["<?xml version='1.0'?>", head, *lines, "  </vtkMultiBlockDataSet>", "</VTKFile>"])
+def _listing(kind: str, version: str, entries: Sequence[str]) -> str:
+    """Text of a VTK file that lists other files."""
+    head = f'<VTKFile type="{kind}" version="{version}" byte_order="LittleEndian">\n  <{kind}>'
+    return "\n".join(["<?xml version='1.0'?>", head, *entries, f"  </{kind}>", "</VTKFile>"])
 
 
 def _named(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:

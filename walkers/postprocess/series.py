@@ -42,7 +42,7 @@ _TALL, _TALLEST, _WIDEST = 1000, 1600, 1900
 _PAGE = (8.5, 9.0)
 """Largest width and height of a picture, inches."""
 _PANEL = (1.4, 5.0)
-"""Width and height of a view, inches; it fills the larger one of these boxes, if the page has room."""
+"""Width or height of a view, inches: the one that gives the larger view, if the page has room."""
 _BESIDE, _BENEATH, _EDGES = 0.3, 0.8, (0.9, 0.1)
 """Space between views side by side (tick labels) and below each other (time, ticks, label); outer edges; inches."""
 _STRIP, _LENGTHS, _GAP = 0.8, (3.6, 5.4), 0.08
@@ -57,14 +57,6 @@ _LETTERS: dict[Any, Any] = {
     "xtick.labelsize": 9,
     "ytick.labelsize": 9,
 }
-
-
-def render_run(directory: Path, destination: Path | None = None, *, images: int = SHOWN) -> list[Path]:
-    """Render a run at several times: the first of independent walkers, otherwise all beads.
-
-    Parameters and errors are those of `render_series`.
-    """
-    return render_series(directory, destination, images=images, walker=0 if case_of(directory).apart else None)
 
 
 @styled

@@ -11,8 +11,8 @@ from typing import TextIO
 
 import numpy as np
 
-from walkers.inputs.errors import refused
 from walkers.inputs.extras import require
+from walkers.postprocess.drawing import check_place
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, read_motion
 from walkers.runner.files import beside
@@ -39,8 +39,7 @@ def write_trajectory(directory: Path, destination: Path, form: str, *, every: in
     InputError
         If the file has another suffix.
     """
-    if destination.suffix.lower() not in SUFFIXES[form] or destination.is_dir():
-        raise refused("--output", f"{destination}: expected the name of a {' or '.join(SUFFIXES[form])} file")
+    check_place(destination, *SUFFIXES[form], option="--output")
     write = {"xyz": _write_xyz, "lammps": _write_lammps}[form]
     if form == "xyz":
         require("xyz")

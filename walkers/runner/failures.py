@@ -6,8 +6,6 @@ each failure is recognised by what it leaves behind, mostly in `walkers.runner.l
 
 from __future__ import annotations
 
-import platform
-from collections.abc import Sequence
 from pathlib import Path
 
 from walkers.inputs.errors import WalkersError
@@ -28,10 +26,6 @@ class EngineFailure(WalkersError):
 class EngineMissing(EngineFailure):
     """There is no liggghts to run. Seen before anything is written."""
 
-    def __init__(self, wanted: str) -> None:
-        text = "is not an executable file on this machine; install it with: sudo apt-get install liggghts"
-        super().__init__(f"no engine: {wanted} {text}")
-
 
 class OtherEngine(EngineFailure):
     """The engine is another version than the one that the contact model was written for."""
@@ -51,15 +45,9 @@ class ContactModelMissing(EngineFailure):
 class EngineDiffers(EngineFailure):
     """A worker of a sweep has another engine than the one that the sweep was started with."""
 
-    def __init__(self, found: Path) -> None:
-        super().__init__(f"the engine on {platform.node()}, {found}, is not the engine that started this sweep")
-
 
 class ProgramDiffers(EngineFailure):
     """A worker of a sweep names runs otherwise than where it was started: resolved cases or decks differ."""
-
-    def __init__(self) -> None:
-        super().__init__(f"the program on {platform.node()} has another version than the one that started the sweep")
 
 
 class EngineNeverStarted(EngineFailure):
@@ -120,25 +108,13 @@ class OutputGone(EngineFailure):
 class WalkersMet(EngineFailure):
     """Walkers of different cases that shared a deck came close to each other. Seen when the deck's output is split."""
 
-    def __init__(self, directory: Path) -> None:
-        super().__init__("walkers of different cases came close to each other in a shared deck", directory)
-
 
 class RunBusy(EngineFailure):
     """Another process, perhaps an engine whose launcher was killed, is writing into this run."""
 
-    def __init__(self, directory: Path) -> None:
-        super().__init__("another process is still running this case", directory)
-
 
 class AuditFailed(EngineFailure):
     """The engine's binary failed its audit: what it computes cannot be trusted."""
-
-    def __init__(self, failures: Sequence[str]) -> None:
-        super().__init__(
-            f"this engine failed its audit in {len(failures)} line(s), first: {failures[0]}; "
-            "for details: walkers check engine (--allow-failed-audit runs anyway)"
-        )
 
 
 class UnauditedEngineWarning(UserWarning):

@@ -290,7 +290,6 @@ def _loads(scene: Scene) -> str:
 
 
 def _parameters(plan: Plan, surfaces: Sequence[Surface]) -> tuple[list[Parameter], list[Parameter]]:
-    """The named parameters of a deck, and what follows from them."""
     case, recording, begin = plan.case, plan.recording, plan.drive_from
     several = len(plan.scene.loadings) > 1
     drive, of_it = of_drive(case.drive, amplitudes=begin is not None and not several)
