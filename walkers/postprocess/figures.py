@@ -119,9 +119,9 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
     begin, named = walked[-1].x[settled], named_of(len(walked))
     names = ("across the slope (mm)", "uphill (mm)") if uphill else ("along the drive axis (mm)", "across it (mm)")
     seen = f"{case.boundary.tilted}, seen along its normal" if case.boundary.tilted else "seen from above"
-    title, distance = f"Distance along the heading; grey: settling{named}", "distance walked (mm)"
+    title, y = f"Distance along the heading; grey: settling{named}", "distance walked (mm)"
     return [
-        Panel(title, "time (s)", distance, walked, settled=begin, least=_LEAST_DISTANCE),
+        Panel(title, "time (s)", y, walked, settled=begin, least=_LEAST_DISTANCE),
         Panel(f"Orientation{named}", "time (s)", "orientation ψ (°)", turned, settled=begin, least=_LEAST_ANGLE),
         Panel(f"Paths of the centres of mass, {seen}{named}", *names, paths, least=_LEAST_DISTANCE),
     ]
