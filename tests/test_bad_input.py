@@ -433,8 +433,8 @@ def test_usual_units_are_read_as_pint_reads_them(symbol: str, monkeypatch: pytes
 def test_shipped_cases_do_not_wait_for_pint() -> None:
     script = """
 import sys
-from walkers.inputs.reading import load_case, shipped_cases
-print([load_case(name).name for name in shipped_cases()] and "pint" in sys.modules)
+from walkers.inputs.reading import load_case, shipped
+print([load_case(name).name for name in shipped("case")] and "pint" in sys.modules)
 """
     told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert told.stdout.strip() == "False"

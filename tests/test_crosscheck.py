@@ -33,7 +33,7 @@ from walkers.check.scenes import (
 from walkers.inputs.boundary import BOTTOM, Flat, Round, Wall
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
-from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped_cases
+from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped
 from walkers.physics.bridge import Surfaces
 from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.physics.laws import law_of
@@ -72,7 +72,7 @@ def one_bead(
 
 def pile(count: int) -> dict[str, Any]:
     """The tables of the shipped pile, with fewer beads."""
-    tables: dict[str, Any] = read_toml(shipped_cases()["pile-ci"])
+    tables: dict[str, Any] = read_toml(shipped("case")["pile-ci"])
     tables["mixture"] |= {"count": count}
     return tables
 

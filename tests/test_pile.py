@@ -26,7 +26,7 @@ from tests.conftest import HALF, PROGRAM, call, engines_in, open_run, to_toml, w
 from tests.printed import spoilt
 from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError
-from walkers.inputs.reading import load_case, resolve_case, shipped_cases
+from walkers.inputs.reading import load_case, resolve_case, shipped
 from walkers.inputs.sweep import expand
 from walkers.postprocess.analyses.piles import Pile
 from walkers.postprocess.analysis import current_result, figures_of, tables_of, tabulate
@@ -47,7 +47,7 @@ from walkers.templates.deck import Deck, Segment, render_deck
 
 
 def document(**changes: dict[str, Any]) -> dict[str, Any]:
-    tables = tomllib.loads(shipped_cases()["pile-ci"].read_text())
+    tables = tomllib.loads(shipped("case")["pile-ci"].read_text())
     for table, values in changes.items():
         tables.setdefault(table, {}).update(values)
     return tables
@@ -533,7 +533,7 @@ def test_leaders_by_chance() -> None:
 
 def test_a_climber_that_leaves_the_container_ends_the_run(tmp_path: Path) -> None:
     """It climbs at 4.8 mm/s; its upper bead is 3.2 mm below where the walls end; segments are of 0.05 s."""
-    tables = tomllib.loads(shipped_cases()["cluster"].read_text())
+    tables = tomllib.loads(shipped("case")["cluster"].read_text())
     tables["contact"]["friction"] = {"bead_bead": 0.3, "bead_wall": 0.3}
     places = ((0.545, 2.0), (0.3075, 1.18135))
     tables["placed"] = [{"radius": f"{r} mm", "at": [f"{2.5001 - r} mm", "0 mm", f"{z} mm"]} for r, z in places]
@@ -551,7 +551,7 @@ def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(tm
 
     On the wall across from it is one led by its small bead.
     """
-    tables = tomllib.loads(shipped_cases()["cluster"].read_text())
+    tables = tomllib.loads(shipped("case")["cluster"].read_text())
     large, small = 0.545, 0.3075
     tables["contact"]["friction"] = {"bead_bead": 0.3, "bead_wall": 0.3}
     tables["placed"] = [
@@ -569,7 +569,7 @@ def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(tm
 
 
 def test_placed_beads_reach_the_side_of_a_cylinder() -> None:
-    tables = tomllib.loads(shipped_cases()["cluster"].read_text())
+    tables = tomllib.loads(shipped("case")["cluster"].read_text())
     tables["boundary"]["shape"] = "cylinder"
     for number, bead in enumerate(tables["placed"]):
         bead["at"] = ["0 mm", "0 mm", f"{8 - 2 * number} mm"]

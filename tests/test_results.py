@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from walkers.inputs.case import Case
-from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped_cases
+from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped
 from walkers.postprocess.analyses.walking import Walking, walkers_met
 from walkers.postprocess.analyses.work import Working
 from walkers.postprocess.analysis import RESULT_NAME, current_result, describe_result, read_result
@@ -237,7 +237,7 @@ def groups(trajectory: Callable[..., Group]) -> dict[int, Group]:
 
 def _hopping(samples: int, **run: object) -> Case:
     """Fig. 4b's walker, whose beads part in every cycle."""
-    tables = read_toml(shipped_cases()["fig4b"])
+    tables = read_toml(shipped("case")["fig4b"])
     tables["dimers"]["replicates"] = 1
     tables["run"] = {"time_step": "3 us", "cycles": 12, "settling_cycles": 4, "samples_per_cycle": samples, **run}
     return resolve_case(tables, source="test", name=f"hopping-{samples}")
