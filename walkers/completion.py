@@ -26,8 +26,7 @@ def offering(*kinds: str) -> Callable[[typer.Context, str], list[str]]:
     """
 
     def offered(ctx: typer.Context, incomplete: str) -> list[str]:
-        from walkers.inputs.reading import shipped_cases
-        from walkers.inputs.sweep import shipped_sweeps
+        from walkers.inputs.reading import shipped
         from walkers.packages import offers
 
         names: list[str] = []
@@ -35,7 +34,7 @@ def offering(*kinds: str) -> Callable[[typer.Context, str], list[str]]:
             if kind in RECORDS:
                 names += [*_names(ctx, kind), *_typed(incomplete, f"*/{RECORDS[kind]}")]
             else:
-                known = [*shipped_cases(), *offers("walkers.cases")] if kind == "case" else shipped_sweeps()
+                known = [*shipped("case"), *offers("walkers.cases")] if kind == "case" else shipped("sweep")
                 names += [*known, *_typed(incomplete, "*.toml")]
         return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers import DEFAULT_OUT, RECORDS
 from walkers.inputs.errors import WalkersError, refused
-from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped_cases, with_changes
+from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped, with_changes
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import (
     CASE_NAME,
@@ -58,7 +58,7 @@ def placed(name: str | Path, out: Path = DEFAULT_OUT) -> Place | None:
     path = Path(name)
     with suppress(OSError):  # a name that no file system accepts
         for place in (path, out / path):
-            if is_deck_folder(place) and str(name) not in shipped_cases():
+            if is_deck_folder(place) and str(name) not in shipped("case"):
                 from walkers.sweeps.by_hand import take_in
 
                 take_in(place)
@@ -72,7 +72,7 @@ def placed(name: str | Path, out: Path = DEFAULT_OUT) -> Place | None:
             return Place(out / path.stem, "sweep")
         if path.suffix == ".zip" and path.is_file():
             return Place(path, "archive")
-        if path.is_dir() and str(name) not in shipped_cases():
+        if path.is_dir() and str(name) not in shipped("case"):
             return Place(path, "folder")
     return None
 

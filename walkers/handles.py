@@ -189,10 +189,11 @@ class Run:
         return Pictures(plot_run(self.finished_directory, _path(to), formats))
 
     def render(self, to: str | Path | None = None, *, images: int = 6) -> Pictures:
-        """Render pictures and return their paths; see `walkers.postprocess.series.render_run`."""
-        from walkers.postprocess.series import render_run
+        """Render the first of independent walkers, or all beads; see `walkers.postprocess.series.render_series`."""
+        from walkers.postprocess.series import render_series
 
-        return Pictures(render_run(self.finished_directory, _path(to), images=images))
+        walker = 0 if self.case.apart else None
+        return Pictures(render_series(self.finished_directory, _path(to), images=images, walker=walker))
 
     def film(
         self,

@@ -47,7 +47,7 @@ def run(
     out
         Folder of the run directories.
     engine
-        Name or path of the binary; see `walkers.runner.find_engine`.
+        Name or path of the binary; see `walkers.runner.binary.find_engine`.
     force
         Run again. The old run is replaced when the new one is finished.
     progress
@@ -97,7 +97,7 @@ def run(
     with watch as advance:
         made = make_runs([case], out, binary, force=force, on_progress=advance, time_limit=time_limit)
     if made.busy:
-        raise RunBusy(unfinished(place))
+        raise RunBusy("another process is still running this case", unfinished(place))
     return Run(made.runs[place.name].directory, cached=place.name in made.found, origins=case.origins)
 
 

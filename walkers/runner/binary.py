@@ -62,7 +62,8 @@ def find_engine(wanted: str | None = None) -> Engine:
     name = wanted or os.environ.get(ENGINE_VARIABLE) or "liggghts"
     found = shutil.which(name)
     if found is None:
-        raise EngineMissing(name)
+        text = "is not an executable file on this machine; install it with: sudo apt-get install liggghts"
+        raise EngineMissing(f"no engine: {name} {text}")
     path = Path(found).resolve()
     return Engine(path, _identity(path, path.stat().st_mtime_ns))
 

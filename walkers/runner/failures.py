@@ -6,8 +6,6 @@ Failures are therefore detected from its output, mostly in `walkers.runner.launc
 
 from __future__ import annotations
 
-import platform
-from collections.abc import Sequence
 from pathlib import Path
 
 from walkers.inputs.errors import WalkersError
@@ -28,19 +26,13 @@ class EngineFailure(WalkersError):
 class EngineMissing(EngineFailure):
     """No liggghts was found. Detected before anything is written."""
 
-    def __init__(self, wanted: str) -> None:
-        text = "is not an executable file on this machine; install it with: sudo apt-get install liggghts"
-        super().__init__(f"no engine: {wanted} {text}")
-
 
 class OtherEngine(EngineFailure):
     """The contact model was written for another version of the engine."""
 
-    def __init__(self, path: Path, version: str | None) -> None:
-        super().__init__(
-            f"{path} is {version or 'no LIGGGHTS that names its version'}: decks need a contact model that is written "
-            f"for {AUDITED_VERSION}, as Debian packages it"
-        )
+    def __init__(self, path: Path, version: str) -> None:
+        needed = f"decks need a contact model that is written for {AUDITED_VERSION}, as Debian packages it"
+        super().__init__(f"{path} is {version}: {needed}")
 
 
 class ContactModelMissing(EngineFailure):
@@ -53,15 +45,9 @@ class ContactModelMissing(EngineFailure):
 class EngineDiffers(EngineFailure):
     """A worker of a sweep has another engine than the process that started the sweep."""
 
-    def __init__(self, found: Path) -> None:
-        super().__init__(f"the engine on {platform.node()}, {found}, is not the engine that started this sweep")
-
 
 class ProgramDiffers(EngineFailure):
     """A worker gives a run another name than the process that started the sweep: resolved cases or decks differ."""
-
-    def __init__(self) -> None:
-        super().__init__(f"the program on {platform.node()} has another version than the one that started the sweep")
 
 
 class EngineNeverStarted(EngineFailure):
@@ -122,25 +108,13 @@ class OutputGone(EngineFailure):
 class WalkersMet(EngineFailure):
     """Walkers of different cases in a shared deck came close to each other. Detected when the output is split."""
 
-    def __init__(self, directory: Path) -> None:
-        super().__init__("walkers of different cases came close to each other in a shared deck", directory)
-
 
 class RunBusy(EngineFailure):
     """Another process, perhaps an engine whose launcher was killed, is writing into this run."""
 
-    def __init__(self, directory: Path) -> None:
-        super().__init__("another process is still running this case", directory)
-
 
 class AuditFailed(EngineFailure):
     """The engine's binary failed its audit: its results cannot be trusted."""
-
-    def __init__(self, failures: Sequence[str]) -> None:
-        super().__init__(
-            f"this engine failed its audit in {len(failures)} line(s), first: {failures[0]}; "
-            "for details: walkers check engine (--allow-failed-audit runs anyway)"
-        )
 
 
 class UnauditedEngineWarning(UserWarning):

@@ -344,7 +344,7 @@ class _Watch:
     def check(self) -> None:
         """Raise the failure that shows while the engine runs, if any."""
         deck, after = self.deck, f"after step {self.step}"
-        if self.version not in (None, AUDITED_VERSION):
+        if self.version is not None and self.version != AUDITED_VERSION:
             raise failures.OtherEngine(self.engine, self.version)
         if self.failure is not None:
             raise self.failure

@@ -87,14 +87,6 @@ class Deck:
 
 
 @dataclass(frozen=True)
-class Checkpoint:
-    """Restart files of a deck: one to write at its end, one to continue from."""
-
-    write: str | None = None
-    read: str | None = None
-
-
-@dataclass(frozen=True)
 class Recording:
     """Last step of a deck and its recording intervals, in steps; ``begin`` is the step of the restart."""
 
@@ -129,7 +121,8 @@ class Plan:
     walkers: tuple[PlacedWalker, ...] = ()  # with the ids of their beads
     prescribed: bool = False  # beads keep their velocities instead of following the forces
     ranks: int = 1  # number of MPI processes
-    checkpoint: Checkpoint = Checkpoint()
+    restart_to: str | None = None  # restart file to write at the end
+    restart_from: str | None = None  # restart file to continue from
     fastest: float | None = None  # speed that no bead can reach, m/s; default: `fastest_of` the case
     drive_from: int | None = 0  # step at which the drive begins; None for a segment before it
     skin: float | None = None  # search distance for neighbours beyond contact, m; default: the smallest radius, with
@@ -202,7 +195,8 @@ def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
         recording=recording,
         walkers=walkers,
         ranks=run.ranks,
-        checkpoint=Checkpoint(restart, PREVIOUS_RESTART_NAME if restart and segment.begin else None),
+        restart_to=restart,
+        restart_from=PREVIOUS_RESTART_NAME if restart and segment.begin else None,
         fastest=max(fastest_of(one, scene) for one in cases),
         drive_from=segment.drive_from,
         skin=_SKIN if case.loose else None,
@@ -305,7 +299,7 @@ def _parameters(plan: Plan, surfaces: Sequence[Surface]) -> tuple[list[Parameter
     given = [*drive, *time]
     if case.gravity > 0.0 and not several:
         given.append(Parameter("gravity", number(case.gravity), "m/s^2"))
-    if not plan.checkpoint.read:
+    if not plan.restart_from:
         given.append(Parameter("density", number(case.density), "kg/m^3", "of the beads"))
     given += of_contacts(case, [contact for contact, _ in surfaces])
     if len(surfaces) == 1:

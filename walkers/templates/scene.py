@@ -12,7 +12,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from walkers.inputs.boundary import Span, Wall
+from walkers.inputs.boundary import Wall
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
 from walkers.inputs.loads import hop_height, reach
@@ -128,16 +128,16 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
             beads.append(Bead(number, centre, bead.radius, surface=surface, loading=loading))
         if one.walks:
             walkers.append(PlacedWalker(len(walkers), make, ids, one.facing, one.angle, origin))
-    room = boundary.room(_span(cases, grid, spacing))
+    room = _room(cases, grid, spacing)
     return Scene(tuple(beads), boundary.walls, *room, surfaces, loadings), tuple(walkers)
 
 
-def _span(cases: Sequence[Case], grid: Sequence[tuple[float, float]], spacing: float) -> Span:
+def _room(cases: Sequence[Case], grid: Sequence[tuple[float, float]], spacing: float) -> tuple[Vector, Vector]:
     far = max(spacing / 2.0, *(reach(case) for case in cases))
     largest = max(max(case.radii) for case in cases)
     amplitude = max(case.drive.amplitude for case in cases)
     placed = [bead for case in cases if case.placed is not None for bead in case.placed.beads]
-    return Span(
+    return cases[0].boundary.room(
         half_x=max([x for x, _ in grid] + [abs(x) for x, *_ in placed], default=0.0) + far,
         half_y=max([y for _, y in grid] + [abs(y) for _, y, *_ in placed], default=0.0) + far,
         height=10.0 * largest
