@@ -15,14 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.changes import Value, flatten
 from walkers.inputs.errors import unusable
-from walkers.inputs.readable import kind_of
-from walkers.physics.units import parse_quantity, split_quantity
+from walkers.physics.units import split_quantity
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
-
-    from walkers.inputs.origins import Origin
 
 MOST_POINTS = 1_000_000
 _SPACINGS = ("linspace", "geomspace")
@@ -222,25 +219,6 @@ def ranges_of(ranges: Mapping[str, Any]) -> dict[str, Range]:
             raise unusable(key, "expected the smaller value first", given)
         found[key] = Range(low, high, unit, kind == "loguniform", *median)
     return found
-
-
-def range_about(one: Origin) -> dict[str, list[Value]]:
-    """The range of an uncertain value for a sampler, with the value of the case as median.
-
-    Raises `InputError` if the range does not contain that value.
-    """
-    name, (low, high) = "loguniform" if one.logarithmic else "uniform", one.range or (None, None)
-    ends = ranges_of({one.key: {name: [low, high]}})[one.key]
-    kind = kind_of(one.key)
-    try:
-        unit = parse_quantity(f"1 {ends.unit}", kind) if kind and ends.unit else 1.0
-        own = (parse_quantity(one.text, kind) if kind and ends.unit else float(one.text)) / unit
-    except ValueError:  # one that the case leaves to the program, such as a time step
-        return {name: [low, high]}
-    if not ends.low * (1.0 - 1e-9) <= own <= ends.high * (1.0 + 1e-9):
-        message = f"expected a range that contains the value of the case, {one.text}"
-        raise unusable(f"uncertain.{one.key}", message, [low, high])
-    return {name: [low, written(min(max(own, ends.low), ends.high), ends.unit), high]}
 
 
 def unit_cube(method: str, dimensions: int, points: int, seed: int) -> npt.NDArray[np.float64]:

@@ -190,8 +190,7 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
     ``source`` is what messages call it; run directories begin with its ``name``. Raises `InputError` if anything in it
     cannot be used.
     """
-    # Imported here, so that a missing file is reported before the schema is built.
-    from walkers.inputs.axes import range_about
+    # Not above: that there is no such file is told before all that a case may say is built.
     from walkers.inputs.changes import changed
     from walkers.inputs.messages import blaming, check_key, validated
     from walkers.inputs.missing import missing_keys
@@ -215,6 +214,4 @@ def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: s
             except InputError as error:
                 problems = [replace(one, key=f"uncertain.{one.key}") for one in error.problems]
                 raise InputError(source, problems) from error
-        if file.uncertain:
-            each(range_about, [one for one in case.origins if one.uncertain])
     return case

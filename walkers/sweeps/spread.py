@@ -8,14 +8,16 @@ from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.axes import range_about, ranges_of, sampled, unit_cube, unit_of
+from walkers.inputs.axes import Range, ranges_of, sampled, unit_cube, unit_of, written
 from walkers.inputs.case import Case
-from walkers.inputs.errors import refused
+from walkers.inputs.errors import refused, unusable
 from walkers.inputs.library import unmeasured
 from walkers.inputs.messages import blaming
 from walkers.inputs.origins import Origin
+from walkers.inputs.readable import kind_of
 from walkers.inputs.rounding import SHOWN_UNITS, rounded
 from walkers.inputs.sweep import Sweep, settings_in
+from walkers.physics.units import parse_quantity
 from walkers.postprocess.analysis import analyses, analyses_of
 from walkers.postprocess.gait import SEPARATED
 from walkers.postprocess.uncertainty import LEAST_PER_VALUE, SPREAD_NAME, spread_of
@@ -79,17 +81,36 @@ class Spread:
         return contents
 
 
+def _range_of(one: Origin) -> dict[str, list[Any]]:
+    """The range of a value as a sweep's sampler takes it: the case's own value is the median.
+
+    So a result is in the middle of what its guesses make of it, wherever in their ranges these are.
+    """
+    name, (low, high) = "loguniform" if one.logarithmic else "uniform", one.range or (None, None)
+    ends: Range = ranges_of({one.key: {name: [low, high]}})[one.key]
+    kind = kind_of(one.key)
+    try:
+        unit = parse_quantity(f"1 {ends.unit}", kind) if kind and ends.unit else 1.0
+        own = (parse_quantity(one.text, kind) if kind and ends.unit else float(one.text)) / unit
+    except ValueError:  # one that the case leaves to the program, such as a time step
+        return {name: [low, high]}
+    if not ends.low * (1.0 - 1e-9) <= own <= ends.high * (1.0 + 1e-9):
+        message = f"expected a range that holds the case's own value, {one.text}"
+        raise unusable(f"uncertain.{one.key}", message, [low, high])
+    return {name: [low, written(min(max(own, ends.low), ends.high), ends.unit), high]}
+
+
 def _half(one: Origin) -> str:
     """Half of the draws, if the case's own value, their median, is an end of its range."""
-    drawn = ranges_of({one.key: range_about(one)})[one.key]
+    drawn = ranges_of({one.key: _range_of(one)})[one.key]
     return f"; half of the draws at {one.text}" if drawn.median in (drawn.low, drawn.high) else ""
 
 
 def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> Sweep:
-    """A sweep over all uncertain values of a case: Sobol's sequence, scrambled so that its columns are least alike.
+    """A sweep over all that is uncertain in a case: Sobol's sequence, scrambled so that its columns are least alike.
 
-    The values of the case are the medians of the draws. `InputError` if the case has no uncertain value, or was changed
-    after it was read.
+    The case's own values are the medians of what is drawn. `InputError` if nothing in the case is uncertain, a range
+    does not hold the case's own value, or the case was changed after it was read.
     """
     import numpy as np
 
@@ -100,7 +121,7 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
         message = "no value is uncertain: give ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
         raise refused(case.name, message)
     with blaming(case.name, case.document):
-        ranges = {one.key: range_about(one) for one in varied}
+        ranges = {one.key: _range_of(one) for one in varied}
 
     def likeness(seed: int) -> float:
         cube = unit_cube("sobol", len(varied), points, seed)
