@@ -1,7 +1,4 @@
-"""Figs. 1b, 2, 3 and 4 of the paper: engine, theory and published values; and what the disagreements depend on.
-
-That is from the shipped sweep ``sensitivity``, one parameter at a time.
-"""
+"""Figs. 1b, 2, 3 and 4 of the paper: engine, theory and published values; sensitivity to the parameters."""
 
 from __future__ import annotations
 
@@ -55,7 +52,7 @@ _PUBLISHED_DASHES = (0, (6, 2, 1, 2))
 
 @styled
 def fig1b(sources: Sources) -> Figure:
-    """The first walker of the alignment's dimers that start on the axis, seen from above every 0.3 s."""
+    """Top views, every 0.3 s, of a dimer of the sweep ``alignment`` that starts on the axis."""
     table = OBSERVATIONS["alignment_asymmetric"].of[0].rows(sources.finished("alignment"))
     trajectory = sources.trajectory(table.sort_values("dimers.angle")["run"].iloc[0])
     case, largest = trajectory.case, float(trajectory.radii.max())
@@ -81,7 +78,7 @@ def fig1b(sources: Sources) -> Figure:
 
 
 def _errorbars(axes: Axes, x: pd.Series[float], rows: pd.DataFrame, *, seen: bool, **look: Any) -> None:
-    """Means, with bars from the smallest to the largest of the walkers, as in the paper, if these are to be seen."""
+    """Means, with bars over the range of the walkers as in the paper, unless symbols hide them."""
     mean, low, high = (rows[name].to_numpy() * 1e3 for name in ("velocity", "smallest", "largest"))
     axes.errorbar(x, mean, yerr=[mean - low, high - mean] if seen else None, mfc="none", **look)
 
@@ -115,7 +112,7 @@ def fig2(sources: Sources) -> Figure:
         panel.plot(list(published.FIT), np.array(list(published.FIT.values())) * 1e3, "*", color="0.45", ms=8, zorder=0)
         panel.axhline(0.0, color="0.4", lw=0.6)
         panel.set(xlabel=r"peak acceleration $a_0$ (g, 9.8 m/s²)", ylabel="velocity (mm/s)", xlim=(0.0, top * 1.03))
-    # The paper's fit goes on beyond what the paper measured: that is not to flatten the rest.
+    # The paper's fit extends beyond the measurements, and must not set the scale.
     measured = [*table["smallest"], *table["largest"], *published.FIT.values()]
     low, high = min(0.0, np.nanmin(measured) * 1e3), np.nanmax(measured) * 1e3
     engine.set_ylim(low - 0.04 * (high - low), high + 0.1 * (high - low))
@@ -142,14 +139,8 @@ def _threshold(axes: Axes, sources: Sources) -> None:
     ends = thresholds(sources.out / "fig2-threshold")
     bounds = ends[["gamma0_at_rest", "gamma0_moving"]].to_numpy(dtype=float)
     for number, (frequency, (low, high)) in enumerate(zip(ends["drive.frequency"], bounds, strict=True)):
-        look: dict[str, Any] = {
-            "fmt": _MARKERS[float(frequency)],
-            "color": f"C{number}",
-            "ms": 4,
-            "lw": 1.0,
-            "mfc": "none",
-        }
-        axes.errorbar(frequency, (low + high) / 2.0, yerr=(high - low) / 2.0, **look)
+        look: dict[str, Any] = {"fmt": _MARKERS[float(frequency)], "color": f"C{number}", "ms": 4, "lw": 1.0}
+        axes.errorbar(frequency, (low + high) / 2.0, yerr=(high - low) / 2.0, mfc="none", **look)
     case = shipped()
     predicted = [threshold(driven(case, frequency, [case.drive.peak_acceleration])[0]) for frequency in _MARKERS]
     axes.plot(list(_MARKERS), predicted, "--", color="0.2", lw=0.9)
@@ -178,7 +169,7 @@ def fig3(sources: Sources) -> Figure:
     seen = _range_seen(table)
     text = "engine, mean and range" if seen else "engine, mean (the range is smaller than the symbol)"
     _errorbars(axes, table["sin_delta"], table, seen=seen, fmt="s", color="C2", ms=5, label=text)
-    # The beads stand above the axes, where they meet no symbol; upright, for some asymmetries are nearly the same.
+    # Radii are above the axes, away from the symbols, and vertical, because some asymmetries are nearly equal.
     above = axes.secondary_xaxis("top")
     above.set_xticks(table["sin_delta"], [f"{one * 1e3:g}/{other * 1e3:g}" for one, other in pairs], rotation=90)
     above.set_xlabel("$R_1/R_2$ (mm)")
@@ -240,19 +231,19 @@ def _draw_cycles(axes: Axes, trajectory: Group) -> None:
 def theory_of_cycles(trajectory: Group) -> list[FloatArray]:
     """Velocity of the walker and rotation velocities of its beads by the theory, m/s, through the cycles shown.
 
-    From the begin of a cycle of the engine's drive; NaN where a contact would open.
+    The series begin with a cycle of the engine's drive; NaN if a contact opens.
     """
     motion = motion_of(trajectory.case)
     sliding = motion.series[:, 0] if np.isfinite(motion.velocity[0]) else np.full_like(motion.series[:, 0], np.nan)
     velocity = translation(sliding)
-    # The theory's substrate accelerates as cos 2πft, the engine's, which moves as sin 2πft, as -sin 2πft along x.
+    # Along x, the substrate accelerates as cos 2πft in the theory, and as -sin 2πft in the engine.
     quarter = sliding.shape[1] // 4
     ahead = quarter if trajectory.walkers[0].facing > 0 else -quarter
     one = [np.roll(series, 1 - ahead) for series in (velocity, velocity - sliding[0], velocity - sliding[1])]
     return [np.concatenate([np.tile(series, _CYCLES), series[:1]]) for series in one]
 
 
-# --- what the disagreements depend on ---------------------------------------------------------------------------------
+# --- sensitivity to the parameters ------------------------------------------------------------------------------------
 
 PARAMETERS = {
     "friction": "contact.friction.bead_wall",
@@ -264,7 +255,7 @@ PARAMETERS = {
     "contact angle (°)": "liquid.contact_angle",
     "restitution": "contact.restitution",
 }
-"""What is varied, and the column that says so (the friction of bead on bead goes with that of bead on wall)."""
+"""Varied parameters and their columns (the friction between beads varies with that at walls)."""
 OBSERVED = {
     "fig2_4g": "Fig. 2: v at 80 Hz, 4 g (mm/s)",
     "fig3_0.4_0.2": "Fig. 3: v for 0.4/0.2 mm (mm/s)",
@@ -273,7 +264,7 @@ OBSERVED = {
     "astray": "off the axis, 60 Hz, 10 g (%)",
     "angle_after_60": "angle after a start at 60° (°)",
 }
-"""The `walkers.paper.published.OBSERVATIONS` that are shown, with their labels."""
+"""The `walkers.paper.published.OBSERVATIONS` in the figure, with their labels."""
 _TOGETHER = "uncalibrated"
 _NO_RANGE = 1e-6
 
@@ -327,7 +318,7 @@ def _tornado(axes: Axes, found: pd.DataFrame, key: str) -> None:
             shown_label = label if place == 0 else None
             if known:
                 axes.barh(place + offset, end - shipped, 0.32, shipped, fc=colour, ec="0.1", lw=0.5, label=shown_label)
-            else:  # bars have nothing to begin at
+            else:  # no start for a bar
                 axes.plot(end, place + offset, "o", color=colour, mec="0.1", ms=6)
     together = found[found["parameter"] == _TOGETHER][key]
     axes.plot(together, [len(PARAMETERS)] * len(together), "D", color="C2", ms=6, label=_TOGETHER)
@@ -338,7 +329,7 @@ def _tornado(axes: Axes, found: pd.DataFrame, key: str) -> None:
     axes.axvline(OBSERVATIONS[key].value or 0.0, color="C1", ls="--", lw=1.4, label="published")
     axes.margins(x=0.08)
     low, high = axes.get_xlim()
-    if high - low < _NO_RANGE:  # nothing changes it: a scale of its rounding would say nothing
+    if high - low < _NO_RANGE:  # only rounding errors
         axes.set_xlim(low - 1.0, high + 1.0)
     axes.set_xlabel(OBSERVED[key])
     axes.grid(axis="y", visible=False)

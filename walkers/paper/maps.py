@@ -40,7 +40,7 @@ MODES = {
 }
 """With their markers and colours."""
 POSTURES = {"climbs upright": "^", "stays, upright": "o", "slides down upright": "v", "leans": "D", "turns over": "X"}
-"""Postures on a wall, with markers."""
+"""Postures on a wall with their markers."""
 STAYS = 5e-5
 """m/s; slower clusters count as at rest (a tenth of a radius per second)."""
 _SHAPES = {"chain": "dimer", "fan": "fan: large, two small", "diamond": "diamond: large, two small, small"}
@@ -60,13 +60,11 @@ _OF_TRAYS = {
     "speed, joined / free": ("speed_ratio",),
     "share of slow walkers": ("slow_share",),
 }
-"""Columns of a sweep's table that share a panel, solid and dashed, by its label."""
+"""Columns of a sweep's table (solid and dashed lines) by the label of their panel."""
 _LARGEST_DRIVE = 10.0
 """Peak acceleration in g up to which the paper shakes."""
-_BEGINNINGS = (15.0, 45.0)
-"""Starts in degrees whose first cycles are compared …"""
-_SMALL = 0.15
-"""… for so many seconds."""
+_BEGINNINGS, _SMALL = (15.0, 45.0), 0.15
+"""Starts (degrees) whose beginnings are compared with the theory, for this time (s)."""
 
 
 def paper_drives() -> dict[str, Alignment]:
@@ -129,13 +127,13 @@ def fig_alignment(sources: Sources) -> Figure:
 
 
 def _draw_beginning(axes: Axes, trajectory: Group, colour: tuple[float, ...]) -> None:
-    """Each walker with the solution that begins as it does."""
+    """Each walker, with the solution for its start."""
     drive, few = trajectory.case.drive, trajectory.time <= _SMALL
     time = trajectory.time[few]
     for number, walker in enumerate(trajectory.walkers):
         psi = trajectory.orientation[few, number]
         axes.plot(time * 1e3, np.degrees(psi), color=colour)
-        # The substrate moves as sin 2πft: it accelerates as -sin 2πft along x, to or against the heading.
+        # The substrate accelerates as -sin 2πft along x, toward or against the heading.
         phase = pi / 2.0 * walker.facing
         predicted = turning(pendulum_of(trajectory.case), float(psi[0]), pi * drive.frequency * time, phase)
         axes.plot(time * 1e3, np.degrees(predicted), "--", color=colour, lw=0.9)
@@ -172,11 +170,10 @@ def _share(sliding: FloatArray, rotation: FloatArray) -> float:
 
 
 def classify(table: pd.DataFrame, shares: Sequence[float]) -> npt.NDArray[np.int64]:
-    """The mode of each finished point of a sweep, a place in `MODES`; ``shares`` are their `sliding_share`.
+    """The mode of each finished point of a sweep, an index in `MODES`; ``shares`` are their `sliding_share`.
 
-    Detached goes before all others: a contact open in some of the samples. Then at rest: velocity and the large bead's
-    mean sliding below `REST`. Then leaves the axis: not all replicates steady, or some turned round. What is left
-    rolls, or slides as well (`SLIDES`).
+    The first mode that applies: detached (a contact is open in some samples); at rest (velocity and mean sliding of the
+    large bead below `REST`); leaves the axis (some replicates not steady or turned round); slides (`SLIDES`); rolls.
     """
     opened = table[["open_1", "open_2", "open_3"]].max(axis=1) > 0.0
     still = (table["velocity"].abs() < REST) & (table["sliding_1"].abs() < REST)
@@ -199,7 +196,7 @@ def fig_modes(sources: Sources) -> Figure:
     _draw_borders(kinds, float(table["gamma0"].max()))
     kinds.set(ylabel=r"dimensionless peak force $\Gamma_0$", ylim=(0.0, None), title="modes in the engine")
     speed = table["velocity"].to_numpy() * 1e3
-    low, high = np.nanpercentile(speed, (2.0, 95.0))  # few are not to darken the rest
+    low, high = np.nanpercentile(speed, (2.0, 95.0))  # without outliers
     look = {"cmap": "viridis", "vmin": min(low, 0.0), "vmax": high}
     drawn = speeds.scatter(table["sin_delta"], table["gamma0"], c=speed, marker="s", s=26, **look)
     speeds.set_title("velocity in the engine")
@@ -214,7 +211,7 @@ def fig_modes(sources: Sources) -> Figure:
 
 
 def _draw_borders(axes: Axes, top: float) -> None:
-    """Where Coulomb friction and the bridges say that the walker starts, slides, detaches; the quasi-static end."""
+    """Borders by the theory: where the walker starts, slides, detaches; the quasi-static end of the paper's model."""
     case, sines = shipped(), np.linspace(0.005, 0.4, 33)
     gammas = np.concatenate([np.linspace(0.02, 0.4, 58)[:-1], np.linspace(0.4, 1.15 * top, 14)])
     motion = motion_of(*[of_asymmetry(case, float(sine), float(gamma)) for sine in sines for gamma in gammas])
@@ -272,11 +269,11 @@ def fig_climbing(sources: Sources) -> Figure:
 
 
 def _draw_map(axes: Axes, table: pd.DataFrame, key: str) -> PathCollection:
-    """The points of a sweep by posture; all have one scale of colours, which is given back."""
+    """Draw the points of a sweep by posture, and return them for the common colour scale."""
     from matplotlib.colors import SymLogNorm
 
     found = postures(table)
-    shades = SymLogNorm(1.0, vmin=_SPEEDS[0], vmax=_SPEEDS[-1])  # few are fast, and they are not to bleach the rest
+    shades = SymLogNorm(1.0, vmin=_SPEEDS[0], vmax=_SPEEDS[-1])  # few are fast
     for posture, marker in enumerate(POSTURES.values()):
         here = table[found == posture]
         drawn = axes.scatter(
@@ -315,7 +312,7 @@ def fig_zoo(sources: Sources) -> Figure:
 
 
 def _draw_cluster(axes: Axes, group: Group) -> None:
-    """The first walker's beads seen against the wall, uphill is up; dotted where it began."""
+    """The beads of the first walker, seen toward the wall, uphill is up; dotted: at the start."""
     from matplotlib.patches import Circle
 
     for frame, style in ((0, {"ls": ":", "fc": "none", "ec": "0.6"}), (-1, {"fc": "#c9d2d8", "ec": "0.2"})):

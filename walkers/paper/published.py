@@ -1,6 +1,6 @@
-"""What the paper publishes of walkers as numbers (``published.toml``), and of which walkers: rows of sweeps, and cases.
+"""Published numbers of the paper (``published.toml``), with their walkers as rows of sweeps and as cases.
 
-`walkers.paper.comparison` evaluates each by the engine, whose sweeps are read once (`Sources`), and by the theory.
+`walkers.paper.comparison` evaluates them by the engine, from sweeps (`Sources`), and by the theory.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ _DEVIATION = 0.15
 
 
 class Point(NamedTuple):
-    """Walkers of the paper's: a sweep that has them, radii (mm), frequency (Hz), peak acceleration (g) or Γ0.
+    """Walkers of the paper: sweep, radii (mm), frequency (Hz), peak acceleration (g) or Γ0, start angle (degrees).
 
-    ``angle`` is where they start, degrees; what is None is whatever the sweep has.
+    None stands for the value of the sweep.
     """
 
     sweep: str
@@ -48,7 +48,7 @@ class Point(NamedTuple):
     angle: float | None = None
 
     def rows(self, table: pd.DataFrame) -> pd.DataFrame:
-        """Those of the points of a sweep that are these walkers."""
+        """The points of a sweep with these walkers."""
         peak = None if self.peak is None else self.peak * GRAVITY
         wanted = {
             **{f"radius_{number}": radius * 1e-3 for number, radius in enumerate(self.radii, start=1)},
@@ -78,23 +78,22 @@ class Observation:
     Attributes
     ----------
     key, what, unit
-        Its name, what it is in words, and in which unit.
+        Name, description and unit.
     value, bounds
-        As published; and between which a value is what the paper says, if it says so: the rounding of its digits
-        (0.735, of which Γ0 = 0.74 is made, is on its edge) is none, those of angles are ours. What is stated in words
-        only has bounds and no value, and does not count among those that agree or disagree.
+        Published value, and range that the paper states. Rounding is no range (Γ0 = 0.74 is 0.735); ranges of angles
+        are ours. A statement in words has bounds and no value, and does not count in the comparison.
     depends_on
         A sentence: what a disagreement of the engine depends on.
     measured
         Whether it tests the engine: Γ0 and Mathieu's V follow from beads and drive alone.
     of, over, quantity
-        It is a mean over walkers, or its ratio to one over others, pair by pair, of a quantity, see
-        `walkers.paper.comparison.evaluate`; if there is none that has a function for the number.
+        It is the mean of a quantity over walkers (``of``), or the ratio to others (``over``), pair by pair, see
+        `walkers.paper.comparison.evaluate`. Numbers without a quantity have functions there.
     fitted, deviation
-        What it is called among those that the theory is fitted to (`walkers.paper.model_terms`), if it is one, and its
-        error there, in ``unit``; 15 % if None.
+        Name among the numbers to which the theory is fitted (`walkers.paper.model_terms`), if it is one, and its error
+        there, in ``unit``; 15 % if None.
     compared
-        Whether it is one of the comparison.
+        Whether it is in the comparison.
     """
 
     key: str
@@ -113,12 +112,12 @@ class Observation:
 
     @property
     def si(self) -> float:
-        """The value in SI units, to the digits that it was published with."""
+        """The value in SI units, with the published digits."""
         return float(f"{self.value or 0.0}e-3") if self.unit == "mm/s" else self.value or 0.0
 
     @property
     def si_deviation(self) -> float:
-        """Its error among those that the theory is fitted to, in SI units."""
+        """Its error in fits of the theory, in SI units."""
         if self.deviation is None:
             return _DEVIATION * abs(self.si)
         return self.deviation * (1.0 if self.over else 1e-3)
@@ -146,10 +145,7 @@ FIG4_PEAKS = tuple(OBSERVATIONS[f"fig4{letter}_velocity"].of[0].peak or 0.0 for 
 
 
 def outside_of_the_paper(case: Case) -> str | None:
-    """How a case lies outside the range in which the paper measured velocities; None if it lies within.
-
-    Of a case that is no dimer's nothing is said.
-    """
+    """How a case of a dimer lies outside the range of the paper's velocities; None if it is within, or no dimer."""
     if not case.walkers or len(case.walkers[0].radii) != 2:
         return None
     points = [point for one in OBSERVATIONS.values() for point in one.of]
@@ -172,19 +168,19 @@ def outside_of_the_paper(case: Case) -> str | None:
 
 
 def shipped() -> Case:
-    """The case whose beads, liquid and contacts Figs. 1b and 2 have."""
+    """The case with the beads, the liquid and the contacts of Figs. 1b and 2."""
     return load_case("fig1b")
 
 
 def driven(case: Case, frequency: float, accelerations: Iterable[float]) -> list[Case]:
-    """A case at another frequency, Hz, and peak accelerations, m/s²; for the theory, without a time step for a deck."""
+    """A case with another frequency (Hz) and peak accelerations (m/s²), for the theory: without a time step."""
     drives = [Harmonic(case.drive.direction, float(frequency), float(peak)) for peak in accelerations]
     run = replace(case.run, time_step=0.0)
     return [replace(case, drive=Drive((one,), case.drive.frame), run=run) for one in drives]
 
 
 def of_radii(case: Case, radii: tuple[float, float], gamma0: float) -> Case:
-    """A case with other beads, radii in m, driven at a Γ0."""
+    """A case with other radii (m), driven at a Γ0."""
     dimer = replace(case, walkers=(replace(case.walkers[0], radii=radii),))
     return replace(dimer, drive=case.drive.with_peak(dimer_of(dimer).peak_acceleration(gamma0)))
 
@@ -212,9 +208,7 @@ class NothingFinishedError(WalkersError):
 
 
 class Sources:
-    """Finished sweeps in a folder of run directories: ``table`` gives the table of one, by its name, ``trajectory`` the
-    motion of the (first) walkers of a run, by its directory.
-    """
+    """Sweeps in a folder: ``table`` gives the table of one by its name, ``trajectory`` the first make of a run."""
 
     def __init__(self, out: Path) -> None:
         self.out = out
@@ -222,7 +216,7 @@ class Sources:
         self.trajectory: Callable[[str], Group] = lru_cache(maxsize=32)(lambda run: read_motion(run).groups[0])
 
     def finished(self, sweep: str) -> pd.DataFrame:
-        """The points of a sweep that are finished; a `NothingFinishedError` if there is none."""
+        """The finished points of a sweep; `NothingFinishedError` if there is none."""
         table = self.table(sweep)
         done = table[table["status"] == "finished"]
         if done.empty:
