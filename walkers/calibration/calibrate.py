@@ -1,7 +1,4 @@
-"""A calibration from its file to its outcome: waves, emulators, posterior, and predictive check by the engine.
-
-A wave is a sweep that runs several parameter sets in all experiments.
-"""
+"""Calibration: waves (sweeps of parameter sets in all experiments), emulators, posterior, check by the engine."""
 
 from __future__ import annotations
 
@@ -68,7 +65,7 @@ def wave_sweep(
 ) -> Sweep:
     """The sweep of a wave: every parameter set (P, D) with every experiment, set by set.
 
-    Experiments may have ``extra`` keys in these runs alone. `InputError` if a key of the calibration is none of a case.
+    Experiments may have ``extra`` keys in this sweep. `InputError` if a key of the calibration is none of a case.
     """
     points = []
     for row in values:
@@ -86,7 +83,7 @@ def wave_sweep(
     document = {
         "title": calibration.file.title,
         "case": calibration.file.case,
-        # What the runs have beside it, such as twice the cycles, stands in for what is set.
+        # Keys of the points, such as twice the cycles, replace those of [set].
         "set": {key: value for key, value in settings.items() if key not in points[0]},
         "zip": [{key: [point[key] for point in points] for key in points[0]}],
     }
@@ -109,7 +106,7 @@ def run_wave(calibration: Calibration, unit: FloatArray, sweep: Sweep, out: Path
     columns = []
     for one in calibration.observations:
         value = mean(one.quantity, one.of)
-        if one.over:  # a ratio of two speeds says nothing where the lower one is none
+        if one.over:  # a ratio of speeds is undefined if the lower one is zero
             below = mean(one.quantity, one.over)
             value = value / np.where(np.abs(below) > _LEAST_SPEED, below, np.nan)
         columns.append(value)
@@ -117,10 +114,7 @@ def run_wave(calibration: Calibration, unit: FloatArray, sweep: Sweep, out: Path
 
 
 def _seen(table: pd.DataFrame, experiments: int) -> dict[str, FloatArray]:
-    """Quantities of each run of a wave's table; NaN where there is none, or the run failed.
-
-    Speeds are means over the walkers that are some until the end (`walkers.postprocess.gait.steady_walkers`).
-    """
+    """Quantities of each run of a wave (speeds: means of steady walkers); NaN if there is none, or the run failed."""
     rows: list[dict[str, float]] = []
     for run, status in zip(table["run"], table["status"], strict=True):
         rows.append(dict.fromkeys(QUANTITIES, np.nan))
@@ -139,12 +133,12 @@ class Outcome:
     calibration: Calibration
     space: Space
     unit: FloatArray  # all sets of all waves, in the unit cube, shape (P, D)
-    emulators: Emulators  # of all waves and of all observations, as the posterior is
+    emulators: Emulators  # of all waves and observations
     posterior: Posterior
-    held_out: dict[str, Posterior]  # of the observations that each trial of the file leaves
+    held_out: dict[str, Posterior]  # posteriors without the observations of each trial of the file
     predictive: Wave  # the engine at samples of the posterior, that of the highest density first
-    checks: dict[str, Wave]  # at the best set that was run: as in the waves, with half the time step, for twice as long
-    failures: dict[str, list[Failure]]  # points that failed, by sweep
+    checks: dict[str, Wave]  # the best set that was run: as in the waves, with half the time step, for twice as long
+    failures: dict[str, list[Failure]]  # failed points by sweep
 
 
 def calibrate(
@@ -157,17 +151,17 @@ def calibrate(
     calibration, options, how
         From `walkers.inputs.calibration.load_calibration`; as for `walkers.sweeps.scheduler.run_sweep`.
     out
-        Folder of the run directories; each wave is a sweep there, and its design is kept in a folder of the
-        calibration's name.
+        Folder of the run directories; each wave is a sweep there, and its design is in a folder with the name of the
+        calibration.
     progress_of
-        As `walkers.paper.published.ProgressOf`.
+        See `walkers.paper.published.ProgressOf`.
 
     Raises
     ------
     InputError
-        If a key of the file cannot be used, or designs that are there belong to other parameters.
+        If a key of the file is invalid, or existing designs belong to other parameters.
     CalibrationStopped
-        If points of a wave are missing, for no fault of their parameters.
+        If points of a wave are missing for other reasons than their parameters.
     runner.EngineFailure
         If there is no engine, or its audit failed.
     """
@@ -200,7 +194,7 @@ def calibrate(
         filling = filling or len(sets)
     emulators = fit_emulators(unit, outcome, calibration.observations, design.seed, filling)
     posterior = _posterior(calibration, emulators)
-    # The sample of the highest density, and others evenly through the samples.
+    # The sample of the highest density, and evenly spaced samples.
     every = np.linspace(0, len(posterior.unit) - 1, design.predictive - 1).round().astype(int)
     drawn = np.concatenate([posterior.best[None], posterior.unit[every]])
     predictive = run("predictive", drawn)
@@ -219,15 +213,11 @@ def _posterior(calibration: Calibration, emulators: Emulators, held_out: Collect
 
 
 def _check_ranges(calibration: Calibration) -> None:
-    """Refuse parameters whose ranges exceed those of a case, before anything is written or run.
-
-    Cases are made at either end of all ranges and at the guesses.
-    """
+    """Resolve the cases at the ends of all ranges and at the guesses: refuse ranges that exceed those of a case."""
     ends = Space(calibration.parameters).values(np.array([[0.0], [1.0]]) * np.ones(len(calibration.parameters)))
     sweep = wave_sweep(calibration, np.concatenate([ends, _guesses(calibration)]), calibration.name)
     try:
-        for _ in sweep.cases():
-            pass
+        list(sweep.cases())
     except InputError as error:
         problem = error.problems[0]
         for one in calibration.parameters:
@@ -250,11 +240,8 @@ def _determinants(calibration: Calibration, wave: int) -> dict[str, Any]:
 
 
 def _kept(path: Path, determinants: dict[str, Any], make: Callable[[], FloatArray]) -> FloatArray:
-    """The parameter sets of a wave, read from its file, or drawn and written.
-
-    A calibration that goes on must not depend on whether the libraries would draw the same points again.
-    """
-    if path.exists():
+    """The parameter sets of a wave, read from its file, or drawn and written."""
+    if path.exists():  # other versions of the libraries may draw other points
         try:
             kept = read_json(path)
             unit = np.array(kept["unit"], dtype=np.float64)
@@ -283,11 +270,11 @@ def next_wave(calibration: Calibration, unit: FloatArray, outcome: FloatArray, p
     Parameters
     ----------
     calibration, points
-        What is calibrated; P (the first wave has the guesses besides).
+        The calibration; P (the first wave also has the guesses).
     unit, outcome : ndarray, shape (N, D) and (N, K)
-        The sets that were run, in the unit cube, and what the engine made of them; none for the first wave.
+        Earlier sets in the unit cube, and their observations; none for the first wave.
     filling
-        How many of them were the first wave.
+        Number of sets in the first wave.
     """
     space, seed = Space(calibration.parameters), calibration.design.seed
     if not len(unit):
@@ -298,8 +285,8 @@ def next_wave(calibration: Calibration, unit: FloatArray, outcome: FloatArray, p
     samples, places = np.unique(posterior.unit, axis=0, return_index=True)
     likely = samples[np.argsort(posterior.log_density[places])[::-1]][: len(samples) // 2]
     draw = np.random.default_rng([seed, len(unit)])
-    # A quarter where the posterior is high, far from each other; half around and between the best sets that were run,
-    # for there the engine is known to be good; the others wherever the posterior is, to find what is missing.
+    # A quarter at high posterior, far from each other; half around and between the best sets that were run; the others
+    # are drawn from the posterior.
     few = points // 4
     among = spread_out(likely[: 20 * points], few, unit)
     parents = unit[ranking(calibration, outcome)[:_PARENTS]]
@@ -312,7 +299,7 @@ def next_wave(calibration: Calibration, unit: FloatArray, outcome: FloatArray, p
 
 
 def _expected_misfit(emulators: Emulators, unit: FloatArray) -> FloatArray:
-    """The misfit of `ranking` as the emulators expect it at points (N, D), shape (N,)."""
+    """The misfit of `ranking` that the emulators expect at points (N, D), shape (N,)."""
     own = [place for place, one in enumerate(emulators.each) if not one.observation.derived]
     mean, deviation = emulators.predict(unit, own)
     transformed = np.clip(mean[..., None] + deviation[..., None] * _QUANTILES, -LARGEST, LARGEST)
@@ -322,12 +309,11 @@ def _expected_misfit(emulators: Emulators, unit: FloatArray) -> FloatArray:
 
 
 def ranking(calibration: Calibration, outcome: FloatArray) -> npt.NDArray[np.int64]:
-    """Order of sets by their outcome (P, K): first those with most observations within their deviations.
+    """Order of sets by their outcome (P, K): those with most observations within their deviations come first.
 
-    Those that are derived from others do not count. Of several sets that with the least misfit Σ ln(1 + r²), r in
-    standard deviations; the logarithm keeps an observation that none of them gives from deciding. One that could not be
-    made is not given, and its misfit is `MISSING_MISFIT`. It is the engine's own word: emulators err most where they
-    hope most.
+    Derived observations do not count. Sets with equal numbers are ordered by the misfit Σ ln(1 + r²), r in standard
+    deviations; the logarithm limits the weight of an observation that no set gives. The misfit of a missing observation
+    is `MISSING_MISFIT`. Only results of the engine count: emulators err most at their optimum.
     """
     own = [place for place, one in enumerate(calibration.observations) if not one.derived]
     value, deviation = np.array([(one.value, one.deviation) for one in calibration.observations])[own].T

@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.distance import cdist
 from scipy.special import log_expit
-from scipy.stats import qmc, truncnorm, uniform
+from scipy.stats import truncnorm, uniform
 
+from walkers.inputs.axes import unit_cube
 from walkers.inputs.calibration import Observation, Parameter
 
 FloatArray = npt.NDArray[np.float64]
@@ -23,8 +24,7 @@ _FOLDS = 10
 _FEW = 20
 _LEAST = 5
 _UNKNOWN = 3.0
-"""Standard deviation of the transformed residual of an observation that fewer than five sets gave: ten deviations
-either way, and the same for all parameters."""
+"""Standard deviation of the transformed residual of an observation with fewer than five values: ten deviations."""
 _EXTREME = 3.0
 LARGEST = 12.0
 """Largest transformed residual; sinh overflows beyond."""
@@ -48,7 +48,6 @@ class Space:
 
     @cached_property
     def _ends(self) -> FloatArray:
-        """Of the ranges, scaled, shape (2, D)."""
         return self._scaled(np.array([one.range for one in self.parameters], np.float64).T)
 
     def _scaled(self, values: FloatArray) -> FloatArray:
@@ -81,9 +80,8 @@ class Space:
         return np.asarray(np.sum([one.logpdf(unit[..., place]) for place, one in enumerate(self.priors)], axis=0))
 
     def design(self, points: int, seed: int) -> FloatArray:
-        """A space-filling first wave, shape (points, D): a scrambled Sobol sequence (`scipy.stats.qmc`)."""
-        sampler = qmc.Sobol(self.dimensions, rng=np.random.default_rng(seed))
-        return np.asarray(sampler.random_base2(int(np.ceil(np.log2(points))))[:points], dtype=np.float64)
+        """A space-filling first wave, shape (points, D): a scrambled Sobol sequence."""
+        return unit_cube("sobol", self.dimensions, points, seed)
 
 
 def spread_out(candidates: FloatArray, points: int, taken: FloatArray) -> FloatArray:
@@ -97,10 +95,7 @@ def spread_out(candidates: FloatArray, points: int, taken: FloatArray) -> FloatA
 
 
 def transformed(outcome: FloatArray, observation: Observation) -> FloatArray:
-    """Arsinh of the residual in standard deviations: linear near the observation, logarithmic far from it.
-
-    Walkers that are far too fast do not outweigh on this scale those that are nearly right.
-    """
+    """Arsinh of the residual in standard deviations, so that walkers that are far too fast do not dominate the fit."""
     return np.asarray(np.arcsinh((outcome - observation.value) / observation.deviation))
 
 
@@ -108,14 +103,14 @@ def transformed(outcome: FloatArray, observation: Observation) -> FloatArray:
 class Emulator:
     """One observation as a function of the parameters: a Gaussian process of the transformed residual.
 
-    What is said of its errors is from cross-validation.
+    Its errors are from cross-validation.
     """
 
     observation: Observation
-    sets: int  # that it knows: those in which there was something to observe
-    process: Any = None  # scikit-learn's, fitted; None if these were too few
-    error_inflation: float = 1.0  # by how much its standard deviations are too small in the later waves; at least 1
-    error: float = np.nan  # root mean square, of the transformed residual
+    sets: int  # number of sets with a value
+    process: Any = None  # fitted process of scikit-learn; None if there are too few sets
+    error_inflation: float = 1.0  # factor by which its standard deviations are too small in later waves; at least 1
+    error: float = np.nan  # root mean square error of the transformed residual
     explained: float = np.nan  # share of the variance
 
     def predict(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -123,7 +118,7 @@ class Emulator:
         if self.process is None:
             return np.zeros(len(unit)), np.full(len(unit), _UNKNOWN)
         with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "Predicted variances")  # at a set that was run: zero, but for rounding
+            warnings.filterwarnings("ignore", "Predicted variances")  # rounding errors of zero, at sets that were run
             mean, deviation = self.process.predict(unit, return_std=True)
         return mean, deviation * self.error_inflation
 
@@ -138,14 +133,14 @@ class Emulator:
 class Emulators:
     """Emulators of K observations, and of their feasibility.
 
-    Observations that are missing in the same sets are one of E events: they need the same walkers.
+    Observations that are missing in the same sets need the same event, one of E.
     """
 
-    each: tuple[Emulator, ...]  # one an observation
-    correlation: FloatArray  # of their errors, shape (K, K), for observations share runs and sets; shrunk toward none
-    event: npt.NDArray[np.int64]  # which one an observation needs, shape (K,)
-    missing: BoolArray  # sets that were run in which an event did not come about, shape (P, E)
-    classifiers: tuple[Any, ...]  # E Gaussian processes; None of an event that came about in all sets, or in none
+    each: tuple[Emulator, ...]
+    correlation: FloatArray  # of their errors, shape (K, K), because observations share runs; shrunk toward zero
+    event: npt.NDArray[np.int64]  # that each observation needs, shape (K,)
+    missing: BoolArray  # sets without the event, shape (P, E)
+    classifiers: tuple[Any, ...]  # E Gaussian processes; None for events in all sets, or in none
 
     def predict(self, unit: FloatArray, places: Sequence[int] | None = None) -> tuple[FloatArray, FloatArray]:
         """Transformed residuals of all observations (or those at some places) and their standard deviations, (N, K)."""
@@ -156,8 +151,8 @@ class Emulators:
     def log_probabilities(self, unit: FloatArray) -> FloatArray:
         """Logarithms of the probabilities of the events at points (N, D), shape (N, E).
 
-        The mean of the logistic function over the normal latent one, by MacKay's approximation
-        (doi 10.1162/neco.1992.4.5.720).
+        Mean of the logistic function over the normal latent one, by MacKay's approximation (doi
+        10.1162/neco.1992.4.5.720).
         """
         latent = np.empty((len(unit), len(self.classifiers)))
         for place, (one, missing) in enumerate(zip(self.classifiers, self.missing.T, strict=True)):
@@ -173,10 +168,9 @@ class Emulators:
         return np.asarray(np.exp(self.log_probabilities(unit))[:, self.event])
 
     def needed(self, places: Sequence[int]) -> list[int]:
-        """Events that some of the observations need, each once, and none that others imply.
+        """Events that observations need, without events that others imply.
 
-        An event that fails just where others fail (a ratio needs the walkers of both its speeds) says nothing that
-        these do not say; counted again it would weigh twice.
+        An event is implied if it is missing exactly where others are (a ratio needs the walkers of both its speeds).
         """
         events, kept = dict.fromkeys(self.event[list(places)].tolist()), []
         for one in events:
@@ -195,18 +189,17 @@ def fit_emulators(
     Parameters
     ----------
     unit, outcome : ndarray, shape (P, D) and (P, K)
-        The sets that were run, in the unit cube, and what they gave; NaN where there was nothing to observe.
+        Parameter sets in the unit cube, and their observations; NaN if there is none.
     observations, seed
-        K of them; of the restarts of the fit.
+        The K observations; seed of the restarts of the fit.
     filling
-        Number of the sets that fill the range. Errors are judged by the sets after them, if there are enough: these are
-        where the posterior is, and there walkers are more than elsewhere on the verge of something.
+        Number of the sets that fill the range. If there are enough later sets, errors are judged by these, because they
+        are close to the posterior, where the engine varies most.
     """
     from sklearn.covariance import LedoitWolf
 
     fitted = [_fitted(unit, outcome[:, k], one, seed, filling) for k, one in enumerate(observations)]
-    # An error that is not known counts as none, which keeps the matrix positive; one of many deviations counts as
-    # three, lest one set decide.
+    # Unknown errors count as zero, which keeps the matrix positive; large ones are limited, so that no set dominates.
     errors = np.clip(np.stack([errors for _, errors in fitted], axis=1), -_EXTREME, _EXTREME)
     size = np.sqrt(np.mean(errors**2, axis=0))
     correlation = LedoitWolf(assume_centered=True).fit(errors / np.where(size > 0.0, size, 1.0)).covariance_
@@ -219,7 +212,7 @@ def fit_emulators(
 def _fitted(
     unit: FloatArray, outcome: FloatArray, observation: Observation, seed: int, filling: int
 ) -> tuple[Emulator, FloatArray]:
-    """An emulator, and its cross-validated errors in stated standard errors, shape (P,); 0 where there is no value."""
+    """An emulator, and its cross-validated errors divided by the predicted ones, shape (P,); 0 without a value."""
     from sklearn.base import clone
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
@@ -251,14 +244,13 @@ def _fitted(
 
 
 def _classifier(unit: FloatArray, made: BoolArray, seed: int) -> Any:
-    """Classifier of an event that occurs in some parameter sets."""
     from sklearn.gaussian_process import GaussianProcessClassifier
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
     if made.all() or not made.any():
         return None
-    # The constant kernel is the uncertainty of the share of feasible sets over the whole range: with few failures
-    # most of the range is feasible, not half of it, as without. Scales below a tenth of the range cannot be learned.
+    # The constant kernel is the uncertainty of the share of feasible sets. Without it, half of the range would be
+    # feasible even with few failures. Scales below a tenth of the range cannot be learned.
     kernel = ConstantKernel(4.0, (1e-1, 1e2)) * Matern(np.full(unit.shape[1], 1.0), (1e-1, 2e1), nu=2.5)
     with _quietly():
         return GaussianProcessClassifier(kernel + ConstantKernel(4.0, "fixed"), random_state=seed).fit(unit, made)
@@ -266,7 +258,7 @@ def _classifier(unit: FloatArray, made: BoolArray, seed: int) -> Any:
 
 @contextmanager
 def _quietly() -> Iterator[None]:
-    """Fit in one thread, for matrices are small, and without warnings of scales at a bound, which have no influence."""
+    """Fit in one thread, because matrices are small, and without warnings of scales at a bound, which do not matter."""
     from sklearn.exceptions import ConvergenceWarning
     from threadpoolctl import threadpool_limits
 

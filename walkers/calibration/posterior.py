@@ -16,15 +16,14 @@ LEAST_SAMPLES = 400.0
 """Smallest effective sample size of a converged posterior."""
 _ROUNDS = 8
 _WIDER, _TEMPERED = 1.5, 150.0
-"""How much wider than the weighted points before them those of a later round are, and what these are to be worth, which
-their likelihood is tempered for."""
+"""Factor of the covariance of a later round, and effective sample size for which the likelihood is tempered."""
 _AT_ONCE = 2048
 _KEPT = 4000
 _DISCREPANCY = 0.5
-"""Scale of the half-Cauchy prior about a group's discrepancy, in standard deviations of its observations: most groups
-have little, but one may have much without bending all parameters toward it."""
+"""Scale of the half-Cauchy prior of a group's discrepancy, in standard deviations of its observations: most groups have
+a small one, but one group may have a large one without distorting all parameters."""
 _MOST = 0.998
-"""Largest cumulative prior probability of a discrepancy, which is then 160 deviations."""
+"""Largest cumulative prior probability of a discrepancy, for 160 deviations."""
 _NEWTON_STEPS, _CONVERGED = 40, 1e-4
 _LEAST_DEVIATION = 1e-3
 
@@ -51,19 +50,18 @@ def log_likelihood(
 
         ψ(z) = ½ sinh(z)ᵀ C⁻¹ sinh(z) + ½ (z − m)ᵀ Σ⁻¹ (z − m)
 
-    is least. To linearise at m instead would make the hopeless cheap: no residual would be more than 1/deviation errors
-    off.
+    is least. Linearisation at m would underestimate large residuals: none would exceed 1/deviation errors.
 
     Parameters
     ----------
     mean, deviation : ndarray, shape (N, K)
-        Of the transformed residuals, by the emulators: m, and the roots of the diagonal of Σ.
+        Transformed residuals by the emulators: m, and the roots of the diagonal of Σ.
     correlation : ndarray, shape (K, K)
-        Of the emulators' errors: that of Σ.
+        Correlation of the emulators' errors, that of Σ.
     shared : ndarray, shape (K, K)
         Covariance of the observations' errors, in their standard deviations (`observation_covariance`).
     discrepancy : ndarray, shape (N, K)
-        What no parameters explain, in the same; C is ``shared`` with its squares added to the diagonal.
+        Unexplained differences, in the same units; C is ``shared`` with their squares added to the diagonal.
     """
     mean, deviation = np.clip(mean, -LARGEST, LARGEST), np.maximum(deviation, _LEAST_DEVIATION)
     covariance = shared + _diagonal(discrepancy**2)
@@ -81,11 +79,7 @@ def log_likelihood(
 
 
 def _mode(mean: FloatArray, of_numbers: FloatArray, of_engine: FloatArray) -> FloatArray:
-    """Minimum of ψ by Newton's method.
-
-    They are of one at most, which is what Newton's are where sinh is an exponential, and take of the curvature what is
-    positive, so that all are downhill.
-    """
+    """Minimum of ψ by Newton's method, with steps of at most 1, and with the positive part of the curvature."""
     z, left = mean.copy(), np.arange(len(mean))
     for _ in range(_NEWTON_STEPS):
         sinh, cosh = np.sinh(z[left]), np.cosh(z[left])
@@ -111,15 +105,15 @@ def _diagonal(rows: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Posterior:
-    """S samples of equal weight, of points with other weights w."""
+    """S samples of equal weight, from points with weights w."""
 
     unit: FloatArray  # in the unit cube, shape (S, D)
-    discrepancy: FloatArray  # of each group, in deviations of its observations: what no parameters explain, (S, G)
-    log_density: FloatArray  # but for a constant, shape (S,)
-    groups: tuple[str, ...]  # G names; those that were held out have no discrepancy of their own
+    discrepancy: FloatArray  # of each group, in deviations of its observations, (S, G)
+    log_density: FloatArray  # up to a constant, shape (S,)
+    groups: tuple[str, ...]  # G names, without held-out groups
     best: FloatArray  # the point of the highest density, shape (D,)
     points: int
-    effective_samples: float  # (Σ w)²/Σ w²: so many independent samples the points are worth
+    effective_samples: float  # (Σ w)²/Σ w²
 
     @property
     def converged(self) -> bool:
@@ -128,10 +122,7 @@ class Posterior:
 
 
 class Density:
-    """Log density of D parameters and of the G groups' discrepancies, in coordinates of which all numbers are allowed.
-
-    Groups that are held out are not used.
-    """
+    """Log density of D parameters and G discrepancies of groups (except held-out ones) in unbounded coordinates."""
 
     def __init__(
         self,
@@ -156,11 +147,11 @@ class Density:
 
     def _of(self, points: FloatArray) -> FloatArray:
         unit, discrepancy = self.places(points)
-        # What is uniform in the cube, or half-Cauchy, is standard normal in these coordinates.
+        # Uniform and half-Cauchy distributions are standard normal in these coordinates.
         total: FloatArray = self._space.log_prior(unit) - 0.5 * np.sum(points**2, axis=1)
         mean, deviation = self._emulators.predict(unit, self._used)
         total += log_likelihood(mean, deviation, self._correlation, self._shared, discrepancy[:, self._group])
-        # What was published was seen, of walkers that walked.
+        # Published observations exist: their walkers walked.
         total += self._emulators.log_probabilities(unit)[:, self._events].sum(axis=1)
         return total
 
@@ -174,12 +165,12 @@ class Density:
 def sample_posterior(density: Density, points: int, seed: int) -> Posterior:
     """Sample the posterior by adaptive importance sampling, starting from the prior.
 
-    Later rounds (``points`` in each) are normal with the mean and covariance of the points weighed so far; all points
-    are weighed over the mixture of what all rounds were drawn from (Cornuet et al. 2012, doi
-    10.1111/j.1467-9469.2011.00756.x). Whether the outcome may be believed is said by its ``converged``.
+    Later rounds (``points`` in each) are normal with mean and covariance of the weighted points so far; all points are
+    weighted by the mixture of all rounds (Cornuet et al. 2012, doi 10.1111/j.1467-9469.2011.00756.x). The result is
+    reliable only if it has ``converged``.
     """
     draw, count = np.random.default_rng(seed), density.dimensions
-    normals = [(np.zeros(count), np.eye(count))]  # that points were drawn from: means and covariances
+    normals = [(np.zeros(count), np.eye(count))]  # mean and covariance of each round
     places, known = np.zeros((0, count)), np.zeros(0)
     for _ in range(_ROUNDS):
         middle, width = normals[-1]
@@ -196,7 +187,7 @@ def sample_posterior(density: Density, points: int, seed: int) -> Posterior:
             tempered = softmax(share * logarithm)
         width = np.cov(places.T, aweights=tempered).reshape(count, count)
         normals.append((tempered @ places, _WIDER * width))
-    samples = min(_KEPT, len(weight))  # each point as often as it weighs
+    samples = min(_KEPT, len(weight))  # in proportion to their weights
     steps = (np.arange(samples) + draw.random()) / samples
     chosen = np.minimum(np.searchsorted(np.cumsum(weight), steps), len(weight) - 1)
     unit, discrepancy = density.places(places[chosen])

@@ -29,9 +29,9 @@ _NARROW, _NARROWER = 1.0 / 3.0, 2.0 / 3.0
 
 
 def write_outcome(found: Outcome, to: Path) -> list[Path]:
-    """Write ``posterior.parquet``, ``calibration.json`` and ``.md``, and the figures (`figures_of`); their paths.
+    """Write ``posterior.parquet``, ``calibration.json`` and ``.md``, and figures (`figures_of`); return their paths.
 
-    The samples' columns are the parameters (in their units), ``discrepancy_GROUP`` (in standard deviations) and
+    Columns of the samples are the parameters (in their units), ``discrepancy_GROUP`` (in standard deviations) and
     ``log_density``.
     """
     import pandas as pd
@@ -62,7 +62,7 @@ def record_of(found: Outcome) -> dict[str, Any]:
     rows = [_row(found, place) for place in range(len(emulators.each))]
     own = [row["agrees"] for row in rows if not row["derived"]]
     values = np.percentile(found.space.values(posterior.unit), (5.0, 50.0, 95.0), axis=0).T.tolist()
-    # Of each parameter the 5 to 95 % interval over that of the prior: 1 if nothing was learned.
+    # Ratio of the 5 to 95 % interval to that of the prior: 1 if nothing was learned.
     widths = np.ptp(np.percentile(posterior.unit, (5.0, 95.0), axis=0), axis=0)
     priors = np.array([np.ptp(one.ppf((0.05, 0.95))) for one in found.space.priors])
     narrowed = dict(zip(names, (widths / priors).tolist(), strict=True))
@@ -184,15 +184,15 @@ def draw_corners(space: Space, sets: FloatArray, best: FloatArray) -> Figure:
 
     count, words = space.dimensions, [("log " if one.log else "") + _labelled(one) for one in space.parameters]
     figure, _ = new_figure(TWO_COLUMNS, TWO_COLUMNS, nrows=count, ncols=count)
-    # corner places its panels itself; after the constrained engine alone that would be refused.
+    # corner places its panels itself, which the constrained layout engine would refuse.
     figure.set_layout_engine("tight")
     figure.set_layout_engine("none")
     corner.corner(
         drawn(sets),
         fig=figure,
-        labels=["\n".join(label.split()) for label in words],  # panels of many parameters are no wider than a word
+        labels=["\n".join(label.split()) for label in words],  # panels may be as narrow as a word
         range=drawn(np.array([np.zeros(count), np.ones(count)])).T.tolist(),
-        truths=None if count == 1 else drawn(best),  # of one parameter corner has a panel, in which it cannot mark any
+        truths=None if count == 1 else drawn(best),  # corner cannot mark a value in a single panel
         truth_color="C1",
         quantiles=[0.05, 0.5, 0.95],
         label_kwargs={"fontsize": 7},
@@ -204,7 +204,7 @@ def draw_corners(space: Space, sets: FloatArray, best: FloatArray) -> Figure:
     )
     if count == 1:
         figure.axes[0].axvline(float(drawn(best)[0]), color="C1")
-    # Few ticks, none at a corner, and labels as far from the panels as the ticks ask for, not as panels are wide.
+    # Few ticks, none at a corner, and labels at a fixed distance from the panels.
     edge, away = 1.0 / TWO_COLUMNS, -26.0 / 72.0
     figure.subplots_adjust(left=edge, bottom=edge, right=0.99, top=0.99, wspace=0.1, hspace=0.1)
     beneath, beside = (ScaledTranslation(*way, figure.dpi_scale_trans) for way in ((0.0, away), (away, 0.0)))
