@@ -14,13 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.conftest import (
-    SHORT,
-    call,
-    document,
-    make_case,
-    to_toml,
-)
+from tests.conftest import SHORT, call, make_case
 from walkers import Run
 from walkers import run as run_case
 from walkers.check.audit import CHECKS, AuditReport, record, run_audit, selected
@@ -234,10 +228,7 @@ def test_an_audit_whose_outcome_cannot_be_kept_is_printed(monkeypatch: pytest.Mo
     assert "cannot be kept" in done.stderr
 
 
-def test_the_program(own_cache: Path, in_folder: Path) -> None:
+def test_a_part_of_the_audit_is_no_audit(own_cache: Path) -> None:
     done = call("check", "engine", "--only", "stock", "--only", "restart", "--json", check=True)
     assert [check["name"] for check in json.loads(done.stdout)["checks"]] == ["restart", "stock"]
-    assert not list(own_cache.rglob("audits/*.json")), "a part of the audit is no audit"
-    (in_folder / "mine.toml").write_text(to_toml(document(run=SHORT)))
-    told = call("run", "mine.toml", check=True).stderr
-    assert told.count("walkers check engine") == 1
+    assert not list(own_cache.rglob("audits/*.json"))

@@ -15,15 +15,7 @@ from scipy.stats import multivariate_normal, norm
 
 from tests.conftest import call, to_toml
 from tests.printed import spoilt
-from walkers.calibration.calibrate import (
-    FINAL,
-    Wave,
-    calibrate,
-    next_wave,
-    ranking,
-    run_wave,
-    wave_sweep,
-)
+from walkers.calibration.calibrate import FINAL, Wave, calibrate, next_wave, ranking, run_wave, wave_sweep
 from walkers.calibration.emulator import Emulator, Emulators, FloatArray, Space, fit_emulators
 from walkers.calibration.posterior import Density, Posterior, log_likelihood, observation_covariance, sample_posterior
 from walkers.calibration.report import figures_of, record_of, words_of
@@ -268,10 +260,7 @@ TRUE = {"friction": 0.1, "drag": 2.0}
 REDUCED: dict[str, Any] = {
     "title": "Friction and drag from three speeds",
     "case": "fig1b",
-    "set": {
-        "dimers": {"replicates": 1},
-        "run": {"cycles": 10, "settling_cycles": 6, "samples_per_cycle": 10},
-    },
+    "set": {"dimers": {"replicates": 1}, "run": {"cycles": 10, "settling_cycles": 6, "samples_per_cycle": 10}},
     "parameters": {
         "friction": {
             "keys": ["contact.friction.bead_wall", "contact.friction.bead_bead"],

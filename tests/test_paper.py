@@ -52,9 +52,7 @@ ON_A_WALL: dict[str, dict[str, Any]] = {
     "climb-friction": {"liquid.viscosity_ratio": [1, 2]},
     "climb-tilt": {"boundary.tilt": ["20 deg", "90 deg"], "liquid.viscosity_ratio": [1]},
     "zoo": {},
-    "zoo-corner": {
-        "clusters[0].radii": [["0.545 mm", "0.3075 mm"], ["0.545 mm", "0.3075 mm", "0.3075 mm"]],
-    },
+    "zoo-corner": {"clusters[0].radii": [["0.545 mm", "0.3075 mm"], ["0.545 mm", "0.3075 mm", "0.3075 mm"]]},
 }
 COMPARED = [number for number in OBSERVATIONS.values() if number.compared]
 

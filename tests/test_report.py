@@ -15,7 +15,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import walkers
-from tests.conftest import call, document, make_case, to_toml
+from tests.conftest import document, make_case, to_toml
 from walkers.inputs.caption import caption
 from walkers.inputs.rounding import rounded, with_decimals
 from walkers.inputs.sweep import expand
@@ -223,14 +223,6 @@ def test_words_and_numbers() -> None:
     assert caption(tilted).endswith("plane tilted by 60°, right is up")
     aside = replace(tilted, boundary=replace(tilted.boundary, uphill=pi / 2.0))
     assert caption(aside).endswith("plane tilted by 60°, up is at 90° from x toward y")
-
-
-def test_the_command_finds_what_a_name_means(walked_run: Path, swept: Path, tmp_path: Path) -> None:
-    to = tmp_path / "report.html"
-    for name in (str(walked_run), swept.name):
-        told = call("report", name, "--out", str(swept.parent), "--to", str(to), check=True)
-        assert told.stdout == f"{to}\n"
-        assert HOSTILE in Page(to).words
 
 
 def test_runs_show_themselves(walked_run: Path, tmp_path: Path) -> None:

@@ -29,6 +29,7 @@ from tests.test_hostile import HOSTILE
 from tests.test_sweeps import SLOW, TINY, contents_of
 from walkers.inputs.errors import InputError
 from walkers.runner.launch import _off_the_network
+from walkers.sweeps.scheduler import Options
 from walkers.sweeps.site import check_path, load_site, pilots
 from walkers.sweeps.table import load
 
@@ -68,7 +69,7 @@ def test_what_parsl_is_told(tmp_path: Path) -> None:
     file |= {"provider": {"qos": "long"}, "executor": {"heartbeat_period": 7, "worker_port_range": [54000, 54100]}}
     (tmp_path / "site.toml").write_text(to_toml(file))
     site = load_site(tmp_path / "site.toml")
-    assert site.workers == 2 * 16 * 4
+    assert Options(1, site).decks_at_once == 2 * 16 * 4
     (executor,) = pilots(site, tmp_path / "parsl").executors
     provider = executor.provider
     told = {"partition": "main", "account": "granular", "walltime": "02:00:00", "qos": "long", "exclusive": False}

@@ -20,17 +20,7 @@ import psutil
 import pyarrow.parquet as pq
 import pytest
 
-from tests.conftest import (
-    PATIENCE,
-    PROGRAM,
-    call,
-    document,
-    engines_in,
-    make_case,
-    to_toml,
-    wait_for,
-    wait_for_engines,
-)
+from tests.conftest import PATIENCE, PROGRAM, call, document, engines_in, make_case, to_toml, wait_for, wait_for_engines
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.motion import read_motion

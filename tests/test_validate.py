@@ -14,31 +14,13 @@ import pytest
 from tests.conftest import call
 from tests.printed import spoilt
 from walkers.check import benchmarks, bridges
-from walkers.check.benchmarks import GLASS, OXIDE, STEEL, Speeds, farthest_point, onto_plane, published
+from walkers.check.benchmarks import GLASS, farthest_point, published
 from walkers.check.bridges import LAWS, Law
 from walkers.check.report import CHAPTERS, PAGE, Chapter, Verdict
 from walkers.physics.capillary import derjaguin_radius
 from walkers.runner.failures import EngineFailure
 
 # --- Impacts --------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("restitution", [0.5, 1.0])
-def test_what_slides_all_the_way_loses_by_coulomb_and_no_other_friction_would_do(restitution: float) -> None:
-    """Damped or not: the elastic repulsion, which limits friction, has the whole impulse of the normal force."""
-    before = Speeds(np.array([5.0]), np.array([20.0]), np.zeros(1))
-    after = onto_plane(STEEL, before, restitution, 0.3)
-    lost, expected = 20.0 - after.tangential[0], 0.3 * (1.0 + restitution) * 5.0
-    assert lost == pytest.approx(expected, rel=2e-3)
-    assert lost != pytest.approx(1.01 * expected, rel=2e-3)
-    assert after.rolling[0] == pytest.approx(2.5 * expected, rel=6e-3)
-
-
-@pytest.mark.parametrize("restitution", [0.3, 0.6, 0.9, 1.0])
-def test_damping_gives_the_restitution_at_any_speed(restitution: float) -> None:
-    normal = np.array([1.0, 3.0])
-    after = onto_plane(OXIDE, Speeds(normal, np.zeros(2), np.zeros(2)), restitution)
-    assert after.normal / normal == pytest.approx(restitution, rel=2e-3)
 
 
 def test_a_point_off_the_curve_is_found_and_judged_by_the_axis() -> None:

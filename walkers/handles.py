@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from walkers.finding import files_of
 from walkers.inputs.errors import refused
-from walkers.runner.directory import FAILURE_NAME, ask_to_stop, case_of, finished_run, is_locked, unfinished
+from walkers.runner.directory import FAILURE_NAME, ask_to_stop, case_of, finished_run, is_locked
 from walkers.runner.files import read_json
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from walkers.postprocess.films import FilmOptions
     from walkers.postprocess.motion import Motion
     from walkers.runner.launch import Progress
+    from walkers.sweeps.table import SweepRecord
 
 Export = Literal["deck", "vtk", "paraview", "xyz", "lammps", "archive"]
 
@@ -71,12 +72,9 @@ class Run:
     @property
     def status(self) -> str:
         """``finished``, ``running``, ``interrupted`` or ``failed``."""
-        from walkers.sweeps.table import unfinished_state
+        from walkers.sweeps.table import state_at, worst_status
 
-        if finished_run(self.directory):
-            return "finished"
-        status = unfinished_state(self.directory, unfinished(self.directory)).status
-        return "interrupted" if status == "missing" else status
+        return worst_status([state_at(self.directory).status])
 
     @property
     def progress(self) -> Progress | None:
@@ -282,28 +280,26 @@ class Sweep:
     """
 
     directory: Path
+    _record: SweepRecord = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Refuse a directory that is not a sweep."""
+        """Read the record of the sweep; `InputError` if the directory is none of a sweep."""
         from walkers.sweeps.table import read_record
 
         object.__setattr__(self, "directory", Path(self.directory))
-        read_record(self.directory)
+        object.__setattr__(self, "_record", read_record(self.directory))
 
     @property
     def status(self) -> str:
         """``finished``, ``running``, ``failed`` (some points) or ``interrupted`` (points are missing)."""
-        from walkers.sweeps.table import read_record, states, worst_status
+        from walkers.sweeps.table import states, worst_status
 
-        return worst_status(state.status for state in states(read_record(self.directory)))
+        return worst_status(state.status for state in states(self._record))
 
     @property
     def runs(self) -> list[Run]:
         """The runs of all points, finished or not."""
-        from walkers.sweeps.table import read_record
-
-        record = read_record(self.directory)
-        return [Run(record.out / name) for name in record.runs]
+        return [Run(self._record.out / name) for name in self._record.runs]
 
     def table(self) -> pd.DataFrame:
         """One row per point; see `walkers.sweeps.table.load`."""
@@ -315,7 +311,7 @@ class Sweep:
         """The status of the points, their failures, and the table in mm, mm/s, nJ and degrees."""
         from walkers.sweeps.table import describe_status, short_text
 
-        return f"{describe_status(self.directory)}\n\n{short_text(self.table())}"
+        return f"{describe_status(self._record)}\n\n{short_text(self.table())}"
 
     def _repr_html_(self) -> str:
         """The table in a notebook."""

@@ -1,7 +1,7 @@
 """The description of an archive: an RO-Crate (researchobject.org) by the Process Run Crate profile, with rocrate.
 
-Three actions per run state the origin of the files, each with its program, input and output: from the case to
-the deck (this program), from the deck to the dumps (the engine), from the dumps to tables and result (this program).
+Each run has three actions with program, input and output: from the case to the deck (this program), from the deck to
+the dumps (the engine), from the dumps to tables and result (this program).
 """
 
 from __future__ import annotations
@@ -64,10 +64,7 @@ class Author:
 
 
 def describe_crate(contents: Contents, authors: Sequence[Author], licence: str) -> dict[str, Any]:
-    """The metadata of an archive, JSON-LD, under one of `LICENCES`.
-
-    Dated by the last of the runs, not by the day: the same runs give the same archive.
-    """
+    """The metadata of an archive, JSON-LD, under one of `LICENCES`; the date is the end of the last run."""
     made = _Crate(authors)
     for one in contents.sweep:
         made.file(one)
@@ -91,7 +88,7 @@ def describe_crate(contents: Contents, authors: Sequence[Author], licence: str) 
     made.describe_root(contents, licence)
     made.crate.root_dataset["mentions"] = actions
     metadata: dict[str, Any] = made.crate.metadata.generate()
-    for entity in metadata["@graph"]:  # what is one is no list, by the specification
+    for entity in metadata["@graph"]:  # by the specification, lists have more than one item
         entity.update({key: one[0] for key, one in entity.items() if isinstance(one, list) and len(one) == 1})
     return metadata
 
@@ -101,13 +98,13 @@ def _moment(iso: str) -> str:
 
 
 class _Crate:
-    """A crate under construction, with the entities to which others refer (files, people)."""
+    """A crate under construction, with files and people, to which other entities refer."""
 
     def __init__(self, authors: Sequence[Author]) -> None:
         from rocrate.rocrate import ROCrate
 
         self.crate = ROCrate(version=VERSION)
-        self.crate.metadata.extra_terms["sha256"] = "http://schema.org/sha256"  # younger than that version's context
+        self.crate.metadata.extra_terms["sha256"] = "http://schema.org/sha256"  # not in the context of that version
         self.files: dict[str, Entity] = {}
         self.people = []
         for author in authors:
@@ -115,12 +112,11 @@ class _Crate:
             self.people.append(self.entity(identifier, "Person", name=author.name))
 
     def entity(self, identifier: str, kind: str, /, **properties: Any) -> Entity:
-        """A contextual entity, once."""
+        """A contextual entity, added once."""
         from rocrate.model.contextentity import ContextEntity
 
-        there = self.crate.get(identifier)
         made = ContextEntity(self.crate, identifier, properties={"@type": kind, **properties})
-        return there if there is not None else self.crate.add(made)
+        return self.crate.get(identifier) or self.crate.add(made)
 
     def describe_root(self, contents: Contents, licence: str) -> None:
         """Describe the archive: title, licence, authors and the cited paper."""
@@ -165,7 +161,7 @@ class _Crate:
                 if metadata.get("unit"):
                     column["unitText"] = metadata["unit"]
                 columns.append(self.entity(f"#{quote(f'{table}.{field.name}')}", "PropertyValue", **column))
-        # Without a source: the archive is written by ourselves, this is its description.
+        # Without a source, because rocrate only describes the archive.
         entity = self.files[item.place] = self.crate.add_file(None, item.place, properties=properties)
         return entity
 

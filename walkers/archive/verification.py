@@ -1,6 +1,6 @@
 """Check whether the files of a run, a sweep or an archive are unchanged.
 
-Archives come from strangers: none is unpacked to be verified, and no file of one is read whole but its list.
+Archives may be hostile: they are not unpacked for the check, and only their list of checksums is read as a whole.
 """
 
 from __future__ import annotations
@@ -26,15 +26,14 @@ from walkers.sweeps.table import PARSL, RECORD_NAME, read_record, states
 SUMS_NAME = "sha256sums.txt"
 """List of checksums in an archive, in the format of ``sha256sum -c``."""
 _MOST_TIMES = 100
-"""A zip file that unpacks to more than this many times its size is refused; those of runs to some five times."""
+"""Zip files that unpack to more than this many times their size are refused; archives of runs unpack to five times."""
 _MOST_ANYWAY = 1 << 28
-"""Bytes; smaller archives are always accepted, because reading takes a second."""
+"""Size in bytes below which archives are always accepted, because reading takes a second."""
 _SHOWN = (
     *(".png", ".pdf", ".svg", ".gif", ".mp4", ".html", ".htm"),
     *(".vtp", ".vtm", ".vtu", ".pvd", ".py", ".xyz", ".lammpstrj", ".csv"),
 )
-"""Suffixes of pictures, films, pages, files for ParaView (with their script) and exports: the program writes them on
-demand and never reads them again."""
+"""Suffixes of pictures, films, pages, files for ParaView and exports, which the program writes and never reads."""
 _LONGEST_SHOWN = 300
 
 
@@ -42,9 +41,9 @@ _LONGEST_SHOWN = 300
 class Verification:
     """State of the files of a run or an archive, or of the points of a sweep; ``intact`` counts unchanged ones.
 
-    ``findings`` are names of the others: ``changed`` and ``missing`` ones; those ``not listed``; what is ``doubtful``,
-    with the reason in brackets; and what was ``made since`` from the run (`_made_since`): no result rests on it.
-    ``left_out`` is how many were left out of an archive on purpose.
+    ``findings`` are the names of the others by kind: ``changed``, ``missing``, ``not listed``, ``doubtful`` (with the
+    reason in brackets), and ``made since`` from the run (`_made_since`), without influence on results. ``left_out`` is
+    the number of files that were left out of an archive on purpose.
     """
 
     name: str
@@ -62,21 +61,20 @@ class Verification:
         """The outcome, and one line for each file that has changed or is not listed."""
         told = f"{self.name}: {self.intact} {'points have a run' if self.of_points else 'files are unchanged'}"
         lines = [f"{told}, {self.left_out} left out of the archive" if self.left_out else told]
-        for kind, names in self.findings.items():  # which a stranger chose, and may have put escape sequences into
+        for kind, names in self.findings.items():  # names in archives may contain escape sequences
             lines += [f"  {kind:<10} {printable(shortened(name, _LONGEST_SHOWN))}" for name in names]
         return "\n".join(lines)
 
 
 def verify(path: Path) -> list[Verification]:
-    """Compare a run, a sweep, or an archive (.zip, or unpacked) with what manifests or its checksums say of it.
+    """Compare a run, a sweep, or an archive (.zip, or unpacked) with the checksums in manifests or in the archive.
 
-    All that is listed must be there and unchanged, and nothing else be there. What was made from finished runs since,
-    and is read by nobody, is named and no failure: pictures, films, pages, files for ParaView, exports and hidden
-    files, but in a zip file, which is written whole. A sweep's directory is held to the same rule; its record has a
-    checksum in archives only.
+    All listed files must exist and be unchanged, and there must be no other files. Files that were made from finished
+    runs and are never read (pictures, films, pages, files for ParaView, exports, hidden files) are named and are no
+    failure, except in a zip file. The same applies to a sweep's directory; its record has a checksum only in archives.
 
-    Of a run or an archive there is one verification, of a sweep that of its points and those of its finished runs.
-    `InputError` if it is none of these, cannot be read, or unpacks to far more than it has bytes.
+    Runs and archives have one verification; sweeps have one of the points, and one of each finished run. `InputError`
+    if the path is none of these, cannot be read, or unpacks to far more than its size.
     """
     if (path / RECORD_NAME).is_file():
         return _verify_sweep(path)
@@ -98,8 +96,8 @@ def _verify_run(directory: Path) -> Verification:
     name = directory.resolve().name
     try:
         contents = read_json(directory / MANIFEST_NAME)
-        listed = {CASE_NAME: "", **contents["sha256"]}  # which every run has
-        beside, left_out = f"{contents['name']}.toml", set(contents.get("left_out", ()))  # of an archive
+        listed = {CASE_NAME: "", **contents["sha256"]}  # every run has a case
+        beside, left_out = f"{contents['name']}.toml", set(contents.get("left_out", ()))  # in archives
         there = _files_below(directory)
         now = checksums(directory, [one for one in there if one in listed and (directory / one).is_file()])
     except FileNotFoundError:
@@ -120,7 +118,7 @@ def _verify_sweep(directory: Path) -> list[Verification]:
     ]
     runs = [state.directory for state in found if state.directory and state.status == "finished"]
     there = [name for name in _files_below(directory) if name != RECORD_NAME and not name.startswith(f"{PARSL}/")]
-    # Bands are texts' only; the others are of an archive: nothing is read from them.
+    # Bands are only printed, and the other files are those of an archive: no result depends on them.
     beside = (SPREAD_NAME, f"{record.name}.toml", "table.parquet")
     files = _compared(record.name, {}, {}, there, lambda name: _made_since(name) or name in beside)
     points = replace(files, intact=len(runs), findings={**files.findings, "missing": lacking}, of_points=True)
@@ -149,7 +147,6 @@ def _verify_archive(
     opened: Callable[[str], IO[bytes]],
     added: Callable[[str], bool],
 ) -> Verification:
-    """Compare the contents of an archive with its checksums."""
     if SUMS_NAME not in files:
         raise refused(path, f"no archive of runs: it has no {SUMS_NAME}")
     with opened(SUMS_NAME) as file:
@@ -163,12 +160,12 @@ def _verify_archive(
     has_run = any(place.count("/") == 2 and place.endswith(f"/{MANIFEST_NAME}") for place in listed)
     doubtful = [] if has_run else [f"{SUMS_NAME} (it lists no run)"]
     now = {place: _checksum(opened, place) for place in files if place in listed}
-    listed.setdefault(METADATA_NAME, "")  # which every archive has
+    listed.setdefault(METADATA_NAME, "")  # every archive has metadata
     return _compared(path.name, listed, now, set(there) - {SUMS_NAME}, added, doubtful=doubtful)
 
 
 def _checksum(opened: Callable[[str], IO[bytes]], place: str) -> str:
-    """SHA-256 of a file; None if it is damaged in the zip file."""
+    """SHA-256 of a file; empty if it is damaged in the zip file."""
     try:
         with opened(place) as file:
             return hashlib.file_digest(file, "sha256").hexdigest()  # type: ignore[arg-type]
@@ -185,15 +182,12 @@ def _compared(
     left_out: Collection[str] = (),
     doubtful: Sequence[str] = (),
 ) -> Verification:
-    """Compare the SHA-256 of files as a list has them, and as they are ``now``, of those that can be read.
-
-    Of all that is ``there``, what is not listed may have been ``added`` since; ``left_out`` need not be there.
-    """
+    """Compare the listed SHA-256 of files with those ``now``; files ``there`` that are not listed may be ``added``."""
     changed = [one for one, checksum in now.items() if checksum != listed[one]]
     others = sorted(set(there).difference(listed))
     since = {one: one.rpartition("/")[0] for one in others if added(one)}
     count = Counter(since.values())
-    # Files of the same folder as one, but those of the topmost: ``vtk`` holds one a frame.
+    # Files of a subfolder count as one: ``vtk`` has one per frame.
     made = (
         f"{folder}/ ({count[folder]} files)" if folder and count[folder] > 1 else one for one, folder in since.items()
     )
@@ -209,13 +203,10 @@ def _compared(
 
 
 def _made_since(name: str) -> bool:
-    """Whether an unlisted file (relative path) was made from a run and cannot influence a result.
-
-    These are what `_SHOWN` says and hidden files. Nothing in ``segments`` is among them: each folder there is taken for
-    a part of the run.
-    """
+    """Whether an unlisted file (relative path) was made from a run and cannot influence a result: `_SHOWN`, hidden."""
     path = PurePosixPath(name)
     hidden = any(part.startswith(".") and part != ".." for part in path.parts)
+    # Everything in the folder of segments is read as a part of the run.
     return SEGMENTS not in path.parts and (hidden or path.suffix.lower() in _SHOWN)
 
 

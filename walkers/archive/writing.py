@@ -24,10 +24,10 @@ from walkers.runner.manifest import MANIFEST_NAME, checksum
 from walkers.sweeps.table import RECORD_NAME, SweepRecord, read_record, states
 
 _STORED = ("/", ".parquet", ".png", ".mp4")
-"""Suffixes of names that are not compressed: folders and compressed files."""
+"""Suffixes of names that are not compressed again, and of folders."""
 _CHUNK_BYTES = 1 << 20
 RUNS = "runs"
-"""Folder of the run directories in an archive, where the program finds them."""
+"""Folder of the run directories in an archive: the default folder of the program."""
 _MEANINGS = {
     CASE_NAME: ("case", "the resolved case: every number that determines the run, SI units"),
     MANIFEST_NAME: ("record", "provenance: versions, machine, times, and checksums of all files"),
@@ -40,10 +40,7 @@ _MEANINGS = {
     "layout.json": ("deck", "columns of the dumps; which bead belongs to which walker"),
     "engine.log": ("output", "the log of the engine"),
     "segment.json": ("output", "first and last step of the segment, and its cost"),
-    "beads.bin": (
-        "dump",
-        "positions, velocities and spins of the beads, LIGGGHTS binary dump; columns in layout.json",
-    ),
+    "beads.bin": ("dump", "positions, velocities and spins of the beads, LIGGGHTS binary dump; columns in layout.json"),
     "bridges.pairs.txt": ("dump", "bridges between beads, frame by frame, text"),
     "bridges.walls.txt": ("dump", "bridges between beads and walls, frame by frame, text"),
     "state.restart": ("dump", "restart file of the engine, from which the next segment continues"),
@@ -61,10 +58,7 @@ class ArchiveRefused(WalkersError):
 
 @dataclass(frozen=True)
 class ArchiveOptions:
-    """Options of an archive: with or without dumps, authors, licence (one of `LICENCES`).
-
-    It always has the tables and results.
-    """
+    """Options of an archive: with or without dumps (tables and results are included), authors, one of `LICENCES`."""
 
     dumps: bool = True
     authors: Sequence[Author] = ()
@@ -132,7 +126,7 @@ def _info(place: str, moment: tuple[int, ...]) -> zipfile.ZipInfo:
 
 
 def _write(archive: zipfile.ZipFile, item: Item, moment: tuple[int, ...]) -> None:
-    """Write a file, and check that it still has its checksum."""
+    """Write a file, and check its checksum again."""
     digest = hashlib.sha256()
     source = io.BytesIO(item.source) if isinstance(item.source, bytes) else item.source.open("rb")
     with source, archive.open(_info(item.place, moment), "w", force_zip64=item.size >= zipfile.ZIP64_LIMIT) as file:
@@ -144,7 +138,6 @@ def _write(archive: zipfile.ZipFile, item: Item, moment: tuple[int, ...]) -> Non
 
 
 def _preview(contents: Contents, options: ArchiveOptions) -> bytes:
-    """The HTML page for readers."""
     from walkers.postprocess.analysis import describe_result, read_result
     from walkers.sweeps.table import load, short_text
 
@@ -180,7 +173,7 @@ def _preview(contents: Contents, options: ArchiveOptions) -> bytes:
 
 @dataclass(frozen=True)
 class Item:
-    """A file of an archive: path there, source or contents, SHA-256, role (as in the crate's actions) and meaning."""
+    """A file of an archive: path in it, source or contents, SHA-256, role (in the crate's actions) and meaning."""
 
     place: str
     source: Path | bytes
@@ -190,12 +183,12 @@ class Item:
 
     @property
     def name(self) -> str:
-        """Its name without folders."""
+        """Name without folders."""
         return self.place.rpartition("/")[2]
 
     @property
     def size(self) -> int:
-        """Bytes."""
+        """Size in bytes."""
         return len(self.source) if isinstance(self.source, bytes) else self.source.stat().st_size
 
 
@@ -212,7 +205,7 @@ def item(place: str, source: Path | bytes, sha256: str | None = None, about: tup
 
 @dataclass(frozen=True)
 class PackedRun:
-    """A run in an archive: source, folder in the archive, manifest in the archive, and files."""
+    """A run in an archive: source, folder and manifest in the archive, and files."""
 
     directory: Path
     place: str
@@ -221,11 +214,11 @@ class PackedRun:
 
     @property
     def name(self) -> str:
-        """Of the run."""
+        """Name of the run."""
         return self.directory.name
 
     def with_role(self, *roles: str) -> list[Item]:
-        """The files with one of some roles."""
+        """The files with one of the roles."""
         return [item for item in self.items if item.role in roles]
 
 
@@ -246,7 +239,7 @@ class Contents:
 
     @property
     def finished(self) -> str:
-        """Time at which the last run was finished, ISO 8601."""
+        """End of the last run, ISO 8601."""
         return max(str(run.manifest["finished"]) for run in self.runs)
 
 

@@ -1,7 +1,4 @@
-"""A calibration from its file to its outcome: waves, emulators, posterior, and predictive check by the engine.
-
-A wave is a sweep that runs several parameter sets in all experiments.
-"""
+"""Calibration: waves (sweeps of parameter sets in all experiments), emulators, posterior, check by the engine."""
 
 from __future__ import annotations
 
@@ -117,10 +114,7 @@ def run_wave(calibration: Calibration, unit: FloatArray, sweep: Sweep, out: Path
 
 
 def _seen(table: pd.DataFrame, experiments: int) -> dict[str, FloatArray]:
-    """Quantities of each run of a wave's table; NaN where there is none, or the run failed.
-
-    Speeds are means over the walkers that stay steady until the end (`walkers.postprocess.gait.steady_walkers`).
-    """
+    """Quantities of each run of a wave (speeds: means of steady walkers); NaN if there is none, or the run failed."""
     rows: list[dict[str, float]] = []
     for run, status in zip(table["run"], table["status"], strict=True):
         rows.append(dict.fromkeys(QUANTITIES, np.nan))
@@ -157,10 +151,10 @@ def calibrate(
     calibration, options, how
         From `walkers.inputs.calibration.load_calibration`; as for `walkers.sweeps.scheduler.run_sweep`.
     out
-        Folder of the run directories; each wave is a sweep there, and its design is kept in a folder of the
-        calibration's name.
+        Folder of the run directories; each wave is a sweep there, and its design is in a folder with the name of the
+        calibration.
     progress_of
-        As `walkers.paper.published.ProgressOf`.
+        See `walkers.paper.published.ProgressOf`.
 
     Raises
     ------
@@ -200,7 +194,7 @@ def calibrate(
         filling = filling or len(sets)
     emulators = fit_emulators(unit, outcome, calibration.observations, design.seed, filling)
     posterior = _posterior(calibration, emulators)
-    # The sample of the highest density, and others evenly through the samples.
+    # The sample of the highest density, and evenly spaced samples.
     every = np.linspace(0, len(posterior.unit) - 1, design.predictive - 1).round().astype(int)
     drawn = np.concatenate([posterior.best[None], posterior.unit[every]])
     predictive = run("predictive", drawn)
@@ -219,15 +213,11 @@ def _posterior(calibration: Calibration, emulators: Emulators, held_out: Collect
 
 
 def _check_ranges(calibration: Calibration) -> None:
-    """Refuse parameters whose ranges exceed those of a case, before anything is written or run.
-
-    Cases are resolved at both ends of all ranges and at the guesses.
-    """
+    """Resolve the cases at the ends of all ranges and at the guesses: refuse ranges that exceed those of a case."""
     ends = Space(calibration.parameters).values(np.array([[0.0], [1.0]]) * np.ones(len(calibration.parameters)))
     sweep = wave_sweep(calibration, np.concatenate([ends, _guesses(calibration)]), calibration.name)
     try:
-        for _ in sweep.cases():
-            pass
+        list(sweep.cases())
     except InputError as error:
         problem = error.problems[0]
         for one in calibration.parameters:
@@ -250,11 +240,8 @@ def _determinants(calibration: Calibration, wave: int) -> dict[str, Any]:
 
 
 def _kept(path: Path, determinants: dict[str, Any], make: Callable[[], FloatArray]) -> FloatArray:
-    """The parameter sets of a wave, read from its file, or drawn and written.
-
-    A continued calibration must not depend on whether the libraries draw the same points again.
-    """
-    if path.exists():
+    """The parameter sets of a wave, read from its file, or drawn and written."""
+    if path.exists():  # other versions of the libraries may draw other points
         try:
             kept = read_json(path)
             unit = np.array(kept["unit"], dtype=np.float64)
@@ -322,12 +309,11 @@ def _expected_misfit(emulators: Emulators, unit: FloatArray) -> FloatArray:
 
 
 def ranking(calibration: Calibration, outcome: FloatArray) -> npt.NDArray[np.int64]:
-    """Order of sets by their outcome (P, K): first those with most observations within their deviations.
+    """Order of sets by their outcome (P, K): those with most observations within their deviations come first.
 
-    Derived observations do not count. Equal sets are ordered by the misfit Σ ln(1 + r²), r in standard deviations; the
-    logarithm limits the influence of an observation that no set reproduces. A missing observation is not reproduced,
-    with the misfit `MISSING_MISFIT`. Only results of the engine are used, because emulators err most at their best
-    predictions.
+    Derived observations do not count. Sets with equal numbers are ordered by the misfit Σ ln(1 + r²), r in standard
+    deviations; the logarithm limits the weight of an observation that no set gives. The misfit of a missing observation
+    is `MISSING_MISFIT`. Only results of the engine count: emulators err most at their optimum.
     """
     own = [place for place, one in enumerate(calibration.observations) if not one.derived]
     value, deviation = np.array([(one.value, one.deviation) for one in calibration.observations])[own].T

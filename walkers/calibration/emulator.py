@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.distance import cdist
 from scipy.special import log_expit
-from scipy.stats import qmc, truncnorm, uniform
+from scipy.stats import truncnorm, uniform
 
+from walkers.inputs.axes import unit_cube
 from walkers.inputs.calibration import Observation, Parameter
 
 FloatArray = npt.NDArray[np.float64]
@@ -23,8 +24,7 @@ _FOLDS = 10
 _FEW = 20
 _LEAST = 5
 _UNKNOWN = 3.0
-"""Standard deviation of the transformed residual of an observation with fewer than five sets: ten deviations in both
-directions, for all parameters."""
+"""Standard deviation of the transformed residual of an observation with fewer than five values: ten deviations."""
 _EXTREME = 3.0
 LARGEST = 12.0
 """Largest transformed residual; sinh overflows beyond."""
@@ -48,7 +48,6 @@ class Space:
 
     @cached_property
     def _ends(self) -> FloatArray:
-        """Scaled ends of the ranges, shape (2, D)."""
         return self._scaled(np.array([one.range for one in self.parameters], np.float64).T)
 
     def _scaled(self, values: FloatArray) -> FloatArray:
@@ -81,9 +80,8 @@ class Space:
         return np.asarray(np.sum([one.logpdf(unit[..., place]) for place, one in enumerate(self.priors)], axis=0))
 
     def design(self, points: int, seed: int) -> FloatArray:
-        """A space-filling first wave, shape (points, D): a scrambled Sobol sequence (`scipy.stats.qmc`)."""
-        sampler = qmc.Sobol(self.dimensions, rng=np.random.default_rng(seed))
-        return np.asarray(sampler.random_base2(int(np.ceil(np.log2(points))))[:points], dtype=np.float64)
+        """A space-filling first wave, shape (points, D): a scrambled Sobol sequence."""
+        return unit_cube("sobol", self.dimensions, points, seed)
 
 
 def spread_out(candidates: FloatArray, points: int, taken: FloatArray) -> FloatArray:
@@ -97,10 +95,7 @@ def spread_out(candidates: FloatArray, points: int, taken: FloatArray) -> FloatA
 
 
 def transformed(outcome: FloatArray, observation: Observation) -> FloatArray:
-    """Arsinh of the residual in standard deviations: linear near the observation, logarithmic far from it.
-
-    On this scale, walkers that are far too fast do not outweigh those that are nearly right.
-    """
+    """Arsinh of the residual in standard deviations, so that walkers that are far too fast do not dominate the fit."""
     return np.asarray(np.arcsinh((outcome - observation.value) / observation.deviation))
 
 
@@ -123,7 +118,7 @@ class Emulator:
         if self.process is None:
             return np.zeros(len(unit)), np.full(len(unit), _UNKNOWN)
         with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "Predicted variances")  # at a set that was run: zero, but for rounding
+            warnings.filterwarnings("ignore", "Predicted variances")  # rounding errors of zero, at sets that were run
             mean, deviation = self.process.predict(unit, return_std=True)
         return mean, deviation * self.error_inflation
 
@@ -173,10 +168,9 @@ class Emulators:
         return np.asarray(np.exp(self.log_probabilities(unit))[:, self.event])
 
     def needed(self, places: Sequence[int]) -> list[int]:
-        """Events that the observations at ``places`` need, without those that others imply.
+        """Events that observations need, without events that others imply.
 
-        An event that fails only where others fail (a ratio needs the walkers of both speeds) adds no information and
-        would count twice.
+        An event is implied if it is missing exactly where others are (a ratio needs the walkers of both its speeds).
         """
         events, kept = dict.fromkeys(self.event[list(places)].tolist()), []
         for one in events:
@@ -205,8 +199,7 @@ def fit_emulators(
     from sklearn.covariance import LedoitWolf
 
     fitted = [_fitted(unit, outcome[:, k], one, seed, filling) for k, one in enumerate(observations)]
-    # An unknown error counts as zero, which keeps the matrix positive; an error of more than three deviations counts
-    # as three, so that one set does not decide.
+    # Unknown errors count as zero, which keeps the matrix positive; large ones are limited, so that no set dominates.
     errors = np.clip(np.stack([errors for _, errors in fitted], axis=1), -_EXTREME, _EXTREME)
     size = np.sqrt(np.mean(errors**2, axis=0))
     correlation = LedoitWolf(assume_centered=True).fit(errors / np.where(size > 0.0, size, 1.0)).covariance_
@@ -219,7 +212,7 @@ def fit_emulators(
 def _fitted(
     unit: FloatArray, outcome: FloatArray, observation: Observation, seed: int, filling: int
 ) -> tuple[Emulator, FloatArray]:
-    """An emulator, and its cross-validated errors in stated standard errors, shape (P,); 0 where there is no value."""
+    """An emulator, and its cross-validated errors divided by the predicted ones, shape (P,); 0 without a value."""
     from sklearn.base import clone
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
@@ -251,7 +244,6 @@ def _fitted(
 
 
 def _classifier(unit: FloatArray, made: BoolArray, seed: int) -> Any:
-    """Classifier of an event that occurs in some parameter sets."""
     from sklearn.gaussian_process import GaussianProcessClassifier
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 

@@ -16,15 +16,14 @@ LEAST_SAMPLES = 400.0
 """Smallest effective sample size of a converged posterior."""
 _ROUNDS = 8
 _WIDER, _TEMPERED = 1.5, 150.0
-"""Width of a later round relative to the weighted points before it, and their effective sample size, for which the
-likelihood is tempered."""
+"""Factor of the covariance of a later round, and effective sample size for which the likelihood is tempered."""
 _AT_ONCE = 2048
 _KEPT = 4000
 _DISCREPANCY = 0.5
-"""Scale of the half-Cauchy prior of a group's discrepancy, in standard deviations of its observations: small for most
-groups, but a group may have a large one, which then does not bias all parameters."""
+"""Scale of the half-Cauchy prior of a group's discrepancy, in standard deviations of its observations: most groups have
+a small one, but one group may have a large one without distorting all parameters."""
 _MOST = 0.998
-"""Largest cumulative prior probability of a discrepancy, which is then 160 deviations."""
+"""Largest cumulative prior probability of a discrepancy, for 160 deviations."""
 _NEWTON_STEPS, _CONVERGED = 40, 1e-4
 _LEAST_DEVIATION = 1e-3
 
@@ -80,11 +79,7 @@ def log_likelihood(
 
 
 def _mode(mean: FloatArray, of_numbers: FloatArray, of_engine: FloatArray) -> FloatArray:
-    """Minimum of ψ by Newton's method.
-
-    Steps are limited to one, the length of Newton steps where sinh is an exponential, and use the positive part of the
-    curvature, so that all go downhill.
-    """
+    """Minimum of ψ by Newton's method, with steps of at most 1, and with the positive part of the curvature."""
     z, left = mean.copy(), np.arange(len(mean))
     for _ in range(_NEWTON_STEPS):
         sinh, cosh = np.sinh(z[left]), np.cosh(z[left])
@@ -127,10 +122,7 @@ class Posterior:
 
 
 class Density:
-    """Log density of D parameters and of the discrepancies of G groups, in unbounded coordinates.
-
-    Groups that are held out are not used.
-    """
+    """Log density of D parameters and G discrepancies of groups (except held-out ones) in unbounded coordinates."""
 
     def __init__(
         self,

@@ -29,9 +29,9 @@ _NARROW, _NARROWER = 1.0 / 3.0, 2.0 / 3.0
 
 
 def write_outcome(found: Outcome, to: Path) -> list[Path]:
-    """Write ``posterior.parquet``, ``calibration.json`` and ``.md``, and the figures (`figures_of`); their paths.
+    """Write ``posterior.parquet``, ``calibration.json`` and ``.md``, and figures (`figures_of`); return their paths.
 
-    The samples' columns are the parameters (in their units), ``discrepancy_GROUP`` (in standard deviations) and
+    Columns of the samples are the parameters (in their units), ``discrepancy_GROUP`` (in standard deviations) and
     ``log_density``.
     """
     import pandas as pd
@@ -190,7 +190,7 @@ def draw_corners(space: Space, sets: FloatArray, best: FloatArray) -> Figure:
     corner.corner(
         drawn(sets),
         fig=figure,
-        labels=["\n".join(label.split()) for label in words],  # panels of many parameters are no wider than a word
+        labels=["\n".join(label.split()) for label in words],  # panels may be as narrow as a word
         range=drawn(np.array([np.zeros(count), np.ones(count)])).T.tolist(),
         truths=None if count == 1 else drawn(best),  # corner cannot mark a value in a single panel
         truth_color="C1",

@@ -42,7 +42,7 @@ class AuditReport:
 
 
 def selected(only: Collection[str] = (), *, quick: bool = False) -> tuple[str, ...]:
-    """Names of the checks to run: those given, or all, or all quick ones; `InputError` if one is that of none."""
+    """Names of the checks to run: the given ones, else all, or all quick ones; `InputError` for unknown names."""
     for name in only:
         if name not in CHECKS:
             raise refused("--only", f"no check {name!r}; {expected_of(name, CHECKS)}")
@@ -64,7 +64,7 @@ def run_audit(
             begin, title = time.perf_counter(), (CHECKS[name].__doc__ or "").rstrip(".")
             try:
                 lines = tuple(CHECKS[name](bench))
-            except Exception as failure:  # whatever another build of the engine does, the table must come
+            except Exception as failure:  # another build of the engine may fail in any way
                 reason = str(failure).split(" (see ", 1)[0] or type(failure).__name__
                 lines = (Line.without_number(f"{title}: {reason}", Verdict.ERROR),)
             chapter = Chapter(name, title, lines, seconds=time.perf_counter() - begin)
@@ -82,9 +82,9 @@ def run_audit(
 
 
 def record(report: AuditReport, *, quick: bool) -> AuditRecord | None:
-    """Keep a report for the user: runs on this binary name it, and are refused if it failed.
+    """Keep a report for the user: runs with this binary name it, and are refused if it failed.
 
-    A report with a line that could not be measured says something of the machine, not of the binary: it is not kept.
+    A report with lines that could not be measured is not kept, because the reason is the machine, not the binary.
     """
     if count(report.chapters, Verdict.ERROR):
         return None

@@ -1,9 +1,9 @@
 """Published bridge laws compared with the Young–Laplace equation, and velocities of walkers with other laws.
 
-A published law gives the pull over the surface tension, F/γ, of a bridge of constant volume at gaps, in Derjaguin's
-way (`walkers.physics.capillary.derjaguin_radius`) where it was made for equal spheres. Those that the program has are
-found in `walkers.physics.laws`; of the others, here, coefficients and numbers of equations are those in the source of
-YADE (its ViscElCapPhys).
+A published law gives the pull divided by the surface tension, F/γ, of a bridge of constant volume against the gap; laws
+for equal spheres use Derjaguin's radius (`walkers.physics.capillary.derjaguin_radius`). Some are laws of the program
+(`walkers.physics.laws`); coefficients and equation numbers of the others are those in the source of YADE
+(ViscElCapPhys).
 
 References
 ----------
@@ -69,8 +69,8 @@ def willett_simple(
 class Law(NamedTuple):
     """A published law: its ``pull`` (radii, volume, contact angle, gaps → F/γ) and its ``rupture`` distance.
 
-    Those that give no rupture distance have Lian et al.'s (1993), whatever the radii. The ``error`` is that of the pull
-    at contact, over Young–Laplace's: of those that were made of its solutions.
+    The default rupture distance is that of Lian et al. (1993), for any radii. ``error`` is the published relative error
+    of the pull at contact, for fits to solutions of the Young–Laplace equation.
     """
 
     name: str

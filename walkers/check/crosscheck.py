@@ -15,10 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 from scipy.stats import ks_2samp
 
-from walkers.check.engine import TERMS, SecondEngine
+from walkers.check.engine import TERMS, SecondEngine, close_pairs
 from walkers.check.kernels import FloatArray
 from walkers.check.report import Chapter, Line, Verdict
 from walkers.handles import Run
@@ -30,8 +29,8 @@ from walkers.postprocess.gait import averages, walk
 from walkers.postprocess.motion import Group, Motion
 
 SPEED, GAIT, ORIENTATION = 1e-4, 1e-3, 0.1
-"""How far the second engine may differ: relative, of walkers' velocities; of rotation and sliding, relative to the
-fastest of them (of small differences these are, where contacts open); at the end, in degrees."""
+"""Tolerances: velocities of walkers (relative); rotation and sliding, relative to the fastest of them; final
+orientation (degrees)."""
 SPEED_FLOOR = 2e-3
 """mm/s; smaller differences are always accepted, for walkers that hardly move."""
 ONE = 0.01
@@ -89,18 +88,12 @@ class Comparison:
 
 
 def crosscheck(
-    case: Case,
-    out: Path,
-    without: Sequence[str] = (),
-    *,
-    seeds: int = 1,
-    make: Callable[[Case, Path], Run] = run,
+    case: Case, out: Path, without: Sequence[str] = (), *, seeds: int = 1, make: Callable[[Case, Path], Run] = run
 ) -> Comparison:
     """Compare the run of a case with the second engine; for a pile, runs with a number of ``seeds``.
 
-    ``out`` is the folder of the run directories, ``without`` terms that the second engine leaves out
-    (`walkers.check.engine.TERMS`), ``make`` makes the run of a case if it is missing. `EngineFailure` if the engine
-    fails in one of the known ways.
+    ``out`` is the folder of the run directories, ``without`` are terms that the second engine leaves out
+    (`walkers.check.engine.TERMS`), ``make`` makes a missing run. `EngineFailure` if the engine fails.
 
     Examples
     --------
@@ -112,7 +105,7 @@ def crosscheck(
 
 
 def compare(motions: Sequence[Motion], without: Sequence[str] = ()) -> Comparison:
-    """Compare finished runs of a case, one a start, with the second engine without some terms."""
+    """Compare finished runs of a case, one per start, with the second engine without some terms."""
     starts = tuple(Start(motion, simulate(motion, without)) for motion in motions)
     case, first, second = motions[0].case, starts[0].first, starts[0].second
     if case.mixture is not None:
@@ -141,10 +134,7 @@ def shortened(case: Case, cycles: int) -> Case:
 
 
 def simulate(motion: Motion, without: Collection[str] = ()) -> Motion:
-    """Move the beads of a run's first frame by the second engine for as long as the run was, without some terms.
-
-    Where the run went on from a restart file the second engine does as LIGGGHTS does there.
-    """
+    """Repeat a run from its first frame, with its restarts, by the second engine without some terms."""
     first = np.concatenate([motion.position[:1], motion.velocity[:1], motion.spin[:1]], axis=-1)
     clock = round(float(motion.time[0]) / motion.case.run.time_step)
     engine = SecondEngine(motion.case, motion.radius, first[0], clock=clock, without=without)
@@ -155,10 +145,7 @@ def simulate(motion: Motion, without: Collection[str] = ()) -> Motion:
 
 
 def _advanced(engine: SecondEngine, motion: Motion) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """The frames after the first and the mean spins since those before, in parts.
-
-    Of walkers, whose spins are averaged over all steps, a part is a cycle; of other beads a segment of the run.
-    """
+    """Frames after the first and the mean spins since the frame before, in parts: cycles of walkers, else segments."""
     steps = np.rint(motion.time / motion.case.run.time_step).astype(np.int64)
     segments = [segment for segment, _ in motion.frames]
     if motion.groups:
@@ -233,13 +220,8 @@ def _pile_lines(starts: Sequence[Start]) -> Iterator[Line]:
 
 
 def _touching(motion: Motion) -> float:
-    """Touching pairs per bead."""
-    reach, radius, found = 2.0 * float(motion.radius.max()), motion.radius, 0
-    for place in motion.position:
-        near = cKDTree(place).query_pairs(reach, output_type="ndarray")
-        apart = np.linalg.norm(place[near[:, 0]] - place[near[:, 1]], axis=1)
-        found += int(np.sum(apart < radius[near].sum(axis=1)))
-    return found / len(motion.position) / len(radius)
+    found = sum(len(close_pairs(position, motion.radius)) for position in motion.position)
+    return found / len(motion.position) / len(motion.radius)
 
 
 def chapter(out: Path, *, quick: bool = False) -> Chapter:

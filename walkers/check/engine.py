@@ -11,15 +11,15 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
 from walkers.check import kernels
-from walkers.check.kernels import CELLS, Bridges, Constants, FloatArray, Pairs, State
+from walkers.check.kernels import CELLS, Bridges, Constants, FloatArray, IntArray, Pairs, State
 from walkers.inputs.boundary import Flat, Wall
 from walkers.inputs.case import Case
 from walkers.physics.bridge import BridgeLaw, Surfaces
 from walkers.physics.laws import law_of
 
 TERMS = ("capillary", "lubrication", "damping", "friction", "rolling-friction", "gravity", "drive")
-"""What may be left out: pull and resistances of the bridges, damping of Hertz's contact and of the spring along the
-surfaces, all of the tangential contact force, the torque against rolling, weight, the inertial force of the frame."""
+"""Terms that can be left out: pull and resistances of bridges, damping of contacts, the tangential contact force, the
+torque against rolling, weight, the inertial force of the frame."""
 _SKIN = 0.4
 """Fraction of the smallest radius; neighbour lists are rebuilt when a bead has moved nearly half of it."""
 
@@ -30,17 +30,17 @@ class SecondEngine:
     Parameters
     ----------
     case
-        Whose density, contacts, liquid, weight, drive, time step and, unless others are given, walls are taken.
+        Gives density, contacts, liquid, weight, drive, time step, and the walls unless others are given.
     radius : ndarray, shape (N,)
-        Of the beads, m.
+        Radii of the beads, m.
     start : ndarray, shape (N, 9)
-        Their position (m), velocity (m/s) and spin (rad/s). What touches has a bridge; springs are unstretched.
+        Position (m), velocity (m/s) and spin (rad/s). Touching beads have a bridge; springs are unstretched.
     walls
-        Others than the case's.
+        Other walls than those of the case.
     clock
-        Step that it is; the drive begins with step 0.
+        Number of the first step; the drive begins with step 0.
     without
-        Those of the `TERMS` that do not act.
+        `TERMS` that are left out.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class SecondEngine:
         self.evaluate()
 
     def evaluate(self) -> None:
-        """Evaluate the forces once more, at the places and velocities that there are, as an engine does that starts."""
+        """Evaluate the forces at the present positions and velocities, as LIGGGHTS does at its start."""
         self._advance(self.clock, (self.clock, 1), np.empty((0, len(self.radius), 9)))
 
     def run(self, steps: int, every: int) -> FloatArray:
@@ -80,10 +80,7 @@ class SecondEngine:
         return frames
 
     def follow(self, frame: FloatArray) -> FloatArray:
-        """Move the beads to the given state of the next step and return forces (N) and torques (N m), (N, 6).
-
-        ``frame`` is of shape (N, 9); its velocities are those that the forces are to be evaluated with.
-        """
+        """Move the beads to a state (N, 9) at the next step; return forces (N) and torques (N m), (N, 6)."""
         state = self.state
         state.position[:], state.velocity[:], state.spin[:] = frame[:, :3], frame[:, 3:6], frame[:, 6:]
         self.clock += 1
@@ -92,7 +89,7 @@ class SecondEngine:
         return np.hstack([state.force, state.torque])
 
     def _advance(self, end: int, records: tuple[int, int], frames: FloatArray) -> int:
-        """Move on to a step, or until neighbours are to be listed anew: the step that it is then."""
+        """Integrate to a step, or until new neighbour lists are needed; return the present step."""
         clock = (self.clock, records[0], end, records[1])
         return kernels.advance(self.constants, self.state, self.pairs, self._listed, self._skin, clock, frames)
 
@@ -102,11 +99,9 @@ class SecondEngine:
         return list(zip(self.pairs.first[held].tolist(), self.pairs.second[held].tolist(), strict=True))
 
     def _list(self) -> None:
-        """List the neighbours; contacts and bridges go on."""
+        """List the neighbours, and keep contacts and bridges."""
         before, self._listed = self.pairs, self.state.position.copy()
-        near = cKDTree(self._listed).query_pairs(2.0 * float(self._reach.max()), output_type="ndarray").astype(np.int64)
-        apart = np.linalg.norm(self._listed[near[:, 0]] - self._listed[near[:, 1]], axis=1)
-        near = near[apart < self._reach[near].sum(axis=1)]
+        near = close_pairs(self._listed, self._reach)
         beads = len(self.radius)
         bodies = beads + len(self.constants.point)
         at_walls = bodies * np.arange(beads)[:, None] + np.arange(beads, bodies)
@@ -116,6 +111,14 @@ class SecondEngine:
         _, new, old = np.intersect1d(keys, known, assume_unique=True, return_indices=True)
         pairs.spring[new], pairs.bridged[new] = before.spring[old], before.bridged[old]
         self.pairs = pairs
+
+
+def close_pairs(position: FloatArray, reach: FloatArray) -> IntArray:
+    """Indices (P, 2) of beads at positions (N, 3) that are closer than the sum of their reaches (N,), m."""
+    near = cKDTree(position).query_pairs(2.0 * float(reach.max()), output_type="ndarray").astype(np.int64)
+    apart = np.linalg.norm(position[near[:, 0]] - position[near[:, 1]], axis=1)
+    close: IntArray = near[apart < reach[near].sum(axis=1)]
+    return close
 
 
 @lru_cache(maxsize=4096)

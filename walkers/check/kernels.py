@@ -31,19 +31,17 @@ FlagArray = npt.NDArray[np.bool_]
 Vector = tuple[float, float, float]
 
 CELLS = 512
-"""Of each of the three pieces of a bridge's splines."""
+"""Cells of each of the three pieces of a bridge's splines."""
 FORMATION, SCALE, MIDDLE, RUPTURE = range(4)
 NONE: Vector = (0.0, 0.0, 0.0)
 
 
 class Bridges(NamedTuple):
-    """T bridges as splines in three pieces: even in the gap h up to the scale, in ln h up to the middle, then to the
-    rupture in √(rupture - h).
+    """T bridges as splines in h up to the scale, in ln h up to the middle, and in √(rupture - h) up to the rupture.
 
-    ``spans``, of shape (T, 4), are the gaps at which a bridge forms, where pieces end, and at which it breaks, m;
-    ``splines`` (T, 3, CELLS, 4, 5) the coefficients of each cell, the highest power first, of pull (N) and resistances;
-    ``kind`` (N,) that of each bead, by its radius; ``between`` (K, K + 1) the bridge of two kinds, in the last column
-    that to walls.
+    ``spans`` (T, 4): gaps at which a bridge forms, pieces end, and it breaks, m; ``splines`` (T, 3, CELLS, 4, 5):
+    coefficients of each cell, highest power first, of pull (N) and resistances; ``kind`` (N,): index of each bead's
+    radius; ``between`` (K, K + 1): index of the bridge between two kinds, and in the last column to walls.
     """
 
     spans: FloatArray
@@ -55,8 +53,8 @@ class Bridges(NamedTuple):
 class Constants(NamedTuple):
     """Constants: N beads, W walls (``hollow``: radii of cylinders, 0 for planes), H harmonics; SI units.
 
-    ``harmonics``, of shape (H, 6), have directions, ω, accelerations and phases; moduli are E* and G*, ``damping`` is
-    β; friction is that between beads and at walls, ``rolling`` both's.
+    ``harmonics`` (H, 6) are directions, ω, accelerations and phases; moduli are E* and G*, ``damping`` is β. Rolling
+    friction is the same for beads and walls.
     """
 
     step: float
@@ -77,7 +75,7 @@ class Constants(NamedTuple):
 
 
 class State(NamedTuple):
-    """Of N beads, arrays of shape (N, 3)."""
+    """State of N beads, arrays of shape (N, 3)."""
 
     position: FloatArray
     velocity: FloatArray
@@ -87,9 +85,9 @@ class State(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """P pairs: beads near each other, and each bead with each wall (numbered after the beads).
+    """P pairs, sorted: neighbouring beads, and each bead with each wall (numbered after the beads).
 
-    They are sorted by their numbers. ``spring``, of shape (P, 3), has tangential displacements, m.
+    ``spring`` (P, 3) has tangential displacements, m.
     """
 
     first: IntArray
@@ -101,9 +99,9 @@ class Pairs(NamedTuple):
 class Meeting(NamedTuple):
     """State of a pair: index of the bridge, gap, reduced radius and mass, friction, normal, and velocities.
 
-    ``order`` is -1 where the first is the larger bead, for which a law's coupling has the other sign; ``apart`` is the
-    velocity of the centres along the normal, ``slide`` that of the surfaces along each other (m/s), ``turn`` the
-    difference of the spins (rad/s).
+    ``order`` is -1 if the first bead is the larger one, which changes the sign of the coupling; ``apart`` is the normal
+    velocity of the centres, ``slide`` the sliding velocity of the surfaces (m/s), ``turn`` the difference of the spins
+    (rad/s).
     """
 
     bridge: int
@@ -295,11 +293,11 @@ def advance(
     clock: tuple[int, int, int, int],
     frames: FloatArray,
 ) -> int:
-    """Move on, until the end or until neighbours are to be listed anew; at the end already, evaluate the forces.
+    """Integrate until the end or until new neighbour lists are needed; at the end, only evaluate the forces.
 
-    ``listed`` has the places at which neighbours were listed, ``skin`` (m) how far apart surfaces may have been then of
-    beads that can meet now. The ``clock`` is the step that it is, that at which the records begin, that at which to
-    end, and the steps between records; ``frames``, of shape (F, N, 9), takes those. Returns the step that it is now.
+    ``listed`` has the positions of the last neighbour lists, ``skin`` (m) the distance of surfaces that these include.
+    ``clock`` has the present step, the first step of the records, the end, and the steps between records, which go to
+    ``frames``, of shape (F, N, 9). Returns the present step.
     """
     now, begin, end, every = clock
     if now == end:

@@ -41,9 +41,9 @@ class Verdict(StrEnum):
 class Line:
     """One line of a table.
 
-    ``expected`` and ``measured`` are in ``unit``; between two engines they are the first one's and the second one's.
-    The largest error that passes is ``tolerance``, infinite where nothing is judged; it is over ``scale``, if left out
-    over the expected number, or 1 if that is 0. ``given`` is a verdict that does not follow from the error.
+    ``expected`` and ``measured`` are in ``unit`` (of two engines: the first and the second). ``tolerance`` is the
+    largest error that passes, infinite without a judgement. Errors are relative to ``scale``; default: the expected
+    number, or 1 if that is 0. ``given`` is a verdict that does not follow from the error.
     """
 
     what: str
@@ -85,11 +85,10 @@ class Line:
 
 @dataclass(frozen=True)
 class Chapter:
-    """Lines of one subject.
+    """Lines of one subject, with its ``name`` in commands, and the ``seconds`` that it took.
 
-    ``name`` is for commands. ``text`` is Markdown of its page: what was compared, with citations and DOIs, what agrees,
-    and each disagreement explained or left open; it refers to ``figures``, by the NAME of their file, as
-    ``![…](figures/validation-NAME.png)``. ``seconds`` is what it took.
+    ``text`` is Markdown for the page: what was compared, with citations, what agrees, and an explanation of each
+    disagreement; it refers to ``figures`` by their names, as ``![…](figures/validation-NAME.png)``.
     """
 
     name: str
@@ -101,7 +100,7 @@ class Chapter:
 
     @property
     def failures(self) -> list[Line]:
-        """The lines that fail, or could not be measured."""
+        """Lines that fail or could not be measured."""
         return [line for line in self.lines if line.failed]
 
     def as_text(self) -> str:
@@ -109,11 +108,7 @@ class Chapter:
         width = max((len(line.what) for line in self.lines), default=0)
         rows = [f"{self.name}: {self.title}"]
         for line in self.lines:
-            judged = (
-                f"error {line.error:.1e} of {line.tolerance:.0e}"
-                if isfinite(line.error) and line.tolerance < inf
-                else ""
-            )
+            judged = f"error {line.error:.1e} of {line.tolerance:.0e}" if isfinite(line.error + line.tolerance) else ""
             numbers = f"{_number(line.expected):>11} {_number(line.measured):>11} {line.unit:4} {judged}"
             rows.append(f"{line.verdict:7} {line.what:{width}} {numbers}".rstrip())
         return "\n".join(rows)
@@ -153,7 +148,7 @@ def as_dict(chapters: Sequence[Chapter], **more: Any) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Validation:
-    """The chapters that were made, in the order of the page, and the files."""
+    """Chapters in the order of the page, and written files."""
 
     chapters: tuple[Chapter, ...]
     files: tuple[Path, ...]
@@ -180,11 +175,11 @@ def validate(
     out, to
         Folders of the run directories and of the page; pictures go into ``figures`` in it.
     only
-        Names of `CHAPTERS`; if empty, all. A page of some has their names in its own. `InputError` for other names.
+        Names of `CHAPTERS`, which are then in the name of the page; if empty, all. `InputError` for other names.
     quick
-        The part of each that takes seconds; of chapters that take no longer, all.
+        Compute only the part of each chapter that takes seconds.
     on_done
-        Called with each chapter as it is done.
+        Called with each finished chapter.
     """
     from joblib import Parallel, delayed
 
@@ -199,7 +194,7 @@ def validate(
         if on_done:
             on_done(chapter)
     chapters = tuple(made[name] for name in names)
-    # A page of some chapters, or of quick ones, is not to take the place of one that has all.
+    # A page with some of the chapters, or with quick ones, does not replace the full page.
     some = [*(["quick"] if quick else []), *(names if names != CHAPTERS else [])]
     page = f"validation-{'-'.join(some)}.md" if some else PAGE
     files: list[Path] = [to / page]

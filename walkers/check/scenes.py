@@ -1,9 +1,9 @@
-"""Scenes of a few beads: what moves, which law, and what is compared between the engine and the second engine.
+"""Scenes of a few beads, which compare the engine with the second engine.
 
-The engine moves most beads along prescribed paths, and the second engine follows their positions: forces and
-torques of each step are compared, over the largest of the scene. Others move freely from the same start in both, and
-their ways and spins are compared. Most scenes have `law`, whose pull and resistances are all there, and have nothing to
-do with each other; each law that comes with the program has two more.
+In most scenes the engine moves the beads along prescribed paths, and the second engine follows their positions: forces
+and torques of each step are compared, relative to the largest of the scene. In other scenes the beads move freely, and
+their displacements and spins are compared. Most scenes have the bridge law `law`, with independent pull and
+resistances; two scenes test each law of the program.
 """
 
 from __future__ import annotations
@@ -95,14 +95,17 @@ _FULL: dict[str, dict[str, Any]] = {
 
 
 def bench_case(**changes: Mapping[str, Any]) -> Case:
-    """A case without friction, damping, viscosity, gravity and drive, to which a check adds what it measures."""
-    merged = {table: {**_BARE.get(table, {}), **changes.get(table, {})} for table in {**_BARE, **changes}}
-    return resolve_case(merged, source="<audit>", name="audit")
+    """A case without friction, damping, viscosity, gravity and drive, with changes."""
+    return resolve_case(_merged(_BARE, changes), source="<audit>", name="audit")
 
 
 def full_case(**changes: Mapping[str, Any]) -> Case:
     """A case with friction, rolling friction, damping and the law of this module, with changes."""
-    return bench_case(**{table: {**_FULL.get(table, {}), **changes.get(table, {})} for table in {**_FULL, **changes}})
+    return bench_case(**_merged(_FULL, changes))
+
+
+def _merged(base: Mapping[str, Mapping[str, Any]], changes: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    return {table: {**base.get(table, {}), **changes.get(table, {})} for table in {**base, **changes}}
 
 
 def over(wall: Flat, gap: float, radius: float, velocity: Vector = STILL, spin: Vector = SPIN, x: float = 0.0) -> Bead:
@@ -150,19 +153,14 @@ def prescribed(case: Case, scene: Scene, steps: int = 2000, **options: Any) -> P
 def second_engine(case: Case, scene: Scene) -> SecondEngine:
     """The second engine with the beads of a scene."""
     start = np.array([[*bead.centre, *bead.velocity, *bead.spin] for bead in scene.beads])
+    radius = np.array([bead.radius for bead in scene.beads])
     without = () if case.drive.frame == "container" else ("drive",)
-    return SecondEngine(
-        case, np.array([bead.radius for bead in scene.beads]), start, walls=scene.walls, without=without
-    )
+    return SecondEngine(case, radius, start, walls=scene.walls, without=without)
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Series of a deck: F frames of N beads, in SI units.
-
-    ``frames``, of shape (F, N, 9), have position, velocity and spin, ``forces`` (F, N, 6) force and torque; ``time`` is
-    of shape (F,).
-    """
+    """Output of a deck, SI units: F times, frames (F, N, 9: position, velocity, spin), forces and torques (F, N, 6)."""
 
     time: FloatArray
     frames: FloatArray
@@ -172,10 +170,7 @@ class Measured:
 
 @dataclass
 class Bench:
-    """Runs decks of an engine in a folder of its own.
-
-    ``engine`` is the binary on trial, ``stop`` is set to end the engines that run, ``version`` is what they print.
-    """
+    """Runs decks in a folder, until ``stop`` is set; ``version`` is that which the engine prints."""
 
     engine: Engine
     folder: Path
@@ -186,7 +181,7 @@ class Bench:
     def run(self, plan: Plan | Deck, carry: Path | None = None) -> Measured:
         """Run a plan whose `recording` has forces, or its deck, with a file such as a restart file beside it."""
         deck = compose(plan) if isinstance(plan, Plan) else plan
-        deck = replace(deck, fastest=inf)  # what a check drives may move faster than what walls drive
+        deck = replace(deck, fastest=inf)  # prescribed beads may be faster than shaken ones
         directory = self.folder / f"deck-{next(self._numbers):03d}"
         directory.mkdir(parents=True)
         write_deck(deck, directory)
@@ -246,7 +241,7 @@ def in_walls(case: Case, series: Measured) -> FloatArray:
     """Frames after the first in the frame of the walls, with the velocities used for the forces."""
     frames = series.frames[1:].copy()
     frames[..., :3] -= prescribed_motion(case.drive, series.time[1:])[0][:, None]
-    # Beads had theirs half a step ago, when walls had that of half a step ago.
+    # Velocities are those of half a step before, of beads and of walls.
     frames[..., 3:6] -= prescribed_motion(case.drive, series.time[1:] - 0.5 * case.run.time_step)[1][:, None]
     return frames
 
@@ -360,7 +355,7 @@ def rank_lines(bench: Bench) -> Iterator[Line]:
     if shutil.which("mpirun") is None:
         yield Line.without_number("two MPI ranks: no mpirun on this machine", Verdict.SKIPPED)
         return
-    # The engine takes a pair the other way round where it has crossed from one rank to the other.
+    # The engine exchanges the beads of a pair that has crossed from one rank to the other.
     first, last = pair(-DEEP, 0.01, STILL)
     rows = (0.0, (first, last)), (2e-3, (last, first))
     scene = standing([*CLIMBING, *(_moved(bead, 2.6e-3, y, 0.9) for y, beads in rows for bead in beads)])
@@ -418,10 +413,8 @@ def step_lines(bench: Bench) -> Iterator[Line]:
     case, ways = _walker(4), []
     for finer in (1, 2, 4):
         cycle = case.run.steps_per_cycle * finer
-        plan = plan_of(
-            replace(case, run=replace(case.run, time_step=case.run.time_step / finer, steps_per_cycle=cycle))
-        )
-        steps = 4 * cycle
+        run = replace(case.run, time_step=case.run.time_step / finer, steps_per_cycle=cycle)
+        plan, steps = plan_of(replace(case, run=run)), 4 * cycle
         frames = bench.run(replace(plan, recording=recording(steps, steps))).frames
         ways.append(frames[-1, :, :3] - frames[0, :, :3])
     coarse, fine = farthest(ways[0], ways[2]), farthest(ways[1], ways[2])

@@ -177,7 +177,7 @@ def sweep(
         how = By(engine=engine, allow_failed_audit=allow_failed_audit)
         record, failures = run_sweep(loaded, out.resolve() if site else out, options, on_progress=advance, **how)
     tell(*(f"point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
-    print(f"{describe_status(record.directory)}\n  table      walkers list {record.directory}")
+    print(f"{describe_status(record)}\n  table      walkers list {record.directory}")
     same = [one for one in next(loaded.cases()).origins if one.key not in loaded.keys]  # varied keys are in the table
     print_lines(lines_of_rest(rests_on(same)))
     return 1 if failures else 0

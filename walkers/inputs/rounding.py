@@ -55,6 +55,11 @@ def with_decimals(value: float, decimals: int) -> str:
     return "0" if float(text) == 0.0 else text
 
 
+def counted(number: int, noun: str) -> str:
+    """A number with its noun, such as ``2 runs``."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def duration_text(seconds: float) -> str:
     """A time in the largest unit of which it is at least two, such as ``3 d``."""
     told = (f"{seconds / size:.0f} {unit}" for unit, size in _LONGER.items() if seconds >= 2 * size)

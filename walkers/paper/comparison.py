@@ -44,11 +44,10 @@ _SMALL = 0.05
 
 
 class Value(NamedTuple):
-    """One of our numbers, in the unit of the published one; NaN where there is none.
+    """A computed number, in the unit of the published one; NaN if there is none.
 
-    ``low`` and ``high`` are the range of the engine over walkers, or over frequencies if the number is a mean over
-    these. ``left_out`` is the number of walkers that are not steady until the end (`walkers.postprocess.gait`). Theory
-    is Coulomb friction with the resistance of bridges, without fit.
+    ``low`` and ``high`` are the range over walkers, or over frequencies for means over these; ``left_out`` walkers are
+    not steady (`walkers.postprocess.gait`). The theory is Coulomb friction and the resistance of bridges, without fits.
     """
 
     engine: float = nan
@@ -71,12 +70,11 @@ def evaluate(number: Observation, table: pd.DataFrame) -> Value:
     Parameters
     ----------
     number
-        Its quantity is ``velocity``, ``rotation_1`` or ``sliding_1``, means of the steady walkers; ``velocity_of_all``,
-        also of those that turn; ``largest_angle`` or ``smallest_angle`` to the drive axis at the end; or ``astray``,
-        the share of walkers that have left the axis, %.
+        Its quantity is ``velocity``, ``rotation_1`` or ``sliding_1``, means over steady walkers; ``velocity_of_all``
+        walkers; ``largest_angle`` or ``smallest_angle`` to the drive axis at the end; or ``astray``, the share of
+        walkers that have left the axis, %.
     table
-        Finished points of a sweep (`walkers.sweeps.table.load`). Other walkers are ignored; missing walkers are left
-        out.
+        Finished points of a sweep (`walkers.sweeps.table.load`). Walkers without a point are left out.
     """
     found = [_of_walkers(point, number.quantity, table) for point in number.of]
     if number.over:
@@ -126,7 +124,7 @@ def _theory(point: Point, quantity: str) -> float:
 
 
 def compare(sources: Sources) -> list[dict[str, Any]]:
-    """All numbers that are compared, in the order of the paper, as ``comparison.json`` has them.
+    """All compared numbers, in the order of the paper, as in ``comparison.json``.
 
     Returns
     -------
@@ -157,7 +155,7 @@ def _value(number: Observation, sources: Sources) -> Value:
 
 
 def _threshold(sources: Sources, *, by_frequency: bool) -> Value:
-    """Γc between the last drive that moved the walkers and the first that did not; or its ratio, with both errors."""
+    """Γc between the last drive with motion and the first without; or its ratio at two frequencies, with errors."""
     sources.finished("fig2-threshold")
     ends = thresholds(sources.out / "fig2-threshold").sort_values("drive.frequency")
     low, high = ends["gamma0_at_rest"].to_numpy(), ends["gamma0_moving"].to_numpy()

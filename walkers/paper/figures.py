@@ -1,7 +1,4 @@
-"""Figs. 1b, 2, 3 and 4 of the paper: engine, theory and published values; and the sensitivity to each parameter.
-
-The sensitivity is from the shipped sweep ``sensitivity``, one parameter at a time.
-"""
+"""Figs. 1b, 2, 3 and 4 of the paper: engine, theory and published values; sensitivity to the parameters."""
 
 from __future__ import annotations
 
@@ -142,14 +139,8 @@ def _threshold(axes: Axes, sources: Sources) -> None:
     ends = thresholds(sources.out / "fig2-threshold")
     bounds = ends[["gamma0_at_rest", "gamma0_moving"]].to_numpy(dtype=float)
     for number, (frequency, (low, high)) in enumerate(zip(ends["drive.frequency"], bounds, strict=True)):
-        look: dict[str, Any] = {
-            "fmt": _MARKERS[float(frequency)],
-            "color": f"C{number}",
-            "ms": 4,
-            "lw": 1.0,
-            "mfc": "none",
-        }
-        axes.errorbar(frequency, (low + high) / 2.0, yerr=(high - low) / 2.0, **look)
+        look: dict[str, Any] = {"fmt": _MARKERS[float(frequency)], "color": f"C{number}", "ms": 4, "lw": 1.0}
+        axes.errorbar(frequency, (low + high) / 2.0, yerr=(high - low) / 2.0, mfc="none", **look)
     case = shipped()
     predicted = [threshold(driven(case, frequency, [case.drive.peak_acceleration])[0]) for frequency in _MARKERS]
     axes.plot(list(_MARKERS), predicted, "--", color="0.2", lw=0.9)
@@ -245,14 +236,14 @@ def theory_of_cycles(trajectory: Group) -> list[FloatArray]:
     motion = motion_of(trajectory.case)
     sliding = motion.series[:, 0] if np.isfinite(motion.velocity[0]) else np.full_like(motion.series[:, 0], np.nan)
     velocity = translation(sliding)
-    # The theory's substrate accelerates as cos 2πft, the engine's, which moves as sin 2πft, as -sin 2πft along x.
+    # Along x, the substrate accelerates as cos 2πft in the theory, and as -sin 2πft in the engine.
     quarter = sliding.shape[1] // 4
     ahead = quarter if trajectory.walkers[0].facing > 0 else -quarter
     one = [np.roll(series, 1 - ahead) for series in (velocity, velocity - sliding[0], velocity - sliding[1])]
     return [np.concatenate([np.tile(series, _CYCLES), series[:1]]) for series in one]
 
 
-# --- what the disagreements depend on ---------------------------------------------------------------------------------
+# --- sensitivity to the parameters ------------------------------------------------------------------------------------
 
 PARAMETERS = {
     "friction": "contact.friction.bead_wall",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
@@ -16,7 +15,7 @@ from walkers.paper.figures import fig1b, fig2, fig3, fig4, fig_sensitivity
 from walkers.paper.maps import fig_alignment, fig_climbing, fig_modes, fig_trays, fig_zoo
 from walkers.paper.published import NothingFinishedError, ProgressOf, Sources
 from walkers.postprocess.drawing import check_formats, save_figure
-from walkers.runner.files import write_text
+from walkers.runner.files import write_json, write_text
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
 
 if TYPE_CHECKING:
@@ -54,8 +53,7 @@ COMPARED = ("fig2", "fig2-threshold", "fig3", "fig4", "alignment")
 class Made(NamedTuple):
     """Written files, failed points by sweep, and figures that could not be drawn with the reasons.
 
-    ``compared`` is the number of published values that test the engine, ``agree`` the number of those that agree; 0 if
-    they were not compared.
+    ``agree`` of ``compared`` published numbers that test the engine agree; both are 0 without a comparison.
     """
 
     files: list[Path]
@@ -65,16 +63,15 @@ class Made(NamedTuple):
     compared: int = 0
 
 
-def make_figures(  # noqa: PLR0913
+def make_figures(
     out: Path,
     to: Path,
     options: Options,
     *,
     only: Sequence[str] = (),
     formats: Sequence[str] = FORMATS,
-    engine: str | None = None,
-    allow_failed_audit: bool = False,
     progress_of: ProgressOf | None = None,
+    **how: Any,
 ) -> Made:
     """Make the missing runs, draw the figures and write the comparison.
 
@@ -82,7 +79,7 @@ def make_figures(  # noqa: PLR0913
     ----------
     out, to
         Folders of the run directories and of the figures.
-    options, engine, allow_failed_audit
+    options, how
         As for `walkers.sweeps.scheduler.run_sweep`.
     only
         Names of `FIGURES`, or ``comparison``; if empty, all except those that are drawn only on request.
@@ -108,7 +105,6 @@ def make_figures(  # noqa: PLR0913
             raise refused(option, f"expected a folder, {folder} is a file")
     needed = [FIGURES[name].sweeps if name in FIGURES else COMPARED for name in chosen]
     failed: dict[str, list[Failure]] = {}
-    how: dict[str, Any] = {"engine": engine, "allow_failed_audit": allow_failed_audit}
     for sweep in dict.fromkeys(sweep for sweeps in needed for sweep in sweeps):
         with progress_of(sweep) if progress_of else nullcontext() as advance:
             _, failures = run_sweep(load_sweep(sweep), out, options, on_progress=advance, **how)
@@ -122,12 +118,11 @@ def make_figures(  # noqa: PLR0913
     if COMPARISON not in chosen:
         return Made(files, failed, left_out)
     rows = compare(Sources(out))
-    texts = {".md": as_markdown(rows), ".json": json.dumps(as_dict(rows), indent=2, ensure_ascii=False) + "\n"}
+    page, record = to / f"{COMPARISON}.md", to / f"{COMPARISON}.json"
     to.mkdir(parents=True, exist_ok=True)
-    for suffix, text in texts.items():
-        files.append((to / COMPARISON).with_suffix(suffix))
-        write_text(files[-1], text)
-    return Made(files, failed, left_out, *count(rows, measured=True))
+    write_text(page, as_markdown(rows))
+    write_json(record, as_dict(rows))
+    return Made([*files, page, record], failed, left_out, *count(rows, measured=True))
 
 
 def draw_figure(name: str, out: Path, to: Path, formats: Sequence[str]) -> list[Path] | str:

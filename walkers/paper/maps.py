@@ -40,7 +40,7 @@ MODES = {
 }
 """Modes with their markers and colours."""
 POSTURES = {"climbs upright": "^", "stays, upright": "o", "slides down upright": "v", "leans": "D", "turns over": "X"}
-"""Postures on a wall, with markers."""
+"""Postures on a wall with their markers."""
 STAYS = 5e-5
 """m/s; slower clusters count as at rest (a tenth of a radius per second)."""
 _SHAPES = {"chain": "dimer", "fan": "fan: large, two small", "diamond": "diamond: large, two small, small"}
@@ -60,13 +60,11 @@ _OF_TRAYS = {
     "speed, joined / free": ("speed_ratio",),
     "share of slow walkers": ("slow_share",),
 }
-"""Columns of a sweep's table that share a panel, solid and dashed, by its label."""
+"""Columns of a sweep's table (solid and dashed lines) by the label of their panel."""
 _LARGEST_DRIVE = 10.0
-"""Largest peak acceleration of the paper, g."""
-_BEGINNINGS = (15.0, 45.0)
-"""Start angles (degrees) whose first cycles are compared …"""
-_SMALL = 0.15
-"""… and the time of the comparison, s."""
+"""Peak acceleration in g up to which the paper shakes."""
+_BEGINNINGS, _SMALL = (15.0, 45.0), 0.15
+"""Starts (degrees) whose beginnings are compared with the theory, for this time (s)."""
 
 
 def paper_drives() -> dict[str, Alignment]:
@@ -174,9 +172,8 @@ def _share(sliding: FloatArray, rotation: FloatArray) -> float:
 def classify(table: pd.DataFrame, shares: Sequence[float]) -> npt.NDArray[np.int64]:
     """The mode of each finished point of a sweep, an index in `MODES`; ``shares`` are their `sliding_share`.
 
-    The first of these applies. Detached: a contact is open in a sample. At rest: velocity and mean sliding of the large
-    bead are below `REST`. Leaves the axis: a replicate is not steady or turned round. Otherwise the large bead rolls,
-    or rolls and slides (`SLIDES`).
+    The first mode that applies: detached (a contact is open in some samples); at rest (velocity and mean sliding of the
+    large bead below `REST`); leaves the axis (some replicates not steady or turned round); slides (`SLIDES`); rolls.
     """
     opened = table[["open_1", "open_2", "open_3"]].max(axis=1) > 0.0
     still = (table["velocity"].abs() < REST) & (table["sliding_1"].abs() < REST)

@@ -80,7 +80,7 @@ class Fit:
 
 
 def _at_the_ends(points: Sequence[Point]) -> list[Point]:
-    """Both ends of the range of frequencies."""
+    """The points at both ends of the range of frequencies."""
     return [one for one in points if one.frequency in _FREQUENCIES or len(points) == 1]
 
 

@@ -1,6 +1,6 @@
 """Published numbers of the paper (``published.toml``) and their walkers, as rows of sweeps and as cases.
 
-`walkers.paper.comparison` evaluates each by the engine, whose sweeps are read once (`Sources`), and by the theory.
+`walkers.paper.comparison` evaluates them by the engine, from sweeps (`Sources`), and by the theory.
 """
 
 from __future__ import annotations
@@ -78,11 +78,10 @@ class Observation:
     Attributes
     ----------
     key, what, unit
-        Its name, a description and its unit.
+        Name, description and unit.
     value, bounds
-        The published value, and the bounds that the paper gives. The rounding of its digits is not a bound (0.735, from
-        which Γ0 = 0.74 is rounded, is on its edge); bounds of angles are ours. An observation in words has bounds and
-        no value, and does not count as agreement or disagreement.
+        Published value, and range that the paper states. Rounding is no range (Γ0 = 0.74 is 0.735); ranges of angles
+        are ours. A statement in words has bounds and no value, and does not count in the comparison.
     depends_on
         A sentence: what a disagreement of the engine depends on.
     measured
@@ -146,10 +145,7 @@ FIG4_PEAKS = tuple(OBSERVATIONS[f"fig4{letter}_velocity"].of[0].peak or 0.0 for 
 
 
 def outside_of_the_paper(case: Case) -> str | None:
-    """How a case lies outside the range in which the paper measured velocities; None if it lies within.
-
-    None also if the case has no dimers.
-    """
+    """How a case of a dimer lies outside the range of the paper's velocities; None if it is within, or no dimer."""
     if not case.walkers or len(case.walkers[0].radii) != 2:
         return None
     points = [point for one in OBSERVATIONS.values() for point in one.of]
@@ -177,14 +173,14 @@ def shipped() -> Case:
 
 
 def driven(case: Case, frequency: float, accelerations: Iterable[float]) -> list[Case]:
-    """A case at another frequency, Hz, and peak accelerations, m/s²; for the theory, without a time step for a deck."""
+    """A case with another frequency (Hz) and peak accelerations (m/s²), for the theory: without a time step."""
     drives = [Harmonic(case.drive.direction, float(frequency), float(peak)) for peak in accelerations]
     run = replace(case.run, time_step=0.0)
     return [replace(case, drive=Drive((one,), case.drive.frame), run=run) for one in drives]
 
 
 def of_radii(case: Case, radii: tuple[float, float], gamma0: float) -> Case:
-    """A case with other beads, radii in m, driven at a Γ0."""
+    """A case with other radii (m), driven at a Γ0."""
     dimer = replace(case, walkers=(replace(case.walkers[0], radii=radii),))
     return replace(dimer, drive=case.drive.with_peak(dimer_of(dimer).peak_acceleration(gamma0)))
 
@@ -212,9 +208,7 @@ class NothingFinishedError(WalkersError):
 
 
 class Sources:
-    """Finished sweeps in a folder of run directories: ``table`` gives the table of one, by its name, ``trajectory`` the
-    motion of the (first) walkers of a run, by its directory.
-    """
+    """Sweeps in a folder: ``table`` gives the table of one by its name, ``trajectory`` the first make of a run."""
 
     def __init__(self, out: Path) -> None:
         self.out = out

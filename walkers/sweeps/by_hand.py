@@ -1,7 +1,7 @@
-"""Decks that are run by hand: the folder that is written for one, and what its run leaves there, read as a run.
+"""Decks that are run by hand: write the folder of a deck, and make a run directory of it after the run.
 
-The folder becomes the run directory, and its only segment. ``deck.json`` keeps the case and the deck as they were
-written; the engine prints the parameters that it reads, so that a deck whose parameters were edited is another case.
+The folder becomes the run directory and its only segment. ``deck.json`` contains the original case and deck. The engine
+prints the parameters that it reads: a deck with edited parameters gives another case.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from walkers.templates.deck import (
 from walkers.templates.parameters import PRINTED, suffixes
 
 _LOGS = (OUTPUT_NAME, "log.liggghts")
-"""Where `run_script` lets the engine's output go, and what LIGGGHTS writes anyhow."""
+"""Output of the engine by `run_script`, and the default log of LIGGGHTS."""
 _PRINTED = re.compile(rf"^{PRINTED} (.+)$", re.MULTILINE)
 _GIVEN = re.compile(r"^variable +(\w+) string ([-+.\de]+)(?: |$)", re.MULTILINE)
 _VARIABLE = re.compile(r"variable (\w+) string")
@@ -57,7 +57,7 @@ _KEYS = {
     **{name: f"liquid.{key}" for name, key in _OF_LIQUID.items()},
     **{"gravity": "environment.gravity", "density": "beads.density", "cycles": "run.cycles"},
 }
-"""Of a case, for parameters of a deck."""
+"""Keys of a case by parameter of a deck."""
 _SCALE = """# Writes tables for another surface tension and viscosity: the deck gives the factors pull and resistance.
 /^[-+.0-9]/ { printf "%s", $1; printf " %.12g", pull * $2; for (i = 3; i <= NF; i++) printf " %.12g", resistance * $i
               printf "\\n"; next }
@@ -93,7 +93,7 @@ def as_run(case: Case, directory: Path | None) -> Case:
 
 
 def take_in(folder: Path) -> None:
-    """Make a run directory of the folder of a deck that was run by hand; nothing if it is one of the last run there.
+    """Make a run directory of the folder of a deck that was run by hand, unless it is up to date.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def take_in(folder: Path) -> None:
 
 
 def _is_current(folder: Path) -> bool:
-    """Whether the folder is a run directory, and was made one after the deck was edited or run last."""
+    """Whether the folder became a run directory after the deck was last edited or run."""
     try:
         layout, made = layout_of(folder), (folder / MANIFEST_NAME).stat().st_mtime_ns
         names = [DECK_NAME, layout.bead_dump, layout.pair_bridge_dump, layout.wall_bridge_dump]
@@ -145,12 +145,9 @@ def _judged(deck: Deck, folder: Path, log: Path) -> EngineReport:
 
 
 def _as_run(case: Case, written: str, now: str, said: str) -> tuple[Case, Segment, list[str]]:
-    """The case that the engine ran, as one segment, and what of the deck was edited.
-
-    ``written`` and ``now`` are the deck's texts, ``said`` is the engine's log with the parameters as the engine read
-    them. `ValueError` if they are none of a case.
-    """
+    """The case that the engine ran, its segment, and the edits, from the deck as written and now, and the log."""
     given = {name: float(value) for name, value in _GIVEN.findall(written)}
+    numbers_now = dict(_GIVEN.findall(now))
     words = (_PRINTED.findall(said) or [""])[-1].split()
     printed = {name: _number(name, value) for name, value in zip(words[::2], words[1::2], strict=True)}
     values, case = {**given, **printed}, case.for_cycles(case.run.attempts[0])
@@ -158,7 +155,8 @@ def _as_run(case: Case, written: str, now: str, said: str) -> tuple[Case, Segmen
     ran = _case_of(case, values, edited)
     rest = int(values.get("rest_steps", 0))
     changes = [f"{name} {value:g}, was {given[name]:g}" for name, value in edited.items()]
-    changes += [f"{name} {value:g}" for name, value in printed.items() if name not in given and _edited(name, now)]
+    # Parameters that followed from others, and that are numbers now.
+    changes += [f"{name} {value:g}" for name, value in printed.items() if name in numbers_now.keys() - given.keys()]
     segment = Segment(0, rest + ran.run.steps, rest)
     return ran, segment, [*changes, *_other_changes(written, now, printed)]
 
@@ -171,14 +169,11 @@ def _number(name: str, value: str) -> float:
 
 
 def _case_of(case: Case, values: Mapping[str, float], edited: Mapping[str, float]) -> Case:
-    """The case with the values of a deck's parameters, of which some were edited."""
+    """The case with the values of a deck's parameters, some of which were edited."""
     ends = suffixes(len(case.drive.harmonics))
     harmonics = [_harmonic(one, end, values) for one, end in zip(case.drive.harmonics, ends, strict=True)]
-    drive, steps, cycles = (
-        replace(case.drive, harmonics=tuple(harmonics)),
-        int(values["steps_per_cycle"]),
-        int(values["cycles"]),
-    )
+    drive = replace(case.drive, harmonics=tuple(harmonics))
+    steps, cycles = int(values["steps_per_cycle"]), int(values["cycles"])
     step, parts = values.get("time_step", case.run.time_step), case.run.samples_per_cycle
     if not isclose(step * steps * drive.frequency, 1.0, rel_tol=_SAME) or steps % parts:
         raise ValueError(
@@ -204,13 +199,8 @@ def _case_of(case: Case, values: Mapping[str, float], edited: Mapping[str, float
     return case if ran == case else ran.read_from({}, partial(_origins, case, edited))
 
 
-def _edited(name: str, now: str) -> bool:
-    """Whether a parameter that followed from others is a number now."""
-    return name in dict(_GIVEN.findall(now))
-
-
 def _harmonic(one: Harmonic, end: str, values: Mapping[str, float]) -> Harmonic:
-    """A harmonic by its parameters; an amplitude that does not follow from the acceleration was edited, and counts."""
+    """A harmonic from its parameters; an amplitude that contradicts the acceleration was edited and replaces it."""
     frequency = values.get(f"frequency{end}", one.frequency)
     peak = values.get(f"peak_acceleration{end}", one.peak_acceleration)
     implied = values.get(f"amplitude{end}", nan) * (2.0 * pi * frequency) ** 2
@@ -221,7 +211,7 @@ def _harmonic(one: Harmonic, end: str, values: Mapping[str, float]) -> Harmonic:
 
 
 def _other_changes(written: str, now: str, given: Collection[str]) -> list[str]:
-    """What else of a deck's commands was edited, in a line, if anything."""
+    """A line about edited commands other than parameters, if there are any."""
     before, after = (
         [
             command
@@ -236,7 +226,7 @@ def _other_changes(written: str, now: str, given: Collection[str]) -> list[str]:
 
 
 def _origins(case: Case, edited: Mapping[str, float]) -> tuple[Origin, ...]:
-    """Where the values of a case come from some of whose parameters were edited: these are given now."""
+    """Origins of the values of a case: edited parameters are given."""
     keys = {_KEYS.get(name, name): value for name, value in edited.items()}
     kept = tuple(one for one in case.origins if one.key not in keys)
     units = {key: " (SI)" if kind_of(re.sub(r"_\d+$", "", key)) else "" for key in keys}
@@ -246,7 +236,7 @@ def _origins(case: Case, edited: Mapping[str, float]) -> tuple[Origin, ...]:
 def _write(
     folder: Path, case: Case, deck: Deck, segment: Segment, report: EngineReport, notes: list[str], wanted: Run
 ) -> None:
-    """Write what a run directory has: case, layout, segment, tables, result, and last its manifest."""
+    """Write the files of a run directory: case, layout, segment, tables, result, and last its manifest."""
     from walkers.postprocess.gait import are_constant
 
     (folder / MANIFEST_NAME).unlink(missing_ok=True)

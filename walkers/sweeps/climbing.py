@@ -1,9 +1,9 @@
 """Statistics of climbs over runs of piles: probability, waiting time, rate, speed and leaders.
 
-A run tells of its pile's first climb until it ends and of nothing after that: it is *right-censored*. The share of the
-piles that have climbed by a time is estimated from runs of any lengths by their survival (Kaplan and Meier 1958). A
-pile has climbed once a cluster has gained enough, not when that begins: counted by its begin, a climb shortly before
-the time would be one in a run that is long enough to show what became of it, and none in a shorter run.
+A run without a climb shows only that its first climb comes later than its end: it is *right-censored*. The share of
+piles that have climbed by a time is estimated from runs of any length by their survival (Kaplan and Meier 1958). A pile
+has climbed when a cluster has gained enough height, not when the rise begins: otherwise a rise shortly before the time
+would count in a run that is long enough to show its outcome, and not in a shorter one.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from walkers.inputs.changes import dotted
 from walkers.inputs.errors import refused
 from walkers.postprocess.analyses.piles import Pile, climbs_by
 from walkers.postprocess.analysis import tables_of
-from walkers.postprocess.clusters import ClimbCriteria
+from walkers.postprocess.clusters import Climb, ClimbCriteria
 from walkers.runner.directory import CASE_NAME, FinishedRun, finished_places, finished_run
 from walkers.sweeps.table import RECORD_NAME, read_record, result_in, states, value_text
 
@@ -31,23 +31,23 @@ FloatArray = npt.NDArray[np.float64]
 
 _CONFIDENCE = 0.95
 _NO_CONDITION = ("name", "title", "seed", "run.seed", "run.cycles", "run.duration")
-"""Keys of a case that are none of a condition under which a pile is shaken: how long it was, is none."""
+"""Keys of a case that do not define a condition: names, seeds and lengths."""
 _DRAWS = 10_000
 _PARTS: Mapping[str, Callable[[Mapping[str, Any]], bool]] = {
     "on_plain_walls": lambda climb: len(climb["walls"]) == 1,
     "in_corners": lambda climb: len(climb["walls"]) > 1,
     "out_of_pile": lambda climb: climb["out_of_pile"],
 }
-"""Parts of the climbs of a result."""
-_ALIKE = 1e-6  # lengths of runs that differ by less, relatively, are the same
+"""Subsets of the climbs of a result."""
+_ALIKE = 1e-6  # relative difference below which lengths of runs are equal
 
 
 @dataclass(frozen=True)
 class Condition:
-    """Finished runs of piles that differ by their seeds and lengths alone.
+    """Finished runs of piles that differ only in seed and length.
 
-    ``source`` is the sweep or folder, where there are several; ``usual`` has the most common value of each key, if one
-    value is more common than any other; ``differs`` has the other values of this condition.
+    ``source`` is the sweep or folder, if there are several; ``usual`` has the most common value of each key, if there
+    is a single one; ``differs`` has the values of this condition that are not usual.
     """
 
     source: str
@@ -60,12 +60,16 @@ class Condition:
         """Label that distinguishes the condition from the others; empty if there is only one."""
         return ", ".join([self.source] * bool(self.source) + [f"{key} = {told}" for key, told in self.differs.items()])
 
+    def value(self, key: str) -> str:
+        """The value of a key, its own or the usual one."""
+        return self.differs.get(key, self.usual.get(key, ""))
+
 
 def conditions_in(directories: Sequence[Path]) -> list[Condition]:
-    """The conditions of the finished runs of piles in sweeps, in folders, or of runs themselves, in their order.
+    """The conditions of finished runs of piles; ``directories`` are sweeps, folders or runs.
 
-    Each run is there once, whatever names it has, and of those that begin alike and were shaken for different times
-    the longest alone: it shows what the others show. `InputError` if there is none in one of them.
+    Each run counts once. Of runs that differ only in length, only the longest one counts, because it contains the
+    others. `InputError` if a directory has no finished run of a pile.
     """
     found = []
     for directory in directories:
@@ -91,7 +95,7 @@ def unfinished_points(directory: Path) -> str:
 
 
 def _groups(directory: Path) -> list[tuple[dict[str, str], list[Path]]]:
-    """What the runs of one condition in a directory have for each key that varies, as text; and these runs."""
+    """For each condition in a directory the values of the varied keys as text, and the runs."""
     varied: dict[Path, dict[str, str]] = {}
     if (directory / RECORD_NAME).exists():
         record = read_record(directory)
@@ -125,40 +129,40 @@ def _groups(directory: Path) -> list[tuple[dict[str, str], list[Path]]]:
 
 
 def _determinants(run: FinishedRun) -> dict[str, Any]:
-    """What determines a run, by dotted keys. Runs of other decks or engines are no repetitions of each other."""
+    """Inputs that determine a run, by dotted keys, with deck version and engine."""
     manifest = run.manifest
     made_by = {"deck version": manifest.get("deck_version"), "engine": manifest["engine"]["sha256"][:8]}
     return dict(dotted(run.case.determinants())) | made_by
 
 
 def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[str, Any]:
-    """Climbs over several runs that differ by their seeds and lengths alone.
+    """Statistics of climbs over several runs that differ only in seed and length.
 
     Parameters
     ----------
     runs
         Run directories of piles.
     within
-        Seconds of drive by which a pile has climbed or not, and after which no run counts any more; if left out the
-        end of the first run that ends without a climb, the longest time at which all of them still count.
+        Time of the drive in s by which a pile has climbed or not; later parts of runs do not count. Default: the end of
+        the shortest run without a climb, which is the longest time at which all runs count.
 
     Returns
     -------
     dict
-        ``within`` (s), ``runs`` and ``seconds`` (of drive, of all runs up to a given ``within``); of the first climbs
-        what `survival` says, and ``first_rate`` with its ``first_rate_interval`` (1/s, first climbs over the seconds
-        until then: were waiting times exponential, the rate of their distribution).
+        ``within`` (s), ``runs`` and ``seconds`` (of drive, of all runs up to a given ``within``). For the first climbs:
+        the items of `survival`, and ``first_rate`` with its ``first_rate_interval`` (1/s, first climbs divided by the
+        time until them: the rate, if waiting times are exponentially distributed).
 
-        Of all climbs that qualified in these seconds: ``climbs``; ``rate`` (1/s, of one start) with the exact Poisson
-        ``rate_interval``; ``dispersion``, the variance over the mean of the climbs of a run (1 where they do not depend
-        on each other; None where lengths of runs differ by more than a tenth); ``times`` and ``onsets`` (s, when the
-        first climb of each run qualified and had begun), ``speeds`` (m/s), ``heights`` (m, of the leaders at last),
-        ``sizes``; and of who led what `leaders` says.
+        For all climbs that qualified in this time: ``climbs``; ``rate`` (1/s, of one start) with the exact Poisson
+        ``rate_interval``; ``dispersion``, variance divided by mean of the number of climbs of a run (1 for independent
+        climbs; None if lengths of runs differ by more than a tenth); ``times`` and ``onsets`` (s, when the first climb
+        of each run qualified and began), ``speeds`` (m/s), ``heights`` (m, of the leaders at the end), ``sizes``; and
+        the items of `leaders`.
 
-        ``each`` has what the results say of each climb, whenever it qualified, and the name of its run.
+        ``each`` has each climb as in the results, whenever it qualified, with the name of its run.
 
-        And all of this of a part of the climbs alone: ``on_plain_walls``, ``in_corners``, and ``out_of_pile``, without
-        clusters that have hung on a wall since the pouring.
+        ``on_plain_walls``, ``in_corners`` and ``out_of_pile`` (without clusters that hang on a wall since the pouring)
+        have all of these items for a part of the climbs.
     """
     results = [result_in(run) for run in runs]
     found = _summary(results, within)
@@ -174,7 +178,7 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
 def _summary(results: Sequence[Mapping[str, Any]], within: float | None) -> dict[str, Any]:
     """`summarise_climbs` of results."""
     driven = np.array([result["driven"] for result in results])
-    # A run that ended since a climber left it says as much of its first climb as a longer one.
+    # A run that ended because a climber left the container shows its first climb as a longer run does.
     still = [float(result["driven"]) for result in results if not result["climbs"]]
     at, cut = (min(still, default=float(driven.max())), np.inf) if within is None else (within, within)
     watched = np.minimum(driven, cut)
@@ -206,7 +210,7 @@ def _summary(results: Sequence[Mapping[str, Any]], within: float | None) -> dict
 
 
 def _rate(name: str, events: int, seconds: float) -> dict[str, Any]:
-    """A number of events over time, 1/s, and its exact 95 % interval (Garwood 1936); None where there was no time."""
+    """Rate of events, 1/s, with the exact 95 % interval (Garwood 1936); None if the time is zero."""
     from scipy.stats import chi2
 
     if seconds <= 0.0:
@@ -223,10 +227,10 @@ def origins(run: Path, within: float | None = None) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        A row a climb: ``size`` and ``out_of_pile``; at rest, before the drive: ``bridges_at_rest`` between its beads,
-        ``leader_at_wall_at_rest`` and ``at_wall_at_rest`` (beads bridged to a side wall), ``share_at_wall`` of all
-        beads of the leader's size; ``bridges`` between its beads when it qualified; ``whole_before`` (s, how long
-        before it came free of the pile its last bead was joined to the others for good; negative where later).
+        One row per climb: ``size`` and ``out_of_pile``; at rest, before the drive: ``bridges_at_rest`` between its
+        beads, ``leader_at_wall_at_rest`` and ``at_wall_at_rest`` (beads bridged to a side wall), ``share_at_wall`` of
+        all beads of the leader's size; ``bridges`` between its beads when it qualified; ``whole_before`` (s, time from
+        when the last bead joined the others for good until the cluster left the pile; negative if later).
     """
     import pandas as pd
 
@@ -264,10 +268,10 @@ def summarise_origins(runs: Sequence[Path], within: float | None = None) -> dict
     Returns
     -------
     dict
-        ``climbs``; ``strangers`` (climbs no two of whose beads were neighbours at rest), ``share_of_bridges`` (of those
-        that the climbers had when they qualified, how many were there at rest), ``leaders_at_wall`` (at rest),
-        ``share_at_wall`` (of all beads of the leaders' sizes, at rest) with ``p_at_wall``, the probability of so many
-        leaders at a wall by chance, if leaders did not depend on each other; ``whole_before`` (s, median).
+        ``climbs``; ``strangers`` (climbs without beads that were neighbours at rest), ``share_of_bridges`` (share of
+        the climbers' bridges that existed at rest), ``leaders_at_wall`` (at rest), ``share_at_wall`` (of all beads of
+        the leaders' sizes, at rest) with ``p_at_wall``, the probability of at least as many leaders at a wall by
+        chance, for independent leaders; ``whole_before`` (s, median).
     """
     rows = [row for run in runs for row in origins(run, within)]
     if not rows:
@@ -287,7 +291,7 @@ def summarise_origins(runs: Sequence[Path], within: float | None = None) -> dict
 
 
 def describe_origins(found: Mapping[str, Any]) -> str:
-    """`summarise_origins` as text; empty where nothing climbed."""
+    """`summarise_origins` as text; empty without climbs."""
     if not found["climbs"]:
         return ""
     return (
@@ -305,37 +309,36 @@ def leaders(climbs: Sequence[tuple[int, int, Sequence[Mapping[str, Any]]]]) -> d
     Parameters
     ----------
     climbs
-        Of each run its beads, its large beads, and its climbs as results tell them.
+        For each run the number of beads, the number of large beads, and the climbs as in the results.
 
     Returns
     -------
     dict
-        ``led_by_large`` climbs; ``share_of_large``, of the beads of all runs; ``p_among_beads``, the probability that
-        so many are led by a large bead if within each run the names "large" and "small" are dealt out anew (a bead that
-        leads twice counts twice: climbs of one run are not taken to be independent); ``p_among_own``, if in each climb
-        any of its own beads led. Both from 10,000 draws, one-sided; None where there is no climb.
+        ``led_by_large`` climbs; ``share_of_large`` in the beads of all runs; ``p_among_beads``, the probability of at
+        least as many climbs led by large beads if the labels "large" and "small" are permuted within each run (a bead
+        that leads twice counts twice: climbs of one run are not independent); ``p_among_own``, the same if any bead of
+        each climbing cluster leads. Both are from 10,000 draws, one-sided; None without climbs.
     """
     draw = np.random.default_rng(0)
     led = sum(climb["leader_large"] for _, _, told in climbs for climb in told)
     beads, large = sum(one[0] for one in climbs), sum(one[1] for one in climbs)
-    found = {"led_by_large": led, "share_of_large": large / beads, "p_among_beads": None, "p_among_own": None}
+    found: dict[str, Any] = {"led_by_large": led, "share_of_large": large / beads}
+    found |= {"p_among_beads": None, "p_among_own": None}
     if not any(told for _, _, told in climbs):
         return found
     dealt, own = np.zeros(_DRAWS), np.zeros(_DRAWS)
     for number, some, told in climbs:
         _, times = np.unique([climb["leader"] for climb in told], return_counts=True)
-        left = np.full(_DRAWS, some)  # large names that are still to be dealt out, to one leader after the other
+        left = np.full(_DRAWS, some)  # labels "large" that are left for the next leaders
         for place, weight in enumerate(times):
             is_large = draw.random(_DRAWS) < left / (number - place)
             dealt += weight * is_large
             left -= is_large
         for climb in told:
             own += draw.random(_DRAWS) < climb["large"] / climb["size"]
-    p_values = {
-        name: float((1 + (drawn >= led).sum()) / (1 + _DRAWS))
-        for name, drawn in (("p_among_beads", dealt), ("p_among_own", own))
-    }
-    return found | p_values
+    for name, drawn in (("p_among_beads", dealt), ("p_among_own", own)):
+        found[name] = float((1 + (drawn >= led).sum()) / (1 + _DRAWS))
+    return found
 
 
 def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any]:
@@ -344,7 +347,7 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
     Parameters
     ----------
     first : ndarray, shape (N,)
-        When it happened in each record, s; infinite where it did not. What comes after the record's end is ignored.
+        Time of the event in each record, s; infinite if there is none. Later events than the record's end are ignored.
     watched : ndarray, shape (N,)
         Length of each record, s.
     at
@@ -353,14 +356,13 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
     Returns
     -------
     dict
-        ``climbed`` (records in which it had by then), ``ended`` (that ended before and in which it had not);
-        ``probability`` of its having happened by then with its ``interval`` (95 %), both None where no record is so
-        long; ``median`` (s, the time by which it has in half, None where that is not reached), ``censored`` (records
-        that ended without it).
+        ``climbed`` (records with the event by then), ``ended`` (records that ended before, without it);
+        ``probability`` of the event by then with its ``interval`` (95 %), both None if no record is long enough;
+        ``median`` (s, time by which half have it; None if not reached), ``censored`` (records that ended without it).
 
-        ``estimator`` says which interval: ``Clopper-Pearson`` (1934, exact, binomial) of the records that are so long,
-        or in which it has happened; ``Kaplan-Meier`` (Greenwood's variance of log(-log) of the survival) where records
-        ended before, if it exists: neither none nor all have climbed.
+        ``estimator`` names the interval: ``Clopper-Pearson`` (1934, exact, binomial) for records that are long enough
+        or have the event; ``Kaplan-Meier`` (Greenwood's variance of log(-log) of the survival) if records ended before
+        and the interval exists, that is, neither none nor all have climbed.
     """
     from scipy.stats import binomtest
 
@@ -392,7 +394,7 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
 
 
 def _share(first: FloatArray, watched: FloatArray) -> Any:
-    """Kaplan and Meier's estimate of the share in which something has happened, of scipy."""
+    """Kaplan and Meier's estimate of the share with the event, by scipy."""
     from scipy.stats import CensoredData, ecdf
 
     return ecdf(CensoredData.right_censored(np.minimum(first, watched), first > watched)).cdf
@@ -406,12 +408,8 @@ def survival_curve(first: FloatArray, watched: FloatArray) -> dict[str, list[flo
     return {"time": time, "probability": [one["probability"] for one in found], "low": [*low], "high": [*high]}
 
 
-VARIATIONS = {
-    "min_rise": (1e-3, 2e-3, 3e-3, 5e-3),
-    "max_gap": (0.03, 0.1, 0.2),
-    "min_overlap": (0.3, 0.5, 0.7),
-}
-"""Other thresholds of `walkers.postprocess.clusters.ClimbCriteria`, tried one at a time."""
+VARIATIONS = {"min_rise": (1e-3, 2e-3, 3e-3, 5e-3), "max_gap": (0.03, 0.1, 0.2), "min_overlap": (0.3, 0.5, 0.7)}
+"""Other thresholds of `walkers.postprocess.clusters.ClimbCriteria`, varied one at a time."""
 _UNITS = {"min_rise": " m", "max_gap": " s"}
 
 
@@ -421,36 +419,28 @@ def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        One row per definition, the usual one first: ``threshold`` and ``value`` (empty and None for the usual one),
-        ``runs``, ``climbed`` (runs with a climb), ``climbs``, ``led_by_large``, ``median_speed`` (m/s);
-        ``rate`` (climbs per run and second) with its exact ``rate_interval``.
+        One row per definition, the default first: ``threshold`` and ``value`` (empty and None for the default),
+        ``runs``, ``climbed`` (runs with a climb), ``climbs``, ``led_by_large``, ``median_speed`` (m/s); ``rate``
+        (climbs per run and second) with its exact ``rate_interval``.
     """
     usual = ClimbCriteria()
-    tried: list[tuple[str, float | None]] = [("", None)]
+    tried: list[tuple[str, Any]] = [("", None)]
     tried += [(name, one) for name, ones in VARIATIONS.items() for one in ones if one != getattr(usual, name)]
-    counts = dict.fromkeys(("climbed", "climbs", "led_by_large"), 0)
-    rows: list[dict[str, Any]] = [
-        {"threshold": name, "value": value, "runs": len(runs), **counts, "median_speed": []} for name, value in tried
-    ]
+    found: list[list[list[Climb]]] = [[] for _ in tried]  # by definition and run
     seconds = 0.0
-    for run in runs:
+    for run in runs:  # one at a time: their tables are large
         tables = tables_of(run)
         seconds += max(float(tables["bed"]["time"][-1]), 0.0)
-        for row in rows:
-            definition = replace(usual, **{row["threshold"]: row["value"]}) if row["threshold"] else usual
-            climbs = climbs_by(tables, definition)
-            row["climbed"] += bool(climbs)
-            row["climbs"] += len(climbs)
-            row["led_by_large"] += sum(climb.leader_large for climb in climbs)
-            row["median_speed"] += [climb.speed for climb in climbs]
-    return [
-        {
-            **row,
-            "median_speed": median(row["median_speed"]) if row["climbs"] else None,
-            **_rate("rate", row["climbs"], seconds),
-        }
-        for row in rows
-    ]
+        for of_runs, (name, value) in zip(found, tried, strict=True):
+            of_runs.append(climbs_by(tables, replace(usual, **{name: value}) if name else usual))
+    rows = []
+    for of_runs, (name, value) in zip(found, tried, strict=True):
+        climbs = [climb for of_run in of_runs for climb in of_run]
+        row: dict[str, Any] = {"threshold": name, "value": value, "runs": len(runs), "climbed": sum(map(bool, of_runs))}
+        row |= {"climbs": len(climbs), "led_by_large": sum(climb.leader_large for climb in climbs)}
+        row["median_speed"] = median(climb.speed for climb in climbs) if climbs else None
+        rows.append(row | _rate("rate", len(climbs), seconds))
+    return rows
 
 
 def describe_sensitivity(rows: Sequence[dict[str, Any]]) -> str:

@@ -18,21 +18,21 @@ if TYPE_CHECKING:
 
 _ACROSS = 3
 _ROW = 2.1  # inches
-_MOST_LETTERS = 40  # side by side below a panel
+_MOST_LETTERS = 40  # in labels side by side below a panel
 _RATE = "climbs per run and second"
 _KINDS = (("all", "", "ko"), ("plain walls", "on_plain_walls", "C1s"), ("corners", "in_corners", "C2^"))
-"""Of all climbs and of parts of them: label, key in what `summarise_climbs` gives, colour and marker."""
+"""All climbs and their parts: label, key in the results of `summarise_climbs`, colour and marker."""
 
 
 @styled
 def climbs_figure(conditions: Sequence[Condition], found: Sequence[Mapping[str, Any]]) -> Figure:
-    """Draw what `walkers.sweeps.climbing.summarise_climbs` found under each condition.
+    """Draw the results of `walkers.sweeps.climbing.summarise_climbs` for each condition.
 
-    The first row is of the first condition that differs by nothing, else of the first one: the share of piles that have
-    climbed by a time (Kaplan and Meier's estimate), speeds against sizes, rates. Below is a panel for each key that
-    varies: the rates against its values, of conditions that differ by nothing else, and how many of the piles climbed.
-    Where conditions differ otherwise by several keys, or come from several sweeps, a single panel lists them all. If
-    they are all pairs of values of two keys, the figure is a map of the rates.
+    The first row shows the usual condition, or the first one: the share of piles that have climbed by a time (Kaplan
+    and Meier's estimate), speeds against sizes, rates. Below is a panel for each varied key: rates against its values,
+    for conditions that differ only in this key, with the number of piles that climbed. If conditions differ in several
+    keys or come from several sweeps, one panel lists them all. If the conditions are all pairs of values of two keys,
+    the figure is a map of the rates.
     """
     usual = next((number for number, one in enumerate(conditions) if not one.differs), 0)
     keys = list(dict.fromkeys(key for one in conditions for key in one.differs))
@@ -67,18 +67,13 @@ def climbs_figure(conditions: Sequence[Condition], found: Sequence[Mapping[str, 
 
 
 def _in_short(one: Condition) -> str:
-    """What tells a condition from the others, a line a key; of keys the last word."""
+    """A short label of a condition: one line per key, with the last word of the key."""
     return "\n".join(f"{key.rpartition('.')[2]} {told}" for key, told in one.differs.items()) or one.source or "usual"
 
 
 def _at(conditions: Sequence[Condition], key: str) -> tuple[list[str], list[int]]:
-    """The values of a key in the conditions in which nothing else differs, and their numbers; numbers ascend."""
-    alone = {
-        one.differs.get(key, one.usual.get(key, "")): number
-        for number, one in enumerate(conditions)
-        if not set(one.differs) - {key}
-    }
-
+    """Sorted values of a key in conditions that differ only in this key, and the numbers of these conditions."""
+    alone = {one.value(key): number for number, one in enumerate(conditions) if one.differs.keys() <= {key}}
     labels = sorted(alone, key=_by_number)
     return labels, [alone[label] for label in labels]
 
@@ -91,18 +86,13 @@ def _by_number(text: str) -> tuple[float, str]:
 
 
 def _grid(conditions: Sequence[Condition], keys: Sequence[str]) -> tuple[list[str], list[str], list[list[int]]] | None:
-    """Values of the first and of the second key, and the numbers of their conditions, a row for each of the second.
-
-    None if not two keys vary, or not every pair of values is a condition.
-    """
-    at = {
-        tuple(one.differs.get(key, one.usual.get(key, "")) for key in keys): number
-        for number, one in enumerate(conditions)
-    }
-    columns, rows = ([*dict.fromkeys(pair[place] for pair in at)] for place in (0, 1)) if len(keys) == 2 else ([], [])
+    """Values of two keys, and numbers of conditions (a row per second value); None unless all pairs are conditions."""
+    at = {tuple(map(one.value, keys)): number for number, one in enumerate(conditions)}
+    if len(keys) != 2:
+        return None
+    columns, rows = (sorted({pair[place] for pair in at}, key=_by_number) for place in (0, 1))
     if not len(at) == len(conditions) == len(columns) * len(rows) or min(len(columns), len(rows)) < 2:
         return None
-    columns, rows = sorted(columns, key=_by_number), sorted(rows, key=_by_number)
     return columns, rows, [[at[column, row] for column in columns] for row in rows]
 
 
@@ -124,10 +114,10 @@ def _draw_climbs(panel: Axes, found: Mapping[str, Any]) -> None:
 def _draw_rates(
     panel: Axes, labels: Sequence[str], found: Sequence[Mapping[str, Any]], *, across: bool = False
 ) -> None:
-    """Rates with their exact intervals, side by side; or one above the other, ``across`` the panel."""
+    """Rates with their exact intervals, vertical, or horizontal (``across``) one above the other."""
     for place, (label, key, look) in enumerate(_KINDS):
         some = [one[key] if key else one for one in found]
-        rates = np.array([one["rate"] for one in some], dtype=float)  # NaN where nothing was shaken
+        rates = np.array([one["rate"] for one in some], dtype=float)  # NaN without a drive
         ends = np.array([one["rate_interval"] or (np.nan, np.nan) for one in some])
         at, errors = np.arange(len(found)) + 0.15 * (place - 1), np.abs(ends.T - rates)
         given: dict[str, Any] = {"xerr": errors} if across else {"yerr": errors}
@@ -149,7 +139,7 @@ def _draw_map(
     grid: tuple[list[str], list[str], list[list[int]]],
     found: Sequence[Mapping[str, Any]],
 ) -> None:
-    """Rates over two keys: in each cell the rate with its interval, and how many of the piles climbed."""
+    """Rates over two keys; each cell has the rate with its interval, and the number of piles that climbed."""
     columns, rows, numbers = grid
     rates = np.array([[found[number]["rate"] for number in row] for row in numbers], dtype=float)
     shown = panel.imshow(rates, cmap="Blues", vmin=0.0, aspect="auto", origin="lower")
@@ -173,14 +163,14 @@ _COLUMNS = (
 
 
 def write_climbs(conditions: Sequence[Condition], found: Sequence[Mapping[str, Any]], to: Path) -> None:
-    """Write what was found under each condition as a table, a row a condition and part of the climbs, or as the figure.
+    """Write the results for each condition as a table (one row per condition and part of the climbs) or as a figure.
 
     Parameters
     ----------
     conditions, found
-        What `walkers.sweeps.climbing.summarise_climbs` found under each condition.
+        The conditions, and the results of `walkers.sweeps.climbing.summarise_climbs` for each.
     to
-        A .csv file for the table (SI units), else the figure's, of `walkers.postprocess.drawing.FORMATS`.
+        A .csv file for the table (SI units), or a figure (`walkers.postprocess.drawing.FORMATS`).
     """
     if to.suffix != ".csv":
         runs = [run.name for one in conditions for run in one.runs]

@@ -36,14 +36,14 @@ if TYPE_CHECKING:
     from walkers.inputs.case import Case
 
 _SIDES = ("first", "second")
-_SPREADS = ("smallest", "largest", "scatter")  # columns of a sweep's table that are no results
+_SPREADS = ("smallest", "largest", "scatter")  # columns of a sweep's table that are not compared
 _VELOCITIES = ("velocity", "right_facing", "left_facing")
-"""Columns whose scatter the result has, and whose numerical error is that of the velocity."""
+"""Columns whose scatter is in the result, and whose numerical error is that of the velocity."""
 _UPHILL = {"right_facing": "facing up", "left_facing": "facing down"}
-"""What columns are called of walkers on a slope that the drive axis goes up."""
+"""Names of columns if the drive axis goes up a slope."""
 _FIRST_MAKE = ("rotation", "sliding", "open")
 _OF_ALL = ("orientation_end", "separated_fraction")
-"""Columns that are means over walkers: of the first make, or of all. (Axial velocities are of two headings.)"""
+"""Columns that are means over walkers of the first make, and over all walkers."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Side:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What differs between two: as JSON, SI units (keys of sweeps in those of their files); as text in usual units."""
+    """Differences as JSON, in SI units (keys of sweeps in the units of their files), and as text in readable units."""
 
     contents: Mapping[str, Any]
     text: str
@@ -66,10 +66,7 @@ class Comparison:
 def _pair(
     quantity: str, unit: str, values: Sequence[float], scatters: Sequence[float], numerical: float = nan
 ) -> tuple[dict[str, Any], list[str]]:
-    """A quantity of both sides as JSON, SI units, and as cells of a text, in usual units.
-
-    Beside the difference are the scatters over copies, and the numerical error of the difference where it is known.
-    """
+    """A quantity of both sides, with difference and errors, as JSON (SI units) and cells of text (readable units)."""
     difference = values[1] - values[0]
     names = ("first", "second", "first_scatter", "second_scatter", "difference", "numerical_error")
     numbers = zip(names, (*values, *scatters, difference, numerical), strict=True)
@@ -111,7 +108,7 @@ def compare_runs(first: Side, second: Side) -> Comparison:
 
 
 def _different(cases: Sequence[Case], names: Sequence[str]) -> tuple[dict[str, list[Any]], str]:
-    """The values of both cases by which they differ, SI units, without what merely follows from others; and as text."""
+    """The given values by which two cases differ, without derived ones, in SI units, and as text."""
     flat = [flattened(one.as_dict()) for one in cases]
     parameters = {key: [one.get(key) for one in flat] for key in differing(flat)}
     rows = [[key, *(readable(key, value) for value in values)] for key, values in parameters.items()]
@@ -123,13 +120,13 @@ def _number_of(value: Any) -> float:
 
 
 def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
-    """All numbers that the analyses give of two runs."""
+    """All numbers that the analyses give for two runs."""
     results = [result_in(run) for run in runs]
     rows = [row_of(result) for result in results]
     scatters = [_scatters(run, result) for run, result in zip(runs, results, strict=True)]
     numerical = hypot(*map(_numerical_error, results))
     units = result_columns([name for result in results for name in result["analyses"]])
-    if any(map(_up_and_down, results)):  # the mean over both is no walker's velocity
+    if any(map(_up_and_down, results)):  # the mean over both sides means nothing
         units = {name: entry for name, entry in units.items() if name != "velocity"}
     uphill, pairs = all(result.get("goes_uphill") for result in results), []
     for name, (unit, _) in units.items():
@@ -144,12 +141,12 @@ def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
 
 
 def _up_and_down(result: Mapping[str, Any]) -> bool:
-    """Whether walkers that face up and down a slope differ."""
+    """Whether walkers facing up and down a slope differ."""
     return bool(result.get("goes_uphill") and sides_apart(result))
 
 
 def _scatters(run: Path, result: Mapping[str, Any]) -> dict[str, float]:
-    """Standard deviations of columns over copies: as the result has them, or of the table of the walkers."""
+    """Standard deviations of columns over copies, from the result or from the table of the walkers."""
     if "velocity" not in result:
         return {}
     from walkers.postprocess.tables import read_table
@@ -166,12 +163,12 @@ def _scatters(run: Path, result: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _numerical_error(result: Mapping[str, Any]) -> float:
-    """Of the velocity, m/s; NaN if it is not known."""
+    """Numerical error of the velocity, m/s; NaN if it is not known."""
     return float((result.get("numerical_error") or {}).get("total", nan))
 
 
 def _errors_text(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
-    """Sentences: what the difference of two velocities is against their numerical errors, and against their bands."""
+    """Sentences that compare the difference of two velocities with numerical errors and bands."""
     results = [with_bands(run, result_in(run)) for run in runs]
     if not all("velocity" in result for result in results):
         return []
@@ -186,12 +183,9 @@ def _errors_text(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
             for name, error, value in zip(names, errors, own, strict=True)
             if value
         )
-        what = (
-            "velocities"
-            if name_of == "velocity"
-            else f"velocities of those facing {ways(uphill=all(one['goes_uphill'] for one in results))[0]}"
-        )
-        lines.append(f"the {what} differ by {words} their numerical error ({shares})")
+        facing = ways(uphill=all(one.get("goes_uphill") for one in results))[0]
+        whose = "" if name_of == "velocity" else f" of those facing {facing}"
+        lines.append(f"the velocities{whose} differ by {words} their numerical error ({shares})")
     lines += [
         f"{name}: the numerical error is not measured for this case"
         for name, error in zip(names, errors, strict=True)
@@ -206,9 +200,9 @@ def _errors_text(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
 
 
 def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comparison:
-    """Compare a column of two sweeps, ``velocity`` or ``climbs`` if none is named, at the points finished in both.
+    """Compare a column of two sweeps (default: ``velocity`` or ``climbs``) at the points that are finished in both.
 
-    `InputError` if they vary other keys, have no finished point in common, or not that column.
+    `InputError` if the varied keys differ, no finished point is common, or a sweep has no such column.
     """
     records, source = (read_record(first), read_record(second)), f"{first}, {second}"
     keys = [[with_unit(key, unit) for key, unit in one.units.items()] for one in records]
@@ -246,7 +240,7 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
 
 
 def _matched(tables: Sequence[pd.DataFrame], keys: list[str]) -> pd.DataFrame:
-    """The rows of two tables whose keys have the same values, the columns of both beside each other."""
+    """The rows of two tables with the same values of the keys, the columns of both side by side."""
     first, second = (table.astype(dict.fromkeys(keys, object)) for table in tables)
     how: dict[str, Any] = {"on": keys} if keys else {"how": "cross"}
     return first.merge(second, suffixes=(f"_{_SIDES[0]}", f"_{_SIDES[1]}"), **how)

@@ -23,27 +23,27 @@ if TYPE_CHECKING:
 
 FloatArray = npt.NDArray[np.float64]
 _NONE = "none"
-"""Instead of a column: do not tell points apart so."""
+"""Instead of a column: no colours or no panels."""
 _SEEDS = ("run.seed", "seed")
 _SYMBOLS = {"gamma0": "Γ0", "sin_delta": "sin δ"}
 _SYMBOLS |= {"right_facing": "velocity, facing right (up)", "left_facing": "velocity, facing left (down)"}
-_LEAST_ASYMMETRIES = 3  # different radii are shown by sin δ from so many on
-_MOST_PANELS = 12  # more combinations are not separated into panels
+_LEAST_ASYMMETRIES = 3  # smallest number of pairs of radii that are shown by sin δ
+_MOST_PANELS = 12
 _MARKERS = "osD^vXP<>*"
-_MODELS = (("--", "_"), (":", "+"))  # of each model the line, and the symbol where points are not joined
-_CURVE, _BEYOND = 61, 0.04  # points of a curve of a model; how far it goes beyond the points, over their range
-_FEW_COLOURS = 6  # more come from a map of colours rather than from the style
-_MOST_COLOURS = 12  # numbers with more values have a scale of colours rather than a legend
-_ROUNDING = 1e-12  # of numbers, over the largest
-_LEAST_RANGE = 1e-4  # of what is drawn over its mean: y shows no less, which would be rounding
-_FEW_TICKS = 6  # ticks are at the values of x if these are so few, and not too near
+_MODELS = (("--", "_"), (":", "+"))  # line of each model, and its symbol if points are not joined
+_CURVE, _BEYOND = 61, 0.04  # points of a model's curve; its length beyond the points, divided by their range
+_FEW_COLOURS = 6  # more colours are from a colour map, fewer from the style
+_MOST_COLOURS = 12  # numbers with more values have a colour scale instead of a legend
+_ROUNDING = 1e-12  # relative to the largest number
+_LEAST_RANGE = 1e-4  # smallest range of the y axis relative to the mean, so that rounding errors are not shown
+_FEW_TICKS = 6  # largest number of x values that all have ticks
 
 
 @dataclass(frozen=True)
 class Factor:
-    """Something by which points differ: its keys, its label, a number (in its unit) or a text for each point.
+    """A property in which points differ: its keys, its label, and a number (in its unit) or a text for each point.
 
-    Of a sample each key is a factor, whose numbers are not levels that others share.
+    Each key of a sample is a factor. Points of a sample do not share values.
     """
 
     keys: tuple[str, ...]
@@ -55,33 +55,33 @@ class Factor:
 
     @property
     def levels(self) -> list[Any]:
-        """The different values: numbers in ascending order, texts in that of the sweep."""
+        """The different values: numbers in ascending order, texts in the order of the sweep."""
         different = dict.fromkeys(self.values)
         return sorted(different) if self.is_number else list(different)
 
     @property
     def name(self) -> str:
-        """The label without the unit and without what else varies with it."""
+        """The label without the unit and without further keys."""
         first = self.label.partition("\n")[0]
         return first.removesuffix(f" ({self.unit})") if self.unit else first
 
     def where(self, level: Any) -> npt.NDArray[np.bool_]:
-        """Which of the points have a level."""
+        """Which points have a level."""
         return np.array([value == level for value in self.values], dtype=bool)
 
     def exact(self, level: float) -> float:
-        """A number; zero if it is but the rounding of the others."""
+        """A number, or zero if it is a rounding error."""
         return 0.0 if abs(level) < _ROUNDING * max(map(abs, self.levels)) else level
 
     def text(self, level: Any, *, by_name: bool = False) -> str:
-        """A level as text, with its unit; if so wanted a number with the factor's name."""
+        """A level as text with its unit, for numbers optionally with the factor's name."""
         text = f"{self.exact(level):.6g} {self.unit}".strip() if self.is_number else str(level)
         return f"{self.name} = {text}" if by_name and self.is_number else text
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Factors along x (samples have a panel for each), in colours and in panels; names of undistinguished keys."""
+    """Factors on the x axis (for samples one panel each), in colours and in panels; names of undistinguished keys."""
 
     x: Sequence[Factor]
     hue: Factor | None
@@ -90,26 +90,26 @@ class Layout:
 
 
 Curves = Callable[[npt.NDArray[np.int64], Factor, FloatArray], Mapping[str, FloatArray]]
-"""From rows that differ along x alone, and values of x, to what models predict there; nothing where none can."""
+"""Function of rows that differ only in x, of the factor x and of values of x: the predictions of models there."""
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """A column of a table in readable units, its errors, and what models predict, row by row; the axis's label."""
+    """A column of a table in readable units: label, values, errors, and predictions of models for each row."""
 
     label: str
     values: FloatArray
     errors: FloatArray
     theory: Mapping[str, FloatArray] = field(default_factory=dict)
     curves: Curves | None = None
-    """What models predict between and beyond the points of some rows, for a factor along x."""
+    """Predictions of models between and beyond the points."""
 
 
 def factors_of(table: pd.DataFrame) -> list[Factor]:
-    """What a sweep's points differ by, in the order of its keys; what has one value is left out.
+    """The factors of a sweep in the order of its keys, without keys that have one value.
 
-    Keys of one axis whose numbers rise or fall together, or that have texts or lists, are one factor. Numbers that go
-    together otherwise, as those of a sample, are one factor each.
+    Keys of one axis are one factor if their numbers rise or fall together, or if they have texts or lists. Otherwise,
+    as in a sample, each key is a factor.
     """
     factors = []
     for keys in table.attrs["axes"]:
@@ -128,7 +128,6 @@ def factors_of(table: pd.DataFrame) -> list[Factor]:
 
 
 def _of_axis(columns: Mapping[str, list[Any]], units: Mapping[str, str]) -> list[Factor]:
-    """The factors of keys that go together."""
     if {type(one) for column in columns.values() for one in column} <= {int, float}:
         rows = np.unique(np.array(list(columns.values()), dtype=float).T, axis=0)
         steps = np.diff(rows, axis=0)
@@ -139,7 +138,7 @@ def _of_axis(columns: Mapping[str, list[Any]], units: Mapping[str, str]) -> list
             values = list(map(float, columns[key]))
             factors.append(Factor((key, *rest), label, values, True, not together, units[key]))
         return factors
-    # Texts: of the key that tells the levels apart, or of all together.
+    # Texts: those of one key that distinguishes all levels, or those of all keys.
     whole = _count(zip(*columns.values(), strict=True))
     shown = next(([key] for key, values in columns.items() if _count(values) == whole), list(columns))
     rest = [key for key in columns if key not in shown]
@@ -168,7 +167,7 @@ def readable_key(key: str) -> str:
 
 
 def drawn_column(rows: pd.DataFrame, name: str, theory: Mapping[str, FloatArray] | None = None) -> Drawn:
-    """A column of numbers of a sweep's table with what models predict (SI units), in readable units."""
+    """A column of numbers of a sweep's table, with the predictions of models (SI units), in readable units."""
     column = _numbers(rows, name, "--y")
     size = readable_unit(rows.attrs["units"].get(name, ""))[1]
     errors = np.full(len(rows), np.nan)
@@ -190,18 +189,19 @@ def _numbers(rows: pd.DataFrame, name: str, option: str) -> Factor:
 
 
 def layout_of(
-    table: pd.DataFrame,
-    rows: pd.DataFrame,
-    *,
-    x: str | None = None,
-    hue: str | None = None,
-    panels: str | None = None,
+    table: pd.DataFrame, rows: pd.DataFrame, *, x: str | None = None, hue: str | None = None, panels: str | None = None
 ) -> Layout:
-    """What of a sweep goes where, as asked for or guessed.
+    """Choose the factors on the x axis, in colours and in panels.
 
-    Guessed is: along x the numbers with the most values, in colours what has the most values of the rest, in panels
-    all else. Samples have a panel for each key. Of the sweep's table (`walkers.sweeps.table.load`) some rows are drawn;
-    asked for are keys that vary or columns, or ``none`` for neither colours nor panels. `InputError` if there is none.
+    By default the x axis has the numbers with the most values, colours have the other factor with the most values, and
+    panels have all further factors. Samples have a panel for each key.
+
+    Parameters
+    ----------
+    table, rows
+        The sweep's table (`walkers.sweeps.table.load`), and the rows that are drawn.
+    x, hue, panels
+        Varied keys or columns; ``none``: no colours or panels. `InputError` if there is no such key or column.
     """
     places = table.index.get_indexer(rows.index).tolist()
     left = factors = [replace(one, values=[one.values[place] for place in places]) for one in factors_of(table)]
@@ -230,26 +230,23 @@ def layout_of(
     if apart is None and panels is None and left and len(along) == 1:
         while prod(len(one.levels) for one in left) > _MOST_PANELS:
             undistinguished.append(left.pop(0 if len(left[0].levels) > _MOST_PANELS else -1).name)
-        apart, left = _joined(left), []
+        apart, left = joined(left), []
     return Layout(along, colours, apart, [*undistinguished, *(one.name for one in left)])
 
 
 def _same(one: Factor, other: Factor) -> bool:
-    """Whether two factors tell the same points apart, such as Γ0 and the acceleration that it follows from."""
+    """Whether two factors distinguish the same points, such as Γ0 and the acceleration."""
     pairs = len(set(zip(one.values, other.values, strict=True)))
     return one.keys == other.keys or pairs == len(one.levels) == len(other.levels)
 
 
 def _along(factors: Sequence[Factor], rows: pd.DataFrame) -> Factor | None:
-    """What is best along x: most values, of equally many the last; categories and seeds if there is nothing else.
-
-    Three or more pairs of radii are numbers: their sin δ, if no two of them have the same.
-    """
+    """The factor for the x axis: numbers with the most values, else categories, else seeds; None without factors."""
     shown = list(factors)
     known = "sin_delta" in rows and rows["sin_delta"].notna().all()  # none of clusters
     sines = rows["sin_delta"].astype(float).round(12).tolist() if known else []
     for place, one in enumerate(factors):
-        if not one.is_number and any(key.endswith("radii") for key in one.keys):
+        if not one.is_number and any(key.endswith("radii") for key in one.keys):  # by sin δ if no two are the same
             pairs = len(set(zip(one.values, sines, strict=bool(sines))))
             if pairs == len(set(sines)) == len(one.levels) >= _LEAST_ASYMMETRIES:
                 shown[place] = Factor(one.keys, "asymmetry sin δ", rows["sin_delta"].tolist(), True)
@@ -257,8 +254,8 @@ def _along(factors: Sequence[Factor], rows: pd.DataFrame) -> Factor | None:
     return shown[max(ranks)[-1]] if ranks else None
 
 
-def _joined(factors: Sequence[Factor]) -> Factor | None:
-    """Several factors as one."""
+def joined(factors: Sequence[Factor]) -> Factor | None:
+    """Several factors as one whose levels are texts; None if there is none."""
     if len(factors) < 2:
         return next(iter(factors), None)
     columns = [[one.text(level, by_name=not one.unit) for level in one.values] for one in factors]
@@ -269,9 +266,9 @@ def _joined(factors: Sequence[Factor]) -> Factor | None:
 
 @styled
 def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Figure:
-    """Draw what `layout_of` and `drawn_column` gave of the same rows.
+    """Draw the results of `layout_of` and `drawn_column` for the same rows.
 
-    What is not positive is left out along axes that are logarithmic, as ``log`` says: ``x``, ``y`` or ``xy``.
+    ``log`` names logarithmic axes (``x``, ``y`` or ``xy``), which leave out zero and negative numbers.
     """
     if "x" in log and not all(one.is_number for one in layout.x):
         raise refused("--logx", f"{layout.x[0].label} has no numbers")
@@ -287,7 +284,7 @@ def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Fig
     for axes, (number, (x, here, name)) in zip(grid.flat, enumerate(parts), strict=False):
         _panel(axes, x, here, drawn, colours, log)
         axes.set_title(plain_text(name))
-        if len(layout.x) > 1 or number + columns >= len(parts):  # nothing is below
+        if len(layout.x) > 1 or number + columns >= len(parts):  # no panel below
             axes.set_xlabel(plain_text(x.label))
             axes.tick_params(labelbottom=True)
         if number % columns == 0:
@@ -305,7 +302,7 @@ def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Fig
 
 
 class _Colours:
-    """How the levels of a factor look: of many numbers by a scale of colours."""
+    """Colours and symbols of the levels of a factor; many numbers have a colour scale."""
 
     def __init__(self, factor: Factor | None, *, hollow: bool) -> None:
         from matplotlib import colormaps
@@ -326,13 +323,13 @@ class _Colours:
 
 
 def _panel(axes: Axes, x: Factor, here: npt.NDArray[np.bool_], drawn: Drawn, colours: _Colours, log: str) -> None:
-    """Means with their errors, joined by lines unless a theory's are there, and the theory's values."""
+    """Means with error bars, joined by lines unless there is a theory, and the predictions of the theory."""
     places = np.array(x.values if x.is_number else [x.levels.index(one) for one in x.values], float)
     count = len(colours.levels)
     for number, (level, look) in enumerate(zip(colours.levels, colours.looks, strict=True)):
         rows = np.flatnonzero(here & (colours.factor.where(level) if colours.factor else True))
         rows = rows[np.argsort(places[rows], kind="stable")]
-        # Symbols of different colours stand aside of their category.
+        # Symbols of different colours are side by side in their category.
         aside = 0.0 if x.is_number else (number - (count - 1) / 2.0) * min(0.12, 0.6 / count)
         is_course = x.is_number and not x.is_sample and x.keys[0] not in _SEEDS
         joined = is_course and len(set(places[rows])) == len(rows) > 1
@@ -350,7 +347,7 @@ def _panel(axes: Axes, x: Factor, here: npt.NDArray[np.bool_], drawn: Drawn, col
 
 
 def _along_axis(x: Factor, log: str) -> FloatArray:
-    """Where curves along x are drawn: a little beyond its smallest and largest values."""
+    """Values of x for curves, to a little beyond the smallest and largest values."""
     low, high = x.levels[0], x.levels[-1]
     if "x" in log and low > 0.0:
         beyond = (high / low) ** _BEYOND
@@ -365,7 +362,7 @@ def _model_look(number: int, joined: bool, colour: Any) -> dict[str, Any]:
 
 
 def _scale_x(axes: Axes, x: Factor, log: str) -> None:
-    """Logarithms, names of categories (aslant if they are long), ticks at the values of x where they are few."""
+    """Scale of the x axis; names of categories (slanted if long); ticks at the values of x if there are few."""
     from matplotlib.ticker import MaxNLocator
 
     if not x.is_number:
@@ -382,12 +379,12 @@ def _scale_x(axes: Axes, x: Factor, log: str) -> None:
         axes.set_xticks([], minor=True)
     elif "x" not in log and all(float(level).is_integer() for level in x.levels):
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    elif "x" not in log and x.is_sample:  # several panels side by side: long numbers would overlap
+    elif "x" not in log and x.is_sample:  # long numbers would overlap in panels side by side
         axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
 
 
 def _scale_y(axes: Axes, drawn: Drawn, log: str) -> None:
-    """Along y what the runs and the first model gave, with margins: another model may leave the axes."""
+    """Scale and range of the y axis: runs and first model with margins; other models may leave the axes."""
     from matplotlib.ticker import MaxNLocator
 
     if "y" in log:
@@ -396,7 +393,7 @@ def _scale_y(axes: Axes, drawn: Drawn, log: str) -> None:
     errors = np.nan_to_num(drawn.errors)
     shown = np.concatenate([drawn.values - errors, drawn.values + errors, *list(drawn.theory.values())[:1]])
     low, high = float(np.nanmin(shown)), float(np.nanmax(shown))
-    if np.all(np.mod(drawn.values[np.isfinite(drawn.values)], 1.0) == 0.0):  # numbers of something
+    if np.all(np.mod(drawn.values[np.isfinite(drawn.values)], 1.0) == 0.0):  # counts
         axes.yaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
         low, high = low - 0.5, high + 0.5
     if high - low <= _LEAST_RANGE * abs(middle := (low + high) / 2.0) or high - low < _ROUNDING:
@@ -407,7 +404,7 @@ def _scale_y(axes: Axes, drawn: Drawn, log: str) -> None:
 
 
 def _legend(figure: Figure, grid: npt.NDArray[Any], colours: _Colours, drawn: Drawn) -> None:
-    """Below all: what colours and lines are. Of many numbers a scale of colours beside all."""
+    """A legend of colours and lines below all panels, or a colour scale beside them."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.lines import Line2D
 

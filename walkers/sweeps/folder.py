@@ -1,14 +1,13 @@
 """Contents of a folder of runs: runs and sweeps with their status; listing and removal.
 
-Nothing is tabulated, no dump is opened and no table: a folder of ten thousand runs takes seconds.
+Listing opens no dumps and no tables: a folder of ten thousand runs takes seconds.
 
-Never removed is what a process is making: who removes a run holds its lock meanwhile, as who makes it does. A finished
-run loses its manifest first: should the removal be interrupted, what is left is no run, and goes the next time.
+Runs in progress are never removed: removal holds the lock of the run. The manifest of a finished run is removed first:
+after an interruption the rest is no finished run, and the next removal takes it.
 """
 
 from __future__ import annotations
 
-import os
 import shutil
 import time
 from collections import Counter
@@ -23,7 +22,7 @@ from typing import Any, Literal
 
 from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.readable import agrees, check_wanted, differing, flattened, has_key, kind_of, readable
-from walkers.inputs.rounding import duration_text, rounded
+from walkers.inputs.rounding import counted, duration_text, rounded
 from walkers.physics.units import Kind, parse_quantity
 from walkers.postprocess.sides import sides_apart
 from walkers.postprocess.uncertainty import SPREAD_NAME
@@ -58,18 +57,18 @@ _SIZES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
 _LOCK = ".lock"
 _MOST_LINES = 40
 _MARK = b"granular-walkers"
-"""In every report and figure that the project writes."""
+"""Text in every report and figure that the project writes."""
 
 
 @dataclass(frozen=True)
 class Entry:
     """A run (``case-hash``) or a sweep in a folder.
 
-    It is finished, running, failed, or interrupted: a run can be continued, of a sweep points are missing. Its
-    age (s) counts from when it was finished or last written to; its size (bytes) is that of its files, of a sweep those
-    of its runs. Its parameters are those of `walkers.inputs.readable.flattened`, of a sweep the numbers of values of
-    what varies. A run gave a velocity (mean over its walkers, m/s; of those facing up a slope where ``sides`` has the
-    velocities of both sides, which differ) or climbs; a sweep has points of some statuses.
+    The status is finished, running, failed, or interrupted (a run can be continued, or points of a sweep are missing).
+    ``age`` (s) counts from the end of the run or from the last change, ``size`` (bytes) is that of the files, for a
+    sweep of its runs. ``parameters`` are those of `walkers.inputs.readable.flattened`, for a sweep the number of values
+    of each varied key. A run has a velocity (m/s, mean over the walkers; if ``sides`` has velocities up and down a
+    slope, that of walkers facing up) or a number of climbs; a sweep has numbers of points by status.
     """
 
     name: str
@@ -103,18 +102,14 @@ def _run_name(directory: Path) -> str:
 
 
 def inventory(out: Path) -> list[Entry]:
-    """All runs and sweeps in a folder, sweeps first, each kind by name; none where there is no folder."""
+    """All runs and sweeps in a folder, sweeps first, sorted by name; none if there is no folder."""
     if out.exists() and not out.is_dir():
         raise refused(out, "expected a folder of runs, this is a file")
-    try:
-        with os.scandir(out) as entries:
-            folders = sorted(Path(entry) for entry in entries if entry.is_dir())
-    except OSError:
-        folders = []
+    folders = sorted(path for path in out.iterdir() if path.is_dir()) if out.exists() else []
     now = time.time()
     runs = [run for path in folders if (run := _run(path, now)) is not None]
     made = {run.place for run in runs}
-    for lock in out.glob(f"*{_LOCK}"):  # a run whose directory is about to be made, or that is made with others
+    for lock in out.glob(f"*{_LOCK}"):  # runs in shared decks, and runs whose directory does not exist yet
         place = lock.with_name(lock.name.removesuffix(_LOCK))
         if place not in made and is_locked(place):
             runs.append(Entry(place.name, place.name.rpartition("-")[0], "running", place))
@@ -123,10 +118,9 @@ def inventory(out: Path) -> list[Entry]:
 
 
 def _run(path: Path, now: float) -> Entry | None:
-    """The run in a directory; None if there is none."""
     name = _run_name(path)
     finished = name == path.name and (path / MANIFEST_NAME).is_file()
-    if not (finished or is_run_name(name)):  # a folder of somebody's, whatever is in it
+    if not (finished or is_run_name(name)):  # a user's folder
         return None
     parameters: Mapping[str, Any] = {}
     case_name = name.rpartition("-")[0]
@@ -160,9 +154,9 @@ def _age(path: Path, now: float) -> float:
 
 
 def weigh(path: Path) -> tuple[int, float]:
-    """Bytes of a file or of all in a directory, and when one was last written (s since the epoch; 0 if none was).
+    """Bytes of a file or of all files in a directory, and time of the last change (s since the epoch; 0 if no file).
 
-    What has several names, as the tables that the segments of a pile share, counts once.
+    Files with several names, such as tables that the segments of a pile share, count once.
     """
     size, newest = {}, 0.0
     for file in [path, *path.rglob("*")]:
@@ -201,10 +195,10 @@ def select(
     older_than: str | None = None,
     where: Sequence[str] = (),
 ) -> list[Entry]:
-    """Those of a folder's entries that are of a case, of a status, older than an age such as ``7 d``.
+    """Select entries by case, by status, by age (older than, such as ``7 d``).
 
-    And of which all conditions ``where`` hold, such as ``drive.frequency=80 Hz``: no sweeps then. `InputError` if an
-    age or a condition cannot be read, or no run has such a key.
+    Conditions ``where``, such as ``drive.frequency=80 Hz``, must all hold and select runs only. `InputError` if an age
+    or a condition cannot be read, or no run has such a key.
     """
     oldest = -inf
     if older_than is not None:
@@ -222,7 +216,7 @@ def select(
         if runs and not any(has_key(run.parameters, key) for run in runs):
             known = ", ".join(dict.fromkeys(one for run in runs for one in run.parameters))
             raise InputError("--where", [Problem(key, None, f"no run has such a key; they have {known}")])
-        alike = {key: 0.0} if kind_of(key) and "/" not in value else {}  # where there are no runs to compare with
+        alike = {key: 0.0} if kind_of(key) and "/" not in value else {}  # if there are no runs to compare with
         for parameters in [run.parameters for run in runs] or [alike]:
             try:
                 check_wanted(parameters, key, value)
@@ -240,7 +234,7 @@ def select(
 
 
 def ordered(entries: Sequence[Entry], order: Order, *, reverse: bool = False) -> list[Entry]:
-    """Entries in an order: the fastest, the youngest and the largest first; what has no velocity last."""
+    """Sort entries: the fastest, youngest or largest first; those without a velocity last."""
     keys: dict[str, Callable[[Entry], Any]] = {
         "velocity": lambda entry: inf if entry.velocity is None else -entry.velocity,
         "size": lambda entry: -entry.size,
@@ -256,7 +250,7 @@ def _varied(runs: Sequence[Entry]) -> Iterator[tuple[str, list[Entry], list[str]
 
 
 def as_json(entries: Sequence[Entry]) -> list[dict[str, Any]]:
-    """Entries as JSON objects, SI units; ``varies`` has, of a run, the values by which runs of its case differ."""
+    """Entries as JSON objects, SI units; for a run, ``varies`` has the values by which runs of its case differ."""
     keys = {case: keys for case, _, keys in _varied([entry for entry in entries if not entry.is_sweep])}
     common = ("name", "case", "status", "age", "size")
     of_runs = ("reason", "message", "velocity", "sides", "climbs")
@@ -279,7 +273,7 @@ def members(entries: Sequence[Entry]) -> list[Entry]:
 def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
     """Entries as text: sweeps, then the runs of each case with a column for each key by which they differ; mm/s.
 
-    The last line has the number of runs of sweeps that are left out.
+    The last line states the number of ``hidden`` runs of sweeps.
     """
     sweeps = [entry for entry in entries if entry.is_sweep]
     runs = [entry for entry in entries if not entry.is_sweep]
@@ -295,7 +289,7 @@ def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
         rows = [[f"{case} ({len(of_case)})", "status", "result", "age", "size", *names]]
         for run in of_case:
             status = f"{run.status}: {run.reason}" if run.reason else run.status
-            result = "-" if run.climbs is None else f"{run.climbs} climb{'' if run.climbs == 1 else 's'}"
+            result = "-" if run.climbs is None else counted(run.climbs, "climb")
             if run.velocity is not None:
                 sides = run.sides or {"": run.velocity}
                 told = (f"{way} {rounded(1e3 * speed, 'mm/s')}".strip() for way, speed in sides.items())
@@ -303,22 +297,17 @@ def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
             values = [readable(key, run.parameters.get(key)) for key in varied]
             rows.append([run.name, status, result, duration_text(run.age), bytes_text(run.size), *values])
         blocks.append(aligned(rows))
-    total = [*counted({"sweep": len(sweeps)}), f"{len(runs)} run{'' if len(runs) == 1 else 's'}"]
+    total = [counted(len(sweeps), "sweep")] * bool(sweeps) + [counted(len(runs), "run")]
     size = bytes_text(sum(entry.size for entry in entries))
     more = f"; not shown: {hidden} runs of sweeps (--all)" if hidden else ""
     return "\n\n".join([*blocks, f"{', '.join(total)}, {size}{more}"])
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> str:
-    """Rows of cells as a text whose columns are aligned."""
+    """Rows of cells as text with aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     filled = ([cell.ljust(width) for cell, width in zip(row, widths, strict=True)] for row in rows)
     return "\n".join("  ".join(row).rstrip() for row in filled)
-
-
-def counted(counts: Mapping[str, int]) -> list[str]:
-    """Numbers of things in words, without those of which there are none."""
-    return [f"{number} {kind}{'s' if number > 1 else ''}" for kind, number in counts.items() if number]
 
 
 def bytes_text(size: int) -> str:
@@ -328,14 +317,14 @@ def bytes_text(size: int) -> str:
 
 @dataclass(frozen=True)
 class Cleaning:
-    """What is to be removed from a folder: runs and sweeps, lock files that lock nothing; what else to tell of it."""
+    """What a cleaning removes from a folder: runs and sweeps, stale lock files; further lines to print."""
 
     remove: Sequence[Entry]
     locks: Sequence[Path]
     told: Sequence[str]
 
     def as_text(self) -> str:
-        """What goes, what of sweeps, what stays, and how much it is."""
+        """What is removed and kept, with the total size."""
         rows, told, total = [], list(self.told), 0
         for one in self.remove:
             size, why = one.size, one.reason or ("" if one.status == "finished" else "can be continued")
@@ -353,12 +342,13 @@ class Cleaning:
         lines = [aligned(rows[:_MOST_LINES])] if rows else []
         lines += [f"and {len(rows) - _MOST_LINES} more"] if len(rows) > _MOST_LINES else []
         kinds = Counter("sweep" if entry.is_sweep else f"{entry.status} run" for entry in self.remove)
-        what = ", ".join(counted({**kinds, "stale lock": len(self.locks)})) or "nothing"
+        kinds["stale lock"] = len(self.locks)
+        what = ", ".join(counted(number, kind) for kind, number in kinds.items() if number) or "nothing"
         return "\n".join([*lines, *told, f"{what} to remove, {bytes_text(total)}"])
 
 
 def _own_files(directory: Path) -> list[Path]:
-    """What the project wrote into a sweep's directory: record, logs, bands, report and figures of default names."""
+    """Files of the project in a sweep's directory: record, logs, bands, report and figures with default names."""
     record = read_record(directory)
     columns = {*record.units, *derived_columns(record.analyses), *result_columns(record.analyses)}
     names = {"report.html", *(f"{column}.png" for column in columns)}
@@ -375,16 +365,16 @@ def plan_cleaning(
     case: str | None = None,
     older_than: str | None = None,
 ) -> Cleaning:
-    """See what may go; nothing is removed.
+    """Plan a cleaning; nothing is removed.
 
-    That is what is ``given``, runs and sweeps by their directories: these go with those of their runs that no other
-    sweep has. Else it is what is interrupted or failed, and if so wanted finished runs that no sweep has. Of all that
-    only what `select` leaves. `InputError` if there is no such thing, or if it may be of a sweep that cannot be read.
+    If runs and sweeps are ``given`` by their directories, they are removed, with the runs of these sweeps that no other
+    sweep has. Otherwise interrupted and failed runs are removed, and on request ``finished`` runs that no sweep has.
+    Case and age limit the choice (`select`). `InputError` if a given one does not exist, or a sweep cannot be read.
     """
     entries = inventory(out)
     if finished or given:
         for sweep_file in out.glob(f"*/{RECORD_NAME}"):
-            read_record(sweep_file.parent)  # of one that cannot be read nobody knows which runs it has
+            read_record(sweep_file.parent)  # its runs must be known
     sweeps_of: dict[str, list[str]] = {}
     for sweep in entries:
         for run in sweep.runs:
@@ -416,7 +406,6 @@ def plan_cleaning(
 
 
 def _found(place: Path, entries: Sequence[Entry]) -> list[Entry]:
-    """The entries of a place, finished or not."""
     place = place.resolve()
     found = [one for one in entries if place == one.directory.resolve()]
     found = found or [one for one in entries if place == one.place.resolve()]
@@ -426,7 +415,7 @@ def _found(place: Path, entries: Sequence[Entry]) -> list[Entry]:
 
 
 def clean(cleaning: Cleaning) -> dict[Path, str]:
-    """Remove what `plan_cleaning` named; what is still there, and why: somebody makes it now, or the system refused."""
+    """Remove what `plan_cleaning` planned; return what is left, with the reason (in progress, or a system error)."""
     left = {}
     for entry in cleaning.remove:
         with locked([] if entry.is_sweep else [entry.place]) as ours:
@@ -443,10 +432,7 @@ def clean(cleaning: Cleaning) -> dict[Path, str]:
 
 
 def _remove(entry: Entry) -> None:
-    """Remove a run, its manifest before all else, or what the project wrote into a sweep's directory, its record last.
-
-    Of a symbolic link the link alone; the directory of a sweep if that is all.
-    """
+    """Remove a run, its manifest first, or the project's files of a sweep, its record last; of a link only the link."""
     directory = entry.directory
     if not entry.is_sweep:
         recover(entry.place)

@@ -1,12 +1,11 @@
 """Make runs: single runs segment by segment, or several at once in a shared deck.
 
-A run is made in ``NAME-HASH.incomplete``, its segments in ``segments/0000``, ``segments/0001``, … there, each from a
-restart file to the next. A segment that is being made is called ``0003.new`` and gets its name when it is whole; an
-interrupted run goes on after the last one. Since the segments are the same whether the run was interrupted or not, so
-is all that comes out of it, bit for bit.
+A run is made in ``NAME-HASH.incomplete``. Its segments are ``segments/0000``, ``segments/0001``, …; each begins with
+the restart file of the one before. A segment is called ``0003.new`` until it is complete. An interrupted run continues
+after its last segment. Segments do not depend on interruptions, so the results are bit-identical.
 
-A shared deck runs in the ``….incomplete`` of the first of its runs. What it wrote is parted among the runs, each of
-which gets a directory like any other, with the deck and what the engine said in ``shared_deck``.
+A shared deck runs in the ``….incomplete`` of its first run. Its output is split into the run directories. These are
+like any others, but contain the deck and the engine's log in ``shared_deck``.
 """
 
 from __future__ import annotations
@@ -67,11 +66,11 @@ from walkers.templates.deck import (
 )
 
 DECK_FOLDER = "shared_deck"
-"""In a run directory: the deck that made it together with others, and what the engine said."""
+"""Folder in a run directory: the shared deck that made the run, and the engine's log."""
 _LEAST_BYTES = 150
-"""Of a restart file, an atom: whole ones had 300 to 580."""
+"""Smallest size of a complete restart file per atom; measured: 300 to 580."""
 _RMS_VELOCITY = re.compile(rb"^root mean square velocity (\S+)", re.MULTILINE)
-"""Of the beads, by mass, m/s; decks that let them come to rest have it printed."""
+"""Mass-weighted velocity of the beads, m/s, which decks print while the beads settle."""
 _Tell = Callable[[Progress], None]
 
 
@@ -94,7 +93,7 @@ def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
 
 @dataclass(frozen=True)
 class Made:
-    """Runs that were wanted: the finished ones, by their names, which of these were found, and which others make."""
+    """Requested runs: the finished ones by name, which of them existed before, and which another process makes."""
 
     runs: Mapping[str, FinishedRun]
     found: frozenset[str]
@@ -110,22 +109,22 @@ def make_runs(
     on_progress: _Tell | None = None,
     time_limit: float | None = None,
 ) -> Made:
-    """Make the runs that are missing, in one deck, and tabulate them; a single one goes on where it was interrupted.
+    """Make the missing runs in one deck, and tabulate them. A single run continues where it was interrupted.
 
     Parameters
     ----------
     cases
         Cases that may share a deck (`walkers.templates.scene`).
     force
-        Also make those that are there; they are replaced by finished ones only.
+        Make all runs again; a run is replaced when the new one is finished.
     on_progress, time_limit
-        Called a few times a second while the engine runs: what it raises ends the engine. Wall time in s that this may
-        take for each segment.
+        Called a few times per second while the engine runs; its exceptions stop the engine. Limit of the wall time in s
+        for each segment.
 
     Raises
     ------
     runner.EngineFailure
-        If the engine fails. Of several cases nothing is left then: they are to be tried apart.
+        If the engine fails. Nothing is left of a shared deck; its cases must be tried again in smaller decks.
     """
     out.mkdir(parents=True, exist_ok=True)
     places = {run_place(case, engine, out): case for case in cases}
@@ -153,7 +152,7 @@ def make_runs(
 
 
 def _stopping(tell: _Tell | None, lock: int) -> _Tell:
-    """What is called with the progress and stops the engine where somebody asks for that (`walkers.Run.stop`)."""
+    """A progress function that also stops the engine when requested (`walkers.Run.stop`)."""
 
     def advance(progress: Progress) -> None:
         if is_to_stop(lock):
@@ -165,10 +164,7 @@ def _stopping(tell: _Tell | None, lock: int) -> _Tell:
 
 
 def progress_at(place: Path) -> Progress | None:
-    """How far the run of a place is, as its files say; None if they do not: it shares a deck, or has just begun.
-
-    The wall time is that of its segment.
-    """
+    """Progress of a run from its files, with the wall time of its segment; None for shared decks and at the start."""
     directory = unfinished(place)
     try:
         case = case_of(directory)
@@ -186,7 +182,7 @@ def progress_at(place: Path) -> Progress | None:
 
 
 def _progress(run: Run, cycles: int, step: int, start: int | None, seconds: float, made: int) -> Progress:
-    """The progress where the attempt for so many cycles, whose drive begins at ``start``, is at a step."""
+    """The progress at a step of the attempt with a number of cycles, whose drive begins at the step ``start``."""
     before = run.steps_until(cycles - 1)
     done = before + (0 if start is None else step - start)
     steps, simulated = run.steps_until(run.cycles), (before + step) * run.time_step
@@ -206,7 +202,7 @@ def _are_constant(directory: Path) -> bool:
 class OpenRun:
     """A run in progress, in a directory beside its final place (`open_locked`).
 
-    ``done`` is what the segments that are whole say of themselves, ``ended`` why there are not more, if not all are.
+    ``done`` are the records of the complete segments, ``ended`` is the reason why the run ended early, if it did.
     """
 
     case: Case
@@ -225,16 +221,16 @@ class OpenRun:
         time_limit: float | None = None,
         render: Callable[[Case, Segment], Deck] = render_deck,
     ) -> None:
-        """Make the segments that are missing, by decks that ``render`` makes; if the engine fails, those before stay.
+        """Make the missing segments with decks by ``render``; ``time_limit`` (s) applies to each.
 
-        The time limit, s, is of each.
+        Complete segments are kept if the engine fails.
         """
         begun, made = time.perf_counter(), 0
         look_ahead()
         for cycles in self.case.run.attempts:
             case = self.case.for_cycles(cycles)
             if self.case.run.until_steady and self.done and self.done[-1]["end"] < case.run.steps:
-                for directory in segment_directories(self.directory):  # an attempt for fewer cycles
+                for directory in segment_directories(self.directory):  # those of an attempt with fewer cycles
                     shutil.rmtree(directory)
                 self.done.clear()
             while (segment := self._next_segment(case)) is not None:
@@ -245,7 +241,7 @@ class OpenRun:
                     begun_at = drive_from(self.case, self.done)
                     if not case.boundary.closed or begun_at is None or segment.begin <= begun_at:
                         raise
-                    # A climber left the container: that ends the experiment, and spoils nothing of what was before.
+                    # A climber left the container: this ends the experiment; the segments before are valid.
                     shutil.rmtree(self.directory / SEGMENTS / f"{len(self.done):04d}.new")
                     self.ended = f"{over.lost} bead(s) left the container over its walls in the next segment"
                     return
@@ -275,20 +271,20 @@ class OpenRun:
             (new / PREVIOUS_RESTART_NAME).unlink(missing_ok=True)
             restart = new / RESTART_NAME
             size = restart.stat().st_size if restart.exists() else 0
-            if not self.case.run.in_one and size < _LEAST_BYTES * deck.layout.atoms:  # the engine does not look at it
+            if not self.case.run.in_one and size < _LEAST_BYTES * deck.layout.atoms:  # the engine does not check this
                 raise DamagedSegment(f"{restart} is incomplete ({size} bytes): is the disk full?")
             velocities = _RMS_VELOCITY.findall((new / OUTPUT_NAME).read_bytes())
             record = write_segment_record(new, segment, report, float(velocities[-1]) if velocities else None)
             settle()
             new.rename(folder / f"{number:04d}")
             fsync_path(folder)
-        # The restart before the last one is kept, should the last one prove bad.
+        # The restart before the last one is kept in case the last one is damaged.
         if number > 1:
             (folder / f"{number - 2:04d}" / RESTART_NAME).unlink(missing_ok=True)
         self.done.append(record)
 
     def finish(self) -> FinishedRun:
-        """Write the manifest, last, and move the directory to its place."""
+        """Write the manifest, and move the directory to its place."""
         wall_seconds, loop_seconds = (sum(one[name] for one in self.done) for name in ("wall_seconds", "loop_seconds"))
         report = EngineReport(self.done[0]["version"], wall_seconds, loop_seconds, int(self.done[-1]["end"]))
         start = drive_from(self.case, self.done) or 0
@@ -305,7 +301,7 @@ class OpenRun:
 def _teller(
     run: Run, cycles: int, segment: Segment, tell: _Tell, made: int = 0, begun: float | None = None
 ) -> Callable[[int], None]:
-    """What makes of a segment's step the progress of its run."""
+    """A function that reports the progress of the run at a step of a segment."""
     since = time.perf_counter() if begun is None else begun
 
     def advance(step: int) -> None:
@@ -319,9 +315,9 @@ def _teller(
 def open_locked(
     case: Case, engine: Engine, place: Path, locks: Sequence[int], *, anew: bool = False
 ) -> Iterator[OpenRun]:
-    """Make a run, whose place its caller has locked, in a directory of its own, or go on with it, unless ``anew``.
+    """Open a run whose place the caller has locked, to start it, or to continue it unless ``anew``.
 
-    Left without `OpenRun.finish` the directory stays as ``….incomplete``, with a ``failure.json`` if something failed.
+    Without `OpenRun.finish` the directory remains ``….incomplete``; after a failure it contains ``failure.json``.
     """
     directory = unfinished(place)
     recover(place)
@@ -330,7 +326,7 @@ def open_locked(
     try:
         with room_on_disk(directory):
             (directory / SEGMENTS).mkdir(parents=True, exist_ok=True)
-            # What an earlier call left beside its whole segments: tables, and parts of files and segments.
+            # Left by an earlier call, besides complete segments: tables, incomplete files and segments.
             for path in (*directory.iterdir(), *(directory / SEGMENTS).glob("*.new")):
                 if path.is_file():
                     path.unlink()
@@ -343,7 +339,7 @@ def open_locked(
         raise
     except (WalkersError, OSError) as failure:
         said = {"reason": type(failure).__name__, "message": str(failure), "lost": getattr(failure, "lost", 0)}
-        with suppress(OSError):  # a full disk: the message reaches the user all the same
+        with suppress(OSError):  # the disk may be full; the message reaches the user anyway
             write_json(directory / FAILURE_NAME, said)
         raise
 
@@ -371,10 +367,7 @@ def _make_together(
     on_progress: _Tell | None,
     time_limit: float | None,
 ) -> dict[str, FinishedRun]:
-    """Make runs of so many cycles by one deck; those of constant velocities, or that take no more cycles.
-
-    Whatever else there is of them goes: what fails together is to be made apart.
-    """
+    """Make runs in one deck for a number of cycles; return those with constant velocities or all of their cycles."""
     tried = {name: case.for_cycles(cycles) for name, case in cases.items()}
     deck, started = render_shared_deck(list(tried.values())), time.time()
     first = next(iter(cases))
@@ -382,10 +375,10 @@ def _make_together(
     shutil.rmtree(incomplete, ignore_errors=True)
     try:
         with room_on_disk(incomplete, deck.layout.bead_dump_bytes):
-            check_room(out, 2 * deck.layout.bead_dump_bytes)  # the whole and its parts, side by side
+            check_room(out, 2 * deck.layout.bead_dump_bytes)  # the dump and its parts exist at the same time
             (incomplete / DECK_FOLDER).mkdir(parents=True)
             write_deck(deck, incomplete / DECK_FOLDER)
-            # To others it is the first of the runs, unfinished.
+            # For other processes the directory is the unfinished first run.
             for name, case in [(".", cases[first]), *cases.items()]:
                 (incomplete / name).mkdir(exist_ok=True)
                 write_json(incomplete / name / CASE_NAME, case.as_dict(), at_once=False)
@@ -406,13 +399,13 @@ def _make_together(
                 move_into_place(incomplete / name, out / name)
     finally:
         shutil.rmtree(incomplete, ignore_errors=True)
-    for name in done:  # what was left of a run that was once made alone, and killed
+    for name in done:  # remains of a run that was made alone and killed
         shutil.rmtree(unfinished(out / name), ignore_errors=True)
     return {name: FinishedRun(out / name) for name in done}
 
 
 def _part(incomplete: Path, cases: Mapping[str, Case], deck: Deck, report: EngineReport) -> None:
-    """Give each run its part of what the deck wrote, and the deck."""
+    """Give each run its part of the output, and the deck."""
     from walkers.postprocess.splitting import split_output
 
     places = {incomplete / name / FIRST_SEGMENT: case for name, case in cases.items()}

@@ -1,4 +1,4 @@
-"""Report of a sweep: table, plot, and as many complete runs as fit."""
+"""Report of a sweep: table, plot, and as many reports of runs as fit."""
 
 from __future__ import annotations
 
@@ -28,38 +28,30 @@ from walkers.postprocess.report.page import (
 )
 from walkers.postprocess.report.run import RunReport
 from walkers.postprocess.uncertainty import not_known
-from walkers.sweeps.figure import readable_key
-from walkers.sweeps.table import (
-    ERRORS,
-    SIDES,
-    load,
-    main_columns,
-    result_in,
-    sides_differ,
-    value_text,
-    varied_columns,
-    with_unit,
-)
+from walkers.sweeps.figure import drawn_column, factors_of, joined, readable_key
+from walkers.sweeps.table import SIDES, load, main_columns, result_in, sides_differ, varied_columns, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
     from bokeh.models import Model
 
-_PLACES = 3000  # beads times instants of each scene at most: less than in a report of one run, that more runs fit
+_PLACES = (
+    3000  # largest number of beads times frames of a run: fewer than in a report of one run, so that more runs fit
+)
 _SHOWN = (
     *("gamma0", "sin_delta", "velocity", "rotation_1", "rotation_2", "steady", "walkers", "cycles"),
     *("climbs", "onset", "speed", "highest", "led_by_large", "brazil_nut_end", "merged", "parted", "status"),
 )
-"""Columns of a sweep's table that the report shows, of those that it has, after what varies."""
+"""Columns of a sweep's table that the report shows after the varied keys, if they exist."""
 _MOST_LEGENDS = 10
 
 
 def report_sweep(directory: Path, to: Path | None = None, *, largest: int = LARGEST) -> Path:
     """Write the report of a sweep as one HTML file that needs no network.
 
-    The table has all points. Whole runs, with parameters, results, plots and beads to be played, are taken along while
-    they fit into so many bytes, first and last first and then those halfway between; the page says which are left out.
-    The file is ``report.html`` in the sweep's directory if no other is named.
+    The table has all points. Reports of runs, with parameters, results, plots and an animation, are included until the
+    file has ``largest`` bytes: the first and the last point, then those halfway between. The page names the others. The
+    default file is ``report.html`` in the sweep's directory.
     """
     require("report")
     frame = load(directory)
@@ -92,14 +84,14 @@ def report_sweep(directory: Path, to: Path | None = None, *, largest: int = LARG
 
 
 def _uncertain(frame: pd.DataFrame) -> list[str]:
-    """A sentence with the uncertain parameters of the finished points that the sweep does not vary."""
+    """A sentence about uncertain parameters that the sweep does not vary."""
     results = [result_in(Path(run)) for run in frame.loc[frame["status"] == "finished", "run"]]
     rests = [one for result in results for one in result.get("rests_on", ()) if one["key"] not in frame.columns]
     return [one.replace("run with", "run a point with") for one in not_known(rests)]
 
 
 def _spread_out(numbers: list[int]) -> list[int]:
-    """Numbers in an order of which any begin is spread over all: both ends, the middle, and so on."""
+    """Numbers in the order of ends, middle, quarters, …, so that the first ones cover the range."""
     order: dict[int, None] = {}
     parts = 1
     while len(order) < len(numbers):
@@ -109,10 +101,7 @@ def _spread_out(numbers: list[int]) -> list[int]:
 
 
 def _table(frame: pd.DataFrame) -> dict[str, Any]:
-    """Heads and rows of what varied, in the file's units, and what came out, in the usual ones.
-
-    What is the same for all points is no column, of which a screen holds few: it is ``shared``, in words.
-    """
+    """Heads and rows of varied keys (units of the file) and results (readable units); equal values are ``shared``."""
     varied, units = varied_columns(frame), frame.attrs["units"]
     apart = sides_differ(frame)
     wanted = [one for name in _SHOWN for one in (SIDES if apart and name == "velocity" else (name,))]
@@ -133,7 +122,6 @@ def _table(frame: pd.DataFrame) -> dict[str, Any]:
 
 
 def _cell(value: Any, size: float, unit: str) -> dict[str, Any]:
-    """A cell of the table: a number, or a text."""
     if isinstance(value, (bool, np.bool_, str)):
         return {"text": str(value), "value": None}
     if value is None or not isfinite(value):
@@ -145,41 +133,28 @@ def _cell(value: Any, size: float, unit: str) -> dict[str, Any]:
 
 
 def _overview(frame: pd.DataFrame) -> Model | None:
-    """What came out against the number that varies most; a colour for each value of what varies besides."""
+    """The main result against the varied number with the most values; a colour for each value of all other keys."""
     result = next((name for name in main_columns(frame) if name in frame and frame[name].notna().any()), None)
-    import pandas as pd
-
-    varied, units = varied_columns(frame), frame.attrs["units"]
-    numeric = [name for name in varied if frame[name].map(type).isin((int, float)).all()]
-    if result is None or not numeric:
+    factors = factors_of(frame)
+    numbers = [one for one in factors if one.is_number]
+    if result is None or not numbers:
         return None
-    x = max(numeric, key=lambda name: frame[name].nunique())
-    others = [name for name in varied if name != x and frame[name].astype(str).nunique() > 1]
-    unit, size = readable_unit(units[result])
-    label, along_x = with_unit(result, unit), with_unit(readable_key(x), units[x])
-    known = frame[frame[result].notna()].sort_values(x, kind="stable")
-    errors = known[ERRORS[result]].to_numpy(float) if result in ERRORS else np.empty(0)
-    seen = errors_seen(errors, known[result].to_numpy(float))
-    text = f"; {SCATTER}" + ("" if seen else ", smaller than the symbols") if len(errors) else ""
-    plot = new_plot(f"{label} against {readable_key(x)}{text}", along_x, label, height=380)
-    apart = known["point"].map(lambda _: "")
-    if others:
-        levels = [known[name].map(lambda level, unit=units[name]: _level(level, unit)) for name in others]
-        apart = pd.concat(levels, axis=1).agg(", ".join, axis=1)
-    names = list(dict.fromkeys(apart.sort_index()))
-    for name, colour in zip(names, cycle(COLOURS), strict=False):
-        part = known[apart == name]
-        along, values = part[x].to_numpy(float), part[result].to_numpy(float) / size
-        legend: dict[str, Any] = {"legend_label": name} if name and len(names) <= _MOST_LEGENDS else {}
+    x = max(numbers, key=lambda one: len(one.levels))
+    others, drawn = joined([one for one in factors if one is not x]), drawn_column(frame, result)
+    seen = errors_seen(drawn.errors, drawn.values)
+    text = f"; {SCATTER}" + ("" if seen else ", smaller than the symbols") if np.isfinite(drawn.errors).any() else ""
+    plot = new_plot(f"{drawn.label} against {x.name}{text}", x.label.replace("\n", " "), drawn.label, height=380)
+    places, known = np.array(x.values), np.isfinite(drawn.values)
+    levels = others.levels if others else [None]
+    for level, colour in zip(levels, cycle(COLOURS), strict=False):
+        rows = np.flatnonzero(known & others.where(level) if others else known)
+        rows = rows[np.argsort(places[rows], kind="stable")]
+        along, values = places[rows], drawn.values[rows]
+        legend: dict[str, Any] = {"legend_label": others.text(level)} if others and len(levels) <= _MOST_LEGENDS else {}
         plot.line(along, values, color=colour, line_alpha=0.4, **legend)
         plot.scatter(along, values, color=colour, size=7, **legend)
         if seen:
-            error_bars(plot, along, values, part[ERRORS[result]].to_numpy(float) / size)
-    if plot.legend:
-        plot.legend.title = ", ".join(map(readable_key, others))
+            error_bars(plot, along, values, drawn.errors[rows])
+    if others and plot.legend:
+        plot.legend.title = others.name
     return with_legend(plot)
-
-
-def _level(value: Any, unit: str) -> str:
-    """A value of what varies, with its unit: ``60 Hz``."""
-    return f"{value_text(value)} {unit}".strip()

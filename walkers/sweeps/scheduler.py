@@ -1,12 +1,12 @@
-"""Run a sweep: points packed into decks, these handed to workers, until every point is settled.
+"""Run a sweep: pack its points into decks, and have workers run the decks until every point is finished or failed.
 
-A deck costs a start-up and a share a step whoever is in it, so that fewer decks are cheaper; more of them fill the
-cores more evenly and give results sooner. They are packed by predicted cost, so that all cores finish together: the
-whole sweep for a number of workers, whatever is finished, so that an interrupted sweep goes on with the decks that it
-would have had.
+Each deck has a start-up time and a cost per step that do not depend on its contents: few decks are cheaper. Many decks
+use the cores more evenly and give results sooner. Decks are packed by their predicted cost, so that all cores finish
+together. The packing depends on the whole sweep and the number of workers, not on what is finished: an interrupted
+sweep continues with the same decks.
 
-Workers are threads on this machine, or Parsl's on a cluster, which gives out again a deck whose worker was lost. What
-the failure of a deck means for its points is decided here: it is tried again in halves.
+Workers are threads on this machine, or Parsl's workers on a cluster. Parsl repeats a deck whose worker was lost. A deck
+that fails is repeated here, as two halves.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING
 
 from walkers.inputs.case import Case
 from walkers.inputs.errors import Stopped, WalkersError, check_utf8, refused
-from walkers.inputs.rounding import duration_text
+from walkers.inputs.rounding import counted, duration_text
 from walkers.inputs.sweep import Sweep
 from walkers.postprocess.analysis import current_result
 from walkers.runner.binary import Engine, find_engine
@@ -57,10 +57,10 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
 
 MOST_WALKERS = 96
-"""In a deck; with 96 the share of the deck's own cost is down to 4 %."""
+"""Limit for a deck; with 96 walkers the cost of the deck itself is 4 % of the total."""
 MOST_POINTS = 64
 LONGEST_SECONDS = 60.0
-"""Predicted time of a deck of several points: results are to keep coming."""
+"""Limit of the predicted time of a deck of several points, so that results appear regularly."""
 _TRIALS = 24
 _AS_GOOD = 1.02
 _LOOK_SECONDS = 0.25
@@ -72,10 +72,10 @@ class ClusterFailed(WalkersError):
 
 @dataclass(frozen=True)
 class Options:
-    """Options of a sweep: number of parallel decks on this machine, or a cluster (which sets the number).
+    """Options of a sweep: cores of this machine (``workers``), or a cluster instead; MPI processes of a deck.
 
-    A point that failed is tried again ``retries`` times, but not after failures of the names ``final``, not by a later
-    call either: the engine would meet them again. ``time_limit`` is the wall time in s that an engine may take.
+    A failed point is repeated ``retries`` times. Failures with the names ``final`` are never repeated, not even by a
+    later call, because the engine would fail again. ``time_limit`` is the wall time in s that an engine may take.
     """
 
     workers: int
@@ -83,24 +83,26 @@ class Options:
     retries: int = 0
     time_limit: float | None = None
     final: frozenset[str] = frozenset()
+    ranks: int = 1
 
     @property
     def decks_at_once(self) -> int:
-        """How many decks run at once, here or on the site."""
-        return self.site.workers if self.site else self.workers
+        """Number of decks that run at the same time."""
+        if self.site is None:
+            return max(1, self.workers // self.ranks)
+        return self.site.cores // self.ranks * self.site.nodes * self.site.jobs
 
     def for_ranks(self, ranks: int) -> Options:
-        """The same for decks of so many MPI processes each: fewer of them at once, so that each has its cores."""
-        site = replace(self.site, ranks=ranks) if self.site else None
-        if site is not None and ranks > site.file.cores:
-            text = f"a deck has {ranks} MPI processes (run.ranks), more than the {site.file.cores} cores of a node"
+        """The same options for decks with a number of MPI processes; `InputError` if a node has fewer cores."""
+        if self.site is not None and ranks > self.site.cores:
+            text = f"a deck has {ranks} MPI processes (run.ranks), more than the {self.site.cores} cores of a node"
             raise refused("cores", text)
-        return replace(self, workers=max(1, self.workers // ranks), site=site)
+        return replace(self, ranks=ranks)
 
 
 @dataclass(frozen=True)
 class Failure:
-    """A point that failed: its number, its run, the name of the failure, what it says, where its remains are."""
+    """A failed point: number, run, name and message of the failure, directory with what is left of the run."""
 
     point: int
     run: str
@@ -111,7 +113,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class SweepProgress:
-    """How far a sweep is: numbers of points and of running decks; seconds since the start and, if known, to the end."""
+    """Progress of a sweep: numbers of points, and of running decks; seconds since the start, and left (if known)."""
 
     points: int
     found: int
@@ -125,10 +127,10 @@ class SweepProgress:
 
 
 _WORST_FIRST = (
-    # Threaten all points.
+    # Failures that can hit every point.
     *("EngineMissing", "EngineDiffers", "ProgramDiffers", "DiskFull", "OutputGone", "EngineNeverStarted"),
     *("EngineError", "MissingFrames", "EngineKilled", "EngineSilent", "LogTooLong"),
-    "",  # what is not in this list
+    "",  # all others
     *("BlowUp", "BeadsLost", "BeadsOverTheTop", "WalkersMet", "TimeLimitExceeded", "RunBusy"),
 )
 _SEVERITY = {name: rank for rank, name in enumerate(_WORST_FIRST)}
@@ -143,9 +145,9 @@ class PlannedDeck:
 
 
 def pack(cases: Mapping[int, Case], workers: int, longest_seconds: float = LONGEST_SECONDS) -> list[PlannedDeck]:
-    """Pack points, by number, into decks for a number of workers; the longest decks first.
+    """Pack points, by number, into decks for a number of workers; the longest decks come first.
 
-    No deck of several points may exceed a predicted time.
+    The predicted time of a deck of several points is at most ``longest_seconds``.
     """
     by_key: dict[Hashable, list[int]] = {}
     for number, case in cases.items():
@@ -160,13 +162,13 @@ def pack(cases: Mapping[int, Case], workers: int, longest_seconds: float = LONGE
         [deck for group in groups for deck in _parted(group, cases, min(length, longest_seconds))] for length in lengths
     ]
     spans = [makespan((deck.seconds for deck in plan), workers) for plan in plans]
-    # Of plans that take as long, the one with the smallest decks.
+    # Of plans that take equally long: the one with the smallest decks.
     good = max(number for number, span in enumerate(spans) if span <= _AS_GOOD * min(spans))
     return sorted(plans[good], key=lambda deck: -deck.seconds)
 
 
 def _parted(group: Sequence[int], cases: Mapping[int, Case], longest: float) -> list[PlannedDeck]:
-    """A group in the fewest decks that keep to the bounds; a point by itself may exceed them."""
+    """The smallest number of decks for a group within the limits, which do not apply to a deck of one point."""
     most_walkers = max(pairs_of_beads(cases[number]) for number in group)
     for parts in range(1, len(group)):
         points = ceil(len(group) / parts)
@@ -180,7 +182,7 @@ def _parted(group: Sequence[int], cases: Mapping[int, Case], longest: float) -> 
 
 
 def _parts(group: Sequence[int], count: int) -> list[Sequence[int]]:
-    """A sequence in so many consecutive parts, of equal lengths as far as that goes."""
+    """Split a sequence into consecutive parts whose lengths differ by at most one."""
     edges = [len(group) * number // count for number in range(count + 1)]
     return [group[start:end] for start, end in pairwise(edges)]
 
@@ -191,7 +193,7 @@ def _deck(points: Sequence[int], cases: Mapping[int, Case]) -> PlannedDeck:
 
 
 def makespan(seconds: Iterable[float], workers: int) -> float:
-    """Time until all is done when each free worker takes the longest that is left, s."""
+    """Time in s until all decks are done, if each free worker takes the longest deck that is left."""
     durations = sorted(seconds, reverse=True)
     ends = [0.0] * max(1, min(workers, len(durations)))
     for duration in durations:
@@ -202,10 +204,9 @@ def makespan(seconds: Iterable[float], workers: int) -> float:
 def unfinished_parts(
     points: Sequence[int], cases: Mapping[int, Case], is_finished: Callable[[int], bool]
 ) -> list[PlannedDeck]:
-    """What is left of a deck: itself, or those of its halves, halves of halves …, of which nothing is finished.
+    """The unfinished part of a deck: the deck itself, or its largest halves, quarters, … without a finished point.
 
-    A deck that fails is tried again in halves; so what is left of it consists of the same decks, whenever the sweep was
-    interrupted.
+    A deck that fails is repeated as two halves. So the same decks are left whenever the sweep is interrupted.
     """
     finished = [is_finished(number) for number in points]
     if all(finished):
@@ -218,9 +219,9 @@ def unfinished_parts(
 def _missing_decks(
     cases: Sequence[Case], points: Sequence[int], options: Options, is_settled: Callable[[int], bool]
 ) -> list[PlannedDeck]:
-    """The decks of some points of which anything is missing, as they are whatever is finished."""
+    """Pack points into decks, and return the unfinished parts of these decks."""
     numbered = {point: cases[point] for point in points}
-    # A shared deck stays well below the limit, for a point by itself could be near it.
+    # A shared deck stays well below the limit, because a single point may be close to it.
     longest = min(LONGEST_SECONDS, 0.5 * options.time_limit) if options.time_limit else LONGEST_SECONDS
     packed = pack(numbered, options.decks_at_once, longest) if numbered else []
     return [part for deck in packed for part in unfinished_parts(deck.points, numbered, is_settled)]
@@ -228,9 +229,9 @@ def _missing_decks(
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """Plan of a sweep: points with their status, missing decks, runs that are not repeated.
+    """Plan of a sweep: points with their status, missing decks, failures that are not repeated.
 
-    Of a sweep with a descent these are all decks down to its bottom: it may end earlier.
+    A descent may end early: the decks are those down to its lowest point.
     """
 
     record: SweepRecord
@@ -248,7 +249,7 @@ class SweepPlan:
         besides = PROGRAM_SECONDS + predicted_overhead(self.cases[point] for point in missing)
         seconds = sum(deck.seconds * max(self.cases[point].run.ranks for point in deck.points) for deck in self.decks)
         apart = sum(predicted_seconds(self.cases[point]) * self.cases[point].run.ranks for point in missing)
-        # Python works for one deck at a time, while the engines of others run.
+        # Python works for one deck at a time, while other engines run.
         until = max(makespan((deck.seconds for deck in self.decks), at_once) + PROGRAM_SECONDS, besides)
         text = ", ".join(f"{count} {status}" for status, count in sorted(Counter(self.statuses).items()))
         keys = ", ".join(with_unit(key, unit) for key, unit in record.units.items())
@@ -257,23 +258,16 @@ class SweepPlan:
             f"{record.name}: {record.title}".rstrip(": "),
             f"  varied     {keys or 'nothing'}",
             f"  points     {len(record.runs)}: {text}",
-            f"  to do      {at_most}{_of(len(missing), 'point')} in {_of(len(self.decks), 'deck')}",
+            f"  to do      {at_most}{counted(len(missing), 'point')} in {counted(len(self.decks), 'deck')}",
             f"  predicted  {at_most}{seconds + besides:.0f} core-seconds ({apart + besides:.0f} without shared decks), "
-            f"{duration_text(until)} with {_of(at_once, 'deck')} in parallel",
+            f"{duration_text(until)} with {counted(at_once, 'deck')} in parallel",
             f"  directory  {record.directory}",
         ]
         return "\n".join(lines)
 
 
-def _of(count: int, thing: str) -> str:
-    return f"{count} {thing}{'' if count == 1 else 's'}"
-
-
 def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = None) -> SweepPlan:
-    """Resolve the points of a sweep and find the missing ones; nothing is written.
-
-    What it is given, and raises, is as of `run_sweep`.
-    """
+    """Resolve the points of a sweep and find the missing ones; nothing is written. Arguments: see `run_sweep`."""
     check_utf8(out.absolute())
     binary = find_engine(engine)
     cases = list(sweep.cases())
@@ -302,31 +296,31 @@ def run_sweep(
     allow_failed_audit: bool = False,
     on_progress: Callable[[SweepProgress], None] | None = None,
 ) -> tuple[SweepRecord, list[Failure]]:
-    """Make all runs of a sweep that are missing.
+    """Make the missing runs of a sweep.
 
     Parameters
     ----------
     sweep, out, options
-        From `walkers.inputs.sweep.load_sweep`; folder of the run directories; how it is to be run.
+        The sweep (`walkers.inputs.sweep.load_sweep`); folder of the run directories; see `Options`.
     engine, allow_failed_audit
-        As of `walkers.run`.
+        See `walkers.run`.
     on_progress
         Called a few times a second.
 
     Returns
     -------
     record, failures
-        The sweep (`walkers.sweeps.table.load` reads the table from ``record.directory``), and the points that failed;
-        all others are finished or, below the end of a descent, not needed.
+        The sweep (`walkers.sweeps.table.load` reads the table from ``record.directory``), and the failed points. All
+        others are finished or, below the end of a descent, not needed.
 
     Raises
     ------
     InputError
-        If a point cannot be used, or a cluster's shell would not take the folder for one.
+        If a point is invalid, or the path of the folder cannot be used in the shell scripts of a cluster.
     runner.EngineFailure
-        If there is no engine, its audit failed, or somebody removed the sweep's directory meanwhile.
+        If there is no engine, its audit failed, or the sweep's directory was removed during the sweep.
     sweeps.scheduler.ClusterFailed
-        If the cluster's jobs end without having worked.
+        If the jobs of the cluster end without doing any work.
     """
     plan = plan_sweep(sweep, out, options, engine)
     record = plan.record
@@ -336,7 +330,7 @@ def run_sweep(
     if not plan.decks:
         return record, plan.final
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    with suppress(ValueError, OSError):  # each point of a running deck keeps a lock open
+    with suppress(ValueError, OSError):  # each point of a running deck keeps a lock file open
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
     with _workers(plan.options, record) as submit:
         failures = _Scheduler(plan, submit).run(on_progress or (lambda _: None))
@@ -350,10 +344,7 @@ def run_sweep(
 
 @dataclass(frozen=True)
 class Report:
-    """Outcome of a deck: velocities (m/s) of its finished runs, or its failure.
-
-    A failure has the name of its class, what it says, and where its remains are.
-    """
+    """Outcome of a deck: velocities (m/s) of its finished runs, or name, message and directory of a failure."""
 
     finished: Mapping[str, float] = field(default_factory=dict)
     failure: str | None = None
@@ -370,10 +361,7 @@ def work(
     time_limit: float | None,
     retries: int = 0,
 ) -> Report:
-    """Make the runs of some names of one deck, on a worker, until it is to stop; a deck that fails is tried again.
-
-    Never raises what is known to happen: see `Report`.
-    """
+    """Make the runs of a deck on a worker, until ``stop`` is set. Known failures are returned, not raised."""
 
     def look(_: object = None) -> None:
         if stop is not None and stop.is_set():
@@ -403,13 +391,10 @@ def work(
 
 @contextmanager
 def _workers(options: Options, record: SweepRecord) -> Iterator[Callable[..., Future[Report]]]:
-    """Start threads, or Parsl on a cluster; yield what takes the arguments of `work`, but the first, there.
-
-    At the end the workers and their engines have ended, however the block is left.
-    """
+    """Start threads or Parsl, yield a function that submits `work` (arguments except ``stop``), and end all workers."""
     if options.site is None:
         stop = threading.Event()
-        with ThreadPoolExecutor(options.workers) as pool:
+        with ThreadPoolExecutor(options.decks_at_once) as pool:
             try:
                 yield lambda **deck: pool.submit(work, stop, **deck)
             finally:
@@ -420,8 +405,8 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[Callable[..., Fu
 
     folder = record.directory / PARSL
     try:
-        kernel = parsl.DataFlowKernel(pilots(options.site, folder))
-    except Exception as error:  # whatever Parsl raises: an address that this machine does not have, ports in use
+        kernel = parsl.DataFlowKernel(pilots(options.site, folder, options.ranks))
+    except Exception as error:  # any class: an address that this machine does not have, ports in use
         text = " ".join(str(error).split())
         text = f"Parsl cannot start ({text}); see {folder}, and [executor] address in the site file"
         raise ClusterFailed(text) from error
@@ -432,36 +417,36 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[Callable[..., Fu
 
 
 def _check_cluster(error: BaseException) -> None:
-    """Raise `ClusterFailed` if a deck failed because the cluster's jobs do."""
+    """Raise `ClusterFailed` if the jobs of the cluster fail, and not only this deck."""
     from parsl.executors.errors import BadStateException
 
     if isinstance(error, BadStateException):
-        first = " ".join(str(error).partition("Error 2:")[0].split())  # the others say the same
+        first = " ".join(str(error).partition("Error 2:")[0].split())  # the other errors repeat the first
         raise ClusterFailed(f"the cluster's jobs fail: {first}") from error
 
 
 class _Scheduler:
-    """Hands out decks and takes in reports."""
+    """Submits decks to the workers, one batch of each group of points at a time, and evaluates their reports."""
 
     def __init__(self, plan: SweepPlan, submit: Callable[..., Future[Report]]) -> None:
         self.plan, self.record, self.cases, self.submit = plan, plan.record, plan.cases, submit
         self.failures = list(plan.final)
         finished = [run for run, status in zip(plan.record.runs, plan.statuses, strict=True) if status == "finished"]
         self.settled = {*finished, *(failure.run for failure in plan.final)}
-        """Names of the runs that are finished or given up."""
+        """Names of the runs that are finished or failed for good."""
         self.velocities: dict[str, float] = {}
         self.ended: SimpleQueue[tuple[PlannedDeck, Future[Report]]] = SimpleQueue()
         self.groups_of: dict[PlannedDeck, int] = {}
-        """The decks on their way, of which group of points."""
+        """Submitted decks, with the number of their group."""
         groups: dict[Hashable, list[list[int]]] = {}
-        for chain in self.record.chains:  # all points are one group, as are descents that may share decks
+        for chain in self.record.chains:  # one group for all points, or for all descents that may share decks
             groups.setdefault(sharing_key(self.cases[chain[0]]) if self.record.descent else None, []).append(chain)
         self.batches = [self._batches(chains) for chains in groups.values()]
         self.begin, self.seconds_done = time.perf_counter(), 0.0
         self.found = self.done = len(finished)
 
     def run(self, on_progress: Callable[[SweepProgress], None]) -> list[Failure]:
-        """Until every point is settled."""
+        """Work until every point is settled; return the failures in the order of the points."""
         shown = 0.0
         for group in range(len(self.batches)):
             self._advance(group)
@@ -481,11 +466,8 @@ class _Scheduler:
         return self.record.runs[point] in self.settled
 
     def _batches(self, chains: list[list[int]]) -> Iterator[list[int]]:
-        """What of a group is made at once, each batch when the one before is settled: all points without descents.
-
-        Descents go down side by side, so many steps at once as fill a deck: those below where a descent ends are made
-        in vain, but cost less than decks that are nearly empty.
-        """
+        """The batches of a group: without descents all points, else the next steps of all descents that continue."""
+        # A batch has as many steps as fill a deck: wasted steps below the end of a descent cost less than short decks.
         step, descent = 0, self.record.descent
         while chains and step < len(chains[0]):
             steps = len(chains[0])
@@ -496,20 +478,18 @@ class _Scheduler:
             now = slice(step, step + steps)
             yield [point for chain in chains for point in chain[now]]
             if descent is not None:
-                chains = [
-                    one for one in chains if not any(descent.at_rest(self._velocity(point)) for point in one[now])
-                ]
+                chains = [one for one in chains if not any(map(self._is_at_rest, one[now]))]
             step += steps
 
-    def _velocity(self, point: int) -> float:
-        """That of a settled point, m/s; NaN if it failed."""
-        run = self.record.runs[point]
+    def _is_at_rest(self, point: int) -> bool:
+        """Whether a settled point ends its descent; a failed one does not."""
+        run, descent = self.record.runs[point], self.record.descent
         if run not in self.velocities:
             self.velocities[run] = velocity_of(self.record.out / run)
-        return self.velocities[run]
+        return descent is not None and descent.at_rest(self.velocities[run])
 
     def _advance(self, group: int) -> None:
-        """Hand out what may be made next of a group of which nothing is on its way."""
+        """Submit the next batch of a group that has no submitted deck."""
         while group not in self.groups_of.values():
             batch = next(self.batches[group], None)
             if batch is None:
@@ -530,7 +510,7 @@ class _Scheduler:
         future.add_done_callback(lambda future: self.ended.put((deck, future)))
 
     def _take_in(self, deck: PlannedDeck, group: int, future: Future[Report]) -> None:
-        """Count what is finished; hand the rest out again: what others were making as it is, what failed in halves."""
+        """Count finished points, and submit the others again: in halves if the deck failed."""
         error = future.exception()
         if error is not None and self.plan.options.site is not None:
             _check_cluster(error)
@@ -546,12 +526,12 @@ class _Scheduler:
             self.failures.append(Failure(left[0], run, report.failure, report.message, report.directory))
             self.settled.add(run)
             self.seconds_done += deck.seconds
-        elif left:
+        elif left:  # without a failure another process was making these points
             for part in _parts(left, 2) if report.failure else [left]:
                 self._hand_out(PlannedDeck(tuple(part), deck.seconds * len(part) / len(deck.points)), group)
 
     def _progress(self) -> SweepProgress:
-        first = list(self.groups_of)[: 4 * self.plan.options.decks_at_once]  # the others wait
+        first = list(self.groups_of)[: 4 * self.plan.options.decks_at_once]  # later decks have not started
         made = [deck for deck in first if is_locked(self.record.out / self.record.runs[deck.points[0]])]
         waiting = sum(deck.seconds for deck in self.groups_of)
         elapsed = time.perf_counter() - self.begin

@@ -1,4 +1,4 @@
-"""Sites of sweeps: the cores of this machine, or the cluster of a site file.
+"""Site files: the cluster on which a sweep runs.
 
     scheduler = "slurm"
     partition = "main"
@@ -6,8 +6,8 @@
     cores     = 32
     jobs      = 4
 
-The scheduling on a cluster is Parsl's. Jobs of a cluster are pilots: each holds workers that take deck after deck until
-none is left.
+Parsl submits the jobs. A job is a pilot: it starts workers, and each worker runs one deck after another until none is
+left.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import os
 import re
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
@@ -36,7 +35,7 @@ if TYPE_CHECKING:
     from parsl.config import Config
 
 _OURS = {
-    # Our key: what one or the other of Parsl's providers calls it.
+    # Key of a site file: its names in Parsl's providers.
     "partition": ("partition", "queue"),
     "account": ("account", "allocation", "project"),
     "walltime": ("walltime",),
@@ -53,21 +52,21 @@ _SCHEDULERS = {
     "condor": "CondorProvider",
     "local": "LocalProvider",
 }
-"""Names of our own; the class names of Parsl's other providers are taken as they are."""
+"""Providers by name; a site file may also give the class name of another provider of Parsl."""
 _GUARDED = ("setsid", "setpriv", "--pdeathsig", "TERM")
-"""How Parsl's interchange is started: out of Ctrl-C's reach, for Parsl waits for its word at the end; and mortal, so
-that the pilots of a sweep that was killed miss it and end too."""
-_MOST_LOSSES = 5  # how often a deck is given out again after its worker was lost (a cancelled job, a node gone down)
+"""Prefix of the command that starts Parsl's interchange. Ctrl-C must not end the interchange, because Parsl waits for
+its last message. If the sweep is killed, the interchange must end, so that the pilots notice and end, too."""
+_MOST_LOSSES = 5  # repetitions of a deck whose worker was lost (a cancelled job, a node that went down)
 _SHELL_TEXTS = ("scheduler_options", "worker_init", "launch_cmd", "interchange_launch_cmd", "regex_job_id")
-"""Settings of Parsl's that are lines or commands by what they are, and one that no shell sees."""
-# SLURM fills in what stands behind a per cent sign, and its jobs end at once where their output cannot go.
+"""Settings of Parsl that are shell commands, and a regular expression that no shell reads."""
+# SLURM replaces patterns such as %N in paths; a job whose output cannot be written ends at once.
 _ODD = re.compile(r"[^\w./+@=,:-]")
 _TAKEN = "expected letters, digits and . _ / + @ = , : -"
 _Count = Annotated[Whole, Field(ge=1, le=10_000)]
 
 
-class SiteFile(BaseModel):
-    """A site file."""
+class Site(BaseModel):
+    """A cluster, as its site file describes it."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -97,34 +96,16 @@ class SiteFile(BaseModel):
         return name
 
 
-@dataclass(frozen=True)
-class Site:
-    """A cluster as its file describes it, and MPI processes (ranks) of its decks: a node takes so many decks fewer."""
-
-    file: SiteFile
-    ranks: int = 1
-
-    @property
-    def workers_per_node(self) -> int:
-        """How many decks run at once on a node."""
-        return max(1, self.file.cores // self.ranks)
-
-    @property
-    def workers(self) -> int:
-        """How many decks run at once."""
-        return self.workers_per_node * self.file.nodes * self.file.jobs
-
-
 def cores_here() -> int:
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0))
 
 
 def load_site(path: str | Path) -> Site:
-    """Read a site file; `InputError` tells what is wrong with it, in Parsl's words if it is Parsl that refuses it."""
+    """Read a site file; `InputError` if it is invalid, with Parsl's message if Parsl refuses it."""
     require("cluster")
     document = read_toml(Path(path))
-    site = Site(validated(SiteFile, document, str(path), "a site"))
+    site = validated(Site, document, str(path), "a site")
     settings = [[table, key] for table in ("provider", "executor") for key in document.get(table, ())]
     for place in (["partition"], ["account"], *settings):
         value = value_at(document, place)
@@ -141,21 +122,21 @@ def load_site(path: str | Path) -> Site:
 
 
 def _launchers() -> Mapping[str, str]:
-    """Our names for Parsl's launchers (``srun``) and theirs (``SrunLauncher``)."""
+    """Names of launchers in site files (``srun``) and in Parsl (``SrunLauncher``)."""
     import parsl.launchers
 
     return {name.removesuffix("Launcher").lower(): name for name in parsl.launchers.__all__ if name[:4] != "Wrap"}
 
 
 def check_path(folder: Path) -> None:
-    """Refuse a folder with a space, a quote or the like in its path: Parsl writes it into shell scripts as it is."""
+    """Refuse a folder whose path contains a space, a quote or the like: Parsl writes it into shell scripts unquoted."""
     whole = str(folder.resolve())
     if odd := _ODD.search(whole):
         raise refused("--out", f"with a site file {_TAKEN} in the path, found {odd[0]!r} in {whole!r}")
 
 
-def pilots(site: Site, run_dir: Path) -> Config:
-    """Parsl's configuration for a cluster; its scripts and logs go to a folder that the nodes must see."""
+def pilots(site: Site, run_dir: Path, ranks: int = 1) -> Config:
+    """Parsl's configuration for decks of a number of MPI processes; the nodes must see ``run_dir`` (scripts, logs)."""
     import parsl.launchers
     import parsl.providers
     from parsl.config import Config
@@ -163,36 +144,35 @@ def pilots(site: Site, run_dir: Path) -> Config:
     from parsl.executors.high_throughput.executor import DEFAULT_LAUNCH_CMD
     from parsl.jobs.error_handlers import windowed_error_handler
 
-    file = site.file
-    name = _SCHEDULERS.get(file.scheduler, file.scheduler)
+    name = _SCHEDULERS.get(site.scheduler, site.scheduler)
     provider_class = getattr(parsl.providers, name)
     taken = inspect.signature(provider_class).parameters
-    # A node is shared with others unless the provider table says otherwise; jobs come and go with the work.
-    ours = {"worker_init": _worker_init(file), "exclusive": False, "min_blocks": 0}
+    # Nodes are shared with other jobs unless [provider] says otherwise; without work there are no jobs.
+    ours = {"worker_init": _worker_init(site), "exclusive": False, "min_blocks": 0}
     settings = {key: value for key, value in ours.items() if key in taken}
     for key, names in _OURS.items():
         theirs = next((one for one in names if one in taken), None)
-        if theirs is not None or (key in file.model_fields_set and key != "cores"):  # then it is Parsl's to refuse it
-            settings[theirs or key] = getattr(file, key)
+        if theirs is not None or (key in site.model_fields_set and key != "cores"):  # Parsl refuses an unknown key
+            settings[theirs or key] = getattr(site, key)
     settings = {key: value for key, value in settings.items() if value is not None}
-    # On several nodes each needs a step of its own to start its workers.
-    launcher = file.launcher or ("srun" if name == "SlurmProvider" and file.nodes > 1 else None)
+    # With several nodes, srun starts the workers of each node.
+    launcher = site.launcher or ("srun" if name == "SlurmProvider" and site.nodes > 1 else None)
     if launcher is not None:
         settings["launcher"] = getattr(parsl.launchers, _launchers()[launcher])()
     options: dict[str, Any] = {
-        "max_workers_per_node": site.workers_per_node,
+        "max_workers_per_node": site.cores // ranks,
         "heartbeat_period": 10,
         "heartbeat_threshold": 60,
         "block_error_handler": windowed_error_handler,
         "worker_logdir_root": str(run_dir),
         "interchange_launch_cmd": [*_GUARDED, str(Path(sys.executable).with_name("interchange.py"))],
     }
-    if file.container:
-        options["launch_cmd"] = f"{file.container} {DEFAULT_LAUNCH_CMD}"
-    if name == "LocalProvider":  # pilots on this machine: nobody else is to be listened to, and Parsl listens to all
+    if site.container:
+        options["launch_cmd"] = f"{site.container} {DEFAULT_LAUNCH_CMD}"
+    if name == "LocalProvider":  # pilots on this machine; by default Parsl accepts connections from everywhere
         options["address"] = "127.0.0.1"
-    provider = provider_class(**(settings | _as_tuples(file.provider)))
-    executor = HighThroughputExecutor(label="pilots", provider=provider, **(options | _as_tuples(file.executor)))
+    provider = provider_class(**(settings | _as_tuples(site.provider)))
+    executor = HighThroughputExecutor(label="pilots", provider=provider, **(options | _as_tuples(site.executor)))
     return Config(
         executors=[executor],
         run_dir=str(run_dir),
@@ -204,18 +184,18 @@ def pilots(site: Site, run_dir: Path) -> Config:
 
 
 def _as_tuples(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Parsl's ranges are tuples, while TOML has lists only."""
+    """Settings with tuples instead of lists: Parsl expects tuples, and TOML has only lists."""
     return {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
 
 
 def _cost_of_failure(error: Exception, _: object) -> float:
-    """What Parsl counts a task's failure for: it may be lost with its worker, and not fail otherwise."""
+    """Share of the retries that a failure uses up: Parsl repeats a deck only if its worker was lost."""
     from parsl.executors.high_throughput.errors import ManagerLost, WorkerLost
 
     return 1.0 if isinstance(error, (ManagerLost, WorkerLost)) else _MOST_LOSSES + 1.0
 
 
-def _worker_init(file: SiteFile) -> str:
-    """Shell lines before the workers: the modules, the site's own lines, and this Python first on the path."""
-    modules = [f"module load {quote(name)}" for name in file.modules]
-    return "\n".join([*modules, *file.shell, f'export PATH={quote(str(Path(sys.executable).parent))}:"$PATH"'])
+def _worker_init(site: Site) -> str:
+    """Shell lines before the workers: load the modules, the lines of the site file, this Python first in PATH."""
+    modules = [f"module load {quote(name)}" for name in site.modules]
+    return "\n".join([*modules, *site.shell, f'export PATH={quote(str(Path(sys.executable).parent))}:"$PATH"'])

@@ -31,11 +31,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 POINTS = 32
-"""Enough for 5 and 95 %, and for ranks that tell what matters most; a power of two, as Sobol's sequence likes it."""
+"""Enough points for 5 and 95 %, and for the strongest rank correlations; a power of two, for Sobol's sequence."""
 _SEEDS = range(1, 65)
-"""Of the scrambling, of which the one is taken whose columns hang together least: of few points in many dimensions some
-do by 0.7, and their influences could not be separated."""
-_AT_REST = 2e-5  # m/s: below, walkers are at rest, as in the sweeps that look for the threshold of motion
+"""Seeds of the scrambling; the one with the least correlated columns is used. With few points in many dimensions,
+correlations of columns reach 0.7, and the influences of the values could not be separated."""
+_AT_REST = 2e-5  # m/s: slower walkers are at rest, as in the sweeps for the threshold of motion
 _WORDS = {
     "forward": "walk toward the large bead",
     "backward": "walk toward the small bead",
@@ -46,7 +46,7 @@ _WORDS = {
 
 @dataclass(frozen=True)
 class Band:
-    """Of a result over the points, SI units: 5, 50 and 95 %, the ends, and how many points gave it."""
+    """Percentiles (5, 50 and 95 %), smallest and largest value of a result, SI units, and number of its points."""
 
     low: float
     median: float
@@ -60,10 +60,10 @@ class Band:
 class Spread:
     """Results of a spread, in the directory of its sweep.
 
-    Values were ``varied``, each drawn from its range; others that nobody measured, but the case gives, were ``held``.
-    Of the results that count, by the columns of the sweep's table, ``bands`` has what they were without walkers that
-    came apart, ``depends`` the rank correlations (Spearman) with what was drawn, the strongest first, if beyond two
-    standard errors of none. So many points went ``forward`` (toward the large bead), …; of piles none did.
+    ``varied`` are the values that were drawn from their ranges, ``held`` are unmeasured values that the case gives.
+    ``bands`` has the main results by the columns of the sweep's table, without walkers that came apart; ``depends`` has
+    their rank correlations (Spearman) with the drawn values, the strongest first, if larger than two standard errors.
+    ``counts`` are numbers of points whose walkers go ``forward`` (toward the large bead), …; empty for piles.
     """
 
     directory: Path
@@ -82,17 +82,14 @@ class Spread:
 
 
 def _range_of(one: Origin) -> dict[str, list[Any]]:
-    """The range of a value as a sweep's sampler takes it: the case's own value is the median.
-
-    So a result is in the middle of what its guesses make of it, wherever in their ranges these are.
-    """
+    """The range of a value for the sampler of a sweep; the value of the case is the median."""
     name, (low, high) = "loguniform" if one.logarithmic else "uniform", one.range or (None, None)
     ends: Range = ranges_of({one.key: {name: [low, high]}})[one.key]
     kind = kind_of(one.key)
     try:
         unit = parse_quantity(f"1 {ends.unit}", kind) if kind and ends.unit else 1.0
         own = (parse_quantity(one.text, kind) if kind and ends.unit else float(one.text)) / unit
-    except ValueError:  # one that the case leaves to the program, such as a time step
+    except ValueError:  # a value that the program computes, such as a time step
         return {name: [low, high]}
     if not ends.low * (1.0 - 1e-9) <= own <= ends.high * (1.0 + 1e-9):
         message = f"expected a range that holds the case's own value, {one.text}"
@@ -101,16 +98,16 @@ def _range_of(one: Origin) -> dict[str, list[Any]]:
 
 
 def _half(one: Origin) -> str:
-    """Half of the draws, if the case's own value, their median, is an end of its range."""
+    """A note that half of the draws are equal, if the median is an end of the range."""
     drawn = ranges_of({one.key: _range_of(one)})[one.key]
     return f"; half of the draws at {one.text}" if drawn.median in (drawn.low, drawn.high) else ""
 
 
 def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> Sweep:
-    """A sweep over all that is uncertain in a case: Sobol's sequence, scrambled so that its columns are least alike.
+    """A sweep over the uncertain values of a case by Sobol's sequence, scrambled for the least correlated columns.
 
-    The case's own values are the medians of what is drawn. `InputError` if nothing in the case is uncertain, a range
-    does not hold the case's own value, or the case was changed after it was read.
+    The medians are the values of the case. `InputError` if no value is uncertain, a range does not contain the value of
+    the case, or the case was changed after it was read.
     """
     import numpy as np
 
@@ -152,13 +149,13 @@ def run_spread(
 ) -> Spread:
     """Run a case with all unmeasured values drawn from their ranges, and write the bands beside the sweep's record.
 
-    The case is as it was read from a file: its own values say what is uncertain. All else is as of
-    `walkers.sweeps.scheduler.run_sweep`. Texts and reports of the case's run have the bands from then on.
+    The case must be as read from a file. Other arguments: see `walkers.sweeps.scheduler.run_sweep`. From then on, texts
+    and reports of the case's run contain the bands.
 
     Notes
     -----
-    Each value is drawn by itself. Those of a calibration hang together (docs/explanation/calibration.md), so that the
-    band of a calibrated case is wider than that of its posterior.
+    Values are drawn independently. Calibrated values are correlated (docs/explanation/calibration.md): for them, the
+    band is wider than that of the posterior.
     """
     sweep = spread_sweep(case, points, engine)
     record, failures = run_sweep(sweep, out, options, engine=engine, **how)
@@ -171,7 +168,7 @@ def run_spread(
         counts = {"forward": int((speeds > _AT_REST).sum()), "backward": int((speeds < -_AT_REST).sum())}
         counts |= {"at_rest": int((speeds.abs() <= _AT_REST).sum()), "separated": len(table) - len(together)}
     shown = [name for one in analyses_of(case) for name in one.headlines if name in one.columns]
-    if sides_differ(together):  # the mean over both is no walker's velocity
+    if sides_differ(together):  # the mean over both sides means nothing
         shown = ["right_facing" if name == "velocity" else name for name in shown]
     spread = Spread(
         directory=record.directory,
@@ -192,7 +189,7 @@ def _band(values: pd.Series[float]) -> Band:
 
 
 def _ranks(table: pd.DataFrame, name: str, keys: tuple[str, ...]) -> dict[str, float]:
-    """Rank correlations of a column with each key, the strongest first, if they are more than chance."""
+    """Rank correlations of a column with each key, the strongest first, without insignificant ones."""
     if len(table) < LEAST_PER_VALUE * len(keys) or table[name].nunique() < 2:
         return {}
     ranks = {key: float(table[key].rank().corr(table[name].rank())) for key in keys}

@@ -1,19 +1,19 @@
 """Sweeps on disk and as tables.
 
-A sweep's directory holds ``sweep.json``, the list of its points, each with the name of its run. The runs themselves are
-beside the sweep's directory, shared by all sweeps of that folder: what is finished, failed or being made is read from
-them and from nowhere else.
+A sweep's directory contains ``sweep.json``, the list of its points with the names of their runs. The run directories
+are beside the sweep's directory, and all sweeps of a folder share them. The status of a point is always read from its
+run directory.
 
-The table has one row per point: what was varied, what follows from its case, and what its run gave. Figure, report,
-comparison and spread of a sweep are made from it. Its ``attrs`` tell of the columns (``units``, ``meanings``) and of
-the sweep (``sweep``, ``title``, ``axes``: the keys that vary, those together that go together).
+The table has one row per point: the varied keys, quantities derived from the case, and the results of the run. Figure,
+report, comparison and spread of a sweep are made from it. Its ``attrs`` describe the columns (``units``, ``meanings``)
+and the sweep (``sweep``, ``title``, ``axes``: tuples of keys that vary together).
 """
 
 from __future__ import annotations
 
 import io
-import json
 import os
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ from walkers.postprocess.analysis import RESULT_NAME, Described, analyses, analy
 from walkers.postprocess.sides import differ
 from walkers.runner.binary import Engine
 from walkers.runner.directory import FAILURE_NAME, finished_run, is_locked, run_place, unfinished
-from walkers.runner.files import read_json, write_bytes, write_json
+from walkers.runner.files import json_bytes, read_json, write_bytes, write_json
 from walkers.runner.manifest import check_unchanged
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 RECORD_NAME = "sweep.json"
 PARSL = "parsl"
-"""Folder of Parsl's scripts and logs in a sweep's directory."""
+"""Folder in a sweep's directory for Parsl's scripts and logs."""
 _FORMAT = 2
 _DRIVE = {
     "frequency": ("Hz", "frequency of the drive"),
@@ -67,9 +67,9 @@ _LEFT_OUT = {
     *("scatter", "right_facing", "left_facing", "sliding_2", "sliding_3", "open_1", "open_2", "open_3"),
     *("separated_fraction", "orientation_end", "turned_round", "walkers_met", "lost", "reason"),
 }
-"""Columns that a table to look at leaves out."""
+"""Columns that the printed table leaves out."""
 _VARIED = "varied"
-"""Meaning of the columns of what varies."""
+"""Meaning of the columns of varied keys."""
 _STATUSES = ("finished", "running", "failed", "missing", "not needed")
 _MOST_FAILURES = 10
 
@@ -79,11 +79,11 @@ _MOST_FAILURES = 10
 
 @dataclass(frozen=True)
 class SweepRecord:
-    """A sweep as its directory describes it.
+    """A sweep as recorded in its directory.
 
-    ``units`` has the keys that vary; of each point ``values`` has one a key, ``derived`` one a column of
-    `derived_columns`, ``runs`` the name of its run. ``analyses`` are those that mean something for its cases; ``file``
-    has the tables of the sweep file, if they were recorded.
+    ``units`` has the varied keys. For each point, ``values`` has the values of these keys, ``derived`` the columns
+    `derived_columns`, ``runs`` the name of the run. ``analyses`` are those that apply to its cases; ``file`` has the
+    tables of the sweep file, if they were recorded.
     """
 
     directory: Path
@@ -104,7 +104,7 @@ class SweepRecord:
 
     @property
     def axes(self) -> list[tuple[str, ...]]:
-        """The keys that vary, those together that its file has in one table beside ``[axes]``."""
+        """The varied keys; keys of one table of the file (``zip``, ``sample``, ``one_at_a_time``) are one axis."""
         together = [flatten(table, is_axis) for table in self.file.get("zip", ())]
         together += [flatten(table["ranges"], is_axis) for table in self.file.get("sample", ())]
         together += [flatten(self.file.get("one_at_a_time", {}), is_axis)]
@@ -113,18 +113,18 @@ class SweepRecord:
 
     @property
     def chains(self) -> list[list[int]]:
-        """The descents: numbers of their points, from the top. All points where there is no descent."""
+        """Numbers of the points of each descent, highest value first; without descents one list of all points."""
         steps = self.descent.steps if self.descent else len(self.runs)
         return [list(range(start, start + steps)) for start in range(0, len(self.runs), steps or 1)]
 
 
 def derived_columns(names: Sequence[str]) -> Described:
-    """Columns that follow from a case, of the analyses of these names: unit and meaning."""
+    """Unit and meaning of the columns that the analyses of these names derive from a case."""
     return {**{key: column for one in analyses() if one.name in names for key, column in one.derived.items()}, **_DRIVE}
 
 
 def result_columns(names: Sequence[str]) -> Described:
-    """Columns that a run gives, of the analyses of these names: unit and meaning."""
+    """Unit and meaning of the columns that the analyses of these names give for a run."""
     return {key: column for one in analyses() if one.name in names for key, column in one.columns.items()}
 
 
@@ -134,7 +134,7 @@ def row_of(result: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def describe_sweep(sweep: Sweep, cases: Sequence[Case], engine: Engine, out: Path) -> SweepRecord:
-    """The record of a sweep whose points have been resolved; `InputError` if piles are to descend."""
+    """The record of a sweep with resolved points; `InputError` for descents of piles, which have no velocity."""
     found = {one.name for case in cases for one in analyses_of(case)}
     names = [one.name for one in analyses() if one.name in found]
     if sweep.descent is not None and "velocity" not in result_columns(names):
@@ -159,7 +159,7 @@ def describe_sweep(sweep: Sweep, cases: Sequence[Case], engine: Engine, out: Pat
 
 
 def write_record(record: SweepRecord) -> None:
-    """Make the sweep's directory, if need be, and write its ``sweep.json``."""
+    """Write ``sweep.json`` into the sweep's directory, which is made if necessary."""
     record.directory.mkdir(parents=True, exist_ok=True)
     points = [
         {"values": list(values), "derived": list(derived.values()), "run": run}
@@ -180,7 +180,7 @@ def write_record(record: SweepRecord) -> None:
 
 
 def read_record(directory: str | Path) -> SweepRecord:
-    """Read a sweep's directory; `InputError` if it is none."""
+    """Read the record in a sweep's directory; `InputError` if there is none."""
     from walkers.inputs.sweep import Descent
 
     given, directory = directory, Path(directory).resolve()
@@ -206,7 +206,7 @@ def read_record(directory: str | Path) -> SweepRecord:
 class PointState:
     """State of a point: finished, failed, running, missing, or not needed (below the end of a descent).
 
-    The directory is that of the finished run, or of what is left of the failed one; the rest is of a failure.
+    ``directory`` is that of the finished or failed run; the other fields describe a failure.
     """
 
     status: str
@@ -217,12 +217,9 @@ class PointState:
 
 
 def states(record: SweepRecord) -> list[PointState]:
-    """State of each point, from the run directories."""
+    """State of each point, read from the run directories."""
     places = [record.out / run for run in record.runs]
-    found = [
-        PointState("finished", place) if finished_run(place) else unfinished_state(place, unfinished(place))
-        for place in places
-    ]
+    found = list(map(state_at, places))
     if record.descent is None:
         return found
     for chain in record.chains:
@@ -236,14 +233,19 @@ def states(record: SweepRecord) -> list[PointState]:
 
 
 def worst_status(points: Iterable[str]) -> str:
-    """The status of a sweep whose points have these: running, else interrupted, else failed, if one is."""
+    """Status of a sweep from those of its points: running, interrupted or failed if one is, in this order."""
     found = set(points)
     worst = {"running": "running", "missing": "interrupted", "failed": "failed"}
     return next((status for one, status in worst.items() if one in found), "finished")
 
 
+def state_at(place: Path) -> PointState:
+    """State of the run that belongs in a place."""
+    return PointState("finished", place) if finished_run(place) else unfinished_state(place, unfinished(place))
+
+
 def unfinished_state(place: Path, directory: Path) -> PointState:
-    """What has become of a run that is not finished, or is made anew, in a directory."""
+    """State of an unfinished run, or of one that is made again, in a directory."""
     if is_locked(place):
         return PointState("running")
     try:
@@ -260,7 +262,7 @@ def velocity_in(result: Mapping[str, Any]) -> float:
 
 
 def velocity_of(directory: Path) -> float:
-    """Mean velocity of a finished run, m/s, as its result says, of whatever version; NaN if its files are damaged."""
+    """Mean velocity in the recorded result of a finished run, m/s; NaN if the files are damaged."""
     with suppress(OSError, ValueError, KeyError, TypeError):
         return velocity_in(recorded_result(directory))
     with suppress(DamagedRunError):
@@ -269,17 +271,17 @@ def velocity_of(directory: Path) -> float:
 
 
 def recorded_result(directory: Path) -> dict[str, Any]:
-    """The result that a finished run has, of whatever version; `OSError`, `ValueError` if it is not what it was."""
+    """The recorded result of a finished run, of any version; `OSError` or `ValueError` if the file was changed."""
     check_unchanged(directory, [RESULT_NAME])
     return read_json(directory / RESULT_NAME)
 
 
 class DamagedRunError(WalkersError):
-    """A finished run whose files were changed or cut since, and whose result cannot be made anew from its dumps."""
+    """A finished run whose files were changed, so that its result cannot be computed again from its dumps."""
 
 
 def result_in(directory: Path) -> dict[str, Any]:
-    """The result of a finished run; `DamagedRunError` if there is none."""
+    """The current result of a finished run; `DamagedRunError` if it cannot be computed."""
     try:
         return current_result(directory)
     except (OSError, ValueError, KeyError, TypeError, IndexError, WalkersError) as error:
@@ -327,7 +329,6 @@ def _with_units(frame: pd.DataFrame, described: Mapping[str, tuple[str, str]]) -
 
 
 def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
-    """What is known of a point."""
     row: dict[str, Any] = {"point": number}
     for key, value in zip(record.units, record.values[number], strict=True):
         row |= {f"{key}[{part}]": one for part, one in enumerate(value)} if isinstance(value, list) else {key: value}
@@ -343,12 +344,12 @@ def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
 
 
 def varied_columns(frame: pd.DataFrame) -> list[str]:
-    """The columns of a sweep's table that have the keys that vary."""
+    """The columns of varied keys in a sweep's table."""
     return [name for name, meaning in frame.attrs["meanings"].items() if meaning == _VARIED]
 
 
 def sides_differ(frame: pd.DataFrame) -> bool:
-    """Whether walkers that face up and down a slope differ at a point: the mean over both is no walker's velocity."""
+    """Whether walkers facing up and down a slope differ at a point, so that their mean velocity means nothing."""
     if not {"upright", *SIDES} <= set(frame.columns):
         return False
     slopes = frame[frame["upright"].notna()]
@@ -356,17 +357,17 @@ def sides_differ(frame: pd.DataFrame) -> bool:
 
 
 def main_columns(frame: pd.DataFrame) -> list[str]:
-    """What is shown of a table if nothing else is asked for: the first of these that it has."""
+    """The main results in order of preference."""
     return ["right_facing", *_RESULTS] if sides_differ(frame) else list(_RESULTS)
 
 
 def default_column(frame: pd.DataFrame) -> str:
-    """The column of a table that is shown if nothing else is asked for."""
+    """The column of a table that is shown by default."""
     return next((name for name in main_columns(frame) if name in frame), "frequency")
 
 
 def find_name(option: str, wanted: str, names: Iterable[str]) -> str:
-    """The name that is meant: itself, or the only one that ends so; `InputError` if there is none, or are several."""
+    """Find a name, or the only name that ends with ``.`` and it; `InputError` if there is none or several."""
     known = list(dict.fromkeys(names))
     found = [name for name in known if name == wanted] or [name for name in known if name.endswith(f".{wanted}")]
     if len(found) == 1:
@@ -381,7 +382,7 @@ def with_unit(words: str, unit: str | None) -> str:
 
 
 def value_text(value: Any) -> str:
-    """A value of a key as text, several with strokes between them."""
+    """A value of a key as text; several are separated by slashes."""
     if isinstance(value, list):
         return "/".join(map(value_text, value))
     return f"{value:g}" if isinstance(value, float) else str(value)
@@ -395,12 +396,11 @@ def encoded(frame: pd.DataFrame, form: str) -> bytes:
         return str(frame.to_csv(index=False, header=heads)).encode()
     if form == "json":  # not by DataFrame.to_json, which rounds to decimals
         rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
-        contents = {"units": units, "meanings": meanings, "points": rows}
-        return (json.dumps(contents, indent=2, ensure_ascii=False) + "\n").encode()
+        return json_bytes({"units": units, "meanings": meanings, "points": rows})
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    # Of numbers and words ("auto") words, of booleans and NaN (not finished) booleans.
+    # Numbers and words ("auto") become words, booleans and NaN (not finished) become booleans.
     mixed = {name: set(frame[name].map(type)) for name in frame.columns if frame[name].dtype == object}
     types = {name: "boolean" for name, kinds in mixed.items() if bool in kinds and str not in kinds}
     types |= {name: "str" for name, kinds in mixed.items() if str in kinds and len(kinds) > 1}
@@ -412,14 +412,14 @@ def encoded(frame: pd.DataFrame, form: str) -> bytes:
 
 
 def write_table_file(frame: pd.DataFrame, path: Path) -> None:
-    """Write a table in the form that the file's name ends in; `InputError` if that is none of `FORMATS`."""
+    """Write a table in the format of the file's suffix; `InputError` if it is none of `FORMATS`."""
     if path.suffix.lstrip(".") not in FORMATS:
         raise refused(path, f"expected a name that ends in .{', .'.join(FORMATS)}")
     write_bytes(path, encoded(frame, path.suffix.lstrip(".")))
 
 
 def short_text(frame: pd.DataFrame) -> str:
-    """A table to look at: what varied, Γ0, sin δ, results in mm, mm/s, nJ and degrees, status, run."""
+    """A table as text: varied keys, Γ0, sin δ, results in mm, mm/s, nJ and degrees, status, run."""
     import pandas as pd
 
     left_out = (_LEFT_OUT - set(SIDES)) | {"velocity"} if sides_differ(frame) else _LEFT_OUT
@@ -435,28 +435,26 @@ def short_text(frame: pd.DataFrame) -> str:
 
 
 def thresholds(directory: str | Path) -> pd.DataFrame:
-    """Where the descents of a sweep ended; `InputError` if it has none.
+    """The ends of the descents of a sweep; `InputError` if it has none.
 
     Returns
     -------
     DataFrame
-        One row per descent: the other keys that vary, ``moving`` and ``at_rest``, the last values of the lowered key at
-        which the walkers moved and the first at which they did not (NaN where there is none, yet or at all), and
-        ``gamma0_moving`` and ``gamma0_at_rest``, the dimensionless peak forces Γ0 there.
+        One row per descent: the other varied keys; ``moving`` and ``at_rest``, the last value of the lowered key at
+        which the walkers move and the first at which they rest (NaN if there is none); and ``gamma0_moving`` and
+        ``gamma0_at_rest``, the dimensionless peak forces Γ0 at these values.
     """
-    import numpy as np
     import pandas as pd
 
     record = read_record(directory)
-    descent = record.descent
-    if descent is None:
+    if (descent := record.descent) is None:
         raise refused(directory, "the sweep has no descent and therefore no thresholds")
     frame = load(directory)
     others = [name for name in varied_columns(frame) if name != descent.key]
     rows = []
     for _, points in frame.groupby(frame["point"] // descent.steps):
         finished = points[points["status"] == "finished"]
-        slow = np.abs(finished["velocity"].to_numpy(dtype=float)) < descent.until_below
+        slow = finished["velocity"].astype(float).abs() < descent.until_below
         row = {name: points.iloc[0][name] for name in others}
         for name, part in (("moving", finished[~slow].tail(1)), ("at_rest", finished[slow].head(1))):
             row[name] = part.iloc[0][descent.key] if len(part) else nan
@@ -472,17 +470,16 @@ def thresholds(directory: str | Path) -> pd.DataFrame:
     return _with_units(pd.DataFrame(rows), described)
 
 
-def describe_status(directory: Path) -> str:
-    """Numbers of points by what has become of them, failures with their reasons, and the thresholds of descents."""
-    record = read_record(directory)
+def describe_status(record: SweepRecord) -> str:
+    """Numbers of points by status, failures with their messages, and the thresholds of descents."""
     found = states(record)
-    count = {status: sum(state.status == status for state in found) for status in _STATUSES}
-    text = ", ".join(f"{number} {status}" for status, number in count.items() if number)
+    count = Counter(state.status for state in found)
+    text = ", ".join(f"{count[status]} {status}" for status in _STATUSES if count[status])
     lines = [f"{record.name}: {len(found)} points, {text or 'none'}"]
     failed = [(number, state) for number, state in enumerate(found) if state.status == "failed"]
     lines += [f"  failed     point {number}: {state.message}" for number, state in failed[:_MOST_FAILURES]]
     if len(failed) > _MOST_FAILURES:
         lines.append(f"             and {len(failed) - _MOST_FAILURES} more")
     if record.descent is not None:
-        lines += [f"  {line}" for line in short_text(thresholds(directory)).splitlines()]
+        lines += [f"  {line}" for line in short_text(thresholds(record.directory)).splitlines()]
     return "\n".join(lines)
