@@ -27,6 +27,7 @@ from walkers.archive.writing import write_archive
 from walkers.inputs.axes import is_axis
 from walkers.inputs.case import Case
 from walkers.inputs.changes import flatten
+from walkers.inputs.origins import Origin
 from walkers.inputs.reading import read_toml, resolve_case, shipped
 from walkers.inputs.sweep import expand
 from walkers.main import main
@@ -101,6 +102,11 @@ def document(**changes: Any) -> dict[str, Any]:
 def make_case(**changes: Any) -> Case:
     """`document`, resolved."""
     return resolve_case(document(**changes), name="test")
+
+
+def origins(case: Case) -> dict[str, Origin]:
+    """The origins of a case's values, by key."""
+    return {one.key: one for one in case.origins}
 
 
 @contextmanager

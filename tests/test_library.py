@@ -10,11 +10,10 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import call, document, to_toml
+from tests.conftest import call, document, origins, to_toml
 from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError
 from walkers.inputs.library import _of_packages, library_of
-from walkers.inputs.origins import Origin
 from walkers.inputs.reading import load_case, resolve_case
 from walkers.inputs.sweep import expand
 from walkers.packages import offers
@@ -31,10 +30,6 @@ density = { value = "2.45 g/cm^3", source = "weighed" }
 materials = ["my beads", "glass"]
 friction  = { value = 0.21, source = "tilting table", range = [0.18, 0.24] }
 """
-
-
-def origins(case: Case) -> dict[str, Origin]:
-    return {one.key: one for one in case.origins}
 
 
 # --- the numbers ------------------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import walkers
-from tests.conftest import REFERENCE, call, document, make_case, to_toml
+from tests.conftest import REFERENCE, call, document, make_case, origins, to_toml
 from walkers.inputs import library
 from walkers.inputs.case import Case
 from walkers.inputs.changes import changed, settings_of
@@ -36,10 +36,6 @@ GLASS = {
     "run": {"cycles": 6},
     "uncertain": {"contact": {"friction": {"bead_wall": {"loguniform": [0.1, 0.6]}}}},
 }
-
-
-def origins(case: Case) -> dict[str, Origin]:
-    return {one.key: one for one in case.origins}
 
 
 def test_values_know_where_they_come_from() -> None:
