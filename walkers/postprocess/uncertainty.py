@@ -43,14 +43,15 @@ def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
 
 
 def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The uncertain values of a result (`rests_on`) as text: guessed, given by the case alone, calibrated."""
+    """The uncertain values of a result (`rests_on`) as text: guessed, uncertain, given, calibrated."""
 
     def listed(head: str, chosen: Iterable[Mapping[str, Any]]) -> list[str]:
         text = ", ".join(f"{one['key'].partition('.')[2]} {one['value']}" for one in chosen)
         wrapper = textwrap.TextWrapper(_WIDTH, f"  {head:10} ", " " * 13, break_on_hyphens=False)
         return wrapper.wrap(text) if text else []
 
-    lines = listed("guessed", [one for one in rests if one["guessed"]])
+    lines = listed("guessed", [one for one in rests if one["guessed"] and one["origin"] == "default"])
+    lines += listed("uncertain", [one for one in rests if one["guessed"] and one["origin"] != "default"])
     whence = {
         "given": "given",
         "calibrated": "calibrated",
