@@ -140,6 +140,14 @@ def test_a_run_by_hand_that_failed_is_told_in_one_message(name: str, folder: Pat
     assert not (folder / "manifest.json").exists()
 
 
+def test_an_amplitude_with_which_beads_would_start_unlike_the_walls_is_refused(tmp_path: Path) -> None:
+    folder = write_folder(make_case(run=SHORT, drive={"frame": "lab"}), tmp_path / "hand").parent
+    _edit(folder, amplitude="1.2e-4")
+    _run(folder)
+    with pytest.raises(InputError, match=r"but the walls at .*: edit peak_acceleration or frequency"):
+        load(folder)
+
+
 LENGTHS = {
     "fig1b": ("12", "# of the drive; walkers run continues to 60 if the velocities are not constant within 0.2 %"),
     "pile-ci": ("36", "below 0.005 m/s"),
