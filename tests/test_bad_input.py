@@ -167,12 +167,14 @@ REFUSED: list[tuple[str, str]] = [
     *((f"{command} .", "not a finished run") for command in READING),
     *((f"{command} {{folder}}", "manifest.json cannot be read") for command in READING[:-1]),
     *((f"sweep {what}", "") for what in ("{bad}", "nosuch", "fig2 --site nosite.toml", "fig2 --out {case}")),
-    *((f"{command} fig1b --set 'drive.frequency=70 mm'", 'fig1b: drive.frequency = "70 mm": expected a frequency')
+    *((f"{command} fig1b --set 'drive.frequency=70 mm'", 'fig1b: --set drive.frequency = "70 mm": expected a frequency')
       for command in ("show", "run", "export --to deck", "show --theory", "plot", "report", "check")),
     ("sweep fig4 --set 'liquid.name=Si AK5'", 'liquid.name = "Si AK5": varies in this sweep and cannot be set'),
     ("run fig1b --points 2", ""),
     ("run nosuch fig1c", 'nosuch: no such file\nfig1c: no such file'),
-    ("show fig1b --set drive.freq=2 --set beads.mat=3", 'did you mean "frequency"?\nfig1b: beads.mat: unknown key'),
+    ("show fig1b --set drive.freq=2 --set beads.mat=3", '"frequency"?\nfig1b: --set beads.mat: unknown key'),
+    ("sweep fig4 --set drive.freq=2", 'fig4: --set drive.freq: unknown key'),
+    ("show climber --set clusters.0.arrangement=fan", 'did you mean "clusters[0].arrangement"?'),
     # Options
     ("check engine --engine no-such-engine", ""),
     ("check engine --only nothing", ""),

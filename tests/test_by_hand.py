@@ -11,6 +11,7 @@ from tests.conftest import SHORT, call, document, make_case
 from walkers import load
 from walkers import run as run_case
 from walkers.inputs.errors import InputError
+from walkers.inputs.readable import differing, flattened
 from walkers.inputs.reading import resolve_case
 from walkers.sweeps.by_hand import take_in, write_folder
 
@@ -82,8 +83,13 @@ def test_an_edited_parameter_is_another_case(name: str, folder: Path, run_direct
     assert found.case.run.period == pytest.approx(same.case.run.period)
     (told,) = found.result["by_hand"][1:]
     assert told.startswith("the deck was edited: ")
-    assert all(parameter in told for parameter in edits)
+    assert all(re.search(rf"{parameter} \S+, was [\d.e-]+", told) for parameter in edits)
     assert "other line" not in told
+    # What commands show and compare.
+    values = flattened(found.case.as_dict())
+    assert values["drive.peak_acceleration"] == found.case.drive.peak_acceleration
+    assert values["run.time_step"] == found.case.run.time_step
+    assert differing([flattened(make_case(run=SHORT).as_dict()), values])
 
 
 def test_a_deck_that_is_edited_and_run_again_is_read_again(folder: Path) -> None:
@@ -106,7 +112,12 @@ def test_a_deck_that_is_edited_and_run_again_is_read_again(folder: Path) -> None
 FAILS = {
     "an error of the engine": ({}, "pair_coeff      * *", "pair_coeff * * 3", "failed: the engine stopped: ERROR"),
     "a time step beyond the limits": ({"steps_per_cycle": "400"}, "", "", "failed: .*blow-up"),
-    "steps that are no cycle": ({"time_step": "3e-6"}, "", "", "cannot be read .*not one cycle of 80 Hz"),
+    "steps that are no cycle": (
+        {"time_step": "3e-6"},
+        "",
+        "",
+        "cannot be read .*not one cycle of 80 Hz .*edit steps_per_cycle",
+    ),
     "a word for a number": ({"restitution": "high"}, "", "", 'variable restitution: expected a number, found "high"'),
     "a run that was stopped": (
         {"cycles": "4000", "peak_acceleration": "1.0"},
@@ -128,6 +139,14 @@ def test_a_run_by_hand_that_failed_is_told_in_one_message(name: str, folder: Pat
         take_in(folder)
     assert len(str(caught.value).splitlines()) == 1
     assert not (folder / "manifest.json").exists()
+
+
+def test_an_amplitude_with_which_beads_would_start_unlike_the_walls_is_refused(tmp_path: Path) -> None:
+    folder = write_folder(make_case(run=SHORT, drive={"frame": "lab"}), tmp_path / "hand").parent
+    _edit(folder, amplitude="1.2e-4")
+    _run(folder)
+    with pytest.raises(InputError, match=r"but the walls at .*: edit peak_acceleration or frequency"):
+        load(folder)
 
 
 LENGTHS = {

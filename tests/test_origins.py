@@ -20,7 +20,7 @@ from walkers.inputs.origins import Origin
 from walkers.inputs.reading import load_case, resolve_case, shipped
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.gait import SEPARATED
-from walkers.postprocess.uncertainty import SPREAD_NAME, band_of, band_text
+from walkers.postprocess.uncertainty import SPREAD_NAME, band_of, band_text, lines_of_rest, rests_on
 from walkers.runner.files import read_json
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.spread import describe, run_spread, spread_sweep
@@ -61,6 +61,21 @@ def test_values_know_where_they_come_from() -> None:
     assert "Si AK5 and Si AK10" in fraction.source
     assert fraction.range == library.unmeasured()["liquid.volume_fraction"].range
     assert origins(load_case("fig1b", {"liquid.law": "willett"}))["liquid.viscosity_ratio"].guessed
+
+
+LENGTHS = {
+    "fig1b": ("4 of 12, 8 of 24, 20 of 60", "derived", "checked after 12 and 24 cycles"),
+    "tray": ("20", "derived", "from the duration"),
+    "pile-ci": ("0", "default", "from the duration, rounded up to a multiple of 3 cycles (one sample)"),
+}
+
+
+@pytest.mark.parametrize("name", LENGTHS)
+def test_the_length_of_a_run_says_how_it_follows(name: str) -> None:
+    found = origins(load_case(name))
+    settling = found["run.settling_cycles"]
+    assert (settling.text, settling.origin, found["run.cycles"].source) == LENGTHS[name]
+    assert settling.value == load_case(name).run.settling_cycles
 
 
 @pytest.mark.parametrize("name", sorted(shipped("case")))
@@ -160,16 +175,25 @@ def test_a_case_changed_after_it_was_read_tells_nothing_of_its_values(tmp_path: 
     assert done.case.document == {}
 
 
-def test_what_is_called_uncertain_keeps_where_it_comes_from() -> None:
+def test_what_is_called_uncertain_keeps_where_it_comes_from(tmp_path: Path) -> None:
     ranges = {"liquid.surface_tension": ["15 mN/m", "25 mN/m"], "contact.friction.bead_wall": [0.2, 0.4]}
     tables = load_case("fig1b").document
-    case = resolve_case({**tables, "uncertain": {**ranges, "dimers.radii[1]": ["0.19 mm", "0.21 mm"]}})
+    tables = {**tables, "uncertain": {**ranges, "dimers.radii[1]": ["0.19 mm", "0.21 mm"]}}
+    case, file = resolve_case(tables), tmp_path / "ranges.toml"
+    file.write_text(to_toml(tables))
     found = origins(case)
     tension, friction, radius = (found[key] for key in (*ranges, "dimers.radii[1]"))
     assert (tension.origin, tension.text, tension.range) == ("library", "19.2 mN/m", ("15 mN/m", "25 mN/m"))
     assert "the paper" in tension.source
     assert (friction.origin, friction.guessed, friction.range) == ("calibrated", True, (0.2, 0.4))
     assert (radius.text, radius.guessed) == ("0.2 mm", True)
+    # In the same words wherever it is shown.
+    words = [f"{one}, uncertain" for one in ("library", "calibrated", "given")]
+    assert [one.word for one in (tension, friction, radius)] == words
+    assert ", uncertain, range 0.2 to 0.4" in call("show", str(file), check=True).stdout
+    assert "  uncertain  surface_tension 19.2 mN/m, friction.bead_wall" in "\n".join(
+        lines_of_rest(rests_on(case.origins))
+    )
     assert {*ranges, "dimers.radii[1]"} < set(spread_sweep(case, 2).keys)
 
 

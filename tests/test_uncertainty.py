@@ -15,7 +15,7 @@ from walkers.inputs import library
 from walkers.inputs.axes import ranges_of
 from walkers.inputs.catalogue import catalogue
 from walkers.inputs.errors import InputError
-from walkers.inputs.numerical import STIFFER, measured, numerical_error
+from walkers.inputs.numerical import INFLUENCE, STIFFER, measured, numerical_error
 from walkers.inputs.readable import kind_of
 from walkers.inputs.reading import load_case, resolve_case
 from walkers.inputs.rounding import rounded
@@ -28,6 +28,7 @@ from walkers.postprocess.uncertainty import band_text
 from walkers.sweeps.comparison import compare_runs
 from walkers.sweeps.folder import as_text, inventory
 from walkers.sweeps.table import default_column, row_of
+from walkers.templates.deck import render_deck
 from walkers.theory.prediction import describe, predict
 
 
@@ -36,6 +37,10 @@ def test_numerical_errors_are_those_of_the_shipped_cases_alone() -> None:
         found = numerical_error(load_case(name))
         assert found is not None
         assert found["total"] == pytest.approx(np.hypot(of_case["half_step"], of_case["stiffer"]))
+    changes = [abs(one["stiffer"] / one["velocity"]) for one in measured().values() if one["velocity"] > 1e-6]
+    assert f"{min(changes):.1%} to {max(changes):.0%}" == INFLUENCE.replace(" %", "%").replace(" to", "% to")
+    for changes_of, told in (({}, "the velocity of this case by 0.024 mm/s"), ({"run.time_step": "1 us"}, INFLUENCE)):
+        assert told in render_deck(load_case("fig1b", changes_of)).text
     longer = load_case("fig1b", {"run.cycles": 30})
     assert numerical_error(longer.renamed("other")) == numerical_error(load_case("fig1b"))
     assert numerical_error(load_case("fig1b", {"contact.friction.bead_wall": 0.2})) is None

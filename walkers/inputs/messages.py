@@ -55,6 +55,8 @@ _WORDS = {
     "a valid boolean": "true or false",
 }
 """What pydantic says, and what this does."""
+_LISTS = re.compile(r"^(clusters|placed|drive\.harmonics)\.")
+"""Keys in a table of which a case may have several."""
 
 
 def quoted(document: Mapping[str, Any], parts: Sequence[str | int]) -> str | None:
@@ -73,6 +75,23 @@ def blaming(source: str, document: Mapping[str, Any] | None = None) -> Iterator[
             raise
         found = [(one, one.value or quoted(document or {}, parts_of(one.key))) for one in error.problems]
         raise InputError(source, [replace(one, value=value) for one, value in found]) from error
+
+
+@contextmanager
+def blaming_changes(changes: Mapping[str, Any]) -> Iterator[None]:
+    """Say in errors which keys are at fault as a change by ``--set``, not in the file."""
+    try:
+        yield
+    except InputError as error:
+        given = [parts_of(key) for key in changes]
+        parts = [parts_of(one.key) for one in error.problems]
+        ours = [any(of and of[: len(one)] == one[: len(of)] for one in given) for of in parts]
+        if not any(ours):
+            raise
+        told = [
+            replace(one, key=f"--set {one.key}") if of else one for one, of in zip(error.problems, ours, strict=True)
+        ]
+        raise InputError(error.source, told) from error
 
 
 def validated(
@@ -166,8 +185,9 @@ def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
         place = below if below in known or f"{below}.*" in known else f"{place}.*"
     table = known.get(place)
     siblings = list(fields_of(table)) if table else []
-    hint = suggestion(word, siblings) if siblings else suggestion(".".join(location), known)
-    elsewhere = [key for key, inner in known.items() if inner is None and "*" not in key and key.split(".")[-1] == word]
+    keys = {_LISTS.sub(r"\1[0].", key): inner for key, inner in known.items()}
+    hint = suggestion(word, siblings) if siblings else suggestion(".".join(location), keys)
+    elsewhere = [key for key, inner in keys.items() if inner is None and "*" not in key and key.split(".")[-1] == word]
     if not hint and elsewhere:
         hint = f'; did you mean "{elsewhere[0]}"?'
     within = f"[{'.'.join(tables)}]" if tables else whole

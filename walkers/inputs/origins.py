@@ -55,7 +55,14 @@ class Origin:
     @property
     def guessed(self) -> bool:
         """Whether the value is a default of an unmeasured quantity, or uncertain in the case."""
-        return self.uncertain or (self.range is not None and self.origin == "default")
+        return self.uncertain or self.word == "guessed"
+
+    @property
+    def word(self) -> str:
+        """``guessed`` for a default that has a range; else the origin, and ``uncertain`` if the case calls it so."""
+        if self.origin == "default" and self.range is not None:
+            return "guessed"
+        return f"{self.origin}, uncertain" if self.uncertain else self.origin
 
 
 class Notes(dict[str, Origin]):

@@ -67,8 +67,7 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Cas
     (0.0003, 0.00025)
     """
     path = find_input(case, "case")
-    document = _changed(read_case(path), changes, str(case))
-    return resolve_case(document, source=str(case), name=path.stem)
+    return _changed(read_case(path), changes, str(case), path.stem)
 
 
 def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
@@ -91,19 +90,21 @@ def with_changes(case: Case, changes: Mapping[str, Any] | None = None) -> Case:
         return case
     if not case.as_read:
         raise refused(case.name, "was changed in Python: expected a case as it was read")
-    return resolve_case(_changed(case.document, changes, case.name), source=case.name, name=case.name)
+    return _changed(case.document, changes, case.name, case.name)
 
 
-def _changed(document: Mapping[str, Any], changes: Mapping[str, Any] | None, source: str) -> Mapping[str, Any]:
-    """The tables of a case with changes, whose keys are checked."""
+def _changed(document: Mapping[str, Any], changes: Mapping[str, Any] | None, source: str, name: str) -> Case:
+    """The case of tables with changes, whose keys are checked."""
     if not changes:
-        return document
+        return resolve_case(document, source=source, name=name)
     from walkers.inputs.changes import changed
-    from walkers.inputs.messages import blaming, check_key
+    from walkers.inputs.messages import blaming, blaming_changes, check_key
 
-    with blaming(source):
-        each(check_key, changes)
-        return changed(document, changes)
+    with blaming_changes(changes):
+        with blaming(source):
+            each(check_key, changes)
+            tables = changed(document, changes)
+        return resolve_case(tables, source=source, name=name)
 
 
 def is_sweep_file(path: Path) -> bool:

@@ -8,7 +8,7 @@ from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import CONSTANT, Case, Run, settling_of
 from walkers.inputs.drive import AXES, Drive, Harmonic, common_frequency, unit_vector, waveform
 from walkers.inputs.errors import unusable
-from walkers.inputs.origins import Notes
+from walkers.inputs.origins import Notes, Origin
 from walkers.inputs.rounding import percent
 from walkers.inputs.schema import DriveTable, HarmonicTable, RunTable
 from walkers.physics.dimer import Dimer
@@ -128,6 +128,9 @@ def _note_run(run: Run, table: RunTable, case: Case, notes: Notes, reason: str) 
     often = run.samples_per_cycle if run.cycles_per_sample == 1 else f"1 in {run.cycles_per_sample} cycles"
     cycles = f"until constant within {percent(CONSTANT)}, at most {run.cycles}" if run.until_steady else run.cycles
     whence = "from the duration" if table.duration else "checked after 12 and 24 cycles"
+    if run.cycles_per_sample > 1:
+        whence += f", rounded up to a multiple of {run.cycles_per_sample} cycles (one sample)"
+    settling = ", ".join(f"{settling_of(cycles)} of {cycles}" for cycles in run.attempts) if run.until_steady else ""
     silence = run.longest_silence(case.count)
     notes.default("run.samples_per_cycle", often)
     if case.loose:
@@ -138,7 +141,10 @@ def _note_run(run: Run, table: RunTable, case: Case, notes: Notes, reason: str) 
         notes.default("run.settled_below", run.settled_below)
     notes.derived("run.time_step", run.time_step, f"auto: {reason}, a whole number of steps per cycle")
     notes.derived("run.cycles", cycles, whence)
-    notes.derived("run.settling_cycles", run.settling_cycles, "a third of the cycles, at most 20")
+    notes.default("run.settling_cycles", run.settling_cycles, "of loose beads")
+    if case.walkers:
+        third = "a third of the cycles, at most 20"
+        notes["run.settling_cycles"] = Origin("", settling, "derived", third, value=run.settling_cycles)
     notes.derived("run.silence", silence, "the engine is stopped if it writes nothing for this long")
     notes.derived("run.log_limit", run.most_log, "the engine is stopped if its log is larger")
 

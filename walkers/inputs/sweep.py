@@ -36,7 +36,7 @@ from walkers.inputs.axes import (
 from walkers.inputs.case import BOUNDS, Case
 from walkers.inputs.changes import Value, changed, flatten
 from walkers.inputs.errors import InputError, Problem, each, refused, shortened, unusable
-from walkers.inputs.messages import blaming, check_key, validated
+from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
 from walkers.inputs.reading import find_input, read_case, read_toml, resolve_case
 from walkers.inputs.schema import Table
 from walkers.physics.units import Speed, Whole
@@ -171,10 +171,11 @@ def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) ->
                 raise unusable("set", "expected a table of keys")
             document = {**document, "set": {**settings_in(document.get("set", {})), **changes}}
         name = _name_with(name, changes)
-    made = expand(document, source=str(sweep), name=name, folder=path.parent)
-    text = "varies in this sweep and cannot be set"
-    if problems := [Problem(key, f'"{value}"', text) for key, value in (changes or {}).items() if key in made.keys]:
-        raise InputError(str(sweep), problems)
+    with blaming_changes(changes or {}):
+        made = expand(document, source=str(sweep), name=name, folder=path.parent)
+        text = "varies in this sweep and cannot be set"
+        if problems := [Problem(key, f'"{value}"', text) for key, value in (changes or {}).items() if key in made.keys]:
+            raise InputError(str(sweep), problems)
     return made
 
 

@@ -50,7 +50,8 @@ def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
         wrapper = textwrap.TextWrapper(_WIDTH, f"  {head:10} ", " " * 13, break_on_hyphens=False)
         return wrapper.wrap(text) if text else []
 
-    lines = listed("guessed", [one for one in rests if one["guessed"]])
+    lines = listed("guessed", [one for one in rests if one["guessed"] and one["origin"] == "default"])
+    lines += listed("uncertain", [one for one in rests if one["guessed"] and one["origin"] != "default"])
     whence = {
         "given": "given",
         "calibrated": "calibrated",

@@ -239,11 +239,10 @@ def _whence(one: dict[str, Any]) -> str:
     """Origin of a value as text."""
     origin, source = str(one["origin"]), str(one["source"])
     ends = f", range {one['range'][0]} to {one['range'][1]}" if one["range"] else ""
-    if one["uncertain"]:
-        ends = f", given as uncertain{ends}"
-    elif origin == "default" and ends:
+    if origin == "default" and ends:
         return f"guessed ({source or 'not measured'}){ends}"
-    elif origin in ("calibrated", "assumed", "package"):
+    ends = f", uncertain{ends}" if one["uncertain"] else ends
+    if origin in ("calibrated", "assumed", "package"):
         return source + ends
     return (f"{origin}: {source}" if source else origin) + ends
 

@@ -19,8 +19,9 @@ from walkers.inputs.case import CONSTANT, Case, Run, settling_of
 from walkers.inputs.drive import Harmonic
 from walkers.inputs.errors import refused
 from walkers.inputs.origins import Origin
-from walkers.inputs.readable import kind_of
+from walkers.inputs.readable import readable
 from walkers.inputs.rounding import percent
+from walkers.inputs.schema import ALTERNATIVES, fields_of
 from walkers.physics.matter import Contact
 from walkers.postprocess.analysis import tabulate
 from walkers.postprocess.dump import DumpError
@@ -47,17 +48,11 @@ _LOGS = (OUTPUT_NAME, "log.liggghts")
 """Output of the engine by `run_script`, and the default log of LIGGGHTS."""
 _PRINTED = re.compile(rf"^{PRINTED} (.+)$", re.MULTILINE)
 _GIVEN = re.compile(r"^variable +(\w+) string ([-+.\de]+)(?: |$)", re.MULTILINE)
+_LINE = re.compile(r"^variable +(\w+) string (\S+)", re.MULTILINE)
 _VARIABLE = re.compile(r"variable (\w+) string")
 _SAME = 1e-9
+_FOLLOW = ("run.time_step", "run.settling_cycles")
 _OF_LIQUID = {"surface_tension": "surface_tension", "viscosity": "dynamic_viscosity"}
-_KEYS = {
-    **{name: f"drive.{name}" for name in ("frequency", "peak_acceleration", "phase")},
-    **{f"friction_{of}": f"contact.friction.{of}" for of in ("bead_bead", "bead_wall")},
-    **{name: f"contact.{name}" for name in ("restitution", "rolling_friction", "youngs_modulus", "poissons_ratio")},
-    **{name: f"liquid.{key}" for name, key in _OF_LIQUID.items()},
-    **{"gravity": "environment.gravity", "density": "beads.density", "cycles": "run.cycles"},
-}
-"""Keys of a case by parameter of a deck."""
 _SCALE = """# Writes tables for another surface tension and viscosity: the deck gives the factors pull and resistance.
 /^[-+.0-9]/ { printf "%s", $1; printf " %.12g", pull * $2; for (i = 3; i <= NF; i++) printf " %.12g", resistance * $i
               printf "\\n"; next }
@@ -155,8 +150,9 @@ def _as_run(case: Case, written: str, now: str, said: str) -> tuple[Case, Segmen
     ran = _case_of(case, values, edited)
     rest = int(values.get("rest_steps", 0))
     changes = [f"{name} {value:g}, was {given[name]:g}" for name, value in edited.items()]
-    # Parameters that followed from others, and that are numbers now.
-    changes += [f"{name} {value:g}" for name, value in printed.items() if name in numbers_now.keys() - given.keys()]
+    before, after, follow = dict(_LINE.findall(written)), dict(_LINE.findall(now)), _derived(case)
+    changed = [name for name in printed if name in follow and name not in given and after.get(name) != before[name]]
+    changes += [f"{name} {printed[name]:g}, was {follow[name]:g}" for name in changed]
     segment = Segment(0, rest + ran.run.steps, rest)
     return ran, segment, [*changes, *_other_changes(written, now, printed)]
 
@@ -177,7 +173,13 @@ def _case_of(case: Case, values: Mapping[str, float], edited: Mapping[str, float
     step, parts = values.get("time_step", case.run.time_step), case.run.samples_per_cycle
     if not isclose(step * steps * drive.frequency, 1.0, rel_tol=_SAME) or steps % parts:
         raise ValueError(
-            f"{steps} steps of {step:g} s are not one cycle of {drive.frequency:g} Hz in {parts} equal parts"
+            f"{steps} steps of {step:g} s are not one cycle of {drive.frequency:g} Hz in {parts} equal parts: "
+            f"edit steps_per_cycle (a multiple of {parts}); time_step follows from it and the frequency"
+        )
+    if not isclose(start := values.get("peak_velocity", drive.peak_velocity), drive.peak_velocity, rel_tol=_SAME):
+        raise ValueError(
+            f"beads start at peak_velocity {start:g} m/s, but the walls at {drive.peak_velocity:g} m/s: edit "
+            "peak_acceleration or frequency, from which amplitude and peak_velocity follow"
         )
     run = replace(case.run, time_step=step, steps_per_cycle=steps)
     if cycles != run.cycles:
@@ -196,7 +198,14 @@ def _case_of(case: Case, values: Mapping[str, float], edited: Mapping[str, float
         liquid=replace(case.liquid, name=None, **liquid) if liquid else case.liquid,
     )
     # The origins of values remain valid for an unchanged case.
-    return case if ran == case else ran.read_from({}, partial(_origins, case, edited))
+    return case if ran == case else ran.read_from({}, partial(_origins, case, ran))
+
+
+def _derived(case: Case) -> dict[str, float]:
+    """Parameters of a deck that follow from others."""
+    ends, harmonics = suffixes(len(case.drive.harmonics)), case.drive.harmonics
+    amplitudes = {f"amplitude{end}": one.amplitude for end, one in zip(ends, harmonics, strict=True)}
+    return {**amplitudes, "peak_velocity": case.drive.peak_velocity, "time_step": case.run.time_step}
 
 
 def _harmonic(one: Harmonic, end: str, values: Mapping[str, float]) -> Harmonic:
@@ -225,12 +234,42 @@ def _other_changes(written: str, now: str, given: Collection[str]) -> list[str]:
     return [f"{len(others)} other line(s), which are not part of the case, first: {others[0]}"] if others else []
 
 
-def _origins(case: Case, edited: Mapping[str, float]) -> tuple[Origin, ...]:
-    """Origins of the values of a case: edited parameters are given."""
-    keys = {_KEYS.get(name, name): value for name, value in edited.items()}
-    kept = tuple(one for one in case.origins if one.key not in keys)
-    units = {key: " (SI)" if kind_of(re.sub(r"_\d+$", "", key)) else "" for key in keys}
-    return (*kept, *(Origin(key, f"{value:.6g}{units[key]}", "given", value=value) for key, value in keys.items()))
+def _origins(case: Case, ran: Case) -> tuple[Origin, ...]:
+    """Origins of the values of an edited deck, which ran: what differs from the case of the deck is given now."""
+    before, known = _values(case), {one.key for one in case.origins}
+    now = {key: value for key, value in _values(ran).items() if value != before[key]}
+    gone = {
+        f"{key.rpartition('.')[0]}.{other.rpartition('.')[2]}"
+        for key in now
+        for other in ALTERNATIVES.get(re.sub(r"harmonics\[\d+\]\.", "", key), ())
+    }
+    if any(key.startswith("drive.harmonics") for key in now) and "drive.frequency" in known:  # those of a waveform
+        now |= {key: value for key, value in _values(ran).items() if key.startswith("drive.harmonics")}
+        gone |= {f"drive.{name}" for name in ("frequency", "peak_acceleration", "phase", "waveform")}
+    if "liquid.dynamic_viscosity" in now:  # of the bridges
+        now["liquid.viscosity_ratio"] = 1.0
+    if ran.drive.frequency != case.drive.frequency and "run.duration" in known:
+        now["run.cycles"], gone = ran.run.cycles, gone | {"run.duration"}
+    found = {one.key: one for one in case.origins if one.key not in gone}
+    for key, value in now.items():
+        found[key] = Origin(key, readable(key, value), "derived" if key in _FOLLOW else "given", value=value)
+    return tuple(found.values())
+
+
+def _values(case: Case) -> dict[str, Any]:
+    """The values of a case that parameters of a deck determine, by their keys in a case file."""
+    harmonics, several = case.drive.harmonics, len(case.drive.harmonics) > 1
+    return {
+        **{
+            f"drive.{f'harmonics[{number}].' if several else ''}{name}": getattr(one, name)
+            for number, one in enumerate(harmonics)
+            for name in ("frequency", "peak_acceleration", "phase")
+        },
+        **{f"contact.{key}": getattr(case.contact, name) for key, (name, _) in fields_of(Contact).items()},
+        **{f"liquid.{key}": getattr(case.liquid, key) for key in _OF_LIQUID.values()},
+        **{key: getattr(case.run, key.partition(".")[2]) for key in ("run.cycles", *_FOLLOW)},
+        **{"environment.gravity": case.gravity, "beads.density": case.density},
+    }
 
 
 def _write(

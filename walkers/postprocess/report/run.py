@@ -80,7 +80,7 @@ def shown_of(case: Case, result: dict[str, Any], origins: Origins = None) -> dic
     Parameters without recorded origins are in SI units.
     """
     parameters = [
-        vars(one) | {"range": " … ".join(map(text_of, one.range or ())), "guessed": one.guessed}
+        vars(one) | {"range": " … ".join(map(text_of, one.range or ())), "origin": one.word}
         for one in (case.origins if origins is None else origins)
     ]
     said = ((key, value) for key, value in dotted(case.as_dict()) if value not in (None, "", [], ()))
@@ -90,7 +90,8 @@ def shown_of(case: Case, result: dict[str, Any], origins: Origins = None) -> dic
         "uncertainty": uncertainty_of(result),
         "warnings": warnings_of(result),
         "quantities": quantities_of(result),
-        "guessed": [one for one in parameters if one["guessed"]],
+        "guessed": [one for one in parameters if one["origin"] == "guessed"],
+        "uncertain": [one for one in parameters if one["origin"].endswith("uncertain")],
         "parameters": parameters or as_run,
     }
 
