@@ -142,7 +142,6 @@ def _judged(deck: Deck, folder: Path, log: Path) -> EngineReport:
 def _as_run(case: Case, written: str, now: str, said: str) -> tuple[Case, Segment, list[str]]:
     """The case that the engine ran, its segment, and the edits, from the deck as written and now, and the log."""
     given = {name: float(value) for name, value in _GIVEN.findall(written)}
-    numbers_now = dict(_GIVEN.findall(now))
     words = (_PRINTED.findall(said) or [""])[-1].split()
     printed = {name: _number(name, value) for name, value in zip(words[::2], words[1::2], strict=True)}
     values, case = {**given, **printed}, case.for_cycles(case.run.attempts[0])
