@@ -155,6 +155,8 @@ REFUSED: list[tuple[str, str]] = [
     ("compare {sweep} {run}", "is a sweep; expected another sweep"),
     ("compare {sweep} fig1b", "is a sweep; expected another"),
     ("compare {sweep} {other}", "vary the same keys"),
+    ("compare fig1b", "fig1b: expected a second run or sweep, or --set KEY=VALUE"),
+    ("compare {sweep} --set run.seed=2", "--set: is for runs and cases"),
     ("climb {sweep}", "expected a finished run of a pile"),
     ("check files .", "expected a run directory"),
     ("plot {run} --hue frequency", "--hue: is for sweeps"),

@@ -163,6 +163,13 @@ def test_compare_takes_cases_and_says_what_was_not_run(out: Path) -> None:
     assert "all results are the same" in same
 
 
+@pytest.mark.parametrize("sides", [["base.toml"], ["base.toml", "base.toml"]])
+def test_compare_changes_the_second_case_alone(out: Path, sides: list[str]) -> None:
+    found = json.loads(call("compare", *sides, "--set", "drive.frequency=90Hz", "--json", check=True).stdout)
+    assert {key: values[1] for key, values in found["parameters"].items()} == {"drive.frequency": 90.0}
+    assert (found["second"], found["not_run"]) == ("base.toml drive.frequency=90Hz", ["base.toml drive.frequency=90Hz"])
+
+
 def test_compare_matches_the_points_of_two_sweeps(out: Path) -> None:
     """Whatever their order; one sweep has points that the other has not."""
     keys = ["drive.frequency", "drive.peak_acceleration"]

@@ -40,6 +40,8 @@ _WITHIN = "Count climbs until this time of the drive, such as '5 s'; default: en
 _THRESHOLDS = "Print the number of climbs for other definitions of a climb."
 _PILES = "Sweeps, folders of runs, runs or cases of piles."
 _NULL = "Runs in which nothing can climb: also print their false climbs. Repeatable."
+_SECOND = "Another run or sweep, named in the same way; default: the first with the values of --set."
+_SECOND_SET = "Replace a value of the second case, such as drive.frequency=70Hz. Repeatable."
 _INTERVAL = "Pictures: time between them, such as '2 s' or 'T/4' (T: period); default: evenly over the run."
 _SLOWDOWN = "Film: slow motion factor; default: chosen so that the film lasts 5 to 10 s."
 
@@ -186,8 +188,8 @@ def report(
 
 def compare(
     first: RunOrSweep,
-    second: RunOrSweep,
-    settings: Set = None,
+    second: str | None = Argument(None, metavar="RUN|SWEEP", help=_SECOND, autocompletion=_ANY),
+    settings: list[str] | None = Option(None, "--set", metavar="KEY=VALUE", help=_SECOND_SET),
     out: Out = DEFAULT_OUT,
     y: SweepColumn = None,
     as_json: Json = False,
@@ -198,7 +200,8 @@ def compare(
     from walkers.pipeline import find_side
     from walkers.sweeps.comparison import compare_runs, compare_sweeps
 
-    changes = changes_of(settings)
+    refuse(first, second is None and not settings, "expected a second run or sweep, or --set KEY=VALUE")
+    second, changes = second or first, changes_of(settings)
     there = {one: placed(one, out) for one in (first, second)}
     sweeps = {one: place.path for one, place in there.items() if place and place.kind == "sweep"}
     if sweeps.keys() == there.keys():
@@ -208,7 +211,7 @@ def compare(
         for one in sweeps:
             refuse(one, True, "is a sweep; expected another sweep to compare with")
         refuse("--y", y is not None, "is for sweeps")
-        found = compare_runs(*each(lambda one: find_side(one, out, changes), (first, second)))
+        found = compare_runs(*each(lambda one: find_side(one[0], out, one[1]), ((first, {}), (second, changes))))
     print_as(as_json, lambda: found.contents, lambda: found.text)
 
 
