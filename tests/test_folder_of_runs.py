@@ -87,6 +87,18 @@ def test_list_tells_by_what_runs_of_a_case_differ(out: Path) -> None:
     assert all("mm/s" in line and " Hz " in line for line in lines[:6])
 
 
+def test_a_resting_walker_is_called_so_everywhere(out: Path) -> None:
+    Path("rest.toml").write_text('case = "base.toml"\n[axes]\ndrive.peak_acceleration = ["0.2 g", "0.3 g"]\n')
+    call("sweep", "rest.toml", check=True)
+    table = walkers.load(out / "rest").table()
+    assert (table["velocity"].abs() > 0.0).all()
+    assert "at rest (below 0.002 mm/s)" in call("run", table["run"][0], check=True).stdout
+    assert call("list", "--all", check=True).stdout.count(" at rest ") == 2
+    head, *rows = call("list", "rest", check=True).stdout.splitlines()[2:]
+    end = head.index(" (mm/s)") + len(" (mm/s)")
+    assert [row[:end].split()[-1] for row in rows] == ["0", "0"]
+
+
 def test_list_filters_and_sorts(out: Path) -> None:
     runs = sorted(finished_places(out).values())
     for number, run in enumerate(runs):  # of a shared deck the manifests are microseconds apart

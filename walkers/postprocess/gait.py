@@ -19,7 +19,7 @@ from walkers.inputs.case import CONSTANT
 from walkers.postprocess.analysis import read_result
 from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
 from walkers.postprocess.motion import Group, read_motion
-from walkers.postprocess.sides import STEADY_SPEED
+from walkers.postprocess.sides import REST, STEADY_SPEED
 from walkers.postprocess.tables import read_table
 
 if TYPE_CHECKING:
@@ -37,8 +37,6 @@ SEPARATED = 0.1
 """Share of the time beyond which beads that no bridge can hold together are no walker."""
 ASTRAY = np.pi / 4.0
 """rad; a walker that ends farther from where it was to face has left the axis."""
-_LEAST_SPEED = 2e-6
-"""m/s; what velocities may differ by however slow the walkers are."""
 _LITTLE, _FADING, _NO_FASTER = 0.005, 0.9, 1e-4
 """rad; at constant velocity a walker turns by less in a cycle, and not by so much more than before; or by at most this
 share of what it did."""
@@ -342,7 +340,7 @@ def _is_constant(group: Group) -> bool:
     turned = np.abs(np.diff(group.orientation[:: run.samples_per_cycle][run.settled_strobes :], axis=0))
     before, after = turned[: len(turned) // 2].max(axis=0), turned[len(turned) // 2 :].max(axis=0)
     little = (after < _LITTLE) & (after < before + _NO_FASTER)
-    allowed = max(CONSTANT * float(np.abs(found.velocity).max()), _LEAST_SPEED)
+    allowed = max(CONSTANT * float(np.abs(found.velocity).max()), REST)
     agree = np.abs(found.first_half - found.second_half).max() <= allowed
     return bool(agree and np.all(little | (after < _FADING * before)))
 

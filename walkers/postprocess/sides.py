@@ -12,6 +12,8 @@ SAME = 0.05
 """Velocities of walkers that faced either way and differ by more than this share are printed apart …"""
 STEADY_SPEED = 1e-5
 """… and by more than this, m/s; halves of a run that differ by less are steady."""
+REST = 2e-6
+"""m/s; slower walkers are at rest: velocities that count as constant may differ by as much."""
 
 
 def ways(*, uphill: bool) -> tuple[str, str]:

@@ -25,7 +25,7 @@ from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.readable import agrees, check_wanted, differing, flattened, has_key, kind_of, readable
 from walkers.inputs.rounding import duration_text, rounded
 from walkers.physics.units import Kind, parse_quantity
-from walkers.postprocess.sides import sides_apart
+from walkers.postprocess.sides import REST, sides_apart
 from walkers.postprocess.uncertainty import SPREAD_NAME
 from walkers.runner.directory import (
     CASE_NAME,
@@ -299,7 +299,7 @@ def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
             if run.velocity is not None:
                 sides = run.sides or {"": run.velocity}
                 told = (f"{way} {rounded(1e3 * speed, 'mm/s')}".strip() for way, speed in sides.items())
-                result = f"{', '.join(told)} mm/s"
+                result = "at rest" if max(map(abs, sides.values())) < REST else f"{', '.join(told)} mm/s"
             values = [readable(key, run.parameters.get(key)) for key in varied]
             rows.append([run.name, status, result, duration_text(run.age), bytes_text(run.size), *values])
         blocks.append(aligned(rows))

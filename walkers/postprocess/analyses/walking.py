@@ -38,7 +38,7 @@ from walkers.postprocess.gait import (
     walk,
 )
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
-from walkers.postprocess.sides import STEADY_SPEED, alike, sides_apart, ways
+from walkers.postprocess.sides import REST, STEADY_SPEED, alike, sides_apart, ways
 from walkers.postprocess.tables import NUMBERED, Columns, columns_of
 from walkers.postprocess.uncertainty import LEAST_PER_VALUE, band_of, band_text, bands_text, wrapped
 
@@ -455,6 +455,8 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
     velocity = result["velocity"]
     toward = {0.0: "toward bead 1", None: "along the heading"}.get(result["sin_delta"], "toward the large bead")
     headline = f"{_speed(velocity['mean'])} mm/s{_band(result)}, positive {toward}"
+    if velocity["n"] and abs(velocity["mean"]) < REST:
+        headline = f"at rest (below {1e3 * REST:g} mm/s){_band(result)}"
     if apart := sides_apart(result):  # the mean over both is no walker's
         (first, one), (second, other) = apart.items()
         up = f"{_speed(one)} mm/s{band}" if (band := _band(result)) else _speed(one)
