@@ -223,9 +223,9 @@ REFUSED: list[tuple[str, str]] = [
         ("--size wide", "expected 360p, 480p, 720p, 1080p"),
         ("--walker 2", "expected less than 2"),
         ("--images 2", "--images: is for pictures"),
-        ("--from soon", 'expected a time such as "0.1 s"'),
-        ("--from '0.2 s'", "expected times within the drive, 0 to 0.1 s"),
-        ("--from '0.05 s' --until '0.05 s'", "expected times within the drive, 0 to 0.1 s"),
+        ("--begin soon", 'expected a time such as "0.1 s"'),
+        ("--begin '0.2 s'", "expected times within the drive, 0 to 0.1 s"),
+        ("--begin '0.05 s' --end '0.05 s'", "expected times within the drive, 0 to 0.1 s"),
     )),
     *((f"render {{pile}} --interval {apart}", "") for apart in ("'3 s'", "soon", "T/4")),  # frames are cycles apart
     *((f"{what} {{pile}} --walker 0", "") for what in ("render", "render --film")),

@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from walkers.inputs.changes import dotted
 from walkers.inputs.errors import refused
+from walkers.inputs.rounding import percent
 from walkers.postprocess.analyses.piles import Pile, climbs_by
 from walkers.postprocess.analysis import tables_of
 from walkers.postprocess.clusters import ClimbCriteria
@@ -292,9 +293,9 @@ def describe_origins(found: Mapping[str, Any]) -> str:
         return ""
     return (
         f"  assembly   in {found['strangers']} of {found['climbs']} climbers no two beads were neighbours at rest; "
-        f"{found['share_of_bridges']:.0%} of the climbers' bridges existed then\n"
+        f"{100 * found['share_of_bridges']:.0f} % of the climbers' bridges existed then\n"
         f"             the last bead joined {found['whole_before']:.2f} s before the cluster came free (median)\n"
-        f"             {found['leaders_at_wall']} leaders were at a wall at rest, as were {found['share_at_wall']:.0%} "
+        f"             {found['leaders_at_wall']} leaders were at a wall at rest, as were {100 * found['share_at_wall']:.0f} % "
         f"of all beads of their size class ({_p_text(found['p_at_wall'])})"
     )
 
@@ -415,8 +416,8 @@ VARIATIONS = {
 _UNITS = {"min_rise": " m", "max_gap": " s"}
 
 
-def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
-    """Dependence of the climb statistics on the thresholds of a climb.
+def sensitivity(runs: Sequence[Path], within: float | None = None) -> list[dict[str, Any]]:
+    """Dependence of the climb statistics on the thresholds of a climb; ``within`` as of `summarise_climbs`.
 
     Returns
     -------
@@ -432,13 +433,13 @@ def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = [
         {"threshold": name, "value": value, "runs": len(runs), **counts, "median_speed": []} for name, value in tried
     ]
-    seconds = 0.0
+    seconds, cut = 0.0, np.inf if within is None else within
     for run in runs:
         tables = tables_of(run)
-        seconds += max(float(tables["bed"]["time"][-1]), 0.0)
+        seconds += min(max(float(tables["bed"]["time"][-1]), 0.0), cut)
         for row in rows:
             definition = replace(usual, **{row["threshold"]: row["value"]}) if row["threshold"] else usual
-            climbs = climbs_by(tables, definition)
+            climbs = [climb for climb in climbs_by(tables, definition) if climb.qualified <= cut]
             row["climbed"] += bool(climbs)
             row["climbs"] += len(climbs)
             row["led_by_large"] += sum(climb.leader_large for climb in climbs)
@@ -496,7 +497,7 @@ def describe_climbs(found: Mapping[str, Any]) -> str:
         lines += [
             *(f"    {name.replace('_', ' '):15} {_rate_text(found[name])}" for name in _PARTS),
             f"  leader     large in {found['led_by_large']} of {found['climbs']} climbs (random bead of the pile, "
-            f"{found['share_of_large']:.0%} large: {_p_text(found['p_among_beads'])}; random bead of the cluster: "
+            f"{100 * found['share_of_large']:.0f} % large: {_p_text(found['p_among_beads'])}; random bead of the cluster: "
             f"{_p_text(found['p_among_own'])})",
             f"  first one  begins after {_range(found['onsets'])} s, counts after {_range(found['times'])} s",
             f"  beads      {sizes} (beads: climbs)",
@@ -518,7 +519,7 @@ def _rate_text(found: Mapping[str, Any]) -> str:
 
 
 def _interval(ends: Sequence[float] | None, digits: str = ".2g", estimator: str = "") -> str:
-    text = ", ".join(filter(None, (f"{_CONFIDENCE:.0%} confidence", estimator)))
+    text = ", ".join(filter(None, (f"{percent(_CONFIDENCE)} confidence", estimator)))
     return "" if ends is None else f" ({ends[0]:{digits}} to {ends[1]:{digits}} with {text})"
 
 

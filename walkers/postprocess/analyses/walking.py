@@ -267,7 +267,7 @@ class Walking(Analysis):
         if result.get("bands") and (apart := sides_apart(result)):
             told = bands_text(result, {"right_facing": "m/s"}, {"right_facing": next(iter(apart.values()))})
             known = [told or "no band: the spread has that of the mean over both ways, which is no walker's velocity"]
-        return [*known, _numerical(result), *_scatter(result)]
+        return [*known, *_numerical(result), *_scatter(result)]
 
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
         """Reasons to doubt the velocity."""
@@ -509,17 +509,19 @@ def _band(result: Mapping[str, Any]) -> str:
     return f" ({band_text(band, 'm/s')}, 5 to 95 %{draws} over the uncertain values)"
 
 
-def _numerical(result: Mapping[str, Any]) -> str:
-    """The numerical error of the velocity, mm/s and shares of the velocity."""
+def _numerical(result: Mapping[str, Any]) -> list[str]:
+    """The numerical error of the velocity, mm/s and shares of the velocity; if it is not known, how to measure it."""
     error, own = result["numerical_error"], abs(result["velocity"]["mean"] or 0.0)
     harder = f"{STIFFER:g} times Young's modulus"
     if error is None:
-        return f"numerical error: not measured for this case; run again at half the time step and with {harder}"
+        told = f"numerical error: not measured for this case; run it at half the time step and with {harder}"
+        checks = result.get("checks", [])
+        return [f"{told}, then walkers compare with the same arguments:" if checks else told, *checks]
     if own < STEADY_SPEED:
-        return f"numerical error {_error(error['total'])} (measured for this case: half the time step, {harder})"
+        return [f"numerical error {_error(error['total'])} (measured for this case: half the time step, {harder})"]
     half_step, stiffer, total = (100.0 * error[name] / own for name in ("half_step", "stiffer", "total"))
     parts = f"half the time step {half_step:+.2g} %, {harder} {stiffer:+.2g} %"
-    return f"numerical error {total:.2g} % (measured for this case: {parts})"
+    return [f"numerical error {total:.2g} % (measured for this case: {parts})"]
 
 
 def _scatter(result: Mapping[str, Any]) -> list[str]:
