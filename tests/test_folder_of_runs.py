@@ -92,7 +92,10 @@ def test_a_resting_walker_is_called_so_everywhere(out: Path) -> None:
     call("sweep", "rest.toml", check=True)
     table = walkers.load(out / "rest").table()
     assert (table["velocity"].abs() > 0.0).all()
-    assert "at rest (below 0.002 mm/s)" in call("run", table["run"][0], check=True).stdout
+    told = call("run", table["run"][0], check=True).stdout
+    assert "at rest (below 0.002 mm/s)" in told
+    for half_or_harder in ("run.time_step=1us", "contact.youngs_modulus=500MPa"):
+        assert f"    walkers run {table['run'][0]} --set {half_or_harder}\n" in told
     assert call("list", "--all", check=True).stdout.count(" at rest ") == 2
     head, *rows = call("list", "rest", check=True).stdout.splitlines()[2:]
     end = head.index(" (mm/s)") + len(" (mm/s)")

@@ -295,8 +295,8 @@ def describe_origins(found: Mapping[str, Any]) -> str:
         f"  assembly   in {found['strangers']} of {found['climbs']} climbers no two beads were neighbours at rest; "
         f"{100 * found['share_of_bridges']:.0f} % of the climbers' bridges existed then\n"
         f"             the last bead joined {found['whole_before']:.2f} s before the cluster came free (median)\n"
-        f"             {found['leaders_at_wall']} leaders were at a wall at rest, as were {100 * found['share_at_wall']:.0f} % "
-        f"of all beads of their size class ({_p_text(found['p_at_wall'])})"
+        f"             {found['leaders_at_wall']} leaders were at a wall at rest, as were "
+        f"{100 * found['share_at_wall']:.0f} % of all beads of their size class ({_p_text(found['p_at_wall'])})"
     )
 
 
@@ -497,8 +497,8 @@ def describe_climbs(found: Mapping[str, Any]) -> str:
         lines += [
             *(f"    {name.replace('_', ' '):15} {_rate_text(found[name])}" for name in _PARTS),
             f"  leader     large in {found['led_by_large']} of {found['climbs']} climbs (random bead of the pile, "
-            f"{100 * found['share_of_large']:.0f} % large: {_p_text(found['p_among_beads'])}; random bead of the cluster: "
-            f"{_p_text(found['p_among_own'])})",
+            f"{100 * found['share_of_large']:.0f} % large: {_p_text(found['p_among_beads'])}; "
+            f"random bead of the cluster: {_p_text(found['p_among_own'])})",
             f"  first one  begins after {_range(found['onsets'])} s, counts after {_range(found['times'])} s",
             f"  beads      {sizes} (beads: climbs)",
             f"  height     {_range(np.array(found['heights']) * 1e3)} mm",
