@@ -97,6 +97,8 @@ def test_a_resting_walker_is_called_so_everywhere(out: Path) -> None:
     for half_or_harder in ("run.time_step=1us", "contact.youngs_modulus=500MPa"):
         assert f"    walkers run {table['run'][0]} --set {half_or_harder}\n" in told
     assert call("list", "--all", check=True).stdout.count(" at rest ") == 2
+    shown = [repr(walkers.load(one)) for one in (table["run"][0], "rest")]
+    assert shown == [f"Run({table['run'][0]}: finished, at rest)", "Sweep(rest: 2 points, 2 finished)"]
     head, *rows = call("list", "rest", check=True).stdout.splitlines()[2:]
     end = head.index(" (mm/s)") + len(" (mm/s)")
     assert [row[:end].split()[-1] for row in rows] == ["0", "0"]

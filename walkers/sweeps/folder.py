@@ -295,18 +295,28 @@ def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
         rows = [[f"{case} ({len(of_case)})", "status", "result", "age", "size", *names]]
         for run in of_case:
             status = f"{run.status}: {run.reason}" if run.reason else run.status
-            result = "-" if run.climbs is None else f"{run.climbs} climb{'' if run.climbs == 1 else 's'}"
-            if run.velocity is not None:
-                sides = run.sides or {"": run.velocity}
-                told = (f"{way} {rounded(1e3 * speed, 'mm/s')}".strip() for way, speed in sides.items())
-                result = "at rest" if max(map(abs, sides.values())) < REST else f"{', '.join(told)} mm/s"
             values = [readable(key, run.parameters.get(key)) for key in varied]
-            rows.append([run.name, status, result, duration_text(run.age), bytes_text(run.size), *values])
+            rows.append([run.name, status, _result_text(run), duration_text(run.age), bytes_text(run.size), *values])
         blocks.append(aligned(rows))
     total = [*counted({"sweep": len(sweeps)}), f"{len(runs)} run{'' if len(runs) == 1 else 's'}"]
     size = bytes_text(sum(entry.size for entry in entries))
     more = f"; not shown: {hidden} runs of sweeps (--all)" if hidden else ""
     return "\n\n".join([*blocks, f"{', '.join(total)}, {size}{more}"])
+
+
+def _result_text(run: Entry) -> str:
+    """Climbs of a pile, or velocities; a dash if there is no result."""
+    if run.velocity is None:
+        return "-" if run.climbs is None else f"{run.climbs} climb{'' if run.climbs == 1 else 's'}"
+    sides = run.sides or {"": run.velocity}
+    told = (f"{way} {rounded(1e3 * speed, 'mm/s')}".strip() for way, speed in sides.items())
+    return "at rest" if max(map(abs, sides.values())) < REST else f"{', '.join(told)} mm/s"
+
+
+def run_text(directory: Path) -> str:
+    """Status and result of the run in a directory, such as ``finished, 1.08 mm/s``."""
+    run = _run(directory, time.time())
+    return "missing" if run is None else f"{run.status}, {_result_text(run)}".removesuffix(", -")
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> str:
