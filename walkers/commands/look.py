@@ -201,17 +201,17 @@ def compare(
     from walkers.sweeps.comparison import compare_runs, compare_sweeps
 
     refuse(first, second is None and not settings, "expected a second run or sweep, or --set KEY=VALUE")
-    second, changes = second or first, changes_of(settings)
-    there = {one: placed(one, out) for one in (first, second)}
+    sides: list[tuple[str, dict[str, Any]]] = [(first, {}), (second or first, changes_of(settings))]
+    there = {one: placed(one, out) for one, _ in sides}
     sweeps = {one: place.path for one, place in there.items() if place and place.kind == "sweep"}
     if sweeps.keys() == there.keys():
-        refuse("--set", bool(changes), "is for runs and cases")
-        found = compare_sweeps(sweeps[first], sweeps[second], y)
+        refuse("--set", bool(settings), "is for runs and cases")
+        found = compare_sweeps(sweeps[first], sweeps[sides[1][0]], y)
     else:
         for one in sweeps:
             refuse(one, True, "is a sweep; expected another sweep to compare with")
         refuse("--y", y is not None, "is for sweeps")
-        found = compare_runs(*each(lambda one: find_side(one[0], out, one[1]), ((first, {}), (second, changes))))
+        found = compare_runs(*each(lambda side: find_side(side[0], out, side[1]), sides))
     print_as(as_json, lambda: found.contents, lambda: found.text)
 
 

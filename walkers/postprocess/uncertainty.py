@@ -98,9 +98,9 @@ def with_bands(directory: Path, result: Mapping[str, Any]) -> dict[str, Any]:
 
     If its numerical error is not measured, it also has the commands that measure it, as ``checks``.
     """
-    result, unknown = dict(result), (OSError, ValueError, KeyError, TypeError)
+    known, unknown = dict(result), (OSError, ValueError, KeyError, TypeError)
     with suppress(*unknown):
-        result["bands"] = read_json(spread_of(directory.resolve()) / SPREAD_NAME)["bands"]
+        known["bands"] = read_json(spread_of(directory.resolve()) / SPREAD_NAME)["bands"]
     if result.get("numerical_error") is None and not result.get("by_hand"):
         with suppress(*unknown):  # a result that is not shown where its case is
             case, name = read_json(directory / CASE_NAME), shlex.quote(str(directory))
@@ -109,8 +109,8 @@ def with_bands(directory: Path, result: Mapping[str, Any]) -> dict[str, Any]:
                 f"run.time_step={0.5e6 * step:.4g}us",
                 f"contact.youngs_modulus={1e-6 * STIFFER * modulus:.4g}MPa",
             )
-            result["checks"] = [f"walkers run {name} --set {change}" for change in changes]
-    return result
+            known["checks"] = [f"walkers run {name} --set {change}" for change in changes]
+    return known
 
 
 def band_of(result: Mapping[str, Any], name: str, own: float | None) -> tuple[float, float] | None:
