@@ -69,7 +69,7 @@ def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def wrapped(sentences: Iterable[str]) -> list[str]:
     """Sentences as indented lines of a text."""
-    wrapper = textwrap.TextWrapper(_WIDTH, "    ", "      ", break_on_hyphens=False)
+    wrapper = textwrap.TextWrapper(_WIDTH, "    ", "      ", break_on_hyphens=False, break_long_words=False)
     # A number and its unit, and a command.
     tied = (re.sub(r"(?<=\d) (?=[%a-z])", "\u00a0", sentence) for sentence in sentences)
     tied = (re.sub(r"walkers run .*", lambda command: command[0].replace(" ", "\u00a0"), one) for one in tied)
