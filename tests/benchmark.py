@@ -22,10 +22,9 @@ from pathlib import Path
 
 import numpy as np
 
-from walkers.inputs import load_case
 from walkers.inputs.case import Case
-from walkers.runner import find_engine
-from walkers.runner.binary import plugin_of
+from walkers.inputs.reading import load_case
+from walkers.runner.binary import find_engine, plugin_of
 from walkers.runner.directory import write_deck
 from walkers.templates.deck import DECK_NAME, Segment, render_deck
 from walkers.templates.engine import ALONE

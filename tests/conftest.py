@@ -24,12 +24,11 @@ from tomli_w import dumps as to_toml
 
 from walkers import run as run_case
 from walkers.archive.writing import write_archive
-from walkers.inputs import resolve_case
 from walkers.inputs.axes import is_axis
 from walkers.inputs.case import Case
 from walkers.inputs.changes import flatten
-from walkers.inputs.reading import read_toml, shipped_cases
-from walkers.inputs.sweep import expand, shipped_sweeps
+from walkers.inputs.reading import read_toml, resolve_case, shipped
+from walkers.inputs.sweep import expand
 from walkers.main import main
 from walkers.postprocess import series
 from walkers.postprocess.gait import Walk, walk
@@ -222,7 +221,7 @@ def pile_run(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
     """The shipped pile of 60 beads."""
 
     def make(out: Path) -> None:
-        tables = read_toml(shipped_cases()["pile-ci"])
+        tables = read_toml(shipped("case")["pile-ci"])
         tables["run"] |= HALF
         assert not run_case(resolve_case(tables, name="pile-ci"), out).cached
 
@@ -331,7 +330,7 @@ def call(*arguments: str, check: bool = False, folder: Path | None = None) -> su
 
 def shipped_sweep(name: str, settings: Mapping[str, Any], axes: Mapping[str, Any]) -> dict[str, Any]:
     """The file of a shipped sweep with further settings, and other values on some of its axes if it has any."""
-    given = read_toml(shipped_sweeps()[name])
+    given = read_toml(shipped("sweep")[name])
     given["set"] = {**flatten(given.get("set", {}), lambda _: False), **settings}
     if "axes" in given:
         given["axes"] = {**flatten(given["axes"], is_axis), **axes}
@@ -341,7 +340,7 @@ def shipped_sweep(name: str, settings: Mapping[str, Any], axes: Mapping[str, Any
 def run_shipped(name: str, given: dict[str, Any], out: Path) -> None:
     """Run what `shipped_sweep` gave, under the sweep's name; no point may fail."""
     _, failures = run_sweep(
-        expand(given, source=name, name=name, folder=shipped_sweeps()[name].parent), out, Options(2)
+        expand(given, source=name, name=name, folder=shipped("sweep")[name].parent), out, Options(2)
     )
     assert not failures
 

@@ -11,10 +11,11 @@ import pytest
 
 from tests.conftest import call, document, make_case, to_toml
 from walkers.commands import MOVED
-from walkers.inputs import InputError, resolve_case
+from walkers.inputs.errors import InputError
+from walkers.inputs.reading import resolve_case
 from walkers.physics import units
 from walkers.physics.units import parse_quantity
-from walkers.templates import render_deck
+from walkers.templates.deck import render_deck
 
 GLASS = {"material": "glass"}
 WALKER = {"radii": ["0.3 mm", "0.2 mm"]}
@@ -55,6 +56,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"contact": {"friction": 0.1}}, "contact.friction = 0.1: expected a table"),
     ({"contact": {"restitution": 1.2}}, "contact.restitution = 1.2: expected at most 1"),
     ({"contact": {"restitution": 0}}, "expected more than 0.05"),
+    ({"contact": {"friction": {"bead_bead": -0.1}}}, "contact.friction.bead_bead = -0.1: expected "),
     ({"drive": {"axis": "w"}}, "drive.axis = \"w\": expected 'x', 'y' or 'z'"),
     ({"drive": {"frame": "labs"}}, 'did you mean "lab"'),
     ({"run": {"cycles": "allways"}}, 'run.cycles = "allways": expected a whole number, or "auto"'),
@@ -105,6 +107,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
      "do not fit between the walls"),
     ({"placed": [bead("1 mm", "9 mm"), bead("0.1 mm", "30 mm"), bead("0.5 mm", "10.4 mm")]}, "overlaps with placed[0]"),
     ({"placed": [bead("1 mm", "9 mm", "0.9 mm")]}, "expected a bead within the boundary"),
+    ({"dimers": None, "placed": [bead("1 mm", "9 mm")], "run": {"seed": 3}}, "run.seed = 3: expected none with placed"),
     # What is missing
     ({"dimers": None}, "dimers: missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]"),
     ({"beads": {"material": None}}, "beads.density: missing; expected such as"),
@@ -207,7 +210,7 @@ REFUSED: list[tuple[str, str]] = [
     ("export {run} --to deck --every 2", "--every: is for --to vtk, paraview, xyz, lammps"),
     ("export {run} --to paraview -o vtk --colour beauty", "expected one of bead, large, omega, radius"),
     *((f"export {{run}} --to archive {words}", told) for words, told in (
-        ("-o run.tar", "--output: expected the name of a .zip file"),
+        ("-o run.tar", "-o: expected the name of a .zip file"),
         ("-o nowhere/run.zip", "No such file"),
         ("--licence MINE", "--licence: expected one of CC-BY-4.0"),
         ("--author=", "--author: expected a name"),
@@ -432,8 +435,8 @@ def test_usual_units_are_read_as_pint_reads_them(symbol: str, monkeypatch: pytes
 def test_shipped_cases_do_not_wait_for_pint() -> None:
     script = """
 import sys
-from walkers.inputs import load_case, shipped_cases
-print([load_case(name).name for name in shipped_cases()] and "pint" in sys.modules)
+from walkers.inputs.reading import load_case, shipped
+print([load_case(name).name for name in shipped("case")] and "pint" in sys.modules)
 """
     told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert told.stdout.strip() == "False"

@@ -14,12 +14,12 @@ import pytest
 
 import walkers
 from tests.conftest import REFERENCE, document, make_case
-from walkers.inputs import InputError, load_case, resolve_case
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Drive, Harmonic, common_frequency
+from walkers.inputs.errors import InputError
 from walkers.inputs.loads import contact_loads
-from walkers.inputs.reading import read_toml, shipped_cases
+from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped
 from walkers.postprocess.analyses.meetings import Course, Meeting, collective
 from walkers.postprocess.analysis import describe_result, figures_of, read_result
 from walkers.postprocess.gait import postures, turned_over_at
@@ -73,7 +73,7 @@ def of_tables(*clusters: dict[str, Any], **tables: Any) -> Case:
     return resolve_case({**FIG1B, "clusters": list(clusters), **tables}, name="cluster")
 
 
-def shipped(**changes: Any) -> Any:
+def fig1b(**changes: Any) -> Any:
     """The shipped walker of Fig. 1b, one of it, briefly."""
     case = load_case("fig1b")
     walkers = replace(case.walkers[0], replicates=1, facing="right", angle_spread=0.0, gap_spread=0.0)
@@ -261,14 +261,6 @@ def test_a_dimer_in_a_groove_rolls_on_both_walls(tmp_path: Path) -> None:
     assert done.export("vtk").exists()
 
 
-def test_walkers_may_run_in_segments(tmp_path: Path) -> None:
-    """A walker of three segments walks as one in one does (restarts: 1e-3)."""
-    run = {"cycles": 24, "settling_cycles": 12, "segment": "0.1 s"}
-    done = walkers.run(of_tables(dimers=dimers(1), run=run), tmp_path)
-    assert [path.name for path in sorted((done.directory / "segments").iterdir())] == ["0000", "0001", "0002"]
-    assert done.result["velocity"]["mean"] == pytest.approx(FIG1B_SPEED, rel=2e-3)
-
-
 @pytest.mark.parametrize("frequency", ["73 Hz", "74 Hz"])
 def test_a_rest_before_the_drive_is_one(tmp_path: Path, frequency: str) -> None:
     """Whatever part of a cycle it takes: nothing moves meanwhile, the bridges drag as they do without it."""
@@ -380,7 +372,7 @@ def test_a_sawtooth_moves_a_symmetric_dimer(run_directory: Callable[..., Path]) 
 
 def test_two_tones_move_a_symmetric_dimer_and_their_phase_says_which_way(run_directory: Callable[..., Path]) -> None:
     """f + 2f breaks the symmetry under half a period; shifted by π, 2f is the mirrored drive. Measured: ∓2.28 mm/s."""
-    case = shipped()
+    case = fig1b()
     case = replace(case, walkers=(replace(case.walkers[0], radii=(0.25e-3, 0.25e-3)),))
 
     def speed(phase: float) -> float:
@@ -402,13 +394,13 @@ def test_gravity_on_a_plane(tilt: float, uphill: float) -> None:
     down = 9.81 * sin(radians(tilt))
     np.testing.assert_allclose(found, (-down * way[0], -down * way[1], -9.81 * cos(radians(tilt))), atol=1e-14)
     assert (found[2] == 0.0) == (tilt == 90.0)
-    assert shipped(boundary=plane).goes_uphill == (tilt > 0.0 and uphill == 0.0)
+    assert fig1b(boundary=plane).goes_uphill == (tilt > 0.0 and uphill == 0.0)
 
 
 def test_a_walker_walks_up_a_slope_until_it_is_too_steep(run_directory: Callable[..., Path]) -> None:
     """As measured: its speed falls with the tilt and changes sign between 10° and 20°."""
     slopes = [Boundary(material="chromium-coated glass", tilt=radians(tilt)) for tilt in (5.0, 20.0)]
-    gentle, steep = (read_result(run_directory(shipped(boundary=slope))) for slope in slopes)
+    gentle, steep = (read_result(run_directory(fig1b(boundary=slope))) for slope in slopes)
     assert gentle["velocity"]["mean"] == pytest.approx(0.605e-3, rel=0.03)
     assert steep["axial_velocity"]["right_facing"] < 0.0
 
@@ -425,7 +417,7 @@ CLIMB = {"time_step": "4 us", "cycles": 24, "settling_cycles": 12}
 
 
 def on_a_wall(friction: float = 0.3, **start: Any) -> Case:
-    case = resolve_case({**read_toml(shipped_cases()["climber-dimer"]), "run": CLIMB}, name="climber-dimer")
+    case = resolve_case({**read_toml(shipped("case")["climber-dimer"]), "run": CLIMB}, name="climber-dimer")
     contact = replace(case.contact, friction_bead_wall=friction, friction_bead_bead=friction)
     begin = {"replicates": 1, "angle_spread": 0.0, "gap_spread": 0.0, "spacing": 0.1, **start}
     return replace(case, contact=contact, walkers=(replace(case.walkers[0], **begin),))
@@ -446,7 +438,7 @@ def climbers(once: Callable[..., Path]) -> dict[str, Path]:
 
 def test_a_dimer_on_a_wall_is_one_on_a_plane_at_90_degrees() -> None:
     """Facing right is facing up there: the same case, hence the same run."""
-    tables = read_toml(shipped_cases()["climber-dimer"])
+    tables = read_toml(shipped("case")["climber-dimer"])
     assert tables["boundary"]["tilt"] == "90 deg"
     tables["dimers"]["facing"] = "right"
     assert resolve_case(tables).determinants() == load_case("climber-dimer").determinants()
@@ -480,7 +472,7 @@ def test_a_climbers_weight_pulls_along_the_axis() -> None:
 def upright(once: Callable[..., Path]) -> Path:
     """The shipped climber, with its spread of starts, for a fifth of its time."""
     run = {"time_step": "2 us", "cycles": 36, "settling_cycles": 24, "samples_per_cycle": 1}
-    tables = {**read_toml(shipped_cases()["climber"]), "run": run}
+    tables = {**read_toml(shipped("case")["climber"]), "run": run}
     case, engine = resolve_case(tables, name="climber"), find_engine(None)
     out = once("upright", lambda folder: make_runs([case], folder, engine))
     return finished_places(out)[run_place(case, engine, out).name]

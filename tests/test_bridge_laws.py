@@ -13,8 +13,8 @@ import pytest
 
 from tests.conftest import make_case
 from walkers.check.bridges import willett_simple
-from walkers.inputs import load_case
 from walkers.inputs.loads import dimer_of
+from walkers.inputs.reading import load_case
 from walkers.inputs.run_tables import limits_of
 from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces

@@ -10,7 +10,8 @@ import pytest
 from tests.conftest import SHORT, call, document, make_case
 from walkers import load
 from walkers import run as run_case
-from walkers.inputs import InputError, resolve_case
+from walkers.inputs.errors import InputError
+from walkers.inputs.reading import resolve_case
 from walkers.sweeps.by_hand import take_in, write_folder
 
 

@@ -30,11 +30,10 @@ from walkers.check.scenes import (
     second_engine,
     standing,
 )
-from walkers.inputs import resolve_case
 from walkers.inputs.boundary import BOTTOM, Flat, Round, Wall
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
-from walkers.inputs.reading import load_case, read_toml, shipped_cases
+from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped
 from walkers.physics.bridge import Surfaces
 from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.physics.laws import law_of
@@ -42,7 +41,7 @@ from walkers.postprocess.dump import FloatArray, local_frames
 from walkers.postprocess.motion import Motion, read_motion
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import EngineError
-from walkers.templates.deck import Checkpoint, Plan, compose
+from walkers.templates.deck import Plan, compose
 from walkers.templates.layout import WALL_BRIDGES
 from walkers.templates.scene import Bead
 
@@ -73,7 +72,7 @@ def one_bead(
 
 def pile(count: int) -> dict[str, Any]:
     """The tables of the shipped pile, with fewer beads."""
-    tables: dict[str, Any] = read_toml(shipped_cases()["pile-ci"])
+    tables: dict[str, Any] = read_toml(shipped("case")["pile-ci"])
     tables["mixture"] |= {"count": count}
     return tables
 
@@ -304,9 +303,9 @@ def test_commands_that_are_refused(bench: Bench, command: str) -> None:
 
 def test_a_restart_with_other_walls_is_refused(bench: Bench) -> None:
     case, beads = bench_case(), [over(FLOOR, -1e-6, RADIUS)]
-    first = prescribed(case, standing(beads), 10, checkpoint=Checkpoint(write="half.restart"))
+    first = prescribed(case, standing(beads), 10, restart_to="half.restart")
     carry = bench.run(first).directory / "half.restart"
     scene = standing(beads, [FLOOR, Round(2.5e-3)])
-    second = replace(first, recording=replace(recording(20), begin=10), checkpoint=Checkpoint(read="half.restart"))
+    second = replace(first, recording=replace(recording(20), begin=10), restart_to=None, restart_from="half.restart")
     with pytest.raises(EngineError, match="another number of walls"):
         bench.run(replace(second, scene=scene), carry)

@@ -7,10 +7,9 @@ from hashlib import sha256
 import pytest
 
 from tests.conftest import document, make_case
-from walkers.inputs import load_case, resolve_case, shipped_cases
 from walkers.inputs.boundary import Boundary
-from walkers.templates import render_deck
-from walkers.templates.deck import CONTENT_VERSION, Deck, Segment, render_shared_deck, settling_steps
+from walkers.inputs.reading import load_case, resolve_case, shipped
+from walkers.templates.deck import CONTENT_VERSION, Deck, Segment, render_deck, render_shared_deck, settling_steps
 from walkers.templates.scene import place
 
 
@@ -23,7 +22,7 @@ def test_rolling_friction_is_left_out_where_there_is_none() -> None:
     assert render_deck(make_case(contact={"rolling_friction": 0.003})).text.count("rolling_friction cdt") == 1
 
 
-@pytest.mark.parametrize("name", shipped_cases())
+@pytest.mark.parametrize("name", shipped("case"))
 def test_numbers_are_rendered_in_full_precision(name: str) -> None:
     case = load_case(name)
     deck = render_deck(case).text

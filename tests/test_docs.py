@@ -29,7 +29,7 @@ from docs.illustrations import (
     stale,
     without_hashes,
 )
-from walkers.inputs import load_case
+from walkers.inputs.reading import load_case
 from walkers.runner.files import read_json, write_json
 
 ROOT = Path(__file__).resolve().parents[1]

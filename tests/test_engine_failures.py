@@ -37,16 +37,14 @@ from tests.conftest import (
     wait_for_engines,
 )
 from walkers import run as run_case
-from walkers.inputs import resolve_case
 from walkers.inputs.case import Case
-from walkers.inputs.reading import read_toml, shipped_cases
-from walkers.runner import failures, find_engine, launch
-from walkers.runner.binary import plugin_of
+from walkers.inputs.reading import read_toml, resolve_case, shipped
+from walkers.runner import failures
+from walkers.runner.binary import find_engine, plugin_of
 from walkers.runner.directory import write_deck
 from walkers.runner.failures import EngineNeverStarted
-from walkers.runner.launch import postponed_interrupts
-from walkers.templates import Deck
-from walkers.templates.deck import Segment, render_deck
+from walkers.runner.launch import launch, postponed_interrupts
+from walkers.templates.deck import Deck, Segment, render_deck
 from walkers.templates.engine import ALONE
 
 Front = Callable[[str], str]
@@ -260,7 +258,7 @@ def test_a_disk_without_room_for_the_dump_and_one_that_fills_up_during_the_run(t
 def _brief_pile(**run: object) -> Case:
     """Settled and shaken for some hundredths of a second."""
     brief = {"duration": "0.03 s", "time_step": "3 us", "longest_settling": "0.02 s", "segment": "0.01 s"}
-    return resolve_case({**read_toml(shipped_cases()["pile-ci"]), "run": {**brief, **run}}, name="brief")
+    return resolve_case({**read_toml(shipped("case")["pile-ci"]), "run": {**brief, **run}}, name="brief")
 
 
 def test_a_full_folder_of_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

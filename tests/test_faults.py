@@ -22,24 +22,22 @@ from tests.conftest import PROGRAM, SHORT, call, document, fill, make_case, moun
 from tests.test_calibration import reduced
 from walkers import run as run_case
 from walkers.calibration.calibrate import _determinants, _kept, calibrate
-from walkers.inputs import InputError, load_case
 from walkers.inputs.calibration import read_calibration
-from walkers.inputs.reading import read_toml
+from walkers.inputs.errors import InputError
+from walkers.inputs.reading import load_case, read_toml
 from walkers.physics.bridge import Surfaces
 from walkers.physics.laws import law_of
-from walkers.postprocess import read_result, tabulate
-from walkers.postprocess.analysis import current_result
+from walkers.postprocess.analysis import current_result, read_result, tabulate
 from walkers.postprocess.dump import BinaryDump, DumpError, local_frames
 from walkers.postprocess.motion import read_bridges, read_motion
-from walkers.runner import finished_run
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import FIRST_SEGMENT, write_deck
+from walkers.runner.directory import FIRST_SEGMENT, finished_run, write_deck
 from walkers.runner.failures import DiskFull, EngineError
 from walkers.runner.launch import launch
 from walkers.runner.manifest import FileChanged, forget_tables
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.table import load as load_table
-from walkers.templates import render_deck
+from walkers.templates.deck import render_deck
 from walkers.templates.layout import BEAD_COLUMNS, MEAN_SPIN_COLUMNS
 
 

@@ -20,13 +20,14 @@ import pytest
 from tests.conftest import PROGRAM, SHORT, call, document, make_case, to_toml
 from walkers import run as run_case
 from walkers.archive.writing import write_archive
-from walkers.inputs import InputError, load_case, resolve_case
 from walkers.inputs.case import Case
+from walkers.inputs.errors import InputError
+from walkers.inputs.reading import load_case, resolve_case
 from walkers.inputs.sweep import load_sweep
 from walkers.inputs.text import rendered
-from walkers.postprocess import read_motion
 from walkers.postprocess.analysis import current_result
 from walkers.postprocess.drawing import new_figure, plain_text, save_figure
+from walkers.postprocess.motion import read_motion
 from walkers.postprocess.paraview import _script
 from walkers.postprocess.report.run import result_html
 from walkers.runner.directory import CASE_NAME, case_of

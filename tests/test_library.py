@@ -11,10 +11,11 @@ from typing import Any
 import pytest
 
 from tests.conftest import call, document, to_toml
-from walkers.inputs import InputError, load_case, resolve_case
 from walkers.inputs.case import Case
-from walkers.inputs.library import _of_packages, library_of, unmeasured
+from walkers.inputs.errors import InputError
+from walkers.inputs.library import _of_packages, library_of
 from walkers.inputs.origins import Origin
+from walkers.inputs.reading import load_case, resolve_case
 from walkers.inputs.sweep import expand
 from walkers.packages import offers
 from walkers.physics.mixtures import water_glycerol
@@ -47,9 +48,6 @@ def test_every_number_of_the_library_has_a_source_and_defaults_lie_within_their_
     assert all(number.value > 0 and len(number.source) > 8 for number in known)
     densities = {name: SHIPPED.material(name)["density"].value for name in materials}
     assert sorted(densities, key=lambda name: densities[name])[:: len(densities) - 1] == ["polystyrene", "brass"]
-    for key, loose in unmeasured().items():
-        if key != "liquid.contact_angle":  # a liquid that wets is at the end
-            assert loose.range[0] < loose.usual.value < loose.range[1]
 
 
 # Mass fraction, °C, viscosity (mPa s; Segur and Oberstar 1951), density (g/cm³; Bosart and Snoddy 1928), both as in the

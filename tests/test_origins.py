@@ -12,11 +12,12 @@ import pytest
 
 import walkers
 from tests.conftest import REFERENCE, call, document, make_case, to_toml
-from walkers.inputs import InputError, library, load_case, shipped_cases
+from walkers.inputs import library
 from walkers.inputs.case import Case
 from walkers.inputs.changes import changed, settings_of
+from walkers.inputs.errors import InputError
 from walkers.inputs.origins import Origin
-from walkers.inputs.reading import resolve_case
+from walkers.inputs.reading import load_case, resolve_case, shipped
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.gait import SEPARATED
 from walkers.postprocess.uncertainty import SPREAD_NAME, band_of, band_text
@@ -66,7 +67,7 @@ def test_values_know_where_they_come_from() -> None:
     assert origins(load_case("fig1b", {"liquid.law": "willett"}))["liquid.viscosity_ratio"].guessed
 
 
-@pytest.mark.parametrize("name", sorted(shipped_cases()))
+@pytest.mark.parametrize("name", sorted(shipped("case")))
 def test_the_origins_tell_the_numbers_of_the_case(name: str) -> None:
     """Each text, read as a file's, gives the same case: nothing is told that is not so."""
     case = load_case(name)

@@ -16,12 +16,10 @@ from PIL import Image
 
 from tests.conftest import call, run_shipped, shipped_sweep
 from tests.printed import letters, spoilt
-from walkers.inputs import load_case
 from walkers.inputs.axes import is_axis
 from walkers.inputs.changes import flatten
 from walkers.inputs.loads import dimer_of
-from walkers.inputs.reading import read_toml
-from walkers.inputs.sweep import shipped_sweeps
+from walkers.inputs.reading import load_case, read_toml, shipped
 from walkers.paper import model_terms, published
 from walkers.paper.comparison import as_dict, as_markdown, compare, count
 from walkers.paper.figures import OBSERVED, PARAMETERS, sensitivities, theory_of_cycles
@@ -184,7 +182,7 @@ def test_the_sensitivity_study_covers_each_parameter_both_ways(
     """The shipped study, two cycles a run."""
 
     def run(out: Path) -> None:
-        given = read_toml(shipped_sweeps()["sensitivity"])
+        given = read_toml(shipped("sweep")["sensitivity"])
         experiments = len(given["zip"][0]["run"]["most_cycles"])
         given["zip"][0]["run"] = {"cycles": [2] * experiments, "settling_cycles": [0] * experiments}
         run_shipped("sensitivity", given, out)

@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 
 from tests.conftest import make_case
-from walkers.inputs import load_case
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
+from walkers.inputs.reading import load_case
 from walkers.physics.bridge import Surfaces
 from walkers.physics.laws import law_of
 from walkers.postprocess.gait import Walk, gait, settled_samples, walk
 from walkers.postprocess.motion import Group
-from walkers.runner import find_engine, launch
+from walkers.runner.binary import find_engine
 from walkers.runner.directory import write_deck
-from walkers.templates import render_deck
+from walkers.runner.launch import launch
+from walkers.templates.deck import render_deck
 
 Walked = Callable[..., Walk]
 Moved = Callable[..., Group]
@@ -90,7 +91,7 @@ def test_bridges_drag_rolling_beads_that_nothing_else_holds(trajectory: Moved, f
     case, dimer = moved.case, dimer_of(moved.case)
     inertia = np.diag([dimer.total_mass, *(0.4 * mass for mass in dimer.masses)])
     answer = np.linalg.solve(
-        1j * case.drive.angular_frequency * inertia + _resistance(case),
+        1j * case.drive.largest.angular_frequency * inertia + _resistance(case),
         np.array([dimer.total_mass * case.drive.peak_acceleration, 0.0, 0.0]),
     )
     settled = settled_samples(moved)
@@ -131,7 +132,7 @@ def test_substrate_moves_as_prescribed(trajectory: Moved, axis: str, frame: str)
     """A sin ωt along the axis, zero across: of the walls that move, or are held in thought; walkers start at rest."""
     moved = trajectory(drive={"axis": axis, "frame": frame}, run={"cycles": 4, "settling_cycles": 1})
     drive, motion, along = moved.case.drive, moved.motion, "xyz".index(axis)
-    phase = drive.angular_frequency * moved.time
+    phase = drive.largest.angular_frequency * moved.time
     places, speeds = motion.substrate, motion.substrate_velocity[:, along]
     np.testing.assert_allclose(places[:, along], drive.amplitude * np.sin(phase), atol=1e-9 * drive.amplitude + 1e-15)
     np.testing.assert_allclose(speeds, drive.peak_velocity * np.cos(phase), atol=1e-9 * drive.peak_velocity)

@@ -16,16 +16,16 @@ from PIL import Image
 
 from tests.conftest import call
 from tests.printed import letters, spoilt
-from walkers.inputs import InputError
 from walkers.inputs.boundary import Boundary
-from walkers.postprocess import Group, Motion, read_motion, read_table
+from walkers.inputs.errors import InputError
 from walkers.postprocess.analysis import figures_of, plot_run
 from walkers.postprocess.drawing import series_look, styled
 from walkers.postprocess.films import FilmOptions, film_times
-from walkers.postprocess.motion import even_frames, even_labels
+from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, read_motion
 from walkers.postprocess.paraview import write_paraview, write_vtk
 from walkers.postprocess.scene import Scene, Window, camera_axes, mesh_of, walls_of
 from walkers.postprocess.series import render_series
+from walkers.postprocess.tables import read_table
 from walkers.postprocess.trajectory_files import box_of
 
 

@@ -24,13 +24,14 @@ import pytest
 import walkers
 from tests.conftest import HALF, PROGRAM, call, engines_in, open_run, to_toml, wait_for
 from tests.printed import spoilt
-from walkers.inputs import Case, InputError, load_case, resolve_case, shipped_cases
+from walkers.inputs.case import Case
+from walkers.inputs.errors import InputError
+from walkers.inputs.reading import load_case, resolve_case, shipped
 from walkers.inputs.sweep import expand
-from walkers.postprocess import current_result, read_motion, read_table, tabulate
 from walkers.postprocess.analyses.piles import Pile
-from walkers.postprocess.analysis import figures_of, tables_of
-from walkers.postprocess.motion import FLOOR, read_bridges
-from walkers.postprocess.tables import described
+from walkers.postprocess.analysis import current_result, figures_of, tables_of, tabulate
+from walkers.postprocess.motion import FLOOR, read_bridges, read_motion
+from walkers.postprocess.tables import described, read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place, segment_directories
 from walkers.runner.failures import EngineError, EngineKilled, RunBusy
@@ -46,7 +47,7 @@ from walkers.templates.deck import Deck, Segment, render_deck
 
 
 def document(**changes: dict[str, Any]) -> dict[str, Any]:
-    tables = tomllib.loads(shipped_cases()["pile-ci"].read_text())
+    tables = tomllib.loads(shipped("case")["pile-ci"].read_text())
     for table, values in changes.items():
         tables.setdefault(table, {}).update(values)
     return tables
@@ -318,41 +319,21 @@ def test_an_error_of_the_engine_leaves_the_parts_before(tmp_path: Path) -> None:
     assert kept.items() <= written(finished.directory).items()
 
 
-BAD: dict[str, tuple[str, dict[str, dict[str, Any]], str]] = {
-    "no count": ("pile-ci", {"mixture": {"count": None}}, "mixture.count"),
-    "both": ("pile-ci", {"mixture": {"fill_height": "3 mm"}}, "mixture.count"),
-    "classes": ("pile-ci", {"mixture": {"large": ["0.29 mm", "0.4 mm"]}}, "mixture.large"),
-    "range": ("pile-ci", {"mixture": {"small": ["0.32 mm", "0.3 mm"]}}, "mixture.small"),
-    "narrow": ("pile-ci", {"boundary": {"width": "1.5 mm"}}, "boundary.width"),
-    "low": ("pile-ci", {"boundary": {"height": "2 mm"}}, "boundary.height"),
-    "long": ("pile-ci", {"run": {"duration": "9000 s"}}, "run.duration"),
-    "step": ("pile-ci", {"run": {"time_step": "6 us"}}, "run.time_step"),
-    "friction": ("pile-ci", {"contact": {"friction": {"bead_bead": -0.1}}}, "contact.friction.bead_bead"),
-    "unknown": ("pile-ci", {"boundary": {"depth": "3 mm"}}, "boundary.depth"),
-    "material": ("pile-ci", {"boundary": {"material": "glas"}, "contact": {"friction": {}}}, "boundary.material"),
-    "outside": ("cluster", {"placed": {"at": ["2.2 mm", "2.2 mm", "8 mm"]}}, "placed[0].at"),
-    "overlap": (
-        "cluster",
-        {"placed": {"at": ["2.1926 mm", "2.1926 mm", "7.4 mm"], "radius": "0.3075 mm"}},
-        "placed[1].at",
-    ),
-    "no unit": ("cluster", {"placed": {"radius": 0.5}}, "placed[0].radius"),
-    "counted": ("cluster", {"beads": {"count": 3}}, "beads.count"),
-    "sized": ("cluster", {"beads": {"sizes": 3}}, "beads.sizes"),
-    "seeded": ("cluster", {"run": {"seed": 3}}, "run.seed"),
-}
+BAD: list[tuple[dict[str, dict[str, Any]], str]] = [
+    ({"mixture": {"count": None}}, "mixture.count"),
+    ({"mixture": {"fill_height": "3 mm"}}, "mixture.count"),
+    ({"mixture": {"large": ["0.29 mm", "0.4 mm"]}}, "mixture.large"),
+    ({"mixture": {"small": ["0.32 mm", "0.3 mm"]}}, "mixture.small"),
+    ({"boundary": {"width": "1.5 mm"}}, "boundary.width"),
+    ({"boundary": {"height": "2 mm"}}, "boundary.height"),
+    ({"run": {"duration": "9000 s"}}, "run.duration"),
+]
 
 
-@pytest.mark.parametrize("name", BAD)
-def test_a_bad_pile_is_told_by_its_key(name: str) -> None:
-    """And so are badly placed beads, and what has no meaning for them."""
-    shipped, changes, key = BAD[name]
-    tables = tomllib.loads(shipped_cases()[shipped].read_text())
-    for table, values in changes.items():
-        whole = tables["placed"][0] if table == "placed" else tables.setdefault(table, {})
-        whole.update(values)
-        for inner in [inner for inner, value in whole.items() if value is None]:
-            del whole[inner]
+@pytest.mark.parametrize(("changes", "key"), BAD)
+def test_a_bad_pile_is_told_by_its_key(changes: dict[str, dict[str, Any]], key: str) -> None:
+    tables = document(**changes)
+    tables["mixture"] = {name: value for name, value in tables["mixture"].items() if value is not None}
     with pytest.raises(InputError, match=re.escape(key)):
         resolve_case(tables, source="bad.toml", name="bad")
 
@@ -554,7 +535,7 @@ def test_leaders_by_chance() -> None:
 
 def test_a_climber_that_leaves_the_container_ends_the_run(tmp_path: Path) -> None:
     """It climbs at 4.8 mm/s; its upper bead is 3.2 mm below where the walls end; segments are of 0.05 s."""
-    tables = tomllib.loads(shipped_cases()["cluster"].read_text())
+    tables = tomllib.loads(shipped("case")["cluster"].read_text())
     tables["contact"]["friction"] = {"bead_bead": 0.3, "bead_wall": 0.3}
     places = ((0.545, 2.0), (0.3075, 1.18135))
     tables["placed"] = [{"radius": f"{r} mm", "at": [f"{2.5001 - r} mm", "0 mm", f"{z} mm"]} for r, z in places]
@@ -572,7 +553,7 @@ def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(tm
 
     On the wall across from it is one led by its small bead.
     """
-    tables = tomllib.loads(shipped_cases()["cluster"].read_text())
+    tables = tomllib.loads(shipped("case")["cluster"].read_text())
     large, small = 0.545, 0.3075
     tables["contact"]["friction"] = {"bead_bead": 0.3, "bead_wall": 0.3}
     tables["placed"] = [
@@ -590,7 +571,7 @@ def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(tm
 
 
 def test_placed_beads_reach_the_side_of_a_cylinder() -> None:
-    tables = tomllib.loads(shipped_cases()["cluster"].read_text())
+    tables = tomllib.loads(shipped("case")["cluster"].read_text())
     tables["boundary"]["shape"] = "cylinder"
     for number, bead in enumerate(tables["placed"]):
         bead["at"] = ["0 mm", "0 mm", f"{8 - 2 * number} mm"]

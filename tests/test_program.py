@@ -19,12 +19,13 @@ from tests.conftest import PROGRAM, SHORT, call, document, to_toml
 from walkers import load_case
 from walkers import run as run_case
 from walkers.commands import GROUPS
-from walkers.inputs.reading import shipped_cases
+from walkers.inputs.reading import shipped
 from walkers.main import _program
 from walkers.physics.time_step import WALKER_FRACTIONS
-from walkers.postprocess import read_result, read_table
-from walkers.runner import find_engine, finished_run
-from walkers.runner.directory import run_place
+from walkers.postprocess.analysis import read_result
+from walkers.postprocess.tables import read_table
+from walkers.runner.binary import find_engine
+from walkers.runner.directory import finished_run, run_place
 from walkers.runner.provenance import COMMIT_NAME, software
 
 ROOT = Path(__file__).parent.parent
@@ -119,7 +120,7 @@ def test_a_new_case_runs_as_it_is_and_with_each_line_that_is_commented_out(kind:
             tried += 1
     assert tried >= 3
     call("new", "copy.toml", "--from", "climber", check=True)
-    assert Path("copy.toml").read_text() == shipped_cases()["climber"].read_text()
+    assert Path("copy.toml").read_text() == shipped("case")["climber"].read_text()
 
 
 # --- help, version, completion ----------------------------------------------------------------------------------------
@@ -188,7 +189,7 @@ def test_shells_complete_commands_names_runs_and_sweeps(
     monkeypatch.chdir(tmp_path)
     runs = {Path(run).name for run in walkers.load("runs/three").table()["run"]}
     assert completed("walkers comp") == ["compare"]
-    assert completed("walkers run fig") == [*(name for name in shipped_cases() if name[:3] == "fig"), "figure.toml"]
+    assert completed("walkers run fig") == [*(name for name in shipped("case") if name[:3] == "fig"), "figure.toml"]
     assert "fig2" in completed("walkers sweep fi")
     assert runs <= set(completed("walkers run base-"))
     assert {"engine", "fig1b"} <= set(completed("walkers check "))

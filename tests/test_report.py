@@ -19,13 +19,13 @@ from tests.conftest import call, document, make_case, to_toml
 from walkers.inputs.caption import caption
 from walkers.inputs.rounding import rounded, with_decimals
 from walkers.inputs.sweep import expand
-from walkers.postprocess import read_motion, read_table
 from walkers.postprocess.analysis import current_result, number_of
-from walkers.postprocess.motion import gathered
+from walkers.postprocess.motion import gathered, read_motion
 from walkers.postprocess.report.page import LARGEST, overhead
 from walkers.postprocess.report.player import cameras_of, player_of
 from walkers.postprocess.report.run import report_run
 from walkers.postprocess.scene import camera_axes
+from walkers.postprocess.tables import read_table
 from walkers.runner.provenance import software
 from walkers.sweeps.report import report_sweep
 from walkers.sweeps.scheduler import Options, run_sweep

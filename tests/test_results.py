@@ -10,16 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from walkers.inputs import load_case, resolve_case, shipped_cases
 from walkers.inputs.case import Case
-from walkers.inputs.reading import read_toml
-from walkers.postprocess import read_motion, read_result, read_table
+from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped
 from walkers.postprocess.analyses.walking import Walking, walkers_met
 from walkers.postprocess.analyses.work import Working
-from walkers.postprocess.analysis import RESULT_NAME, current_result, describe_result
+from walkers.postprocess.analysis import RESULT_NAME, current_result, describe_result, read_result
 from walkers.postprocess.gait import Averages, averages, fit_slopes, gait, gaps, settled_samples, steady_walkers, walk
-from walkers.postprocess.motion import Group
-from walkers.postprocess.tables import described
+from walkers.postprocess.motion import Group, read_motion
+from walkers.postprocess.tables import described, read_table
 from walkers.runner.directory import SEGMENTS
 from walkers.runner.files import write_json
 from walkers.runner.manifest import record_tables
@@ -239,7 +237,7 @@ def groups(trajectory: Callable[..., Group]) -> dict[int, Group]:
 
 def _hopping(samples: int, **run: object) -> Case:
     """Fig. 4b's walker, whose beads part in every cycle."""
-    tables = read_toml(shipped_cases()["fig4b"])
+    tables = read_toml(shipped("case")["fig4b"])
     tables["dimers"]["replicates"] = 1
     tables["run"] = {"time_step": "3 us", "cycles": 12, "settling_cycles": 4, "samples_per_cycle": samples, **run}
     return resolve_case(tables, source="test", name=f"hopping-{samples}")

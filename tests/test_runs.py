@@ -33,11 +33,20 @@ from tests.conftest import (
     wait_for,
 )
 from walkers import run as run_case
-from walkers.inputs import InputError
-from walkers.runner import FinishedRun, Progress, find_engine, finished_run, run_name
-from walkers.runner.directory import FIRST_SEGMENT, finished_places, is_locked, locked
+from walkers.inputs.errors import InputError
+from walkers.runner.binary import find_engine
+from walkers.runner.directory import (
+    FIRST_SEGMENT,
+    FinishedRun,
+    finished_places,
+    finished_run,
+    is_locked,
+    locked,
+    run_name,
+)
 from walkers.runner.failures import RunBusy
-from walkers.templates import render_deck
+from walkers.runner.launch import Progress
+from walkers.templates.deck import render_deck
 
 PATIENCE_OF_LOCKS = "walkers.runner.directory._PATIENCE_SECONDS"
 

@@ -12,14 +12,14 @@ import pytest
 
 from tests.conftest import document
 from walkers import run as run_case
-from walkers.inputs import load_case, resolve_case
 from walkers.inputs.case import Case
 from walkers.inputs.drive import AXES
 from walkers.inputs.errors import InputError, Stopped
+from walkers.inputs.reading import load_case, resolve_case
 from walkers.postprocess.gait import are_constant, walk
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.tables import read_table
-from walkers.runner import find_engine
+from walkers.runner.binary import find_engine
 from walkers.runner.directory import FIRST_SEGMENT
 from walkers.runner.launch import Progress
 from walkers.sweeps.making import make_runs

@@ -10,8 +10,8 @@ import pytest
 from scipy.stats import qmc
 
 from tests.conftest import document, make_case, to_toml
-from walkers.inputs import InputError
 from walkers.inputs.case import Case
+from walkers.inputs.errors import InputError
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.sweep import Sweep, expand, load_sweep
 from walkers.postprocess.analyses.meetings import Meetings

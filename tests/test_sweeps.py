@@ -33,15 +33,16 @@ from tests.conftest import (
 )
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.sweep import load_sweep
-from walkers.postprocess import read_motion, read_table
-from walkers.runner import find_engine, finished_run
-from walkers.runner.directory import FIRST_SEGMENT, locked
+from walkers.postprocess.motion import read_motion
+from walkers.postprocess.tables import read_table
+from walkers.runner.binary import find_engine
+from walkers.runner.directory import FIRST_SEGMENT, finished_run, locked
 from walkers.runner.failures import WalkersMet
 from walkers.runner.summary import predicted_overhead
 from walkers.sweeps.making import make_runs
 from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep, work
 from walkers.sweeps.table import load, thresholds
-from walkers.templates import render_deck
+from walkers.templates.deck import render_deck
 
 TINY = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
 # Long enough for whoever is to be stopped meanwhile, however fast or busy the machine.

@@ -10,16 +10,15 @@ import numpy as np
 import pytest
 
 from tests.conftest import call, document, make_case, to_toml
-from walkers.inputs import load_case, resolve_case
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of, resistances_at_rest
-from walkers.inputs.reading import read_toml, shipped_cases
+from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped
 from walkers.inputs.sweep import expand
 from walkers.physics.dimer import Dimer
-from walkers.postprocess import read_table
 from walkers.postprocess.analysis import read_result
 from walkers.postprocess.gait import gait
 from walkers.postprocess.motion import Group
+from walkers.postprocess.tables import read_table
 from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import thresholds
 from walkers.theory.mathieu import Alignment, alignment, is_stable, largest_stable_v, time_to_turn
@@ -186,7 +185,7 @@ def test_the_damped_mathieu_equation_has_its_known_limits(damping: float) -> Non
 
 def climber(viscosity: float, tilt: str = "90 deg", **drive: str) -> Case:
     """A dimer on a wall that leads with its large bead, half a degree off the axis; viscosity over glycerol's."""
-    tables: dict[str, Any] = read_toml(shipped_cases()["climber-dimer"])
+    tables: dict[str, Any] = read_toml(shipped("case")["climber-dimer"])
     tables["dimers"] |= {"replicates": 1, "angle": "0.5 deg", "angle_spread": "0 deg", "gap_spread": 0.0}
     tables["liquid"] |= {"viscosity_ratio": viscosity}
     tables["boundary"] |= {"tilt": tilt}

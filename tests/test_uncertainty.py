@@ -11,12 +11,13 @@ import pytest
 
 import walkers
 from tests.conftest import make_case
-from walkers.inputs import library, load_case, resolve_case
+from walkers.inputs import library
 from walkers.inputs.axes import ranges_of
 from walkers.inputs.catalogue import catalogue
 from walkers.inputs.errors import InputError
 from walkers.inputs.numerical import STIFFER, measured, numerical_error
 from walkers.inputs.readable import kind_of
+from walkers.inputs.reading import load_case, resolve_case
 from walkers.inputs.rounding import rounded
 from walkers.paper.published import outside_of_the_paper
 from walkers.physics.units import parse_quantity
@@ -57,7 +58,7 @@ def test_the_numerical_error_is_what_a_shorter_step_and_harder_beads_change(runs
 
 def test_what_is_usual_lies_within_its_range() -> None:
     """Strictly, but for a contact angle of 0°, the end of what is possible."""
-    numbers = {key: (one.usual, one.range) for key, one in library.unmeasured().items() if one.usual}
+    numbers = {key: (one, one.range) for key, one in library.unmeasured().items()}
     for entry in catalogue(of_others=False):
         if entry.kind == "surface pairs":
             known = {key: one for key, one in entry.numbers.items() if one.range}

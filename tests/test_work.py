@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from walkers.inputs.loads import contact_loads, dimer_of
-from walkers.postprocess import current_result, read_table
-from walkers.postprocess.analysis import describe_result, figures_of
+from walkers.postprocess.analysis import current_result, describe_result, figures_of
+from walkers.postprocess.tables import read_table
 from walkers.runner.directory import case_of
 
 

@@ -11,8 +11,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.exporting import exporting
-
 if TYPE_CHECKING:
     from walkers.handles import Run, Sweep
     from walkers.inputs.reading import load_case
@@ -28,15 +26,11 @@ _PACKAGES = (
     *("physics", "inputs", "templates", "runner", "postprocess"),
     *("sweeps", "archive", "check", "theory", "paper", "calibration"),
 )
-_exported = exporting(
-    "walkers",
-    **{
-        "handles": ["Run", "Sweep"],
-        "pipeline": ["load", "run", "start", "sweep"],
-        "inputs.reading": ["load_case"],
-        "postprocess.films": ["FilmOptions"],
-    },
-)
+_MODULES = {
+    **{"FilmOptions": "postprocess.films", "Run": "handles", "Sweep": "handles", "load_case": "inputs.reading"},
+    **dict.fromkeys(("load", "run", "start", "sweep"), "pipeline"),
+}
+"""Modules of the public names."""
 
 
 def __dir__() -> list[str]:
@@ -44,5 +38,9 @@ def __dir__() -> list[str]:
 
 
 def __getattr__(name: str) -> Any:
-    """The public names and the packages, imported on first use."""
-    return import_module(f"walkers.{name}") if name in _PACKAGES else _exported(name)
+    """The public names and the packages, imported on first use: pydantic, jinja2 and numpy take time to load."""
+    if name in _PACKAGES:
+        return import_module(f"walkers.{name}")
+    if name not in _MODULES:
+        raise AttributeError(f"module 'walkers' has no attribute {name!r}")
+    return getattr(import_module(f"walkers.{_MODULES[name]}"), name)

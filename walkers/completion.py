@@ -1,6 +1,6 @@
-"""What a shell offers as values of arguments: shipped names, files, runs and sweeps that are there.
+"""Completion of arguments in a shell: shipped names, files, existing runs and sweeps.
 
-Where nothing is offered the shell completes names of files by itself. Nothing is imported that takes time.
+If nothing is offered, the shell completes names of files by itself. Slow imports are avoided.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _RUN = re.compile(r".+-[0-9a-f]{12}")
 
 
 def offering(*kinds: str) -> Callable[[typer.Context, str], list[str]]:
-    """What offers things of some kinds that begin as what was typed.
+    """A function that offers values of some kinds that begin with the typed text.
 
     Parameters
     ----------
@@ -26,8 +26,7 @@ def offering(*kinds: str) -> Callable[[typer.Context, str], list[str]]:
     """
 
     def offered(ctx: typer.Context, incomplete: str) -> list[str]:
-        from walkers.inputs.reading import shipped_cases
-        from walkers.inputs.sweep import shipped_sweeps
+        from walkers.inputs.reading import shipped
         from walkers.packages import offers
 
         names: list[str] = []
@@ -35,7 +34,7 @@ def offering(*kinds: str) -> Callable[[typer.Context, str], list[str]]:
             if kind in RECORDS:
                 names += [*_names(ctx, kind), *_typed(incomplete, f"*/{RECORDS[kind]}")]
             else:
-                known = [*shipped_cases(), *offers("walkers.cases")] if kind == "case" else shipped_sweeps()
+                known = [*shipped("case"), *offers("walkers.cases")] if kind == "case" else shipped("sweep")
                 names += [*known, *_typed(incomplete, "*.toml")]
         return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
 
@@ -56,7 +55,7 @@ def _names(ctx: typer.Context, kind: str) -> list[str]:
 
 
 def _typed(incomplete: str, pattern: str) -> list[str]:
-    """What there is of a pattern in the folder that was typed: its first part."""
+    """Files that match a pattern in the folder at the beginning of the typed text."""
     folder = incomplete.rpartition("/")[0] + "/" if "/" in incomplete else ""
     found = Path(folder or ".").glob(pattern)
     return sorted(f"{folder}{path.relative_to(folder).parts[0]}" for path in found)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers import DEFAULT_OUT, RECORDS
 from walkers.inputs.errors import WalkersError, refused
-from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped_cases, with_changes
+from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped, with_changes
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import (
     CASE_NAME,
@@ -41,7 +41,7 @@ NOT_A_RUN = {
 class Place(NamedTuple):
     """Place of a named object: path, kind (of `RECORDS`, ``archive`` or ``folder``), and case.
 
-    A run need not be finished: its place is where it belongs.
+    The path of an unfinished run is that of its final directory.
     """
 
     path: Path
@@ -50,14 +50,15 @@ class Place(NamedTuple):
 
 
 def placed(name: str | Path, out: Path = DEFAULT_OUT) -> Place | None:
-    """What there is of a name, as a path or in a folder of runs, but for the runs of cases.
+    """The object with a name, which is a path or a name in a folder of runs; None if there is none.
 
-    A folder shadows no shipped case by its name alone. That of a deck that was run by hand is made a run directory.
+    A folder does not hide a shipped case of the same name. The folder of a deck that was run by hand becomes a run
+    directory.
     """
     path = Path(name)
-    with suppress(OSError):  # a name that no file system takes
+    with suppress(OSError):  # a name that no file system accepts
         for place in (path, out / path):
-            if is_deck_folder(place) and str(name) not in shipped_cases():
+            if is_deck_folder(place) and str(name) not in shipped("case"):
                 from walkers.sweeps.by_hand import take_in
 
                 take_in(place)
@@ -71,18 +72,18 @@ def placed(name: str | Path, out: Path = DEFAULT_OUT) -> Place | None:
             return Place(out / path.stem, "sweep")
         if path.suffix == ".zip" and path.is_file():
             return Place(path, "archive")
-        if path.is_dir() and str(name) not in shipped_cases():
+        if path.is_dir() and str(name) not in shipped("case"):
             return Place(path, "folder")
     return None
 
 
 def files_of(place: Path) -> Path:
-    """Where the files of a run are, finished or not."""
+    """The directory with the files of a run, finished or not."""
     return place if finished_run(place) else unfinished(place)
 
 
 def _is_begun(place: Path) -> bool:
-    """Whether a run that is not finished is being made, or was interrupted, whose place this is."""
+    """Whether a place belongs to a running or interrupted run."""
     return (unfinished(place) / CASE_NAME).is_file() or is_locked(place)
 
 
@@ -94,12 +95,12 @@ def case_at(
     Parameters
     ----------
     what
-        A case: resolved, a file, or a shipped one by its name. Or a run, by its name in ``out`` or its directory: then
-        its case, whose run belongs beside it.
+        A case (resolved, file or shipped name), or a run (directory, or name in ``out``): then its case, and the folder
+        that contains the run.
     out
         Folder of the run directories.
     changes
-        Values put in place of the case's, by dotted keys.
+        Values that replace those of the case, by dotted keys.
     """
     out = Path(out)
     if not isinstance(what, (str, Path)):
@@ -121,7 +122,7 @@ def case_at(
 
 
 def find(what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None) -> Place:
-    """Find what a user names: the one way in which all commands do. Nothing in it is read or made anew.
+    """Find what a user names, in the same way for all commands. Its contents are not read.
 
     Parameters
     ----------
@@ -131,14 +132,14 @@ def find(what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Mappin
     out
         Folder of the run directories.
     changes
-        Values in place of those of the case, or of the run's case, by dotted keys: the run with these.
+        Values that replace those of the case, or of the case of the run, by dotted keys: finds the run with these.
 
     Raises
     ------
     InputError
-        If there is no such thing.
+        If it does not exist.
     runner.EngineFailure
-        If a case is given and there is no engine to look its run up for.
+        If a case is given and no engine is installed.
     """
     if not changes and isinstance(what, (str, Path)) and (there := placed(what, Path(out))):
         return there
@@ -159,7 +160,7 @@ class IncompleteRunWarning(UserWarning):
 
 
 def check_run(directory: Path, *, dumps: bool = True) -> None:
-    """Refuse a finished run that cannot be read; its tables are made anew if need be."""
+    """Refuse an unreadable finished run; recompute its tables if necessary."""
     from walkers.postprocess.analysis import current_result
 
     run = FinishedRun(directory)
@@ -174,7 +175,7 @@ def check_run(directory: Path, *, dumps: bool = True) -> None:
 
 @contextmanager
 def _refusing_damage(directory: Path, message: str) -> Iterator[None]:
-    """Turn what a damaged file leads to into one message of bad input."""
+    """Turn the errors of a damaged file into one `InputError`."""
     try:
         yield
     except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError, WalkersError) as error:
@@ -182,7 +183,7 @@ def _refusing_damage(directory: Path, message: str) -> Iterator[None]:
 
 
 def _check_dumps(run: FinishedRun) -> None:
-    """Refuse a run without a dump that no archive left out; warn of one that was cut."""
+    """Refuse a run without a dump, unless an archive left it out; warn if the dump is cut."""
     left_out = run.manifest.get("left_out", ())  # of an archive
     for segment in run.segments:
         layout = layout_of(segment)

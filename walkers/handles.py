@@ -65,7 +65,7 @@ class Run:
     _last: list[Progress] = field(default_factory=list, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Take the name of a directory for the directory."""
+        """Make a path of the name of a directory."""
         object.__setattr__(self, "directory", Path(self.directory))
 
     def __repr__(self) -> str:
@@ -86,7 +86,7 @@ class Run:
 
     @property
     def progress(self) -> Progress | None:
-        """Progress of a running run, whichever process runs it, the last known between segments; None if unknown."""
+        """Progress of a running run, in any process; between segments the last known one; None if unknown."""
         from walkers.sweeps.making import progress_at
 
         if not is_locked(self.directory):
@@ -103,7 +103,7 @@ class Run:
         return read_last_frame(self._files)
 
     def stop(self, patience: float = 30.0) -> str:
-        """Stop the run, whichever process runs it, and return its status after at most ``patience`` seconds.
+        """Stop the run, in any process, and return its status after at most ``patience`` seconds.
 
         Complete segments are kept, and ``walkers run`` continues after them. A point that shares a deck with other
         points of a sweep does not stop.
@@ -195,10 +195,11 @@ class Run:
         return Pictures(plot_run(self.finished_directory, _path(to), formats))
 
     def render(self, to: str | Path | None = None, *, images: int = 6) -> Pictures:
-        """Render pictures and return their paths; see `walkers.postprocess.series.render_run`."""
-        from walkers.postprocess.series import render_run
+        """Render the first of independent walkers, or all beads; see `walkers.postprocess.series.render_series`."""
+        from walkers.postprocess.series import render_series
 
-        return Pictures(render_run(self.finished_directory, _path(to), images=images))
+        walker = 0 if self.case.apart else None
+        return Pictures(render_series(self.finished_directory, _path(to), images=images, walker=walker))
 
     def film(
         self,
@@ -289,7 +290,7 @@ class Sweep:
     directory: Path
 
     def __post_init__(self) -> None:
-        """Refuse what is no sweep."""
+        """Refuse a directory that is not a sweep."""
         from walkers.sweeps.table import read_record
 
         object.__setattr__(self, "directory", Path(self.directory))

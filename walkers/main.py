@@ -65,9 +65,9 @@ def main(arguments: list[str] | None = None) -> NoReturn:
 
 
 def _open_streams() -> None:
-    """Give the program the streams that it was started without, and let none fail on a character.
+    """Open standard streams that were closed at the start, and let no stream fail on a character.
 
-    A file that is opened later would get the number of a closed stream, and what is printed would go into it.
+    Otherwise, a file that is opened later gets the number of a closed stream and receives the printed text.
     """
     for number in range(3):
         try:
@@ -78,7 +78,7 @@ def _open_streams() -> None:
     for number, name in ((1, "stdout"), (2, "stderr")):
         stream = getattr(sys, name)
         if stream is not getattr(sys, f"__{name}__"):
-            continue  # whoever called us has put another there
+            continue  # the caller has replaced it
         encoding = "utf-8" if stream is None else stream.encoding
         writer = BufferedWriter(_Stream(number, "w", closefd=False))
         at_once = number == 2 or os.isatty(number)
@@ -114,7 +114,7 @@ class _Grouped(TyperGroup):
     """The commands under the headings of `GROUPS`. An unknown command is refused with a suggestion."""
 
     def format_commands(self, _ctx: Any, formatter: Any) -> None:
-        """Write them below their headings."""
+        """Write the commands below their headings."""
         for heading in dict.fromkeys(GROUPS.values()):
             names = sorted(self.commands, key=lambda name: name not in SECTIONS)
             there = [name for name in names if getattr(self.commands[name], "rich_help_panel", "") == heading]
@@ -122,7 +122,7 @@ class _Grouped(TyperGroup):
                 formatter.write_dl([(name, self.commands[name].get_short_help_str(1000)) for name in there])
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """The command that is named first."""
+        """The command that the first argument names."""
         if args[0] not in self.commands and not ctx.resilient_parsing:
             from walkers.inputs.errors import refused
             from walkers.inputs.library import suggestion
@@ -136,18 +136,18 @@ class _OrCase(TyperGroup):
     """Sub-commands of a command; any other word is CASE."""
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """The command of a name."""
+        """The sub-command with a name."""
         return super().get_command(ctx, cmd_name) or self.commands.get("CASE")
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Their names; where a shell completes them, the cases that may stand there."""
+        """Names of the sub-commands; for the completion of a shell, also of cases."""
         case = "CASE" in self.commands
         return [*self.commands, *(offering("case")(ctx, "") if case and ctx.resilient_parsing else ())]
 
 
 def _program() -> typer.Typer:
     """The program, whose commands are the public functions of the modules of `GROUPS`."""
-    # Rich takes longer to load than all that most commands need.
+    # Rich takes longer to load than everything else that most commands need.
     plain: dict[str, Any] = {"no_args_is_help": True, "pretty_exceptions_enable": False, "rich_markup_mode": None}
     plain["context_settings"] = {"help_option_names": ["-h", "--help"]}
     program = typer.Typer(name="walkers", cls=_Grouped, help="Wet granular walkers, simulated with LIGGGHTS.", **plain)
@@ -194,7 +194,7 @@ def _options(
 
 
 def describe_version() -> str:
-    """Package, its commit if that is known, and engine, a line each."""
+    """Versions of the package (with its commit, if known) and of the engine, one per line."""
     from walkers.runner.binary import find_engine, version_in
     from walkers.runner.failures import EngineMissing
     from walkers.runner.provenance import PROJECT, software
@@ -220,15 +220,15 @@ def _report_stop(stop: BaseException) -> int:
     status = stop.status if isinstance(stop, _Terminated) else next((s for k, s in known if isinstance(stop, k)), None)
     if status is not None:
         return _tell(str(stop) or "interrupted", status)
-    # So it ends where nobody reads what is printed: it is no failure that the reader has had enough.
+    # The reader of the output, such as head, has closed it; this is not a failure.
     if isinstance(stop if isinstance(stop, OSError) else stop.__context__, BrokenPipeError):
         _drop_stdout()
         return 0
-    if isinstance(stop, OSError):  # a path that was given cannot be read or written
+    if isinstance(stop, OSError):  # a given path cannot be read or written
         if stop.filename == _STDOUT:
             _drop_stdout()
         return _tell(f"{stop.filename}: {stop.strerror}" if stop.filename else str(stop), 2)
-    # Typer's usage errors know how to show themselves and which status they are.
+    # Typer's usage errors print themselves and have their own exit status.
     if hasattr(stop, "show") and hasattr(stop, "exit_code"):
         stop.show()
         return int(stop.exit_code)

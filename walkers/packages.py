@@ -1,6 +1,6 @@
 """Entry points of installed packages: materials, cases and bridge laws.
 
-A package is imported when something that it brings is asked for; its names are known before.
+A package is imported only when one of its entry points is used; their names are known before.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Offer:
     entry: EntryPoint
 
     def load(self, *, call: bool = True) -> Any:
-        """What the function that it names returns, or the function; raises `ValueError` with the package's name."""
+        """The function that it names, or what this returns (``call``); raises `ValueError` with the package's name."""
         try:
             found = self.entry.load()
             return found() if call else found
@@ -44,7 +44,7 @@ class Offer:
 
 @cache
 def offers(group: Group) -> Mapping[str, Offer]:
-    """What installed packages offer, by name; of two of one name the first."""
+    """Entry points of installed packages, by name; the first one of two with the same name."""
     from importlib.metadata import entry_points
 
     found: dict[str, Offer] = {}
@@ -55,5 +55,5 @@ def offers(group: Group) -> Mapping[str, Offer]:
 
 
 def warn_of(error: Exception) -> None:
-    """Warn that what a package brings is left out."""
+    """Warn that an entry point of a package is left out."""
     warnings.warn(str(error), BrokenPackageWarning, stacklevel=2)

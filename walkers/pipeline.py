@@ -47,7 +47,7 @@ def run(
     out
         Folder of the run directories.
     engine
-        Name or path of the binary; see `walkers.runner.find_engine`.
+        Name or path of the binary; see `walkers.runner.binary.find_engine`.
     force
         Run again. The old run is replaced when the new one is finished.
     progress
@@ -91,13 +91,13 @@ def run(
         check_run(place, dumps=False)
         return Run(place, origins=case.origins)
     check_audit(binary, allow_failed_audit)
-    # Numpy and pyarrow are loaded while the engine works; nothing else is waiting for the interpreter then.
+    # Numpy and pyarrow are loaded while the engine works and the interpreter is idle.
     threading.Thread(target=_load_postprocess, daemon=True).start()
     watch = nullcontext(progress) if callable(progress) else shown_if(progress, progress_of(case.name))
     with watch as advance:
         made = make_runs([case], out, binary, force=force, on_progress=advance, time_limit=time_limit)
     if made.busy:
-        raise RunBusy(unfinished(place))
+        raise RunBusy("another process is still running this case", unfinished(place))
     return Run(made.runs[place.name].directory, cached=place.name in made.found, origins=case.origins)
 
 
@@ -120,7 +120,7 @@ def start(case: Case | str | Path, out: str | Path = DEFAULT_OUT, **how: Any) ->
     def make() -> None:
         try:
             run(resolved, folder, **how)
-        except WalkersError as failure:  # that of an engine is in the files of the run too
+        except WalkersError as failure:  # the files of the run also contain a failure of the engine
             failures.append(failure)
 
     thread = threading.Thread(target=make, daemon=True)
@@ -248,13 +248,13 @@ def load_sweep(what: str | Path, out: str | Path = DEFAULT_OUT) -> Sweep:
 
 
 def finished_at(what: Case | str | Path, out: Path = DEFAULT_OUT) -> Run | None:
-    """The finished run of a name or a directory; None of a case."""
+    """The finished run with a name or a directory; None for a case."""
     there = placed(what, out) if isinstance(what, (str, Path)) else None
     return run_at(there, str(what)) if there and there.kind == "run" and finished_run(there.path) else None
 
 
 def run_at(place: Place, name: str) -> Run:
-    """The run at a place that a user named so; `InputError` if it is none, or finished and cannot be read."""
+    """The run at a place with the user's name for it; `InputError` if it is no run, or finished and unreadable."""
     if place.kind != "run":
         raise refused(name, NOT_A_RUN[place.kind])
     if finished_run(place.path):
@@ -263,7 +263,7 @@ def run_at(place: Place, name: str) -> Run:
 
 
 def find_side(what: str | Path, out: Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None) -> Side:
-    """A run, which need not be finished, or a case with its run if it has one, to be compared."""
+    """One side of a comparison: a run, finished or not, or a case with its run if it exists."""
     from walkers.sweeps.comparison import Side
 
     case, folder = case_at(what, out, changes)

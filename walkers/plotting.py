@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 _OF_SHAPE = ("radii", "volume_fraction", "contact_angle")
-"""Ends of the keys that bridges have another shape by."""
+"""Ends of the keys that change the shape of bridges."""
 
 
 class LeftOutWarning(UserWarning):
@@ -97,9 +97,8 @@ def sweep_figure(
     Returns
     -------
     Figure
-        Means; bars are the scatter over copies where the table has it. What a key has for a unit in the sweep's file,
-        its axis has; other columns are in mm, mm/s, g (9.8 m/s²) and degrees. What is left out is reported in a
-        `LeftOutWarning`.
+        Means; bars are the scatter over copies where the table has it. The axis of a key has the unit of the sweep
+        file; other columns are in mm, mm/s, g (9.8 m/s²) and degrees. A `LeftOutWarning` reports what is left out.
 
     Raises
     ------
@@ -112,7 +111,7 @@ def sweep_figure(
 def _figure_of(
     table: pd.DataFrame, source: str | Path, *, y: str | None = None, log: str = "", theory: bool = False, **layout: Any
 ) -> Figure:
-    """The figure of a table that was read from a sweep's directory; ``layout`` is what `layout_of` takes."""
+    """The figure of the table of a sweep; ``layout`` contains the arguments of `layout_of`."""
     column = _column(table, y)
     done = table[table["status"] == "finished"]
     counts = Counter(table["status"][table["status"] != "finished"])
@@ -159,9 +158,9 @@ def _curves(
     x: Factor,
     places: FloatArray,
 ) -> dict[str, FloatArray]:
-    """Predictions of the theory between the points of a key; empty if they would take long. Adds why it has ``gaps``.
+    """Predictions of the theory between the points of a key; empty if they take too long. Adds reasons for ``gaps``.
 
-    Cases of another shape of their bridges are solved for a quarter of a second each.
+    Each new shape of bridges takes a quarter of a second to solve.
     """
     from walkers.theory.prediction import predicted_column
 
@@ -171,7 +170,7 @@ def _curves(
     at: list[int] = []
     between: list[Case] = []
     for number, place in enumerate(places.tolist()):
-        with suppress(InputError, ValueError):  # beyond what a case may be
+        with suppress(InputError, ValueError):  # a value that no case may have
             value = f"{place!r} {x.unit}" if x.unit else place
             between.append(resolve_case(changed(case.document, {key: value}), name=case.name))
             at.append(number)

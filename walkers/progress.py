@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 _Show = Callable[[float, float, str, float], None]
-"""Shows the whole, how much of it is done, and words, given the seconds that have passed."""
+"""Shows the total, the completed part, a text and the elapsed seconds."""
 _FIRST_LINE_SECONDS = 1.0
 _LONGEST_SILENCE_SECONDS = 60.0
 
@@ -63,7 +63,7 @@ def progress_of_film(name: str) -> Iterator[Callable[[int, int], None]]:
 
 
 def shown_if(wanted: bool | None, progress: AbstractContextManager[T]) -> AbstractContextManager[T | None]:
-    """A progress if it is wanted, or if nobody says and this is a notebook; else what gives None."""
+    """The progress if it is wanted (None: only in notebooks); otherwise a context that yields None."""
     return progress if (_in_notebook() if wanted is None else wanted) else nullcontext()
 
 
@@ -93,7 +93,7 @@ def _shown(name: str) -> Iterator[_Show]:
 
         def line(_whole: float, _done: float, words: str, elapsed: float) -> None:
             nonlocal due
-            if elapsed >= due:  # lines grow rarer with time
+            if elapsed >= due:  # lines become rarer with time
                 due = elapsed + min(elapsed, _LONGEST_SILENCE_SECONDS)
                 print(f"{name}: {words}", file=sys.stderr, flush=True)
 
@@ -102,10 +102,10 @@ def _shown(name: str) -> Iterator[_Show]:
 
 @contextmanager
 def _notebook_bar(name: str) -> Iterator[_Show]:
-    """A bar that is replaced in place. Of rich's widget a stored notebook keeps an empty box; this leaves a line."""
+    """A bar that is updated in place. A stored notebook keeps its last line; of rich's widget it keeps an empty box."""
     import IPython.display
 
-    shown: Any = IPython.display  # which has types for some of its functions, and not for these
+    shown: Any = IPython.display  # its types lack these functions
     handle = shown.display(shown.HTML(""), display_id=True)
     told = "stopped"
 

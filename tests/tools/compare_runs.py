@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from walkers import run
-from walkers.inputs.reading import shipped_cases
+from walkers.inputs.reading import shipped
 from walkers.postprocess.dump import BinaryDump
 
 LEFT_OUT = ("pile-small", "pile-fig1a")  # minutes
@@ -28,7 +28,7 @@ COLUMNS = ("x", "y", "z", "vx", "vy", "vz")
 def digests(out: Path) -> dict[str, dict[str, object]]:
     """Of each shipped case: digest of its bead dumps, and numbers of its result."""
     found: dict[str, dict[str, object]] = {}
-    for name in shipped_cases():
+    for name in shipped("case"):
         if name in LEFT_OUT:
             continue
         outcome = run(name, out)

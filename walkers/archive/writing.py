@@ -87,7 +87,7 @@ def write_archive(directory: str | Path, to: Path | None = None, options: Archiv
     contents = contents_of(directory, dumps=options.dumps)
     to = Path(f"{contents.name}.zip") if to is None else to
     if to.suffix != ".zip" or to.is_dir():
-        raise refused("--output", f"expected the name of a .zip file, not {to}")
+        raise refused("-o", f"expected the name of a .zip file, not {to}")
     metadata = json_bytes(describe_crate(contents, options.authors, options.licence))
     about = [item(METADATA_NAME, metadata), item(PREVIEW_NAME, _preview(contents, options))]
     sums = "".join(f"{one.sha256}  {one.place}\n" for one in [*contents.items, *about])

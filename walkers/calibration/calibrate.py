@@ -59,7 +59,7 @@ class Wave:
 
     unit: FloatArray  # the sets, in the unit cube, shape (P, D)
     outcome: FloatArray  # each observation, shape (P, K); NaN where there is none
-    table: pd.DataFrame  # the sweep's, P times the number of experiments long
+    table: pd.DataFrame  # of the sweep; one row per set and experiment
     failures: list[Failure]  # of its points
 
 
@@ -68,7 +68,7 @@ def wave_sweep(
 ) -> Sweep:
     """The sweep of a wave: every parameter set (P, D) with every experiment, set by set.
 
-    Experiments may have ``extra`` keys in these runs alone. `InputError` if a key of the calibration is none of a case.
+    ``extra`` are keys of experiments for this sweep only. `InputError` if a key of the calibration is no key of a case.
     """
     points = []
     for row in values:
@@ -86,7 +86,7 @@ def wave_sweep(
     document = {
         "title": calibration.file.title,
         "case": calibration.file.case,
-        # What the runs have beside it, such as twice the cycles, stands in for what is set.
+        # Extra keys, such as twice the cycles, replace those that are set.
         "set": {key: value for key, value in settings.items() if key not in points[0]},
         "zip": [{key: [point[key] for point in points] for key in points[0]}],
     }
@@ -109,7 +109,7 @@ def run_wave(calibration: Calibration, unit: FloatArray, sweep: Sweep, out: Path
     columns = []
     for one in calibration.observations:
         value = mean(one.quantity, one.of)
-        if one.over:  # a ratio of two speeds says nothing where the lower one is none
+        if one.over:  # a ratio to a vanishing speed is meaningless
             below = mean(one.quantity, one.over)
             value = value / np.where(np.abs(below) > _LEAST_SPEED, below, np.nan)
         columns.append(value)
@@ -119,7 +119,7 @@ def run_wave(calibration: Calibration, unit: FloatArray, sweep: Sweep, out: Path
 def _seen(table: pd.DataFrame, experiments: int) -> dict[str, FloatArray]:
     """Quantities of each run of a wave's table; NaN where there is none, or the run failed.
 
-    Speeds are means over the walkers that are some until the end (`walkers.postprocess.gait.steady_walkers`).
+    Speeds are means over the walkers that stay steady until the end (`walkers.postprocess.gait.steady_walkers`).
     """
     rows: list[dict[str, float]] = []
     for run, status in zip(table["run"], table["status"], strict=True):
@@ -139,10 +139,10 @@ class Outcome:
     calibration: Calibration
     space: Space
     unit: FloatArray  # all sets of all waves, in the unit cube, shape (P, D)
-    emulators: Emulators  # of all waves and of all observations, as the posterior is
+    emulators: Emulators  # from all waves and observations, as the posterior
     posterior: Posterior
-    held_out: dict[str, Posterior]  # of the observations that each trial of the file leaves
-    predictive: Wave  # the engine at samples of the posterior, that of the highest density first
+    held_out: dict[str, Posterior]  # from the observations that each trial of the file keeps
+    predictive: Wave  # the engine at samples of the posterior; first the one of highest density
     checks: dict[str, Wave]  # at the best set that was run: as in the waves, with half the time step, for twice as long
     failures: dict[str, list[Failure]]  # points that failed, by sweep
 
@@ -165,9 +165,9 @@ def calibrate(
     Raises
     ------
     InputError
-        If a key of the file cannot be used, or designs that are there belong to other parameters.
+        If a key of the file cannot be used, or existing designs belong to other parameters.
     CalibrationStopped
-        If points of a wave are missing, for no fault of their parameters.
+        If points of a wave are missing for reasons other than their parameters.
     runner.EngineFailure
         If there is no engine, or its audit failed.
     """
@@ -221,7 +221,7 @@ def _posterior(calibration: Calibration, emulators: Emulators, held_out: Collect
 def _check_ranges(calibration: Calibration) -> None:
     """Refuse parameters whose ranges exceed those of a case, before anything is written or run.
 
-    Cases are made at either end of all ranges and at the guesses.
+    Cases are resolved at both ends of all ranges and at the guesses.
     """
     ends = Space(calibration.parameters).values(np.array([[0.0], [1.0]]) * np.ones(len(calibration.parameters)))
     sweep = wave_sweep(calibration, np.concatenate([ends, _guesses(calibration)]), calibration.name)
@@ -243,7 +243,7 @@ def _guesses(calibration: Calibration) -> FloatArray:
 
 
 def _determinants(calibration: Calibration, wave: int) -> dict[str, Any]:
-    """Inputs that determine the parameter sets of a wave (from 1), besides earlier results of the engine."""
+    """Inputs that determine the parameter sets of a wave (from 1), together with earlier results of the engine."""
     parameters = {one.name: [*one.range, one.log, one.unit] for one in calibration.parameters}
     seed, guesses = calibration.design.seed, [list(guess) for guess in calibration.guesses]
     return {"parameters": parameters, "seed": seed, "guesses": guesses, "waves": calibration.design.waves[:wave]}
@@ -252,7 +252,7 @@ def _determinants(calibration: Calibration, wave: int) -> dict[str, Any]:
 def _kept(path: Path, determinants: dict[str, Any], make: Callable[[], FloatArray]) -> FloatArray:
     """The parameter sets of a wave, read from its file, or drawn and written.
 
-    A calibration that goes on must not depend on whether the libraries would draw the same points again.
+    A continued calibration must not depend on whether the libraries draw the same points again.
     """
     if path.exists():
         try:
@@ -283,11 +283,11 @@ def next_wave(calibration: Calibration, unit: FloatArray, outcome: FloatArray, p
     Parameters
     ----------
     calibration, points
-        What is calibrated; P (the first wave has the guesses besides).
+        The calibration; P (the first wave has the guesses in addition).
     unit, outcome : ndarray, shape (N, D) and (N, K)
-        The sets that were run, in the unit cube, and what the engine made of them; none for the first wave.
+        Sets that were run, in the unit cube, and the engine's observations; none for the first wave.
     filling
-        How many of them were the first wave.
+        Number of sets of the first wave.
     """
     space, seed = Space(calibration.parameters), calibration.design.seed
     if not len(unit):
@@ -299,7 +299,7 @@ def next_wave(calibration: Calibration, unit: FloatArray, outcome: FloatArray, p
     likely = samples[np.argsort(posterior.log_density[places])[::-1]][: len(samples) // 2]
     draw = np.random.default_rng([seed, len(unit)])
     # A quarter where the posterior is high, far from each other; half around and between the best sets that were run,
-    # for there the engine is known to be good; the others wherever the posterior is, to find what is missing.
+    # where the engine is known to agree; the others from the whole posterior, to find other regions.
     few = points // 4
     among = spread_out(likely[: 20 * points], few, unit)
     parents = unit[ranking(calibration, outcome)[:_PARENTS]]
@@ -312,7 +312,7 @@ def next_wave(calibration: Calibration, unit: FloatArray, outcome: FloatArray, p
 
 
 def _expected_misfit(emulators: Emulators, unit: FloatArray) -> FloatArray:
-    """The misfit of `ranking` as the emulators expect it at points (N, D), shape (N,)."""
+    """Misfit of `ranking` that the emulators expect at points (N, D), shape (N,)."""
     own = [place for place, one in enumerate(emulators.each) if not one.observation.derived]
     mean, deviation = emulators.predict(unit, own)
     transformed = np.clip(mean[..., None] + deviation[..., None] * _QUANTILES, -LARGEST, LARGEST)
@@ -324,10 +324,10 @@ def _expected_misfit(emulators: Emulators, unit: FloatArray) -> FloatArray:
 def ranking(calibration: Calibration, outcome: FloatArray) -> npt.NDArray[np.int64]:
     """Order of sets by their outcome (P, K): first those with most observations within their deviations.
 
-    Those that are derived from others do not count. Of several sets that with the least misfit Σ ln(1 + r²), r in
-    standard deviations; the logarithm keeps an observation that none of them gives from deciding. One that could not be
-    made is not given, and its misfit is `MISSING_MISFIT`. It is the engine's own word: emulators err most where they
-    hope most.
+    Derived observations do not count. Equal sets are ordered by the misfit Σ ln(1 + r²), r in standard deviations; the
+    logarithm limits the influence of an observation that no set reproduces. A missing observation is not reproduced,
+    with the misfit `MISSING_MISFIT`. Only results of the engine are used, because emulators err most at their best
+    predictions.
     """
     own = [place for place, one in enumerate(calibration.observations) if not one.derived]
     value, deviation = np.array([(one.value, one.deviation) for one in calibration.observations])[own].T

@@ -23,8 +23,8 @@ _FOLDS = 10
 _FEW = 20
 _LEAST = 5
 _UNKNOWN = 3.0
-"""Standard deviation of the transformed residual of an observation that fewer than five sets gave: ten deviations
-either way, and the same for all parameters."""
+"""Standard deviation of the transformed residual of an observation with fewer than five sets: ten deviations in both
+directions, for all parameters."""
 _EXTREME = 3.0
 LARGEST = 12.0
 """Largest transformed residual; sinh overflows beyond."""
@@ -48,7 +48,7 @@ class Space:
 
     @cached_property
     def _ends(self) -> FloatArray:
-        """Of the ranges, scaled, shape (2, D)."""
+        """Scaled ends of the ranges, shape (2, D)."""
         return self._scaled(np.array([one.range for one in self.parameters], np.float64).T)
 
     def _scaled(self, values: FloatArray) -> FloatArray:
@@ -87,7 +87,7 @@ class Space:
 
 
 def spread_out(candidates: FloatArray, points: int, taken: FloatArray) -> FloatArray:
-    """A number of candidates (C, D), each one farthest from the earlier ones and from the given points."""
+    """Choose candidates (C, D), each one farthest from the earlier ones and from the points ``taken``."""
     distance = cdist(candidates, taken).min(axis=1, initial=np.inf)
     chosen: list[int] = []
     for _ in range(min(points, len(candidates))):
@@ -99,7 +99,7 @@ def spread_out(candidates: FloatArray, points: int, taken: FloatArray) -> FloatA
 def transformed(outcome: FloatArray, observation: Observation) -> FloatArray:
     """Arsinh of the residual in standard deviations: linear near the observation, logarithmic far from it.
 
-    Walkers that are far too fast do not outweigh on this scale those that are nearly right.
+    On this scale, walkers that are far too fast do not outweigh those that are nearly right.
     """
     return np.asarray(np.arcsinh((outcome - observation.value) / observation.deviation))
 
@@ -108,13 +108,13 @@ def transformed(outcome: FloatArray, observation: Observation) -> FloatArray:
 class Emulator:
     """One observation as a function of the parameters: a Gaussian process of the transformed residual.
 
-    What is said of its errors is from cross-validation.
+    Its errors are from cross-validation.
     """
 
     observation: Observation
-    sets: int  # that it knows: those in which there was something to observe
-    process: Any = None  # scikit-learn's, fitted; None if these were too few
-    error_inflation: float = 1.0  # by how much its standard deviations are too small in the later waves; at least 1
+    sets: int  # number of sets with this observation
+    process: Any = None  # fitted, of scikit-learn; None if there are too few sets
+    error_inflation: float = 1.0  # factor by which its standard deviations are too small in later waves; at least 1
     error: float = np.nan  # root mean square, of the transformed residual
     explained: float = np.nan  # share of the variance
 
@@ -138,17 +138,17 @@ class Emulator:
 class Emulators:
     """Emulators of K observations, and of their feasibility.
 
-    Observations that are missing in the same sets are one of E events: they need the same walkers.
+    Observations that are missing in the same sets form one of E events: they need the same walkers.
     """
 
     each: tuple[Emulator, ...]  # one an observation
-    correlation: FloatArray  # of their errors, shape (K, K), for observations share runs and sets; shrunk toward none
-    event: npt.NDArray[np.int64]  # which one an observation needs, shape (K,)
-    missing: BoolArray  # sets that were run in which an event did not come about, shape (P, E)
-    classifiers: tuple[Any, ...]  # E Gaussian processes; None of an event that came about in all sets, or in none
+    correlation: FloatArray  # of their errors, shape (K, K), since observations share runs and sets; shrunk toward zero
+    event: npt.NDArray[np.int64]  # event that each observation needs, shape (K,)
+    missing: BoolArray  # sets in which an event did not occur, shape (P, E)
+    classifiers: tuple[Any, ...]  # E Gaussian processes; None for an event that occurred in all sets, or in none
 
     def predict(self, unit: FloatArray, places: Sequence[int] | None = None) -> tuple[FloatArray, FloatArray]:
-        """Transformed residuals of all observations (or those at some places) and their standard deviations, (N, K)."""
+        """Transformed residuals of all observations (or those at ``places``) and their standard deviations, (N, K)."""
         chosen = range(len(self.each)) if places is None else places
         mean, deviation = zip(*(self.each[one].predict(unit) for one in chosen), strict=True)
         return np.stack(mean, axis=1), np.stack(deviation, axis=1)
@@ -156,7 +156,7 @@ class Emulators:
     def log_probabilities(self, unit: FloatArray) -> FloatArray:
         """Logarithms of the probabilities of the events at points (N, D), shape (N, E).
 
-        The mean of the logistic function over the normal latent one, by MacKay's approximation
+        Mean of the logistic function over the normal latent function, in MacKay's approximation
         (doi 10.1162/neco.1992.4.5.720).
         """
         latent = np.empty((len(unit), len(self.classifiers)))
@@ -173,10 +173,10 @@ class Emulators:
         return np.asarray(np.exp(self.log_probabilities(unit))[:, self.event])
 
     def needed(self, places: Sequence[int]) -> list[int]:
-        """Events that some of the observations need, each once, and none that others imply.
+        """Events that the observations at ``places`` need, without those that others imply.
 
-        An event that fails just where others fail (a ratio needs the walkers of both its speeds) says nothing that
-        these do not say; counted again it would weigh twice.
+        An event that fails only where others fail (a ratio needs the walkers of both speeds) adds no information and
+        would count twice.
         """
         events, kept = dict.fromkeys(self.event[list(places)].tolist()), []
         for one in events:
@@ -195,18 +195,18 @@ def fit_emulators(
     Parameters
     ----------
     unit, outcome : ndarray, shape (P, D) and (P, K)
-        The sets that were run, in the unit cube, and what they gave; NaN where there was nothing to observe.
+        Sets that were run, in the unit cube, and their observations; NaN where there is none.
     observations, seed
-        K of them; of the restarts of the fit.
+        K observations; seed of the restarts of the fit.
     filling
-        Number of the sets that fill the range. Errors are judged by the sets after them, if there are enough: these are
-        where the posterior is, and there walkers are more than elsewhere on the verge of something.
+        Number of space-filling sets. Errors are estimated from the later sets, if there are enough: these are near the
+        posterior, where walkers are more often close to a transition.
     """
     from sklearn.covariance import LedoitWolf
 
     fitted = [_fitted(unit, outcome[:, k], one, seed, filling) for k, one in enumerate(observations)]
-    # An error that is not known counts as none, which keeps the matrix positive; one of many deviations counts as
-    # three, lest one set decide.
+    # An unknown error counts as zero, which keeps the matrix positive; an error of more than three deviations counts
+    # as three, so that one set does not decide.
     errors = np.clip(np.stack([errors for _, errors in fitted], axis=1), -_EXTREME, _EXTREME)
     size = np.sqrt(np.mean(errors**2, axis=0))
     correlation = LedoitWolf(assume_centered=True).fit(errors / np.where(size > 0.0, size, 1.0)).covariance_
@@ -257,8 +257,8 @@ def _classifier(unit: FloatArray, made: BoolArray, seed: int) -> Any:
 
     if made.all() or not made.any():
         return None
-    # The constant kernel is the uncertainty of the share of feasible sets over the whole range: with few failures
-    # most of the range is feasible, not half of it, as without. Scales below a tenth of the range cannot be learned.
+    # The constant kernel is the uncertainty of the share of feasible sets over the whole range: with few failures,
+    # most of the range is feasible; without it, half. Scales below a tenth of the range cannot be learned.
     kernel = ConstantKernel(4.0, (1e-1, 1e2)) * Matern(np.full(unit.shape[1], 1.0), (1e-1, 2e1), nu=2.5)
     with _quietly():
         return GaussianProcessClassifier(kernel + ConstantKernel(4.0, "fixed"), random_state=seed).fit(unit, made)
@@ -266,7 +266,7 @@ def _classifier(unit: FloatArray, made: BoolArray, seed: int) -> Any:
 
 @contextmanager
 def _quietly() -> Iterator[None]:
-    """Fit in one thread, for matrices are small, and without warnings of scales at a bound, which have no influence."""
+    """Fit in one thread (matrices are small) and without warnings about scales at a bound, which have no influence."""
     from sklearn.exceptions import ConvergenceWarning
     from threadpoolctl import threadpool_limits
 

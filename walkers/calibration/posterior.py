@@ -16,13 +16,13 @@ LEAST_SAMPLES = 400.0
 """Smallest effective sample size of a converged posterior."""
 _ROUNDS = 8
 _WIDER, _TEMPERED = 1.5, 150.0
-"""How much wider than the weighted points before them those of a later round are, and what these are to be worth, which
-their likelihood is tempered for."""
+"""Width of a later round relative to the weighted points before it, and their effective sample size, for which the
+likelihood is tempered."""
 _AT_ONCE = 2048
 _KEPT = 4000
 _DISCREPANCY = 0.5
-"""Scale of the half-Cauchy prior about a group's discrepancy, in standard deviations of its observations: most groups
-have little, but one may have much without bending all parameters toward it."""
+"""Scale of the half-Cauchy prior of a group's discrepancy, in standard deviations of its observations: small for most
+groups, but a group may have a large one, which then does not bias all parameters."""
 _MOST = 0.998
 """Largest cumulative prior probability of a discrepancy, which is then 160 deviations."""
 _NEWTON_STEPS, _CONVERGED = 40, 1e-4
@@ -44,26 +44,25 @@ def observation_covariance(observations: Sequence[Observation], shared: Mapping[
 def log_likelihood(
     mean: FloatArray, deviation: FloatArray, correlation: FloatArray, shared: FloatArray, discrepancy: FloatArray
 ) -> FloatArray:
-    """Logarithm of the density of residuals of zero, but for ½ K ln 2π, shape (N,).
+    """Logarithm of the density at residuals of zero, without ½ K ln 2π, shape (N,).
 
     ln ∫ N(sinh z; 0, C) N(z; m, Σ) dz, z the transformed residuals (`walkers.calibration.emulator.transformed`), by
     Laplace's approximation, −ψ(z) − ½ ln |C| − ½ ln |Σ| − ½ ln |∇∇ψ| at the z where
 
         ψ(z) = ½ sinh(z)ᵀ C⁻¹ sinh(z) + ½ (z − m)ᵀ Σ⁻¹ (z − m)
 
-    is least. To linearise at m instead would make the hopeless cheap: no residual would be more than 1/deviation errors
-    off.
+    is least. A linearisation at m would favour wrong parameters: no residual would exceed 1/deviation errors.
 
     Parameters
     ----------
     mean, deviation : ndarray, shape (N, K)
-        Of the transformed residuals, by the emulators: m, and the roots of the diagonal of Σ.
+        Transformed residuals of the emulators: m, and the roots of the diagonal of Σ.
     correlation : ndarray, shape (K, K)
-        Of the emulators' errors: that of Σ.
+        Correlation of the errors of the emulators, for Σ.
     shared : ndarray, shape (K, K)
         Covariance of the observations' errors, in their standard deviations (`observation_covariance`).
     discrepancy : ndarray, shape (N, K)
-        What no parameters explain, in the same; C is ``shared`` with its squares added to the diagonal.
+        Discrepancies, in the same unit; C is ``shared`` with their squares added to the diagonal.
     """
     mean, deviation = np.clip(mean, -LARGEST, LARGEST), np.maximum(deviation, _LEAST_DEVIATION)
     covariance = shared + _diagonal(discrepancy**2)
@@ -83,8 +82,8 @@ def log_likelihood(
 def _mode(mean: FloatArray, of_numbers: FloatArray, of_engine: FloatArray) -> FloatArray:
     """Minimum of ψ by Newton's method.
 
-    They are of one at most, which is what Newton's are where sinh is an exponential, and take of the curvature what is
-    positive, so that all are downhill.
+    Steps are limited to one, the length of Newton steps where sinh is an exponential, and use the positive part of the
+    curvature, so that all go downhill.
     """
     z, left = mean.copy(), np.arange(len(mean))
     for _ in range(_NEWTON_STEPS):
@@ -111,15 +110,15 @@ def _diagonal(rows: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Posterior:
-    """S samples of equal weight, of points with other weights w."""
+    """S samples of equal weight, drawn from points with weights w."""
 
     unit: FloatArray  # in the unit cube, shape (S, D)
-    discrepancy: FloatArray  # of each group, in deviations of its observations: what no parameters explain, (S, G)
-    log_density: FloatArray  # but for a constant, shape (S,)
+    discrepancy: FloatArray  # of each group, in deviations of its observations, shape (S, G)
+    log_density: FloatArray  # up to a constant, shape (S,)
     groups: tuple[str, ...]  # G names; those that were held out have no discrepancy of their own
     best: FloatArray  # the point of the highest density, shape (D,)
     points: int
-    effective_samples: float  # (Σ w)²/Σ w²: so many independent samples the points are worth
+    effective_samples: float  # (Σ w)²/Σ w²
 
     @property
     def converged(self) -> bool:
@@ -128,7 +127,7 @@ class Posterior:
 
 
 class Density:
-    """Log density of D parameters and of the G groups' discrepancies, in coordinates of which all numbers are allowed.
+    """Log density of D parameters and of the discrepancies of G groups, in unbounded coordinates.
 
     Groups that are held out are not used.
     """
@@ -151,16 +150,16 @@ class Density:
         self._correlation = emulators.correlation[np.ix_(self._used, self._used)]
 
     def __call__(self, points: FloatArray) -> FloatArray:
-        """At points (N, D + G), shape (N,)."""
+        """Log density at points (N, D + G), shape (N,)."""
         return np.concatenate([self._of(points[at : at + _AT_ONCE]) for at in range(0, len(points), _AT_ONCE)])
 
     def _of(self, points: FloatArray) -> FloatArray:
         unit, discrepancy = self.places(points)
-        # What is uniform in the cube, or half-Cauchy, is standard normal in these coordinates.
+        # In these coordinates, uniform and half-Cauchy priors are standard normal.
         total: FloatArray = self._space.log_prior(unit) - 0.5 * np.sum(points**2, axis=1)
         mean, deviation = self._emulators.predict(unit, self._used)
         total += log_likelihood(mean, deviation, self._correlation, self._shared, discrepancy[:, self._group])
-        # What was published was seen, of walkers that walked.
+        # Published walkers did walk: their events occurred.
         total += self._emulators.log_probabilities(unit)[:, self._events].sum(axis=1)
         return total
 
@@ -174,12 +173,12 @@ class Density:
 def sample_posterior(density: Density, points: int, seed: int) -> Posterior:
     """Sample the posterior by adaptive importance sampling, starting from the prior.
 
-    Later rounds (``points`` in each) are normal with the mean and covariance of the points weighed so far; all points
-    are weighed over the mixture of what all rounds were drawn from (Cornuet et al. 2012, doi
-    10.1111/j.1467-9469.2011.00756.x). Whether the outcome may be believed is said by its ``converged``.
+    Later rounds (``points`` in each) are normal, with the mean and covariance of the points weighted so far. All points
+    are weighted by the mixture of the distributions of all rounds (Cornuet et al. 2012, doi
+    10.1111/j.1467-9469.2011.00756.x). `Posterior.converged` tells whether the result is reliable.
     """
     draw, count = np.random.default_rng(seed), density.dimensions
-    normals = [(np.zeros(count), np.eye(count))]  # that points were drawn from: means and covariances
+    normals = [(np.zeros(count), np.eye(count))]  # distributions of the rounds: means and covariances
     places, known = np.zeros((0, count)), np.zeros(0)
     for _ in range(_ROUNDS):
         middle, width = normals[-1]
@@ -196,7 +195,7 @@ def sample_posterior(density: Density, points: int, seed: int) -> Posterior:
             tempered = softmax(share * logarithm)
         width = np.cov(places.T, aweights=tempered).reshape(count, count)
         normals.append((tempered @ places, _WIDER * width))
-    samples = min(_KEPT, len(weight))  # each point as often as it weighs
+    samples = min(_KEPT, len(weight))  # each point in proportion to its weight
     steps = (np.arange(samples) + draw.random()) / samples
     chosen = np.minimum(np.searchsorted(np.cumsum(weight), steps), len(weight) - 1)
     unit, discrepancy = density.places(places[chosen])

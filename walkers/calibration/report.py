@@ -62,7 +62,7 @@ def record_of(found: Outcome) -> dict[str, Any]:
     rows = [_row(found, place) for place in range(len(emulators.each))]
     own = [row["agrees"] for row in rows if not row["derived"]]
     values = np.percentile(found.space.values(posterior.unit), (5.0, 50.0, 95.0), axis=0).T.tolist()
-    # Of each parameter the 5 to 95 % interval over that of the prior: 1 if nothing was learned.
+    # Width of the 5 to 95 % interval over that of the prior: 1 if nothing was learned.
     widths = np.ptp(np.percentile(posterior.unit, (5.0, 95.0), axis=0), axis=0)
     priors = np.array([np.ptp(one.ppf((0.05, 0.95))) for one in found.space.priors])
     narrowed = dict(zip(names, (widths / priors).tolist(), strict=True))
@@ -184,7 +184,7 @@ def draw_corners(space: Space, sets: FloatArray, best: FloatArray) -> Figure:
 
     count, words = space.dimensions, [("log " if one.log else "") + _labelled(one) for one in space.parameters]
     figure, _ = new_figure(TWO_COLUMNS, TWO_COLUMNS, nrows=count, ncols=count)
-    # corner places its panels itself; after the constrained engine alone that would be refused.
+    # corner places its panels itself, which the constrained layout engine refuses.
     figure.set_layout_engine("tight")
     figure.set_layout_engine("none")
     corner.corner(
@@ -192,7 +192,7 @@ def draw_corners(space: Space, sets: FloatArray, best: FloatArray) -> Figure:
         fig=figure,
         labels=["\n".join(label.split()) for label in words],  # panels of many parameters are no wider than a word
         range=drawn(np.array([np.zeros(count), np.ones(count)])).T.tolist(),
-        truths=None if count == 1 else drawn(best),  # of one parameter corner has a panel, in which it cannot mark any
+        truths=None if count == 1 else drawn(best),  # corner cannot mark a value in a single panel
         truth_color="C1",
         quantiles=[0.05, 0.5, 0.95],
         label_kwargs={"fontsize": 7},
@@ -204,7 +204,7 @@ def draw_corners(space: Space, sets: FloatArray, best: FloatArray) -> Figure:
     )
     if count == 1:
         figure.axes[0].axvline(float(drawn(best)[0]), color="C1")
-    # Few ticks, none at a corner, and labels as far from the panels as the ticks ask for, not as panels are wide.
+    # Few ticks, none at a corner; the distance of labels depends on the ticks, not on the width of panels.
     edge, away = 1.0 / TWO_COLUMNS, -26.0 / 72.0
     figure.subplots_adjust(left=edge, bottom=edge, right=0.99, top=0.99, wspace=0.1, hspace=0.1)
     beneath, beside = (ScaledTranslation(*way, figure.dpi_scale_trans) for way in ((0.0, away), (away, 0.0)))

@@ -22,9 +22,8 @@ from walkers.check.engine import TERMS, SecondEngine
 from walkers.check.kernels import FloatArray
 from walkers.check.report import Chapter, Line, Verdict
 from walkers.handles import Run
-from walkers.inputs import resolve_case
 from walkers.inputs.case import Case
-from walkers.inputs.reading import load_case, read_toml, shipped_cases, with_changes
+from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped, with_changes
 from walkers.inputs.text import rendered
 from walkers.pipeline import run
 from walkers.postprocess.gait import averages, walk
@@ -255,7 +254,7 @@ def chapter(out: Path, *, quick: bool = False) -> Chapter:
 def full_cases() -> dict[str, Case]:
     """Walkers, climbers, clusters, other drives and walls, and a small pile."""
     alone = {"dimers.replicates": 2, "dimers.facing": "right"}
-    walker, symmetric = (read_toml(shipped_cases()[name]) for name in ("fig1b", "symmetric"))
+    walker, symmetric = (read_toml(shipped("case")[name]) for name in ("fig1b", "symmetric"))
     fan = {"arrangement": "fan", "radii": ["0.3 mm", "0.2 mm", "0.2 mm"], "angle": "20 deg", "replicates": 2}
     clusters = {**{name: table for name, table in walker.items() if name != "dimers"}, "clusters": [fan]}
     tones = [

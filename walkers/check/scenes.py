@@ -22,12 +22,11 @@ import numpy as np
 from walkers.check.engine import SecondEngine
 from walkers.check.kernels import FloatArray
 from walkers.check.report import Line, Verdict
-from walkers.inputs import resolve_case
 from walkers.inputs.boundary import BOTTOM, Flat, Round, Wall
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
 from walkers.inputs.errors import Stopped
-from walkers.inputs.reading import load_case
+from walkers.inputs.reading import load_case, resolve_case
 from walkers.inputs.text import rendered
 from walkers.physics.bridge import Curve, Forces, Surfaces
 from walkers.physics.laws import LAWS, law_of
@@ -37,7 +36,7 @@ from walkers.runner.binary import Engine
 from walkers.runner.directory import write_deck
 from walkers.runner.launch import launch
 from walkers.templates.bridge_tables import tabulated
-from walkers.templates.deck import BRIDGES_NAME, Checkpoint, Deck, Plan, Recording, compose, plan_of
+from walkers.templates.deck import BRIDGES_NAME, Deck, Plan, Recording, compose, plan_of
 from walkers.templates.layout import BEAD_COLUMNS, FORCE_COLUMNS
 from walkers.templates.scene import Bead, Scene
 
@@ -340,9 +339,9 @@ def restart_lines(bench: Bench) -> Iterator[Line]:
     gone = replace(over(FLOOR, -DEEP, S, WAY), centre=(3e-3, 0.0, S - DEEP))
     scene = standing([*beads, gone, *(_moved(bead, 0.0, 3e-3) for bead in pair(-DEEP, 0.04, STILL))])
     whole = bench.run(prescribed(full_case(), scene, 1000))
-    first = prescribed(full_case(), scene, 500, checkpoint=Checkpoint(write="half.restart"))
+    first = prescribed(full_case(), scene, 500, restart_to="half.restart")
     carry = bench.run(first).directory / "half.restart"
-    second = replace(first, recording=replace(recording(1000), begin=500), checkpoint=Checkpoint(read="half.restart"))
+    second = replace(first, recording=replace(recording(1000), begin=500), restart_to=None, restart_from="half.restart")
     forces = bench.run(second, carry).forces[1:, :, :3]
     kept = ("wall spring", 0), ("pair spring", 1), ("open wall bridge", 3), ("open pair bridge", 5)
     for what, number in kept:

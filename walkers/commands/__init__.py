@@ -9,7 +9,7 @@ SECTIONS = {
     "check": "Check the engine, the contact model, one case, or files. Exit status 1 if something differs.",
     "paper": "Compare with the published results: figures, numbers, and further terms of the theory.",
 }
-"""Commands that have commands."""
+"""Commands with sub-commands, and their help."""
 MOVED = {
     "result": "run",
     "theory": "show --theory",
@@ -24,4 +24,4 @@ MOVED = {
     "figures": "paper figures",
     "model-terms": "paper terms",
 }
-"""What took the place of commands that were."""
+"""Commands that replace old ones."""

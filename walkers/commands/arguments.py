@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share, and what commands do alike."""
+"""Arguments, options and functions that several commands share."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ OlderThan = Annotated[str | None, Option(metavar="AGE", help=_AGE)]
 
 
 class By(TypedDict):
-    """What runs cases."""
+    """Arguments for the engine that runs cases."""
 
     engine: str | None
     allow_failed_audit: bool
@@ -60,28 +60,28 @@ def changes_of(settings: list[str] | None) -> dict[str, Any]:
 
 
 def load_case(case: str, settings: list[str] | None, out: Path) -> ResolvedCase:
-    """The case that was named, with values put beside its own."""
+    """The named case, with changed values."""
     from walkers.finding import case_at
 
     return case_at(case, out, changes_of(settings))[0]
 
 
 def load_run(run: str, settings: list[str] | None, out: Path) -> FoundRun:
-    """The finished run that was named, of the case with values put beside its own."""
+    """The named finished run, or that of its case with changed values."""
     from walkers.pipeline import load_run
 
     return load_run(run, out, changes_of(settings))
 
 
 def load_any(what: str, settings: list[str] | None, out: Path) -> FoundRun | Sweep:
-    """The finished run or the sweep that was named."""
+    """The named sweep or finished run, with changed values."""
     from walkers.pipeline import load_finished
 
     return load_finished(what, out, changes_of(settings))
 
 
 def on_cores(jobs: int | None) -> Options:
-    """Options for a number of decks at once on this machine; None: one per core."""
+    """Options for a number of parallel decks on this machine; None: one per core."""
     from walkers.sweeps.scheduler import Options
     from walkers.sweeps.site import cores_here
 
@@ -89,7 +89,7 @@ def on_cores(jobs: int | None) -> Options:
 
 
 def refuse(option: str, wrong: bool, why: str) -> None:
-    """Refuse an option if something is wrong with it, and say why."""
+    """Raise an `InputError` with the reason if an option is ``wrong``."""
     from walkers.inputs.errors import refused
 
     if wrong:
@@ -97,13 +97,13 @@ def refuse(option: str, wrong: bool, why: str) -> None:
 
 
 def refuse_given(options: dict[str, Any], why: str) -> None:
-    """Refuse the first of some options that was given, and say why."""
+    """Raise an `InputError` with the reason if one of these options is given."""
     for option, value in options.items():
         refuse(option, value not in (None, False, [], ()), why)
 
 
 def check_folder(option: str, folder: Path) -> None:
-    """Refuse a file as a folder."""
+    """Refuse a folder that is a file."""
     refuse(option, folder.exists() and not folder.is_dir(), f"expected a folder, {folder} is a file")
 
 
@@ -113,7 +113,7 @@ def print_as(as_json: bool, value: Callable[[], Any], text: Callable[[], str]) -
 
 
 def print_lines(lines: Iterable[object]) -> None:
-    """Print each of some things, such as the paths of files that were written."""
+    """Print one item per line, such as the paths of written files."""
     for line in lines:
         print(line)
 

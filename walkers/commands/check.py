@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 _FILES = "An archive, or a run or a sweep (folder, name in --out, or case)."
 _NAME = "A material, a liquid, a bridge law, a case, a sweep or a calibration."
+_CHAPTER = "benchmarks, bridges or crosscheck; default: all."
 _CALIBRATION = "A calibration file, or the name of a shipped calibration such as ruby."
 
 
@@ -69,7 +70,7 @@ def check_engine(
 
 
 def check_literature(
-    chapters: list[str] | None = Argument(None, metavar="CHAPTER", help="benchmarks, bridges, crosscheck, or all."),
+    chapters: list[str] | None = Argument(None, metavar="CHAPTER", help=_CHAPTER),
     quick: bool = Option(False, "--quick", help="Run only the fast part of each chapter."),
     out: Out = DEFAULT_OUT,
     to: Path | None = Option(None, help="Folder to write the page to; default: OUT/validation."),

@@ -27,15 +27,13 @@ from walkers.commands.arguments import (
 from walkers.completion import offering
 
 _FORM = (
-    "Form, not a file (-o). deck: the LIGGGHTS deck of the case. vtk: .vtp and .vtm files with a .pvd. paraview: the "
-    "same, with a ParaView script. xyz, lammps: the trajectory for OVITO, ASE, MDAnalysis. archive: an RO-Crate (.zip) "
-    "to publish."
+    "Format of the export. deck: LIGGGHTS deck of the case. vtk: .vtp and .vtm files with a .pvd. paraview: the same, "
+    "with a ParaView script. xyz, lammps: the trajectory for OVITO, ASE, MDAnalysis. archive: an RO-Crate (.zip) to "
+    "publish."
 )
-_OUTPUT = (
-    "File or folder (--to is the form). Default: in the run's folder; archives: the current folder; decks: printed."
-)
+_OUTPUT = "File or folder to write; default: in the run's folder, archives in the current folder. Decks are printed."
 _EVERY = "vtk, paraview, xyz, lammps: write every Nth sample; default: one per cycle, for xyz and lammps every sample."
-_AS_PLACED = "vtk, paraview: keep independent walkers at their places in the deck instead of side by side."
+_AS_PLACED = "vtk, paraview: keep independent walkers at their positions in the deck, not side by side."
 _WITHOUT_DUMPS = "archive: leave out the engine's dumps; tables and results are included."
 _LICENCE = "archive: CC-BY-4.0 (default), CC0-1.0, CC-BY-SA-4.0 or BSD-3-Clause."
 _ANY = offering("case", "run", "sweep")
@@ -45,7 +43,7 @@ _RUNS = "Runs and sweeps: folder, name in --out, or case."
 def export(
     what: RunOrSweep,
     form: Literal["deck", "vtk", "paraview", "xyz", "lammps", "archive"] = Option(..., "--to", help=_FORM),
-    output: Path | None = Option(None, "-o", "--output", help=_OUTPUT),
+    output: Path | None = Option(None, "-o", help=_OUTPUT),
     settings: Set = None,
     out: Out = DEFAULT_OUT,
     every: int | None = Option(None, min=1, help=_EVERY),
@@ -106,7 +104,7 @@ def export(
 
 
 def _options(form: str, every: int | None, as_placed: bool, vtu: bool, colour: str | None) -> dict[str, Any]:
-    """What the function that writes a form takes."""
+    """Arguments of the function that writes a form."""
     if form in ("xyz", "lammps"):
         return {"every": every or 1}
     own = {"vtu": vtu} if form == "vtk" else {"colour": colour}
@@ -131,7 +129,7 @@ def clean(
 
     check_folder("--out", out)
     refuse("--finished", finished and bool(runs), "has no meaning with given runs")
-    refuse("--set", bool(settings) and not runs, "expected a case beside")
+    refuse("--set", bool(settings) and not runs, "is for given runs and sweeps")
     changes = changes_of(settings)
 
     def place_of(one: str) -> Path:
@@ -143,7 +141,7 @@ def clean(
     if dry_run or not (plan.remove or plan.locks):
         return 0
     if not yes:
-        refuse("--yes", not sys.stdin.isatty(), "expected: there is no terminal to ask at")
+        refuse("--yes", not sys.stdin.isatty(), "expected, because there is no terminal to ask for confirmation")
         if not typer.confirm("remove them?"):
             print("nothing removed")
             return 0

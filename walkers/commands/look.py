@@ -36,7 +36,7 @@ _SWEEPS = offering("sweep")
 _ALL = "Include the runs of sweeps."
 _WHERE = 'Only runs with this value, such as "drive.frequency=80 Hz". Repeatable.'
 _TABLE = "Write the table of the sweep, with units, to this file (.csv, .parquet, .json)."
-_WITHIN = "Count climbs until this time of the drive, such as '5 s'; default: end of the shortest run without a climb."
+_WITHIN = "Count climbs up to this time of the drive, such as '5 s'; default: end of the shortest run without a climb."
 _THRESHOLDS = "Print the number of climbs for other definitions of a climb."
 _PILES = "Sweeps, folders of runs, runs or cases of piles."
 _NULL = "Runs in which nothing can climb: also print their false climbs. Repeatable."
@@ -57,7 +57,7 @@ def list_(
     older_than: OlderThan = None,
     where: list[str] | None = Option(None, metavar="KEY=VALUE", help=_WHERE),
     sort: Literal["name", "status", "velocity", "age", "size"] = Option(
-        "name", help="Sort order: fastest, youngest or largest first."
+        "name", help="Sort by this; the fastest, youngest or largest comes first."
     ),
     reverse: bool = Option(False, "--reverse", help="Reverse the order."),
     to: Path | None = Option(None, help=_TABLE),

@@ -32,12 +32,12 @@ from walkers.commands.arguments import (
 from walkers.completion import offering
 
 _MANY = 10_000
-"""Points of a sweep that take seconds to be resolved."""
+"""Number of points that take seconds to resolve."""
 _NAME = "Name of the case; the file is NAME.toml."
 _FROM = "Copy this shipped case, such as pile-small (list: walkers library)."
 _OFFERED = offering("case", "run")
 _CASES = "Case files, names of shipped cases, or runs (name or folder)."
-_LIMIT = "Time limit in s for each run, for piles for each segment."
+_LIMIT = "Time limit in s for each run; for piles, for each segment."
 _SPREAD = "Also run with uncertain values drawn from their ranges, and print the band of the result."
 _SWEEP_FILE = "A sweep file, or the name of a shipped sweep such as fig2."
 
@@ -109,14 +109,14 @@ def run(
     from walkers.runner.summary import notes
 
     refuse("--points", points is not None and not spread, "is for --spread")
-    # A mistake in the last file shows before the first run starts.
+    # Report a mistake in the last file before the first run starts.
     loaded = each(lambda case: case_at(case, out, changes_of(settings)), cases)
     there = [None if settings or force else finished_at(case, out) for case in cases]
     check_folder("--out", out)
     if spread:
         from walkers.sweeps.spread import POINTS, describe, run_spread, spread_sweep
 
-        for case, _ in loaded:  # and so does a range that its key does not take
+        for case, _ in loaded:  # also an unusable range
             list(spread_sweep(case, points or POINTS, engine).cases())
     failed, how = False, By(engine=engine, allow_failed_audit=allow_failed_audit)
     for (case, folder), found in zip(loaded, there, strict=True):
@@ -178,6 +178,6 @@ def sweep(
         record, failures = run_sweep(loaded, out.resolve() if site else out, options, on_progress=advance, **how)
     tell(*(f"point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
     print(f"{describe_status(record.directory)}\n  table      walkers list {record.directory}")
-    same = [one for one in next(loaded.cases()).origins if one.key not in loaded.keys]  # what varies is in the table
+    same = [one for one in next(loaded.cases()).origins if one.key not in loaded.keys]  # varied keys are in the table
     print_lines(lines_of_rest(rests_on(same)))
     return 1 if failures else 0

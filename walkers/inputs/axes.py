@@ -87,7 +87,7 @@ def values_of(key: str, axis: object) -> list[Value]:
     if not (isinstance(given, list) and len(given) == 3 and type(given[2]) is int and 1 <= given[2] <= MOST_POINTS):
         message = f'expected first value, last value and number, such as {{ {kind} = ["0.5 g", "10 g", 20] }}'
         raise unusable(key, message, axis)
-    first, last, unit = _range(key, given[:2], positive=kind == "geomspace")
+    (first, last), unit = _numbers(key, given[:2], positive=kind == "geomspace")
     numbers = [written(float(one), unit) for one in getattr(np, kind)(first, last, given[2])]
     # Between whole numbers whole ones stay whole: seeds, cycles, replicates.
     if type(given[0]) is type(given[1]) is int:
@@ -95,13 +95,13 @@ def values_of(key: str, axis: object) -> list[Value]:
     return numbers
 
 
-def _range(key: str, given: list[Value], *, positive: bool) -> tuple[float, float, str | None]:
-    """Both ends of a range and their unit."""
+def _numbers(key: str, given: list[Value], *, positive: bool) -> tuple[list[float], str | None]:
+    """The numbers of a range and their unit."""
     unit = unit_of(key, given)
-    first, *_, last = numbers = [number_of(key, one) for one in given]
+    numbers = [number_of(key, one) for one in given]
     if positive and min(numbers) <= 0:
         raise unusable(key, "expected values above zero", given)
-    return first, last, unit
+    return numbers, unit
 
 
 def _quantity(value: Value) -> tuple[float, str | None] | None:
@@ -214,8 +214,7 @@ def ranges_of(ranges: Mapping[str, Any]) -> dict[str, Range]:
         kind = next(iter(given)) if isinstance(given, Mapping) and len(given) == 1 else ""
         if kind not in _DISTRIBUTIONS or not (isinstance(given[kind], list) and len(given[kind]) in (2, 3)):
             raise unusable(key, "expected { uniform = [low, high] } or { loguniform = [low, high] }", given)
-        *_, unit = _range(key, given[kind], positive=kind == "loguniform")
-        low, *median, high = (number_of(key, one) for one in given[kind])
+        (low, *median, high), unit = _numbers(key, given[kind], positive=kind == "loguniform")
         if low >= high or not all(low <= one <= high for one in median):
             raise unusable(key, "expected the smaller value first", given)
         found[key] = Range(low, high, unit, kind == "loguniform", *median)

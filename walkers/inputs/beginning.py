@@ -6,7 +6,7 @@ from pathlib import Path
 
 from walkers.inputs.bodies import ARRANGEMENTS
 from walkers.inputs.errors import check_utf8, refused
-from walkers.inputs.reading import shipped_cases
+from walkers.inputs.reading import shipped
 from walkers.inputs.text import printable
 
 _FOLDER = Path(__file__).with_name("beginnings")
@@ -36,7 +36,7 @@ def write_case(path: Path, kind: str = "walker", source: str | None = None) -> P
     if path.stem in ("", ".", ".."):
         raise refused(path, "expected a name")
     if source is not None:
-        known = shipped_cases()
+        known = shipped("case")
         if source not in known:
             raise refused("--from", f"{source}: {expected_of(source, known)}")
         text = known[source].read_text("utf-8")

@@ -210,11 +210,6 @@ class Walkers:
     places: Annotated[tuple[_Place, ...], Field(max_length=100, alias="at")] = ()
 
     @property
-    def count(self) -> int:
-        """Number of beads."""
-        return len(self.radii) * self.replicates
-
-    @property
     def all_radii(self) -> list[float]:
         """Radius of every bead, m."""
         return [*self.radii] * self.replicates
@@ -400,11 +395,6 @@ class Placed:
     """Beads placed one by one: x, y, z (m, from the middle of the floor) and radius (m) of each."""
 
     beads: tuple[tuple[float, float, float, float], ...]
-
-    @property
-    def count(self) -> int:
-        """Number of beads."""
-        return len(self.beads)
 
     @property
     def all_radii(self) -> list[float]:

@@ -72,21 +72,6 @@ BOTTOM = Flat((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
-class Span:
-    """Room that the beads need, m: half the extent of their paths, height, margin, largest radius."""
-
-    half_x: float
-    half_y: float
-    height: float
-    margin: float
-    largest: float
-
-
-Room = tuple[Vector, Vector]
-"""Lower and upper corner of the simulation box, m."""
-
-
-@dataclass(frozen=True)
 class Layer:
     """A layer of positions from which beads are poured: positions (m), pitch (m), and largest displacement."""
 
@@ -181,14 +166,19 @@ class Boundary:
                 walls.append(Flat((half * x, half * y, 0.0), (-x, -y, 0.0), name))
         return tuple(walls)
 
-    def room(self, span: Span) -> Room:
-        """The simulation box for a `Span`; in a container, climbers may rise above the rim."""
-        x, y = span.half_x + 2.0 * span.margin, span.half_y + 2.0 * span.margin
-        top, below = span.height + 2.0 * span.margin, 4.0 * span.largest
+    def room(
+        self, half_x: float, half_y: float, *, height: float, margin: float, largest: float
+    ) -> tuple[Vector, Vector]:
+        """Lower and upper corner of the simulation box; in a container, climbers may rise above the rim.
+
+        Half the extent of the beads' paths, their height, a margin, and the largest radius are in m.
+        """
+        x, y = half_x + 2.0 * margin, half_y + 2.0 * margin
+        top, below = height + 2.0 * margin, 4.0 * largest
         if self.shape == "plane":
-            below = span.margin
+            below = margin
         if self.shape == "channel":
-            y, top = self.width / 2.0 + span.margin, max(top, self.width)
+            y, top = self.width / 2.0 + margin, max(top, self.width)
         if self.closed:
             x = y = self.width / 2.0 + _RIM
             top = 2.0 * self.height

@@ -243,7 +243,6 @@ def _unknown_names(file: CalibrationFile) -> Iterator[Problem]:
 
 
 def _contradictions(file: CalibrationFile) -> Iterator[Problem]:
-    """Duplicates, missing entries and contradictions."""
     names = [one.name for one in file.observations]
     for number, one in enumerate(file.observations):
         if names.index(one.name) != number:

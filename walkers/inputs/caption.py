@@ -13,13 +13,13 @@ def caption(case: Case) -> str:
 
     Examples
     --------
-    >>> from walkers.inputs import load_case
+    >>> from walkers.inputs.reading import load_case
     >>> caption(load_case("fig4a"))
     '6 walkers of R = 0.6 / 0.3 mm on a plane of glass, Si AK5; 80 Hz, a0 = 19.6 m/s²'
     """
     bodies = [f"{make.replicates} walkers of R = {radii_text(make.radii)} mm" for make in case.walkers]
     if case.loose:
-        bodies.append(f"{case.count - sum(make.count for make in case.walkers)} loose beads")
+        bodies.append(f"{case.count - sum(len(make.all_radii) for make in case.walkers)} loose beads")
     boundary = f"in a {case.boundary.shape}" if case.boundary.closed else f"on a {case.boundary.shape}"
     return f"{', '.join(bodies)} {boundary} of {case.boundary.material}, {liquid_text(case)}; {conditions(case)}"
 

@@ -223,7 +223,7 @@ class Case:
     @property
     def count(self) -> int:
         """How many beads there are."""
-        return sum(body.count for body in self.bodies)
+        return len(self.all_radii)
 
     @property
     def large(self) -> int:

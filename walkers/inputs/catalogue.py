@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 
@@ -47,8 +47,7 @@ def catalogue(*, of_others: bool = True) -> list[Entry]:
     Raises `InputError` if that library cannot be used. What is wrong with a package is a warning.
     """
     found = list(_of_library(Library(read_library(Path()) if of_others else None)))
-    for key, loose in unmeasured().items():
-        found.append(Entry("not measured", key, numbers={"default": replace(loose.usual, range=loose.range)}))
+    found += [Entry("not measured", key, numbers={"default": one}) for key, one in unmeasured().items()]
     found += [Entry("bridge laws", name, text=_summary(name)) for name in LAWS]
     found += [Entry("bridge laws", one.name, one.place) for one in offers("walkers.bridge_laws").values()]
     for kind in COMMANDS:
@@ -71,7 +70,6 @@ def _of_library(known_to: Library) -> Iterator[Entry]:
 
 
 def _summary(law: str) -> str:
-    """First line of the file of a law."""
     text = resources.files("walkers.physics.laws").joinpath(f"{law.replace('-', '_')}.py").read_text("utf-8")
     return text.split('"""')[1].splitlines()[0]
 

@@ -47,12 +47,6 @@ class Harmonic:
         return self.peak_acceleration / self.angular_frequency**2
 
     @property
-    def displacement(self) -> Vector:
-        """A along its direction, m."""
-        x, y, z = self.direction
-        return (self.amplitude * x, self.amplitude * y, self.amplitude * z)
-
-    @property
     def peak_velocity(self) -> float:
         """A 2πf, m/s."""
         return self.peak_acceleration / self.angular_frequency
@@ -89,11 +83,6 @@ class Drive:
     def frequency(self) -> float:
         """Of the cycle, the common period of the harmonics, Hz; raises `ValueError` if they have none."""
         return common_frequency([one.frequency for one in self.harmonics])
-
-    @property
-    def angular_frequency(self) -> float:
-        """2π times that of the cycle, rad/s."""
-        return 2.0 * pi * self.frequency
 
     @property
     def amplitude(self) -> float:

@@ -50,11 +50,14 @@ class Known:
     value, written, source
         SI; as the library has it, with its unit; where it is from.
     range
-        Ends between which a calibrated number may lie as well (5 to 95 % of the posterior), as a case would write them.
+        Ends between which an unmeasured number may lie, or a calibrated one (5 to 95 % of the posterior), as a case
+        would write them.
     calibrated_with
         Names of the liquids of the experiments that it was calibrated to; empty if it was not.
     origin
         Of whose library it is.
+    logarithmic
+        Whether the range is of magnitudes.
     """
 
     value: float
@@ -63,18 +66,7 @@ class Known:
     range: tuple[Any, Any] | None = None
     calibrated_with: tuple[str, ...] = ()
     origin: Whence = "library"
-
-
-@dataclass(frozen=True)
-class Unmeasured:
-    """Unmeasured value that a case may leave out: default and range.
-
-    ``logarithmic`` says whether the range is of magnitudes; ``range`` is as a case would write it.
-    """
-
-    usual: Known
-    range: tuple[Any, Any]
-    logarithmic: bool
+    logarithmic: bool = False
 
 
 class Collection(NamedTuple):
@@ -172,7 +164,8 @@ def _known(key: str, entry: Mapping[str, Any], of: Collection, liquids: tuple[st
     number = units.parse_quantity(value, kind) if kind else float(value)
     source = entry.get("source", f"calibrated with {' and '.join(liquids)}" if liquids else "")
     ends = (entry["range"][0], entry["range"][1]) if "range" in entry else None
-    return Known(number, value, ", ".join(filter(None, (of.place, source))), ends, liquids, of.origin)
+    place = ", ".join(filter(None, (of.place, source)))
+    return Known(number, value, place, ends, liquids, of.origin, entry.get("log", False))
 
 
 def check_library(tables: object, source: str) -> None:
@@ -248,13 +241,10 @@ def _check_pairs(tables: Mapping[str, Any], source: str) -> None:
 
 
 @cache
-def unmeasured() -> Mapping[str, Unmeasured]:
-    """Unmeasured values by keys of a case."""
-    found = {}
-    for key, entry in _contents()["unmeasured"].items():
-        usual = _known(key, {"value": entry["usual"]}, Collection("library", "", {}))
-        found[key] = Unmeasured(usual, (entry["range"][0], entry["range"][1]), entry.get("log", False))
-    return found
+def unmeasured() -> Mapping[str, Known]:
+    """Defaults and ranges of the unmeasured values that a case may leave out, by keys of a case."""
+    program = Collection("library", "", {})
+    return {key: _known(key, entry, program) for key, entry in _contents()["unmeasured"].items()}
 
 
 def expected_of(word: str, known: Iterable[str]) -> str:

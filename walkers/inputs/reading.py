@@ -38,11 +38,6 @@ def shipped(kind: str) -> dict[str, Path]:
     return {path.stem: path for path in sorted((_HERE / f"{kind}s").glob("*.toml"))}
 
 
-def shipped_cases() -> dict[str, Path]:
-    """The cases that come with the project: name to file."""
-    return shipped("case")
-
-
 def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Case:
     """Read and resolve a case.
 

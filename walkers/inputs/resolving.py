@@ -23,11 +23,7 @@ from walkers.inputs.library import Known, Library, expected_of
 from walkers.inputs.loads import contact_loads, reach
 from walkers.inputs.origins import Notes, Origin, Whence, origins_of
 from walkers.inputs.run_tables import resolve_drive, resolve_run
-from walkers.inputs.schema import (
-    MOST_BEADS,
-    CaseFile,
-    MixtureTable,
-)
+from walkers.inputs.schema import MOST_BEADS, CaseFile, MixtureTable
 from walkers.physics.dimer import Dimer
 from walkers.physics.laws import LAWS, by_name
 from walkers.physics.matter import DEFAULT_LAW, Liquid
@@ -120,8 +116,7 @@ def _known(
         **{key: on_wall.get(key.split(".")[1]) for key in _OF_SURFACES},
         **{f"liquid.{key}": known for key, known in (known_to.liquid(liquid, mixture) if liquid else {}).items()},
     }
-    usual = {key: loose.usual for key, loose in library.unmeasured().items()}
-    return usual | {key: known for key, known in found.items() if known}
+    return {**library.unmeasured()} | {key: known for key, known in found.items() if known}
 
 
 @cache
@@ -208,7 +203,6 @@ def _liquid_of(table: Liquid, notes: Notes) -> Liquid:
 
 
 def _walkers_of(key: str, table: Walkers, boundary: Boundary, notes: Notes) -> Walkers:
-    """The walkers of a table, which stands under a key."""
     if table.facing in ("up", "down") and (not boundary.tilt or boundary.uphill):
         message = "on a plane that is tilted along the drive alone walkers face up or down"
         raise unusable(f"{key}.facing", f'expected "both", "right" or "left": {message}')
@@ -247,7 +241,6 @@ def _radii(table: Walkers, notes: Notes) -> tuple[float, ...]:
 
 
 def _arranged(walkers: Walkers, key: str) -> Walkers:
-    """A cluster in an arrangement."""
     name = walkers.arrangement
     known = ARRANGEMENTS.get(name)
     if known is None:

@@ -201,9 +201,6 @@ class EnvironmentTable(Table):
     gravity: units.Acceleration = 9.81
 
 
-# --- a case file ------------------------------------------------------------------------------------------------------
-
-
 class CaseFile(Table):
     """A case file: bodies on a boundary under a drive, with a liquid and contacts.
 

@@ -37,7 +37,7 @@ from walkers.inputs.case import BOUNDS, Case
 from walkers.inputs.changes import Value, changed, flatten
 from walkers.inputs.errors import InputError, Problem, each, refused, shortened, unusable
 from walkers.inputs.messages import blaming, check_key, validated
-from walkers.inputs.reading import find_input, read_case, read_toml, resolve_case, shipped
+from walkers.inputs.reading import find_input, read_case, read_toml, resolve_case
 from walkers.inputs.schema import Table
 from walkers.physics.units import Speed, Whole
 
@@ -155,11 +155,6 @@ class Sweep:
             case = resolve_case(document, source=where, name=self.case_name)
             # The base case's title may say what does not hold here.
             yield case.renamed(case.name, f"{shortened(self.name)}: {shortened(text)}") if text else case
-
-
-def shipped_sweeps() -> dict[str, Path]:
-    """The sweeps that come with the project: name to file."""
-    return shipped("sweep")
 
 
 def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) -> Sweep:

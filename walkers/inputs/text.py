@@ -24,7 +24,7 @@ def rendered(package: str, template: str, **values: Any) -> str:
     jinja2.UndefinedError
         If it names a value that is not given.
     """
-    return _environment(package).get_template(template).render(**values)
+    return environment(package).get_template(template).render(**values)
 
 
 def printable(text: str) -> str:
@@ -59,16 +59,18 @@ _FILTERS: Mapping[str, Callable[..., Any]] = {
 
 
 @cache
-def _environment(package: str) -> Environment:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
+def environment(*packages: str, html: bool = False) -> Environment:
+    """What renders the templates of packages; in ``html`` values are escaped."""
+    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
-    environment = Environment(
-        loader=PackageLoader(package, "."),
+    made = Environment(
+        loader=ChoiceLoader([PackageLoader(package, ".") for package in packages]),
         undefined=StrictUndefined,
-        keep_trailing_newline=True,
+        autoescape=html,
+        keep_trailing_newline=not html,
         trim_blocks=True,
         lstrip_blocks=True,
         auto_reload=False,
     )
-    environment.filters.update(_FILTERS)
-    return environment
+    made.filters.update(_FILTERS)
+    return made

@@ -36,19 +36,19 @@ if TYPE_CHECKING:
     import pandas as pd
 
 AGREES = 0.15
-"""A number within this share of the published one agrees with it, where the paper gives no spread."""
+"""Relative difference up to which a number agrees with the published one, if the paper gives no spread."""
 _CASES = ("fig1b", "fig4a", "fig4b")
-"""Of the paper's figures, whose numerical error is known."""
+"""Cases of the paper's figures, whose numerical error is known."""
 _SMALL = 0.05
-"""mm/s: where the published value is zero, a number within this agrees with it."""
+"""mm/s; difference up to which a number agrees with a published zero."""
 
 
 class Value(NamedTuple):
     """One of our numbers, in the unit of the published one; NaN where there is none.
 
-    ``low`` and ``high`` of the engine's are over walkers, or over the frequencies where a number is a mean over these;
-    ``left_out`` of all walkers are not steady until the end (`walkers.postprocess.gait`). Theory is Coulomb
-    friction with the resistance of bridges, nothing fitted.
+    ``low`` and ``high`` are the range of the engine over walkers, or over frequencies if the number is a mean over
+    these. ``left_out`` is the number of walkers that are not steady until the end (`walkers.postprocess.gait`). Theory
+    is Coulomb friction with the resistance of bridges, without fit.
     """
 
     engine: float = nan
@@ -59,24 +59,24 @@ class Value(NamedTuple):
 
 
 def misalignment(run: str | Path) -> FloatArray:
-    """Angles of a run's walkers to the drive axis at the end, whichever way they face, degrees, each 0 to 90."""
+    """Angles of the walkers of a run to the drive axis at the end, in either direction, 0 to 90 degrees."""
     ends = np.degrees(read_table(run, "walkers")["orientation_end"].to_numpy())
     angles: FloatArray = np.abs((ends + 90.0) % 180.0 - 90.0)
     return angles
 
 
 def evaluate(number: Observation, table: pd.DataFrame) -> Value:
-    """What the engine gives of a number whose quantity is of walkers, by runs of them, and the theory.
+    """The values of engine and theory for a published number of walkers.
 
     Parameters
     ----------
     number
-        Its quantity is ``velocity``, ``rotation_1`` or ``sliding_1``, means of the walkers that are steady;
-        ``velocity_of_all``, whichever way they turn; ``largest_angle`` or ``smallest_angle`` to the drive axis in the
-        end; or ``astray``, the share of those that have left it, %.
+        Its quantity is ``velocity``, ``rotation_1`` or ``sliding_1``, means of the steady walkers; ``velocity_of_all``,
+        also of those that turn; ``largest_angle`` or ``smallest_angle`` to the drive axis at the end; or ``astray``,
+        the share of walkers that have left the axis, %.
     table
-        Finished points of a sweep (`walkers.sweeps.table.load`): those that are of other walkers are not looked at, and
-        walkers that are not there are left out.
+        Finished points of a sweep (`walkers.sweeps.table.load`). Other walkers are ignored; missing walkers are left
+        out.
     """
     found = [_of_walkers(point, number.quantity, table) for point in number.of]
     if number.over:
@@ -95,7 +95,7 @@ def evaluate(number: Observation, table: pd.DataFrame) -> Value:
 
 
 def _of_walkers(point: Point, quantity: str, table: pd.DataFrame) -> Value | None:
-    """Of the walkers of a point, mm/s, degrees or %; None if it is not among the finished."""
+    """A quantity of the walkers of a point, mm/s, degrees or %; None if the point is not finished."""
     rows = point.rows(table)
     if rows.empty:
         return None
@@ -117,7 +117,7 @@ def _of_walkers(point: Point, quantity: str, table: pd.DataFrame) -> Value | Non
 
 
 def _theory(point: Point, quantity: str) -> float:
-    """The theory's speed of the walkers of a point, mm/s; NaN for what contacts do that open."""
+    """Speed of the walkers of a point in the theory, mm/s; NaN if contacts open."""
     motion = motion_of(point.case())
     family = quantity.partition("_")[0]
     if family == "velocity":
@@ -131,11 +131,10 @@ def compare(sources: Sources) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        What is published (``key``, ``what``, ``unit``, ``published``, ``measured``, ``bounds``); our `Value`, None
-        where there is none; ``ratio`` of engine (or theory, where the number is one of theory alone) to published, None
-        where that is zero or in words; ``within_bounds``, whether it lies within what the paper says (None: it gives no
-        bounds); ``agrees``, the same or, without bounds, whether within `AGREES` of the published value; and ``why``
-        not: what that depends on.
+        The published number (``key``, ``what``, ``unit``, ``published``, ``measured``, ``bounds``); our `Value`, or
+        None; ``ratio`` of engine (or theory, if the number is only theoretical) to published, None if that is zero or
+        in words; ``within_bounds`` of the paper (None: it gives no bounds); ``agrees``: the same or, without bounds,
+        within `AGREES` of the published value; and ``why`` not: what a disagreement depends on.
     """
     return [_row(number, _value(number, sources)) for number in OBSERVATIONS.values() if number.compared]
 
@@ -171,7 +170,7 @@ def _threshold(sources: Sources, *, by_frequency: bool) -> Value:
 
 
 def _row(number: Observation, value: Value) -> dict[str, Any]:
-    ours = value.theory if number.key.startswith("mathieu") else value.engine  # the engine knows nothing of Mathieu's
+    ours = value.theory if number.key.startswith("mathieu") else value.engine  # V is not a number of the engine
     within = None if number.bounds is None else bool(number.bounds[0] <= ours <= number.bounds[1])
     allowed = AGREES * abs(number.value) if number.value else _SMALL
     agrees = bool(abs(ours - (number.value or 0.0)) <= allowed) if within is None else within
@@ -189,7 +188,7 @@ def _row(number: Observation, value: Value) -> dict[str, Any]:
 
 
 def count(rows: Sequence[Mapping[str, Any]], *, measured: bool) -> tuple[int, int]:
-    """How many rows agree, of how many: those in which the engine has a say, or the others; none that is in words."""
+    """Numbers of agreeing rows and of all rows, without those in words: those that test the engine, or the others."""
     chosen = [row["agrees"] for row in rows if row["measured"] == measured and row["published"] is not None]
     return sum(chosen), len(chosen)
 
@@ -201,7 +200,7 @@ def as_dict(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
-    """The comparison as a table, and below it what disagrees and why."""
+    """The comparison as a table, followed by the disagreements and their reasons."""
     reasons: dict[str, list[str]] = {}
     for row in rows:
         if not row["agrees"]:

@@ -1,6 +1,6 @@
-"""Figs. 1b, 2, 3 and 4 of the paper: engine, theory and published values; and what the disagreements depend on.
+"""Figs. 1b, 2, 3 and 4 of the paper: engine, theory and published values; and the sensitivity to each parameter.
 
-That is from the shipped sweep ``sensitivity``, one parameter at a time.
+The sensitivity is from the shipped sweep ``sensitivity``, one parameter at a time.
 """
 
 from __future__ import annotations
@@ -36,26 +36,26 @@ if TYPE_CHECKING:
     from walkers.postprocess.motion import Group
 
 _INTERVAL, _IMAGES = 0.3, 6
-"""Fig. 1b: seconds between images, and how many."""
+"""Fig. 1b: seconds between images, and number of images."""
 _MARKERS = {60.0: "D", 70.0: "o", 80.0: "^", 90.0: "s"}
 """Fig. 2: the paper's symbols by frequency, Hz."""
 _DASHES = ("-", (0, (6, 2)), (0, (3, 2)), (0, (1, 1.5)))
-"""From the lowest frequency to the highest."""
+"""Dashes from the lowest to the highest frequency."""
 _FINE = 61
 _CYCLES = 2
-"""Of Fig. 4."""
+"""Cycles of Fig. 4."""
 _SERIES = (
     ("walker", "velocity", "s", "#c4473a", 7.5),
     ("large bead", "rotation_1", "o", "#111111", 5.0),
     ("small bead", "rotation_2", "^", "#1f5fa8", 2.5),
 )
-"""Of Fig. 4: name, column of a sweep's table, marker, colour and size: none hides another."""
+"""Fig. 4: name, column of a sweep's table, marker, colour, and size, so that none hides another."""
 _PUBLISHED_DASHES = (0, (6, 2, 1, 2))
 
 
 @styled
 def fig1b(sources: Sources) -> Figure:
-    """The first walker of the alignment's dimers that start on the axis, seen from above every 0.3 s."""
+    """The first dimer of the sweep ``alignment`` that starts on the axis, seen from above every 0.3 s."""
     table = OBSERVATIONS["alignment_asymmetric"].of[0].rows(sources.finished("alignment"))
     trajectory = sources.trajectory(table.sort_values("dimers.angle")["run"].iloc[0])
     case, largest = trajectory.case, float(trajectory.radii.max())
@@ -81,7 +81,7 @@ def fig1b(sources: Sources) -> Figure:
 
 
 def _errorbars(axes: Axes, x: pd.Series[float], rows: pd.DataFrame, *, seen: bool, **look: Any) -> None:
-    """Means, with bars from the smallest to the largest of the walkers, as in the paper, if these are to be seen."""
+    """Means, with bars from the smallest to the largest walker, as in the paper, if the range is visible."""
     mean, low, high = (rows[name].to_numpy() * 1e3 for name in ("velocity", "smallest", "largest"))
     axes.errorbar(x, mean, yerr=[mean - low, high - mean] if seen else None, mfc="none", **look)
 
@@ -115,7 +115,7 @@ def fig2(sources: Sources) -> Figure:
         panel.plot(list(published.FIT), np.array(list(published.FIT.values())) * 1e3, "*", color="0.45", ms=8, zorder=0)
         panel.axhline(0.0, color="0.4", lw=0.6)
         panel.set(xlabel=r"peak acceleration $a_0$ (g, 9.8 m/s²)", ylabel="velocity (mm/s)", xlim=(0.0, top * 1.03))
-    # The paper's fit goes on beyond what the paper measured: that is not to flatten the rest.
+    # The paper's fit extends beyond its measurements; this part must not set the scale.
     measured = [*table["smallest"], *table["largest"], *published.FIT.values()]
     low, high = min(0.0, np.nanmin(measured) * 1e3), np.nanmax(measured) * 1e3
     engine.set_ylim(low - 0.04 * (high - low), high + 0.1 * (high - low))
@@ -137,7 +137,7 @@ def fig2(sources: Sources) -> Figure:
 
 
 def _threshold(axes: Axes, sources: Sources) -> None:
-    """Γc by the paper's protocol: between the last drive that moved the walkers and the first that did not."""
+    """Γc by the protocol of the paper: between the last drive with motion and the first one without."""
     sources.finished("fig2-threshold")
     ends = thresholds(sources.out / "fig2-threshold")
     bounds = ends[["gamma0_at_rest", "gamma0_moving"]].to_numpy(dtype=float)
@@ -178,7 +178,7 @@ def fig3(sources: Sources) -> Figure:
     seen = _range_seen(table)
     text = "engine, mean and range" if seen else "engine, mean (the range is smaller than the symbol)"
     _errorbars(axes, table["sin_delta"], table, seen=seen, fmt="s", color="C2", ms=5, label=text)
-    # The beads stand above the axes, where they meet no symbol; upright, for some asymmetries are nearly the same.
+    # The beads stand above the axes, away from symbols; upright, because some asymmetries are nearly the same.
     above = axes.secondary_xaxis("top")
     above.set_xticks(table["sin_delta"], [f"{one * 1e3:g}/{other * 1e3:g}" for one, other in pairs], rotation=90)
     above.set_xlabel("$R_1/R_2$ (mm)")
@@ -194,7 +194,7 @@ def fig3(sources: Sources) -> Figure:
 
 @styled
 def fig4(sources: Sources) -> Figure:
-    """Velocity and rotation of the beads through two cycles, where the large bead rolls and where it slides too."""
+    """Velocity and rotation of the beads over two cycles: the large bead rolls, or rolls and slides."""
     from matplotlib.lines import Line2D
 
     table = sources.finished("fig4")
@@ -240,7 +240,7 @@ def _draw_cycles(axes: Axes, trajectory: Group) -> None:
 def theory_of_cycles(trajectory: Group) -> list[FloatArray]:
     """Velocity of the walker and rotation velocities of its beads by the theory, m/s, through the cycles shown.
 
-    From the begin of a cycle of the engine's drive; NaN where a contact would open.
+    Starts with a cycle of the engine's drive; NaN where a contact would open.
     """
     motion = motion_of(trajectory.case)
     sliding = motion.series[:, 0] if np.isfinite(motion.velocity[0]) else np.full_like(motion.series[:, 0], np.nan)
@@ -264,7 +264,7 @@ PARAMETERS = {
     "contact angle (°)": "liquid.contact_angle",
     "restitution": "contact.restitution",
 }
-"""What is varied, and the column that says so (the friction of bead on bead goes with that of bead on wall)."""
+"""Varied parameters and their columns (bead-bead friction varies with bead-wall friction)."""
 OBSERVED = {
     "fig2_4g": "Fig. 2: v at 80 Hz, 4 g (mm/s)",
     "fig3_0.4_0.2": "Fig. 3: v for 0.4/0.2 mm (mm/s)",
@@ -273,7 +273,7 @@ OBSERVED = {
     "astray": "off the axis, 60 Hz, 10 g (%)",
     "angle_after_60": "angle after a start at 60° (°)",
 }
-"""The `walkers.paper.published.OBSERVATIONS` that are shown, with their labels."""
+"""Shown `walkers.paper.published.OBSERVATIONS`, with their labels."""
 _TOGETHER = "uncalibrated"
 _NO_RANGE = 1e-6
 
@@ -282,7 +282,7 @@ def sensitivities(sources: Sources) -> pd.DataFrame:
     """`OBSERVED` for the shipped parameters and for each parameter lower and higher, in the order of the sweep.
 
     Columns are ``parameter`` (``shipped``, one of `PARAMETERS`, or ``uncalibrated``), its ``value``, and the
-    observations: NaN where a run is not finished, and for speeds of which no walker is left on the axis.
+    observations: NaN where a run is not finished, and for speeds if no walker stays on the axis.
     """
     import pandas as pd
 
@@ -327,7 +327,7 @@ def _tornado(axes: Axes, found: pd.DataFrame, key: str) -> None:
             shown_label = label if place == 0 else None
             if known:
                 axes.barh(place + offset, end - shipped, 0.32, shipped, fc=colour, ec="0.1", lw=0.5, label=shown_label)
-            else:  # bars have nothing to begin at
+            else:  # bars have no start
                 axes.plot(end, place + offset, "o", color=colour, mec="0.1", ms=6)
     together = found[found["parameter"] == _TOGETHER][key]
     axes.plot(together, [len(PARAMETERS)] * len(together), "D", color="C2", ms=6, label=_TOGETHER)
@@ -338,7 +338,7 @@ def _tornado(axes: Axes, found: pd.DataFrame, key: str) -> None:
     axes.axvline(OBSERVATIONS[key].value or 0.0, color="C1", ls="--", lw=1.4, label="published")
     axes.margins(x=0.08)
     low, high = axes.get_xlim()
-    if high - low < _NO_RANGE:  # nothing changes it: a scale of its rounding would say nothing
+    if high - low < _NO_RANGE:  # no effect: do not scale to rounding errors
         axes.set_xlim(low - 1.0, high + 1.0)
     axes.set_xlabel(OBSERVED[key])
     axes.grid(axis="y", visible=False)

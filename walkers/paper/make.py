@@ -54,7 +54,8 @@ COMPARED = ("fig2", "fig2-threshold", "fig3", "fig4", "alignment")
 class Made(NamedTuple):
     """Written files, failed points by sweep, and figures that could not be drawn with the reasons.
 
-    Of ``compared`` published numbers that test the engine so many ``agree``; none if they were not compared.
+    ``compared`` is the number of published values that test the engine, ``agree`` the number of those that agree; 0 if
+    they were not compared.
     """
 
     files: list[Path]
@@ -84,14 +85,14 @@ def make_figures(  # noqa: PLR0913
     options, engine, allow_failed_audit
         As for `walkers.sweeps.scheduler.run_sweep`.
     only
-        Names of `FIGURES`, or ``comparison``; if empty, all but those that are drawn only if asked for.
+        Names of `FIGURES`, or ``comparison``; if empty, all except those that are drawn only on request.
     formats
-        Of the figures, of `walkers.postprocess.drawing.FORMATS`.
+        Formats of the figures, from `walkers.postprocess.drawing.FORMATS`.
 
     Raises
     ------
     InputError
-        If there is no such figure or format, or a file is where a folder is to be.
+        If a figure or format does not exist, or a folder is a file.
     """
     require("theory")
     import joblib
@@ -113,7 +114,7 @@ def make_figures(  # noqa: PLR0913
             _, failures = run_sweep(load_sweep(sweep), out, options, on_progress=advance, **how)
         failed |= {sweep: failures} if failures else {}
     figures = [name for name in chosen if name in FIGURES]
-    # Processes of loky do not import the caller's script, as those of `multiprocessing` do.
+    # Processes of loky do not import the caller's script, unlike those of `multiprocessing`.
     draw = joblib.Parallel(n_jobs=min(options.workers, len(figures) or 1))
     outcomes = draw(joblib.delayed(draw_figure)(name, out, to, formats) for name in figures)
     files = [path for outcome in outcomes if isinstance(outcome, list) for path in outcome]

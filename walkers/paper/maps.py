@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from walkers.postprocess.motion import Group
 
 SLIDES = 0.1
-"""The large bead slides if its sliding velocity is more than this share of its rotation velocity, in the rms."""
+"""Ratio of rms sliding velocity to rms rotation velocity above which the large bead slides."""
 MODES = {
     "at rest": ("x", "0.1"),
     "large bead rolls": ("o", "#1f4e8c"),
@@ -37,7 +37,7 @@ MODES = {
     "leaves the axis": ("v", "#dd9d1f"),
     "detached": ("*", "#c4473a"),
 }
-"""With their markers and colours."""
+"""Modes with their markers and colours."""
 POSTURES = {"climbs upright": "^", "stays, upright": "o", "slides down upright": "v", "leans": "D", "turns over": "X"}
 """Postures on a wall, with markers."""
 STAYS = 5e-5
@@ -49,9 +49,9 @@ _MAPS = (
 )
 """Rows of maps: sweep, key along x, and its label."""
 _SPEEDS = (-10.0, -3.0, -1.0, 0.0, 1.0, 3.0, 10.0)
-"""mm/s, on the scale of colours."""
+"""mm/s; ticks of the colour scale."""
 _SIDE_BY_SIDE = 5
-"""Clusters."""
+"""Number of clusters in a row."""
 _OF_TRAYS = {
     "share in clusters": ("clustered_share",),
     "share in the largest cluster": ("largest_share",),
@@ -61,11 +61,11 @@ _OF_TRAYS = {
 }
 """Columns of a sweep's table that share a panel, solid and dashed, by its label."""
 _LARGEST_DRIVE = 10.0
-"""Peak acceleration in g up to which the paper shakes."""
+"""Largest peak acceleration of the paper, g."""
 _BEGINNINGS = (15.0, 45.0)
-"""Starts in degrees whose first cycles are compared …"""
+"""Start angles (degrees) whose first cycles are compared …"""
 _SMALL = 0.15
-"""… for so many seconds."""
+"""… and the time of the comparison, s."""
 
 
 def paper_drives() -> dict[str, Alignment]:
@@ -90,7 +90,7 @@ def climber(*, large_bead_below: bool) -> Alignment:
 
 @styled
 def fig_alignment(sources: Sources) -> Figure:
-    """ψ(t) of asymmetric and symmetric dimers, its beginning beside theory, and the chart of stability."""
+    """ψ(t) of asymmetric and symmetric dimers, its first cycles with the theory, and the stability chart."""
     from matplotlib import colormaps
     from matplotlib.ticker import MultipleLocator
 
@@ -128,13 +128,13 @@ def fig_alignment(sources: Sources) -> Figure:
 
 
 def _draw_beginning(axes: Axes, trajectory: Group, colour: tuple[float, ...]) -> None:
-    """Each walker with the solution that begins as it does."""
+    """Each walker with the solution for the same start."""
     drive, few = trajectory.case.drive, trajectory.time <= _SMALL
     time = trajectory.time[few]
     for number, walker in enumerate(trajectory.walkers):
         psi = trajectory.orientation[few, number]
         axes.plot(time * 1e3, np.degrees(psi), color=colour)
-        # The substrate moves as sin 2πft: it accelerates as -sin 2πft along x, to or against the heading.
+        # The substrate moves as sin 2πft: it accelerates as -sin 2πft along x, along or against the heading.
         phase = pi / 2.0 * walker.facing
         predicted = turning(pendulum_of(trajectory.case), float(psi[0]), pi * drive.frequency * time, phase)
         axes.plot(time * 1e3, np.degrees(predicted), "--", color=colour, lw=0.9)
@@ -171,11 +171,11 @@ def _share(sliding: FloatArray, rotation: FloatArray) -> float:
 
 
 def classify(table: pd.DataFrame, shares: Sequence[float]) -> npt.NDArray[np.int64]:
-    """The mode of each finished point of a sweep, a place in `MODES`; ``shares`` are their `sliding_share`.
+    """The mode of each finished point of a sweep, an index in `MODES`; ``shares`` are their `sliding_share`.
 
-    Detached goes before all others: a contact open in some of the samples. Then at rest: velocity and the large bead's
-    mean sliding below `REST`. Then leaves the axis: not all replicates steady, or some turned round. What is left
-    rolls, or slides as well (`SLIDES`).
+    The first of these applies. Detached: a contact is open in a sample. At rest: velocity and mean sliding of the large
+    bead are below `REST`. Leaves the axis: a replicate is not steady or turned round. Otherwise the large bead rolls,
+    or rolls and slides (`SLIDES`).
     """
     opened = table[["open_1", "open_2", "open_3"]].max(axis=1) > 0.0
     still = (table["velocity"].abs() < REST) & (table["sliding_1"].abs() < REST)
@@ -186,7 +186,7 @@ def classify(table: pd.DataFrame, shares: Sequence[float]) -> npt.NDArray[np.int
 
 @styled
 def fig_modes(sources: Sources) -> Figure:
-    """Γ0 against sin δ: the engine's modes with the models' borders, and the engine's velocity."""
+    """Γ0 against sin δ: modes of the engine with the borders of the models, and velocity of the engine."""
     table, case = sources.finished("modes"), shipped()
     modes = classify(table, [sliding_share(sources.trajectory(run)) for run in table["run"]])
     figure, (kinds, speeds) = new_figure(TWO_COLUMNS, 4.4, ncols=2, sharey=True)
@@ -198,7 +198,7 @@ def fig_modes(sources: Sources) -> Figure:
     _draw_borders(kinds, float(table["gamma0"].max()))
     kinds.set(ylabel=r"dimensionless peak force $\Gamma_0$", ylim=(0.0, None), title="modes in the engine")
     speed = table["velocity"].to_numpy() * 1e3
-    low, high = np.nanpercentile(speed, (2.0, 95.0))  # few are not to darken the rest
+    low, high = np.nanpercentile(speed, (2.0, 95.0))  # a few values must not set the scale
     look = {"cmap": "viridis", "vmin": min(low, 0.0), "vmax": high}
     drawn = speeds.scatter(table["sin_delta"], table["gamma0"], c=speed, marker="s", s=26, **look)
     speeds.set_title("velocity in the engine")
@@ -213,7 +213,7 @@ def fig_modes(sources: Sources) -> Figure:
 
 
 def _draw_borders(axes: Axes, top: float) -> None:
-    """Where Coulomb friction and the bridges say that the walker starts, slides, detaches; the quasi-static end."""
+    """Borders by Coulomb friction and bridges: the walker starts, slides, detaches; and the quasi-static limit."""
     case, sines = shipped(), np.linspace(0.005, 0.4, 33)
     gammas = np.concatenate([np.linspace(0.02, 0.4, 58)[:-1], np.linspace(0.4, 1.15 * top, 14)])
     motion = motion_of(*[of_asymmetry(case, float(sine), float(gamma)) for sine in sines for gamma in gammas])
@@ -240,8 +240,8 @@ def _draw_borders(axes: Axes, top: float) -> None:
 def postures(table: pd.DataFrame) -> npt.NDArray[np.int64]:
     """Posture of the walkers of each point of a sweep, an index in `POSTURES`.
 
-    Turns over if any of them does; leans if any does not end upright; else it climbs, slides down or is slower than
-    `STAYS`.
+    Turns over if any walker does; leans if any walker does not end upright; else climbs, slides down, or stays (slower
+    than `STAYS`).
     """
     turned, leaning, speed = table["turned_round"] > 0, table["upright"] < table["walkers"], table["axial_velocity"]
     found: npt.NDArray[np.int64] = np.select([turned, leaning, speed < -STAYS, speed < STAYS], [4, 3, 2, 1], 0)
@@ -250,7 +250,7 @@ def postures(table: pd.DataFrame) -> npt.NDArray[np.int64]:
 
 @styled
 def fig_climbing(sources: Sources) -> Figure:
-    """Dimer, fan and diamond: the bridges' viscosity against friction on a wall, and against tilt."""
+    """Dimer, fan and diamond: viscosity of the bridges against friction on a wall, and against tilt."""
     from matplotlib.lines import Line2D
 
     figure, rows = new_figure(TWO_COLUMNS, 4.8, nrows=2, ncols=3, sharey=True)
@@ -271,11 +271,11 @@ def fig_climbing(sources: Sources) -> Figure:
 
 
 def _draw_map(axes: Axes, table: pd.DataFrame, key: str) -> PathCollection:
-    """The points of a sweep by posture; all have one scale of colours, which is given back."""
+    """Draw the points of a sweep by posture; return points with the common colour scale."""
     from matplotlib.colors import SymLogNorm
 
     found = postures(table)
-    shades = SymLogNorm(1.0, vmin=_SPEEDS[0], vmax=_SPEEDS[-1])  # few are fast, and they are not to bleach the rest
+    shades = SymLogNorm(1.0, vmin=_SPEEDS[0], vmax=_SPEEDS[-1])  # a few fast ones must not set the scale
     for posture, marker in enumerate(POSTURES.values()):
         here = table[found == posture]
         drawn = axes.scatter(
@@ -314,7 +314,7 @@ def fig_zoo(sources: Sources) -> Figure:
 
 
 def _draw_cluster(axes: Axes, group: Group) -> None:
-    """The first walker's beads seen against the wall, uphill is up; dotted where it began."""
+    """The beads of the first walker in front of the wall, uphill is up; dotted at the start."""
     from matplotlib.patches import Circle
 
     for frame, style in ((0, {"ls": ":", "fc": "none", "ec": "0.6"}), (-1, {"fc": "#c9d2d8", "ec": "0.2"})):

@@ -1,9 +1,8 @@
 """Further terms of the theory, each fitted to the published numbers.
 
-The engine knows Coulomb's friction and the bridges' resistance to sliding and rolling. The theory integrates under any
-law of friction, thousands of walkers a second, so that for every term all parameters can be searched for what they give
-at best. It is a theory of walkers whose contacts stay closed, aligned with the drive: of hopping and turning it knows
-nothing.
+The engine has Coulomb friction and the resistance of bridges to sliding and rolling. The theory integrates thousands of
+walkers per second under any friction law, so that all parameters can be fitted for every term. It is for walkers that
+are aligned with the drive and whose contacts stay closed; it does not describe hopping or turning.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ ALWAYS: Ranges = {
     "friction_bead": (0.02, 0.6),
     "log10_viscosity_ratio": (-1.0, 2.3),
 }
-"""What the engine has: three frictions, and the bridges' viscosity over the liquid's. Of ``log10_`` the logarithm."""
+"""Terms of the engine: three friction coefficients, and the viscosity of bridges over that of the liquid (log10)."""
 KAPPA: Ranges = {"log10_kappa": (-1.0, 2.0)}
 TERMS: Mapping[str, Ranges] = {
     "weaker or stronger bridges to the substrate": {"wall_bridge_factor": (0.5, 1.3)},
@@ -50,14 +49,14 @@ _WITHOUT = {
     "log10_stribeck_velocity": -3.0,
 }
 NOTHING_ELSE = {"friction_wall": 1e-6, "friction_slide": 1e-6, "friction_bead": 1e-6, "log10_viscosity_ratio": -9.0}
-"""What leaves the paper's law alone, F∥ = κ v F, but integrated in time, with inertia."""
+"""Parameters that leave only the paper's law, F∥ = κ v F, integrated in time with inertia."""
 _KEYS = (
     *(f"fig2_{g}g" for g in range(2, 7)),
     *("fig2_plateau", "fig2_frequency_4g", "fig2_frequency", "fig2_rest"),
     *(key for key, number in OBSERVATIONS.items() if number.fitted and key.startswith(("fig3", "fig4"))),
 )
 FITTED = tuple(OBSERVATIONS[key] for key in _KEYS)
-"""Of walkers on the axis whose contacts stay closed: of Fig. 4b, where they open in every cycle, there is none."""
+"""Numbers of walkers on the axis whose contacts stay closed; in Fig. 4b they open in every cycle."""
 _FREQUENCIES = (60.0, 90.0)
 _CYCLES = 40
 _HOPELESS = 30.0
@@ -68,8 +67,8 @@ PAGE_NAME = "model_terms.md"
 class Fit:
     """Best fit with some terms: parameters, and values by the name of each number (m/s, or a ratio).
 
-    So many are ``met``, within their deviations; of the others the names, the worst first. ``misfit`` is Σ ln(1 + r²),
-    r in deviations.
+    ``met`` numbers are within their deviations; ``missed`` are the names of the others, the worst first. ``misfit`` is
+    Σ ln(1 + r²), r in deviations.
     """
 
     name: str
@@ -87,7 +86,7 @@ def _at_the_ends(points: Sequence[Point]) -> list[Point]:
 
 @cache
 def walkers_of_the_paper() -> dict[Point, Case]:
-    """The walkers of `FITTED` without a calibration: perfectly wetting bridges of 1 % of the liquid as it is."""
+    """The walkers of `FITTED` without calibration: perfect wetting, volume fraction 1 %, viscosity of the liquid."""
     cases = {}
     for point in (one for number in FITTED for part in (number.of, number.over) for one in _at_the_ends(part)):
         case = point.case()
@@ -105,9 +104,9 @@ def _walkers() -> Walker:
 
 
 def speeds(parameters: Mapping[str, float]) -> dict[str, dict[Point, float]]:
-    """What walkers of the paper do, m/s, by quantity and point; NaN where the forces have no solution.
+    """Velocities of the paper's walkers, m/s, by quantity and point; NaN where the forces have no solution.
 
-    The parameters are of `ALWAYS` and of any of `TERMS`.
+    The parameters are those of `ALWAYS` and of any of `TERMS`.
     """
     cases, walkers = walkers_of_the_paper(), _walkers()
     known = {**_WITHOUT, "log10_kappa": -inf, **parameters}
@@ -129,7 +128,7 @@ def speeds(parameters: Mapping[str, float]) -> dict[str, dict[Point, float]]:
         [case.drive.peak_acceleration for case in cases.values()],
         cycles=_CYCLES,
     )
-    # Contacts that would open for a moment are let be: the engine's walkers hop there and walk on.
+    # Contacts that would open for a moment are allowed: in the engine, walkers hop there and walk on.
     sliding = np.where(motion.solved, motion.sliding, np.nan)
     columns = {"velocity": translation(sliding), "sliding_1": sliding[0]}
     return {name: dict(zip(cases, map(float, values), strict=True)) for name, values in columns.items()}
@@ -162,13 +161,13 @@ def fit(
     Parameters
     ----------
     name, ranges
-        Of the terms, and of all parameters that are searched for; others are ``fixed``.
+        Name of the terms, and ranges of all fitted parameters; others are ``fixed``.
     wanted
-        What is to come out, of `FITTED`.
+        Numbers to fit, of `FITTED`.
     begin
-        Parameters to begin with; those of a term that are not among them begin where it does nothing.
+        Initial parameters; missing parameters of a term begin where the term has no effect.
     generations
-        Of the search.
+        Generations of the search.
     """
     from scipy.optimize import differential_evolution
 
@@ -201,7 +200,7 @@ def try_model_terms(to: Path) -> list[Fit]:
     """Fit without any term, with each, with all of them, and the paper's law alone; write ``model_terms.md``."""
     require("theory")
     bare = fit("Coulomb friction and the bridges' resistance", ALWAYS)
-    # From where the others end: what has more parameters must not come out worse for want of generations.
+    # Begin where the others end, so that more parameters do not give a worse fit.
     added = [fit(name, {**ALWAYS, **ranges}, begin=bare.parameters) for name, ranges in TERMS.items()]
     best = min(added, key=lambda one: one.misfit)
     every = {**ALWAYS, **{key: ends for ranges in TERMS.values() for key, ends in ranges.items()}}

@@ -1,4 +1,4 @@
-"""What the paper publishes of walkers as numbers (``published.toml``), and of which walkers: rows of sweeps, and cases.
+"""Published numbers of the paper (``published.toml``) and their walkers, as rows of sweeps and as cases.
 
 `walkers.paper.comparison` evaluates each by the engine, whose sweeps are read once (`Sources`), and by the theory.
 """
@@ -35,9 +35,9 @@ _DEVIATION = 0.15
 
 
 class Point(NamedTuple):
-    """Walkers of the paper's: a sweep that has them, radii (mm), frequency (Hz), peak acceleration (g) or Γ0.
+    """Walkers of the paper: a sweep that contains them, radii (mm), frequency (Hz), peak acceleration (g) or Γ0.
 
-    ``angle`` is where they start, degrees; what is None is whatever the sweep has.
+    ``angle`` is the start angle, degrees; None stands for any value of the sweep.
     """
 
     sweep: str
@@ -48,7 +48,7 @@ class Point(NamedTuple):
     angle: float | None = None
 
     def rows(self, table: pd.DataFrame) -> pd.DataFrame:
-        """Those of the points of a sweep that are these walkers."""
+        """The points of a sweep with these walkers."""
         peak = None if self.peak is None else self.peak * GRAVITY
         wanted = {
             **{f"radius_{number}": radius * 1e-3 for number, radius in enumerate(self.radii, start=1)},
@@ -78,23 +78,23 @@ class Observation:
     Attributes
     ----------
     key, what, unit
-        Its name, what it is in words, and in which unit.
+        Its name, a description and its unit.
     value, bounds
-        As published; and between which a value is what the paper says, if it says so: the rounding of its digits
-        (0.735, of which Γ0 = 0.74 is made, is on its edge) is none, those of angles are ours. What is stated in words
-        only has bounds and no value, and does not count among those that agree or disagree.
+        The published value, and the bounds that the paper gives. The rounding of its digits is not a bound (0.735, from
+        which Γ0 = 0.74 is rounded, is on its edge); bounds of angles are ours. An observation in words has bounds and
+        no value, and does not count as agreement or disagreement.
     depends_on
         A sentence: what a disagreement of the engine depends on.
     measured
         Whether it tests the engine: Γ0 and Mathieu's V follow from beads and drive alone.
     of, over, quantity
-        It is a mean over walkers, or its ratio to one over others, pair by pair, of a quantity, see
-        `walkers.paper.comparison.evaluate`; if there is none that has a function for the number.
+        The observation is the mean of a quantity over walkers, or its ratio to that over others, pair by pair; see
+        `walkers.paper.comparison.evaluate`. Without a quantity, `walkers.paper.comparison` has a function for it.
     fitted, deviation
-        What it is called among those that the theory is fitted to (`walkers.paper.model_terms`), if it is one, and its
-        error there, in ``unit``; 15 % if None.
+        Its name among the numbers to which the theory is fitted (`walkers.paper.model_terms`), if any, and its error
+        there, in ``unit``; 15 % if None.
     compared
-        Whether it is one of the comparison.
+        Whether it is part of the comparison.
     """
 
     key: str
@@ -113,12 +113,12 @@ class Observation:
 
     @property
     def si(self) -> float:
-        """The value in SI units, to the digits that it was published with."""
+        """The value in SI units, with the published digits."""
         return float(f"{self.value or 0.0}e-3") if self.unit == "mm/s" else self.value or 0.0
 
     @property
     def si_deviation(self) -> float:
-        """Its error among those that the theory is fitted to, in SI units."""
+        """Its error for fits of the theory, in SI units."""
         if self.deviation is None:
             return _DEVIATION * abs(self.si)
         return self.deviation * (1.0 if self.over else 1e-3)
@@ -148,7 +148,7 @@ FIG4_PEAKS = tuple(OBSERVATIONS[f"fig4{letter}_velocity"].of[0].peak or 0.0 for 
 def outside_of_the_paper(case: Case) -> str | None:
     """How a case lies outside the range in which the paper measured velocities; None if it lies within.
 
-    Of a case that is no dimer's nothing is said.
+    None also if the case has no dimers.
     """
     if not case.walkers or len(case.walkers[0].radii) != 2:
         return None
@@ -172,7 +172,7 @@ def outside_of_the_paper(case: Case) -> str | None:
 
 
 def shipped() -> Case:
-    """The case whose beads, liquid and contacts Figs. 1b and 2 have."""
+    """The case with the beads, liquid and contacts of Figs. 1b and 2."""
     return load_case("fig1b")
 
 
@@ -204,11 +204,11 @@ def described(case: Case) -> str:
 # --- the sweeps that figures are made from ----------------------------------------------------------------------------
 
 ProgressOf = Callable[[str], AbstractContextManager[Callable[[SweepProgress], None]]]
-"""Gives, for the name of a sweep, a context whose value is called with its progress."""
+"""Function from the name of a sweep to a context that yields a function for its progress."""
 
 
 class NothingFinishedError(WalkersError):
-    """A sweep without finished points."""
+    """A sweep has no finished points."""
 
 
 class Sources:
@@ -222,7 +222,7 @@ class Sources:
         self.trajectory: Callable[[str], Group] = lru_cache(maxsize=32)(lambda run: read_motion(run).groups[0])
 
     def finished(self, sweep: str) -> pd.DataFrame:
-        """The points of a sweep that are finished; a `NothingFinishedError` if there is none."""
+        """The finished points of a sweep; raises `NothingFinishedError` if there is none."""
         table = self.table(sweep)
         done = table[table["status"] == "finished"]
         if done.empty:

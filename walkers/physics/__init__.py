@@ -1,4 +1,4 @@
-"""Physical laws, one file each, with equation and source, in plain numbers of SI units.
+"""Physical laws, one file each, with equation and source; all numbers are in SI units.
 
-The resolved case (forces at rest, the time step), the audit and the theory all take them from here.
+The resolved case (forces at rest, time step), the audit and the theory use them.
 """

@@ -19,7 +19,7 @@ def derjaguin_radius(radius_1: float, radius_2: float) -> float:
 def bridge_volume_between_beads(radius_1: float, radius_2: float, volume_fraction: float) -> float:
     """Volume of the bridge between two beads, m³, from the radii (m) and the ratio of liquid to bead volume.
 
-    Each bead gives half of its liquid film that lies in the cap that the other one covers (Shi and McCarthy 2008).
+    Each bead contributes half of its liquid film in the cap that the other bead covers (Shi and McCarthy 2008).
     """
 
     def share(own: float, other: float) -> float:

@@ -1,7 +1,7 @@
 """Contacts of softened beads: Hertz repulsion 4/3 E* √R* δ^(3/2), and the elastic Hertz impact.
 
 E* = E/(2(1 − ν²)) and G* = E/(4(1 + ν)(2 − ν)) (Mindlin 1949) of two bodies of the same modulus. A wall is a sphere
-without end: R* is the bead's radius and m* its mass. In an impact at a normal speed v_n
+of infinite radius: R* is the radius of the bead and m* its mass. In an impact at a normal speed v_n
 
     δ_max = (15 m* v_n²/(16 E* √R*))^(2/5),    F_max = 4/3 E* √R* δ_max^(3/2),    and the contact lasts 2.943 δ_max/v_n.
 

@@ -12,7 +12,7 @@ from walkers.physics.capillary import capillary_force_limit_at_wall
 class Dimer:
     """Derived quantities of the two beads of a case: symbols of the paper, SI units.
 
-    Bead 1 is the case's first. Khan et al.: sin δ = (R1 − R2)/(R1 + R2), μ = (m1 − m2)/M, R̄ = (R1 + R2)/2,
+    Bead 1 is the first bead of the case. Khan et al.: sin δ = (R1 − R2)/(R1 + R2), μ = (m1 − m2)/M, R̄ = (R1 + R2)/2,
     Γ0 = a0 M/(4πγR̄) (their Eq. 1).
     """
 

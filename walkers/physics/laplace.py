@@ -1,26 +1,27 @@
-"""Capillary bridges by the Young–Laplace equation: force against gap, and where they break.
+"""Capillary bridges from the Young–Laplace equation: force as a function of the gap, and rupture.
 
-A bridge is axisymmetric and without weight, between two spheres, or a sphere and a plane (a radius of infinity). Its
-profile r(s), z(s) by the arc length s, φ its angle to the radius, obeys
+A bridge is axisymmetric and weightless, between two spheres, or a sphere and a plane (infinite radius). Its profile
+r(s), z(s) as a function of the arc length s, with the angle φ to the radius, obeys
 
     dr/ds = cos φ,   dz/ds = sin φ,   dφ/ds = p - sin φ / r,
 
-p the liquid's excess pressure over the surface tension; it meets the solids, whose slopes there are the filling angles
-α, at their contact angles θ, φ = π - α1 - θ1 and α2 + θ2, and encloses the given volume. Along it
+where p is the excess pressure of the liquid over the surface tension. The slopes of the solids at the wetting lines are
+the filling angles α. With the contact angles θ, the profile begins at φ = π - α1 - θ1 and ends at φ = α2 + θ2. It
+encloses the given volume. The pull on either solid,
 
-    F / γ = π (2 r sin φ - p r²)
+    F / γ = π (2 r sin φ - p r²),
 
-is the same everywhere, and is the pull on either solid.
+has the same value at all points of the profile.
 
-`force_curve` and `rupture_distance` take its solutions in closed form, those of Delaunay,
+`force_curve` and `rupture_distance` use the solutions in closed form (Delaunay),
 
     r² = r0² + 2 (1 - p r0 sin φ0) (1 - cos ps) / p² + 2 r0 cos φ0 sin(ps) / p,
 
-follow the family of bridges of one volume through the largest gap that it reaches, and stop there: beyond are the
-unstable ones, with thinner necks at smaller gaps, and no bridge is at a larger one.
+and follow the family of bridges of one volume up to the largest gap. There is no bridge at a larger gap; the rest of
+the family is unstable, with thinner necks at smaller gaps.
 
-Lengths may be in any one unit, volumes in its cube; forces over the surface tension are lengths. Within, the unit
-is the cube root of the volume.
+Lengths may have any common unit, and volumes its cube; forces over the surface tension are lengths. Internally, the
+unit is the cube root of the volume.
 
 References
 ----------
@@ -46,7 +47,7 @@ from scipy.optimize import brentq
 
 FloatArray = npt.NDArray[np.float64]
 Array = npt.NDArray[Any]
-"""Real, or complex to be differentiated by complex steps."""
+"""Real, or complex for derivatives by complex steps."""
 
 _NODES, _WEIGHTS = (
     0.5 * (part + shift) for part, shift in zip(np.polynomial.legendre.leggauss(48), (1.0, 0.0), strict=True)
@@ -83,7 +84,7 @@ class ForceCurve(NamedTuple):
 
 @dataclass(frozen=True)
 class _Solid:
-    """A sphere of curvature k (0: a plane), met at the contact angle θ, on arcs t from its apex."""
+    """A sphere of curvature k (0: a plane) with contact angle θ; arcs t are measured from its apex."""
 
     curvature: float
     contact_angle: float
@@ -105,7 +106,7 @@ class _Solid:
 
 
 def _sinc(x: Array) -> Array:
-    """sin(x)/x, for complex arguments as well: differentiated by complex steps."""
+    """sin(x)/x, also for complex arguments (derivatives by complex steps)."""
     small = np.abs(x) < 1e-4
     safe = np.where(small, 1.0, x)
     return np.where(small, 1.0 - x**2 / 6.0, np.sin(safe) / safe)
@@ -196,9 +197,9 @@ _GAP = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
 
 
 def _toroid(family: _Family, gap: float) -> FloatArray:
-    """A circular profile between wetting lines of the same radius, of the volume 1 that a flat ring has."""
+    """An approximate bridge: a circular profile between wetting lines of one radius, which enclose the volume 1."""
     curvature = family.first.curvature + family.second.curvature
-    # π b² (gap + k b² / 4) = 1, from surfaces that part as k b² / 2.
+    # π b² (gap + k b² / 4) = 1, between surfaces whose distance grows as k b² / 2.
     squared = 2.0 / (pi * gap + sqrt((pi * gap) ** 2 + pi * curvature))
     arc = np.full(2, sqrt(squared))
     height = gap + float(family.first.rise(arc)[0] + family.second.rise(arc)[0])
@@ -254,7 +255,7 @@ class _Branch:
 
 @lru_cache(maxsize=256)
 def _branch(family: _Family) -> _Branch:
-    """Follow a family by its arc length until its gap falls.
+    """Follow a family along its arc length until its gap decreases.
 
     Raises
     ------
@@ -320,18 +321,18 @@ def force_curve(
     Parameters
     ----------
     radius_1, radius_2
-        Of the spheres; infinity: a plane.
+        Radii of the spheres; infinity for a plane.
     volume
-        Of the liquid, in the cube of their unit.
+        Volume of the liquid, in the cube of the unit of the radii.
     contact_angle
-        rad; one, or one on each solid.
+        rad; one for both solids, or one for each.
     gaps
-        From 0 to rupture at most, shape (n,).
+        From 0 to the rupture distance, shape (n,).
 
     Raises
     ------
     ValueError
-        If a gap is negative or beyond rupture, or nothing positive was given for radii and volume.
+        If a gap is negative or beyond rupture, or radii or volume are not positive.
     NoBridgeError
         If no bridge was found (a contact angle so large that the liquid is not held between them).
     """
@@ -359,7 +360,7 @@ def _stable(family: _Family, branch: _Branch, gap: float) -> FloatArray:
     at = low if gap <= gaps[index] else float(brentq(lambda arc: between(arc)[4] - gap, low, high))
     found = family.at_gap(between(at), gap)
     if found is None or np.max(np.abs(found - between(at))[[0, 1, 3]]) > _NEAR:
-        # Close to the largest gap bridges hardly move with it, or are the unstable one: along the family instead.
+        # Near the largest gap, bridges depend strongly on it, or the unstable one is found: search along the family.
         chord = branch.bridges[index + 1] - branch.bridges[index]
 
         def across(arc: float) -> FloatArray:

@@ -18,10 +18,10 @@ DEFAULT_LAW = "young-laplace"
 class Liquid:
     """``[liquid]``: a name from the library, numbers, or both (numbers take precedence).
 
-    ``mass_fraction`` (of the glycerol) and ``temperature`` (20 °C if left out) are of the liquid ``water-glycerol``.
-    ``volume_fraction`` is the liquid on a bead over the bead's volume, ``viscosity_ratio`` the viscosity of the bridges
-    over that of the liquid: how strongly they drag. Resolved, ``dynamic_viscosity`` is the bridges'.
-    ``law`` is that of the bridges, one of `walkers.physics.laws` or a function of yours, ``file.py:function``.
+    ``mass_fraction`` (of glycerol) and ``temperature`` (default: 20 °C) belong to ``water-glycerol``.
+    ``volume_fraction`` is the volume of the liquid on a bead over that of the bead, ``viscosity_ratio`` the viscosity
+    of the bridges over that of the liquid. In a resolved case, ``dynamic_viscosity`` is that of the bridges. ``law`` is
+    the bridge law: one of `walkers.physics.laws`, or your own function, ``file.py:function``.
     """
 
     name: str | None = None
@@ -41,7 +41,7 @@ class Liquid:
 class Contact:
     """``[contact]``: the model of the contacts; the Young's modulus is that of the softened beads and walls.
 
-    The engine takes no restitution of 0.05 or less and no modulus above 1 GPa; contacts below 5 MPa change speeds.
+    The engine requires a restitution above 0.05 and a modulus up to 1 GPa; a modulus below 5 MPa changes velocities.
     """
 
     friction_bead_bead: Annotated[Coefficient, Field(alias="friction.bead_bead")]

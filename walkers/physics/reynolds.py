@@ -6,34 +6,34 @@ the pressure obeys
 
     ∇ · (H³ ∇p) = 12η (w + r · (q - κ s)),        p = 0 at the wetted radius r_w,
 
-for q tilts the surfaces against each other, and sliding surfaces close the gap as far as the disc is bent. Force and
-couple follow from the pressure and the shear stress of sliding,
+because q tilts the surfaces against each other, and sliding closes the gap if the disc is curved. Force and couple
+follow from the pressure and the shear stress of sliding,
 
     F = -∫ ηs/H dA - κ ∫ p r dA,                  M = ∫ p r dA = -K (q - κ s).
 
-The disc holds the volume of the bridge, π r_w² h + π r_w⁴/4R*, as Pitois et al. (2000) have it:
+The disc contains the volume of the bridge, π r_w² h + π r_w⁴/4R* (Pitois et al. 2000):
 
     H_w = h + r_w²/2R* = √(h² + V/πR*).
 
-With y = H_w/h - 1 the resistances are, in closed form,
+With y = H_w/h - 1, the resistances in closed form are
 
     N = 6πηR*²/h (1 - h/H_w)²                     (their X²)
     S = 2πηR* ln(1 + y) + κ² K,    C = -κ K,      Q = K = 96πηR*³ J(y).
 
-J (`_tilted`) is for the pressure's shape f along a radius, x² = r²/2R*h: f = -x/10(1 + x²)² solves the equation
-(Goldman et al. 1967, O'Neill and Stewartson 1967), and is brought to zero at r_w by the solution of ∇ · (H³ ∇p) = 0,
-that is x ₂F₁(2 - √10/2, 2 + √10/2; 2; -x²).
+J (`_tilted`) follows from the profile f of the pressure along a radius, x² = r²/2R*h. f = -x/10(1 + x²)² solves the
+equation (Goldman et al. 1967, O'Neill and Stewartson 1967). A multiple of x ₂F₁(2 - √10/2, 2 + √10/2; 2; -x²), which
+solves ∇ · (H³ ∇p) = 0, makes it zero at r_w.
 
-The matrix of S, C, Q is symmetric (Onsager), and C² ≤ S Q, S Q - C² being 2πηR* ln(1 + y) K. A motion of the pair as
-one rigid body has w = s = q = 0. Where the disc is wide against the gap, all three go with ln(H_w/h): S = 6πηR 8/15,
-C = -6πηR² 2/5, Q = 6πηR³ 4/5 times it at a plane, which gives a sphere that translates the force 8/15 and the torque
-2/15, one that rotates 2/5 · 4/3 (Goldman et al.), and between spheres the coefficients of Jeffrey and Onishi (1984). As
-the bridge thins, r_w → 0, all vanish: N as y², S as y, C and Q as y³. Gaps below `Surfaces.closest` count as that one:
-surfaces are rough (Adams and Perchard 1985).
+The matrix of S, C, Q is symmetric (Onsager), and S Q - C² = 2πηR* ln(1 + y) K is positive. A motion of the pair as one
+rigid body has w = s = q = 0. If the disc is wide compared with the gap, all three are proportional to ln(H_w/h). At a
+plane, S = 6πηR 8/15, C = -6πηR² 2/5 and Q = 6πηR³ 4/5 times this logarithm: a translating sphere has the force 8/15 and
+the torque 2/15, a rotating sphere 2/5 · 4/3 (Goldman et al.). Between spheres, the coefficients are those of Jeffrey
+and Onishi (1984). For a thin bridge, r_w → 0, all vanish: N as y², S as y, C and Q as y³. Gaps below
+`Surfaces.closest` count as that gap, because surfaces are rough (Adams and Perchard 1985).
 
-What is left out: the shear of liquid outside the wedge (immersed spheres have 0.9588 besides 8/15 ln; a small bridge
-has no such liquid); moving contact lines; at the edge a pressure other than the air's (that by the surface tension is
-in the pull, as long as the edge is round); cavitation, where the pressure is below the air's.
+Left out are the shear of liquid outside the wedge (for immersed spheres 0.9588 in addition to 8/15 ln; a small bridge
+has no such liquid); moving contact lines; a pressure at the edge other than that of the air (the capillary pressure is
+part of the pull, as long as the edge is round); and cavitation where the pressure is below that of the air.
 
 References
 ----------
@@ -65,9 +65,9 @@ def curve(surfaces: Surfaces, pull: Callable[[FloatArray], FloatArray], rupture:
     surfaces
         The pair.
     pull
-        Pull over the surface tension, m, of gaps, m, both of shape (n,).
+        Function from gaps (m) to the pull over the surface tension (m), both of shape (n,).
     rupture
-        m.
+        Rupture distance, m.
     """
 
     def pulled(gaps: FloatArray) -> FloatArray:
@@ -106,7 +106,7 @@ def _tilted(deep: FloatArray) -> FloatArray:
 
     the second term by Green's identity; y³/96 where y is small and the terms cancel.
     """
-    from scipy.special import hyp2f1  # half a second, which a case that is only shown is spared
+    from scipy.special import hyp2f1  # takes half a second, which `walkers show` does not need
 
     lifted = hyp2f1(_A, _B, 2.0, -deep)
     slope = 1.0 - _A * _B * deep * hyp2f1(_A + 1.0, _B + 1.0, 3.0, -deep) / lifted

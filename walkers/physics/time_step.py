@@ -1,4 +1,4 @@
-"""The time step: its limits, the step that ``"auto"`` takes, and its fit into the drive's cycle.
+"""The time step: its limits, the step of ``"auto"``, and its fit into the cycle of the drive.
 
 The time step has three limits. The first two apply to all granular simulations, the third only to wet ones. Above the
 third, velocities are wrong without any warning (a glycerol climber: 10.9 mm/s at 1.2 of the limit, 1.8 converged).
@@ -21,8 +21,8 @@ from walkers.physics.contact import reduced_modulus
 from walkers.physics.matter import Contact, Liquid
 
 AUTO_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.2, "hertz": 0.1, "viscous": 0.4}
-"""Share of each limit that ``"auto"`` stays under where beads are loose: at 0.4 of the viscous limit (2 µs for
-glycerol) the climber and the pile were converged."""
+"""Largest share of each limit for ``"auto"`` with loose beads. At 0.4 of the viscous limit (2 µs for glycerol), the
+climber and the pile were converged."""
 WALKER_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.4, "hertz": 0.2, "viscous": 0.4}
 """The same for cases with only walkers, which do not collide with each other: at 0.4 of the Rayleigh limit, velocities
 are within 0.25 % of those at 0.05 (Figs. 1b, 2, 3, 4a, 4b); between 0.59 and 0.71 of the limit they become wrong."""
@@ -33,7 +33,7 @@ Bridged = Sequence[tuple[float, Sequence[float]]]
 
 
 def auto_fractions(*, loose: bool) -> Mapping[str, float]:
-    """Share of each limit that ``"auto"`` stays under, of beads that are loose or of walkers."""
+    """Largest share of each limit for ``"auto"``, with loose beads or only walkers."""
     return AUTO_FRACTIONS if loose else WALKER_FRACTIONS
 
 
@@ -50,7 +50,7 @@ class TimeStepLimits:
         return asdict(self)
 
     def recommended(self, *, loose: bool) -> tuple[float, str]:
-        """Largest step, in s, that respects every limit with margin, of loose beads or walkers; what determines it."""
+        """Largest step (s) within the shares of all limits, for loose beads or walkers; and what determines it."""
         shares = auto_fractions(loose=loose)
         steps = [(shares[name] * at, f"{shares[name]:g} of the {name} limit") for name, at in self.as_dict().items()]
         longest = LONGEST_WALKER_STEP
@@ -100,8 +100,8 @@ def _drag(reduced_radius: float, liquid: Liquid, contact: Contact) -> float:
 def fit_into_cycle(largest_time_step: float, frequency: float, samples_per_cycle: int) -> tuple[float, int]:
     """Largest step (s) up to the given one that divides the cycle and each sampling interval into whole steps.
 
-    A cycle of 6250 steps sampled every 312 drifts through the phase and puts 3 % on a mean velocity. Returns the step
-    and how many are a cycle, of a drive of this frequency (Hz).
+    Samples that drift through the phase (every 312 of 6250 steps) change a mean velocity by 3 %. Returns the step and
+    the number of steps per cycle of a drive with this frequency (Hz).
     """
     # A step given as 2 us must give 6250 steps in 12.5 ms, not one interval more for the last bit of the quotient.
     intervals = ceil(1.0 / (frequency * largest_time_step * samples_per_cycle) * (1.0 - 1e-12))

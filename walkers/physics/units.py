@@ -1,8 +1,7 @@
 """Physical quantities: strings with units are read as numbers in SI units.
 
-Units are pint's. Two of its readings are wrong for this field and are caught here: its ``g`` is the gram, while the
-literature on shaken grains writes accelerations in g (the paper: 1 g = 9.8 m/s²); and it takes radians for pure
-numbers, so that "500 rad/s" would pass for 500 Hz.
+Units are those of pint, with two exceptions. Accelerations in ``g`` are in units of 9.8 m/s² (the paper), not grams.
+Radians are not pure numbers, so that "500 rad/s" is not read as 500 Hz.
 """
 
 from __future__ import annotations
@@ -51,9 +50,9 @@ _ZEROS: Mapping[str, float] = {"K": 0.0, "degC": 273.15, "°C": 273.15}
 class Kind:
     """Kind of a quantity: name, SI unit, example for messages, and physical bounds of its magnitude.
 
-    The bounds are generous; they keep slips of the exponent out of formulas that would overflow. ``sign`` says what is
-    accepted in files: ``more than zero``, ``zero or more``, or anything. As an annotation of a float it makes pydantic
-    read a text with a unit.
+    The bounds are wide; they keep wrong exponents out of formulas that would overflow. ``sign`` is the accepted sign in
+    files: ``more than zero``, ``zero or more``, or anything. As an annotation of a float, a kind makes pydantic read
+    text with a unit.
     """
 
     name: str
@@ -84,7 +83,7 @@ class Kind:
 
 
 def parse_quantity(text: str, kind: Kind) -> float:
-    """Read a quantity of a kind, such as ``"0.3 mm"``, as a number in SI units; of an acceleration ``g`` is 9.8 m/s².
+    """Read a quantity of a kind, such as ``"0.3 mm"``, as a number in SI units; ``g`` of an acceleration is 9.8 m/s².
 
     Raises
     ------
@@ -116,8 +115,8 @@ def _has_zero(symbol: str, kind: Kind) -> bool:
 def _registry() -> UnitRegistry[float]:
     """Pint's registry with the ``gee`` (9.8 m/s²) added.
 
-    Pint could keep the parsed definitions in the user's cache, a tenth of a second faster; two programs that fill that
-    cache at once leave it broken for good.
+    Pint's cache of parsed definitions would save a tenth of a second, but two programs that fill it at once break it
+    permanently.
     """
     import pint
 
@@ -138,7 +137,7 @@ def _by_pint(symbol: str, kind: Kind) -> float:
         root = str(units.Quantity(1.0, unit).to_root_units().units)
     except Exception as error:  # pint's parser raises a dozen types, the tokenizer's errors among them
         raise ValueError(kind.expectation) from error
-    # Pint takes radians and bits for pure numbers.
+    # Pint treats radians and bits as pure numbers.
     if kind.unit == ANGLE.unit and str(unit) not in _ANGLE_UNITS:
         raise ValueError(kind.expectation)
     if kind.unit == FILE_SIZE.unit and root != "bit":

@@ -1,7 +1,7 @@
 """Analyses of runs. Each analysis states the cases to which it applies.
 
-A class in a module of `walkers.postprocess.analyses` is one more. What runs have of tables, results, text, reports and
-figures, and sweeps of columns, follows from what it declares.
+An analysis is a class in a module of `walkers.postprocess.analyses`. Tables, results, texts, reports and figures of
+runs and columns of sweeps follow from what it declares.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ class Quantity:
     Attributes
     ----------
     path, error
-        Where a result has it, such as ``surface.end``, and its standard error; at the path of a mean over copies are
-        their scatter, smallest and largest.
+        Dotted keys of the number, such as ``surface.end``, and of its standard error. The path of a mean over copies
+        also leads to scatter, smallest and largest.
     label
-        Of its row in reports, if it has one.
+        Label of the row in reports; empty for none.
     unit
-        Of the number; ``share`` for what is read in per cent.
+        SI unit; ``share`` for a number that is shown in per cent.
     column, meaning, of
-        Of its column in a sweep's table, if it has one; and what gives that, if it is no number at the path.
+        Column in the table of a sweep, empty for none; function that gives its value if this is not at the path.
     """
 
     path: str
@@ -84,7 +84,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Number:
-    """A number of a result by its dotted key, such as ``velocity.mean``, SI; displayed unit and its factor."""
+    """A number (SI) at a dotted key of a result, such as ``velocity.mean``; the displayed unit and its factor."""
 
     key: str
     value: float
@@ -129,26 +129,25 @@ def number_of(result: Mapping[str, Any], key: str, unit: str = "") -> Number | N
         if value is None:
             return None
     shown, factor = SHOWN_UNITS.get(unit, (unit, 1.0))
-    # A whole number stays one.
-    return Number(key, value, shown, 1 if factor == 1.0 else factor)
+    return Number(key, value, shown, 1 if factor == 1.0 else factor)  # a whole number stays one
 
 
 class Measured:
-    """A run for figures; motion and tables (`tables_of`) are read once, on first use."""
+    """A run whose motion and tables (`tables_of`) are read once, on first use."""
 
     def __init__(self, directory: Path) -> None:
         self.directory, self.case = directory, case_of(directory)
 
     @cached_property
     def motion(self) -> Motion:
-        """Of its beads."""
+        """The motion of the beads."""
         from walkers.postprocess.motion import read_motion
 
         return read_motion(self.directory)
 
     @cached_property
     def tables(self) -> dict[str, Columns]:
-        """By their names."""
+        """The tables by name."""
         return tables_of(self.directory)
 
 
@@ -158,13 +157,13 @@ class Analysis(ABC):
     Attributes
     ----------
     order
-        Results tell first of those that have a small one; their first line is the headline.
+        Place in results, the smallest first; the first line of the first analysis is the headline.
     version
-        Of its method: results of another one are made anew.
+        Version of the method; results of other versions are recomputed.
     tables
-        That it writes, by name, as `walkers.postprocess.tables.described` takes them.
+        Tables that the analysis writes, by name; see `walkers.postprocess.tables.described`.
     derived, headlines
-        Columns of a sweep's table that follow from a point's case, and those of `columns` that count first.
+        Columns of a sweep's table that follow from the case; the main columns among `columns`.
     """
 
     order: ClassVar[int] = 9
@@ -203,9 +202,8 @@ class Analysis(ABC):
         if not self.headlines:
             return []
         units = {name: self.columns[name][0] for name in self.headlines}
-        return (
-            [sentence] if (sentence := bands_text(result, units, self.row(result))) else not_known(result["rests_on"])
-        )
+        sentence = bands_text(result, units, self.row(result))
+        return [sentence] if sentence else not_known(result["rests_on"])
 
     @property
     def columns(self) -> Described:
@@ -292,7 +290,7 @@ def tabulate(directory: str | Path) -> dict[str, Any]:
 
 
 def _measured(directory: Path) -> tuple[dict[str, Any], dict[str, Columns]]:
-    """The result of a run directory and its tables, from its dumps."""
+    """Result and tables of a run directory, from its dumps."""
     from walkers.postprocess.motion import read_motion
 
     check_unchanged(directory, files_of_segments(directory))
@@ -364,15 +362,15 @@ def read_result(directory: str | Path) -> dict[str, Any]:
 def current_result(directory: str | Path) -> dict[str, Any]:
     """The result of a finished run; recomputed if files are missing, damaged or of an earlier version of an analysis.
 
-    A warning tells of damage. What cannot be written, as where all is read-only, is not. Without dumps a result of an
-    earlier method stays what it is, if it has all current quantities.
+    Damaged files give a warning. In a read-only directory nothing is written. Without dumps, a result of an earlier
+    version is returned if it has all current quantities.
 
     Raises
     ------
     postprocess.dump.DumpError, OSError, ValueError
-        If it cannot be made anew.
+        If the result cannot be recomputed.
     runner.manifest.FileChanged
-        If it was edited.
+        If the result was edited.
     """
     from walkers.postprocess.tables import intact
 
@@ -382,10 +380,10 @@ def current_result(directory: str | Path) -> dict[str, Any]:
     try:
         result = read_result(directory)
         wanted = analyses_of(case_of(directory))
-        result.setdefault("rests_on", [])  # of runs that did not say it
+        result.setdefault("rests_on", [])  # missing in old runs
         lines_of_rest(result["rests_on"])
         versions = {one.name: one.version for one in wanted}
-        there = analyses_in(result)  # without those that came later
+        there = analyses_in(result)  # without later ones
         if bool(there) == bool(wanted) and all(one.can_show(result) for one in there):
             kept = result
         names = [name for one in wanted for name in one.tables]
@@ -414,7 +412,7 @@ def current_result(directory: str | Path) -> dict[str, Any]:
 def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool = False) -> str:
     """The result of a run (as `tabulate` returns it) in a few lines: mm, mm/s, degrees.
 
-    Where it was ``cached``, it says that it was there before.
+    ``cached`` results are marked as already run.
     """
     result = with_bands(directory, result)
     lines = [line for one in analyses_in(result) for line in one.lines(result)]
@@ -455,8 +453,8 @@ def figures_of(directory: Path) -> dict[str, Figure]:
 def plot_run(directory: Path, destination: Path | None = None, formats: Sequence[str] = ("png",)) -> list[Path]:
     """Draw the figures of a run, such as ``walk`` for walkers and ``climb`` for piles.
 
-    The files go to ``destination``, or to the run directory. A format that `walkers.postprocess.drawing.FORMATS` lacks
-    raises ``InputError``.
+    The files are written into ``destination``, by default the run directory. A format that is not in
+    `walkers.postprocess.drawing.FORMATS` raises ``InputError``.
     """
     check_formats(formats)
     destination = destination or directory

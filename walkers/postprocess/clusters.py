@@ -1,16 +1,15 @@
 """Clusters that are free of the pile: tracks through time, events, and climbs.
 
-A *cluster* is a connected component of the beads' bridges (touching or open) of at least two beads that is *free*
-of the pile's bulk: the component of most beads, and all that is bridged to the floor. It is *held* if a bridge joins
-one of its beads to a side wall. A *track* is a cluster followed by its beads: from frame to frame it is the one that
-shares most of them. What is no cluster for a moment only, because its tail brushes the pile or it lets go of the wall,
-for no longer than `ClimbCriteria.max_gap`, stays the same track.
+Bridges, touching or open, divide the beads of a pile into connected components. The *bulk* is the largest component
+together with all components that are bridged to the floor. A *cluster* is a component of at least two beads that is
+*free*, that is, not part of the bulk. It is *held* if a bridge joins one of its beads to a side wall. A *track* follows
+a cluster through time: in each frame it continues with the cluster that shares most of its beads. A track does not end
+if the cluster touches the pile or loses the wall for at most `ClimbCriteria.max_gap`.
 
-A *climb* is height gained while free and held: a track whose beads rose by at least `ClimbCriteria.min_rise` between
-frames that follow each other and in both of which the cluster was free and held. From frame to frame the rise is that
-of the mean height of the beads that it has in both, so that beads that it takes up or leaves behind count for nothing.
-A column that detaches high and sinks gains none; a bead thrown into the air is not held, nor is what flies for a
-moment.
+A *climb* is a track that rises by at least `ClimbCriteria.min_rise` while its cluster is free and held. The rise
+between two successive frames is the change of the mean height of the beads that the cluster has in both, so that beads
+that join or leave do not count. A column that detaches high and sinks does not climb, nor does a bead in the air, which
+is not held.
 """
 
 from __future__ import annotations
@@ -28,10 +27,10 @@ from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import FLOOR, Bridges
 
 Cluster = tuple[frozenset[int], frozenset[int]]
-"""The beads of a cluster in a frame and the side walls that hold it."""
+"""Beads of a cluster in a frame, and side walls that hold it."""
 
 Joined = tuple[IntArray, BoolArray]
-"""Bridges of a frame: pairs of joined beads, shape (K, 2), and beads joined to a side wall, shape (N,)."""
+"""Pairs of joined beads of a frame, shape (K, 2), and whether each bead is joined to a side wall, shape (N,)."""
 
 _FEWEST_BEADS = 2
 _FEWEST_FRAMES = 3
@@ -48,14 +47,14 @@ class ClimbCriteria:
     max_gap: float = 0.1
     """Longest time, s, for which a cluster may touch the pile or lose the wall within a track."""
     min_overlap: float = 0.5
-    """Smallest share of common beads (of the smaller cluster) of two clusters of one track."""
+    """Smallest share of common beads (of the smaller cluster) in successive clusters of a track."""
 
 
 @dataclass
 class Track:
-    """A cluster through time: frames in which it is free and held, with its beads and side walls.
+    """A cluster through time: frames in which it is free and held, its beads and side walls.
 
-    And the number of the track that took over its beads, and the frame in which it did; None if none did.
+    ``merged_into`` and ``merged_at`` are the track into which it merged and the frame in which it did, or None.
     """
 
     frames: list[int] = field(default_factory=list)
@@ -76,10 +75,10 @@ def connected(count: int, pairs: IntArray) -> IntArray:
 
 
 def bulk_of(labels: IntArray, bridges: Bridges, *, heap: bool = True) -> BoolArray:
-    """Beads of the bulk, shape (N,): the largest component and all components bridged to the floor.
+    """Whether beads are part of the bulk, shape (N,).
 
-    Without a ``heap``, where beads were placed one by one, the component of most beads may be a cluster on a wall: then
-    the floor alone decides.
+    Without a ``heap`` (beads placed one by one) the largest component may be a cluster on a wall; then the bulk is what
+    is bridged to the floor.
     """
     on_floor = labels[bridges.wall_beads[bridges.walls == FLOOR]]
     most = [np.bincount(labels).argmax()] if heap else []
@@ -98,12 +97,12 @@ def held_clusters(labels: IntArray, bridges: Bridges, bulk: BoolArray) -> Iterat
 
 
 def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]], definition: ClimbCriteria) -> list[Track]:
-    """Track the clusters of all frames (`held_clusters`; time in s, shape (F,)), in the order of their first frames."""
+    """Tracks of the clusters of all frames (`held_clusters`; time in s, shape (F,)), in the order of their begins."""
     tracks: list[Track] = []
     alive: list[int] = []
     for frame, found in enumerate(clusters):
         alive = [number for number in alive if time[frame] - time[tracks[number].frames[-1]] <= definition.max_gap]
-        # The larger overlap first: of two tracks that meet, the one that gives more beads goes on.
+        # The larger overlap first: of two tracks that merge, the one with more beads continues.
         shared = []
         for number in alive:
             before = tracks[number].members[-1]
@@ -137,10 +136,10 @@ def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]], definition: 
 
 @dataclass(frozen=True)
 class Beads:
-    """Beads of a pile: times (s, shape (F,)), heights (m, shape (F, N)), and which beads are large.
+    """Beads of a pile: time (s, shape (F,)), height (m, shape (F, N); clusters alone need it), and which are large.
 
-    And of each frame the height of the bulk's surface, and which beads are of the bulk; the first frame of the drive;
-    names of walls, by their numbers. Heights are needed of the members of clusters alone.
+    ``surface`` and ``bulk`` are the height of the surface and the beads of the bulk in each frame, ``first`` is the
+    first frame of the drive.
     """
 
     time: FloatArray
@@ -156,11 +155,10 @@ class Beads:
 class Climb:
     """``clusters.parquet``: one row per cluster of a pile.
 
-    Unlike ``begin``, ``onset`` and ``qualified`` do not depend on later frames, so a longer record contains the same
-    climbs up to a given time as a shorter one. The standard error of the speed is that of a mean over up to ten equal
-    parts of the rise (NaN with less than four frames). It is too small if the speed changes more slowly than over a
-    tenth of the climb. The speed of a short and unsteady climb is too large, because begin and end are chosen for the
-    largest gain.
+    Unlike ``begin``, ``onset`` and ``qualified`` do not depend on later frames: up to a given time, records of any
+    length contain the same climbs. The standard error of the speed is that of the mean over up to ten equal parts of
+    the rise. It is too small if the speed changes more slowly than over a tenth of the climb. Begin and end maximise
+    the gain, so the speed of a short and unsteady climb is too large.
     """
 
     track: Annotated[int, "", "index of the cluster, followed through time"]
@@ -206,7 +204,7 @@ def classify(number: int, track: Track, beads: Beads, definition: ClimbCriteria)
     leader = topmost.most_common(1)[0][0]
     speed, error = _speed(seconds[begin : end + 1], gained[begin : end + 1])
     last, members, walls, first = track.frames[end], track.members[end], sorted(track.walls[end]), track.members[0]
-    # What was in the bulk for less than a brush has hung on a wall since the beads were poured.
+    # Beads that were hardly in the bulk have hung on a wall since they were poured.
     bulk = [one[list(first)].mean() >= definition.min_overlap for one in beads.bulk[beads.first : track.frames[0]]]
     in_bulk = float(np.diff(time[beads.first : track.frames[0] + 1])[bulk].sum())
     return Climb(
@@ -235,10 +233,10 @@ def classify(number: int, track: Track, beads: Beads, definition: ClimbCriteria)
 
 
 def _qualified(gained: FloatArray, min_rise: float) -> tuple[int, int] | None:
-    """Begin of the rise that makes a track a climb, and the frame at which it qualifies; None if there is none.
+    """Begin of the rise that makes a track a climb, and the frame at which it qualifies; None without a climb.
 
-    There it is farther above its lowest than ever before, by enough, and that took frames enough: a hop between two
-    frames is none.
+    It qualifies where its height above its lowest is a maximum so far, at least ``min_rise``, and the rise has enough
+    frames: a hop between two frames is not a climb.
     """
     places, least = np.arange(len(gained)), np.minimum.accumulate(gained)
     risen = gained - least
@@ -251,7 +249,7 @@ def _qualified(gained: FloatArray, min_rise: float) -> tuple[int, int] | None:
 def _gained(track: Track, time: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Rise since the first frame of a track (m) and its duration (s), shape (frames of the track,).
 
-    What is gained while it is no cluster does not count, nor does the time; what is lost then does.
+    In gaps between frames neither a gain of height nor the time counts; a loss of height does.
     """
     rises, seconds = [0.0], [0.0]
     for place, (before, now) in enumerate(pairwise(track.frames)):
@@ -264,7 +262,7 @@ def _gained(track: Track, time: FloatArray, height: FloatArray) -> tuple[FloatAr
 
 
 def _speed(seconds: FloatArray, gained: FloatArray) -> tuple[float, float]:
-    """Gain over time, and its standard error from equal parts; NaN with too few frames."""
+    """Speed and its standard error from equal parts; NaN with too few frames."""
     whole = seconds[-1] - seconds[0]
     if len(gained) < _FEWEST_FRAMES or whole == 0.0:
         return np.nan, np.nan
@@ -302,7 +300,7 @@ class Assembly:
 def assembly_of(
     tracks: Sequence[Track], climbs: Sequence[Climb], beads: Beads, bridges: Sequence[Joined]
 ) -> list[Assembly]:
-    """State of the beads of each climb in each frame, from the bridges of each frame."""
+    """State of the beads of each climb in each frame."""
     rows = []
     rest = max(beads.first - 1, 0)
     for climb in climbs:
@@ -353,8 +351,8 @@ class Event:
 def events_of(tracks: Sequence[Track], climbs: Sequence[Climb], beads: Beads, definition: ClimbCriteria) -> list[Event]:
     """The events of all tracks in the order of time.
 
-    A cluster that is free and held in the first frame of the drive was so before, and one that may still be within a
-    brush in the last frame goes on: these begins and ends are no events.
+    The begin of a track in the first frame of the drive is not an event, nor is the end of a track that may still
+    continue after the last frame.
     """
     time, events = beads.time, []
 
@@ -371,7 +369,7 @@ def events_of(tracks: Sequence[Track], climbs: Sequence[Climb], beads: Beads, de
         if track.merged_at is not None and track.merged_into is not None:
             add(track.merged_at, "merged", number, track.merged_into)
         elif time[-1] - time[last] > definition.max_gap:
-            # It is back on the pile if most of its beads were there when it could no longer be the same.
+            # It rejoined the pile if most of its beads were in the bulk before the track ended.
             until = min(int(np.searchsorted(time, time[last] + definition.max_gap, side="right")), len(time) - 1)
             members, after = list(track.members[-1]), beads.bulk[last + 1 : until + 1]
             back = any(bulk[members].mean() >= definition.min_overlap for bulk in after)
@@ -380,7 +378,7 @@ def events_of(tracks: Sequence[Track], climbs: Sequence[Climb], beads: Beads, de
 
 
 def _parent(tracks: Sequence[Track], number: int, time: FloatArray, definition: ClimbCriteria) -> int | None:
-    """The track that contained most beads of another track shortly before its begin."""
+    """The track that had most of the beads of a track shortly before its begin."""
     first, members = tracks[number].frames[0], tracks[number].members[0]
     best, most = None, definition.min_overlap * len(members)
     for other, track in enumerate(tracks):

@@ -26,7 +26,7 @@ _STYLE = Path(__file__).parent / "style.mplstyle"
 _DASHES = ("-", (0, (5, 1.5)), (0, (1, 1.2)))
 _MARKERS = "os^Dv"
 _MAKER = "granular-walkers"
-_LEAST_ERROR = 0.02  # of the range of values, about half of the height of a symbol
+_LEAST_ERROR = 0.02  # about half of the height of a symbol, over the range of values
 UNSEEN = "error bars are smaller than the symbols"
 """Note where error bars are left out."""
 SCATTER = "bars: standard deviation of the copies (uncertain parameters not varied)"
@@ -49,12 +49,12 @@ def styled(draw: Callable[_Given, _Drawn]) -> Callable[_Given, _Drawn]:
 
 
 def plain_text(text: str) -> str:
-    """A text of the user's as matplotlib shows it literally: no formula begins, no control character is left."""
+    """A text of the user for matplotlib: without formulas and control characters."""
     return "\n".join(map(printable, text.split("\n"))).replace("$", r"\$")
 
 
 def new_figure(width: float, height: float, *, mosaic: Any = None, **options: Any) -> tuple[Figure, Any]:
-    """A figure (inches) and its axes without pyplot's global state, for functions that are `styled`.
+    """A figure (size in inches) and its axes without the global state of pyplot, for `styled` functions.
 
     Options are those of `matplotlib.figure.Figure.subplots`, or with a ``mosaic`` those of ``subplot_mosaic``.
     """
@@ -65,7 +65,7 @@ def new_figure(width: float, height: float, *, mosaic: Any = None, **options: An
 
 
 def letter_panels(panels: Iterable[Axes]) -> None:
-    """Put (a), (b), … before the titles of panels, which move to the left; after z come aa, ab, …."""
+    """Put (a), (b), … before the titles of panels, aligned to the left; z is followed by aa, ab, …."""
     letters = [*ascii_lowercase, *map("".join, product(ascii_lowercase, repeat=2))]
     for panel, letter in zip(panels, letters, strict=False):
         title, size = panel.get_title(), panel.title.get_fontsize()
@@ -110,35 +110,34 @@ def check_formats(formats: Sequence[str]) -> None:
             raise refused("--format", f"{form!r}: expected one of {', '.join(FORMATS)}")
 
 
-def check_place(path: Path, *suffixes: str) -> None:
-    """Raise `InputError` if a path is a folder or has none of these suffixes."""
+def check_place(path: Path, *suffixes: str, option: str = "--to") -> None:
+    """Raise `InputError` for an option whose path is a folder or has none of these suffixes."""
     if path.suffix.lower() not in suffixes or path.is_dir():
-        expected = f"expected the name of a {' or '.join(suffixes)} file"
-        raise refused("--to", f"{path}: {expected}")
+        raise refused(option, f"{path}: expected the name of a {' or '.join(suffixes)} file")
 
 
 def save_figure(
     figure: Figure, path: Path, sources: Sequence[str], formats: Sequence[str] = ("png",), title: str = ""
 ) -> list[Path]:
-    """Write a figure, in one or several formats, beside its place and rename it.
+    """Write a figure, in one or several formats, beside its final place and rename it.
 
     Parameters
     ----------
     figure, path, formats
-        What is written where; the suffix is replaced by each format's, of `FORMATS`, else there is an InputError.
+        The figure; the file, whose suffix each format replaces; formats of `FORMATS`, else InputError.
     sources, title
-        Written into the file: names of the run directories that it shows, which end in the hash of case and engine.
+        Metadata of the file: names of the run directories, which end in the hash of case and engine; title.
     """
     check_formats(formats)
     path.parent.mkdir(parents=True, exist_ok=True)
     name, runs = printable(title or path.stem), " ".join(dict.fromkeys(sources))
-    # Without a date the same figure is the same file. PDF knows no source.
+    # Without dates equal figures are equal files. PDF has no field for the source.
     metadata: dict[str, dict[str, str | None]] = {
         "png": {"Title": name, "Source": runs, "Software": _MAKER},
         "svg": {"Title": name, "Source": runs, "Creator": _MAKER, "Date": None},
         "pdf": {"Title": name, "Subject": f"Source: {runs}", "Creator": _MAKER, "CreationDate": None},
     }
-    # Laid out once, for all formats: a layout begins where the last one ended, and would be another each time.
+    # One layout for all formats: each further one would begin with the last and give another result.
     styled(figure.draw_without_rendering)()
     figure.set_layout_engine("none")
     written = [path.with_suffix(f".{form}") for form in dict.fromkeys(formats)]

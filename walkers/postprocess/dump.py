@@ -1,7 +1,7 @@
-"""Read the engine's dumps: those of beads (``dump custom … .bin``) on a memory map, those of bridges as text.
+"""Read the engine's dumps: binary dumps of beads (``dump custom … .bin``) and text dumps of bridges.
 
 A frame of beads is int64 step, int64 rows, int32 triclinic, 6 int32 boundary, 6 float64 box, int32 columns, int32
-processes, then for each process int32 count and that many float64. Columns have no names: the layout has them.
+processes, then for each process int32 count and that many float64. The layout has the names of the columns.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ class DumpError(WalkersError):
 
 
 class NoNumberError(DumpError):
-    """A dump with NaN or infinity, from a blow-up that the engine does not report or from a damaged disk."""
+    """A dump with NaN or infinity, from an unreported blow-up or a damaged disk."""
 
 
 class _Frame(NamedTuple):
-    """Its parts, one a process: their offsets in bytes and numbers of values; and where it ends."""
+    """A frame: offset (bytes) and number of values of the part of each process, and the end of the frame."""
 
     step: int
     rows: int
@@ -64,7 +64,7 @@ class BinaryDump:
         self.columns = columns
         size = path.stat().st_size
         self._bytes: npt.NDArray[np.uint8] = np.memmap(path, np.uint8, "r") if size else np.empty(0, np.uint8)
-        # Most often all frames are of one process and as long as each other: then one look at the file is enough.
+        # Usually all frames are of one process and equally long, and one comparison finds them all.
         self._starts = self._starts_of_alike(size)
         self._alike = len(self._starts) > 0
         offset = int(self._starts[-1]) + self._stride if self._alike else 0
@@ -81,7 +81,7 @@ class BinaryDump:
         return len(self._starts)
 
     def _starts_of_alike(self, size: int) -> npt.NDArray[np.int64]:
-        """Offsets of the frames from the first one on that are as that; none if that has several parts."""
+        """Offsets of the leading frames that are equal in form to the first; none if it has several parts."""
         first = self._read_header(0, size) if size else None
         if first is None or len(first.parts) > 1:
             return np.empty(0, dtype=np.int64)
@@ -147,11 +147,11 @@ class BinaryDump:
         whole = self._bytes[: len(self) * self._stride].reshape(len(self), self._stride)
         data = np.ascontiguousarray(whole[:, _HEADER.size + _COUNT.size :]).view(np.float64)
         if not np.isfinite(data).all():
-            self.frame(int(np.flatnonzero(~np.isfinite(data).all(axis=1))[0]))  # which says where
+            self.frame(int(np.flatnonzero(~np.isfinite(data).all(axis=1))[0]))  # raises the error
         return data.reshape(len(self), data.shape[1] // len(self.columns), len(self.columns))
 
     def write_like(self, data: FloatArray, path: Path) -> None:
-        """Write a dump, of one process, with the heads of this one's frames and data (frames, rows, columns)."""
+        """Write a dump of one process: the headers of these frames with other data, shape (frames, rows, columns)."""
         count = data.shape[1] * data.shape[2]
         heads = []
         for start in self._starts:
@@ -159,11 +159,11 @@ class BinaryDump:
             head[1], head[-1] = data.shape[1], 1
             heads.append(np.frombuffer(_HEADER.pack(*head) + _COUNT.pack(count), dtype=np.uint8))
         body = np.ascontiguousarray(data).reshape(len(data), -1).view(np.uint8)
-        with path.open("wb") as file:  # ndarray.tofile does not say why it could not write
+        with path.open("wb") as file:  # errors of ndarray.tofile have no reason
             file.write(np.concatenate([np.stack(heads), body], axis=1).data)
 
     def column(self, name: str) -> int:
-        """Number of a column."""
+        """Index of a column."""
         return self.columns.index(name)
 
 
@@ -203,7 +203,7 @@ def local_frames(path: Path, columns: tuple[str, ...]) -> Iterator[tuple[int, Fl
 
 
 def write_local_dump(path: Path, columns: tuple[str, ...], frames: Iterable[tuple[int, FloatArray]]) -> None:
-    """Write a local dump as the engine does, twelve digits, without the bounds of its box."""
+    """Write a local dump as the engine does, with twelve digits; the bounds of the box are zero."""
     lines = []
     for step, rows in frames:
         lines += ["ITEM: TIMESTEP", str(step), "ITEM: NUMBER OF ENTRIES", str(len(rows)), "ITEM: BOX BOUNDS ff ff ff"]

@@ -1,7 +1,4 @@
-"""Figures of a run: panels with lines, drawn by matplotlib here and by Bokeh in reports.
-
-Path, orientation and gait of walkers; climbs of piles.
-"""
+"""Figures of walkers and piles: panels with lines, drawn by matplotlib here and by Bokeh in reports."""
 
 from __future__ import annotations
 
@@ -29,21 +26,21 @@ if TYPE_CHECKING:
 MOST_NAMED = 12  # walkers, or climbs, in a legend
 _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
 """Markers of events (`walkers.postprocess.clusters.Event`)."""
-_HEIGHT = 1.6  # inches of a panel
-_LETTERS = 90  # of a line of a title
+_HEIGHT = 1.6  # height of a panel, inches
+_LETTERS = 90  # letters of a line of a title
 _LEAST_DISTANCE, _LEAST_ANGLE, _LEAST_SPEED = 0.01, 0.1, 0.01
 """Smallest ranges of axes in mm, ° and mm/s, so that rounding errors do not look like motion."""
-_ASIDE, _WIDE = 10.0, 26  # °, from which on a legend has the angle at the start; letters of labels in three columns
-_SHOWN, _LONG = 8, 4.0  # images of a walker; lengths of a walker from which on they are centred on it
+_ASIDE, _WIDE = 10.0, 26  # smallest angle at the start (°) in a legend; letters of labels in three columns
+_SHOWN, _LONG = 8, 4.0  # images of a walker; lengths of a path beyond which they are centred on the walker
 _GREY, _PALE, _OTHERS = "#5b6770", "#b4bec5", "#c78a2c"
 
 
 @dataclass(frozen=True)
 class Line:
-    """A line in the units of its panel, of K points.
+    """A line of K points in the units of its panel.
 
-    ``colour`` is its number among the colours of a figure, or a colour; ``marker`` as matplotlib calls it; a ``width``
-    (points) of 0 is of marks alone; an ``error`` is of each y.
+    ``colour`` is a number of a colour of the figure, or a colour; ``marker`` is one of matplotlib; a ``width`` (points)
+    of 0 means markers alone; ``error`` is the error of each y.
     """
 
     x: FloatArray
@@ -60,9 +57,9 @@ class Line:
 class Panel:
     """A plot: title, labels of its axes, lines from bottom to top, and grey background intervals.
 
-    ``band`` are two lines of the same x with grey between them, ``settled`` the x up to which it is grey, ``log`` says
-    that y is logarithmic, ``zero`` that it is shown where y is zero, ``least`` the smallest range of y that is shown,
-    ``height`` how high it is in a figure, over others.
+    ``band`` are two lines of the same x with grey between them, ``settled`` is the end of the grey interval of x,
+    ``log`` is a logarithmic y axis, ``zero`` draws a line at y = 0, ``least`` is the smallest range of y, ``height`` is
+    relative to other panels.
     """
 
     title: str
@@ -88,7 +85,7 @@ class Panel:
 
 
 def nested_widths(count: int, largest: float = 3.0) -> list[float]:
-    """Widths of lines (points), the lowest line first, so that coinciding lines are all visible."""
+    """Widths of lines (points), the lowest line first, so that coinciding lines are visible."""
     return [1.1] if count < 2 else np.linspace(min(1.1 + 2.2 * (count - 1), largest), 1.1, count).tolist()
 
 
@@ -123,22 +120,16 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
     begin, named = walked[-1].x[settled], named_of(len(walked))
     names = ("across the slope (mm)", "uphill (mm)") if uphill else ("along the drive axis (mm)", "across it (mm)")
     seen = f"{case.boundary.tilted}, seen along its normal" if case.boundary.tilted else "seen from above"
+    title, y = f"Distance along the heading; grey: settling{named}", "distance walked (mm)"
     return [
-        Panel(
-            f"Distance along the heading; grey: settling{named}",
-            "time (s)",
-            "distance walked (mm)",
-            walked,
-            settled=begin,
-            least=_LEAST_DISTANCE,
-        ),
+        Panel(title, "time (s)", y, walked, settled=begin, least=_LEAST_DISTANCE),
         Panel(f"Orientation{named}", "time (s)", "orientation ψ (°)", turned, settled=begin, least=_LEAST_ANGLE),
         Panel(f"Paths of the centres of mass, {seen}{named}", *names, paths, least=_LEAST_DISTANCE),
     ]
 
 
 def named_of(count: int) -> str:
-    """How many walkers a legend names, where these are not all."""
+    """Number of walkers that a legend names, if not all."""
     return f" ({MOST_NAMED} of {count} walkers named)" if count > MOST_NAMED else ""
 
 
@@ -157,9 +148,9 @@ def velocity_panel(case: Case, walkers: Columns) -> Panel:
 
 
 def gait_panels(group: Group) -> list[Panel]:
-    """Velocities of the first walker through its last two cycles (Fig. 4 of Khan et al.), and of the substrate.
+    """Velocities of the first walker and of the substrate in the last two cycles (Fig. 4 of Khan et al.).
 
-    None of them if the run was sampled less than eight times a cycle.
+    No panels if the run has less than eight samples per cycle.
     """
     samples, first = group.case.run.samples_per_cycle, group.walkers[0]
     if not group.motion.follows_cycles or len(group.time) <= 2 * samples:
@@ -177,23 +168,21 @@ def gait_panels(group: Group) -> list[Panel]:
         Line(phase, values[:, number], labels[number], colours[number], width=widths[number])
         for number in range(len(names))
     ]
-    x, title = (
-        "time (cycles of the drive, last two)",
-        f"walker {first.walker}; a bead rolls without sliding where its curve coincides with the walker's",
-    )
+    x = "time (cycles of the drive, last two)"
+    title = f"walker {first.walker}; a bead rolls without sliding where its curve coincides with the walker's"
     y = "velocity relative to the\nsubstrate; beads: −R dφ/dt (mm/s)"
     panels = [Panel(title, x, y, lines, zero=True, height=2.5, least=_LEAST_SPEED)]
     shaken = group.motion.substrate_velocity[last] @ np.array(group.case.drive.direction)
-    if np.any(shaken):  # faster than its walkers by far: in their panel it would make them all flat
+    if np.any(shaken):  # much faster than the walkers, hence in a panel of its own
         line = Line(phase, first.facing * shaken * 1e3, colour=_GREY, dashed=True)
         panels.append(Panel("substrate, along the start direction", x, "velocity\n(mm/s)", [line], zero=True))
     return panels
 
 
 def pile_panels(tables: Mapping[str, Columns]) -> list[Panel]:
-    """Heights of the clusters' leaders over the pile's surface with events, segregation, bridges, agitation.
+    """Heights of the clusters' leaders and of the surface, events, segregation, bridges and agitation.
 
-    Of the tables of a pile (`walkers.postprocess.analysis.tables_of`).
+    ``tables`` are those of a pile (`walkers.postprocess.analysis.tables_of`).
     """
     bed, x = tables["bed"], "time since the start of the drive (s)"
     time = bed["time"]
@@ -235,8 +224,8 @@ def _leaders(tables: Mapping[str, Columns]) -> Iterator[Line]:
 def assembly_panels(tables: Mapping[str, Columns]) -> list[Panel]:
     """History of the beads of the first climb out of a pile, from rest until it qualifies.
 
-    Heights, thick from where bridges join a bead to the others; how many are joined, and how many are at a wall. Of the
-    tables of a pile; none where nothing climbed out of it.
+    Heights, with thick lines while bridges join a bead to the others; numbers of beads that are joined, in the bulk,
+    and at a wall. No panels if nothing climbed out of the pile.
     """
     clusters, past = tables["clusters"], tables["assembly"]
     first = np.flatnonzero(clusters["climbed"] & clusters["out_of_pile"])
@@ -285,7 +274,7 @@ def walk_figure(groups: list[Group], walked: Panel, turned: Panel) -> Figure:
         draw_panel(axes[name], panel)
         axes[name].set_xlabel(panel.x)
         for number, line in enumerate(axes[name].lines):
-            # Marks of walkers that do the same stand beside each other.
+            # Markers of coinciding lines are next to each other.
             line.set(**series_look(number), markevery=(0.02 * (number % 6), 0.12), linewidth=0.9)
     axes["walked"].set_title("grey: settling")
     letter_panels(axes.values())
@@ -298,7 +287,7 @@ def walk_figure(groups: list[Group], walked: Panel, turned: Panel) -> Figure:
 
 @styled
 def stacked(panels: Sequence[Panel], case: Case) -> Figure:
-    """Panels of a run of a case one below the other, their legends beside them."""
+    """Panels of a run one below the other, with legends on the right."""
     ratios = [panel.height for panel in panels]
     height = _HEIGHT * sum(ratios)
     figure, axes = new_figure(TWO_COLUMNS, height, nrows=len(panels), height_ratios=ratios, sharex=True, squeeze=False)
@@ -315,7 +304,7 @@ def stacked(panels: Sequence[Panel], case: Case) -> Figure:
 
 
 def draw_panel(axes: Axes, panel: Panel) -> None:
-    """A panel without its title and the legend below."""
+    """Draw a panel without title and legend."""
     for line in panel.lines:
         colour = f"C{line.colour}" if isinstance(line.colour, int) else line.colour
         look: dict[str, Any] = {"marker": line.marker, "mfc": "none"} if line.marker else {}

@@ -1,8 +1,8 @@
 """Films of runs with rolling beads, physical time, slow motion and a scale bar.
 
-The camera rests in the laboratory, so that the boundary is seen to shake; where the path of the beads is long it moves
-along with them. Films whose pictures are half a cycle apart or more show one phase of the drive, as a stroboscope does.
-On a tilted boundary an arrow points down, the way of gravity.
+The view is in the laboratory, so that the boundary shakes; the camera follows the beads if their path is long. If
+successive pictures are half a cycle apart or more, all show the same phase of the drive (stroboscopic). On a tilted
+boundary an arrow shows the direction of gravity.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from walkers.postprocess.scene import Picture, Scene, Window, camera_axes, round
 from walkers.runner.files import beside
 
 _SIZES = {"360p": (640, 360), "480p": (854, 480), "720p": (1280, 720), "1080p": (1920, 1080)}
-_AROUND = 1.2  # extent of the picture over that of what the beads reach
-_LETTERS, _LEAST_LETTERS = 24, 15  # lines of text that would fill a picture; pixels
-_SECONDS = 10.0  # a film lasts so long, or less, if no slowdown is given
-_LEAST_SEEN = 10.0  # recorded frames a second of such a film, where moments between them are not known
-_COLOURS, _SAMPLES = 40, 6  # in a GIF; pictures from which they are taken
+_AROUND = 1.2  # extent of the picture over that of the paths of the beads
+_LETTERS, _LEAST_LETTERS = 24, 15  # lines of text per picture; smallest height of a line, pixels
+_SECONDS = 10.0  # largest duration of a film without a given slowdown, s
+_LEAST_SEEN = 10.0  # smallest number of recorded frames per second of such a film, if they do not resolve the cycle
+_COLOURS, _SAMPLES = 40, 6  # colours of a GIF; pictures from which they are chosen
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def parse_size(text: str) -> tuple[int, int]:
 
 
 def parse_time(option: str, text: str) -> float:
-    """Read a physical time that an option gives, ``0.1 s`` or a number of s, in s; an InputError if it is none."""
+    """Read the physical time of an option, such as ``0.1 s`` or a number, in s; otherwise `InputError`."""
     try:
         return parse_quantity(f"{text} s" if text.replace(".", "", 1).isdigit() else text, DURATION)
     except ValueError as error:
@@ -144,7 +144,7 @@ def _check_format(path: Path, options: FilmOptions) -> None:
 
 
 def _shown(motion: Motion, walker: int | None) -> Motion:
-    """The motion of one walker where they are independent, else all of it."""
+    """The motion of one of independent walkers, otherwise the whole motion."""
     count = len(motion.walkers)
     if not motion.case.apart:
         if walker is not None:
@@ -160,9 +160,8 @@ def _shown(motion: Motion, walker: int | None) -> Motion:
 class FilmTimes(NamedTuple):
     """Times of the K pictures of a film.
 
-    ``time`` is physical (s); ``frame`` the number of the frame of the motion, between two a fraction where the motion
-    between them is known. The film is ``slowdown`` times slower than in reality; if it is ``stroboscopic`` all pictures
-    are at one phase of the drive.
+    ``time`` is the physical time (s). ``frame`` is the index of the frame of the motion, a fraction between two frames.
+    ``slowdown`` is the slow motion factor; in a ``stroboscopic`` film all pictures are at one phase of the drive.
     """
 
     time: FloatArray
@@ -174,9 +173,8 @@ class FilmTimes(NamedTuple):
 def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
     """Distribute the pictures of a film over the drive.
 
-    Pictures that are half a cycle apart or more are moved to whole cycles, as a stroboscope would show them; else the
-    shaking would beat with the pictures. Where frames are so rare that they do not follow a cycle each picture is the
-    nearest frame. If nothing of the run is between begin and end there is an InputError.
+    Pictures that are half a cycle apart or more are moved to whole cycles, otherwise they would show a beat. If the
+    frames do not resolve the cycle, each picture is the nearest frame. Times outside of the drive raise an InputError.
     """
     last, begin = float(motion.time[-1]), options.begin
     end = last if options.end is None else min(options.end, last)
@@ -209,10 +207,10 @@ def _captions(
     from PIL import Image, ImageDraw, ImageFont
 
     (wide, tall), edge, case = size, max(_LEAST_LETTERS, size[1] // _LETTERS), scene.motion.case
-    # Pillow's own letters have no × and no ².
+    # Pillow's own font has no × and no ².
     font = Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
     large, small = (ImageFont.truetype(font, round(share * edge)) for share in (1.2, 0.85))
-    # All pictures may be of one frame, where frames are rarer than pictures.
+    # All pictures may show the same frame.
     decimals = max(0, ceil(-log10(float(np.diff(times.time).max(initial=0.0)) or 1.0) - 1e-9))
     speed = speed_text(times.slowdown) + (", stroboscopic" if times.stroboscopic else "")
     drive = f"{case.drive.frequency:g} Hz, {case.drive.peak_acceleration:.3g} m/s²"
@@ -242,18 +240,17 @@ def _captions(
 
 
 def speed_text(slowdown: float) -> str:
-    """The slow motion in words: ``20 × slower``."""
+    """The slow motion as text: ``20 × slower``."""
     if slowdown == 1.0:
         return "real time"
     return f"{slowdown:.4g} × slower" if slowdown > 1.0 else f"{1.0 / slowdown:.4g} × faster"
 
 
 def _write_mp4(path: Path, pictures: Iterator[Picture], options: FilmOptions, count: int) -> None:
-    """H.264, by ffmpeg, which ends in silence when the disk is full."""
+    """Write H.264 with ffmpeg, which does not report a full disk."""
     from imageio_ffmpeg import count_frames_and_secs, write_frames
 
-    # With its index in front a browser plays it while it loads.
-    index = ["-movflags", "+faststart"]
+    index = ["-movflags", "+faststart"]  # at the begin of the file: browsers play it while it loads
     writer = write_frames(
         path, options.size, fps=options.fps, codec="libx264", quality=7, macro_block_size=2, output_params=index
     )
@@ -272,7 +269,7 @@ def _write_mp4(path: Path, pictures: Iterator[Picture], options: FilmOptions, co
 
 
 def _write_gif(path: Path, pictures: Iterator[Picture], fps: int, samples: Picture) -> None:
-    """One palette for all pictures, no dithering: what does not move is the same in all of them and takes no room."""
+    """Write all pictures with one palette and no dithering, so that parts at rest need no space."""
     from PIL import Image
 
     palette = Image.fromarray(samples).quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)

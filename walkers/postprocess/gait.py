@@ -1,10 +1,10 @@
 """How walkers walk: velocities, rotation and sliding, orientation, contacts, posture; steady, constant or not.
 
-Velocities are along the walker's heading, from the small bead to the large one, relative to the substrate. With e the
-heading, z the normal of the substrate and ω a bead's angular velocity, the rotation velocity R ω·(z × e) is the paper's
-−R dφ/dt (Fig. 4), and the sliding velocity at a contact with the substrate, v·e − R ω·(z × e), its R dφ/dt + v_x. At
-the contact between the beads the sliding velocity is R1 dφ1/dt + R2 dφ2/dt. Beads beside each other turn about the
-line that is level and across the one between them; a bead slides on the wall that is nearest to it, with its normal.
+Velocities are relative to the substrate and along the heading e, from the small bead to the large one. With the normal
+z of the substrate and the angular velocity ω of a bead, the rotation velocity is R ω·(z × e), the paper's −R dφ/dt
+(Fig. 4), and the sliding velocity at the substrate is v·e − R ω·(z × e), its R dφ/dt + v_x. Between two beads the
+sliding velocity is R1 dφ1/dt + R2 dφ2/dt about the level line perpendicular to the line between their centres. A bead
+slides on its nearest wall, whose normal replaces z.
 """
 
 from __future__ import annotations
@@ -29,17 +29,18 @@ STEADY_DIFFERENCE = 0.05
 """A walker is steady if the velocities of the two halves of the fitted cycles differ by less than this share, or by
 `STEADY_SPEED`."""
 UPRIGHT = np.radians(15.0)
-"""rad; how far off an upright walker may end."""
+"""Largest final angle of an upright walker, rad."""
 _NO_MORE = np.radians(0.5)
-"""rad; what it may go off by in the second half of a run."""
+"""Largest increase of its angle in the second half of a run, rad."""
 POSTURES = ("upright", "leaning", "turned over")
 SEPARATED = 0.1
-"""Share of the time beyond which beads that no bridge can hold together are no walker."""
+"""Share of the time with separated beads beyond which they are not a walker."""
 ASTRAY = np.pi / 4.0
-"""rad; a walker that ends farther from where it was to face has left the axis."""
+"""Largest final angle of a walker that is on the axis, rad."""
 _LITTLE, _FADING, _NO_FASTER = 0.005, 0.9, 1e-4
-"""rad; at constant velocity a walker turns by less in a cycle, and not by so much more than before; or by at most this
-share of what it did."""
+"""A walker of constant velocity turns by less than the first angle (rad) per cycle, and in the second half of the run
+by less than the third angle more than in the first half; or by at most the second number times what it turned before.
+"""
 _PARTLY = np.linspace(-0.95, -0.1, 9)
 _LASTING = np.linspace(0.1, 0.9, 9)
 _MODELS = np.array(
@@ -50,8 +51,8 @@ _MODELS = np.array(
         *((phi, 0.0, 1.0 / len(_LASTING)) for phi in _LASTING),
     ]
 ).T
-"""What steps may be, φ, θ and a weight beforehand: independent; differences of independent positions; some of both;
-autocorrelated. The first is twice as likely as each of the others."""
+"""Models of the steps: φ, θ and prior weight. Independent steps (of twice the weight of the others); differences of
+independent positions; mixtures of both; autocorrelated steps."""
 _TINY = 1e-300
 
 
@@ -59,9 +60,9 @@ _TINY = 1e-300
 class Gait:
     """Time series of F frames and W walkers of n beads; SI units.
 
-    Velocity of the mass centre along the heading, shape (F, W), rotation velocity of the beads, shape (F, W, n), and
-    sliding velocity and gap (negative: overlap) at the contacts, shape (F, W, n + pairs): the beads with walls, then
-    their pairs.
+    Velocity of the mass centre along the heading, shape (F, W); rotation velocity of the beads, shape (F, W, n);
+    sliding velocity and gap (negative for overlap) at the contacts of the beads with walls, then of their pairs, shape
+    (F, W, n + pairs).
     """
 
     velocity: FloatArray
@@ -95,8 +96,7 @@ def gait(group: Group) -> Gait:
 class Averages:
     """Means over the cycles after the settling ones; contacts as in `Gait`.
 
-    Rotation, m/s, shape (W, n), sliding, m/s, and the share of the time in which surfaces do not touch, shape
-    (W, n + pairs).
+    Rotation, m/s, shape (W, n); sliding, m/s, and share of the time with open contacts, shape (W, n + pairs).
     """
 
     rotation: FloatArray
@@ -105,15 +105,16 @@ class Averages:
 
 
 _PARTS = 10
-"""Of an interval between samples, at which gaps are looked at: with 20 samples a cycle 200 times."""
+"""Parts of an interval between samples at which gaps are evaluated."""
 
 
 def averages(group: Group) -> Averages:
-    """Mean rotation and sliding over all steps, and how long contacts are open, after the settling cycles.
+    """Mean rotation and sliding and share of open contacts after the settling cycles.
 
-    Means over 20 samples a cycle are up to a tenth off where contacts open: spins change within few steps as beads
-    touch. So spins are those that the engine averaged, velocities are displacements, and gaps are looked at ten times
-    between samples, on cubics through places and velocities (with less than eight samples a cycle, at these alone).
+    Means over 20 samples per cycle have errors up to 10 % if contacts open, because spins change within few steps when
+    beads touch. Therefore spins are averages of the engine over all steps, velocities are displacements, and gaps are
+    evaluated ten times per interval between samples by cubic interpolation (with less than eight samples per cycle, at
+    the samples).
     """
     samples = settled_samples(group)
     mean = gait(Group(group.motion.averaged, group.make, group.walkers))
@@ -127,7 +128,7 @@ def averages(group: Group) -> Averages:
 
 
 def gaps(group: Group, at_walls: FloatArray | None = None) -> FloatArray:
-    """Gaps at the contacts (as in `Gait`), m, shape (F, W, n + pairs), given those at walls if they are known."""
+    """Gaps at the contacts (as in `Gait`), m, shape (F, W, n + pairs); ``at_walls`` are those at walls, if known."""
     radii, position = group.radii, group.position
     found = [_nearest_wall(group)[0] if at_walls is None else at_walls]
     for one, other in group.make.pairs:
@@ -137,7 +138,7 @@ def gaps(group: Group, at_walls: FloatArray | None = None) -> FloatArray:
 
 
 def _nearest_wall(group: Group) -> tuple[FloatArray, FloatArray | None]:
-    """Gap of each bead to the wall that is nearest to it, and that wall's normal; None where there is but a floor."""
+    """Gap of each bead to its nearest wall, and the normal of this wall; None if the floor is the only wall."""
     boundary, position = group.case.boundary, group.position
     if boundary.bare:
         return position[..., 2] - group.radii, None
@@ -152,9 +153,9 @@ def _nearest_wall(group: Group) -> tuple[FloatArray, FloatArray | None]:
 class Walk:
     """Velocities of W walkers after the settling cycles, m/s, each of shape (W,).
 
-    ``velocity`` is the slope of the distance walked along the heading, one sample a cycle, with its standard error
-    (`fit_slopes`); the axial and the lateral ones are the mass centre's velocities along and across the drive axis in
-    the frame of the substrate; ``steady`` says whether the first and the second half agree.
+    ``velocity`` is the slope of the distance along the heading, one sample per cycle, with its standard error
+    (`fit_slopes`). Axial and lateral velocities are those of the mass centre along and across the drive axis.
+    ``steady`` is whether the first and the second half agree.
     """
 
     velocity: FloatArray
@@ -169,8 +170,7 @@ class Walk:
 def distance_walked(group: Group) -> tuple[FloatArray, FloatArray]:
     """Time (s, shape (cycles + 1,)) and distance along the heading (m, shape (cycles + 1, W)) at the end of each cycle.
 
-    Each cycle's displacement is projected on the mean of the headings at its ends, so that a walker that turns is
-    followed around the curve.
+    The displacement of each cycle is projected on the mean heading, so that a turning walker is followed on its curve.
     """
     strobe = group.case.run.samples_per_cycle
     centre, heading = group.mass_centre[::strobe], group.heading[::strobe]
@@ -213,13 +213,13 @@ def walk(group: Group) -> Walk:
 def fit_slopes(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Slopes of the columns of ``values`` against time (least squares) and their standard errors.
 
-    Values are cumulated step by step, so that their residuals are anything but independent, as the textbook's error
-    takes them: of forty random steps it is eight times too small. The slope is Σ c_s d_s of the steps d_s,
-    c_s = Σ_{t > s} (t − t̄)/Σ (t − t̄)², its variance cᵀ Γ c. Γ is that of an autoregressive moving average,
-    d_s − v = φ (d_{s−1} − v) + e_s + θ e_{s−1}, averaged over φ and θ with their restricted likelihoods (v and the
-    variance of e integrated out; Patterson and Thompson 1971, doi 10.1093/biomet/58.3.545), which the innovations give
-    (Brockwell and Davis 1991, doi 10.1007/978-1-4419-0320-4, chapter 5). Few steps do not tell random ones from noise
-    about a steady walk; the error is then nearer to that of random steps, the larger one.
+    Values are sums of steps, so their residuals are not independent; the usual error of a fit assumes that they are and
+    is eight times too small for forty random steps. The slope is Σ c_s d_s with the steps d_s and
+    c_s = Σ_{t > s} (t − t̄)/Σ (t − t̄)²; its variance is cᵀ Γ c. Γ is the covariance of an autoregressive moving
+    average, d_s − v = φ (d_{s−1} − v) + e_s + θ e_{s−1}, averaged over φ and θ with their restricted likelihoods (v and
+    the variance of e integrated out; Patterson and Thompson 1971, doi 10.1093/biomet/58.3.545) from the innovations
+    (Brockwell and Davis 1991, doi 10.1007/978-1-4419-0320-4, chapter 5). A few steps do not distinguish random steps
+    from noise about a steady walk; then the error is close to that of random steps, the larger one.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def fit_slopes(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatA
     slope, standard_error : ndarray, shape (K,)
         The error is NaN for fewer than three points.
     """
-    # Moving the origin keeps rounding out of the sums: positions reach metres, steps micrometres.
+    # Differences from the mean avoid rounding errors: positions reach metres, steps micrometres.
     time, values = time - time.mean(), values - values.mean(axis=0)
     square = float(np.sum(time**2))
     slope = time @ values / square
@@ -243,13 +243,13 @@ def fit_slopes(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatA
 
 
 def _variance(steps: FloatArray, weights: FloatArray) -> FloatArray:
-    """Of sums of steps (N, K), weighted (N,), averaged over the models: shape (K,)."""
+    """Variance of weighted sums of steps (shape (N, K), weights (N,)), averaged over the models, shape (K,)."""
     phi, theta, before = _MODELS
     squares, logarithm = _innovations(steps - steps.mean(axis=0), phi, theta)
     likelihood = np.log(before)[:, None] + logarithm[:, None] - 0.5 * (len(steps) - 1) * np.log(squares)
     share = np.exp(likelihood - likelihood.max(axis=0))
     share /= share.sum(axis=0)
-    # Autocovariances of steps whose e has a variance of one, times those of the weights.
+    # Autocovariances of steps (unit variance of e) times those of the weights.
     own = np.correlate(weights, weights, "full")[len(weights) - 1 :]
     next_one = (1.0 + phi * theta) * (phi + theta) / (1.0 - phi**2)
     later = phi[:, None] ** np.arange(len(steps) - 1) @ own[1:]
@@ -258,14 +258,14 @@ def _variance(steps: FloatArray, weights: FloatArray) -> FloatArray:
 
 
 def _of_one_step(phi: FloatArray, theta: FloatArray) -> FloatArray:
-    """The variance of a step if that of e is one."""
+    """Variance of a step for unit variance of e."""
     return np.asarray((1.0 + 2.0 * phi * theta + theta**2) / (1.0 - phi**2))
 
 
 def _innovations(steps: FloatArray, phi: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Squares of standardised innovations, shape (M, K), and the likelihoods' logarithms without them, shape (M,).
+    """Sums of squared standardised innovations, shape (M, K), and log-likelihoods without them, shape (M,).
 
-    The common mean of the steps is taken out by generalised least squares: a column of ones goes with them.
+    The common mean of the steps is removed by generalised least squares, hence the column of ones.
     """
     columns = np.concatenate([steps, np.ones((len(steps), 1))], axis=1)
     variance, expected = _of_one_step(phi, theta), np.zeros((len(phi), columns.shape[1]))
@@ -283,14 +283,14 @@ def _innovations(steps: FloatArray, phi: FloatArray, theta: FloatArray) -> tuple
 
 
 def settled_samples(group: Group) -> slice:
-    """The samples of whole cycles after the settling ones, each phase equally often."""
+    """The samples of whole cycles after the settling ones; each phase occurs equally often."""
     run = group.case.run
     samples = run.samples_per_cycle
     return slice(run.settled_strobes * samples, run.cycles // run.cycles_per_sample * samples)
 
 
 def turned_over_at(group: Group) -> FloatArray:
-    """End of the cycle in which a walker first turned by more than 90° from its start, s; NaN if none; shape (W,)."""
+    """End of the first cycle with a heading more than 90° from that at the start, s; NaN if none; shape (W,)."""
     strobe = group.case.run.samples_per_cycle
     over = np.abs(group.orientation[::strobe] - group.orientation[0]) > np.pi / 2.0
     return np.where(over.any(axis=0), group.time[::strobe][over.argmax(axis=0)], np.nan)
@@ -299,10 +299,10 @@ def turned_over_at(group: Group) -> FloatArray:
 def postures(group: Group) -> list[str]:
     """Posture of each walker on a slope or a wall, one of `POSTURES`.
 
-    A walker with its large bead uphill can tip over like an inverted pendulum; its velocity has a meaning only as long
-    as it does not. Evaluated once per cycle. A walker has turned over if it turned by more than 90° from its start. It
-    is upright if it ends within 15° of the direction given by facing and no longer tilts: in the second half of the run
-    the angle decreased, or increased by less than half a degree. All others lean.
+    A walker with its large bead uphill can tip over like an inverted pendulum; then its velocity has no meaning. The
+    angle is evaluated once per cycle. A walker has turned over if it turned by more than 90° from its start. It is
+    upright if it ends within 15° of the direction given by facing and its angle increased by less than half a degree in
+    the second half of the run. All others lean.
     """
     off = np.abs(group.orientation[:: group.case.run.samples_per_cycle])
     end, middle = off[-1], off[len(off) // 2]
@@ -312,8 +312,8 @@ def postures(group: Group) -> list[str]:
 
 
 def came_near(centre: FloatArray, near: float) -> bool:
-    """Whether two of several points, shape (F, W, 2), ever came within a distance of each other."""
-    # Only walkers whose ranges overlap can have met: of a thousand, a few pairs are left to be followed.
+    """Whether two of W points, shape (F, W, 2), ever came within a distance of each other."""
+    # Only points whose ranges overlap can have met: of a thousand, a few pairs remain.
     middle = (centre.max(axis=0) + centre.min(axis=0)) / 2.0
     reach = np.linalg.norm(centre - middle, axis=-1).max(axis=0)
     for number in range(len(middle) - 1):
@@ -325,12 +325,11 @@ def came_near(centre: FloatArray, near: float) -> bool:
 
 
 def are_constant(directory: Path) -> bool:
-    """Whether velocities of a run, made or being made, are constant: its walkers need no more cycles.
+    """Whether the velocities of a run, finished or not, are constant, so that it needs no more cycles.
 
-    After a third of the cycles, at most 20, the velocities of both halves of the others agree, and no walker turns ever
-    faster. Of 362 dimers of the shipped sweeps that ran for 60 cycles, those that are constant so after 12, 24 … had
-    speeds within 0.2 % of the final ones; by their velocities alone some were 4 % off (they had begun to turn, faster
-    and faster).
+    The velocities of both halves of the cycles after settling must agree, and no walker may turn at an increasing rate.
+    Of 362 dimers of the shipped sweeps that ran for 60 cycles, those that were constant after 12 or 24 had speeds
+    within 0.2 % of the final ones; without the criterion for turning some differed by 4 %.
     """
     return all(_is_constant(group) for group in read_motion(directory).groups)
 
@@ -351,14 +350,14 @@ def on_axis(walkers: pd.DataFrame) -> pd.Series[bool]:
 
 
 def together(walkers: pd.DataFrame) -> pd.Series[bool]:
-    """Whether the beads of walkers of a table ``walkers`` stay where a bridge can hold them."""
+    """Whether the beads of walkers of a table ``walkers`` stay together."""
     return walkers["separated_fraction"] < SEPARATED
 
 
 def steady_walkers(run: str | Path) -> pd.DataFrame:
     """Rows of a finished run's table ``walkers`` that are steady, on the axis and whose beads stay together.
 
-    Symmetric dimers turn across the axis and need only stay together: they have no way to walk.
+    Symmetric dimers, which do not walk and turn across the axis, need only stay together.
     """
     walkers = read_table(run, "walkers")
     kept = together(walkers)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from walkers.inputs.bodies import Walkers
 from walkers.inputs.case import Case
@@ -32,7 +33,7 @@ FLOOR = 0
 """Index of the floor among the walls of a container; the others are side walls."""
 LEAST_SAMPLES = 8
 """Smallest number of samples per cycle that resolves the motion within a cycle."""
-_LEFT_OUT = 0.02  # of a run, beyond the last of several even times
+_LEFT_OUT = 0.02  # largest part of a run after the last of several evenly spaced times
 _OF_FRAMES = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "frames", "mean_spin")
 _OF_BEADS = ("position", "velocity", "spin", "mean_spin")
 
@@ -44,23 +45,22 @@ class Motion:
     Attributes
     ----------
     case
-        Of the run; if it was driven until its velocities were constant, with the cycles that it took.
+        The case; if the run ended at constant velocities, with the cycles that it took.
     time : ndarray, shape (F,)
-        s, from the begin of the drive; negative while the beads come to rest.
+        Time since the start of the drive, s; negative while the beads come to rest.
     position, velocity, spin : ndarray, shape (F, N, 3)
-        Of the centres; angular velocity, rad/s.
+        Position and velocity of the centres; angular velocity, rad/s.
     substrate, substrate_velocity : ndarray, shape (F, 3)
-        Displacement and velocity of the boundary in the laboratory, whichever frame the run was made in, m and m/s.
+        Displacement and velocity of the boundary in the laboratory, for both frames of the drive, m and m/s.
     radius : ndarray, shape (N,)
     walkers
-        Which beads are whose, by their numbers from 0.
+        The walkers with the indices of their beads, from 0.
     frames : list of (Path, int)
-        Segment and number of each frame within it, for the bridges.
+        Segment of each frame and its number there, for the bridges.
     truncated, ended_early
-        Whether the dump ends within a frame; whether the run ended before the most cycles that it may take, for its
-        velocities were constant.
+        Whether the dump ends within a frame; whether the run ended early because its velocities were constant.
     mean_spin : ndarray, shape (F, N, 3), or None
-        Angular velocity averaged over all steps since the frame before (nothing in the first frame), of walkers.
+        Angular velocity averaged over the steps since the previous frame (zero in the first frame), if recorded.
     """
 
     case: Case
@@ -82,7 +82,7 @@ class Motion:
 
     @property
     def directory(self) -> Path:
-        """Of the run."""
+        """The run directory."""
         return run_of(self.frames[0][0])
 
     @property
@@ -97,11 +97,11 @@ class Motion:
 
     @property
     def driven(self) -> Motion:
-        """The motion without the rest before the drive."""
+        """The motion during the drive."""
         return self.select(slice(self.first_driven, None)) if self.first_driven else self
 
     def select(self, frames: slice = slice(None), beads: IntArray | None = None, **changes: Any) -> Motion:
-        """Selected frames and beads, with changes; beads are renumbered, walkers keep their numbers."""
+        """The motion of selected frames and beads, with changes; beads are renumbered, walkers are not."""
         parts: dict[str, Any] = {
             name: None if (one := getattr(self, name)) is None else one[frames] for name in _OF_FRAMES
         }
@@ -115,15 +115,15 @@ class Motion:
         return replace(self, **parts)
 
     def of_walkers(self, walkers: Collection[PlacedWalker]) -> Motion:
-        """That of the beads of some walkers alone."""
+        """The motion of the beads of some walkers."""
         return self.select(beads=np.array([bead for one in walkers for bead in one.beads]))
 
     @property
     def averaged(self) -> Motion:
         """Means over the F - 1 intervals between frames: positions, velocities and spins.
 
-        Velocities are displacements over time, which is the average over all steps, and so are spins where they were
-        averaged; elsewhere they are the mean of both ends.
+        Velocities are displacements over time, the average over all steps. Spins are those that the engine averaged, if
+        any, otherwise the mean of both ends.
         """
         spin = (self.spin[1:] + self.spin[:-1]) / 2.0 if self.mean_spin is None else self.mean_spin[1:]
         position = (self.position[1:] + self.position[:-1]) / 2.0
@@ -131,7 +131,7 @@ class Motion:
         return self.select(slice(1, None), position=position, velocity=velocity, spin=spin)
 
     def between(self, share: float) -> Motion:
-        """Positions at a fraction of the F - 1 intervals between frames, by cubic Hermite interpolation."""
+        """Positions at a fraction of each of the F - 1 intervals between frames, by cubic Hermite interpolation."""
         interval = np.diff(self.time)[:, None, None]
         begin, end, left = self.position[:-1], self.position[1:], 1.0 - share
         position = left**2 * (1.0 + 2.0 * share) * begin + share**2 * (3.0 - 2.0 * share) * end
@@ -154,7 +154,7 @@ class Motion:
 
     @cached_property
     def groups(self) -> list[Group]:
-        """The walkers, make by make, while they are driven."""
+        """The walkers by make, during the drive."""
         driven = self.driven
         return [
             Group(driven, make, [walker for walker in self.walkers if walker.make == number])
@@ -164,7 +164,7 @@ class Motion:
 
 @dataclass(frozen=True, repr=False)
 class Group:
-    """The walkers of one make in a motion of all beads: W walkers of n beads each, and how each was started."""
+    """The W walkers of one make, of n beads each, in a motion of all beads."""
 
     motion: Motion
     make: Walkers
@@ -175,12 +175,12 @@ class Group:
 
     @property
     def case(self) -> Case:
-        """Of the run."""
+        """The case."""
         return self.motion.case
 
     @property
     def time(self) -> FloatArray:
-        """Of the frames, s, shape (F,)."""
+        """Time of the frames, s, shape (F,)."""
         return self.motion.time
 
     @property
@@ -190,17 +190,17 @@ class Group:
 
     @cached_property
     def rows(self) -> IntArray:
-        """Numbers of the beads in the motion, shape (W, n)."""
+        """Indices of the beads in the motion, shape (W, n)."""
         return np.array([walker.beads for walker in self.walkers], dtype=np.int64)
 
     @cached_property
     def position(self) -> FloatArray:
-        """Of the bead centres, m, shape (F, W, n, 3)."""
+        """Positions of the bead centres, m, shape (F, W, n, 3)."""
         return self.motion.position[:, self.rows]
 
     @cached_property
     def velocity(self) -> FloatArray:
-        """Of the bead centres, m/s, shape (F, W, n, 3)."""
+        """Velocities of the bead centres, m/s, shape (F, W, n, 3)."""
         return self.motion.velocity[:, self.rows]
 
     @cached_property
@@ -217,7 +217,7 @@ class Group:
 
     @property
     def drive_axis(self) -> FloatArray:
-        """Direction from which orientations are measured, in the plane of the floor: the drive's, or x."""
+        """Reference direction of orientations in the plane of the floor: that of the drive, or x."""
         return np.array(self.case.drive_axis)
 
     @property
@@ -228,10 +228,10 @@ class Group:
 
     @cached_property
     def heading(self) -> FloatArray:
-        """Unit vectors in the plane of the floor in which walkers head, shape (F, W, 3).
+        """Headings: unit vectors in the plane of the floor, shape (F, W, 3).
 
-        From the centroid of the small beads to that of the large ones; where there are none, from the hindmost beads to
-        the foremost (`walkers.inputs.bodies.Walkers.toward_large`).
+        They point from the centroid of the small beads to that of the large beads; with beads of one size, from the
+        hindmost to the foremost beads (`walkers.inputs.bodies.Walkers.toward_large`).
         """
         arm = np.einsum("fwbx,b->fwx", self.position, np.array(self.make.toward_large))
         arm[..., 2] = 0.0
@@ -249,9 +249,9 @@ class Group:
 
 
 def even_frames(motion: Motion, count: int) -> list[int]:
-    """Frames through the drive, equally far apart from its first: ``count``, or fewer if these end nearer to its end.
+    """Evenly spaced frames from the first of the drive: ``count``, or fewer if the last is then nearer to the end.
 
-    At the same phase of the drive, if there are as many cycles, or walkers would seem to go back.
+    They are at the same phase if there are enough cycles; otherwise walkers would appear to move backward.
     """
     start, cycle = motion.first_driven, motion.case.run.samples_per_cycle
     last = len(motion.time) - 1 - start
@@ -274,9 +274,9 @@ def even_labels(time: FloatArray) -> list[str]:
 
 
 def gathered(motion: Motion, lane: float = 2.0) -> Motion:
-    """Independent walkers moved close together for pictures, on parallel lanes.
+    """Independent walkers moved onto parallel lanes for pictures; between walls the first walker alone.
 
-    Between walls there is no room for lanes: then the first walker alone. Everything else is left as it is.
+    All other motions are returned unchanged. ``lane`` is the distance of the lanes in lengths of the longest walker.
     """
     case = motion.case
     if not case.apart:
@@ -296,9 +296,9 @@ def read_motion(directory: str | Path) -> Motion:
     Raises
     ------
     postprocess.dump.DumpError
-        If there is no segment, or one cannot be read.
+        If there is no segment, or a segment cannot be read.
     FileNotFoundError
-        If it is no such directory.
+        If the directory is not a run directory.
 
     Examples
     --------
@@ -316,13 +316,13 @@ def read_motion(directory: str | Path) -> Motion:
     try:
         return _motion(case, segments)
     except NoNumberError as error:
-        finished = (directory / MANIFEST_NAME).is_file()  # then it was tabulated, without such numbers
+        finished = (directory / MANIFEST_NAME).is_file()  # then its dumps contained no such numbers
         message = "the dump was damaged after the run was finished" if finished else "the simulation blew up"
         raise DumpError(f"{error}: {message}") from error
 
 
 def _opened(segment: Path) -> tuple[dict[str, Any], Layout, BinaryDump]:
-    """The record, the layout and the beads' dump of a segment."""
+    """Record, layout and bead dump of a segment."""
     path = segment / SEGMENT_NAME
     try:
         record = read_json(path)
@@ -349,7 +349,7 @@ def _motion(case: Case, segments: dict[Path, tuple[dict[str, Any], Layout, Binar
             raise DumpError(f"{dump.path}: {len(data)} complete frames, too few for a motion")
         if data.shape[1] != layout.atoms:
             raise DumpError(f"{segment}: {data.shape[1]} rows, expected {layout.atoms}")
-        begin = 1 if steps else 0  # the first frame is the last one of the segment before
+        begin = 1 if steps else 0  # the first frame repeats the last one of the previous segment
         stacks.append(data[begin:])
         steps += dump.steps[begin:].tolist()
         frames += [(segment, number) for number in range(begin, len(data))]
@@ -358,12 +358,12 @@ def _motion(case: Case, segments: dict[Path, tuple[dict[str, Any], Layout, Binar
 
 
 def read_last_frame(directory: Path) -> Motion:
-    """The last complete frame of a run directory, also of the segment that is being made; `DumpError` if none is."""
+    """The last complete frame of a run directory, also of an unfinished segment; `DumpError` if there is none."""
     case, new = case_of(directory), sorted((directory / SEGMENTS).glob("*.new"))
     whole = [(path, *_opened(path)) for path in segment_directories(directory)]
     records = [record for _, record, _, _ in whole]
     found = [(path, layout, dump) for path, _, layout, dump in whole]
-    with suppress(OSError, ValueError, KeyError, TypeError):  # which has not begun to write
+    with suppress(OSError, ValueError, KeyError, TypeError):  # no output yet
         found += [
             (path, layout := layout_of(path), BinaryDump(path / layout.bead_dump, layout.bead_columns)) for path in new
         ]
@@ -382,10 +382,10 @@ def _of_frames(
     steps: list[int],
     frames: list[tuple[Path, int]],
 ) -> Motion:
-    """The motion of frames, shape (frames, beads, columns), each of a step, in segments."""
+    """The motion of dumped frames, shape (frames, beads, columns), with the step and the segment of each."""
     record, layout, dump = segments[frames[-1][0]]
     cycles = record["end"] // case.run.steps_per_cycle if case.run.until_steady else case.run.cycles
-    # Before the drive has begun it is as if it would with the next frame.
+    # Before the drive, time is measured from the next frame.
     starts = [one["drive_from"] for one, _, _ in segments.values() if one["drive_from"] is not None]
     start = starts[0] if starts else steps[-1] + case.run.steps_per_sample
     time = (np.array(steps, dtype=np.float64) - start) * case.run.time_step
@@ -394,9 +394,8 @@ def _of_frames(
         column = dump.column(name)
         return data[:, :, column : column + 3]
 
-    # In the laboratory frame the walls move, in the container's they rest.
     shift, speed = prescribed_motion(case.drive, time)
-    if starts and start:  # the frame at which the drive begins is the last one of the rest before it
+    if starts and start:  # in the last frame at rest the walls do not move yet
         speed[time == 0.0] = 0.0
     substrate, substrate_velocity = (shift, speed) if case.drive.frame == "lab" else boundary_motion(case.drive, time)
     return Motion(
@@ -417,7 +416,7 @@ def _of_frames(
 
 
 def prescribed_motion(drive: Drive, time: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Displacement and velocity of the walls in the frame of the run, m and m/s, each of shape (F, 3)."""
+    """Displacement and velocity of the walls in the frame of the drive, m and m/s, shape (F, 3)."""
     if drive.frame == "lab":
         return boundary_motion(drive, time)
     return np.zeros((len(time), 3)), np.zeros((len(time), 3))
@@ -438,20 +437,18 @@ def boundary_motion(drive: Drive, time: FloatArray) -> tuple[FloatArray, FloatAr
 class Bridges:
     """The bridges of one frame: K between beads, M to walls.
 
-    Only the normal part of what the engine reports is kept: the tangential part is wrong for sliding contacts (see
-    `walkers.templates.engine`).
+    Tangential forces are left out: the engine reports wrong ones for sliding contacts.
 
     Attributes
     ----------
     frame : int
-        Number of the frame in the motion.
+        Index of the frame in the motion.
     beads : ndarray of int, shape (K, 2)
-        Numbers of the two beads, from 0.
+        Indices of the two beads, from 0.
     force, gap : ndarray, shape (K,)
-        Net normal force (capillary, viscous and elastic), positive where it pulls the two together, N; and the gap, m,
-        negative where they touch.
+        Net normal force (capillary, viscous and elastic), positive for attraction, N; gap, negative for overlap, m.
     wall_beads, walls, wall_force, wall_gap : ndarray, shape (M,)
-        Bead and wall, 0 being the floor, and the same of bridges to walls.
+        Index of the bead and of the wall (0: floor), force and gap of the bridges to walls.
     """
 
     frame: int
@@ -463,15 +460,21 @@ class Bridges:
     wall_force: FloatArray
     wall_gap: FloatArray
 
+    def rows(self) -> dict[str, npt.NDArray[Any]]:
+        """Columns of all bridges, those between beads first; ``bead_2`` of a wall and ``wall`` of none are -1."""
+        pairs, gap = np.sort(self.beads, axis=1), np.concatenate([self.gap, self.wall_gap])
+        return {
+            "bead_1": np.concatenate([pairs[:, 0], self.wall_beads]),
+            "bead_2": np.concatenate([pairs[:, 1], np.full(len(self.walls), -1)]),
+            "wall": np.concatenate([np.full(len(pairs), -1), self.walls]),
+            "gap": gap,
+            "normal_force": np.concatenate([self.force, self.wall_force]),
+            "touching": gap <= 0.0,
+        }
+
 
 def read_bridges(motion: Motion) -> Iterator[Bridges]:
-    """The bridges of each frame of a motion in which they were recorded, in their order.
-
-    Raises
-    ------
-    DumpError
-        If a dump cannot be read, or ends early.
-    """
+    """The bridges of each frame of a motion that recorded them; `DumpError` if a dump cannot be read or ends early."""
     stride = motion.case.run.samples_per_bridge_sample
     wanted = {place: frame for frame, place in enumerate(motion.frames)}
     for segment in dict.fromkeys(segment for segment, _ in motion.frames):
@@ -488,9 +491,9 @@ def read_bridges(motion: Motion) -> Iterator[Bridges]:
 
 
 def _bridges(motion: Motion, frame: int, between: FloatArray, against: FloatArray, layout: Layout) -> Bridges:
-    """The bridges of a frame, given the rows of its dumps."""
+    """The bridges of a frame from the rows of its dumps."""
     place, pair, wall = motion.position[frame], layout.pair_bridge_columns.index, layout.wall_bridge_columns.index
-    # Neighbours without a bridge are reported too, with no force.
+    # The dumps also contain neighbours without a bridge; their force is zero.
     between = between[np.any(between[:, pair("fx") : pair("fx") + 3] != 0.0, axis=1)]
     against = against[np.any(against[:, wall("fx") : wall("fx") + 3] != 0.0, axis=1)]
     ids = between[:, [pair("id1"), pair("id2")]].astype(np.int64) - 1

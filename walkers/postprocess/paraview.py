@@ -1,9 +1,7 @@
-"""Files for ParaView: beads, bridges and the moving boundary as named blocks, a .vtm a frame, in a .pvd in seconds.
+"""Files for ParaView: beads, bridges and the moving boundary as blocks of one .vtm per frame, listed in a .pvd (s).
 
-Names of arrays end with their units, as in ``speed (m/s)``; arrays without one are numbers of something.
-
-Beside them a script that shows them, and no state file (``.pvsm``): only ParaView can write those, they hold all
-properties of one version and the absolute paths of the files.
+Names of arrays end with their units, as in ``speed (m/s)``; indices and numbers have none. A script shows the files. A
+state file (``.pvsm``) is not written: it contains all properties of one version of ParaView, and absolute paths.
 """
 
 from __future__ import annotations
@@ -11,7 +9,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +33,7 @@ _UNITS = {
     **{"speed": "m/s", "velocity": "m/s", "omega": "rad/s", "radius": "m", "gap": "m", "normal_force": "N"},
     "liquid": "m^3",
 }
-"""Of arrays."""
+"""Units of arrays."""
 
 
 def write_vtk(
@@ -51,21 +49,21 @@ def write_vtk(
     Parameters
     ----------
     directory, destination
-        A run directory; folder to write, replaced if it holds nothing but files of this function, else an InputError
-        is raised: ``vtk`` in the run directory if None.
+        A run directory; the folder to write, ``vtk`` in the run directory if None. A folder with files of this
+        function alone is replaced; any other files in it raise an InputError.
     every
         Write every ``every``-th sample of the drive; None: one per cycle. Bridges are in the frames that recorded
         them.
     vtu
         Also write the beads as ``.vtu``.
     as_placed
-        Keep independent walkers at their places in the deck, centimetres apart, instead of side by side.
+        Leave independent walkers at their places in the deck, centimetres apart, instead of side by side.
 
     Returns
     -------
     Path
-        The ``.pvd`` file: its times are seconds, each with the blocks ``beads``, ``boundary`` and, where they were
-        recorded, ``bridges``.
+        The ``.pvd`` file with times in s; each frame has the blocks ``beads``, ``boundary`` and, if recorded,
+        ``bridges``.
     """
     destination = destination or directory / "vtk"
     motion, place = _shown(directory, as_placed=as_placed), destination.resolve()
@@ -76,17 +74,16 @@ def write_vtk(
     try:
         beside.chmod(0o755)
         for frame, meshes in _frames(motion, every or motion.case.run.samples_per_cycle):
-            files = {kind: f"{kind}_{frame:06d}.vtp" for kind in meshes}
+            blocks: list[str] = []
             for kind, mesh in meshes.items():
-                _save(mesh, beside / files[kind])
-            write_text(beside / f"frame_{frame:06d}.vtm", _blocks(files))
+                _save(mesh, beside / f"{kind}_{frame:06d}.vtp")
+                blocks.append(f'    <DataSet index="{len(blocks)}" name="{kind}" file="{kind}_{frame:06d}.vtp"/>')
+            write_text(beside / f"frame_{frame:06d}.vtm", _listing("vtkMultiBlockDataSet", "1.0", blocks))
             time = float(motion.time[frame])
             entries.append(f'    <DataSet timestep="{time!r}" group="" part="0" file="frame_{frame:06d}.vtm" />')
             if vtu:
                 meshes["beads"].cast_to_unstructured_grid().save(beside / f"beads_{frame:06d}.vtu")
-        head = '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n  <Collection>'
-        lines = ["<?xml version='1.0' encoding='utf-8'?>", head, *entries, "  </Collection>", "</VTKFile>"]
-        write_text(beside / _COLLECTION, "\n".join(lines))
+        write_text(beside / _COLLECTION, _listing("Collection", "0.1", entries))
         if place.exists():
             shutil.rmtree(place)
         beside.rename(place)
@@ -103,8 +100,8 @@ def write_paraview(
 ) -> Path:
     """Write a run for ParaView, with a script that shows it.
 
-    Beads are coloured by an array; if None, by ``walker`` where there are walkers, else ``speed``. If there is no such
-    array an InputError is raised. All else is as in `write_vtk`; what is returned is the script.
+    ``colour`` is the array that colours the beads, by default ``walker`` if there are walkers, else ``speed``; an
+    unknown array raises an InputError. ``options`` are those of `write_vtk`. Returns the script.
     """
     driven = _shown(directory, as_placed=options.get("as_placed", False)).driven
     names = set(beads_at(driven, 0).array_names)
@@ -120,7 +117,7 @@ def write_paraview(
 
 
 def open_paraview(script: Path) -> None:
-    """Start ParaView with a script, and do not wait for it; an InputError if there is none."""
+    """Start ParaView with a script without waiting for its end; InputError if ParaView is not installed."""
     program = shutil.which("paraview")
     if program is None:
         raise refused("--open", f"ParaView is not installed; open {script} in ParaView to show the run")
@@ -128,13 +125,13 @@ def open_paraview(script: Path) -> None:
 
 
 def _shown(directory: Path, *, as_placed: bool) -> Motion:
-    """The motion that the files hold and the camera sees: walkers side by side, unless they are left as placed."""
+    """The motion that is written: independent walkers side by side, unless left as placed."""
     motion = read_motion(directory)
     return gathered(motion) if motion.case.boundary.bare and not as_placed else motion
 
 
 def _save(mesh: pv.PolyData, path: Path) -> None:
-    """Write a mesh; VTK by itself would only print, at length, that a disk is full."""
+    """Write a mesh; raises OSError if the disk is full, which VTK itself would only print."""
     from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
     writer = vtkXMLPolyDataWriter()
@@ -146,7 +143,7 @@ def _save(mesh: pv.PolyData, path: Path) -> None:
 
 
 def _check_replaceable(place: Path) -> None:
-    """Only a folder that this module wrote, or an empty one, may be replaced."""
+    """Refuse to replace anything but an empty folder or one that this module wrote."""
     held = ""
     if place.is_dir():
         ours = {".vtp", ".vtm", ".vtu", Path(_COLLECTION).suffix}
@@ -159,13 +156,10 @@ def _check_replaceable(place: Path) -> None:
         raise refused(place, f"{expected}; {held}")
 
 
-def _blocks(files: Mapping[str, str]) -> str:
-    """A file of VTK's that joins others, by the names of its blocks."""
-    lines = [
-        f'    <DataSet index="{at}" name="{kind}" file="{file}"/>' for at, (kind, file) in enumerate(files.items())
-    ]
-    head = '<VTKFile type="vtkMultiBlockDataSet" version="1.0" byte_order="LittleEndian">\n  <vtkMultiBlockDataSet>'
-    return "\n".join(["<?xml version='1.0'?>", head, *lines, "  </vtkMultiBlockDataSet>", "</VTKFile>"])
+def _listing(kind: str, version: str, entries: Sequence[str]) -> str:
+    """Text of a VTK file that lists other files."""
+    head = f'<VTKFile type="{kind}" version="{version}" byte_order="LittleEndian">\n  <{kind}>'
+    return "\n".join(["<?xml version='1.0'?>", head, *entries, f"  </{kind}>", "</VTKFile>"])
 
 
 def _named(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
@@ -174,7 +168,7 @@ def _named(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]
 
 
 def _frames(motion: Motion, every: int) -> Iterator[tuple[int, dict[str, pv.PolyData]]]:
-    """One of so many frames of the drive, and its ``beads``, ``boundary`` and, where recorded, ``bridges``."""
+    """Frames of the drive, each with its meshes ``beads``, ``boundary`` and, if recorded, ``bridges``."""
     recorded = read_bridges(motion)
     following = next(recorded, None)
     further = [one.point_data(motion) for one in analyses_of(motion.case)]
@@ -191,9 +185,9 @@ def _frames(motion: Motion, every: int) -> Iterator[tuple[int, dict[str, pv.Poly
 
 
 def beads_at(motion: Motion, frame: int) -> pv.PolyData:
-    """Beads of a frame as points, positions in the frame of the run, SI units.
+    """Beads of a frame as points in the laboratory, SI units.
 
-    Point data: ``bead`` (number, from 0), ``walker`` (its number, -1 for none), ``radius (m)``, ``large``,
+    Point data: ``bead`` and ``walker`` (indices from 0; -1 for no walker), ``radius (m)``, ``large``,
     ``omega (rad/s)``, and ``velocity (m/s)`` and ``speed (m/s)`` relative to the boundary.
     """
     import pyvista as pv
@@ -216,28 +210,20 @@ def beads_at(motion: Motion, frame: int) -> pv.PolyData:
 def bridges_at(motion: Motion, bridges: Bridges) -> pv.PolyData:
     """Bridges of a frame as lines, from centre to centre, or from a centre to the nearest point of the wall.
 
-    Cell data: ``bead_1`` and ``bead_2`` (numbers of beads, from 0; -1 for a wall), ``wall`` (its number, -1 for none),
-    ``gap (m)``, ``normal_force (N)``, ``touching`` and ``walker`` (the first bead's).
+    Cell data: ``bead_1`` and ``bead_2`` (indices from 0; -1 for a wall), ``wall`` (index; -1 for none), ``gap (m)``,
+    ``normal_force (N)``, ``touching`` and ``walker`` (of the first bead).
     """
     import pyvista as pv
 
-    centres, pairs = motion.position[bridges.frame], np.sort(bridges.beads, axis=1)
-    held = centres[bridges.wall_beads]
+    centres, rows = motion.position[bridges.frame], bridges.rows()
+    held, joined = centres[bridges.wall_beads], len(bridges.beads)
     feet = np.stack([held - wall.distances(held)[:, None] * wall.normals(held) for wall in motion.case.boundary.walls])
     walls = np.stack([held, feet[bridges.walls, np.arange(len(held))]], axis=1)
+    pairs = np.stack([rows["bead_1"], rows["bead_2"]], axis=1)[:joined]
     ends = np.concatenate([centres[pairs], walls]) + motion.substrate[bridges.frame]
     mesh = pv.line_segments_from_points(ends.reshape(-1, 3))
-    first, gap = np.concatenate([pairs[:, 0], bridges.wall_beads]), [bridges.gap, bridges.wall_gap]
-    arrays = {
-        "bead_1": first,
-        "bead_2": np.concatenate([pairs[:, 1], np.full(len(held), -1)]),
-        "wall": np.concatenate([np.full(len(pairs), -1), bridges.walls]),
-        "gap": np.concatenate(gap),
-        "normal_force": np.concatenate([bridges.force, bridges.wall_force]),
-        "touching": (np.concatenate(gap) <= 0.0).astype(np.int64),
-        "walker": motion.walker_of[first],
-    }
-    mesh.cell_data.update(_named(arrays))
+    rows |= {"touching": rows["touching"].astype(np.int64), "walker": motion.walker_of[rows["bead_1"]]}
+    mesh.cell_data.update(_named(rows))
     return mesh
 
 
@@ -245,7 +231,7 @@ def _script(motion: Motion, colour: str, folder: Path) -> str:
     scene = Scene.around(motion, camera_axes(motion), _AROUND)
     tall = scene.height(_WIDE)
     place, middle, up = scene.camera(10.0 * tall)
-    # What changes from frame to frame has a scale from nothing to what one in a hundred exceeds.
+    # The scale of values that change in time ends at their 99th percentile.
     vectors = {"speed": motion.velocity, "velocity": motion.velocity, "omega": motion.spin}.get(colour)
     return rendered(
         "walkers.postprocess",

@@ -28,33 +28,34 @@ Picture = npt.NDArray[np.uint8]
 """Red, green, blue, shape (height, width, 3)."""
 RUBY = (0xB0203C, 0xE0566C)
 GLASS = (0x8C9AA5, 0xC9D2D8)
-"""Large and small beads, of those that are pointed out and of the others."""
+"""Colours of large and small beads: highlighted beads and the others."""
 _GROUND, _LINES, _WALL, _EDGE = "#e3e8eb", "#bcc6cd", "#eef1f3", "#5a6670"
-_SHADOW = 0.4  # of black, where a bead stands
-_PALE, _BRIGHTEST = 0.72, 150.0  # white in the paler lunes of a ball; mean of red, green and blue in the darker ones
+_SHADOW = 0.4  # opacity of a shadow below the centre of a bead
+_PALE, _BRIGHTEST = 0.72, 150.0  # share of white in the pale lunes; largest mean of red, green, blue in the dark ones
 _LUNES = 6
-_ROUNDS = ((10, 72), (100, 30), (500, 18))  # cells around a ball where beads are fewer than that; else 12
-_SIDES = 64  # of the prism that a round wall is drawn as
-_BEYOND = 6.0  # extent of the floor over that of the picture: it has no end
+_ROUNDS = ((10, 72), (100, 30), (500, 18))  # number of cells around a ball for fewer beads than the first; else 12
+_SIDES = 64  # sides of the prism that is drawn for a cylinder
+_BEYOND = 6.0  # extent of the floor over that of the picture
 _ELEVATION_OF_ONE, _ELEVATION = radians(35.0), radians(60.0)
-"""Of the camera above a floor: with one walker that is seen from its side, and otherwise."""
+"""Elevation of the camera above a floor: for one walker seen from its side, and otherwise."""
 _LONG, _ABOUT = 1.5, 1.4
-"""The camera follows beads where a view of their whole path would be larger by the first factor than one of the beads;
-the extent of the picture then, over what the path does not need."""
+"""The camera follows the beads if a view of their whole path is larger by the first factor than a view that follows
+them; the second factor is the margin of that view."""
 
 
 @dataclass(frozen=True)
 class Turns:
-    """Quaternions (x, y, z, w) from the axes at the first frame to those of each frame, shape (F, N, 4).
+    """Orientations of the beads.
 
-    And rotation vectors from each frame to the next one, rad, shape (F, N, 3); of the last frame nothing.
+    ``turned`` are quaternions (x, y, z, w) of the rotation since the first frame, shape (F, N, 4). ``step`` are
+    rotation vectors to the next frame, rad, shape (F, N, 3), zero in the last frame.
     """
 
     turned: FloatArray
     step: FloatArray
 
     def at(self, frame: int, share: float) -> FloatArray:
-        """Rotation matrices of the beads, shape (N, 3, 3), at a share of the way from a frame to the next one."""
+        """Rotation matrices of the beads, shape (N, 3, 3), at a fraction of the interval after a frame."""
         from scipy.spatial.transform import Rotation
 
         further = Rotation.from_rotvec(share * self.step[frame])
@@ -63,12 +64,11 @@ class Turns:
 
 
 def turns_of(motion: Motion) -> Turns | None:
-    """Integrate the spins of a motion, dR/dt = [ω]× R; None where they are not known well enough.
+    """Integrate the spins of a motion, dR/dt = [ω]× R; None if the frames are too far apart.
 
-    The engine keeps no orientation of a sphere: over each interval between frames it turns by ω Δt about ω. Where there
-    are walkers the engine averaged spins over all steps between frames, and the sum is exact for axes that keep their
-    direction between two frames. Elsewhere spins are known at the frames alone: their means do (trapezoids) if the
-    frames follow the cycle, and nothing is known if they are whole cycles apart.
+    The engine has no orientations of spheres. Here a bead turns by ω Δt about ω between two frames. With walkers, ω is
+    the average over all steps, and the result is exact if the axis is constant during the interval. Otherwise ω is the
+    mean of both frames, which is sufficient if the frames resolve the cycle.
     """
     from scipy.spatial.transform import Rotation
 
@@ -88,10 +88,10 @@ def turns_of(motion: Motion) -> Turns | None:
 class Scene:
     """Beads, walls and an orthographic view of them.
 
-    ``axes`` are unit vectors to the right in the picture, up, and toward the camera, as rows; ``low`` and ``high`` what
-    the camera takes in along them, mm. It rests in the laboratory if the boundary is seen ``shaken``, else on the
-    boundary. ``rolling`` beads are two-coloured where it is known how they roll. ``path`` is how far the camera has
-    moved along in each frame, mm, shape (F, 3); None if it rests.
+    The rows of ``axes`` are unit vectors to the right in the picture, up, and toward the camera; ``low`` and ``high``
+    are the limits of the view along them, mm. If ``shaken``, the view is in the laboratory, otherwise in the frame of
+    the boundary. ``rolling`` beads have two colours if their orientation is known. ``path`` is the displacement of the
+    camera in each frame, mm, shape (F, 3); None for a camera at rest.
     """
 
     motion: Motion
@@ -106,10 +106,10 @@ class Scene:
     def around(
         cls, motion: Motion, axes: FloatArray, share: float = 1.0, frames: slice = slice(None), **options: Any
     ) -> Scene:
-        """A view of all that beads reach in some frames, and of the width and the floor of a container.
+        """A view of the beads in some frames, and of the width and the floor of a container.
 
-        ``share`` is the extent of the picture over that; options are ``shaken``, ``rolling`` and ``path``, with which
-        the view is of the beads alone.
+        ``share`` is the extent of the picture over that of the beads. Options are ``shaken``, ``rolling`` and ``path``;
+        with a path the view does not include the container.
         """
         seen = motion.position[frames]
         if options.get("shaken", True):
@@ -125,9 +125,9 @@ class Scene:
         return cls(motion, axes, low - wider, high + wider, **options)
 
     def following(self, aspect: float, share: float = 1.0, frames: slice = slice(None)) -> Scene:
-        """The same, or where the path of the beads is long a view of the beads with which the camera moves along.
+        """The same view, or, if the path of the beads is long, a closer view that follows the beads.
 
-        ``aspect`` is the width of the picture over its height; the others are those of `around`.
+        ``aspect`` is the width of the picture over its height; ``share`` and ``frames`` are those of `around`.
         """
         path = path_of(self.motion, frames.start or 0)
         options = {"shaken": self.shaken, "rolling": self.rolling, "path": path}
@@ -135,7 +135,7 @@ class Scene:
         return near if self.height(aspect) > _LONG * near.height(aspect) else self
 
     def moved(self, frame: float) -> FloatArray:
-        """How far the camera has moved along in a frame, or between two, mm."""
+        """Displacement of the camera in a frame, or between two (a fraction), mm."""
         if self.path is None:
             return np.zeros(3)
         number, last = int(frame), len(self.path) - 1
@@ -144,18 +144,18 @@ class Scene:
         return moved
 
     def height(self, aspect: float) -> float:
-        """Of the picture, mm, whose width is so many times that."""
+        """Height of the picture, mm, for a ratio of width to height."""
         right, up, _ = self.high - self.low
         return float(max(up, right / aspect))
 
     def camera(self, distance: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """A camera so far before the middle of what is seen: place and middle, mm, and upward direction."""
+        """A camera at a distance (mm) from the middle of the view: its position, the middle (mm), upward direction."""
         middle = (self.low + self.high) / 2.0 @ self.axes
         return middle + distance * self.axes[2], middle, self.axes[1]
 
     @cached_property
     def turns(self) -> Turns | None:
-        """Orientation of the beads; None if it is not shown or unknown."""
+        """Orientations of the beads; None if not shown or unknown."""
         return turns_of(self.motion) if self.rolling else None
 
     @cached_property
@@ -166,7 +166,7 @@ class Scene:
         return chosen | tracks_of(motion)[1] if Pile().applies(motion.case) else chosen
 
     def colours(self, chosen: npt.NDArray[np.bool_]) -> FloatArray:
-        """Red, green, blue (to 255) of beads, some chosen ones in ruby, and of their paler lunes, shape (2, N, 3)."""
+        """Red, green, blue (to 255) of the dark and the pale lunes of beads, shape (2, N, 3); chosen ones in ruby."""
         large = self.motion.large
         packed = np.where(chosen, np.where(large, *RUBY), np.where(large, *GLASS))
         plain = (packed[:, None] >> np.array([16, 8, 0]) & 255).astype(np.float64)
@@ -177,7 +177,7 @@ class Scene:
 
 
 def path_of(motion: Motion, begin: int = 0) -> FloatArray:
-    """The way of the middle of the beads since a frame, smoothed over a cycle of the drive, mm, shape (F, 3)."""
+    """Displacement of the centre of the beads since a frame, smoothed over a cycle, mm, shape (F, 3)."""
     from scipy.signal import savgol_filter
 
     middle = 1e3 * motion.position.mean(axis=1)
@@ -188,13 +188,13 @@ def path_of(motion: Motion, begin: int = 0) -> FloatArray:
 
 
 def against_gravity(motion: Motion) -> FloatArray:
-    """Unit vector against gravity in the frame of the boundary; its normal without gravity."""
+    """Unit vector against gravity in the frame of the boundary; without gravity the normal of the floor."""
     against = -np.array(motion.case.gravity_vector)
     return against / np.linalg.norm(against) if against.any() else np.array([0.0, 0.0, 1.0])
 
 
 def axes_toward(toward: FloatArray, upward: FloatArray) -> FloatArray:
-    """Unit vectors to the right and up in a picture and toward the camera, as rows; up is as near upward as it can."""
+    """Unit vectors to the right, up, and toward the camera, as rows; up is the projection of ``upward``."""
     toward = toward / np.linalg.norm(toward)
     up = upward - (upward @ toward) * toward
     up /= np.linalg.norm(up)
@@ -202,10 +202,10 @@ def axes_toward(toward: FloatArray, upward: FloatArray) -> FloatArray:
 
 
 def camera_axes(motion: Motion) -> FloatArray:
-    """The `axes_toward` the camera of films, in the boundary's frame.
+    """The axes (`axes_toward`) of films and players, in the frame of the boundary.
 
-    Containers are seen from the side. Floors are seen from above, from the right of the drive axis or, where they are
-    tilted, of the way uphill. Up in the picture is up against gravity.
+    Containers are seen from the side. Floors are seen obliquely from above, from the right of the drive axis or, if
+    tilted, of the uphill direction. Up in the picture is against gravity.
     """
     case = motion.case
     boundary, along = case.boundary, np.array(case.drive_axis)
@@ -220,7 +220,7 @@ def camera_axes(motion: Motion) -> FloatArray:
 
 
 def plan_axes(motion: Motion, along: FloatArray) -> FloatArray:
-    """The `axes_toward` the normal of a floor; up in the picture is uphill, on a level floor to the left of a way."""
+    """The axes (`axes_toward`) of a view along the normal of a floor; up is uphill, or to the left of ``along``."""
     boundary = motion.case.boundary
     upward = np.cross([0.0, 0.0, 1.0], along)
     if boundary.tilt:
@@ -229,9 +229,9 @@ def plan_axes(motion: Motion, along: FloatArray) -> FloatArray:
 
 
 def walls_of(motion: Motion) -> list[FloatArray]:
-    """Corners of each wall, counterclockwise as the beads see them, m, shape (K, 3).
+    """Corners of each wall, counterclockwise as seen from the beads, m, shape (K, 3).
 
-    Those of a container end at its rim, those without an end where the beads do; a round one is a prism.
+    The walls of a container end at its rim, unbounded walls around the beads. A cylinder is a prism.
     """
     from scipy.spatial import HalfspaceIntersection
 
@@ -263,7 +263,7 @@ def walls_of(motion: Motion) -> list[FloatArray]:
 
 
 def mesh_of(faces: Sequence[FloatArray]) -> pv.PolyData:
-    """Polygons with these corners."""
+    """A mesh of polygons, given their corners."""
     import pyvista as pv
 
     points, sizes = np.concatenate(faces), np.array([len(corners) for corners in faces])
@@ -272,7 +272,7 @@ def mesh_of(faces: Sequence[FloatArray]) -> pv.PolyData:
 
 
 def floor_lines(low: FloatArray, high: FloatArray, step: float) -> FloatArray:
-    """Ends of lines on the floor between two corners, along x and y at multiples of a step, shape (2 K, 3)."""
+    """Ends of K lines on the floor between two corners, along x and y at multiples of a step, shape (2 K, 3)."""
     lines = []
     for along, across in ((0, 1), (1, 0)):
         marks = step * np.arange(np.ceil(low[across] / step), np.floor(high[across] / step) + 1)
@@ -283,16 +283,16 @@ def floor_lines(low: FloatArray, high: FloatArray, step: float) -> FloatArray:
 
 
 def round_below(value: float) -> float:
-    """Largest number of …, 1, 2, 5, 10, … up to a value."""
+    """Largest of the numbers …, 1, 2, 5, 10, … that does not exceed a value."""
     decade = 10.0 ** np.floor(np.log10(value) + 1e-9)
     return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= value * (1.0 + 1e-9)))
 
 
 def beach_ball(rounds: int, motion: Motion) -> tuple[FloatArray, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Points of a unit ball of two-coloured lunes, of so many cells around (a multiple of six), triangles, and colours.
+    """Points (shape (V, 3), also the normals), triangles (shape (T, 3)) and colours of a unit ball of six lunes.
 
-    The points, shape (V, 3), are its normals too; triangles have the shape (T, 3); colours are 1 for the points of the
-    paler lunes, else 0. Its axis is that about which walkers roll, in containers y, toward which one looks.
+    ``rounds``, a multiple of six, is the number of cells around it. Colours are 1 in pale lunes and 0 in dark ones. The
+    axis is the one about which walkers roll; in containers it is y, the direction of view.
     """
     import pyvista as pv
 
@@ -315,10 +315,10 @@ def beach_ball(rounds: int, motion: Motion) -> tuple[FloatArray, npt.NDArray[np.
 
 
 class Window:
-    """A window off-screen onto a scene, of so many pixels across and up, `pixels_per_mm` of them to a mm."""
+    """An off-screen window that shows a scene; ``size`` is its width and height in pixels."""
 
     def __init__(self, scene: Scene, size: Sequence[int]) -> None:
-        # Without this VTK tries an X server first and says so.
+        # Otherwise VTK first tries an X server, and prints that.
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
         import pyvista as pv
 
@@ -344,7 +344,7 @@ class Window:
         self._beads = _Copies(self._plotter, points, triangles, radius, specular=0.4)
 
     def picture(self, frame: float) -> Picture:
-        """The beads in a frame, or between two on the cubic through their places and velocities."""
+        """Picture of a frame, or of a time between two frames (a fraction) by cubic interpolation."""
         motion, shift, number = self._scene.motion, np.zeros(3), int(frame)
         place, time, share = motion.position[number], motion.time[number], frame - number
         if share:
@@ -361,15 +361,15 @@ class Window:
             actor.position = tuple(shift)
         moved = self._scene.moved(frame)
         self._plotter.camera.position, self._plotter.camera.focal_point = self._place + moved, self._middle + moved
-        self._plotter.render()  # a screenshot does so the first time only
+        self._plotter.render()  # a screenshot alone renders only the first time
         return np.array(self._plotter.screenshot(return_img=True), dtype=np.uint8)
 
     def close(self) -> None:
-        """Give back the window."""
+        """Close the window."""
         self._plotter.close()
 
     def _floor(self, wide: float) -> list[pv.Actor]:
-        """A floor with lines, by which it is seen to move."""
+        """A floor with lines that make its motion visible."""
         import pyvista as pv
 
         path = np.zeros((1, 3)) if self._scene.path is None else self._scene.path
@@ -385,7 +385,7 @@ class Window:
         ]
 
     def _walls(self, wide: float) -> list[pv.Actor]:
-        """Walls, of which those that would hide the beads are left out; their edges nearer, lest walls hide them."""
+        """Walls behind the beads and, slightly nearer to the camera, the edges of all walls."""
         faces = [1e3 * corners for corners in walls_of(self._scene.motion)]
         walls = mesh_of(faces).clean(tolerance=1e-6, absolute=True)
         drawn = self._plotter.add_mesh(walls, color=_WALL, lighting=False)
@@ -399,7 +399,7 @@ class Window:
         return parts
 
     def _marks(self, faces: Sequence[FloatArray], axis: int, step: float) -> pv.PolyData:
-        """Lines on the walls behind the beads, across the axis of the camera's way, by which it is seen to move."""
+        """Lines on the walls behind the beads, across the path of the camera, that make its motion visible."""
         import pyvista as pv
 
         toward = self._scene.axes[2]
@@ -413,7 +413,7 @@ class Window:
 
 
 class _Copies:
-    """Copies of a unit mesh, one a bead, which are moved, turned and coloured from frame to frame; in mm."""
+    """Copies of a unit mesh, one per bead, with the positions, orientations and colours of a frame; mm."""
 
     def __init__(self, plotter: pv.Plotter, points: Any, triangles: Any, radius: FloatArray, **look: Any) -> None:
         import pyvista as pv
@@ -425,17 +425,17 @@ class _Copies:
         self._mesh.point_data["Normals"] = np.asarray(self._mesh.points).copy()
         self._mesh.point_data.active_normals_name = "Normals"
         drawn = plotter.add_mesh(self._mesh, scalars="colour", rgb=True, smooth_shading=False, **look)
-        drawn.prop.culling = "back"  # the far halves of spheres, half of the work, are never seen
-        drawn.prop.interpolation = "Phong"  # by these normals, where pyvista would compute others
+        drawn.prop.culling = "back"  # the invisible halves of spheres are half of the work
+        drawn.prop.interpolation = "Phong"  # with these normals; pyvista would compute others
 
     def move(self, centres: FloatArray, turned: FloatArray | None = None) -> None:
-        """Put them at centres (shape (N, 3)), turned by rotation matrices (shape (N, 3, 3))."""
+        """Move them to centres, shape (N, 3), and turn them by rotation matrices, shape (N, 3, 3)."""
         turned = np.tile(np.eye(3), (len(centres), 1, 1)) if turned is None else turned
-        # A sphere's own points are its normals: smooth without computing any.
+        # The points of a unit sphere are its normals.
         normals = self._points @ np.swapaxes(turned, 1, 2).astype(np.float32)
         self._mesh.points = (self._radius * normals + centres[:, None].astype(np.float32)).reshape(-1, 3)
         self._mesh.point_data["Normals"] = normals.reshape(-1, 3)
 
     def colour(self, colours: FloatArray) -> None:
-        """Colour their points, red, green, blue and perhaps opacity to 255, shape (N, V, 3 or 4)."""
+        """Set the colours of the points: red, green, blue and perhaps opacity, up to 255, shape (N, V, 3 or 4)."""
         self._mesh.point_data["colour"] = colours.reshape(-1, colours.shape[-1]).round().astype(np.uint8)

@@ -1,7 +1,7 @@
 """Time series of views of a run or one walker: containers from the side, planes along their normal.
 
-One walker is shown as in Fig. 1 of Khan et al.: strips of the floor below each other, one a time; beside each other
-where it walks up a slope. On a tilted plane up in the picture is uphill.
+One walker is shown as in Fig. 1 of Khan et al.: a strip of the floor for each time, below each other, or side by side
+if it walks up a slope. On a tilted plane up in the picture is uphill.
 """
 
 from __future__ import annotations
@@ -34,22 +34,22 @@ SERIES_NAME, PICTURE_NAME = "series.png", "walker.png"
 SHOWN = 6
 """Pictures in a time series."""
 _TOLERANCE = 0.1
-"""Of a time between pictures: frames are where they are."""
+"""Tolerance of the time between pictures, relative."""
 _PIXELS = 40.0
-"""To a millimetre of a picture, at least, where the screen has room for it."""
+"""Smallest resolution of a view in pixels per mm, unless it becomes too large."""
 _TALL, _TALLEST, _WIDEST = 1000, 1600, 1900
-"""Pixels of a view: so high, higher for boxes that are much higher than wide, lower for what is much wider."""
+"""Pixels of a view: usual height, largest height (views that are much higher than wide), largest width."""
 _PAGE = (8.5, 9.0)
-"""Inches of a picture, across and up, at most: its letters are as large as those of the page that shows it."""
+"""Largest width and height of a picture, inches."""
 _PANEL = (1.4, 5.0)
-"""Inches of a view in it, across and up: as large as one of the two says, if the page has room."""
+"""Width or height of a view, inches: the one that gives the larger view, if the page has room."""
 _BESIDE, _BENEATH, _EDGES = 0.3, 0.8, (0.9, 0.1)
-"""Inches between views: for what sticks out of tick labels, for time, ticks and label; and about all of them."""
+"""Space between views side by side (tick labels) and below each other (time, ticks, label); outer edges; inches."""
 _STRIP, _LENGTHS, _GAP = 0.8, (3.6, 5.4), 0.08
-"""Inches of a strip with a walker: across it; along it, at least and at most; and between strips."""
+"""Width, smallest and largest length of a strip, and space between strips, inches."""
 _MARGIN, _STILL, _LONG = 0.25, 0.1, 4.0
-"""Edge of a strip over half the width of the walker; share of half its length below which it does not walk; and number
-of its lengths above which each strip is centred on it."""
+"""Edge of a strip over half the width of the walker; displacement of a walker at rest over half its length; number of
+lengths of a path beyond which each strip is centred on the walker."""
 _LETTERS: dict[Any, Any] = {
     "font.size": 10,
     "axes.titlesize": 10,
@@ -57,14 +57,6 @@ _LETTERS: dict[Any, Any] = {
     "xtick.labelsize": 9,
     "ytick.labelsize": 9,
 }
-
-
-def render_run(directory: Path, destination: Path | None = None, *, images: int = SHOWN) -> list[Path]:
-    """Render a run at several times: the first of independent walkers, otherwise all beads.
-
-    Parameters and errors are those of `render_series`.
-    """
-    return render_series(directory, destination, images=images, walker=0 if case_of(directory).apart else None)
 
 
 @styled
@@ -85,16 +77,16 @@ def render_series(
     destination
         The PNG to write; ``series.png``, of one walker ``walker.png``, in the run directory if None.
     images
-        How many at most, equally far apart through the drive: fewer where the last one is nearer to its end then.
+        Largest number of pictures, evenly spaced through the drive; fewer if the last is then nearer to its end.
     apart
-        Seconds between them: the last ones of the run then, as many as ``images``.
+        Time between pictures, s: the last ``images`` of the run.
     walker
         Number of a walker to show by itself.
 
     Raises
     ------
     InputError
-        If the destination is no PNG, frames were recorded less often, or the drive was shorter than that.
+        If the destination is no PNG, frames were recorded less often, or the drive was shorter.
     """
     from matplotlib import rc_context
 
@@ -140,7 +132,7 @@ def _views(motion: Motion, frames: Sequence[int]) -> Figure:
 
 
 def _strips(motion: Motion, frames: Sequence[int]) -> Figure:
-    """One walker at several times on strips of the floor, each with its time; on a long walk with its way too."""
+    """One walker at several times on strips of the floor; a long path is given as distances beside the times."""
     axes, radius = plan_axes(motion, np.array(motion.case.drive_axis)), 1e3 * motion.radius[:, None]
     place = 1e3 * motion.position[frames] @ axes.T
     middle = place.mean(axis=1)
@@ -175,9 +167,9 @@ def _strips(motion: Motion, frames: Sequence[int]) -> Figure:
 def _strip_panels(
     pictures: Sequence[Picture], bounds: FloatArray, inches: float, along: int, said: Sequence[str]
 ) -> tuple[Figure, list[Axes]]:
-    """Pictures with these bounds (mm, shape (2, 2)) below each other, or if they are upright beside each other.
+    """Pictures with bounds (mm, shape (2, 2)) below each other, or upright ones (``along`` 1) side by side.
 
-    Above them is what is said of them.
+    The lines of ``said`` are above them.
     """
     (across, up), left, below = np.ptp(bounds, axis=1) * inches, 0.75 if along else 0.3, 0.2 if along else 0.6
     columns, rows = (len(pictures), 1) if along else (1, len(pictures))
@@ -200,7 +192,7 @@ def _strip_panels(
 
 
 def _describe_strips(figure: Figure, panels: Sequence[Axes], case: Case, times: Sequence[str], along: int) -> None:
-    """Times, and what the axis is; on a slope an arrow down it, the way of that part of gravity."""
+    """Add times, the label of the axis, and on a slope an arrow for the component of gravity."""
     tilted, wide = case.boundary.tilted, figure.get_figwidth()
     for panel, time in zip(panels, times, strict=True):
         if along:
@@ -219,27 +211,25 @@ def _describe_strips(figure: Figure, panels: Sequence[Axes], case: Case, times: 
 
 
 def _pixels(wide: float, tall: float) -> list[int]:
-    """Of a view of so many mm, across and up."""
+    """Width and height in pixels of a view whose width and height are in mm."""
     pixels = min(max(_TALL / tall, min(_PIXELS, _TALLEST / tall)), _WIDEST / wide)
     return [max(1, round(extent * pixels)) for extent in (wide, tall)]
 
 
 def top_view(group: Group, walker: int, frame: int, along: tuple[float, float], across: tuple[float, float]) -> Picture:
-    """One walker seen from above, as a stroboscope shows it.
+    """One walker of a group in a frame, seen from above.
 
     Parameters
     ----------
-    group
-        Of the walkers.
-    walker, frame
-        Which of them, and when.
+    group, walker, frame
+        The group, index of the walker in it, and of the frame.
     along, across
         Bounds of the picture along and across the drive axis, m, relative to the substrate.
 
     Returns
     -------
     ndarray, shape (height, width, 3)
-        Red, green, blue; the first row is the farthest to the left of the drive axis, 120 pixels to the smaller radius.
+        Red, green, blue; the first row is on the left of the drive axis; 120 pixels per smaller radius.
     """
     motion = group.motion.of_walkers(group.walkers[walker : walker + 1])
     bounds = 1e3 * np.array([along, across, (0.0, 2.0 * group.radii.max())])
@@ -252,14 +242,14 @@ def top_view(group: Group, walker: int, frame: int, along: tuple[float, float], 
 
 
 def _panels(count: int, wide: float, tall: float, title: str) -> tuple[Figure, list[Axes]]:
-    """A figure with a title and so many axes of one shape, given in mm, in as many rows as make them largest.
+    """A figure with a title and equal axes (width and height in mm), in the number of rows that makes them largest.
 
-    Their places are reckoned here: no layout of matplotlib's knows how large axes of a fixed aspect will be.
+    Their positions are calculated here because layouts of matplotlib do not know the size of axes of a fixed aspect.
     """
     aspired = max(_PANEL[0] / wide, _PANEL[1] / tall)
 
     def inches(rows: int) -> float:
-        """To a millimetre."""
+        """Inches per mm."""
         across, up = ((whole - edge) for whole, edge in zip(_PAGE, _EDGES, strict=True))
         return min(aspired, (across / ceil(count / rows) - _BESIDE) / wide, (up / rows - _BENEATH) / tall)
 
@@ -283,7 +273,7 @@ def _panels(count: int, wide: float, tall: float, title: str) -> tuple[Figure, l
 
 
 def _frames_apart(motion: Motion, images: int, apart: float, directory: Path) -> list[int]:
-    """The last frames of a run that are so many seconds apart, to a tenth of that."""
+    """The last frames of a run that are ``apart`` seconds apart, within the tolerance."""
     last = len(motion.time) - 1
     between = motion.case.run.steps_per_sample * motion.case.run.time_step
     every, expected = round(apart / between), ""
@@ -297,10 +287,7 @@ def _frames_apart(motion: Motion, images: int, apart: float, directory: Path) ->
 
 
 def seconds_apart(text: str, directory: Path) -> float:
-    """Read a time between pictures: a duration, or a part or multiple of the drive's cycle such as ``T/4`` or ``2 T``.
-
-    An ``InputError`` says that the text is neither.
-    """
+    """Read a time between pictures: a duration, or a part or multiple of a cycle such as ``T/4``; else `InputError`."""
     cycles = re.fullmatch(r"(?P<many>[\d.]*)\s*T\s*(/\s*(?P<parts>\d+))?", text.strip())
     seconds = 0.0
     with suppress(ValueError, ZeroDivisionError):

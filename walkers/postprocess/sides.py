@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from walkers.postprocess.dump import BoolArray, IntArray
 
 SAME = 0.05
-"""Velocities of walkers that faced either way and differ by more than this share are printed apart …"""
+"""Mean velocities of the two directions are printed separately if they differ by more than this share …"""
 STEADY_SPEED = 1e-5
 """… and by more than this, m/s; halves of a run that differ by less are steady."""
 REST = 2e-6
@@ -22,18 +22,18 @@ def ways(*, uphill: bool) -> tuple[str, str]:
 
 
 def differ(one: float, other: float) -> bool:
-    """Whether mean velocities (m/s) of walkers that faced either way differ; not if one is NaN."""
+    """Whether the mean velocities (m/s) of the two directions differ; false for NaN."""
     return abs(one - other) > max(SAME * max(abs(one), abs(other)), STEADY_SPEED)
 
 
 def alike(facing: IntArray, *, uphill: bool) -> BoolArray:
-    """Which walkers means of gait and work include, shape (W,): on a slope those facing up, if there are any."""
+    """Walkers over which gait and work are averaged, shape (W,): on a slope those facing up, if there are any."""
     up = facing > 0
     return up if uphill and up.any() else up | True
 
 
 def sides_apart(result: Mapping[str, Any]) -> dict[str, float]:
-    """Mean velocities (m/s) of the walkers of a result, by the way that they faced, if they differ; empty otherwise."""
+    """Mean velocities (m/s) of a result by direction at the start if they differ; otherwise empty."""
     right, left = ((result.get(name) or {}).get("mean") for name in ("right_facing", "left_facing"))
     if right is None or left is None or not differ(right, left):
         return {}

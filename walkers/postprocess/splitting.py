@@ -1,4 +1,4 @@
-"""Split the output of a shared deck: each case gets its own dumps, as from a deck of its own."""
+"""Split the output of a shared deck: each case gets its dumps as if it had run alone."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from walkers.templates.layout import Layout
 def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) -> None:
     """Write the dumps and the layout of each case into its directory, and remove those of the shared deck.
 
-    Beads and walkers are numbered anew in each; they stay where they were in the shared deck.
+    Beads and walkers are renumbered; their positions are those in the shared deck.
 
     Parameters
     ----------
     directory, layout
-        Where the deck ran, and what it wrote.
+        Directory and layout of the deck.
     cases
-        From each case's directory to the case, in the order of the deck.
+        Cases by directory, in the order of the deck.
 
     Raises
     ------
     runner.failures.WalkersMet
-        If two walkers came near each other, so that they are not what they would be alone.
+        If two walkers came so close that they are not independent.
     postprocess.dump.DumpError
         If a dump cannot be read.
     """
@@ -42,7 +42,7 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) ->
     sampled = frames[:: next(iter(cases.values())).run.samples_per_cycle, :, x : x + 2]
     centre = np.stack([sampled[:, np.array(one.beads) - 1].mean(axis=1) for one in layout.walkers], axis=1)
     if came_near(centre, NEAR * max(make.length for case in cases.values() for make in case.walkers)):
-        raise WalkersMet(directory)
+        raise WalkersMet("walkers of different cases came close to each other in a shared deck", directory)
     owner, renumbered = (np.zeros(layout.atoms + 1, dtype=np.int64) for _ in range(2))
     walkers = iter(layout.walkers)
     for number, (place, case) in enumerate(cases.items()):

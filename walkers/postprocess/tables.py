@@ -1,6 +1,6 @@
-"""The tables of a run: parquet files whose columns carry their unit and meaning.
+"""The tables of a run: parquet files whose columns have units and meanings.
 
-Written with pyarrow alone (pandas takes a third of a second to import); read into pandas.
+They are written with pyarrow alone, because pandas takes a third of a second to import.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ if TYPE_CHECKING:
 
 Columns: TypeAlias = dict[str, npt.NDArray[Any]]
 NUMBERED = "numbered"
-"""Marks a field that stands for several columns, one per bead or contact: ``rotation_1``, ``rotation_2``, …"""
+"""Marks a field with several columns, one per bead or contact: ``rotation_1``, ``rotation_2``, …"""
 
 
 def described(table: type) -> dict[str, tuple[str, str]]:
     """Units and meanings of the columns of a table.
 
-    A table is a dataclass whose fields are its columns, each ``Annotated`` with its unit, its meaning and perhaps
-    `NUMBERED`; those that are get ``_*`` after their names. It holds arrays, all of the table, or a row of it.
+    A table is a dataclass, which contains either the arrays of all columns or a single row. Each field is
+    ``Annotated`` with unit and meaning, and `NUMBERED` if it has several columns: then its name gets ``_*``.
     """
     found = {name: hint.__metadata__ for name, hint in get_type_hints(table, include_extras=True).items()}
     return {f"{name}_*" if one[2:] else name: one[:2] for name, one in found.items()}
 
 
 def columns_of(table: Any) -> Columns:
-    """The columns of a table that holds arrays; those that are numbered along its last axis."""
+    """The columns of a table that contains arrays; the last axis of numbered columns is the number."""
     columns: Columns = {}
     for name in described(type(table)):
         values = getattr(table, name.removesuffix("_*"))
@@ -52,13 +52,7 @@ def columns_of_rows(table: type, rows: Sequence[Any]) -> Columns:
 
 
 def write_table(directory: Path, name: str, table: type, columns: Columns) -> None:
-    """Write the columns of a table beside its place in a run directory and rename it.
-
-    Raises
-    ------
-    KeyError
-        If a column of the table is missing.
-    """
+    """Write a table into a run directory, beside its final place, and rename it; KeyError if a column is missing."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -83,7 +77,7 @@ def write_table(directory: Path, name: str, table: type, columns: Columns) -> No
 
 
 def _arrow(values: npt.NDArray[Any]) -> Any:
-    """An arrow array on numpy's memory; ``pyarrow.array`` would import pandas to see whether it was given a series."""
+    """An arrow array that shares numpy's memory; ``pyarrow.array`` would import pandas."""
     import pyarrow as pa
 
     if values.dtype.kind == "U":
@@ -117,19 +111,19 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
     directory
         The run directory.
     name
-        One of those of its analyses, such as ``trajectory``, ``walkers``, ``bridges``, of a pile ``bed``, ``clusters``.
+        A table of its analyses, such as ``trajectory``, ``walkers`` or ``bridges``; of a pile ``bed`` or ``clusters``.
 
     Returns
     -------
     DataFrame
-        Its ``attrs["units"]`` maps columns to units.
+        ``attrs["units"]`` maps columns to units.
 
     Raises
     ------
     FileNotFoundError
         If the directory has no such table.
     runner.manifest.FileChanged
-        If it is not what it was when the run was finished.
+        If the table has changed since the run was finished.
     """
     table = _read(Path(directory), name)
     frame: pd.DataFrame = table.to_pandas()

@@ -1,8 +1,7 @@
 """Trajectories for other programs: extended XYZ (OVITO, ASE) and LAMMPS text dumps (OVITO, MDAnalysis, LAMMPS tools).
 
-Lengths are in mm, velocities in mm/s, angular velocities in rad/s, times in s: the XYZ writer has eight decimals, which
-of a length in m would be 10 nm. Places and velocities are relative to the boundary, as in
-`walkers.postprocess.Motion`.
+Lengths are in mm, velocities in mm/s, angular velocities in rad/s, times in s. The XYZ writer has eight decimals, so
+lengths in m would be rounded to 10 nm. Positions and velocities are relative to the boundary.
 """
 
 from __future__ import annotations
@@ -12,8 +11,8 @@ from typing import TextIO
 
 import numpy as np
 
-from walkers.inputs.errors import refused
 from walkers.inputs.extras import require
+from walkers.postprocess.drawing import check_place
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, read_motion
 from walkers.runner.files import beside
@@ -22,7 +21,7 @@ _COLUMNS = ("id", "type", "mol", "radius", "x", "y", "z", "vx", "vy", "vz", "ome
 _FORMAT = "%d %d %d" + " %.10g" * 10
 _MM = 1e3
 SUFFIXES = {"xyz": (".xyz", ".extxyz"), "lammps": (".lammpstrj",)}
-"""Of the names of files, by their forms."""
+"""Suffixes of files by form."""
 
 
 def write_trajectory(directory: Path, destination: Path, form: str, *, every: int = 1) -> Path:
@@ -31,17 +30,16 @@ def write_trajectory(directory: Path, destination: Path, form: str, *, every: in
     Parameters
     ----------
     destination
-        The file to write, whose name ends in one of `SUFFIXES`.
+        The file to write, with one of the `SUFFIXES`.
     form
         ``xyz`` for extended XYZ, ``lammps`` for a LAMMPS text dump.
 
     Raises
     ------
     InputError
-        If the name ends otherwise.
+        If the file has another suffix.
     """
-    if destination.suffix.lower() not in SUFFIXES[form] or destination.is_dir():
-        raise refused("--output", f"{destination}: expected the name of a {' or '.join(SUFFIXES[form])} file")
+    check_place(destination, *SUFFIXES[form], option="-o")
     write = {"xyz": _write_xyz, "lammps": _write_lammps}[form]
     if form == "xyz":
         require("xyz")
@@ -55,7 +53,7 @@ def write_trajectory(directory: Path, destination: Path, form: str, *, every: in
 
 
 def box_of(motion: Motion) -> FloatArray:
-    """Corners of the box that all frames have, mm, shape (2, 3): about all beads; of a container its inner width."""
+    """Corners of the box of all frames, mm, shape (2, 3): it contains all beads, and the inner width of a container."""
     radius = motion.radius[:, None]
     low, high = (motion.position - radius).min(axis=(0, 1)), (motion.position + radius).max(axis=(0, 1))
     if motion.case.boundary.closed:

@@ -19,7 +19,7 @@ from walkers.runner.directory import CASE_NAME
 from walkers.runner.files import read_json
 
 SPREAD_NAME = "spread.json"
-"""File of the bands in the directory of a spread (`spread_of`)."""
+"""Name of the file with the bands in the directory of a spread (`spread_of`)."""
 LEAST_PER_VALUE = 3
 """Draws per varied value below which the band is approximate and rank correlations are not significant."""
 _OVER = "over the ranges of uncertain values"
@@ -27,17 +27,17 @@ _WIDTH = 110
 
 
 def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
-    """Unmeasured values of a result, and values that the case calls uncertain.
+    """Unmeasured values of a case, and values that it calls uncertain.
 
-    Each has a ``key``, ``value`` (as a case file would say it), ``origin`` (``given``, ``library``, ``calibrated``,
-    ``assumed`` or ``default``), ``range`` (both ends, or None), ``logarithmic``, and whether it is ``guessed``.
+    Each has a ``key``, ``value`` (as in a case file), ``origin`` (``given``, ``library``, ``calibrated``, ``assumed``
+    or ``default``), ``range`` (both ends, or None), ``logarithmic``, and whether it is ``guessed``.
     """
     return [
         {
             "key": one.key,
             "value": one.text,
             "origin": one.origin,
-            "range": list(one.range) if one.range else None,  # as it is read from a file
+            "range": list(one.range) if one.range else None,  # a list, as in the file
             "logarithmic": one.logarithmic,
             "guessed": one.guessed,
         }
@@ -47,7 +47,7 @@ def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
 
 
 def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The uncertain values of a result (`rests_on`) as text: guessed, given by the case alone, calibrated."""
+    """The uncertain values of a result (`rests_on`) as text, by origin."""
 
     def listed(head: str, chosen: Iterable[Mapping[str, Any]]) -> list[str]:
         text = ", ".join(f"{one['key'].partition('.')[2]} {one['value']}" for one in chosen)
@@ -77,7 +77,7 @@ def wrapped(sentences: Iterable[str]) -> list[str]:
 
 
 def not_known(rests: Sequence[Mapping[str, Any]]) -> list[str]:
-    """A sentence with the values of a result (`rests_on`) that are known as a range only, if there are any."""
+    """A sentence with the values of a result (`rests_on`) that have a range, if there are any."""
     names = [
         one["key"].partition(".")[2].partition(".bead_")[0].replace("_", " ")
         for one in rests
@@ -89,7 +89,7 @@ def not_known(rests: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def spread_of(directory: Path) -> Path:
-    """The directory of the spread of a run (`walkers.sweeps.spread`), whether it is there or not."""
+    """The directory of the spread of a run (`walkers.sweeps.spread`); it need not exist."""
     return directory.with_name(f"{directory.name}-spread")
 
 
@@ -114,10 +114,9 @@ def with_bands(directory: Path, result: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def band_of(result: Mapping[str, Any], name: str, own: float | None) -> tuple[float, float] | None:
-    """Both ends of the band of a quantity, SI, which includes the result itself; None if there is no band.
+    """Both ends of the band of a quantity (SI), extended to the result ``own`` of the case; None without a band.
 
-    A spread draws half of the values below and half above those of the case, so the result of the case is usually in
-    the band. If it is not (few draws), the band is extended to it.
+    The result is usually in the band, because a spread draws half of the values below and half above those of the case.
     """
     band = (result.get("bands") or {}).get(name)
     if band is None:
@@ -127,14 +126,14 @@ def band_of(result: Mapping[str, Any], name: str, own: float | None) -> tuple[fl
 
 
 def band_text(band: tuple[float, float], unit: str) -> str:
-    """Both ends of a band in the usual unit, to three digits: ``0.489 to 5.83 mm/s``."""
+    """Both ends of a band in the displayed unit, with three digits: ``0.489 to 5.83 mm/s``."""
     shown, factor = SHOWN_UNITS.get(unit, (unit, 1.0))
     low, high = (rounded(float(f"{end * factor:.3g}"), shown) for end in band)
     return f"{low} to {high} {shown}".rstrip()
 
 
 def bands_text(result: Mapping[str, Any], units: Mapping[str, str], own: Mapping[str, Any]) -> str:
-    """The bands of several quantities in a sentence; empty if there is none."""
+    """The bands of several quantities in a sentence; empty without bands."""
     bands = {name: band for name in units if (band := band_of(result, name, own.get(name)))}
     if not bands:
         return ""

@@ -1,8 +1,8 @@
 """The engine: identity of its binary, the contact model that it loads, and records of audits.
 
-The contact model of decks is a shared library, compiled where it is first needed and kept in the user's cache, like the
-records of audits. The engine's binary interface is that of its very package: headers and library are those of this
-machine, and only the version that the model was written for is served.
+The contact model is a shared library. It is compiled on first use and kept in the user's cache, as are the records of
+audits. It is compiled with the headers and the library of this machine, since its binary interface must match the
+installed package, and only for the engine version that it was written for.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from walkers.templates.engine import AUDITED_VERSION
 ENGINE_VARIABLE = "WALKERS_ENGINE"
 SOURCES = Path(str(files("walkers.engine")))
 _MODEL = ("bridge.cpp", "table.h")
-"""The contact model's sources."""
+"""Source files of the contact model."""
 _PACKAGES = ("g++", "libliggghts-dev", "libopenmpi-dev")
 _HEADERS = Path("/usr/include/liggghts")
-# Without -march the numbers are the same on all machines of an architecture: no fused operations. -O3 does not reorder.
+# Without -march, all machines of an architecture give the same numbers (no fused operations). -O3 does not reorder.
 _OPTIONS = (
     *("-shared", "-fPIC", "-std=gnu++11", "-O3", "-fno-math-errno"),
     *("-DNDEBUG", "-DOMPI_SKIP_MPICXX", "-Wall", "-Wextra"),
@@ -62,7 +62,8 @@ def find_engine(wanted: str | None = None) -> Engine:
     name = wanted or os.environ.get(ENGINE_VARIABLE) or "liggghts"
     found = shutil.which(name)
     if found is None:
-        raise EngineMissing(name)
+        text = "is not an executable file on this machine; install it with: sudo apt-get install liggghts"
+        raise EngineMissing(f"no engine: {name} {text}")
     path = Path(found).resolve()
     return Engine(path, _identity(path, path.stat().st_mtime_ns))
 
@@ -77,13 +78,13 @@ def _identity(path: Path, _modified: int) -> str:
 
 
 def _parts_of(path: Path) -> tuple[Path, ...]:
-    """An executable and the ``libliggghts`` that it loads: Debian's is a front of 18 kB."""
+    """An executable and the ``libliggghts`` that it loads (Debian's executable is only a launcher of 18 kB)."""
     listing = subprocess.run(["ldd", str(path)], capture_output=True, text=True, errors="replace", check=False).stdout
     return path, *(Path(match) for match in _LIBRARY.findall(listing))
 
 
 def version_in(output: bytes) -> str | None:
-    """The version that a banner in the engine's output names, such as ``LIGGGHTS-PUBLIC 3.8.0``; None without one."""
+    """The version in the banner of the engine's output, such as ``LIGGGHTS-PUBLIC 3.8.0``; None without a banner."""
     match = _BANNER.search(output)
     return match.group(1).decode("utf-8", "replace").strip() if match else None
 
@@ -92,10 +93,10 @@ def version_in(output: bytes) -> str | None:
 
 
 def plugin_of(engine: Engine) -> Path:
-    """The contact model for an engine, compiled if it never was.
+    """The contact model for an engine, compiled on first use.
 
-    `OtherEngine` if the engine is another version than the one that the model was written for, `ContactModelMissing` if
-    it cannot be compiled: what is missing, or what the compiler says.
+    Raises `OtherEngine` if the model was written for another version of the engine, and `ContactModelMissing` if it
+    cannot be compiled.
     """
     fingerprint = hashlib.sha256("\0".join(_OPTIONS).encode())
     for name in _MODEL:
@@ -113,7 +114,7 @@ def plugin_of(engine: Engine) -> Path:
 
 @lru_cache(maxsize=8)
 def _check_version(engine: Engine) -> None:
-    """Refuse a binary that says to be another version; of one that does not say it, the banner is looked at later."""
+    """Refuse a binary that contains another version; if it contains none, the banner is checked later."""
     for part in _parts_of(engine.path):
         with part.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as contents:
             version = said[0].decode() if (said := _VERSION.search(contents)) else AUDITED_VERSION
@@ -145,7 +146,7 @@ def _compile(place: Path) -> None:
 
 
 def run_script(plugin: Path, ranks: int) -> str:
-    """A shell script that runs a deck by hand: the model is loaded into the engine, its output goes to a file."""
+    """A shell script that runs a deck by hand: it loads the model into the engine and writes the output to a file."""
     parallel = f"mpirun -n {ranks} " if ranks > 1 else ""
     return (
         f'# Runs {DECK_NAME} with the contact model "cohesion bridge", which is loaded into liggghts.\n'
@@ -166,10 +167,10 @@ def compile_model() -> None:
 
 @dataclass(frozen=True)
 class AuditRecord:
-    """Outcome of an audit of a binary, which ``engine`` names by its hash and ``version`` by its banner.
+    """Outcome of an audit of a binary, identified by its hash (``engine``) and its banner (``version``).
 
-    ``scope`` is ``full`` or ``quick``, ``lines`` the number of lines of which ``failures`` failed and so many were
-    ``skipped`` for want of a program.
+    ``scope`` is ``full`` or ``quick``, ``lines`` the number of checked lines, ``failures`` those that failed,
+    ``skipped`` the number of those that need a missing program.
     """
 
     engine: str
@@ -195,9 +196,9 @@ def _record_of(engine: str, scope: str) -> Path:
 
 
 def read_audit(engine: str) -> AuditRecord | None:
-    """The record of a binary, by its hash: one that failed if there is one, else the full one, else the quick one.
+    """The record of a binary, by its hash: a failed one if it exists, else the full one, else the quick one.
 
-    None if the binary was never audited or its records cannot be read.
+    None if the binary has no readable record.
     """
     known = []
     for scope in ("full", "quick"):
@@ -210,7 +211,7 @@ def read_audit(engine: str) -> AuditRecord | None:
 
 
 def is_new(engine: str) -> bool:
-    """Whether a binary is asked about for the first time with this user's cache; it is not from then on."""
+    """Whether this is the first call for a binary with this user's cache."""
     place = _record_of(engine, "seen")
     with suppress(OSError):  # a cache that cannot be written: it is new each time
         place.parent.mkdir(parents=True, exist_ok=True)
@@ -220,7 +221,7 @@ def is_new(engine: str) -> bool:
 
 
 def write_audit(record: AuditRecord) -> None:
-    """Keep a record: a full audit's replaces a quick one's, whose lines it has; `OSError` if the cache refuses."""
+    """Save a record; a full one replaces a quick one. Raises `OSError` if the cache cannot be written."""
     place = _record_of(record.engine, record.scope)
     place.parent.mkdir(parents=True, exist_ok=True)
     write_json(place, asdict(record))

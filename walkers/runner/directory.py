@@ -1,14 +1,14 @@
 """Run directories: one per run, named by the case and a hash of everything that determines the run.
 
-A run is made in ``<name>-<hash>.incomplete`` and renamed to ``<name>-<hash>`` when its manifest has been written, last:
-a directory without a manifest is not a run, and a run that is made anew replaces the old one only when it has finished.
-Input and output of the engine are in ``segments/0000``, ``segments/0001``, …; walkers have one unless their case
-asks for more.
+A run is made in ``<name>-<hash>.incomplete``. Its manifest is written last, then the directory is renamed to
+``<name>-<hash>``: a directory without a manifest is not a finished run, and a repeated run replaces the old one only
+when it has finished. Input and output of the engine are in ``segments/0000``, ``segments/0001``, …; walkers have one
+segment unless their case asks for more.
 
-While it is made, the file ``<name>-<hash>.lock`` is locked. The lock is the kernel's (``flock``): it ends with the last
-process that has the file open, however that ends. Engines inherit it, so that one which outlives its launcher keeps
-others away from the directory that it writes into. It does so for moments only, for the kernel ends it with its
-launcher: whoever meets a lock waits that long.
+During the run, the file ``<name>-<hash>.lock`` is locked with ``flock``. The kernel releases the lock when the last
+process that has the file open ends, for any reason. Engines inherit the lock: an engine that outlives its launcher
+keeps other processes away from its directory. The kernel ends such an engine within moments; a process that finds a
+lock waits that long.
 """
 
 from __future__ import annotations
@@ -43,23 +43,23 @@ SEGMENTS = "segments"
 FIRST_SEGMENT = Path(SEGMENTS) / "0000"
 SEGMENT_NAME = "segment.json"
 DECK_RECORD_NAME = "deck.json"
-"""In the folder of a deck to be run by hand: its case and its text as they were written."""
+"""File beside a deck to be run by hand: the case and the text of the deck as written."""
 UNFINISHED = ".incomplete"
 REPLACED = ".replaced"
 _LONGEST_NAME = 80
 _LOOK_SECONDS = 0.01
 _PATIENCE_SECONDS = 2.0
-"""Before locks are taken for another's: engines whose launcher was killed end within a fraction of a second."""
+"""Waiting time for a lock: engines whose launcher was killed end within a fraction of a second."""
 
 
 # --- names ------------------------------------------------------------------------------------------------------------
 
 
 def run_name(case: Case, engine: Engine) -> str:
-    """Name of a run's directory: the case's name and 12 hex digits over resolved case, engine and the decks' version.
+    """Name of a run directory: name of the case, and 12 hex digits of a hash of case, engine and version of the decks.
 
-    The wording of a deck is not among it: a comment in a template leaves the runs that are there. The file of a law of
-    the user's own is.
+    The text of the deck is not hashed, so that a changed comment in a template keeps existing runs. The file of a
+    user's own bridge law is hashed.
     """
     determinants = {"case": case.determinants(), "deck": CONTENT_VERSION, "engine": engine.sha256, "format": FORMAT}
     if own := source_sha256(case.liquid.law):
@@ -69,30 +69,30 @@ def run_name(case: Case, engine: Engine) -> str:
 
 
 def name_of(case_name: str) -> str:
-    """A case's name as a run's begins with it."""
+    """The name of a case at the beginning of the name of a run."""
     return re.sub(r"[^\w.+-]+", "_", case_name)[:_LONGEST_NAME]
 
 
 def is_run_name(name: str) -> bool:
-    """Whether a directory may be a run's by its name: twelve hex digits at the end."""
+    """Whether a name may be that of a run directory: it ends in twelve hex digits."""
     return re.fullmatch(r".+-[0-9a-f]{12}", name) is not None
 
 
 def run_place(case: Case, engine: Engine, out: Path) -> Path:
-    """Where the run of a case belongs."""
+    """The final directory of the run of a case."""
     return out / run_name(case, engine)
 
 
 def unfinished(place: Path) -> Path:
-    """Where the run of a place is made."""
+    """The directory in which the run of a place is made."""
     return place.with_name(place.name + UNFINISHED)
 
 
 def holds_unfinished(directory: Path) -> bool:
-    """Whether a directory has what that of an unfinished run has: its case, or nothing but what is there before it."""
+    """Whether a directory is that of an unfinished run: it contains a case, or only files that are written earlier."""
     try:
         names = {path.name for path in directory.iterdir()}
-    except OSError:  # not ours to read
+    except OSError:  # unreadable
         return False
     return CASE_NAME in names or all(name in (SEGMENTS, FAILURE_NAME) or name.startswith(".case.") for name in names)
 
@@ -102,7 +102,7 @@ def holds_unfinished(directory: Path) -> bool:
 
 @dataclass(frozen=True)
 class FinishedRun:
-    """A run that has its manifest: its directory, and what that holds."""
+    """A run with a manifest: its directory and the contents."""
 
     directory: Path
 
@@ -123,29 +123,29 @@ class FinishedRun:
 
     @property
     def layout(self) -> Layout:
-        """What the dumps of the first segment hold."""
+        """The layout of the dumps of the first segment."""
         return layout_of(self.segments[0])
 
 
 def case_of(directory: Path) -> Case:
-    """The resolved case of a run directory; `OSError`, `ValueError` if it cannot be read, or was changed since."""
+    """The resolved case of a run directory; raises `OSError` or `ValueError` if it is unreadable or was changed."""
     check_unchanged(directory, [CASE_NAME])
     return Case.from_dict(read_json(directory / CASE_NAME))
 
 
 def layout_of(segment: Path) -> Layout:
-    """What the dumps of a segment hold; `OSError`, `ValueError`, `KeyError`, `TypeError` if it cannot be read."""
+    """Layout of the dumps of a segment; raises `OSError`, `ValueError`, `KeyError` or `TypeError` if unreadable."""
     return Layout.from_dict(read_json(segment / LAYOUT_NAME))
 
 
 def segment_directories(directory: Path) -> list[Path]:
-    """The whole segments of a run, in their order; that of a deck that was run by hand is the directory itself."""
+    """The complete segments of a run, in order; for a deck that was run by hand, the directory itself."""
     found = sorted(path for path in (directory / SEGMENTS).glob("[0-9]*") if not path.suffix)
     return found or ([directory] if (directory / SEGMENT_NAME).is_file() else [])
 
 
 def run_of(segment: Path) -> Path:
-    """The run directory that a segment is of."""
+    """The run directory of a segment."""
     return segment.parent.parent if segment.parent.name == SEGMENTS else segment
 
 
@@ -159,7 +159,7 @@ def files_of_segments(directory: Path) -> list[str]:
 
 
 def is_deck_folder(folder: Path) -> bool:
-    """Whether a deck to be run by hand was written into a folder."""
+    """Whether a folder contains a deck to be run by hand."""
     return (folder / DECK_RECORD_NAME).is_file() and (folder / DECK_NAME).is_file()
 
 
@@ -169,15 +169,15 @@ def finished_run(directory: Path) -> FinishedRun | None:
 
 
 def finished_places(out: Path) -> dict[str, Path]:
-    """All finished runs of a folder: from their names to their directories."""
+    """Directories of all finished runs of a folder, by name."""
     places = [path.parent for path in sorted(out.glob(f"*/{MANIFEST_NAME}"))]
     return {place.name: place for place in places if not place.name.endswith((UNFINISHED, REPLACED))}
 
 
 def drive_from(case: Case, done: Iterable[Mapping[str, Any]]) -> int | None:
-    """Step at which the drive begins, given the records of the segments that are whole; None if that is not known yet.
+    """Step at which the drive begins, from the records of the complete segments; None if it is not known yet.
 
-    It is the end of the first segment that leaves the beads at rest, or that is the last in which they may come to it.
+    It is the end of the first segment that leaves the beads at rest, or of the last segment that may be used for that.
     """
     if not case.run.rests:
         return 0
@@ -196,8 +196,8 @@ def drive_from(case: Case, done: Iterable[Mapping[str, Any]]) -> int | None:
 def write_deck(deck: Deck, directory: Path, before: Path | None = None) -> None:
     """Write a deck, its files and its layout into a directory.
 
-    A file that is the same in that of the segment ``before`` is linked to: the tables of a pile's bridges are larger
-    than what a segment of it computes.
+    Files that are the same in the segment ``before`` are linked: the bridge tables of a pile are larger than the output
+    of a segment.
     """
     for name, text in {DECK_NAME: deck.text, **deck.files}.items():
         contents = text.encode("utf-8", "surrogateescape")
@@ -211,7 +211,7 @@ def write_deck(deck: Deck, directory: Path, before: Path | None = None) -> None:
 def write_segment_record(
     directory: Path, segment: Segment, report: EngineReport, rms_velocity: float | None = None
 ) -> dict[str, Any]:
-    """Write what a segment is and what it took into its directory, and return it."""
+    """Write the steps and the cost of a segment into its directory, and return this record."""
     record = {**vars(segment), **vars(report), "root_mean_square_velocity": rms_velocity}
     write_json(directory / SEGMENT_NAME, record, at_once=False)
     return record
@@ -219,9 +219,9 @@ def write_segment_record(
 
 @contextmanager
 def room_on_disk(incomplete: Path, needed: int | None = None) -> Iterator[None]:
-    """Turn the system's word for a full disk, to which so many bytes are still to be written, into a `DiskFull`.
+    """Turn the system's error for a full disk into a `DiskFull` that names the bytes still ``needed``.
 
-    And that for a directory that was removed into an `OutputGone`.
+    Turn the error for a removed directory into an `OutputGone`.
     """
     try:
         yield
@@ -234,7 +234,7 @@ def room_on_disk(incomplete: Path, needed: int | None = None) -> Iterator[None]:
 
 
 def move_into_place(made: Path, place: Path) -> None:
-    """Give a directory that has been made, and is safe on disk, its name, in exchange for one that has it already."""
+    """Rename a complete directory to its final place, and replace one that exists there."""
     recover(place)
     replaced = place.with_name(place.name + REPLACED)
     if place.exists():
@@ -245,7 +245,7 @@ def move_into_place(made: Path, place: Path) -> None:
 
 
 def recover(place: Path) -> None:
-    """Undo a replacement that was interrupted between its two renames; end one that was interrupted after them."""
+    """Undo a replacement that was interrupted between its two renames; finish one that was interrupted after them."""
     replaced = place.with_name(place.name + REPLACED)
     if not place.exists() and replaced.exists():
         replaced.rename(place)
@@ -262,14 +262,14 @@ def _lock_file(place: Path) -> Path:
 
 @contextmanager
 def locked(places: Iterable[Path]) -> Iterator[Mapping[Path, int]]:
-    """Lock those of the final places of runs that nobody else has locked, two seconds later at the latest.
+    """Lock the final places of runs, except those that other processes keep locked for more than two seconds.
 
-    Yields those that are ours until the end of the block, with the descriptors of their lock files.
+    Yields the locked places with the descriptors of their lock files; they stay locked until the end of the block.
     """
     ours: dict[Path, int] = {}
     end = time.monotonic() + _PATIENCE_SECONDS
     try:
-        # In the order of their names, so that of two who want the same places one gets them rather than each a half.
+        # Sorted, so that one of two processes that want the same places gets all of them, not each process a part.
         for place in sorted(set(places)):
             if (descriptor := _lock(_lock_file(place), end)) is not None:
                 ours[place] = descriptor
@@ -281,7 +281,7 @@ def locked(places: Iterable[Path]) -> Iterator[Mapping[Path, int]]:
 
 
 def _lock(file: Path, end: float) -> int | None:
-    """Lock a file that others may be removing at this moment: the lock counts only on the file that has the name."""
+    """Lock a file that other processes may be removing: the lock counts only if the file still has the name."""
     while True:
         descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
         try:

@@ -1,13 +1,11 @@
 """Failures of runs.
 
-The engine's own signs are unreliable (an ERROR line without an exit status, an exit status without a line, silence), so
-each failure is recognised by what it leaves behind, mostly in `walkers.runner.launch`.
+The engine reports errors unreliably (an ERROR line without an exit status, an exit status without a line, silence).
+Failures are therefore detected from its output, mostly in `walkers.runner.launch`.
 """
 
 from __future__ import annotations
 
-import platform
-from collections.abc import Sequence
 from pathlib import Path
 
 from walkers.inputs.errors import WalkersError
@@ -15,9 +13,9 @@ from walkers.templates.engine import AUDITED_VERSION
 
 
 class EngineFailure(WalkersError):
-    """Root of the failures of a run, which ``failure.json`` tells by the names of their classes.
+    """Base class of the failures of a run; ``failure.json`` contains the name of the class.
 
-    ``directory`` is where its remains are, ``lost`` the number of beads lost.
+    ``directory`` contains the files of the failed run; ``lost`` is the number of lost beads.
     """
 
     def __init__(self, message: str, directory: Path | None = None, *, lost: int = 0) -> None:
@@ -26,54 +24,42 @@ class EngineFailure(WalkersError):
 
 
 class EngineMissing(EngineFailure):
-    """There is no liggghts to run. Seen before anything is written."""
-
-    def __init__(self, wanted: str) -> None:
-        text = "is not an executable file on this machine; install it with: sudo apt-get install liggghts"
-        super().__init__(f"no engine: {wanted} {text}")
+    """No liggghts was found. Detected before anything is written."""
 
 
 class OtherEngine(EngineFailure):
-    """The engine is another version than the one that the contact model was written for."""
+    """The contact model was written for another version of the engine."""
 
-    def __init__(self, path: Path, version: str | None) -> None:
-        super().__init__(
-            f"{path} is {version or 'no LIGGGHTS that names its version'}: decks need a contact model that is written "
-            f"for {AUDITED_VERSION}, as Debian packages it"
-        )
+    def __init__(self, path: Path, version: str) -> None:
+        needed = f"decks need a contact model that is written for {AUDITED_VERSION}, as Debian packages it"
+        super().__init__(f"{path} is {version}: {needed}")
 
 
 class ContactModelMissing(EngineFailure):
-    """The contact model that decks need cannot be compiled. Seen before the engine starts."""
+    """The contact model cannot be compiled. Detected before the engine starts."""
 
     def __init__(self, why: str) -> None:
         super().__init__(f"no contact model for the engine: {why}")
 
 
 class EngineDiffers(EngineFailure):
-    """A worker of a sweep has another engine than the one that the sweep was started with."""
-
-    def __init__(self, found: Path) -> None:
-        super().__init__(f"the engine on {platform.node()}, {found}, is not the engine that started this sweep")
+    """A worker of a sweep has another engine than the process that started the sweep."""
 
 
 class ProgramDiffers(EngineFailure):
-    """A worker of a sweep names runs otherwise than where it was started: resolved cases or decks differ."""
-
-    def __init__(self) -> None:
-        super().__init__(f"the program on {platform.node()} has another version than the one that started the sweep")
+    """A worker gives a run another name than the process that started the sweep: resolved cases or decks differ."""
 
 
 class EngineNeverStarted(EngineFailure):
-    """The engine ended before it named its version: nothing was done. It is tried again before this is raised."""
+    """The engine ended before it printed its version, also when it was started again."""
 
 
 class EngineError(EngineFailure):
-    """The engine stopped with an ERROR line, which is quoted, or with a non-zero status and none."""
+    """The engine stopped with an ERROR line, which is quoted, or only with a non-zero status."""
 
 
 class EngineKilled(EngineFailure):
-    """A signal ended the engine: a crash of its own (SIGSEGV), or somebody's kill."""
+    """A signal ended the engine: a crash (SIGSEGV) or a kill."""
 
 
 class EngineSilent(EngineFailure):
@@ -89,11 +75,11 @@ class MissingFrames(EngineFailure):
 
 
 class BeadsLost(EngineFailure):
-    """Beads left the simulation box. Seen in the number of atoms, which the engine prints every cycle."""
+    """Beads left the simulation box. Detected from the number of atoms, which the engine prints every cycle."""
 
 
 class BeadsOverTheTop(BeadsLost):
-    """The beads that were lost were last seen nearest to the top of the box: climbers that outgrow a container."""
+    """Beads left the simulation box at its top: before, the bead closest to its sides was the highest one."""
 
 
 class BlowUp(EngineFailure):
@@ -101,11 +87,11 @@ class BlowUp(EngineFailure):
 
 
 class TimeLimitExceeded(EngineFailure):
-    """The run took longer than it was allowed to."""
+    """The run exceeded its time limit."""
 
 
 class DiskFull(EngineFailure):
-    """No room for the output. Seen beforehand from the known size of the dump, or while the engine writes."""
+    """No room for the output. Detected before the run from the known size of the dump, or while the engine writes."""
 
     def __init__(self, needed: int | None, free: int, directory: Path) -> None:
         wanted = "" if needed is None else f"{needed / 1e6:.3g} MB are still to be written, "
@@ -120,27 +106,15 @@ class OutputGone(EngineFailure):
 
 
 class WalkersMet(EngineFailure):
-    """Walkers of different cases that shared a deck came close to each other. Seen when the deck's output is split."""
-
-    def __init__(self, directory: Path) -> None:
-        super().__init__("walkers of different cases came close to each other in a shared deck", directory)
+    """Walkers of different cases in a shared deck came close to each other. Detected when the output is split."""
 
 
 class RunBusy(EngineFailure):
     """Another process, perhaps an engine whose launcher was killed, is writing into this run."""
 
-    def __init__(self, directory: Path) -> None:
-        super().__init__("another process is still running this case", directory)
-
 
 class AuditFailed(EngineFailure):
-    """The engine's binary failed its audit: what it computes cannot be trusted."""
-
-    def __init__(self, failures: Sequence[str]) -> None:
-        super().__init__(
-            f"this engine failed its audit in {len(failures)} line(s), first: {failures[0]}; "
-            "for details: walkers check engine (--allow-failed-audit runs anyway)"
-        )
+    """The engine's binary failed its audit: its results cannot be trusted."""
 
 
 class UnauditedEngineWarning(UserWarning):

@@ -1,4 +1,4 @@
-"""Files written beside their place and renamed: readers see the old file or the new one, never a part."""
+"""Write files under a temporary name and rename them: readers see the old file or the new one, never a part."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Read a JSON object; `OSError`, `ValueError` if the file cannot be read, or holds something else."""
+    """Read a JSON object; raises `OSError` or `ValueError` if the file is unreadable or contains something else."""
     contents = path.read_bytes()
     try:
         found = json.loads(contents)
@@ -24,12 +24,12 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def write_json(path: Path, contents: Mapping[str, Any], *, at_once: bool = True) -> None:
-    """Write a JSON object; not at once if the directory is put on the disk later, as a whole (`settle`)."""
+    """Write a JSON object; ``at_once`` is False if the whole directory is flushed to disk later (`settle`)."""
     write_bytes(path, json_bytes(contents), at_once=at_once)
 
 
 def json_bytes(contents: Mapping[str, Any]) -> bytes:
-    """A JSON object as our files have it."""
+    """A JSON object in the format of all JSON files of the program."""
     return (json.dumps(contents, indent=2, ensure_ascii=False) + "\n").encode("utf-8")
 
 
@@ -48,7 +48,7 @@ def write_bytes(path: Path, contents: bytes, *, at_once: bool = True) -> None:
 
 
 def link_or_copy(source: str | Path, to: str | Path) -> None:
-    """The same file in two places; a copy where the file system has no links."""
+    """Link a file to a second place; copy it if the file system has no links."""
     try:
         os.link(source, to)
     except OSError:
@@ -57,14 +57,14 @@ def link_or_copy(source: str | Path, to: str | Path) -> None:
 
 @contextmanager
 def beside(path: Path) -> Iterator[Path]:
-    """Yield a name beside a file's to write it under; it gets its own at the end, or goes if the block fails."""
-    # Several may write it at once; what writes pictures and films goes by the suffix.
+    """Yield a temporary path beside a file; it is renamed to the file at the end, or removed if the block fails."""
+    # Several processes may write it at once; writers of pictures and films need the suffix.
     new = path.with_name(f".{path.stem}.{os.getpid()}.new{path.suffix}")
     try:
         yield new
         new.replace(path)
     except BaseException as error:
-        if isinstance(error, OSError) and error.filename in (None, str(new)):  # a disk that is full does not say which
+        if isinstance(error, OSError) and error.filename in (None, str(new)):  # errors of a full disk name no file
             error.filename = str(path)
         with suppress(OSError):
             new.unlink(missing_ok=True)
@@ -72,12 +72,12 @@ def beside(path: Path) -> Iterator[Path]:
 
 
 def settle() -> None:
-    """Put all that was written on the disk, so that a directory's new name outlives a loss of power."""
-    os.sync()  # in a hundredth of the time that its files take one by one
+    """Flush all files to disk, so that the new name of a directory survives a loss of power."""
+    os.sync()  # a hundred times faster than file by file
 
 
 def fsync_path(path: Path) -> None:
-    """Put a file, or the names in a directory, on the disk."""
+    """Flush a file, or the names in a directory, to disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

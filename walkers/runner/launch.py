@@ -23,28 +23,28 @@ from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, RUN_NAME, Deck
 from walkers.templates.engine import ALONE, AUDITED_VERSION, POSITION_IS_NO_NUMBER, RANKS, STEP_VARIABLES
 
 _POLL_SECONDS = 0.05
-# The kernel ends the engine when whoever launched it dies, be it by SIGKILL.
+# The kernel ends the engine when its launcher dies, even by SIGKILL.
 _MORTAL = ("setpriv", "--pdeathsig", "KILL")
-# Whoever died before that was asked of the kernel is not noticed by it: then the parent is another one by now.
+# The kernel does not notice a launcher that died before this request; then the parent is another process.
 _UNLESS_ORPHAN = ("sh", "-c", '[ "$PPID" = "$0" ] && exec "$@"')
-# Unless told otherwise mpirun refuses root, more ranks than cores, and binds all decks to the same cores.
+# By default, mpirun refuses root and more ranks than cores, and binds all decks to the same cores.
 _TOGETHER = ("mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none", "-n")
-# Where there is but a loopback nobody reaches mpirun, which listens on every address that it sees, whatever it is told.
+# mpirun always listens on every address that it finds; with only a loopback, no other machine can reach it.
 _LOOPBACK_ALONE = ("sh", "-c", 'PATH="$PATH:/usr/sbin:/sbin" ip link set lo up && exec "$@"', "sh")
 _UNSHARED = (("unshare", "--net"), ("unshare", "--net", "--map-current-user", "--keep-caps"))
-"""For root, and for others."""
+"""For root, and for other users."""
 _PAUSE_SECONDS = 0.2
 _GRACE_SECONDS = 2.0
 _LONGEST_LOOK = 1.0
-"""Between two looks no more than this counts as silence, in s: whoever was stopped meanwhile, as SLURM does with whole
-jobs, has heard nothing of an engine that was stopped too."""
+"""Longest time between two looks that counts as silence, in s. SLURM may suspend this process and the engine together;
+that time is not silence."""
 _CHUNK_BYTES = 1 << 20
-"""Read of the engine's output at once; a line is shorter."""
+"""Size of one read of the engine's output; a line is shorter."""
 _SPARE_BYTES = 64 * 1024
 _TAIL_BYTES = 16 * 1024
-"""Of a log, in which a status line is."""
+"""End of a log that contains a status line."""
 _TEMPORARY_BYTES = 16_000_000
-"""In TMPDIR, of mpirun and its processes: with 6 MB they wait for each other without end."""
+"""Room in TMPDIR for mpirun and its processes; with 6 MB they wait for each other forever."""
 _STATUS_LINE = re.compile(rb"^ *(\d+) +(\d+) +(\S+)((?: +[-+.\w]+){6}) *$", re.MULTILINE)
 """Step, atoms, speed of the fastest bead (m/s), and the beads' bounds (m: x, x, y, y, z, z)."""
 _ERROR_LINE = re.compile(rb"^.*\bERROR\b.*$", re.MULTILINE)
@@ -53,10 +53,10 @@ _LOOP_TIME = re.compile(rb"^Loop time of (\S+) on", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run is: steps of the drive, done and in all; simulated time, s; wall time of this call, s.
+    """Progress of a run: steps of the drive, done and in total; simulated time, s; wall time of this call, s.
 
-    ``made`` are the steps that were made in this call; ``resting`` says that the beads still come to rest,
-    ``may_end_early`` that the steps are those of all attempts, of which the last ones may not be needed.
+    ``made`` is the number of steps of this call. ``resting``: the beads still come to rest. ``may_end_early``: the
+    total is that of all attempts, and the last ones may not be needed.
     """
 
     step: int
@@ -69,11 +69,11 @@ class Progress:
 
     @property
     def share(self) -> str:
-        """How much of the drive is done."""
+        """Completed share of the drive, as text."""
         return "coming to rest" if self.resting else f"{100 * self.step / self.steps:.0f} %"
 
     def __str__(self) -> str:
-        """How much is done, how fast, and how long the rest takes."""
+        """Completed share, speed and remaining time."""
         rate = self.made / self.elapsed if self.elapsed else 0.0
         left = duration_text((self.steps - self.step) / rate) if rate else ""
         left = f"{'at most ' * self.may_end_early}{left} left" if left else "starting"
@@ -82,7 +82,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class EngineReport:
-    """What a run of the engine took: wall time and time in its loop (s), steps, and the version it named."""
+    """Cost of a run of the engine: wall time and time in its loop (s), steps; and the version that it printed."""
 
     version: str
     wall_seconds: float
@@ -100,20 +100,20 @@ def launch(
     keep_open: Sequence[int] = (),
     starts: int = 3,
 ) -> EngineReport:
-    """Run a deck that has been written into a directory, until its end or its first sign of failure.
+    """Run a deck in a directory until its end or its first failure.
 
     Parameters
     ----------
     deck, directory, engine
-        The deck; where its files are already, and the engine works; the binary.
+        The deck; the directory with its files, in which the engine works; the binary.
     on_step
-        Called a few times a second, and at the end, with the step that the engine is at; an exception ends the engine.
+        Called a few times per second, and at the end, with the current step; an exception ends the engine.
     time_limit
         Wall time in s after which the run is stopped.
     keep_open
         File descriptors that the engine inherits (the lock of the run).
     starts
-        How often an engine is started that ends before it has done anything.
+        Largest number of starts if the engine ends before it prints its version.
 
     Raises
     ------
@@ -146,21 +146,21 @@ def last_step(log: Path) -> int:
 
 
 def judge(deck: Deck, directory: Path, log: Path) -> EngineReport:
-    """Judge by its log and its dumps a deck that an engine ran which nobody watched; failures are those of `launch`."""
+    """Check a deck that was run by hand, from its log and dumps; raises the failures of `launch`."""
     watch = _Watch(deck, directory, Path("liggghts"), None)
     watch.log = log
     return watch.verdict(0)
 
 
 def check_room(folder: Path, needed: int) -> None:
-    """Raise `DiskFull` unless so many bytes, and some more, are free where a folder is."""
+    """Raise `DiskFull` unless the disk of a folder has room for the ``needed`` bytes and a reserve."""
     free = shutil.disk_usage(folder).free
     if free < needed + _SPARE_BYTES:
         raise failures.DiskFull(needed, free, folder)
 
 
 def _before(ranks: int) -> tuple[str, ...]:
-    """What starts the engine, so that it ends with its launcher, in as many processes, off the network if several."""
+    """Command that starts the engine so that it ends with its launcher; several ranks without access to the network."""
     mortal = _MORTAL if shutil.which(_MORTAL[0]) else ()
     unless_orphan = (*_UNLESS_ORPHAN, str(os.getpid())) if mortal else ()
     if ranks == 1:
@@ -170,7 +170,7 @@ def _before(ranks: int) -> tuple[str, ...]:
 
 @cache
 def _off_the_network() -> tuple[str, ...]:
-    """What starts a program where there is no network but the loopback; nothing where the system lets nobody do so."""
+    """Command that starts a program with only a loopback network; empty if the system does not allow it."""
     for unshared in _UNSHARED:
         prefix = (*unshared, *_LOOPBACK_ALONE)
         with suppress(OSError, subprocess.CalledProcessError):
@@ -181,10 +181,10 @@ def _off_the_network() -> tuple[str, ...]:
 
 @contextmanager
 def postponed_interrupts() -> Iterator[None]:
-    """Let SIGINT, SIGTERM and SIGHUP take effect at the end of the block only.
+    """Delay SIGINT, SIGTERM and SIGHUP to the end of the block.
 
-    An exception out of `subprocess.Popen` would leave an engine behind that nobody knows of. Handlers are not inherited
-    by the engine, as a mask of blocked signals would be.
+    An exception inside `subprocess.Popen` would leave an unknown engine behind. The engine does not inherit handlers,
+    but would inherit a mask of blocked signals.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -204,19 +204,19 @@ def postponed_interrupts() -> Iterator[None]:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """End the engine and all of its children: politely, then not."""
+    """End the engine and all of its children, first with SIGTERM, then with SIGKILL."""
     if process.poll() is None:
         with suppress(ProcessLookupError, subprocess.TimeoutExpired):
             os.killpg(process.pid, signal.SIGTERM)
             process.wait(_GRACE_SECONDS)
-    # Children may outlive their parent, or not care for SIGTERM.
+    # Children may outlive their parent or ignore SIGTERM.
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
 
 
 class _Watch:
-    """Reads the engine's output as it grows, keeps of it what is asked for later, and raises what is wrong."""
+    """Reads the engine's output as it grows, keeps the values that are needed later, and raises failures."""
 
     def __init__(self, deck: Deck, directory: Path, engine: Path, time_limit: float | None) -> None:
         self.deck, self.layout, self.directory, self.engine = deck, deck.layout, directory, engine
@@ -245,7 +245,7 @@ class _Watch:
 
     def run(self, command: Sequence[str], on_step: Callable[[int], None], keep_open: Sequence[int]) -> EngineReport:
         """Start an engine and watch it to its end."""
-        # What a user has Open MPI do on a cluster, such as by which network to meet, may leave no way on one machine.
+        # A user's Open MPI settings for a cluster, such as the network, may not work on one machine.
         ours = {name: value for name, value in os.environ.items() if not name.startswith("OMPI_MCA_")}
         environment = {**ours, **(RANKS if self.layout.ranks > 1 else ALONE)}
         for name in STEP_VARIABLES:
@@ -274,14 +274,14 @@ class _Watch:
             if process is not None:
                 _end(process)
                 with suppress(OSError):  # a folder that is gone
-                    if self.log.stat().st_size > self.deck.log_limit:  # before its engine had ended
+                    if self.log.stat().st_size > self.deck.log_limit:  # written before the engine ended
                         os.truncate(self.log, int(self.deck.log_limit))
         report = self.verdict(process.returncode)
         on_step(self.step)
         return report
 
     def look(self) -> None:
-        """Take in what the engine has written since the last look, as far as its log may go, or how long it has not."""
+        """Read the output since the last look, up to the limit of the log, or add to the time of silence."""
         with self.log.open("rb") as output:
             output.seek(self.read)
             while self.read <= self.deck.log_limit and (chunk := output.read(_CHUNK_BYTES)):
@@ -307,7 +307,7 @@ class _Watch:
             self.last_line = words.rsplit(b"\n", 1)[-1]
 
     def _judge(self, step: int, atoms: int, speed: float, bounds: Sequence[float]) -> failures.EngineFailure | None:
-        """What a status line tells of the beads, given the one before."""
+        """The failure that a status line shows, given the line before; None if there is none."""
         fastest, lost = self.deck.fastest, self.layout.atoms - atoms
         seconds, clearance = (step - self.step) * self.layout.time_step, self.clearance
         sides = list(zip(*self.deck.box, bounds[::2], bounds[1::2], strict=True))
@@ -344,7 +344,7 @@ class _Watch:
     def check(self) -> None:
         """Raise the failure that shows while the engine runs, if any."""
         deck, after = self.deck, f"after step {self.step}"
-        if self.version not in (None, AUDITED_VERSION):
+        if self.version is not None and self.version != AUDITED_VERSION:
             raise failures.OtherEngine(self.engine, self.version)
         if self.failure is not None:
             raise self.failure
@@ -365,7 +365,7 @@ class _Watch:
             raise failures.DiskFull(missing, free, self.directory)
 
     def verdict(self, status: int) -> EngineReport:
-        """Judge a run that has ended: raise its failure or report what it took."""
+        """Judge a run that has ended: raise its failure, or return its cost."""
         wall_seconds, layout, self.time_limit = self.elapsed, self.layout, math.inf
         self.look()
         self._take_in(self.rest)  # the last line may lack its end

@@ -22,17 +22,17 @@ from walkers.templates.deck import CONTENT_VERSION
 MANIFEST_NAME = "manifest.json"
 FORMAT = 2
 _SMALL_BYTES = 8 << 20
-"""Less than this is hashed before threads have begun."""
+"""Smaller amounts are hashed faster without threads."""
 _MOST_THREADS = 4
 
 
 def write_manifest(
     case: Case, name: str, engine: Engine | None, report: EngineReport, *, started: float, directory: Path, **more: Any
 ) -> None:
-    """Write the manifest of a run, all of whose files are in its directory but this one.
+    """Write the manifest of a run, after all of its other files.
 
-    The run was ``started`` so many seconds after the epoch, and took the engine, in all calls, what its report says.
-    Of an engine that was started by hand (None) only the version is known.
+    ``report`` is the cost of the engine over all calls; ``started`` is in seconds after the epoch. The engine is None
+    for a deck that was run by hand: only the version is known.
     """
     finished = time.time()
     audit = read_audit(engine.sha256) if engine else None
@@ -82,7 +82,7 @@ def _iso(seconds: float) -> str:
 
 
 def checksums(directory: Path, names: Iterable[str]) -> dict[str, str]:
-    """SHA-256 of files of a directory, in threads where there is much to read; `OSError` if one cannot be read."""
+    """SHA-256 of files of a directory, in threads if there is much to read; raises `OSError` if one is unreadable."""
     paths = {name: directory / name for name in names}
     if sum(path.stat().st_size for path in paths.values()) < _SMALL_BYTES:
         return {name: checksum(path) for name, path in paths.items()}
@@ -101,10 +101,10 @@ class FileChanged(WalkersError, ValueError):
 
 
 def check_unchanged(directory: Path, names: Collection[str]) -> bool:
-    """Refuse files of a finished run that are not what its manifest says; of an unfinished run nothing is said.
+    """Compare files of a finished run with its manifest; return whether the manifest lists all of them.
 
-    Whether the manifest says something of all of them; `FileChanged` if one differs, `OSError` or `ValueError` if the
-    manifest, or a file, cannot be read.
+    Raises `FileChanged` if one differs, `OSError` or `ValueError` if the manifest or a file is unreadable. True for an
+    unfinished run, which has no manifest.
     """
     try:
         sums = _sums(read_json(directory / MANIFEST_NAME), directory)
@@ -125,20 +125,21 @@ def _sums(contents: dict[str, Any], directory: Path) -> dict[str, str]:
 
 
 def forget_tables(directory: Path, names: Collection[str]) -> None:
-    """Remove files that will be recomputed from the manifest of a finished run."""
+    """Remove from the manifest of a finished run the checksums of files that will be recomputed."""
     _change(directory, names, anew=False)
 
 
 def record_tables(directory: Path, names: Collection[str]) -> None:
     """Record in the manifest of a finished run that files were recomputed from its dumps: program, time, checksums.
 
-    Between `forget_tables` and this, the manifest says nothing of them: who is killed there leaves no false alarm.
+    Between `forget_tables` and this call the manifest does not list them, so that a kill in between gives no false
+    alarm.
     """
     _change(directory, names, anew=True)
 
 
 def _change(directory: Path, names: Collection[str], *, anew: bool) -> None:
-    """Change what a manifest says of some files; nothing is done if the run is not finished."""
+    """Change the entries of files in a manifest; does nothing if the run is not finished."""
     if not (directory / MANIFEST_NAME).is_file():
         return
     contents = read_json(directory / MANIFEST_NAME)

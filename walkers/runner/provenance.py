@@ -1,6 +1,6 @@
 """Software of a run: version and commit of the program, versions of Python and of required packages.
 
-Stands on Python alone: the build of a wheel (``setup.py``) runs this file to learn the commit.
+Uses only the standard library: the build of a wheel (``setup.py``) runs this file to find the commit.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from pathlib import Path
 
 PROJECT = "granular-walkers"
 COMMIT_NAME = "commit.txt"
-"""In a wheel that was built in a checkout: its commit."""
+"""File with the commit, in a wheel that was built in a checkout."""
 _PATIENCE_SECONDS = 20.0
 
 
 @dataclass(frozen=True)
 class Software:
-    """What makes runs: versions of the project, of Python and of the packages that it requires, by name.
+    """Versions of the program, of Python and of the required packages, by name.
 
-    ``commit`` is that of the checkout that it runs from or was built in, with ``+changes`` if files that git knows had
-    been changed; None if that is not known.
+    ``commit`` is that of the checkout from which the program runs or was built, with ``+changes`` if tracked files
+    differ; None if unknown.
     """
 
     version: str
@@ -38,7 +38,7 @@ class Software:
 
 @cache
 def software() -> Software:
-    """What makes the runs of this process; looked up once, which takes some 30 ms."""
+    """The software of this process, looked up once (30 ms)."""
     try:
         version, required = metadata.version(PROJECT), metadata.requires(PROJECT) or []
     except metadata.PackageNotFoundError:
@@ -56,18 +56,18 @@ def software() -> Software:
 
 
 def look_ahead() -> None:
-    """Begin to look up `software` in a thread, as long as there is nothing to do but to wait for an engine."""
+    """Look up `software` in a thread while the program waits for an engine."""
     threading.Thread(target=software, daemon=True).start()
 
 
 def commit_of(checkout: Path) -> str | None:
-    """The commit of a checkout, with ``+changes`` if files that git knows differ from it; None if it is no checkout.
+    """The commit of a checkout, with ``+changes`` if tracked files differ from it; None if it is no checkout.
 
-    Files that git does not know do not count: runs are made in the folder.
+    Untracked files do not count, because runs are made in the folder.
     """
     if not (checkout / ".git").exists():
         return None
-    # Not of another repository that a hook of git speaks for; and nothing is written, for many may ask at once.
+    # A git hook may set another repository. Nothing is written, because many processes may ask at once.
     ours = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
     command = ["git", "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty=+changes"]
     try:

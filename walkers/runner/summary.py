@@ -25,21 +25,21 @@ from walkers.templates.deck import RESTING_SEGMENTS, settling_steps
 START_UP_SECONDS = 0.04
 _STEP_MICROSECONDS = 0.9
 _WALKER_MICROSECONDS = 0.22
-"""1.0 µs a step for one walker, 2.2 for 6, 6.2 for 24, 22 for 96, 2.6 for 9 in a tray."""
+"""Measured: 1.0 µs per step for one walker, 2.2 for 6, 6.2 for 24, 22 for 96, 2.6 for 9 in a tray."""
 _BEAD_STEPS_PER_SECOND = 7.5e6
-"""Of loose beads: 7.7 million with 60 of them."""
+"""For loose beads; measured: 7.7 million with 60 beads."""
 _SOLVING_SECONDS = 0.27
-"""Of a shape of a bridge that was never solved."""
+"""For each shape of bridge without a cached solution."""
 _MEASURING_SECONDS = 0.037
-"""Of the tables and the result of a run."""
+"""For the tables and the result of a run."""
 PROGRAM_SECONDS = 1.5
-"""Of what a program loads before and while it runs cases."""
+"""For the imports of a program that runs cases."""
 _LOOSE_PACKING = 0.55
 _FASTEST_CLIMB = 12e-3
-"""m/s; of some hundred climbs in glycerol at the paper's drive none was faster."""
+"""m/s; none of about a hundred climbs in glycerol at the drive of the paper was faster."""
 _GAIN_PER_RANK = 0.9
 _TRIED_AGAIN = (1.0, 0.1, 0.1)
-"""Share of the runs that end when their velocities are constant that are made a first, a second and a third time."""
+"""Of the runs that may end when their velocities are constant: shares with a first, second and third attempt."""
 
 
 def predicted_seconds(case: Case, walkers: int | None = None) -> float:
@@ -50,7 +50,7 @@ def predicted_seconds(case: Case, walkers: int | None = None) -> float:
     case
         A case of the deck, for the number of its steps.
     walkers
-        Beads' pairs in the deck, those of clusters by their beads; the case's own if left out.
+        Number of pairs of beads in the deck (`pairs_of_beads`); default: that of the case.
     """
     run = case.run
     cycles = sum(share * cycles for share, cycles in zip(_TRIED_AGAIN, run.attempts, strict=False))
@@ -65,7 +65,7 @@ def predicted_seconds(case: Case, walkers: int | None = None) -> float:
 
 
 def predicted_overhead(cases: Iterable[Case]) -> float:
-    """CPU time in s besides the engine: solving bridges and measuring motions."""
+    """CPU time in s in addition to the engine: solving bridges and measuring motions."""
     from walkers.physics.bridge import Surfaces
     from walkers.physics.laws.young_laplace import unsolved
 
@@ -82,7 +82,7 @@ def predicted_overhead(cases: Iterable[Case]) -> float:
 
 
 def pairs_of_beads(case: Case) -> int:
-    """Half of the number of a case's beads: what costs as much as so many dimers."""
+    """Half of the number of beads of a case: the number of dimers with the same cost."""
     return -(-case.count // 2)
 
 
@@ -101,12 +101,12 @@ def notes(case: Case) -> list[str]:
 
 
 def _volume(case: Case) -> float:
-    """Of all beads, m³."""
+    """Volume of all beads, m³."""
     return sum(4.0 / 3.0 * pi * radius**3 for radius in case.all_radii)
 
 
 def _youngs_modulus(case: Case) -> Known | None:
-    """Of the material of the beads, if the library has it."""
+    """Young's modulus of the material of the beads, if the library has it."""
     known_to, name = library_of(case.document), case.material
     return known_to.material(name).get("youngs_modulus") if name and known_to.has("materials", name) else None
 
@@ -119,8 +119,8 @@ def summarise(case: Case) -> dict[str, Any]:
     dict
         ``case`` (resolved), ``drive`` (its largest harmonic, the sum of all), ``beads`` (numbers, mass, liquid),
         ``dimer`` (M, R̄, Γ0, sin δ, mass asymmetry; of dimers), ``contacts`` (forces, bridges, overlaps of each make of
-        walkers), ``time_step`` (limits, None where one does not apply, the chosen step, its share of each and that of
-        ``"auto"``), ``run`` (steps, samples, predicted seconds).
+        walkers), ``time_step`` (limits, None if one does not apply; the chosen step; its shares of the limits and those
+        of ``"auto"``), ``run`` (steps, samples, predicted seconds).
     """
     run, drive, limits = case.run, case.drive, limits_of(case).as_dict()
     volume = _volume(case)
@@ -224,7 +224,7 @@ def describe(summary: dict[str, Any]) -> str:
 
 
 def _text_of_case(case: dict[str, Any]) -> list[str]:
-    """A resolved case, a line for each value: its key, the value in the units of a case file, where it comes from."""
+    """A resolved case, one line per value: key, value in the units of a case file, and origin."""
     lines, table = [printable(f"{case['name']}: {case['title']}").rstrip(": ")], None
     for one in case["origins"]:
         within, _, key = one["key"].rpartition(".")

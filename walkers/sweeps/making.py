@@ -86,7 +86,10 @@ def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
         message = "this engine was never audited; check its forces with: walkers check engine (shown once)"
         warnings.warn(message, UnauditedEngineWarning, stacklevel=3)
     elif audit is not None and not audit.passed and not allow_failed_audit:
-        raise AuditFailed(audit.failures)
+        raise AuditFailed(
+            f"this engine failed its audit in {len(audit.failures)} line(s), first: {audit.failures[0]}; "
+            "for details: walkers check engine (--allow-failed-audit runs anyway)"
+        )
 
 
 @dataclass(frozen=True)

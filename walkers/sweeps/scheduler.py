@@ -25,6 +25,7 @@ from functools import partial
 from itertools import pairwise
 from math import ceil
 from pathlib import Path
+from platform import node
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
@@ -382,9 +383,9 @@ def work(
         look()
         own = find_engine(str(engine.path))
         if own.sha256 != engine.sha256:
-            raise EngineDiffers(own.path)
+            raise EngineDiffers(f"the engine on {node()}, {own.path}, is not the engine that started this sweep")
         if list(runs) != [run_place(case, own, out).name for case in cases]:
-            raise ProgramDiffers
+            raise ProgramDiffers(f"the program on {node()} has another version than the one that started the sweep")
         made = make_runs(cases, out, own, on_progress=look, time_limit=time_limit)
         return Report({name: velocity_in(current_result(run.directory)) for name, run in made.runs.items()})
     except (OSError, WalkersError) as error:

@@ -1,10 +1,4 @@
 """Decks: the input scripts of LIGGGHTS.
 
-Knows the cases (`inputs`); knows nothing of processes, files on disk or results. docs/explanation/engine.md explains
-the form of the decks.
+Uses cases (`inputs`), not processes, files on disk or results. docs/explanation/engine.md explains the decks.
 """
-
-from walkers.templates.deck import Deck, render_deck
-from walkers.templates.layout import Layout, PlacedWalker
-
-__all__ = ["Deck", "Layout", "PlacedWalker", "render_deck"]

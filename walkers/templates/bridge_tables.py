@@ -1,8 +1,8 @@
 """Tables of a bridge law that the contact model ``cohesion bridge`` interpolates (its format: walkers/engine/table.h).
 
-Near contact the gap h is divided by octaves of 1 + h/scale into cells; from the last octave to the rupture cells are
-even in sqrt((rupture - h)/(rupture - m)). A law may have a kink at h = scale, between two cells, and end with an
-infinite slope. Within a cell the engine's forces are cubic, through four rows.
+Near contact, cells divide the octaves of 1 + h/scale evenly, where h is the gap; from the end m of the last octave to
+the rupture, cells are even in sqrt((rupture - h)/(rupture - m)). A law may have a kink at h = scale, between two cells,
+and end with an infinite slope. Within a cell, the engine interpolates by a cubic through four rows.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from walkers.physics.laws import law_of
 from walkers.templates.scene import Bead, Surface
 
 TOLERANCE = 1e-6
-"""Of interpolated forces, relative to a column's largest value within a factor of two of the gap."""
+"""Tolerance of interpolated forces, relative to a column's largest value within a factor of two of the gap."""
 _COARSEST, _FINEST = 8, 256
 _COLUMNS = ("pull", "normal resistance", "sliding resistance", "coupling", "rolling resistance")
 
 
 class UnusableLawError(ValueError):
-    """A law that cannot be tabulated: what is wrong with it."""
+    """A law cannot be tabulated; the message says why."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A law for two surfaces, as the engine has it.
+    """The table of a law for two surfaces, as the engine reads it.
 
     ``curve`` says where the bridge forms and breaks, ``scale`` (m), ``octaves`` and ``cells`` the grid (see above).
     ``rows`` are the forces at its gaps, shape (3 cells (octaves + 2) + 1, 5), as `walkers.physics.bridge.Forces`.
@@ -44,11 +44,11 @@ class Table:
 
     @property
     def gaps(self) -> FloatArray:
-        """Of the rows, m."""
+        """Gaps of the rows, m."""
         return np.append(self.within(np.array([0.0, 1.0 / 3.0, 2.0 / 3.0])), self.curve.rupture)
 
     def within(self, parts: FloatArray) -> FloatArray:
-        """Gaps at some parts of all cells, m."""
+        """Gaps at the given parts of all cells, m."""
         mantissas = (1.0 + (np.arange(self.cells)[:, None] + parts).ravel() / self.cells)[None, :]
         near = self.scale * ((2.0 ** np.arange(self.octaves)[:, None] * mantissas).ravel() - 1.0)
         middle = self.scale * (2.0**self.octaves - 1.0)
@@ -57,7 +57,7 @@ class Table:
         return np.concatenate([near, far])
 
     def text(self) -> str:
-        """The table's part of the engine's file after its first line; twelve digits, far beyond `TOLERANCE`."""
+        """The text of the table in the engine's file; twelve digits, far more accurate than `TOLERANCE`."""
         head = f"range {self.curve.formation!r} {self.curve.rupture!r} {self.scale!r} {self.octaves} {self.cells}"
         numbers = np.column_stack([self.gaps, self.rows]).tolist()
         return "\n".join([head, *(" ".join(f"{number:.12g}" for number in row) for row in numbers)]) + "\n"
@@ -65,13 +65,13 @@ class Table:
 
 @lru_cache(maxsize=4096)
 def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) -> Table:
-    """Tabulate a law as finely as the tolerance of the interpolated forces asks for.
+    """Tabulate a law as finely as the tolerance of the interpolated forces requires.
 
     Raises
     ------
     UnusableLawError
-        If forces are no numbers, resistances are negative or would give energy, the rupture is no positive number or
-        closer than the formation, or no table is fine enough.
+        If forces are not numbers, resistances are negative or create energy, the rupture distance is not positive or
+        less than the formation distance, or no table is fine enough.
     """
     curve = law(surfaces)
     if not 0.0 < curve.rupture < inf:
@@ -97,7 +97,7 @@ def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) 
 
 
 def _checked(curve: Curve, gaps: FloatArray) -> FloatArray:
-    """Forces at some gaps, if they are usable."""
+    """Forces at gaps; raises `UnusableLawError` if they are unusable."""
     with np.errstate(all="ignore"):
         forces = curve.forces(gaps)
     columns = np.array(np.broadcast_to(forces.columns(), (len(gaps), len(_COLUMNS))), dtype=np.float64)
@@ -117,7 +117,7 @@ def _checked(curve: Curve, gaps: FloatArray) -> FloatArray:
 
 
 def _error(table: Table) -> tuple[float, float]:
-    """The largest relative error between rows of what the engine makes of them, and its gap (m)."""
+    """The largest relative error of the engine's interpolation between rows, and its gap (m)."""
     parts = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])
     gaps = table.within(parts)
     exact = _checked(table.curve, gaps)
@@ -126,7 +126,7 @@ def _error(table: Table) -> tuple[float, float]:
     shares = parts[:, None] ** powers @ np.linalg.inv((powers[:, None] / 3.0) ** powers)
     fours = np.lib.stride_tricks.sliding_window_view(table.rows, 4, axis=0)[::3]
     error = np.abs(np.swapaxes(fours @ shares.T, 1, 2).reshape(exact.shape) - exact)
-    # Errors count against what is near: forces fall by orders of magnitude, and some end at zero.
+    # Errors are relative to forces nearby: forces fall by orders of magnitude, and some end at zero.
     nearer = np.abs(exact[np.searchsorted(gaps, 0.5 * gaps)])
     size = np.maximum(np.maximum(nearer, np.abs(exact)), 1e-3 * np.abs(table.rows[:1]))
     relative = np.divide(error, size, out=np.zeros_like(error), where=size > 0.0).max(axis=1)
@@ -135,14 +135,14 @@ def _error(table: Table) -> tuple[float, float]:
 
 
 def bridge_tables(surfaces: Sequence[Surface], beads: Iterable[Bead]) -> str:
-    """The engine's file of a deck: a table for every two surfaces that may meet; beads of different types never do.
+    """The bridge tables of a deck: one for every two surfaces that may meet (beads of different types never meet).
 
     Parameters
     ----------
     surfaces
-        How beads of each atom type touch each other and the walls, whose type comes after theirs.
+        Contact and liquid of each atom type; the type of the walls comes last.
     beads
-        Of the deck, whose atom types are their surfaces.
+        Beads of the deck; their atom types are their surfaces.
 
     Raises
     ------

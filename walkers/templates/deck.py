@@ -47,11 +47,11 @@ LOADS_NAME = "loads.txt"
 RUN_NAME = "run.sh"
 SCALED_NAME = "bridges.scaled.txt"
 SCALE_NAME = "scale.awk"
-"""What writes the tables anew, for a tension or viscosity that was changed by hand: beside decks to be run by hand."""
+"""Script beside decks to be run by hand: rescales the tables for an edited surface tension or viscosity."""
 CONTENT_VERSION = 7
-"""Of what decks compute, by which runs are named: to be raised where a case gives other numbers.
+"""Version of what decks compute, part of the names of runs: increase it if a case gives other numbers.
 
-Decks that compute the same numbers bit for bit in other words keep it.
+Do not increase it if decks with another text give the same numbers bit for bit.
 """
 
 RESTART_NAME = "state.restart"
@@ -59,17 +59,17 @@ PREVIOUS_RESTART_NAME = "previous.restart"
 SETTLING_SECONDS = 0.05
 """Length of the segments in which beads come to rest; at the end of each we check whether they have."""
 RESTING_SEGMENTS = 3
-"""So many of them were enough in the piles that were made."""
+"""Largest number of such segments that piles needed."""
 _STIFFEST = 1e9
 """Pa; no case has stiffer contacts, but a check may."""
 _MOST_BINS = 3e7
-"""Of the largest bead's radius, into which atoms are sorted every 1,000 steps.
+"""Largest number of bins, as large as the radius of the largest bead, into which atoms are sorted every 1,000 steps.
 
-60 beads in a box of 1.5e9 took 50 times as long with the sorting as without; above 2^31 the engine refuses.
+Sorting 60 beads into 1.5e9 bins made a run 50 times slower; above 2^31 the engine refuses.
 """
 _LEAST_NEIGHBOURS = 100
 _SKIN = 2e-4
-"""m; of piles: between 0.1 and 0.3 mm it makes no difference of more than some per cent to the time of a step."""
+"""m; for piles. From 0.1 to 0.3 mm, the time per step changes by a few per cent."""
 
 
 @dataclass(frozen=True)
@@ -77,26 +77,18 @@ class Deck:
     """A deck that is ready to run."""
 
     text: str  # what LIGGGHTS reads
-    files: Mapping[str, str]  # that it reads in turn, name to text
-    layout: Layout  # what it will write
+    files: Mapping[str, str]  # further input files, name to text
+    layout: Layout  # of its output
     box: tuple[Vector, Vector]  # corners of the simulation box, m
     fastest: float  # a speed that no bead can reach by the drive, gravity and the capillary forces alone, m/s
     silence: float  # how long the engine may write nothing, s
     log_limit: float  # how large its log may become, bytes
-    beyond_limits: bool = False  # whether the time step is beyond a limit, as a case may insist
-
-
-@dataclass(frozen=True)
-class Checkpoint:
-    """Restart files of a deck: one to write at its end, one to go on from."""
-
-    write: str | None = None
-    read: str | None = None
+    beyond_limits: bool = False  # whether the time step exceeds a limit (`run.allow_unstable`)
 
 
 @dataclass(frozen=True)
 class Recording:
-    """Until which step a deck runs and how often it records, in steps; ``begin`` is where a restart goes on."""
+    """Last step of a deck and its recording intervals, in steps; ``begin`` is the step of the restart."""
 
     steps: int
     sample_every: int
@@ -109,7 +101,7 @@ class Recording:
 
 @dataclass(frozen=True)
 class Segment:
-    """A segment of a run: from a step to a step, from a restart file (unless it is the first) to the next.
+    """A segment of a run, between two steps; it begins with the restart file of the segment before, if there is one.
 
     ``drive_from`` is the step at which the drive begins; None while the beads come to rest.
     """
@@ -121,23 +113,24 @@ class Segment:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a deck is put together from."""
+    """Contents of a deck."""
 
     case: Case  # materials, liquid, contacts, drive, gravity and time step
     scene: Scene
     recording: Recording
-    walkers: tuple[PlacedWalker, ...] = ()  # which beads are whose
+    walkers: tuple[PlacedWalker, ...] = ()  # with the ids of their beads
     prescribed: bool = False  # beads keep their velocities instead of following the forces
     ranks: int = 1  # number of MPI processes
-    checkpoint: Checkpoint = Checkpoint()
-    fastest: float | None = None  # speed that no bead can reach, m/s; `fastest_of` the case if left out
+    restart_to: str | None = None  # restart file to write at the end
+    restart_from: str | None = None  # restart file to continue from
+    fastest: float | None = None  # speed that no bead can reach, m/s; default: `fastest_of` the case
     drive_from: int | None = 0  # step at which the drive begins; None for a segment before it
-    skin: float | None = None  # how far beyond contact neighbours are looked for, m; if left out, the smallest radius,
-    # and wide bins, which suits few beads far apart
+    skin: float | None = None  # search distance for neighbours beyond contact, m; default: the smallest radius, with
+    # wide bins, for few beads far apart
 
 
 def first_segment(case: Case) -> Segment:
-    """The segment that a run begins with: all of it, or the first cycles, or that in which the beads come to rest."""
+    """The first segment of a run: the whole run, its first cycles, or the first one in which the beads come to rest."""
     run = case.run
     if run.rests:
         return Segment(0, settling_steps(case), None)
@@ -145,13 +138,13 @@ def first_segment(case: Case) -> Segment:
 
 
 def whole(case: Case) -> Segment:
-    """A run at a stretch, as by hand: a rest that is enough for most piles, and the cycles that are tried first."""
+    """A run in one segment, as by hand: enough time to rest for most piles, and the cycles of the first attempt."""
     rest = RESTING_SEGMENTS * settling_steps(case) if case.run.rests else 0
     return Segment(0, rest + case.run.attempts[0] * case.run.steps_per_cycle, rest)
 
 
 def next_segment(case: Case, segment: Segment) -> Segment | None:
-    """The segment of the drive after one of the drive; None after the last one."""
+    """The next segment of the drive; None after the last one."""
     run, start = case.run, segment.drive_from or 0
     end = min(segment.end + run.cycles_per_segment * run.steps_per_cycle, start + run.steps)
     return Segment(segment.end, end, start) if end > segment.end else None
@@ -164,7 +157,7 @@ def settling_steps(case: Case) -> int:
 
 
 def render_deck(case: Case, segment: Segment | None = None) -> Deck:
-    """Render a segment of a case's run, the first one if left out.
+    """Render a segment of the run of a case; default: the first one.
 
     Numbers are in full precision: the shortest text that reads back as the same double.
     """
@@ -183,7 +176,7 @@ def render_shared_deck(cases: Sequence[Case]) -> Deck:
 
 
 def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
-    """The plan of a segment of cases that share a deck: their bodies on one boundary, recorded as the cases say."""
+    """The plan of a segment of cases that share a deck: their bodies on one boundary, with their sampling."""
     case, run = cases[0], cases[0].run
     segment = segment or first_segment(case)
     scene, walkers = place(cases)
@@ -202,7 +195,8 @@ def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
         recording=recording,
         walkers=walkers,
         ranks=run.ranks,
-        checkpoint=Checkpoint(restart, PREVIOUS_RESTART_NAME if restart and segment.begin else None),
+        restart_to=restart,
+        restart_from=PREVIOUS_RESTART_NAME if restart and segment.begin else None,
         fastest=max(fastest_of(one, scene) for one in cases),
         drive_from=segment.drive_from,
         skin=_SKIN if case.loose else None,
@@ -210,7 +204,7 @@ def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
 
 
 def compose(plan: Plan) -> Deck:
-    """Put a deck together from its blocks.
+    """Compose a deck from its blocks.
 
     Raises
     ------
@@ -227,7 +221,7 @@ def compose(plan: Plan) -> Deck:
     radii = [bead.radius for bead in scene.beads]
     smallest, largest = min(radii), max(radii)
     skin = plan.skin or smallest
-    # How many of the smallest beads there is room for within sight of the largest one, and some more.
+    # At least the number of the smallest beads that fit into the search distance of the largest one.
     sight = largest + 2.0 * smallest + skin
     most_neighbours = max(_LEAST_NEIGHBOURS, ceil((sight**3 - largest**3) / smallest**3))
     space = prod(high - low for low, high in zip(scene.lower, scene.upper, strict=True))
@@ -271,7 +265,7 @@ def compose(plan: Plan) -> Deck:
         pair_bridge_options=" ".join(PAIR_BRIDGES.values()),
         skin=skin,
         most_neighbours=most_neighbours,
-        # At most some ten thousand bins, none smaller than two beads (m).
+        # At most about ten thousand bins, none smaller than two beads (m).
         bin_size=None if plan.skin else max(4.0 * largest, (space / 2e4) ** (1.0 / 3.0)),
         wide=not plan.skin and space > _MOST_BINS * largest**3,
     )  # fmt: skip
@@ -296,7 +290,7 @@ def _loads(scene: Scene) -> str:
 
 
 def _parameters(plan: Plan, surfaces: Sequence[Surface]) -> tuple[list[Parameter], list[Parameter]]:
-    """The named parameters of a deck, and what follows from them."""
+    """The named parameters of a deck, and the values that follow from them."""
     case, recording, begin = plan.case, plan.recording, plan.drive_from
     several = len(plan.scene.loadings) > 1
     drive, of_it = of_drive(case.drive, amplitudes=begin is not None and not several)
@@ -305,7 +299,7 @@ def _parameters(plan: Plan, surfaces: Sequence[Surface]) -> tuple[list[Parameter
     given = [*drive, *time]
     if case.gravity > 0.0 and not several:
         given.append(Parameter("gravity", number(case.gravity), "m/s^2"))
-    if not plan.checkpoint.read:
+    if not plan.restart_from:
         given.append(Parameter("density", number(case.density), "kg/m^3", "of the beads"))
     given += of_contacts(case, [contact for contact, _ in surfaces])
     if len(surfaces) == 1:
@@ -314,16 +308,16 @@ def _parameters(plan: Plan, surfaces: Sequence[Surface]) -> tuple[list[Parameter
 
 
 def _run_steps(plan: Plan, named: Mapping[str, str]) -> str:
-    """The number of steps, by the parameters that it follows from."""
+    """The number of steps, as a formula of the parameters."""
     if "cycles" not in named:
         return str(plan.recording.steps)
     return f"$({'v_rest_steps+' if 'rest_steps' in named else ''}v_cycles*v_steps_per_cycle)"
 
 
 def _coefficients(contacts: Sequence[Contact], named: Collection[str], of_beads: str, of_walls: str = "") -> list[str]:
-    """A coefficient for every pair of atom types, of each surface against itself and against the walls, or its name.
+    """Values or names of a coefficient for all pairs of atom types; the walls come last.
 
-    The walls come last. Beads of different surfaces never meet.
+    Beads of different surfaces never meet.
     """
     wall, names = len(contacts), (of_beads, of_walls or of_beads)
     values = [[f"${{{name}}}" if name in named else number(getattr(one, name)) for name in names] for one in contacts]
@@ -335,7 +329,7 @@ def _coefficients(contacts: Sequence[Contact], named: Collection[str], of_beads:
 
 
 def fastest_of(case: Case, scene: Scene) -> float:
-    """Ten times the boundary's peak velocity (20 in a pile), the deepest fall, and what a bridge can give, m/s."""
+    """Ten times the boundary's peak velocity (20 in a pile), plus the speeds of the deepest fall and a bridge, m/s."""
     sizes = sorted(bead.radius for bead in scene.beads)
     mass = 4.0 / 3.0 * pi * sizes[0] ** 3 * case.density
     bridge = bridge_at_rest(case, sizes[-1], inf)

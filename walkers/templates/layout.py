@@ -8,9 +8,9 @@ from typing import Any
 BEAD_COLUMNS = ("id", "type", "radius", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz")
 """Columns of the bead dump, in the engine's names (m, m/s, rad/s)."""
 MEAN_SPIN_COLUMNS = ("f_mean_spin[1]", "f_mean_spin[2]", "f_mean_spin[3]")
-"""Further ones where there are walkers: the angular velocity, mean over the steps since the frame before (rad/s)."""
+"""Further columns for walkers: angular velocity, averaged over the steps since the last frame (rad/s)."""
 FORCE_COLUMNS = ("fx", "fy", "fz", "tqx", "tqy", "tqz")
-"""Further ones that it may have (N, N m)."""
+"""Optional further columns (N, N m)."""
 
 PAIR_BRIDGES = {
     "x1 y1 z1 x2 y2 z2": "pos",
@@ -18,9 +18,9 @@ PAIR_BRIDGES = {
     "fx fy fz": "force",
     "overlap": "delta",
 }
-"""What the engine computes of bridges between beads, in its order: columns and the option that gives them."""
+"""Output of the engine for bridges between beads, in its order: columns and the option that gives them."""
 WALL_BRIDGES = ("x", "y", "z", "bead_x", "bead_y", "bead_z", "wall", "id", "fx", "fy", "fz", "overlap")
-"""What the fix of the walls has of bridges to walls, in its order: foot, bead, number of the wall, …"""
+"""Output of the fix of the walls for bridges to walls, in its order: foot, bead, number of the wall, …"""
 PAIR_BRIDGE_COLUMNS = ("id1", "id2", "fx", "fy", "fz", "overlap")
 """Columns of the dump of bridges between beads; the force acts on bead ``id1``."""
 WALL_BRIDGE_COLUMNS = ("wall", "id", "fx", "fy", "fz", "overlap")
@@ -29,7 +29,7 @@ WALL_BRIDGE_COLUMNS = ("wall", "id", "fx", "fy", "fz", "overlap")
 
 @dataclass(frozen=True)
 class PlacedWalker:
-    """One walker of a deck: which of the case's makes of walkers it is, its beads' ids, and how it was started.
+    """One walker of a deck: number of its make in the case, ids of its beads, and its start.
 
     ``facing`` is the direction in which the first bead points, +1 along the drive axis (right) or −1 (left);
     ``start_angle`` in rad is measured from that direction; ``origin`` in m.

@@ -1,8 +1,8 @@
-"""The named parameters of a deck: lines that a reader of the deck may change, and formulas of what follows from them.
+"""The named parameters of a deck: lines that a user may edit, and formulas for the values that follow from them.
 
-LIGGGHTS puts the text of a ``string`` variable where ``${name}`` stands, and computes ``$(formula)`` in double
-precision to 20 digits, so that a deck with names computes bit for bit what one with numbers does. The value of an
-``equal`` variable is written with 15 digits.
+LIGGGHTS replaces ``${name}`` by the text of a ``string`` variable, and computes ``$(formula)`` in double precision to
+20 digits. A deck with names therefore gives the same results bit for bit as one with numbers. The value of an ``equal``
+variable would have 15 digits.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from walkers.templates.scene import Surface
 
 STATUS_LINES_PER_CYCLE = 4
 PRINTED = "parameters:"
-"""How the line begins by which the engine says what the parameters were."""
+"""Start of the line in which the engine prints the parameters."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A line of a deck: name, value (a number, or a formula in ``$()``), unit, and what is not obvious."""
+    """A line of a deck: name, value (a number, or a formula in ``$()``), unit, and a remark."""
 
     name: str
     value: str
@@ -44,12 +44,12 @@ def number(value: float) -> str:
 
 
 def suffixes(count: int) -> list[str]:
-    """What tells the names of several parameters of a kind apart: nothing if there is one."""
+    """Suffixes for the names of several parameters of a kind; empty for a single one."""
     return [""] if count == 1 else [f"_{place}" for place in range(1, count + 1)]
 
 
 def in_cycles(steps: int, steps_per_cycle: int) -> str:
-    """Steps as a multiple or a part of a cycle, where they are one."""
+    """Steps as a multiple or a part of a cycle, if possible."""
     whole, rest = divmod(steps, steps_per_cycle)
     if whole and not rest:
         return "${steps_per_cycle}" if whole == 1 else f"$({whole}*v_steps_per_cycle)"
@@ -66,7 +66,7 @@ def along(name: str, direction: Vector) -> str:
 
 
 def of_drive(drive: Drive, *, amplitudes: bool) -> tuple[list[Parameter], list[Parameter]]:
-    """What is given of a drive, and what follows from that; without ``amplitudes`` its times alone."""
+    """Given and derived parameters of a drive; without ``amplitudes`` only its times."""
     given, derived = [], []
     for end, one in zip(suffixes(len(drive.harmonics)), drive.harmonics, strict=True):
         given.append(Parameter(f"frequency{end}", number(one.frequency), "Hz"))
@@ -86,14 +86,14 @@ def of_drive(drive: Drive, *, amplitudes: bool) -> tuple[list[Parameter], list[P
 
 
 def of_time(case: Case, drive_from: int | None, steps: int, stable: float) -> tuple[list[Parameter], list[Parameter]]:
-    """What is given of the time step and of the length, and what follows from that.
+    """Given and derived parameters of the time step and of the length of the run.
 
     Parameters
     ----------
     case
-        For its run.
+        Case with the run.
     drive_from, steps
-        Step at which the drive begins, None if the length is to be no parameter; number of steps.
+        Step at which the drive begins (None: the length is not a parameter); number of steps.
     stable
         Time step below which the integration is stable, s.
     """
@@ -113,7 +113,7 @@ def of_time(case: Case, drive_from: int | None, steps: int, stable: float) -> tu
 
 
 def of_contacts(case: Case, contacts: Sequence[Contact]) -> list[Parameter]:
-    """Stiffness, damping and friction; these two where all beads have the same."""
+    """Stiffness, and damping and friction if they are the same for all beads."""
     first = contacts[0]
     softened = "softened for a longer time step; speeds agree within 1 % from 1e7 to 5e8"
     found = [Parameter("youngs_modulus", number(first.youngs_modulus), "Pa", softened)]
@@ -127,9 +127,9 @@ def of_contacts(case: Case, contacts: Sequence[Contact]) -> list[Parameter]:
 
 
 def of_liquid(surface: Surface, radius: float) -> list[Parameter]:
-    """Tension and viscosity, if pulls and resistances in the tables of the bridges are proportional to them; else none.
+    """Surface tension and viscosity, if the pulls and resistances in the bridge tables are proportional to them.
 
-    The laws that come with the program are tried for a bead of this radius (m) on a wall, whose table a deck has.
+    Built-in laws are tested with a bead of this radius (m) at a wall; other laws have no such parameters.
     """
     import numpy as np
 

@@ -1,9 +1,9 @@
 """Contents of the simulation box: beads and walls of one case, or of several cases that share a deck.
 
-An engine deck has one time step and shape of boundary, and walls that do not move where walkers of several
-cases stand on them. What may differ from walker to walker are the beads' radii, how they start, their surfaces
-(frictions and restitution) with their liquid, which become atom types, and what loads them: how the boundary leans,
-along what axes and how strongly it is shaken. Only the frequencies and phases of the drive are the same for all.
+A deck has one time step and one shape of boundary; its walls do not move if walkers of several cases stand on them.
+Walkers may differ in radii, start, surfaces (friction, restitution) and liquid, which become atom types, and in their
+loads: tilt of the boundary, axes and acceleration of the drive. Frequencies and phases of the drive are the same for
+all.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from walkers.inputs.boundary import Span, Wall
+from walkers.inputs.boundary import Wall
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
 from walkers.inputs.loads import hop_height, reach
@@ -32,14 +32,14 @@ class Bead:
     radius: float
     velocity: Vector = (0.0, 0.0, 0.0)
     spin: Vector = (0.0, 0.0, 0.0)
-    surface: int = 1  # which of the scene's ways to touch is its, from 1
-    loading: int = 0  # which of the scene's loadings it feels, from 0
-    density: float | None = None  # None for that of the case
+    surface: int = 1  # number of its surface in the scene, from 1
+    loading: int = 0  # index of its loading in the scene, from 0
+    density: float | None = None  # None: that of the case
 
 
 @dataclass(frozen=True)
 class Loading:
-    """Accelerations of a bead besides its contacts, in the frame of the boundary, m/s².
+    """Accelerations of a bead other than by contacts, in the frame of the boundary, m/s².
 
     Gravity, and the amplitude of the inertial acceleration of each harmonic of the drive.
     """
@@ -50,13 +50,13 @@ class Loading:
 
 @dataclass(frozen=True)
 class Scene:
-    """Beads, walls and the box's corners, all in m; how surfaces touch and what loads beads, each once."""
+    """Beads, walls and corners of the box, in m; and the different surfaces and loadings."""
 
     beads: tuple[Bead, ...]
     walls: tuple[Wall, ...]
     lower: Vector
     upper: Vector
-    surfaces: tuple[Surface, ...] = ()  # the case's own if left out
+    surfaces: tuple[Surface, ...] = ()  # default: that of the case
     loadings: tuple[Loading, ...] = ()
 
 
@@ -73,14 +73,14 @@ def loading_of(case: Case) -> Loading:
 
 
 def sharing_key(case: Case) -> Hashable:
-    """Cases with equal keys may share a deck: everything of the case that a deck has only once.
+    """All properties of a case that a deck has only once: cases with equal keys may share a deck.
 
-    The time step is among it. Cases whose ``"auto"`` steps differ (beads of other sizes) stay apart, so that a case is
-    integrated with the same step whoever shares the deck.
+    The time step is one of them. Cases with different ``"auto"`` steps (beads of other sizes) do not share a deck, so
+    that the step of a case does not depend on the others.
     """
     if not case.independent:
         return case
-    # Walkers that are to stand closer than their own reach would not meet the same neighbours in another company.
+    # Walkers with a spacing below their own reach would meet other neighbours in a shared deck.
     crowded = case if min(one.spacing for one in case.walkers) < 2.0 * reach(case) else None
     contact = replace(
         case.contact,
@@ -100,8 +100,8 @@ def sharing_key(case: Case) -> Hashable:
 def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
     """Place the bodies of cases that share a deck, and size the box so that no walker can leave it unnoticed.
 
-    Walkers stand on a grid, all else where the case has it. Each walker draws its start from its own random stream
-    (seed, number of the walker in its case), so that walker k is the same whoever shares the deck.
+    Walkers stand on a grid, other beads at the places in the case. Each walker draws its start from its own random
+    stream (seed, number of the walker in its case), so that walker k does not depend on the other cases.
 
     Raises
     ------
@@ -128,16 +128,16 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
             beads.append(Bead(number, centre, bead.radius, surface=surface, loading=loading))
         if one.walks:
             walkers.append(PlacedWalker(len(walkers), make, ids, one.facing, one.angle, origin))
-    room = boundary.room(_span(cases, grid, spacing))
+    room = _room(cases, grid, spacing)
     return Scene(tuple(beads), boundary.walls, *room, surfaces, loadings), tuple(walkers)
 
 
-def _span(cases: Sequence[Case], grid: Sequence[tuple[float, float]], spacing: float) -> Span:
+def _room(cases: Sequence[Case], grid: Sequence[tuple[float, float]], spacing: float) -> tuple[Vector, Vector]:
     far = max(spacing / 2.0, *(reach(case) for case in cases))
     largest = max(max(case.radii) for case in cases)
     amplitude = max(case.drive.amplitude for case in cases)
     placed = [bead for case in cases if case.placed is not None for bead in case.placed.beads]
-    return Span(
+    return cases[0].boundary.room(
         half_x=max([x for x, _ in grid] + [abs(x) for x, *_ in placed], default=0.0) + far,
         half_y=max([y for _, y in grid] + [abs(y) for _, y, *_ in placed], default=0.0) + far,
         height=10.0 * largest

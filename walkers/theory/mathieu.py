@@ -1,21 +1,21 @@
 """Alignment: whether a dimer on a substrate or a wall stays aligned with the axis of the drive.
 
-One that rolls sideways without sliding, about the line through its contacts with the substrate, turns by
+A dimer that rolls sideways without sliding, at Ω about the line through its contacts with the substrate, turns by
 ψ̇ = Ω (R1 - R2)/L with L = 2√(R1 R2). Energy and the work of the inertial force give a Mathieu equation, with ϑ = πft,
 
     d²ψ/dϑ² + [U - 4V cos 2ϑ] ψ = 0,    4V = (5/7) a0/(π² f²) (R1 - R2)/L (Σ m R)/(Σ m R²)
 
 and U = 0 on a level substrate. A steady acceleration along the axis, such as a climber's weight, gives U as the drive
-gives V. Bridges to the substrate whose resistance to rolling is Q take the power Σ Q Ω² of the energy (7/10) Σ m R² Ω²,
-which adds 2β dψ/dϑ with 2πfβ = (5/7) (Σ Q)/(Σ m R²); that between the beads takes nothing of a rigid cone. Where the
-drive is fast, U + 2V²/(1 + β²) takes the place of U - 4V cos 2ϑ (Kapitza's pendulum): a dimer on its head (U < 0)
-stands where that is positive.
+gives V. Bridges to the substrate with rolling resistance Q dissipate the power Σ Q Ω² of the energy (7/10) Σ m R² Ω²,
+which adds 2β dψ/dϑ with 2πfβ = (5/7) (Σ Q)/(Σ m R²); the bridge between the beads of a rigid cone dissipates nothing.
+For a fast drive, U + 2V²/(1 + β²) replaces U - 4V cos 2ϑ (Kapitza's pendulum): a dimer on its head (U < 0) stands if
+this is positive.
 
-The equation takes the two beads for a cone, one rigid body. They are not: each may spin about its own normal to the
-substrate, against which nothing holds it, and a contact that slides along the axis resists sideways sliding as a drag
-does only. `turning_rate` leaves all that to the beads: it is the Floquet exponent of ψ, both beads' sideways velocities
-and their spins about the drive and about the normal, linearised about the axial motion of `walkers.theory.motion`. The
-engine's dimers turn over at these rates within a per cent (docs/explanation/climbing.md).
+The equation treats the two beads as a cone, one rigid body. In fact, each bead can spin freely about its own normal to
+the substrate, and a contact that slides along the axis resists sideways sliding only as a drag does. `turning_rate`
+includes this: it is the Floquet exponent of ψ, the sideways velocities of both beads, and their spins about the drive
+and about the normal, linearised about the axial motion of `walkers.theory.motion`. Dimers in the engine turn over at
+these rates within a per cent (docs/explanation/climbing.md).
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ from walkers.theory.motion import Friction, Walker, walk
 from walkers.theory.quasistatic import FloatArray, inertia_matrix, normal_force_matrix, rolling_matrix, translation
 
 _NEUTRAL = 1e-6
-"""A growth per unit of ϑ, or a multiplier less one, that is the error of what is zero."""
+"""Growth per unit of ϑ, or multiplier minus one, that counts as zero."""
 _BANDS = 6
 """Number of stability intervals that are examined, from the lowest."""
 _SLOWEST = 1e-4
-"""A contact that slides more slowly, m/s, resists sideways sliding as much as one that slides at this."""
+"""m/s; a contact that slides more slowly resists sideways sliding as at this speed."""
 _STEPS = 256
-"""Of a cycle."""
+"""Steps per cycle."""
 _ANGLE = radians(1.0)
-"""The angle to the axis at which rolling friction is to act. It is the larger the smaller the angle, for while a bead's
-rolling along the axis reverses, only its rolling sideways is left."""
+"""Angle to the axis at which rolling friction is evaluated. Rolling friction is larger at smaller angles: while the
+rolling along the axis reverses, only sideways rolling is left."""
 
 
 @dataclass(frozen=True)
@@ -143,9 +143,9 @@ def turning(parameters: Alignment, start: float, angles: npt.ArrayLike, phase: f
     parameters, start
         U, V and β; ψ at ϑ = 0, rad.
     angles : ndarray, shape (N,)
-        ϑ = πft at which ψ (rad, of this shape) is wanted, from 0 on.
+        Increasing ϑ = πft from 0 on; the result is ψ (rad) at these.
     phase
-        Of the drive, rad; at 0 the substrate accelerates toward the large bead first.
+        Phase of the drive, rad; at 0 the substrate first accelerates toward the large bead.
     """
     from scipy.integrate import solve_ivp
 
@@ -168,9 +168,9 @@ def time_to_turn(rate: float) -> float:
 def turning_rate(case: Case) -> float | None:
     """Growth rate of small angles to the axis, 1/s; negative for decay, None if the motion is not periodic.
 
-    Each contact resists sideways sliding by c = μF/|v|, for friction is against the direction of sliding, which is the
-    axis but for a small angle, and its bridge as it does along the axis. Rolling friction resists sideways rolling by
-    μ F R/|ω| likewise, with the engine's model of constant torque; it is left out of the axial motion.
+    Each contact resists sideways sliding by c = μF/|v|, because friction is opposite to the direction of sliding, which
+    is almost along the axis; its bridge resists as along the axis. Similarly, rolling friction resists sideways rolling
+    by μ F R/|ω|, with the engine's model of constant torque; it is left out of the axial motion.
     """
     dimer, walker, friction = dimer_of(case), Walker.of_case(case), Friction.of_cases(case)
     frequency, peak, steady = case.drive.frequency, case.drive.peak_acceleration, case.axial_gravity
@@ -187,19 +187,19 @@ def turning_rate(case: Case) -> float | None:
     couples = coupling * sliding + rolling * (roll @ sliding)
     parallel = np.linalg.solve(gains, -slope - np.outer([1.0, 1.0, 0.0], pull)) - roll.T @ couples
     normal = walker.at_rest * dimer.capillary_scale + normal_force_matrix(dimer.sin_delta) @ parallel
-    normal = np.maximum(normal, 0.0)  # a contact that would open bears nothing
+    normal = np.maximum(normal, 0.0)  # an open contact has no load
     radii, masses, accelerated = np.array(dimer.radii)[:, None], np.array(dimer.masses)[:, None], translation(slope)
     spin = (translation(sliding) - sliding[:2]) / radii  # about the horizontal across the axis
     push = masses[0] * (accelerated + pull) + parallel[0]  # along the axis, of the second bead on the first
     torque = 0.4 * masses * radii * (accelerated - slope[:2]) - radii * parallel[:2] - couples[:2]  # of the other bead
-    # Against sideways sliding and, at beads' sideways speed in the mean at `_ANGLE`, rolling.
+    # Resistance to sideways sliding, and to rolling at the mean sideways speed of the beads at `_ANGLE`.
     drags = np.asarray(friction.kinetic) * normal / np.maximum(np.abs(sliding), _SLOWEST)
     speed = 5.0 / 7.0 * peak / (2.0 * pi * frequency) * _ANGLE / sqrt(2.0)
     levers, spins = np.array([*dimer.radii, dimer.reduced_radius])[:, None], np.array([*spin, spin[0] - spin[1]])
     hindered = case.contact.rolling_friction * normal * levers / np.hypot(spins, speed / levers)
     slopes = _sideways(dimer, walker.resistances, drags, hindered, spin, push, torque)
     found = _multipliers(slopes, 1.0 / (frequency * _STEPS))
-    # Beads that spin against each other about their vertical axes, as two wheels in mesh, do so for ever.
+    # Beads that spin against each other about their vertical axes, as two wheels in mesh, are not damped.
     neutral = np.abs(found - 1.0).argmin()
     if abs(found[neutral] - 1.0) < _NEUTRAL:
         found = np.delete(found, neutral)
@@ -217,10 +217,10 @@ def _sideways(
 ) -> FloatArray:
     """The linear equations of sideways motion, shape (steps, 7, 7).
 
-    Of ψ, then of each bead the velocity across the drive, then of each the spin about the drive, then about the
-    vertical. The push along the axis has a part across the drive, ψ times as large; so have the torque and the spin.
-    Contacts slide and roll across the dimer, v and q; forces -(c v + S v + C q) and couples -(C v + Q q + h q) act as
-    `walkers.physics.bridge` has it, c the drags and h what hinders rolling. SI units.
+    The variables are ψ, the velocities of the beads across the drive, their spins about the drive, and their spins
+    about the vertical. The push along the axis has a component across the drive, ψ times as large, as have the torque
+    and the spin. Contacts slide and roll across the dimer, v and q, with the forces -(c v + S v + C q) and couples -(C
+    v + Q q + h q) of `walkers.physics.bridge`; c are the drags, h the resistances to rolling. SI units.
     """
     radii, sine = np.array(dimer.radii), dimer.sin_delta
     cosine, inertias = sqrt(1.0 - sine**2), 0.4 * np.array(dimer.masses) * radii**2
@@ -234,7 +234,7 @@ def _sideways(
     slide, couple, turn = resistances[..., None]
     forces = -(drags[:, :, None] + slide) * sliding - couple * rolling
     couples = -couple * sliding - (turn + hindered[:, :, None]) * rolling
-    # Rolling friction acts against the spin across the drive as well, which the other bead's torque must overcome.
+    # Rolling friction also opposes the spin across the drive, which the torque of the other bead must overcome.
     couples[:2, :, 0] -= hindered[:2] * spin
     slopes[:, 0, 1:3] = np.array([1.0, -1.0]) / (2.0 * sqrt(radii[0] * radii[1]))
     for bead, side in enumerate((1.0, -1.0)):

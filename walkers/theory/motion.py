@@ -6,10 +6,10 @@
 
     f = S v + C q,    m = C v + Q q
 
-(`walkers.physics.bridge`); the couples press no contact. Coulomb's law
-is set-valued: a contact that sticks is held by whatever force keeps it at rest. Each step is implicit
-(`walkers.theory.stepping`), its friction forces found by a semi-smooth Newton method: sticking needs no regularisation,
-and steps are short only where a contact begins to stick or to slip.
+(`walkers.physics.bridge`); the couples do not load contacts. Coulomb's law is set-valued: the friction of a sticking
+contact is the force that keeps it at rest. Steps are implicit (`walkers.theory.stepping`) and find the friction forces
+by a semi-smooth Newton method. Sticking needs no regularisation; steps are short only where a contact begins to stick
+or to slip.
 """
 
 from __future__ import annotations
@@ -35,21 +35,21 @@ from walkers.theory.quasistatic import (
 )
 
 STEPS_PER_CYCLE = 64
-"""Within 0.01 mm/s of 1024 under Coulomb friction with the bridges' drag, 0.07 without (80 Hz, up to 11 g)."""
+"""Velocities differ from those with 1024 steps by up to 0.01 mm/s, 0.07 without bridge drag (80 Hz, up to 11 g)."""
 CYCLES = 60
 
 
 @dataclass(frozen=True)
 class Friction:
-    """F∥ = F (μ(v) sign v + κ v) at each of the three contacts; at v = 0 whatever up to F μs holds it.
+    """F∥ = F (μ(v) sign v + κ v) at each of the three contacts; at v = 0 any force up to F μs.
 
     μ(v) = μk + (μs - μk) exp(-(v/vs)²), after Stribeck. Each is a number, or an array that broadcasts to (3, N) for N
-    parameter sets: contacts 1, 2 (beads on the substrate) and 3 (bead on bead). F is that of rigid beads; the engine's
-    Coulomb limit has the damping of the contact besides, which is nothing while beads neither approach nor part.
+    parameter sets: contacts 1, 2 (beads on the substrate) and 3 (bead on bead). F is that of rigid beads; the Coulomb
+    limit of the engine includes contact damping, which vanishes while the gap is constant.
     """
 
     kinetic: npt.ArrayLike = 0.0  # μk, Coulomb's coefficient
-    static: npt.ArrayLike | None = None  # μs; μk where it is None
+    static: npt.ArrayLike | None = None  # μs; default: μk
     stribeck_velocity: float = 1e-3  # vs, m/s
     linear: npt.ArrayLike = 0.0  # κ, s/m: the paper's law
 
@@ -115,8 +115,8 @@ class Walker:
 class Motion:
     """Means of N walkers over the last cycle, m/s; over the second half of all cycles if the last two do not agree.
 
-    The velocity, positive toward the large bead, is NaN where a contact opened, for there the model does not hold, and
-    where the forces have no solution (the paper's law does not beyond some Γ0).
+    The velocity, positive toward the large bead, is NaN where a contact opened (the model does not hold) and where the
+    forces have no solution (the paper's law beyond a certain Γ0).
     """
 
     velocity: FloatArray  # shape (N,)
@@ -154,7 +154,7 @@ def walk(
     steady_acceleration
         A pull along the axis toward the small bead, m/s²: the weight of a walker that climbs with its large bead above.
     cycles, steps_per_cycle
-        Of the drive, at most (fewer for a gait that repeats itself sooner), and steps of time in each.
+        Largest number of cycles of the drive (a periodic motion ends earlier), and time steps per cycle.
     """
     require("theory")
     from walkers.theory.stepping import integrate
@@ -167,7 +167,7 @@ def walk(
     tables = _tables(walker, drive[:, 0] * steps_per_cycle)
     mean, least, repeated, solved, series = integrate(tables, law, drive, cycles, steps_per_cycle)
     velocity = translation(mean)
-    if not np.any(drive[:, 2]):  # by symmetry; what is left is the error of the steps
+    if not np.any(drive[:, 2]):  # by symmetry; the rest is the error of the steps
         velocity = np.where(walker.sin_delta == 0.0, 0.0, velocity)
     holds = solved & (least > 0.0).all(axis=0)
     return Motion(

@@ -19,21 +19,21 @@ from walkers.theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, FloatArr
 MOVING = 1e-6
 """A walker faster than this, m/s, moves."""
 GROWS = 0.05
-"""A rate, 1/s, above which small angles to the axis grow: half as large again in ten seconds."""
+"""1/s; rate above which small angles to the axis count as growing: by half in ten seconds."""
 _TRIALS = 33
 _ROUNDS = 3
 MODEL = "theory: Coulomb friction and drag"
 PAPER = f"theory: paper's fit, κ = {FRICTION_OF_THE_PAPER * 1e-3:g} s/mm"
-"""Coulomb friction with the resistance of bridges (`motion_of`); the paper's own model, of what its friction was fitted
-to (`walkers.theory.quasistatic.mean_velocity`)."""
+"""Coulomb friction with the resistance of bridges (`motion_of`); the model of the paper, for the cases to which its
+friction was fitted (`walkers.theory.quasistatic.mean_velocity`)."""
 _BEADS, _BOUNDARIES, _LIQUIDS = "ruby", ("chromium-coated glass", "glass"), ("Si AK5", "Si AK10")
 """Beads, boundaries and liquids of the paper's walkers on a level substrate (Figs. 2 to 4)."""
 
 
 def motion_of(*cases: Case, viscous: bool = True) -> Motion:
-    """The motions of cases' walkers, aligned with the drive, with the pulls that the engine gives their bridges.
+    """The motions of the walkers of cases, aligned with the drive, with the same pulls of bridges as in the engine.
 
-    If ``viscous`` the bridges' resistance to sliding and rolling acts beside friction. Errors as for `check_applies`.
+    If ``viscous``, bridges also resist sliding and rolling. Errors as for `check_applies`.
     """
     check_applies(*cases)
     return walk(
@@ -59,9 +59,9 @@ def check_applies(*cases: Case) -> None:
 
 
 def threshold(case: Case, *, viscous: bool = True) -> float:
-    """Γc: the smallest Γ0 at which a case's walker (as for `motion_of`) moves at the case's frequency.
+    """Γc: the smallest Γ0 at which the walker of a case (as for `motion_of`) moves at the frequency of the case.
 
-    To a part in ten thousand of the range in which contacts stay closed; NaN if it does not move there, and for a
+    The tolerance is 1e-4 of the range in which contacts stay closed. NaN if the walker does not move there, and for a
     symmetric dimer.
     """
     check_applies(case)
@@ -83,7 +83,7 @@ def threshold(case: Case, *, viscous: bool = True) -> float:
 
 
 def predict(case: Case) -> dict[str, Any]:
-    """What ``walkers show --theory`` prints of a case, SI units; None where the model does not hold, with the reason.
+    """The content of ``walkers show --theory``, SI units; None where the model does not hold, with the reason.
 
     Errors as for `check_applies`.
     """
@@ -156,11 +156,10 @@ def alignment_of(case: Case) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``u``, ``v``, ``damping`` (β, by the bridges) of the Mathieu equation, whether small angles are ``stable`` by it
-        and the ``largest_stable_v`` on a level substrate; ``rolling_rate``, at which they grow by it, 1/s; ``rate``, at
-        which they grow or (negative) decay where contacts may slide and beads spin, 1/s (at 1° if there is rolling
-        friction), None where the axial motion does not repeat itself; whether the dimer ``stands``;
-        ``turns_over_after``, s from 1° to 90°.
+        ``u``, ``v`` and ``damping`` (β, by the bridges) of the Mathieu equation; whether small angles are ``stable`` in
+        it; the ``largest_stable_v`` on a level substrate; ``rolling_rate``, the growth rate in it, 1/s; ``rate``, the
+        growth rate with sliding contacts and spinning beads, 1/s (negative: decay; at 1° if there is rolling friction),
+        None if the axial motion is not periodic; whether the dimer ``stands``; ``turns_over_after``, s from 1° to 90°.
     """
     drive = case.drive
     mathieu = pendulum_of(case)
@@ -190,7 +189,7 @@ def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
     ]
     if result is not None:
         rotation, sliding = result["rotation"], result["sliding"]
-        # On a slope the theory is that of walkers that go up it.
+        # On a slope, the theory is that of walkers that face uphill.
         side = "right_facing" if result["goes_uphill"] and result["right_facing"]["n"] else "velocity"
         found = {
             "velocity": result[side]["mean"],
@@ -255,15 +254,15 @@ def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, Floa
     Parameters
     ----------
     cases, column
-        N of them; ``velocity``, ``right_facing``, ``left_facing``, ``rotation_1``, ``sliding_1``, …
+        N cases; ``velocity``, ``right_facing``, ``left_facing``, ``rotation_1``, ``sliding_1``, …
 
     Returns
     -------
     predictions
-        From the name of a model to its values, m/s, shape (N,); NaN where it says nothing. Empty where no model has the
-        column, or says anything at any point.
+        Values of each model by its name, m/s, shape (N,); NaN where it does not apply. Empty if no model has the column
+        or applies to any point.
     reasons
-        Why points have none of `MODEL`, or velocities none of `PAPER`, and of how many that is so.
+        Reasons why points lack a value of `MODEL`, or velocities one of `PAPER`, with the number of points.
     """
     family, _, number = column.rpartition("_")
     is_velocity = column in ("velocity", "right_facing", "left_facing")

@@ -2,7 +2,7 @@
 
 Symbols are those of Khan et al., *Self-assembled granular walkers*: bead 1 is the large one,
 sin δ = (R1 - R2)/(R1 + R2) and μ = (m1 - m2)/M. Contacts 1 and 2 are the beads on the substrate, 3 is bead on bead; x
-points from bead 2 to bead 1. Forces are in units of 4πγR̄, so that a drive of Γ0 pulls with Γ0.
+points from bead 2 to bead 1. Forces are in units of 4πγR̄, in which the force of the drive is Γ0.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def inertia_matrix(sin_delta: npt.ArrayLike) -> FloatArray:
 def rolling_matrix(first: npt.ArrayLike, second: npt.ArrayLike) -> FloatArray:
     """The matrix H of q = H v: rolling rates (`walkers.physics.bridge`) from sliding velocities, closed contacts.
 
-    Beads of radii R1 and R2 (m, of shape …) that go at v = (v1 + v2 - v3)/2 and slide at v1 and v2 on the substrate
+    Beads of radii R1 and R2 (m, of shape …) that move at v = (v1 + v2 - v3)/2 and slide at v1 and v2 on the substrate
     have q1 = (v1 - v)/R1 and q2 = (v2 - v)/R2; on each other they have q3 = q1 - q2, the first bead as body 1. Shape
     (…, 3, 3), 1/m.
     """
@@ -87,8 +87,8 @@ class Detachment(NamedTuple):
 def detachment(sin_delta: npt.ArrayLike) -> Detachment:
     """Smallest force along the axis, in either direction, that opens a contact (equal densities), shape (…).
 
-    The friction forces that go with a steady force follow from inertia alone, so that this holds for any friction law
-    that can give them.
+    The friction forces under a steady force follow from inertia alone, so that this holds for any friction law that
+    allows them.
     """
     s = np.asarray(sin_delta, np.float64)
     with np.errstate(divide="ignore"):

@@ -1,4 +1,4 @@
-"""The implicit steps of `walkers.theory.motion`, compiled (numba): one walker after the other, each while it needs."""
+"""The implicit time steps of `walkers.theory.motion`, compiled by numba; walkers are integrated one by one."""
 
 from __future__ import annotations
 
@@ -11,23 +11,24 @@ BoolArray = npt.NDArray[np.bool_]
 Three = tuple[float, float, float]
 
 FINER, LEVELS = 8, 3
-"""A step in which a contact begins to stick or to slip is cut into 8, and of these those in which it does into 8."""
+"""A step in which a contact begins to stick or to slip is divided into 8 parts, and such a part into 8 again."""
 STAGE = 1.0 - np.sqrt(0.5)
-"""Length of either stage of an L-stable step of second order (Alexander, SIAM J. Numer. Anal. 14 (1977) 1006)."""
+"""Length of each stage of an L-stable step of second order (Alexander, SIAM J. Numer. Anal. 14 (1977) 1006)."""
 _TICKS = FINER ** (LEVELS - 1)
 _NEWTON_STEPS = 30
 _TOLERANCE = 1e-8
-"""Of the friction forces, in units of 4πγR̄."""
+"""Tolerance of the friction forces, in units of 4πγR̄."""
 _SLIDING, _PARALLEL, _NORMAL, _MODE = range(4)
-"""Rows of a walker's state: sliding velocities, friction forces, normal forces, and 0, ±1: sticking, sliding. What is
-worked with has such a state first, then a matrix and a right side."""
+"""Rows of a walker's state: sliding velocities, friction forces, normal forces, and modes (0: sticks, ±1: slides). The
+work array contains such a state, then a matrix and a right side."""
 _COAST, _GAIN, _PRESS, _LIFT, _REST = 0, 3, 6, 9, 12
 """First rows of the matrices of a walker's table."""
 _REPEATED = 1e-6
 _FAST = 3e-3
-"""Mean sliding velocities of two cycles that differ by less than 1 µm/s (of each 3 mm/s) are those of one gait."""
+"""m/s. Cycles repeat if their mean sliding velocities differ by less than 1 µm/s, or at higher speeds by 1 µm/s per
+3 mm/s."""
 _SCATTER = 10.0
-"""The error of the steps, in the same unit. Cycles of one gait may differ by it for ever; their mean is the gait's."""
+"""Error of the steps, as a multiple of that difference: cycles of one gait may differ by it; their mean is used."""
 
 
 @njit(cache=True)
@@ -39,22 +40,22 @@ def integrate(
     Parameters
     ----------
     tables : ndarray, shape (N, 3, 13, 3)
-        Of each walker, for stages of a step, of an 8th and of a 64th of it, which take h seconds each: velocities v0
-        become P v0 - h G F∥, normal forces are F0 + B P v0 + D F∥. Three rows of P, G (m/s²), D and B (s/m), and F0.
+        For each walker, and for stages (of h seconds) of a step, of an 8th and of a 64th of it: velocities v0 become
+        P v0 - h G F∥, normal forces are F0 + B P v0 + D F∥. Three rows of P, G (m/s²), D and B (s/m), and F0.
     law : ndarray, shape (N, 4, 3)
-        Of each, contact by contact: μk, μs, vs (m/s), κ (s/m).
+        μk, μs, vs (m/s), κ (s/m) of each walker and contact.
     drive : ndarray, shape (N, 3)
         Frequency (Hz), peak acceleration and steady acceleration (m/s²).
     cycles, steps
-        Cycles at most, and steps of time in each.
+        Largest number of cycles, and time steps per cycle.
 
     Returns
     -------
     mean, least : ndarray, shape (3, N)
-        Over the last cycle sliding velocities (m/s) in the mean, and the smallest normal forces.
+        Mean sliding velocities (m/s) and smallest normal forces over the last cycle.
     repeated, solved : ndarray of bool, shape (N,)
-        Whether the last two cycles agree, or the later half of all within the error of the steps (where the last two
-        do not, means are over that half), and whether friction forces that obey the law were found at every step.
+        Whether the last two cycles agree, or all cycles of the second half within the error of the steps (then means
+        are over that half); and whether friction forces that obey the law were found at every step.
     series : ndarray, shape (N, steps, 3)
         Sliding velocities through the last cycle.
     """
@@ -100,9 +101,9 @@ def _advance(  # noqa: PLR0913, PLR0917
     totals: FloatArray,
     work: FloatArray,
 ) -> bool:
-    """One step of time, in shorter ones where a contact begins to stick or to slip; state and totals in place.
+    """One time step, divided where a contact begins to stick or to slip; changes state and totals in place.
 
-    Times are parts of a cycle. Whether friction forces were found all the way.
+    Times are parts of a cycle. Returns whether friction forces were found at every stage.
     """
     tick, level, after = 0, 0, work[:4]
     while tick < _TICKS:
@@ -140,7 +141,7 @@ def _differ(one: FloatArray, other: FloatArray) -> bool:
 def _stage(
     table: FloatArray, law: FloatArray, drive: FloatArray, end: float, length: float, start: Three, work: FloatArray
 ) -> bool:
-    """An implicit Euler step from the velocities ``start``; its end replaces the state. Whether forces were found."""
+    """An implicit Euler step from the velocities ``start``, in place; returns whether forces were found."""
     seconds, state = length / drive[0], work[:4]
     push = seconds * (drive[1] * np.cos(2.0 * np.pi * end) + drive[2])
     free = _times(table, _COAST, (start[0] - push, start[1] - push, start[2]))
@@ -158,8 +159,8 @@ def _stage(
 def _settle(table: FloatArray, law: FloatArray, seconds: float, free: Three, rest: Three, work: FloatArray) -> bool:
     """Find the friction forces and modes at the end of a stage, in place, by a semi-smooth Newton method.
 
-    A contact sticks if the force that would hold it is within the limit, else it slips (Alart and Curnier, Comput.
-    Methods Appl. Mech. Eng. 92 (1991) 353). Whether they were found.
+    A contact sticks if the force that holds it is within the limit, else it slips (Alart and Curnier, Comput. Methods
+    Appl. Mech. Eng. 92 (1991) 353). Returns whether they were found.
     """
     modes, parallel, rows, right = work[_MODE], work[_PARALLEL], work[4:7], work[7]
     for _ in range(_NEWTON_STEPS):
@@ -181,7 +182,7 @@ def _settle(table: FloatArray, law: FloatArray, seconds: float, free: Three, res
                 fade *= np.exp(-((speed / law[2, at]) ** 2))
             kinetic, drag = law[0, at] + fade, normal * law[3, at]
             slope = side * kinetic + law[3, at] * speed
-            # How the force at a normal force falls with the speed, after Stribeck, and grows with it by κ.
+            # Friction force over normal force: falls with the speed (Stribeck) and grows with it by κ.
             steep = drag - 2.0 * side * normal * fade * speed / law[2, at] ** 2
             for by in range(3):
                 rows[at, by] = steep * seconds * table[_GAIN + at, by] - slope * table[_PRESS + at, by]

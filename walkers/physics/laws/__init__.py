@@ -1,9 +1,8 @@
 """Laws of liquid bridges by name: built-in laws and laws of users.
 
-A law is a function `Surfaces → Curve` (`walkers.physics.bridge`). Those that come with the program are the functions
-``law`` of the files beside this one, each with its equation and source, named as the file; another file there is
-another law. Packages bring laws by entry points ``walkers.bridge_laws``. A user's own is named by where it is,
-``package.module:function`` or ``path/to/file.py:function``.
+A law is a function `Surfaces → Curve` (`walkers.physics.bridge`). A built-in law is the function ``law`` of a file in
+this folder, with its equation and source, and has the name of the file. Packages add laws by entry points
+``walkers.bridge_laws``. A user's own law is named ``package.module:function`` or ``path/to/file.py:function``.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from typing import TYPE_CHECKING
 from walkers.packages import offers
 from walkers.physics.matter import Liquid
 
-if TYPE_CHECKING:  # numpy is not needed to know a law by its name
+if TYPE_CHECKING:  # numpy is not needed to find a law by name
     from walkers.physics.bridge import BridgeLaw
 
 LAWS = tuple(one.name.replace("_", "-") for one in iter_modules(__path__))
@@ -31,12 +30,12 @@ LAWS = tuple(one.name.replace("_", "-") for one in iter_modules(__path__))
 def by_name(name: str) -> BridgeLaw:
     """Find a law by name: one of `LAWS`, of an installed package, ``package.module:function`` or ``file.py:function``.
 
-    Files are those of the working directory.
+    Paths of files are relative to the working directory.
 
     Raises
     ------
     ValueError
-        If there is none of this name; what a user's own file or module raises is the error's cause.
+        If there is no law with this name; an error in a user's file or module is its cause.
     """
     place, _, function = name.rpartition(":")
     if name in LAWS:
@@ -55,7 +54,7 @@ def by_name(name: str) -> BridgeLaw:
 
 
 def source_sha256(name: str) -> str | None:
-    """SHA-256 of the file that a user's own law is in, None of a law that comes with the program; errors: `by_name`."""
+    """SHA-256 of the file of a user's own law, None for a built-in law; raises the errors of `by_name`."""
     if name in LAWS:
         return None
     file = getsourcefile(by_name(name))
@@ -68,7 +67,7 @@ def law_of(liquid: Liquid) -> BridgeLaw:
 
 
 def _module(name: str, place: str) -> ModuleType:
-    """A module, or a file as one, which is among the imported ones while it runs: its dataclasses look for it there."""
+    """A module, or a file as one; a file is in `sys.modules` while it runs, where its dataclasses look for it."""
     key = f"walkers_law_{Path(place).resolve()}"
     try:
         if not place.endswith(".py"):

@@ -26,7 +26,7 @@ PUBLISHED = "Rabinovich 2005"
 
 
 def lambert(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
-    """Rabinovich et al.'s without its second term, as Lambert et al. (2008) correct it: 2πRγ cos θ / (1 + h / 2d).
+    """Pull without the second term, as corrected by Lambert et al. (2008): 2πRγ cos θ / (1 + h / 2d).
 
     d, half the immersed height, from the volume: 2d/h = -1 + √(1 + 2V / πRh²) (Rabinovich et al., Eq. 20).
     Parameters and result as for `walkers.physics.laws.soulie.pull`.

@@ -1,14 +1,14 @@
 """Van der Waals attraction of dry surfaces, F = A R* / (6 (h + d0)²), without resistances.
 
-A is the Hamaker constant, for silica in vacuum 6.5e-20 J (Bergström 1997), and d0 = 0.165 nm the distance of surfaces
-that touch (Israelachvili 2011, Sec. 13.13). Nothing has to form: the attraction begins and ends at the gap at which it
-is `SMALLEST` of what it is at contact, (1/√SMALLEST - 1) d0 = 5 nm.
+A is the Hamaker constant, for silica in vacuum 6.5e-20 J (Bergström 1997), and d0 = 0.165 nm the distance of touching
+surfaces (Israelachvili 2011, Sec. 13.13). The attraction begins and ends at the gap at which it is `SMALLEST` times its
+value at contact, (1/√SMALLEST - 1) d0 = 5 nm.
 
-It is that of smooth surfaces, 0.12 mN for a bead of 0.3 mm on a plane, as much as a bridge has; asperities of some
-nanometres leave a hundredth of it or less (take a larger ``cutoff``). It changes within nanometres, of which a step of
-a simulation must be a small part.
+The law is for smooth surfaces: 0.12 mN for a bead of 0.3 mm on a plane, as much as a bridge. Asperities of a few
+nanometres reduce it to a hundredth or less (take a larger ``cutoff``). It changes within nanometres; the motion in a
+time step must be much smaller.
 
-For another constant, define a law in a file of your own (`walkers.physics.laws`):
+For another constant, define a law in your own file (`walkers.physics.laws`):
 
     law = functools.partial(walkers.physics.laws.van_der_waals.law, hamaker_constant=15e-20)
 

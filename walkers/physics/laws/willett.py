@@ -53,7 +53,7 @@ def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, 
         + t @ [0.03345, 0.04543, -0.09056] * v
         + t @ [0.0018574, 0.004456, -0.006257] * v**2
     )
-    # At contact ln s is -∞: a gap so small that the force is the one there.
+    # At contact ln s is -∞; a very small gap gives the same force.
     s = np.log(np.maximum(gaps, 1e-9 * radius) / 2.0 / sqrt(volume / radius))
     apart = np.where(gaps > 0.0, np.exp(f3 * s + f4 * s**2), 0.0)
     return 2.0 * pi * radius * np.exp(f1 - f2 * apart)

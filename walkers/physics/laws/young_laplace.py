@@ -1,10 +1,10 @@
 """The Young–Laplace equation, solved numerically: force and rupture distance, with Reynolds' resistances.
 
-The pull is that of `walkers.physics.laplace`, its closed form, for the volume and the contact angle given, between
-beads and at a plane; the bridge breaks at the largest gap at which the equation has a solution. Near rupture, the pull
-falls as the square root of the remaining gap, with an infinite slope. It is smooth in t = √(1 - h/rupture), and a
-polynomial in t through a few dozen solutions is as accurate as the equation. Polynomials are kept in the user's cache,
-by the bridge's shape: half a second is saved each time.
+The pull between beads and at a plane is the closed solution of `walkers.physics.laplace` for the given volume and
+contact angle. The bridge breaks at the largest gap at which the equation has a solution. Near rupture, the pull falls
+as the square root of the remaining gap, with an infinite slope. It is smooth in t = √(1 - h/rupture), and a polynomial
+in t through a few dozen solutions is as accurate as the equation. The user's cache keeps the polynomial of each shape
+of bridge, which saves half a second.
 
 The resistances are those of `walkers.physics.reynolds`.
 """
@@ -30,7 +30,7 @@ NODES = (24, 48, 96)
 suffices for errors below 1e-7 of the pull at contact at volumes above 1e-6 R³."""
 _Shape = tuple[float, float, float]
 _SMALL = 1e-9
-"""Of the pull at contact: the last coefficients of a polynomial that is fine enough."""
+"""Largest last coefficients of an accurate polynomial, relative to the pull at contact."""
 
 
 def law(surfaces: Surfaces) -> Curve:
@@ -84,7 +84,7 @@ def _solved(shape: _Shape) -> tuple[float, Chebyshev]:
         numbers = np.load(place)
     except (OSError, ValueError, EOFError):
         numbers = _solve(shape)
-        with suppress(OSError):  # written beside and renamed, if it can be: others may be at it
+        with suppress(OSError):  # renamed, because other processes may write it too
             place.parent.mkdir(parents=True, exist_ok=True)
             with tempfile.NamedTemporaryFile(dir=place.parent, suffix=".part", delete=False) as file:
                 np.save(file, numbers)

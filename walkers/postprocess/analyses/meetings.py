@@ -1,9 +1,9 @@
 """Analysis of walkers that may meet: meetings and their outcome, clustering and jamming.
 
-Walkers are *joined* if bridges lead from one to the other, directly or by others; those that are joined are a cluster.
-A cluster, or a walker by itself, is *held* if a bridge joins one of its beads to a side wall. A walker is *free* if it
-is neither joined nor held. A *meeting* begins with the first bridge between two walkers and ends, if it does, when the
-last one between them is gone; two that meet again have another one. *At the end* is the last tenth of the drive.
+Walkers that bridges connect, directly or through others, are *joined*: they are a cluster. A cluster, or a single
+walker, is *held* if a bridge joins one of its beads to a side wall. A walker is *free* if it is neither joined nor
+held. A *meeting* of two walkers begins with the first bridge between them and ends when the last one breaks. *At the
+end* means during the last tenth of the drive.
 """
 
 from __future__ import annotations
@@ -108,9 +108,8 @@ class Meeting:
 class Course:
     """W walkers in K frames, at least one per cycle.
 
-    ``time`` (s) has the shape (K,), ``centre`` (centre of mass, m) and ``heading`` have the shape (K, W, 2). ``size``,
-    the number of joined walkers including the walker itself, and ``held``, whether the group is joined to a side wall,
-    have the shape (K, W).
+    ``time`` (s) has the shape (K,), ``centre`` (centre of mass, m) and ``heading`` have the shape (K, W, 2); ``size``
+    (number of walkers in the cluster) and ``held`` have the shape (K, W).
     """
 
     time: FloatArray
@@ -147,7 +146,7 @@ class Meetings(Analysis):
         return {"coverage": float(f"{pi * sum(radius**2 for radius in case.all_radii) / floor:.3g}")}
 
     def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
-        """Events between recorded frames of bridges; walkers joined in the first frame have merged at that time."""
+        """Events between recorded frames of bridges; walkers that are joined in the first frame merge at that time."""
         rows: list[Meeting] = []
         before: frozenset[tuple[int, int]] = frozenset()
         centre, heading = _places(motion)
@@ -174,7 +173,7 @@ class Meetings(Analysis):
         events = [row.event for row in rows]
         run = motion.case.run
         often = max(1, run.samples_per_cycle // run.samples_per_bridge_sample)
-        # From the begin of the drive to the end, the same phase of each cycle.
+        # The same phase of each cycle of the drive.
         kept = np.arange(len(frames) - 1, -1, -often)[::-1]
         kept = kept[motion.time[frames][kept] >= 0.0]
         strobed = np.array(frames)[kept]
@@ -219,7 +218,7 @@ class Meetings(Analysis):
         ]
 
     def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
-        """The paths of all walkers."""
+        """Paths of all walkers."""
         return {"paths": [_paths(run.motion)]}
 
     def draw(self, name: str, panels: Sequence[Panel], run: Measured) -> Figure:
@@ -248,7 +247,7 @@ def _paths(motion: Motion) -> Panel:
 
 
 def _colours(count: int) -> list[str]:
-    """Distinct colours for a number of walkers."""
+    """Distinct colours of walkers."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
@@ -257,7 +256,7 @@ def _colours(count: int) -> list[str]:
 
 @styled
 def _drawn(panel: Panel, motion: Motion) -> Figure:
-    """A panel of paths with the beads at the end."""
+    """A figure of paths with the beads at the end."""
     from matplotlib.patches import Circle
 
     from walkers.postprocess.figures import draw_panel
@@ -289,9 +288,9 @@ def _places(motion: Motion) -> tuple[FloatArray, FloatArray]:
 
 
 def collective(course: Course, meetings: Sequence[Meeting], axis: FloatArray) -> dict[str, Any]:
-    """Collective quantities of a result, from the course and the meetings; None for undefined quantities.
+    """Collective quantities of a result, defined by the columns of `Meetings`; None for undefined quantities.
 
-    ``axis`` is the unit vector of the drive. See the columns of `Meetings` for what each number is.
+    ``axis`` is the unit vector of the drive.
     """
     time, last = course.time, len(course.time) - 1
     begin = min(int(np.searchsorted(time, time[-1] - _END * (time[-1] - time[0]))), last - 1)
@@ -335,7 +334,7 @@ def collective(course: Course, meetings: Sequence[Meeting], axis: FloatArray) ->
 
 
 def _lives(meetings: Sequence[Meeting], end: float) -> Iterator[tuple[Meeting, float, bool]]:
-    """Each meeting, how long the two were joined (s), and whether they parted before the end."""
+    """Each meeting, its duration (s), and whether the two separated before the end."""
     together: dict[tuple[int, int], Meeting] = {}
     for one in meetings:
         pair = one.walker, one.other

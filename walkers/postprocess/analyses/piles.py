@@ -133,7 +133,7 @@ class Pile(Analysis):
             labels = connected(len(motion.radius), bridges.beads)
             bulks.append(bulk_of(labels, bridges, heap=case.mixture is not None))
             wet.append(liquid_of_beads(motion.radius, case.liquid.volume_fraction, bridges))
-            # While the pile falls and settles, most of it is free of the rest.
+            # While the pile settles, most beads are free of the bulk.
             driven = motion.time[bridges.frame] >= 0.0
             held.append(list(held_clusters(labels, bridges, bulks[-1])) if driven else [])
             joined.append(_joined(bridges, len(motion.radius)))
@@ -167,12 +167,8 @@ class Pile(Analysis):
         }
 
     def derived_of(self, case: Case) -> dict[str, float]:
-        """Numbers of beads and the length of the drive."""
-        return {
-            "beads": case.count,
-            "large": case.large,
-            "duration": case.duration,
-        }
+        """Numbers of beads and duration of the drive."""
+        return {"beads": case.count, "large": case.large, "duration": case.duration}
 
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
         """Quantities of all climbs, of the bed, and of each climb."""
@@ -256,7 +252,7 @@ class Pile(Analysis):
         return lines + wrapped(self.uncertainty(result))
 
     def point_data(self, motion: Motion) -> Callable[[Bridges], Columns]:
-        """Cluster and track of each bead, the liquid in its bridges (m³), and whether it climbs."""
+        """Cluster and track of each bead, liquid in its bridges (m³), and whether it climbs."""
         track, climber = tracks_of(motion)
 
         def of_frame(bridges: Bridges) -> Columns:
@@ -268,7 +264,7 @@ class Pile(Analysis):
         return of_frame
 
     def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
-        """Heights of the clusters, their events, segregation and agitation; the past of the first climb's beads."""
+        """Heights and events of clusters, segregation, agitation; history of the beads of the first climb."""
         from walkers.postprocess.figures import assembly_panels, pile_panels
 
         assembly = assembly_panels(run.tables)
@@ -282,7 +278,7 @@ def _late(motion: Motion) -> BoolArray:
 
 
 def _bed_result(motion: Motion, bed: Columns, inner: Mapping[str, float | None]) -> dict[str, Any]:
-    """The bed in a result; ``inner``: beads away from walls, just before the drive."""
+    """The bed in a result; ``inner``: coordination away from walls, just before the drive."""
     first, end = motion.first_driven, motion.time[-1]
     rest = max(int(np.searchsorted(motion.time, 0.0, side="right")) - 1, 0)
     ends = ("surface", "brazil_nut")
@@ -303,7 +299,6 @@ def _bed_result(motion: Motion, bed: Columns, inner: Mapping[str, float | None])
 
 
 def _climb_row(climb: Climb) -> dict[str, Any]:
-    """A climb in a result."""
     names = ("begin", "end", "onset", "qualified", "gain", "speed", "standard_error", "leader_large", "height")
     known = {name: getattr(climb, name) for name in (*names, "size", "large")}
     finite = {name: value if np.isfinite(value) else None for name, value in known.items()}
@@ -322,7 +317,7 @@ def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
 
 
 def climbs_by(tables: Mapping[str, Columns], definition: ClimbCriteria) -> list[Climb]:
-    """Climbs in a pile by another definition, from its tables; without walls and bulk."""
+    """Climbs in a pile by another definition, from its tables; walls and bulk are not known."""
     time, members = tables["bed"]["time"], tables["members"]
     frame, bead = np.searchsorted(time, members["time"]), members["bead"]
     height = np.full((len(time), bead.max(initial=0) + 1), nan)
@@ -339,7 +334,7 @@ def climbs_by(tables: Mapping[str, Columns], definition: ClimbCriteria) -> list[
 
 
 def _members(tracks: Sequence[Track], beads: Beads) -> list[Member]:
-    """Frame by frame, and in a frame in the order of their smallest beads, as `held_clusters` finds clusters."""
+    """Rows by frame and, within a frame, in the order in which `held_clusters` finds clusters."""
     found = [
         (frame, number, sorted(own))
         for number, one in enumerate(tracks)
@@ -361,7 +356,7 @@ def _leader(climb: Mapping[str, Any]) -> str:
 
 
 def _joined(bridges: Bridges, count: int) -> Joined:
-    """Beads and walls that the bridges of a frame join."""
+    """The joined beads of a frame."""
     at_wall = np.zeros(count, dtype=np.bool_)
     at_wall[bridges.wall_beads[bridges.walls != FLOOR]] = True
     return bridges.beads.astype(np.int32), at_wall
@@ -370,12 +365,11 @@ def _joined(bridges: Bridges, count: int) -> Joined:
 def _bed(
     motion: Motion, bridges: Bridges, joined: Joined, bulk: BoolArray, liquid: FloatArray, held: Sequence[Cluster]
 ) -> Bed:
-    """The state of a pile in a frame, given its bulk, the liquid of each bead and the clusters that are held."""
+    """State of a pile in a frame from its bulk, the liquid of each bead and the held clusters."""
     frame = bridges.frame
     position, radius, large = motion.position[frame], motion.radius, motion.large
-    container = motion.case.boundary  # its cross-section is cut into cells of about four large radii
-    tops = _surface_cells(position[bulk], radius[bulk], container, 4.0 * float(radius.max()))
-    # With no bulk the floor is the surface.
+    # Cells of the cross-section are about four large radii wide. Without a bulk the floor is the surface.
+    tops = _surface_cells(position[bulk], radius[bulk], motion.case.boundary, 4.0 * float(radius.max()))
     low, middle, high = (float(value) for value in np.percentile(tops if len(tops) else [0.0], (10.0, 50.0, 90.0)))
     touching = int((bridges.gap <= 0.0).sum())
     return Bed(
@@ -403,8 +397,8 @@ def _bed(
 def coordination_of_inner(bridges: Bridges, count: int) -> dict[str, float | None]:
     """Contacts and bridges per bead to other beads, for beads without a bridge to a wall or the floor.
 
-    Beads at a wall have fewer neighbours among the beads than those within, which a small pile has few of. Told are
-    ``beads``, how many they are, and their mean ``contacts`` and ``bridges``; None where there is none.
+    Beads at a wall have fewer neighbours. The result has the number of inner ``beads`` and their mean ``contacts`` and
+    ``bridges``, None if there are none.
     """
     inner = np.ones(count, dtype=bool)
     inner[bridges.wall_beads] = False
@@ -420,11 +414,11 @@ def coordination_of_inner(bridges: Bridges, count: int) -> dict[str, float | Non
 
 
 def liquid_of_beads(radius: FloatArray, volume_fraction: float, bridges: Bridges) -> FloatArray:
-    """Liquid in the bridges of each bead, m³, shape (N,): half of that of each of its bridges, all of that at walls.
+    """Liquid in the bridges of each bead, m³, shape (N,): half of each bridge to a bead, all of a bridge to a wall.
 
-    The engine gives a bridge a share of the films of its two beads, that of the caps which they cover of each other
-    (Shi and McCarthy 2008), and half of a bead's film to a bridge with a wall, whatever other bridges it has. Caps of
-    beads that touch do not overlap, so that a frame's liquid is less than was given; the rest is on the beads.
+    A bridge between beads contains the films of the caps that the two beads cover of each other (Shi and McCarthy
+    2008); a bridge to a wall contains half of the film of its bead, independent of other bridges. Caps of touching
+    beads do not overlap, so the bridges of a frame contain only a part of the liquid; the rest is on the beads.
     """
     sizes, which = np.unique(radius, return_inverse=True)
     between = np.array([[bridge_volume_between_beads(one, other, volume_fraction) for other in sizes] for one in sizes])
@@ -437,7 +431,7 @@ def liquid_of_beads(radius: FloatArray, volume_fraction: float, bridges: Bridges
 
 
 def _surface_cells(position: FloatArray, radius: FloatArray, container: Boundary, cell: float) -> FloatArray:
-    """Height of the highest bead top in each x-y cell that has a bead, m."""
+    """Height of the highest bead top in each x-y cell with beads, m."""
     across = max(1, int(container.width / cell))
     place = np.clip(((position[:, :2] / container.width + 0.5) * across).astype(int), 0, across - 1)
     tops = np.full(across * across, -np.inf)
@@ -447,7 +441,7 @@ def _surface_cells(position: FloatArray, radius: FloatArray, container: Boundary
 
 
 def segregation(height: FloatArray, large: BoolArray) -> float:
-    """The Brazil-nut index: ⟨z⟩ of the large beads minus ⟨z⟩ of the small ones, over their sum; 0 without a class."""
+    """Brazil-nut index: ⟨z⟩ of large minus ⟨z⟩ of small beads, over their sum; 0 if a class is missing."""
     if not large.any() or large.all():
         return 0.0
     above, below = float(height[large].mean()), float(height[~large].mean())
@@ -457,18 +451,18 @@ def segregation(height: FloatArray, large: BoolArray) -> float:
 def packing_profile(
     position: FloatArray, radius: FloatArray, liquid: FloatArray, container: Boundary, layer: float
 ) -> Profile:
-    """Packing fraction and liquid against height, averaged over frames.
+    """Packing fraction and liquid fraction against height, mean over frames.
 
     Parameters
     ----------
     position : ndarray, shape (F, N, 3)
     radius : ndarray, shape (N,)
     liquid : ndarray, shape (F, N)
-        Of `liquid_of_beads`; it is taken to be where the bead's centre is.
+        Result of `liquid_of_beads`, located at the centres of the beads.
     container
-        Gives the cross-section.
+        Boundary with the cross-section.
     layer
-        Thickness of the layers, m. A sphere's volume is shared out exactly between the layers that it reaches into.
+        Thickness of the layers, m. The volume of a sphere is divided exactly between the layers.
     """
     edges = np.arange(0.0, float((position[..., 2] + radius).max()) + layer, layer)
     below = np.zeros(len(edges))

@@ -1,8 +1,8 @@
 """Analysis of walkers: velocity, rotation, sliding, orientation.
 
-The result follows the protocol of the paper: each velocity is the mean over copies, its error bar the largest minus the
-smallest, with the walkers that face left and right also apart. The copies differ only in how they start: their scatter
-says how alike they are, not what the velocity is uncertain by.
+The result follows the protocol of the paper: a velocity is the mean over copies, its error bar the largest minus the
+smallest; walkers that start facing left and right are also averaged separately. The copies differ only in how they
+start: their scatter is not an uncertainty of the velocity.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ class Walking(Analysis):
         known, makes = self.derived_of(case), [_summary(one, case) for one in rows]
         summary = {
             **_summary(tables["walkers"], case),
-            # A contact's number means another one in another make: these are of the first.
+            # The numbers of contacts differ between makes: these are those of the first make.
             **{name: makes[0][name] for name in ("rotation", "sliding", "open")},
             "walkers_met": walkers_met(groups),
             "meet": case.meets,
@@ -219,7 +219,9 @@ class Walking(Analysis):
         told = "mean orientation at the end of the run"
         yield Quantity("orientation_end", "orientation at the end", "rad", "orientation_end", told)
         for number, make in enumerate(result.get("makes", [])):
-            yield Quantity(f"makes.{number}.velocity", f"velocity of walkers with radii {_radii(make)} mm", "m/s")
+            yield Quantity(
+                f"makes.{number}.velocity", f"velocity of walkers with radii {radii_text(make['radii'])} mm", "m/s"
+            )
         yield Quantity("walkers", "walkers", column="walkers", meaning="number of walkers")
         label = f"steady walkers: both halves agree within {percent(STEADY_DIFFERENCE)}"
         yield Quantity("steady", label, column="steady", meaning=f"number of {label}")
@@ -257,7 +259,7 @@ class Walking(Analysis):
             shares = ", ".join(f"{name} {100 * open_ones[contact]:.1f} %" for contact, name in names.items())
             lines.append(f"  contacts open: {shares} of the time")
         return lines + [
-            f"  of {_radii(one)} mm  {_speed(one['velocity']['mean'])} mm/s; {_steady(one)}"
+            f"  of {radii_text(one['radii'])} mm  {_speed(one['velocity']['mean'])} mm/s; {_steady(one)}"
             for one in result.get("makes", [])
         ]
 
@@ -298,7 +300,7 @@ class Walking(Analysis):
 
 
 def _stacked(parts: list[Columns]) -> Columns:
-    """Tables one below the other; numbers that one lacks are NaN."""
+    """Concatenated tables; missing columns are NaN."""
     lengths = [len(part["walker"]) for part in parts]
     keys = dict.fromkeys(key for part in parts for key in part)
     return {
@@ -338,8 +340,8 @@ def _rows(group: Group, motion: Gait) -> WalkerRows:
 
 
 def _bridges(motion: Motion) -> Columns:
-    """Sorted by time, walker and contact."""
-    contact_of: dict[tuple[int, int], int] = {}  # of two beads, or of a bead (with −1) and a wall
+    """Rows sorted by time, walker and contact."""
+    contact_of: dict[tuple[int, int], int] = {}  # by two beads, or by a bead and −1 for a wall
     for walker in motion.walkers:
         touching = [(bead, -1) for bead in walker.beads]
         touching += [(walker.beads[one], walker.beads[other]) for one, other in motion.case.walkers[walker.make].pairs]
@@ -351,29 +353,23 @@ def _bridges(motion: Motion) -> Columns:
 
 
 def _bridge_rows(motion: Motion, bridges: Bridges, contact_of: Mapping[tuple[int, int], int]) -> BridgeRows:
-    """The rows of a frame: bridges between beads, then those to walls."""
-    pairs, walls = np.sort(bridges.beads, axis=1), len(bridges.wall_beads)
-    first = np.concatenate([pairs[:, 0], bridges.wall_beads])
-    second = np.concatenate([pairs[:, 1], np.full(walls, -1)])
-    owner, gap = motion.walker_of[first], np.concatenate([bridges.gap, bridges.wall_gap])
+    """Rows of a frame: bridges between beads, then bridges to walls."""
+    rows = bridges.rows()
+    first, second = rows["bead_1"], rows["bead_2"]
+    owner = motion.walker_of[first]
     joined = np.where(second >= 0, motion.walker_of[second], owner)
     ends = zip(first.tolist(), second.tolist(), strict=True)
     return BridgeRows(
         time=np.full(len(first), motion.time[bridges.frame]),
         walker=owner,
         contact=np.array([contact_of.get(one, 0) for one in ends], dtype=np.int64),
-        bead_1=first,
-        bead_2=second,
-        wall=np.concatenate([np.full(len(pairs), -1), bridges.walls]),
         other_walker=np.where(joined == owner, -1, joined),
-        gap=gap,
-        touching=gap <= 0.0,
-        normal_force=np.concatenate([bridges.force, bridges.wall_force]),
+        **rows,
     )
 
 
 def spread(values: FloatArray) -> dict[str, Any]:
-    """Mean, extremes and scatter (standard deviation) over copies; a single one has no scatter."""
+    """Mean, extremes and scatter (standard deviation) over copies; no scatter for a single one."""
     count = len(values)
     if count == 0:
         return {"n": 0, "mean": None, "smallest": None, "largest": None, "scatter": None}
@@ -387,13 +383,13 @@ def spread(values: FloatArray) -> dict[str, Any]:
 
 
 def _mean(values: FloatArray) -> float | None:
-    """Mean over those that have the number."""
+    """Mean of the finite values."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if len(known) else None
 
 
 def _summary(walkers: Columns, case: Case) -> dict[str, Any]:
-    """Summary of rows of the table of walkers for a result."""
+    """Result of rows of the table of walkers."""
     velocity, axial, facing = (walkers[name] for name in ("velocity", "axial_velocity", "facing"))
     turned, same = np.isfinite(walkers["turned_at"]), alike(facing, uphill=case.goes_uphill)
 
@@ -424,7 +420,7 @@ def _summary(walkers: Columns, case: Case) -> dict[str, Any]:
 
 
 def _posture(groups: Iterable[Group], walkers: Columns) -> dict[str, Any]:
-    """Numbers of walkers by posture, times of turning over (s), and final deviation of the others (rad)."""
+    """Numbers of walkers by posture, times of turning over (s), and largest final angle of the others (rad)."""
     counts = Counter(posture for group in groups for posture in postures(group))
     turned_at, end = walkers["turned_at"], np.abs(walkers["orientation_end"])
     over, kept = turned_at[np.isfinite(turned_at)], end[np.isnan(turned_at)]
@@ -436,7 +432,6 @@ def _posture(groups: Iterable[Group], walkers: Columns) -> dict[str, Any]:
 
 
 def _contact_names(group: Group) -> dict[str, str]:
-    """Names of the contacts of the first make."""
     pairs = group.make.pairs
     names = [f"bead {bead + 1}" for bead in range(len(group.radii))]
     names += ["bead on bead"] if len(pairs) == 1 else [f"beads {one + 1}-{other + 1}" for one, other in pairs]
@@ -444,20 +439,20 @@ def _contact_names(group: Group) -> dict[str, str]:
 
 
 def walkers_met(groups: Iterable[Group]) -> bool:
-    """Whether two walkers came so close that they are no longer independent replicates."""
+    """Whether two walkers came so close that they are not independent."""
     groups = list(groups)
     centre = np.concatenate([one.mass_centre[:: one.case.run.samples_per_cycle, :, :2] for one in groups], axis=1)
     return came_near(centre, NEAR * max(one.make.length for one in groups))
 
 
 def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
-    """Velocity of walkers that kept their heading."""
+    """Drive and velocity of walkers that kept their heading."""
     velocity = result["velocity"]
     toward = {0.0: "toward bead 1", None: "along the heading"}.get(result["sin_delta"], "toward the large bead")
     headline = f"{_speed(velocity['mean'])} mm/s{_band(result)}, positive {toward}"
     if velocity["n"] and abs(velocity["mean"]) < REST:
         headline = f"at rest (below {1e3 * REST:g} mm/s){_band(result)}"
-    if apart := sides_apart(result):  # the mean over both is no walker's
+    if apart := sides_apart(result):  # no walker has the mean velocity
         (first, one), (second, other) = apart.items()
         up = f"{_speed(one)} mm/s{band}" if (band := _band(result)) else _speed(one)
         headline = f"facing {first} {up}, facing {second} {_speed(other)} mm/s, positive {toward}"
@@ -465,7 +460,7 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
 
 
 def _of_sides(result: Mapping[str, Any]) -> list[str]:
-    """Velocities by direction at the start, and the numbers of walkers that turned and that are steady."""
+    """Velocities by direction at the start, and numbers of walkers that turned and that are steady."""
     if _fell(result):
         return []
     first, second = ways(uphill=result["goes_uphill"])
@@ -479,12 +474,12 @@ def _of_sides(result: Mapping[str, Any]) -> list[str]:
 
 
 def _fell(result: Mapping[str, Any]) -> bool:
-    """Whether walkers turned over on a slope: a mean with them is no walker's velocity."""
+    """Whether walkers turned over on a slope, so that no walker has the mean velocity."""
     return bool(result.get("goes_uphill") and result["turned_round"])
 
 
 def _of_fallen(result: Mapping[str, Any], drive: str) -> list[str]:
-    """Posture of walkers of which some turned over, their velocity up the slope, and that of the others."""
+    """Posture of walkers some of which turned over, velocity up the slope, and velocity of the others."""
     axial, kept = result["axial_velocity"], result["kept_heading"]
     up, down = (
         "none" if speed is None else f"{_speed(speed)} mm/s" for speed in (axial["right_facing"], axial["left_facing"])
@@ -499,7 +494,7 @@ def _of_fallen(result: Mapping[str, Any], drive: str) -> list[str]:
 
 
 def _band(result: Mapping[str, Any]) -> str:
-    """The band of the velocity, if a spread was run; of those that faced right or up, where the sides differ."""
+    """Band of the velocity from a spread; if the directions differ, that of walkers facing right or up."""
     name = "right_facing" if sides_apart(result) else "velocity"
     band = band_of(result, name, result[name]["mean"])
     if band is None:
@@ -510,7 +505,7 @@ def _band(result: Mapping[str, Any]) -> str:
 
 
 def _numerical(result: Mapping[str, Any]) -> list[str]:
-    """The numerical error of the velocity, mm/s and shares of the velocity; if it is not known, how to measure it."""
+    """Numerical error of the velocity in per cent, or in mm/s if it does not walk; if unknown, how to measure it."""
     error, own = result["numerical_error"], abs(result["velocity"]["mean"] or 0.0)
     harder = f"{STIFFER:g} times Young's modulus"
     if error is None:
@@ -525,12 +520,12 @@ def _numerical(result: Mapping[str, Any]) -> list[str]:
 
 
 def _scatter(result: Mapping[str, Any]) -> list[str]:
-    """Scatter of the copies, if there are several."""
+    """Scatter of several copies."""
     velocity, count = result["velocity"], result["velocity"]["n"]
     if count < 2 or _fell(result):
         return []
     what = "walkers" if result["meet"] or "makes" in result else "copies"
-    if apart := sides_apart(result):  # what the sides differ by is no scatter
+    if apart := sides_apart(result):  # the difference of the directions is not scatter
         sides = zip(apart, (result["right_facing"], result["left_facing"]), strict=True)
         each = [
             f"the {side['n']} {what} facing {way} {_error(side['scatter'])}"
@@ -551,7 +546,7 @@ def _headlines(result: Mapping[str, Any], drive: str) -> list[str]:
 
 
 def _told_posture(summary: Mapping[str, Any]) -> str:
-    """Angles in degrees: "upright to the end, within 0.1°"."""
+    """Postures as text: "upright to the end, within 0.1°"."""
     count = sum(summary[name] for name in POSTURES)
     within = "" if summary["ends_within"] is None else f", within {max(degrees(summary['ends_within']), 0.1):.1f}°"
     first, last = (f"{time:.2f}" for time in summary["turned_at"] or (nan, nan))
@@ -571,13 +566,8 @@ def _told_posture(summary: Mapping[str, Any]) -> str:
     )
 
 
-def _radii(make: Mapping[str, Any]) -> str:
-    """Radii of the beads of a make, mm."""
-    return radii_text(make["radii"])
-
-
 def _steady(result: Mapping[str, Any]) -> str:
-    """Number of steady walkers and reason for the end of the run, with criteria."""
+    """Number of steady walkers and reason for an early end of the run, with criteria."""
     told = f"{result['steady']} of {result['walkers']} steady (both halves agree within {percent(STEADY_DIFFERENCE)})"
     if result.get("ended_early"):
         told += f"; ended after {result['cycles']} cycles (constant within {percent(CONSTANT)})"
@@ -585,15 +575,15 @@ def _steady(result: Mapping[str, Any]) -> str:
 
 
 def _speed(value: float | None) -> str:
-    """A speed in m/s as text in mm/s: three decimals at most."""
+    """A speed (m/s) as text in mm/s."""
     return "-" if value is None else with_decimals(value * 1e3, 3)
 
 
 def _error(value: float) -> str:
-    """An error of a speed in m/s as text, in mm/s."""
+    """An error of a speed (m/s) as text in mm/s."""
     return f"{told} mm/s" if (told := _speed(value)) != "0" else "below 0.001 mm/s"
 
 
 def _angle(value: float | None) -> str:
-    """An angle in rad as text in degrees: two decimals at most."""
+    """An angle (rad) as text in degrees."""
     return "-" if value is None else with_decimals(degrees(value), 2)

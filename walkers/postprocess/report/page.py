@@ -1,7 +1,6 @@
-"""Self-contained HTML file: libraries, plots and players are packed into it; no network, no other file.
+"""Self-contained HTML file with packed libraries, plots and players: no network, no other file.
 
-A page is a list of sections, one of which is shown at a time where there is JavaScript; without it all of their tables
-can be read.
+A page is a list of sections, which JavaScript shows one at a time; without it all tables can be read.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.inputs.errors import refused
+from walkers.inputs.text import environment
 from walkers.postprocess.drawing import UNSEEN, check_place, errors_seen
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.figures import Panel
@@ -28,7 +28,6 @@ from walkers.runner.provenance import PROJECT, software
 if TYPE_CHECKING:
     from bokeh.models import Model
     from bokeh.plotting import figure as Figure  # noqa: N812
-    from jinja2 import Environment
 
 _PACKAGE = "walkers.postprocess.report"
 NAME = "report.html"
@@ -36,7 +35,7 @@ LARGEST = 5_000_000
 """Largest size of a report in bytes, small enough for mail."""
 COLOURS = ("#b0203c", "#1f3b73", "#3f7f93", "#c78a2c", "#5b6770", "#7a4a8c", "#4c8c4a", "#1d2429")
 _MARKERS = {"o": "circle", "s": "square", "^": "triangle", "v": "inverted_triangle", "D": "diamond", "x": "x"}
-"""What Bokeh calls them; others are diamonds."""
+"""Names of markers in Bokeh; others are diamonds."""
 _MOST_POINTS = 600
 """Largest number of points of a line; longer lines are thinned out."""
 
@@ -49,7 +48,7 @@ def check_report(path: Path) -> None:
 
 
 def write_page(path: Path, title: str, body: str, carried: Mapping[str, str]) -> Path:
-    """Write a page beside its place and rename it: a plain title, a body of HTML, and by id what scripts unpack."""
+    """Write a page from a plain title, a body of HTML, and packed data by id."""
     libraries = {f"library-{name}": _library(name) for name in ("bokeh", "k3d")} if carried else {}
     page = fill(
         "page.html.j2",
@@ -65,18 +64,18 @@ def write_page(path: Path, title: str, body: str, carried: Mapping[str, str]) ->
 
 
 def overhead() -> int:
-    """Bytes of a page's libraries and scripts."""
+    """Size of the libraries and scripts of a page, bytes."""
     texts = [_library("bokeh"), _library("k3d"), *_scripts(), _text(_PACKAGE, "report.css")]
     return sum(map(len, texts)) + 2000
 
 
 def fill(template: str, package: str = _PACKAGE, **values: Any) -> str:
-    """The HTML of a template; what is put in is escaped."""
-    return _environment(package).get_template(template).render(**values)
+    """The HTML of a template; values are escaped."""
+    return environment(package, _PACKAGE, html=True).get_template(template).render(**values)
 
 
 def packed_plots(plots: Model) -> str:
-    """Bokeh plots as the page carries them."""
+    """Packed Bokeh plots for a page."""
     from bokeh.embed import json_item
 
     return _packed(json.dumps(json_item(plots)))
@@ -134,7 +133,7 @@ def new_plot(title: str, x: str, y: str, *, height: int = 300, **options: Any) -
 
 
 def with_legend(plot: Figure) -> Figure:
-    """The plot with its legend beside it, by which lines can be hidden."""
+    """The plot with a legend on the right; a click hides a line."""
     if plot.legend:
         plot.add_layout(plot.legend[0], "right")
         plot.legend.click_policy = "hide"
@@ -144,7 +143,7 @@ def with_legend(plot: Figure) -> Figure:
 
 
 def error_bars(plot: Figure, x: Sequence[Any] | FloatArray, y: FloatArray, error: FloatArray) -> None:
-    """Error bars."""
+    """Draw error bars."""
     from bokeh.models import ColumnDataSource
     from bokeh.models.annotations import Whisker
 
@@ -160,7 +159,7 @@ def _packed(text: str) -> str:
 @cache
 def _library(name: str) -> str:
     if name == "k3d":
-        # Its letters are in it as woff2; the same in other formats would be looked for beside the page.
+        # It contains its font as woff2; browsers would look for the other formats beside the page.
         source = _text("k3d", "static/standalone.js")
         return _packed(re.sub(r',url\(fonts/[^)]*\) format\("(?:woff|truetype)"\)', "", source))
     from bokeh.resources import Resources
@@ -169,24 +168,9 @@ def _library(name: str) -> str:
 
 
 def _scripts() -> list[str]:
-    """What unpacks and plays."""
     return [_text("k3d", "static/fflate.js"), _text(_PACKAGE, "player.js")]
 
 
 @cache
 def _text(package: str, name: str) -> str:
     return files(package).joinpath(name).read_text("utf-8")
-
-
-@cache
-def _environment(package: str) -> Environment:
-    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
-
-    return Environment(
-        loader=ChoiceLoader([PackageLoader(package, "."), PackageLoader(_PACKAGE, ".")]),
-        undefined=StrictUndefined,
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        auto_reload=False,
-    )

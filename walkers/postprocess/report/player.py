@@ -1,8 +1,7 @@
 """Interactive 3-D player of the beads of a run: a K3D plot for reports and notebooks.
 
-Lengths are in mm, in the frame of the boundary; where a walker walks far the view moves along with it. Beads are beach
-balls, which shows how they roll, but for those whose spins are recorded too seldom to be added up
-(`walkers.postprocess.scene.turns_of`).
+Lengths are in mm, in the frame of the boundary; the view follows a walker with a long path. Two-coloured balls show how
+beads roll, unless the frames are too far apart (`walkers.postprocess.scene.turns_of`).
 """
 
 from __future__ import annotations
@@ -37,18 +36,18 @@ MOST_PLACES = 8000
 """Largest number of beads times frames in a plot, which limits its file size."""
 _FLOOR, _LINES = 0xDFE5E8, 0x9AA6AE
 _AROUND = 1.15  # extent of the view over that of the beads
-_VIEW, _ASPECT = 30.0, 1.5  # degrees, of the camera's view; width of a picture over its height, at least
-_MOST_LINES = 200.0  # on a floor
-_LANE = 1.25  # lengths of a walker between the lanes of independent ones
+_VIEW, _ASPECT = 30.0, 1.5  # angle of view, degrees; smallest ratio of width to height
+_MOST_LINES = 200.0  # largest number of lines on a floor
+_LANE = 1.25  # distance of the lanes of independent walkers, in lengths of a walker
 _GRID = 2.0**-13
-"""mm, to which places are rounded: 0.1 µm. What is rounded to powers of two can be packed."""
+"""Positions are rounded to this (mm, about 0.1 µm); multiples of a power of two can be packed."""
 
 
 @dataclass(frozen=True)
 class Player:
     """A K3D plot (a widget in notebooks), its first and last time (s), and captions.
 
-    ``cameras`` are where one may look from, by name: place, target and upward direction of a camera, mm.
+    ``cameras`` are positions, targets (mm) and upward directions of cameras, by name.
     """
 
     plot: k3d.Plot
@@ -61,7 +60,7 @@ class Player:
 def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: int = 480) -> Player:
     """The player of a run directory or of its motion, with a height in pixels.
 
-    Beads times instants are so many ``places`` at most: instants are left out evenly, and walkers if they are many.
+    ``places`` is the largest number of beads times frames; frames are left out evenly, and replicates of walkers.
     """
     require("report")
     import k3d
@@ -96,7 +95,7 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
     for part in [*boundary, *beads]:
         plot += part
     plot.fps_meter, plot.camera = False, next(iter(cameras.values()))
-    # Plays the run in so many seconds in K3D's own player, which goes by its time speed.
+    # K3D's own player plays the run in 12 s.
     plot.time = begin = float(shown.time[0])
     end = float(shown.time[-1])
     plot.time_speed = (end - begin) / 12.0 or 1.0
@@ -104,9 +103,9 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
 
 
 def cameras_of(motion: Motion, path: FloatArray | None = None) -> dict[str, list[float]]:
-    """Where to look from so that everything is in view, gravity downward: `Player.cameras`.
+    """Cameras (`Player.cameras`) that see everything, with gravity downward.
 
-    ``path`` is taken from where beads are (`walkers.postprocess.scene.Scene`).
+    ``path`` is subtracted from the positions of the beads (`walkers.postprocess.scene.Scene`).
     """
     upward = against_gravity(motion)
     first = np.array([-0.25, -1.0, 0.2]) if motion.case.boundary.closed else camera_axes(motion)[2]
@@ -125,7 +124,7 @@ def cameras_of(motion: Motion, path: FloatArray | None = None) -> dict[str, list
 
 
 def _gravity(scene: Scene) -> Any:
-    """An arrow the way of gravity, at the left edge of the first view: on the right a wall would hide it."""
+    """An arrow in the direction of gravity, at the left edge of the first view."""
     import k3d
 
     long = 0.3 * scene.height(_ASPECT)
@@ -138,7 +137,7 @@ def _gravity(scene: Scene) -> Any:
 
 
 def _thinned(motion: Motion, places: int) -> tuple[Motion, int, list[str]]:
-    """The motion of what is shown, of how many frames one is shown, and that in words."""
+    """The motion that is shown, the stride of the frames, and both as captions."""
     captions, count = [], len(motion.walkers)
     if motion.case.apart:
         firsts = {one.make: one for one in reversed(motion.walkers)}
@@ -147,7 +146,7 @@ def _thinned(motion: Motion, places: int) -> tuple[Motion, int, list[str]]:
             each = "" if len(firsts) == 1 else " of each make"
             captions.append(f"The view shows the first walker{each}; the run has {count} walkers.")
     stride, samples = ceil(len(motion.time) * len(motion.radius) / places), motion.case.run.samples_per_cycle
-    # Of a divisor of the samples in a cycle, or of whole cycles, the phases are the same in each cycle.
+    # A stride that divides a cycle, or is a multiple of one, gives the same phases in each cycle.
     divisors = (number for number in range(stride, samples + 1) if samples % number == 0)
     stride = next(divisors, ceil(stride / samples) * samples)
     if stride > 1:
@@ -159,7 +158,7 @@ def _thinned(motion: Motion, places: int) -> tuple[Motion, int, list[str]]:
 
 
 def _balls(motion: Motion, turned: FloatArray, colours: FloatArray) -> list[Any]:
-    """A ball a bead, its matrix a series in time, between whose instants K3D turns it on."""
+    """A ball per bead with a time series of matrices, which K3D interpolates."""
     import k3d
     from scipy.spatial.transform import Rotation
 
@@ -184,7 +183,7 @@ def _balls(motion: Motion, turned: FloatArray, colours: FloatArray) -> list[Any]
 
 
 def _points(motion: Motion, colours: FloatArray) -> Any:
-    """All beads as points with a size."""
+    """All beads as points of their size."""
     import k3d
 
     points = k3d.points(
@@ -201,12 +200,12 @@ def _points(motion: Motion, colours: FloatArray) -> Any:
 
 
 def _series(motion: Motion, values: FloatArray) -> dict[str, Any]:
-    """Values through time, as K3D takes them."""
+    """A time series for K3D."""
     return {f"{time:.6f}": value for time, value in zip(motion.time, values.astype(np.float32), strict=True)}
 
 
 def _walls(motion: Motion, step: float) -> list[Any]:
-    """The boundary, transparent where it is upright, and lines on a bare floor, a step (mm) apart."""
+    """The boundary, with transparent side walls, and lines on a bare floor with a spacing (mm)."""
     import k3d
 
     faces = [1e3 * corners for corners in walls_of(motion)]

@@ -32,10 +32,7 @@ Origins = tuple[Origin, ...] | None
 
 
 class RunReport:
-    """Contents of a page for its template; ``carried``: data that the scripts unpack.
-
-    The page has it in a section of its own, and in its player so many places at most (`player_of`).
-    """
+    """Contents of a section of a page; ``carried`` are the packed data, ``places`` limits the player (`player_of`)."""
 
     def __init__(
         self, directory: Path, section: str = "run", places: int = MOST_PLACES, origins: Origins = None
@@ -56,7 +53,7 @@ class RunReport:
 
 
 def report_run(directory: Path, to: Path | None = None, origins: Origins = None) -> Path:
-    """Write the report of a run as one HTML file that needs no network.
+    """Write the report of a run as a self-contained HTML file.
 
     Parameters
     ----------
@@ -68,7 +65,7 @@ def report_run(directory: Path, to: Path | None = None, origins: Origins = None)
     Raises
     ------
     InputError, postprocess.dump.DumpError
-        If the name is none of an HTML file, or there is no folder for it; if the dumps cannot be read.
+        If the file is no HTML file in an existing folder; if the dumps cannot be read.
     """
     require("report")
     path = to or directory / NAME
@@ -80,7 +77,7 @@ def report_run(directory: Path, to: Path | None = None, origins: Origins = None)
 def shown_of(case: Case, result: dict[str, Any], origins: Origins = None) -> dict[str, Any]:
     """Warnings, quantities and uncertainties of a result; summary and parameters of a case.
 
-    Of runs that did not keep where their values come from, the parameters are in SI units.
+    Parameters without recorded origins are in SI units.
     """
     parameters = [
         vars(one) | {"range": " … ".join(map(text_of, one.range or ())), "guessed": one.guessed}
