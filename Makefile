@@ -85,7 +85,7 @@ bench: setup .venv/with-dev ## Measure what docs/explanation/performance.md stat
 
 .PHONY: clean
 clean: ## Remove the environment and caches, never the runs
-	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info docs/gallery docs/reference/generated
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache build *.egg-info docs/gallery
 
 .PHONY: extras
 extras: setup .venv/with-all ## Install what reports, archives, calibrations, the theory, checks and clusters need

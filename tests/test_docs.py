@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 import walkers
-from docs._ext.generated import key_rows
+from docs._ext import generated
 from docs.illustrations import (
     ILLUSTRATIONS,
     RECORD,
@@ -34,8 +34,7 @@ from walkers.runner.files import read_json, write_json
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
-WRITTEN_BY_THE_BUILD = ("docs/gallery", "docs/reference/generated")
-PAGES = [page for page in pages_of(DOCS) if not page.relative_to(ROOT).as_posix().startswith(WRITTEN_BY_THE_BUILD)]
+PAGES = [page for page in pages_of(DOCS) if not page.is_relative_to(DOCS / "gallery")]
 
 # --- links ------------------------------------------------------------------------------------------------------------
 
@@ -147,9 +146,15 @@ def test_examples_give_what_they_say(module: str, runs_folder: Path, monkeypatch
 
 
 def test_each_key_of_a_case_file_has_its_meaning() -> None:
-    rows = key_rows()  # `KeyError` if one has none
+    rows = generated.key_rows()  # `KeyError` if one has none
     assert {"`radii`", "`friction.bead_wall`", "`gravity`"} <= {row[0] for table in rows.values() for row in table}
     assert all(meaning.endswith((".", ")", "`")) for table in rows.values() for _, meaning, _, _ in table)
+
+
+@pytest.mark.parametrize("name", generated.PAGES)
+def test_generated_pages_of_the_reference_are_todays(name: str) -> None:
+    """If this fails, run ``python -m docs._ext.generated``."""
+    assert (generated.FOLDER / f"{name}.md").read_text("utf-8") == generated.PAGES[name]()
 
 
 def test_the_table_of_performance_is_the_benchmarks() -> None:

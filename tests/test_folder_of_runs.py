@@ -87,6 +87,23 @@ def test_list_tells_by_what_runs_of_a_case_differ(out: Path) -> None:
     assert all("mm/s" in line and " Hz " in line for line in lines[:6])
 
 
+def test_a_resting_walker_is_called_so_everywhere(out: Path) -> None:
+    Path("rest.toml").write_text('case = "base.toml"\n[axes]\ndrive.peak_acceleration = ["0.2 g", "0.3 g"]\n')
+    call("sweep", "rest.toml", check=True)
+    table = walkers.load(out / "rest").table()
+    assert (table["velocity"].abs() > 0.0).all()
+    told = call("run", table["run"][0], check=True).stdout
+    assert "at rest (below 0.002 mm/s)" in told
+    for half_or_harder in ("run.time_step=1us", "contact.youngs_modulus=500MPa"):
+        assert f"    walkers run {table['run'][0]} --set {half_or_harder}\n" in told
+    assert call("list", "--all", check=True).stdout.count(" at rest ") == 2
+    shown = [repr(walkers.load(one)) for one in (table["run"][0], "rest")]
+    assert shown == [f"Run({table['run'][0]}: finished, at rest)", "Sweep(rest: 2 points, 2 finished)"]
+    head, *rows = call("list", "rest", check=True).stdout.splitlines()[2:]
+    end = head.index(" (mm/s)") + len(" (mm/s)")
+    assert [row[:end].split()[-1] for row in rows] == ["0", "0"]
+
+
 def test_list_filters_and_sorts(out: Path) -> None:
     runs = sorted(finished_places(out).values())
     for number, run in enumerate(runs):  # of a shared deck the manifests are microseconds apart
@@ -161,6 +178,13 @@ def test_compare_takes_cases_and_says_what_was_not_run(out: Path) -> None:
     same = call("compare", "base.toml", "base.toml", check=True).stdout
     assert "the cases are the same" in same
     assert "all results are the same" in same
+
+
+@pytest.mark.parametrize("sides", [["base.toml"], ["base.toml", "base.toml"]])
+def test_compare_changes_the_second_case_alone(out: Path, sides: list[str]) -> None:
+    found = json.loads(call("compare", *sides, "--set", "drive.frequency=90Hz", "--json", check=True).stdout)
+    assert {key: values[1] for key, values in found["parameters"].items()} == {"drive.frequency": 90.0}
+    assert (found["second"], found["not_run"]) == ("base.toml drive.frequency=90Hz", ["base.toml drive.frequency=90Hz"])
 
 
 def test_compare_matches_the_points_of_two_sweeps(out: Path) -> None:

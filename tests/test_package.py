@@ -142,7 +142,8 @@ def test_mandatory_packages_run_tabulate_and_draw(bare: Path, in_folder: Path) -
     table += "walkers.load('mine.toml').trajectory.shape[0])"
     assert told("python", "-c", table).split() == ["finished", "finished", "61"]
     assert told("walkers", "report", "mine.toml", status=2).splitlines()[-1] == (
-        "walkers: a report or an interactive view needs bokeh, k3d: pip install 'granular-walkers[report]'"
+        "walkers: a report or an interactive view needs bokeh, k3d: "
+        "make extras, or pip install 'granular-walkers[report]'"
     )
     assert not list(in_folder.rglob("report.html"))
 
@@ -172,7 +173,7 @@ def test_what_needs_an_extra_names_it_before_it_begins(
         monkeypatch.setitem(sys.modules, module_of(package), None)
     for use in NEEDING[extra]:
         with pytest.raises(
-            ExtraMissing, match=rf"^{EXTRAS[extra][0]} needs [\w, -]+: pip install '{OURS}\[{extra}\]'$"
+            ExtraMissing, match=rf"^{EXTRAS[extra][0]} needs [\w, -]+: make extras, or pip install '{OURS}\[{extra}\]'$"
         ):
             use(run, tmp_path)
     assert not list(tmp_path.iterdir())

@@ -259,7 +259,7 @@ def test_an_mp4_shows_a_walker_that_walks_and_a_gif_lasts_as_long_as_it_says(fil
     ruby = [(one[..., 0] > 2.0 * one[..., 1]) & (one[..., 0] > 60) for one in pictures]
     assert all(0.02 < one.mean() < 0.4 for one in ruby)
     assert (ruby[0] != ruby[-1]).mean() > 0.01
-    options = ["--size", "160x90", "--fps", "20", "--slowdown", "10", "--until", "0.05 s", "--walker", "1"]
+    options = ["--size", "160x90", "--fps", "20", "--slowdown", "10", "--end", "0.05 s", "--walker", "1"]
     call("render", "--film", str(filmed), "--to", str(tmp_path / "walk.gif"), *options, check=True)
     film = Image.open(tmp_path / "walk.gif")
     assert (film.size, film.n_frames, film.info["duration"], film.info["loop"]) == ((160, 90), 11, 50, 0)

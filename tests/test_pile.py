@@ -369,7 +369,7 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
         edges = picture.point_data.active_scalars.reshape(up, across, -1)[..., :3]
         assert all((edge == 255).all() for edge in (edges[0], edges[-1], edges[:, 0], edges[:, -1]))  # nothing is cut
     told(
-        "render", "--film", str(run), "--to", "one.gif", "--fps", "10", "--size", "64x64", "--until", "8 ms"
+        "render", "--film", str(run), "--to", "one.gif", "--fps", "10", "--size", "64x64", "--end", "8 ms"
     )  # within a frame
     film = told(
         "render", "--film", str(run), "--to", "here/box.mp4", "--fps", "10", "--size", "160x120", "--slowdown", "5"
@@ -377,7 +377,9 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(film)
     assert frames == int(50.0 * motion.time[-1]) + 1
     assert seconds == pytest.approx(5.0 * motion.time[-1], abs=0.1)
-    assert "as defined" in told("climb", str(run), "--sensitivity")
+    whole, begun = (told("climb", str(run), "--sensitivity", *cut) for cut in ([], ["--within", "1 ms"]))
+    assert "as defined" in whole
+    assert float(re.findall(r"\(0 to (\S+) with", begun)[0]) > float(re.findall(r"\(0 to (\S+) with", whole)[0])
     reader = pv.get_reader(told("export", str(run), "--to", "vtk", "--every", "4", "-o", "here/vtk"))
     driven = np.flatnonzero(motion.time >= 0.0)[::4]
     np.testing.assert_allclose(reader.time_values, motion.time[driven], atol=1e-12)
@@ -410,7 +412,7 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     upper = 3.6889 / found["seconds"]  # of no event (Garwood 1936)
     assert found["rate_interval"] == pytest.approx([0.0, upper], rel=1e-4)
     printed = call("climb", record.name, "--null", str(out), "--out", str(out), check=True).stdout
-    assert printed.count(f"runs climbed; climbs 0: 0 per run and second (0 to {upper:.2g} with 95% confidence)") == 16
+    assert printed.count(f"runs climbed; climbs 0: 0 per run and second (0 to {upper:.2g} with 95 % confidence)") == 16
     written = tmp_path / "climbs.csv"
     assert call("climb", str(out), "--to", str(written), check=True).stdout.count("0 of 2 runs climbed") == 1
     assert pd.read_csv(written)["rate_high"].to_list() == pytest.approx([upper] * 3, rel=1e-4)
@@ -478,7 +480,7 @@ def test_runs_of_different_lengths_tell_one_probability(monkeypatch: pytest.Monk
     assert found["censored"] == (begins > np.minimum(driven, 3.0)).sum()
     assert found["ended"] == (begins > driven)[driven < 3.0].sum()
     assert f"{found['ended']} ended before" in describe_climbs(found)
-    assert "95% confidence, Kaplan-Meier)" in describe_climbs(found)
+    assert "95 % confidence, Kaplan-Meier)" in describe_climbs(found)
     assert summed_up(monkeypatch, results, within=7.0)["probability"] is None
 
 

@@ -69,6 +69,12 @@ class Run:
         """Make a path of the name of a directory."""
         object.__setattr__(self, "directory", Path(self.directory))
 
+    def __repr__(self) -> str:
+        """Directory, status and result in a line."""
+        from walkers.sweeps.folder import run_text
+
+        return f"Run({self.directory}: {run_text(self._files)})"
+
     @property
     def status(self) -> str:
         """``finished``, ``running``, ``interrupted`` or ``failed``."""
@@ -288,6 +294,12 @@ class Sweep:
 
         object.__setattr__(self, "directory", Path(self.directory))
         object.__setattr__(self, "_record", read_record(self.directory))
+
+    def __repr__(self) -> str:
+        """Name and numbers of points by status in a line."""
+        from walkers.sweeps.table import describe_status
+
+        return f"Sweep({describe_status(self._record).splitlines()[0]})"
 
     @property
     def status(self) -> str:

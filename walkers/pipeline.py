@@ -274,4 +274,5 @@ def find_side(what: str | Path, out: Path = DEFAULT_OUT, changes: Mapping[str, A
         with suppress(EngineMissing):
             directory = run_place(case, find_engine(), folder)
     name = directory.name if directory and there and there.kind == "run" else str(what)
+    name = " ".join([name, *(f"{key}={value}" for key, value in (changes or {}).items())])
     return Side(name, case, directory if directory and finished_run(directory) else None)

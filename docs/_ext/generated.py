@@ -1,4 +1,9 @@
-"""Pages of the reference that the build writes to reference/generated: commands, keys, columns, library."""
+"""Pages of the reference in reference/generated: commands, keys, columns, library, shipped cases.
+
+They are tracked, so that they can be read without a build, which writes them too. After a change of what they show:
+
+    python -m docs._ext.generated
+"""
 
 from __future__ import annotations
 
@@ -33,6 +38,7 @@ if TYPE_CHECKING:
     from sphinx.config import Config
 
 MEANINGS = Path(__file__).with_name("meanings.toml")
+FOLDER = Path(__file__).parents[1] / "reference" / "generated"
 
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 _AT_REST = 1e-6  # m/s
@@ -263,11 +269,10 @@ def _commands() -> str:
 PAGES = {"commands": _commands, "tables": _keys, "library": _library, "shipped": _shipped}
 
 
-def _write(app: Sphinx, _config: Config) -> None:
-    folder = Path(app.srcdir) / "reference" / "generated"
-    folder.mkdir(parents=True, exist_ok=True)
+def _write(_app: Sphinx | None = None, _config: Config | None = None) -> None:
+    FOLDER.mkdir(parents=True, exist_ok=True)
     for name, page in PAGES.items():
-        path, text = folder / f"{name}.md", page()
+        path, text = FOLDER / f"{name}.md", page()
         if not path.exists() or path.read_text("utf-8") != text:  # else Sphinx would read it again
             path.write_text(text, "utf-8")
 
@@ -276,3 +281,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     """Write the pages before Sphinx looks for files."""
     app.connect("config-inited", _write)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+if __name__ == "__main__":
+    _write()

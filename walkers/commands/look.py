@@ -40,6 +40,8 @@ _WITHIN = "Count climbs up to this time of the drive, such as '5 s'; default: en
 _THRESHOLDS = "Print the number of climbs for other definitions of a climb."
 _PILES = "Sweeps, folders of runs, runs or cases of piles."
 _NULL = "Runs in which nothing can climb: also print their false climbs. Repeatable."
+_SECOND = "Another run or sweep, named in the same way; default: the first with the values of --set."
+_SECOND_SET = "Replace a value of the second case, such as drive.frequency=70Hz. Repeatable."
 _INTERVAL = "Pictures: time between them, such as '2 s' or 'T/4' (T: period); default: evenly over the run."
 _SLOWDOWN = "Film: slow motion factor; default: chosen so that the film lasts 5 to 10 s."
 
@@ -122,22 +124,22 @@ def render(
     settings: Set = None,
     out: Out = DEFAULT_OUT,
     to: Path | None = Option(None, help="File to write: .png; films: .mp4, .gif; default: in the run's folder."),
-    walker: int | None = Option(None, min=0, help="Number of the walker to show; default: the first, or all beads."),
+    walker: int | None = Option(None, min=0, help="Walker to show, counted from 0; default: the first, or all beads."),
     images: int | None = Option(None, min=1, max=20, help="Largest number of pictures; default: 6."),
     interval: str | None = Option(None, help=_INTERVAL),
     film: bool = Option(False, "--film", help="Render a film instead of pictures."),
     size: str | None = Option(None, help="Film: 360p, 480p, 720p, 1080p, or pixels such as 1280x720; default: 720p."),
     fps: int | None = Option(None, min=1, max=60, help="Film: frames per second; default: 25."),
     slowdown: float | None = Option(None, min=0.05, max=10000.0, help=_SLOWDOWN),
-    begin: str | None = Option(None, "--from", help="Film: physical time of the first frame, such as '0.1 s'."),
-    end: str | None = Option(None, "--until", help="Film: physical time of the last frame."),
+    begin: str | None = Option(None, help="Film: physical time of the first frame, such as '0.1 s'."),
+    end: str | None = Option(None, help="Film: physical time of the last frame."),
 ) -> None:
     """Render pictures of a run at several times, or a film with --film."""
     from walkers.postprocess.films import FilmOptions, parse_size, parse_time
     from walkers.postprocess.series import render_series, seconds_apart
     from walkers.progress import progress_of_film
 
-    of_films = {"--size": size, "--fps": fps, "--slowdown": slowdown, "--from": begin, "--until": end}
+    of_films = {"--size": size, "--fps": fps, "--slowdown": slowdown, "--begin": begin, "--end": end}
     if film:
         refuse_given({"--images": images, "--interval": interval}, "is for pictures, not for --film")
     else:
@@ -150,8 +152,8 @@ def render(
             fps=fps or 25,
             slowdown=slowdown,
             walker=walker,
-            begin=parse_time("--from", begin) if begin else 0.0,
-            end=parse_time("--until", end) if end else None,
+            begin=parse_time("--begin", begin) if begin else 0.0,
+            end=parse_time("--end", end) if end else None,
         )
         with progress_of_film(found.case.name) as advance:
             path = found.film(to, options, on_progress=advance)
@@ -186,8 +188,8 @@ def report(
 
 def compare(
     first: RunOrSweep,
-    second: RunOrSweep,
-    settings: Set = None,
+    second: str | None = Argument(None, metavar="RUN|SWEEP", help=_SECOND, autocompletion=_ANY),
+    settings: list[str] | None = Option(None, "--set", metavar="KEY=VALUE", help=_SECOND_SET),
     out: Out = DEFAULT_OUT,
     y: SweepColumn = None,
     as_json: Json = False,
@@ -198,17 +200,18 @@ def compare(
     from walkers.pipeline import find_side
     from walkers.sweeps.comparison import compare_runs, compare_sweeps
 
-    changes = changes_of(settings)
-    there = {one: placed(one, out) for one in (first, second)}
+    refuse(first, second is None and not settings, "expected a second run or sweep, or --set KEY=VALUE")
+    sides: list[tuple[str, dict[str, Any]]] = [(first, {}), (second or first, changes_of(settings))]
+    there = {one: placed(one, out) for one, _ in sides}
     sweeps = {one: place.path for one, place in there.items() if place and place.kind == "sweep"}
     if sweeps.keys() == there.keys():
-        refuse("--set", bool(changes), "is for runs and cases")
-        found = compare_sweeps(sweeps[first], sweeps[second], y)
+        refuse("--set", bool(settings), "is for runs and cases")
+        found = compare_sweeps(sweeps[first], sweeps[sides[1][0]], y)
     else:
         for one in sweeps:
             refuse(one, True, "is a sweep; expected another sweep to compare with")
         refuse("--y", y is not None, "is for sweeps")
-        found = compare_runs(*each(lambda one: find_side(one, out, changes), (first, second)))
+        found = compare_runs(*each(lambda side: find_side(side[0], out, side[1]), sides))
     print_as(as_json, lambda: found.contents, lambda: found.text)
 
 
@@ -240,11 +243,11 @@ def climb(
     lines: list[str] = []
     found: list[dict[str, Any]] = []
     if thresholds or null:
-        refuse_given({"--within": within, "--to": to}, "has no meaning with --sensitivity or --null")
+        refuse_given({"--to": to}, "has no meaning with --sensitivity or --null")
         nulls = climbing.conditions_in([find(one, out).path for one in null]) if null else []
         named = [(one.label, one) for one in conditions] + [(f"null: {one.label}".rstrip(), one) for one in nulls]
         for label, one in named:
-            found.append({"condition": label, "thresholds": climbing.sensitivity(one.runs)})
+            found.append({"condition": label, "thresholds": climbing.sensitivity(one.runs, until)})
             lines += filter(None, [label, climbing.describe_sensitivity(found[-1]["thresholds"])])
     else:
         found = [climbing.summarise(one, until) for one in conditions]

@@ -26,7 +26,7 @@ class ExtraMissing(InputError):
     """Packages of an extra that are not installed; the message says how to install them."""
 
     def __init__(self, extra: str, missing: list[str]) -> None:
-        how = f"pip install 'granular-walkers[{extra}]'"
+        how = f"make extras, or pip install 'granular-walkers[{extra}]'"
         super().__init__(EXTRAS[extra][0], [Problem("", None, f"needs {', '.join(missing)}: {how}")])
         self.args = (f"{self.source} {self.problems[0]}",)
 

@@ -14,7 +14,7 @@ SHOWN_UNITS = {
     "share": ("%", 100.0),
 }
 """For units of a result, those that are shown, and how many of them one is."""
-NOISE = {"": 1e-9, "mm/s": 1e-4, "mm": 1e-6, "°": 1e-3, "deg": 1e-3, "%": 1e-3, "nJ": 1e-6}
+NOISE = {"": 1e-9, "mm/s": 5e-4, "mm": 1e-6, "°": 1e-3, "deg": 1e-3, "%": 1e-3, "nJ": 1e-6}
 """In displayed units: smaller values are rounding errors and are printed as 0."""
 _LARGEST_WRITTEN_OUT = 1e7
 _LONGER = {"d": 86400.0, "h": 3600.0, "min": 60.0}

@@ -15,6 +15,7 @@ from walkers.inputs.reading import load_case
 from walkers.paper.published import FIG3_FIT, GRAVITY, OBSERVATIONS, Sources, described, of_asymmetry, shipped
 from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
 from walkers.postprocess.gait import gait, settled_samples
+from walkers.postprocess.sides import REST
 from walkers.theory.mathieu import Alignment, alignment, is_stable, turning
 from walkers.theory.prediction import MOVING, motion_of, pendulum_of
 from walkers.theory.quasistatic import FloatArray, detachment, translation
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
 
     from walkers.postprocess.motion import Group
 
-REST = 2e-6
-"""m/s; slower walkers are at rest."""
 SLIDES = 0.1
 """Ratio of rms sliding velocity to rms rotation velocity above which the large bead slides."""
 MODES = {

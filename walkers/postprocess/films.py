@@ -179,8 +179,8 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
     last, begin = float(motion.time[-1]), options.begin
     end = last if options.end is None else min(options.end, last)
     if not 0.0 <= begin < end:
-        message = f"nothing to show: expected times within the drive, 0 to {last:.4g} s, --from before --until"
-        raise refused("--from, --until", message)
+        message = f"nothing to show: expected times within the drive, 0 to {last:.4g} s, --begin before --end"
+        raise refused("--begin, --end", message)
     follows, slowdown = motion.follows_cycles, options.slowdown
     if slowdown is None:
         largest = _SECONDS / (end - begin)

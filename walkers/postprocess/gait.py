@@ -19,7 +19,7 @@ from walkers.inputs.case import CONSTANT
 from walkers.postprocess.analysis import read_result
 from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
 from walkers.postprocess.motion import Group, read_motion
-from walkers.postprocess.sides import STEADY_SPEED
+from walkers.postprocess.sides import REST, STEADY_SPEED
 from walkers.postprocess.tables import read_table
 
 if TYPE_CHECKING:
@@ -37,8 +37,6 @@ SEPARATED = 0.1
 """Share of the time with separated beads beyond which they are not a walker."""
 ASTRAY = np.pi / 4.0
 """Largest final angle of a walker that is on the axis, rad."""
-_LEAST_SPEED = 2e-6
-"""Difference of constant velocities that is always allowed, m/s."""
 _LITTLE, _FADING, _NO_FASTER = 0.005, 0.9, 1e-4
 """A walker of constant velocity turns by less than the first angle (rad) per cycle, and in the second half of the run
 by less than the third angle more than in the first half; or by at most the second number times what it turned before.
@@ -341,7 +339,7 @@ def _is_constant(group: Group) -> bool:
     turned = np.abs(np.diff(group.orientation[:: run.samples_per_cycle][run.settled_strobes :], axis=0))
     before, after = turned[: len(turned) // 2].max(axis=0), turned[len(turned) // 2 :].max(axis=0)
     little = (after < _LITTLE) & (after < before + _NO_FASTER)
-    allowed = max(CONSTANT * float(np.abs(found.velocity).max()), _LEAST_SPEED)
+    allowed = max(CONSTANT * float(np.abs(found.velocity).max()), REST)
     agree = np.abs(found.first_half - found.second_half).max() <= allowed
     return bool(agree and np.all(little | (after < _FADING * before)))
 

@@ -12,6 +12,8 @@ SAME = 0.05
 """Mean velocities of the two directions are printed separately if they differ by more than this share …"""
 STEADY_SPEED = 1e-5
 """… and by more than this, m/s; halves of a run that differ by less are steady."""
+REST = 2e-6
+"""m/s; slower walkers are at rest: velocities that count as constant may differ by as much."""
 
 
 def ways(*, uphill: bool) -> tuple[str, str]:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import re
+import shlex
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from walkers.inputs.library import unmeasured
+from walkers.inputs.numerical import STIFFER
 from walkers.inputs.origins import Origin
 from walkers.inputs.rounding import SHOWN_UNITS, rounded
+from walkers.runner.directory import CASE_NAME
 from walkers.runner.files import read_json
 
 SPREAD_NAME = "spread.json"
@@ -66,8 +70,10 @@ def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def wrapped(sentences: Iterable[str]) -> list[str]:
     """Sentences as indented lines of a text."""
-    wrapper = textwrap.TextWrapper(_WIDTH, "    ", "      ", break_on_hyphens=False)
-    tied = (re.sub(r"(?<=\d) (?=[%a-z])", "\u00a0", sentence) for sentence in sentences)  # a number and its unit
+    wrapper = textwrap.TextWrapper(_WIDTH, "    ", "      ", break_on_hyphens=False, break_long_words=False)
+    # A number and its unit, and a command.
+    tied = (re.sub(r"(?<=\d) (?=[%a-z])", "\u00a0", sentence) for sentence in sentences)
+    tied = (re.sub(r"walkers run .*", lambda command: command[0].replace(" ", "\u00a0"), one) for one in tied)
     return [line.replace("\u00a0", " ") for sentence in tied for line in wrapper.wrap(sentence)]
 
 
@@ -89,12 +95,23 @@ def spread_of(directory: Path) -> Path:
 
 
 def with_bands(directory: Path, result: Mapping[str, Any]) -> dict[str, Any]:
-    """A result with the ``bands`` of its quantities, if there is a spread of the run."""
-    try:
-        bands = read_json(spread_of(directory.resolve()) / SPREAD_NAME)["bands"]
-    except (OSError, ValueError, KeyError, TypeError):
-        return dict(result)
-    return {**result, "bands": bands}
+    """A result with the ``bands`` of its quantities, if a spread of the run is beside it.
+
+    If its numerical error is not measured, it also has the commands that measure it, as ``checks``.
+    """
+    known, unknown = dict(result), (OSError, ValueError, KeyError, TypeError)
+    with suppress(*unknown):
+        known["bands"] = read_json(spread_of(directory.resolve()) / SPREAD_NAME)["bands"]
+    if result.get("numerical_error") is None and not result.get("by_hand"):
+        with suppress(*unknown):  # a result that is not shown where its case is
+            case, name = read_json(directory / CASE_NAME), shlex.quote(str(directory))
+            step, modulus = case["run"]["time_step"], case["contact"]["youngs_modulus"]
+            changes = (
+                f"run.time_step={0.5e6 * step:.4g}us",
+                f"contact.youngs_modulus={1e-6 * STIFFER * modulus:.4g}MPa",
+            )
+            known["checks"] = [f"walkers run {name} --set {change}" for change in changes]
+    return known
 
 
 def band_of(result: Mapping[str, Any], name: str, own: float | None) -> tuple[float, float] | None:

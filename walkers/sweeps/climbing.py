@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from walkers.inputs.changes import dotted
 from walkers.inputs.errors import refused
+from walkers.inputs.rounding import percent
 from walkers.postprocess.analyses.piles import Pile, climbs_by
 from walkers.postprocess.analysis import tables_of
 from walkers.postprocess.clusters import Climb, ClimbCriteria
@@ -296,10 +297,10 @@ def describe_origins(found: Mapping[str, Any]) -> str:
         return ""
     return (
         f"  assembly   in {found['strangers']} of {found['climbs']} climbers no two beads were neighbours at rest; "
-        f"{found['share_of_bridges']:.0%} of the climbers' bridges existed then\n"
+        f"{100 * found['share_of_bridges']:.0f} % of the climbers' bridges existed then\n"
         f"             the last bead joined {found['whole_before']:.2f} s before the cluster came free (median)\n"
-        f"             {found['leaders_at_wall']} leaders were at a wall at rest, as were {found['share_at_wall']:.0%} "
-        f"of all beads of their size class ({_p_text(found['p_at_wall'])})"
+        f"             {found['leaders_at_wall']} leaders were at a wall at rest, as were "
+        f"{100 * found['share_at_wall']:.0f} % of all beads of their size class ({_p_text(found['p_at_wall'])})"
     )
 
 
@@ -413,8 +414,8 @@ VARIATIONS = {"min_rise": (1e-3, 2e-3, 3e-3, 5e-3), "max_gap": (0.03, 0.1, 0.2),
 _UNITS = {"min_rise": " m", "max_gap": " s"}
 
 
-def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
-    """Dependence of the climb statistics on the thresholds of a climb.
+def sensitivity(runs: Sequence[Path], within: float | None = None) -> list[dict[str, Any]]:
+    """Dependence of the climb statistics on the thresholds of a climb; ``within`` as of `summarise_climbs`.
 
     Returns
     -------
@@ -427,12 +428,13 @@ def sensitivity(runs: Sequence[Path]) -> list[dict[str, Any]]:
     tried: list[tuple[str, Any]] = [("", None)]
     tried += [(name, one) for name, ones in VARIATIONS.items() for one in ones if one != getattr(usual, name)]
     found: list[list[list[Climb]]] = [[] for _ in tried]  # by definition and run
-    seconds = 0.0
+    seconds, cut = 0.0, np.inf if within is None else within
     for run in runs:  # one at a time: their tables are large
         tables = tables_of(run)
-        seconds += max(float(tables["bed"]["time"][-1]), 0.0)
+        seconds += min(max(float(tables["bed"]["time"][-1]), 0.0), cut)
         for of_runs, (name, value) in zip(found, tried, strict=True):
-            of_runs.append(climbs_by(tables, replace(usual, **{name: value}) if name else usual))
+            climbs = climbs_by(tables, replace(usual, **{name: value}) if name else usual)
+            of_runs.append([climb for climb in climbs if climb.qualified <= cut])
     rows = []
     for of_runs, (name, value) in zip(found, tried, strict=True):
         climbs = [climb for of_run in of_runs for climb in of_run]
@@ -486,8 +488,8 @@ def describe_climbs(found: Mapping[str, Any]) -> str:
         lines += [
             *(f"    {name.replace('_', ' '):15} {_rate_text(found[name])}" for name in _PARTS),
             f"  leader     large in {found['led_by_large']} of {found['climbs']} climbs (random bead of the pile, "
-            f"{found['share_of_large']:.0%} large: {_p_text(found['p_among_beads'])}; random bead of the cluster: "
-            f"{_p_text(found['p_among_own'])})",
+            f"{100 * found['share_of_large']:.0f} % large: {_p_text(found['p_among_beads'])}; "
+            f"random bead of the cluster: {_p_text(found['p_among_own'])})",
             f"  first one  begins after {_range(found['onsets'])} s, counts after {_range(found['times'])} s",
             f"  beads      {sizes} (beads: climbs)",
             f"  height     {_range(np.array(found['heights']) * 1e3)} mm",
@@ -508,7 +510,7 @@ def _rate_text(found: Mapping[str, Any]) -> str:
 
 
 def _interval(ends: Sequence[float] | None, digits: str = ".2g", estimator: str = "") -> str:
-    text = ", ".join(filter(None, (f"{_CONFIDENCE:.0%} confidence", estimator)))
+    text = ", ".join(filter(None, (f"{percent(_CONFIDENCE)} confidence", estimator)))
     return "" if ends is None else f" ({ends[0]:{digits}} to {ends[1]:{digits}} with {text})"
 
 

@@ -24,7 +24,7 @@ from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.readable import agrees, check_wanted, differing, flattened, has_key, kind_of, readable
 from walkers.inputs.rounding import counted, duration_text, rounded
 from walkers.physics.units import Kind, parse_quantity
-from walkers.postprocess.sides import sides_apart
+from walkers.postprocess.sides import REST, sides_apart
 from walkers.postprocess.uncertainty import SPREAD_NAME
 from walkers.runner.directory import (
     CASE_NAME,
@@ -289,18 +289,28 @@ def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
         rows = [[f"{case} ({len(of_case)})", "status", "result", "age", "size", *names]]
         for run in of_case:
             status = f"{run.status}: {run.reason}" if run.reason else run.status
-            result = "-" if run.climbs is None else counted(run.climbs, "climb")
-            if run.velocity is not None:
-                sides = run.sides or {"": run.velocity}
-                told = (f"{way} {rounded(1e3 * speed, 'mm/s')}".strip() for way, speed in sides.items())
-                result = f"{', '.join(told)} mm/s"
             values = [readable(key, run.parameters.get(key)) for key in varied]
-            rows.append([run.name, status, result, duration_text(run.age), bytes_text(run.size), *values])
+            rows.append([run.name, status, _result_text(run), duration_text(run.age), bytes_text(run.size), *values])
         blocks.append(aligned(rows))
     total = [counted(len(sweeps), "sweep")] * bool(sweeps) + [counted(len(runs), "run")]
     size = bytes_text(sum(entry.size for entry in entries))
     more = f"; not shown: {hidden} runs of sweeps (--all)" if hidden else ""
     return "\n\n".join([*blocks, f"{', '.join(total)}, {size}{more}"])
+
+
+def _result_text(run: Entry) -> str:
+    """Climbs of a pile, or velocities; a dash if there is no result."""
+    if run.velocity is None:
+        return "-" if run.climbs is None else counted(run.climbs, "climb")
+    sides = run.sides or {"": run.velocity}
+    told = (f"{way} {rounded(1e3 * speed, 'mm/s')}".strip() for way, speed in sides.items())
+    return "at rest" if max(map(abs, sides.values())) < REST else f"{', '.join(told)} mm/s"
+
+
+def run_text(directory: Path) -> str:
+    """Status and result of the run in a directory, such as ``finished, 1.08 mm/s``."""
+    run = _run(directory, time.time())
+    return "missing" if run is None else f"{run.status}, {_result_text(run)}".removesuffix(", -")
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> str:

@@ -28,7 +28,7 @@ from walkers.inputs.errors import InputError, Problem, WalkersError, refused
 from walkers.inputs.library import suggestion
 from walkers.inputs.rounding import DIGITS, NOISE, SHOWN_UNITS
 from walkers.postprocess.analysis import RESULT_NAME, Described, analyses, analyses_in, analyses_of, current_result
-from walkers.postprocess.sides import differ
+from walkers.postprocess.sides import REST, differ
 from walkers.runner.binary import Engine
 from walkers.runner.directory import FAILURE_NAME, finished_run, is_locked, run_place, unfinished
 from walkers.runner.files import json_bytes, read_json, write_bytes, write_json
@@ -429,7 +429,8 @@ def short_text(frame: pd.DataFrame) -> str:
         if units.get(name) in SHOWN_UNITS:
             units[name], factor = SHOWN_UNITS[units[name]]
             values = shown[name].astype(float) * factor
-            shown[name] = values.mask(values.abs() < NOISE[units[name]], 0.0)
+            least = 1e3 * REST if units[name] == "mm/s" else NOISE[units[name]]
+            shown[name] = values.mask(values.abs() < least, 0.0)
     shown.columns = pd.Index([with_unit(name, units.get(name)) for name in shown.columns])
     return str(shown.to_string(index=False, float_format=lambda value: f"{value:.{DIGITS}g}", na_rep="-"))
 

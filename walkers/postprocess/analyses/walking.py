@@ -38,7 +38,7 @@ from walkers.postprocess.gait import (
     walk,
 )
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
-from walkers.postprocess.sides import STEADY_SPEED, alike, sides_apart, ways
+from walkers.postprocess.sides import REST, STEADY_SPEED, alike, sides_apart, ways
 from walkers.postprocess.tables import NUMBERED, Columns, columns_of
 from walkers.postprocess.uncertainty import LEAST_PER_VALUE, band_of, band_text, bands_text, wrapped
 
@@ -269,7 +269,7 @@ class Walking(Analysis):
         if result.get("bands") and (apart := sides_apart(result)):
             told = bands_text(result, {"right_facing": "m/s"}, {"right_facing": next(iter(apart.values()))})
             known = [told or "no band: the spread has that of the mean over both ways, which is no walker's velocity"]
-        return [*known, _numerical(result), *_scatter(result)]
+        return [*known, *_numerical(result), *_scatter(result)]
 
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
         """Reasons to doubt the velocity."""
@@ -450,6 +450,8 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
     velocity = result["velocity"]
     toward = {0.0: "toward bead 1", None: "along the heading"}.get(result["sin_delta"], "toward the large bead")
     headline = f"{_speed(velocity['mean'])} mm/s{_band(result)}, positive {toward}"
+    if velocity["n"] and abs(velocity["mean"]) < REST:
+        headline = f"at rest (below {1e3 * REST:g} mm/s){_band(result)}"
     if apart := sides_apart(result):  # no walker has the mean velocity
         (first, one), (second, other) = apart.items()
         up = f"{_speed(one)} mm/s{band}" if (band := _band(result)) else _speed(one)
@@ -502,17 +504,19 @@ def _band(result: Mapping[str, Any]) -> str:
     return f" ({band_text(band, 'm/s')}, 5 to 95 %{draws} over the uncertain values)"
 
 
-def _numerical(result: Mapping[str, Any]) -> str:
-    """Numerical error of the velocity in per cent, or in mm/s if it does not walk."""
+def _numerical(result: Mapping[str, Any]) -> list[str]:
+    """Numerical error of the velocity in per cent, or in mm/s if it does not walk; if unknown, how to measure it."""
     error, own = result["numerical_error"], abs(result["velocity"]["mean"] or 0.0)
     harder = f"{STIFFER:g} times Young's modulus"
     if error is None:
-        return f"numerical error: not measured for this case; run again at half the time step and with {harder}"
+        told = f"numerical error: not measured for this case; run it at half the time step and with {harder}"
+        checks = result.get("checks", [])
+        return [f"{told}, then walkers compare with the same arguments:" if checks else told, *checks]
     if own < STEADY_SPEED:
-        return f"numerical error {_error(error['total'])} (measured for this case: half the time step, {harder})"
+        return [f"numerical error {_error(error['total'])} (measured for this case: half the time step, {harder})"]
     half_step, stiffer, total = (100.0 * error[name] / own for name in ("half_step", "stiffer", "total"))
     parts = f"half the time step {half_step:+.2g} %, {harder} {stiffer:+.2g} %"
-    return f"numerical error {total:.2g} % (measured for this case: {parts})"
+    return [f"numerical error {total:.2g} % (measured for this case: {parts})"]
 
 
 def _scatter(result: Mapping[str, Any]) -> list[str]:

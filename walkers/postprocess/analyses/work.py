@@ -72,11 +72,11 @@ class Working(Analysis):
 
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
         """Work per cycle and cost of transport."""
-        del result
+        these = ", walkers facing up" if result.get("goes_uphill") else ""
         text = "work of the drive on a walker per cycle, mean over the walkers (on a slope, those facing up)"
-        yield Quantity("work", "work of the drive per cycle", "J", "work", text)
+        yield Quantity("work", f"work of the drive per cycle{these}", "J", "work", text)
         text = "power of the drive over weight times walking speed, mean over the walkers (on a slope, those facing up)"
-        yield Quantity("cost_of_transport", "cost of transport", "", "cost_of_transport", text)
+        yield Quantity("cost_of_transport", f"cost of transport{these}", "", "cost_of_transport", text)
 
     def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
         """The work on each walker, cycle by cycle."""
