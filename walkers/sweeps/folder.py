@@ -25,7 +25,7 @@ from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.readable import agrees, check_wanted, differing, flattened, has_key, kind_of, readable
 from walkers.inputs.rounding import duration_text, rounded
 from walkers.physics.units import Kind, parse_quantity
-from walkers.postprocess.sides import sides_apart
+from walkers.postprocess.sides import of_tray, sides_apart
 from walkers.postprocess.uncertainty import SPREAD_NAME
 from walkers.runner.directory import (
     CASE_NAME,
@@ -69,7 +69,8 @@ class Entry:
     age (s) counts from when it was finished or last written to; its size (bytes) is that of its files, of a sweep those
     of its runs. Its parameters are those of `walkers.inputs.readable.flattened`, of a sweep the numbers of values of
     what varies. A run gave a velocity (mean over its walkers, m/s; of those facing up a slope where ``sides`` has the
-    velocities of both sides, which differ) or climbs; a sweep has points of some statuses.
+    velocities of both sides, which differ; ``tray`` has what `of_tray` says of walkers that may meet) or climbs; a
+    sweep has points of some statuses.
     """
 
     name: str
@@ -83,6 +84,7 @@ class Entry:
     message: str | None = None
     velocity: float | None = None
     sides: Mapping[str, float] = field(default_factory=dict)
+    tray: Sequence[str] = ()
     climbs: int | None = None
     points: Mapping[str, int] | None = None
     runs: Sequence[str] = ()
@@ -150,7 +152,7 @@ def _run(path: Path, now: float) -> Entry | None:
         result = recorded_result(path)
         velocity, climbs = result.get("velocity") or {}, result.get("climbs")
         sides = sides_apart(result)
-        given = {"velocity": sides.get("up", velocity.get("mean")), "sides": sides}
+        given = {"velocity": sides.get("up", velocity.get("mean")), "sides": sides, "tray": of_tray(result)}
         given["climbs"] = None if climbs is None else len(climbs)
     return Entry(name, case_name, "finished", path, _age(path / MANIFEST_NAME, now), size, parameters, **given)
 
@@ -299,7 +301,7 @@ def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
             if run.velocity is not None:
                 sides = run.sides or {"": run.velocity}
                 told = (f"{way} {rounded(1e3 * speed, 'mm/s')}".strip() for way, speed in sides.items())
-                result = f"{', '.join(told)} mm/s"
+                result = ", ".join(run.tray[:2]) or f"{', '.join(told)} mm/s"
             values = [readable(key, run.parameters.get(key)) for key in varied]
             rows.append([run.name, status, result, duration_text(run.age), bytes_text(run.size), *values])
         blocks.append(aligned(rows))
