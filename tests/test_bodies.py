@@ -24,9 +24,11 @@ from walkers.postprocess.analyses.meetings import Course, Meeting, collective
 from walkers.postprocess.analysis import describe_result, figures_of, read_result
 from walkers.postprocess.gait import postures, turned_over_at
 from walkers.postprocess.motion import read_motion
+from walkers.postprocess.sides import of_tray
 from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import finished_places, run_place
+from walkers.sweeps.folder import as_text, inventory
 from walkers.sweeps.making import make_runs
 from walkers.templates.scene import place
 from walkers.theory.prediction import motion_of, predict
@@ -170,8 +172,18 @@ def test_walkers_on_a_tray_meet_and_stick(tmp_path: Path) -> None:
     for row in merged.itertuples():
         joined = between[(between["walker"] == row.walker) & (between["other_walker"] == row.other)]
         assert joined["time"].min() == pytest.approx(row.time)
-    assert "at the end joined" in tray.describe()
-    assert "spacing" not in tray.describe()  # a meeting is no fault here
+    told = tray.describe()
+    assert "at the end connected" in told
+    assert "spacing" not in told  # a meeting is no fault here
+    speed, *end = of_tray(tray.result)
+    assert speed == f"free walkers {1e3 * tray.result['free_speed']:.3f} mm/s"
+    assert end[1] == f"{round(9 * tray.result['clustered_share'])} of 9 connected"
+    assert told.splitlines()[1].startswith(f"  tray       {speed}; at the end {end[0]}, {end[1]}")
+    assert "facing" not in told
+    assert "not steady" not in told  # walkers that have met stop
+    assert f"{speed}, {end[0]}" in as_text(inventory(tmp_path))
+    assert of_tray({**tray.result, "free_speed": None, "slow_share": None})[0] == "no walker is free"
+    assert of_tray({**tray.result, "held_share": 1.0})[-1] == "none free"
     group = tray.motion.groups[0]
     centre = group.mass_centre[:: group.case.run.samples_per_cycle]
     speed = np.linalg.norm(np.diff(centre, axis=0), axis=-1) * group.case.drive.frequency

@@ -221,6 +221,18 @@ def test_up_in_the_picture_is_up_against_gravity(motion: Motion) -> None:
         assert toward[2] > 0.5  # nobody looks from below
 
 
+@pytest.mark.parametrize(("meet", "seen"), [(True, [-2.0, -2.0]), (False, [-2.0, 0.0])])
+def test_a_closed_tray_is_seen_from_above(meet: bool, seen: list[float], motion: Motion) -> None:
+    boundary = replace(motion.case.boundary, shape="box", width=4e-3, height=3e-3)
+    walkers = tuple(replace(one, meet=meet) for one in motion.case.walkers)
+    one = motion.of_walkers(motion.walkers[:1])
+    inside = one.position - np.array([*one.walkers[0].origin, 0.0])
+    tray = replace(one, position=inside, case=replace(one.case, boundary=boundary, walkers=walkers))
+    axes = camera_axes(tray)
+    assert axes[2, 2] == float(meet)
+    np.testing.assert_allclose(Scene.around(tray, axes, shaken=False).low[:2], seen, atol=1e-2)
+
+
 @pytest.mark.parametrize(("lengths", "follows"), [(0.0, False), (0.5, False), (40.0, True)])
 def test_the_camera_follows_a_walker_that_walks_far(lengths: float, follows: bool, motion: Motion) -> None:
     """Its beads are as large in the picture as without the way, and in the middle of it."""

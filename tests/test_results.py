@@ -15,8 +15,10 @@ from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped
 from walkers.postprocess.analyses.walking import Walking, walkers_met
 from walkers.postprocess.analyses.work import Working
 from walkers.postprocess.analysis import RESULT_NAME, current_result, describe_result, read_result
+from walkers.postprocess.figures import walk_panels
 from walkers.postprocess.gait import Averages, averages, fit_slopes, gait, gaps, settled_samples, steady_walkers, walk
 from walkers.postprocess.motion import Group, read_motion
+from walkers.postprocess.sides import sides
 from walkers.postprocess.tables import described, read_table
 from walkers.runner.directory import SEGMENTS
 from walkers.runner.files import write_json
@@ -213,6 +215,15 @@ def test_a_single_walker_has_no_scatter(run_directory: Callable[..., Path]) -> N
     result = read_result(unsettled)
     assert result["steady"] == 0
     assert "not steady" in describe_result(unsettled, result)
+
+
+def test_walkers_are_named_by_the_direction_in_which_they_face(run_directory: Callable[..., Path]) -> None:
+    degrees = np.array([0.0, 91.0, 150.0, 20.0, -175.0])
+    assert sides([1, 1, 1, -1, -1], np.radians(degrees)).tolist() == [1, 1, -1, -1, 1]
+    turned = run_directory(dimers={"angle": "150 deg"}, run={"cycles": 6, "settling_cycles": 2})
+    result, [walked, *_] = read_result(turned), walk_panels(read_motion(turned).groups)
+    assert (result["right_facing"]["n"], result["left_facing"]["n"]) == (0, 1)
+    assert walked.lines[0].label.startswith("0: left at -30°, ")
 
 
 def test_walkers_that_come_close_are_reported(moved: Group, directory: Path) -> None:

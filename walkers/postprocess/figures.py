@@ -16,7 +16,7 @@ from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, 
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.gait import averages, distance_walked, fit_slopes, gait, walk
 from walkers.postprocess.motion import Group, even_frames, even_labels
-from walkers.postprocess.sides import ways
+from walkers.postprocess.sides import sides, ways
 from walkers.postprocess.tables import Columns
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ _LEAST_DISTANCE, _LEAST_ANGLE, _LEAST_SPEED = 0.01, 0.1, 0.01
 """Smallest ranges of axes in mm, ° and mm/s, so that rounding errors do not look like motion."""
 _ASIDE, _WIDE = 10.0, 26  # smallest angle at the start (°) in a legend; letters of labels in three columns
 _SHOWN, _LONG = 8, 4.0  # images of a walker; lengths of a path beyond which they are centred on the walker
+_ALONG = "displacement along the drive axis (mm)"
 _GREY, _PALE, _OTHERS = "#5b6770", "#b4bec5", "#c78a2c"
 
 
@@ -108,9 +109,10 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
         way = (group.mass_centre[::strobe] - group.mass_centre[0]) * 1e3
         for place, walker in enumerate(group.walkers):
             number = walker.walker
-            angle = float(np.degrees(group.orientation[0, place]))
+            angle, side = float(np.degrees(group.orientation[0, place])), sides(walker.facing, walker.start_angle)
+            angle -= np.copysign(180.0, angle) if side != walker.facing else 0.0
             at = f" at {angle:.0f}°" if abs(angle) > _ASIDE else ""
-            text = f"{number}: {facing[int(walker.facing < 0)]}{at}, {velocity_text(slope[place] * 1e3)} mm/s"
+            text = f"{number}: {facing[int(side < 0)]}{at}, {velocity_text(slope[place] * 1e3)} mm/s"
             look: dict[str, Any] = {"label": text if number < MOST_NAMED else "", "colour": number}
             look["width"] = widths[len(walked)]
             walked.append(Line(time, distance[:, place] * 1e3, **look))
@@ -118,7 +120,7 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
             along, across = way[:, place] @ group.drive_axis, way[:, place] @ group.across_axis
             paths.append(Line(-across, along, **look) if uphill else Line(along, across, **look))
     begin, named = walked[-1].x[settled], named_of(len(walked))
-    names = ("across the slope (mm)", "uphill (mm)") if uphill else ("along the drive axis (mm)", "across it (mm)")
+    names = ("across the slope (mm)", "uphill (mm)") if uphill else (_ALONG, "across it (mm)")
     seen = f"{case.boundary.tilted}, seen along its normal" if case.boundary.tilted else "seen from above"
     title, y = f"Distance along the heading; grey: settling{named}", "distance walked (mm)"
     return [
@@ -138,7 +140,7 @@ def velocity_panel(case: Case, walkers: Columns) -> Panel:
     velocity, error, lines = 1e3 * walkers["velocity"], 1e3 * walkers["standard_error"], []
     for way, direction in zip((1, -1), ways(uphill=case.goes_uphill), strict=True):
         label, colour, marker = f"started facing {direction}", int(way < 0), "o" if way > 0 else "s"
-        these = walkers["facing"] == way
+        these = sides(walkers["facing"], walkers["start_angle"]) == way
         if not these.any():
             continue
         number = walkers["walker"][these]
@@ -174,7 +176,7 @@ def gait_panels(group: Group) -> list[Panel]:
     panels = [Panel(title, x, y, lines, zero=True, height=2.5, least=_LEAST_SPEED)]
     shaken = group.motion.substrate_velocity[last] @ np.array(group.case.drive.direction)
     if np.any(shaken):  # much faster than the walkers, hence in a panel of its own
-        line = Line(phase, first.facing * shaken * 1e3, colour=_GREY, dashed=True)
+        line = Line(phase, sides(first.facing, first.start_angle) * shaken * 1e3, colour=_GREY, dashed=True)
         panels.append(Panel("substrate, along the start direction", x, "velocity\n(mm/s)", [line], zero=True))
     return panels
 
@@ -362,7 +364,8 @@ def _draw_strobe(axes: Axes, group: Group) -> None:
         labels = [f"{time}\n{one:.1f} mm" for time, one in zip(labels, way, strict=True)]
     edges = float((along - radii).min() - radii.max()), float((along + radii).max() + radii.max())
     ends = -pitch * (len(shown) - 0.4), 0.6 * pitch
-    title, name = f"walker {group.walkers[0].walker}", "from the midpoint (mm)" if long else "along the drive axis (mm)"
+    name = "from the midpoint (mm)" if long else _ALONG.replace("along ", "along\n")
+    title = f"walker {group.walkers[0].walker}"
     if uphill:
         axes.set(xlim=(-ends[1], -ends[0]), ylim=edges, ylabel=name if long else "uphill (mm)")
         axes.set_xticks(pitch * np.arange(len(shown)), labels, rotation=90)

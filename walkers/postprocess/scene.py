@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.inputs.boundary import Flat
+from walkers.inputs.case import Case
 from walkers.postprocess.analyses.piles import Pile, tracks_of
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, boundary_motion
@@ -119,8 +120,8 @@ class Scene:
         seen, radius = 1e3 * seen @ axes.T, 1e3 * motion.radius[:, None]
         low, high = (seen - radius).min(axis=(0, 1)), (seen + radius).max(axis=(0, 1))
         if motion.case.boundary.closed and path is None:
-            half = 1e3 * motion.case.boundary.width / 2.0
-            low[:2], high[0] = np.minimum(low[:2], [-half, 0.0]), max(high[0], half)
+            half = 5e2 * motion.case.boundary.width * np.array([1.0, axes[2, 2] > 0.5])  # from above also across
+            low[:2], high[:2] = np.minimum(low[:2], -half), np.maximum(high[:2], half)
         wider = (share - 1.0) / 2.0 * (high - low)
         return cls(motion, axes, low - wider, high + wider, **options)
 
@@ -201,17 +202,25 @@ def axes_toward(toward: FloatArray, upward: FloatArray) -> FloatArray:
     return np.array([np.cross(up, toward), up, toward])
 
 
+def from_the_side(case: Case) -> bool:
+    """Whether a run is seen from the side: in a container, but on a tray, where walkers would hide one another."""
+    return case.boundary.closed and (case.loose or not case.meets)
+
+
 def camera_axes(motion: Motion) -> FloatArray:
     """The axes (`axes_toward`) of films and players, in the frame of the boundary.
 
-    Containers are seen from the side. Floors are seen obliquely from above, from the right of the drive axis or, if
-    tilted, of the uphill direction. Up in the picture is against gravity.
+    Containers are seen from the side, closed trays along their normal (`from_the_side`). Open floors are seen obliquely
+    from above, from the right of the drive axis or, if tilted, of the uphill direction. Up in the picture is against
+    gravity, on closed trays y or uphill.
     """
     case = motion.case
     boundary, along = case.boundary, np.array(case.drive_axis)
     uphill = np.array([cos(boundary.uphill), sin(boundary.uphill), 0.0])
-    if boundary.closed:
+    if from_the_side(case):
         return axes_toward(np.array([0.0, -1.0, 0.0]), against_gravity(motion))
+    if boundary.closed:
+        return plan_axes(motion, np.array([1.0, 0.0, 0.0]))
     sideways = boundary.bare and (not boundary.tilt or abs(uphill @ along) > 0.5)
     elevation = _ELEVATION_OF_ONE if len(motion.walkers) == 1 and sideways else _ELEVATION
     across = np.cross([0.0, 0.0, 1.0], uphill if boundary.tilt else along)
@@ -296,7 +305,7 @@ def beach_ball(rounds: int, motion: Motion) -> tuple[FloatArray, npt.NDArray[np.
     """
     import pyvista as pv
 
-    axis = np.cross([0.0, 0.0, 1.0], [1.0, 0.0, 0.0] if motion.case.boundary.closed else motion.case.drive_axis)
+    axis = np.cross([0.0, 0.0, 1.0], [1.0, 0.0, 0.0] if from_the_side(motion.case) else motion.case.drive_axis)
     lunes = [
         pv.Sphere(
             radius=1.0,

@@ -1,4 +1,4 @@
-"""Time series of views of a run or one walker: containers from the side, planes along their normal.
+"""Time series of views of a run or one walker: containers from the side, planes and trays along their normal.
 
 One walker is shown as in Fig. 1 of Khan et al.: a strip of the floor for each time, below each other, or side by side
 if it walks up a slope. On a tilted plane up in the picture is uphill.
@@ -23,7 +23,7 @@ from walkers.physics.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_place, new_figure, plain_text, save_figure, styled
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, gathered, read_motion
-from walkers.postprocess.scene import Picture, Scene, Window, axes_toward, plan_axes
+from walkers.postprocess.scene import Picture, Scene, Window, axes_toward, from_the_side, plan_axes
 from walkers.runner.directory import case_of
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def render_series(
 def _views(motion: Motion, frames: Sequence[int]) -> Figure:
     """All beads at several times, with axes in mm."""
     boundary = motion.case.boundary
-    sideways = boundary.closed
+    sideways = from_the_side(motion.case)
     axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     if not sideways:
         axes = plan_axes(motion, np.array([1.0, 0.0, 0.0]))

@@ -1,11 +1,15 @@
-"""Walkers by direction at the start: the mean over both directions may not be the velocity of any walker."""
+"""Walkers by direction at the start, and those of a tray: a mean over all may not be the velocity of any walker."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from walkers.inputs.rounding import with_decimals
+
 if TYPE_CHECKING:
+    import numpy.typing as npt
+
     from walkers.postprocess.dump import BoolArray, IntArray
 
 SAME = 0.05
@@ -14,6 +18,8 @@ STEADY_SPEED = 1e-5
 """… and by more than this, m/s; halves of a run that differ by less are steady."""
 REST = 2e-6
 """m/s; slower walkers are at rest: velocities that count as constant may differ by as much."""
+_ACROSS = 0.02
+"""Cosine: walkers that start across the drive axis, within about 1°, face as `facing` says."""
 
 
 def ways(*, uphill: bool) -> tuple[str, str]:
@@ -26,6 +32,13 @@ def differ(one: float, other: float) -> bool:
     return abs(one - other) > max(SAME * max(abs(one), abs(other)), STEADY_SPEED)
 
 
+def sides(facing: npt.ArrayLike, start_angle: npt.ArrayLike) -> IntArray:
+    """Direction in which walkers face at their start: 1 along the drive axis, −1 opposite; the angle counts."""
+    import numpy as np
+
+    return np.where(np.cos(start_angle) < -_ACROSS, np.negative(facing), facing)
+
+
 def alike(facing: IntArray, *, uphill: bool) -> BoolArray:
     """Walkers over which gait and work are averaged, shape (W,): on a slope those facing up, if there are any."""
     up = facing > 0
@@ -33,8 +46,24 @@ def alike(facing: IntArray, *, uphill: bool) -> BoolArray:
 
 
 def sides_apart(result: Mapping[str, Any]) -> dict[str, float]:
-    """Mean velocities (m/s) of a result by direction at the start if they differ; otherwise empty."""
+    """Mean velocities (m/s) of a result by direction at the start if they differ; otherwise empty.
+
+    Empty also for walkers that may meet: the means include those that stopped (`of_tray`).
+    """
     right, left = ((result.get(name) or {}).get("mean") for name in ("right_facing", "left_facing"))
-    if right is None or left is None or not differ(right, left):
+    if result.get("meet") or right is None or left is None or not differ(right, left):
         return {}
     return dict(zip(ways(uphill=bool(result.get("goes_uphill"))), (right, left), strict=True))
+
+
+def of_tray(result: Mapping[str, Any]) -> list[str]:
+    """Walkers that may meet: speed of free ones, then numbers at the end, as text; empty for other walkers."""
+    if not result.get("meet") or "held_share" not in result:
+        return []
+    free, count, joined, held = (result[key] for key in ("free_speed", "walkers", "clustered_share", "held_share"))
+    shares = {"slow": result["slow_share"], "connected": joined, "held at a side": held or None}
+    return [
+        "no walker is free" if free is None else f"free walkers {with_decimals(1e3 * free, 3)} mm/s",
+        *(f"{round(count * share)} of {count} {what}" for what, share in shares.items() if share is not None),
+        *(["none free"] if free is not None and max(joined, held) == 1.0 else []),
+    ]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from walkers.inputs.errors import refused
 from walkers.inputs.readable import differing, flattened, readable, readable_unit
 from walkers.inputs.rounding import percent, rounded
-from walkers.postprocess.sides import alike, sides_apart, ways
+from walkers.postprocess.sides import alike, sides, sides_apart, ways
 from walkers.postprocess.uncertainty import band_of, band_text, not_known, with_bands
 from walkers.runner.directory import case_of
 from walkers.sweeps.folder import aligned
@@ -153,7 +153,7 @@ def _scatters(run: Path, result: Mapping[str, Any]) -> dict[str, float]:
 
     scatters = {name: _number_of(result[name]["scatter"]) for name in _VELOCITIES}
     walkers = read_table(run, "walkers")
-    walkers = walkers[alike(walkers["facing"].to_numpy(), uphill=bool(result.get("goes_uphill")))]
+    walkers = walkers[alike(sides(walkers["facing"], walkers["start_angle"]), uphill=bool(result.get("goes_uphill")))]
     for name in walkers.columns:
         of_first = name.rpartition("_")[0] in _FIRST_MAKE
         rows = walkers[walkers["make"] == 0] if of_first else walkers

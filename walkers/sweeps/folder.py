@@ -24,7 +24,7 @@ from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.readable import agrees, check_wanted, differing, flattened, has_key, kind_of, readable
 from walkers.inputs.rounding import counted, duration_text, rounded
 from walkers.physics.units import Kind, parse_quantity
-from walkers.postprocess.sides import REST, sides_apart
+from walkers.postprocess.sides import REST, of_tray, sides_apart
 from walkers.postprocess.uncertainty import SPREAD_NAME
 from walkers.runner.directory import (
     CASE_NAME,
@@ -68,7 +68,8 @@ class Entry:
     ``age`` (s) counts from the end of the run or from the last change, ``size`` (bytes) is that of the files, for a
     sweep of its runs. ``parameters`` are those of `walkers.inputs.readable.flattened`, for a sweep the number of values
     of each varied key. A run has a velocity (m/s, mean over the walkers; if ``sides`` has velocities up and down a
-    slope, that of walkers facing up) or a number of climbs; a sweep has numbers of points by status.
+    slope, that of walkers facing up; ``tray`` has the text of `of_tray`) or a number of climbs; a sweep has numbers of
+    points by status.
     """
 
     name: str
@@ -82,6 +83,7 @@ class Entry:
     message: str | None = None
     velocity: float | None = None
     sides: Mapping[str, float] = field(default_factory=dict)
+    tray: Sequence[str] = ()
     climbs: int | None = None
     points: Mapping[str, int] | None = None
     runs: Sequence[str] = ()
@@ -144,7 +146,7 @@ def _run(path: Path, now: float) -> Entry | None:
         result = recorded_result(path)
         velocity, climbs = result.get("velocity") or {}, result.get("climbs")
         sides = sides_apart(result)
-        given = {"velocity": sides.get("up", velocity.get("mean")), "sides": sides}
+        given = {"velocity": sides.get("up", velocity.get("mean")), "sides": sides, "tray": of_tray(result)}
         given["climbs"] = None if climbs is None else len(climbs)
     return Entry(name, case_name, "finished", path, _age(path / MANIFEST_NAME, now), size, parameters, **given)
 
@@ -299,9 +301,11 @@ def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
 
 
 def _result_text(run: Entry) -> str:
-    """Climbs of a pile, or velocities; a dash if there is no result."""
+    """Climbs of a pile, what walkers on a tray do, or velocities; a dash if there is no result."""
     if run.velocity is None:
         return "-" if run.climbs is None else counted(run.climbs, "climb")
+    if run.tray:
+        return ", ".join(run.tray[:2])
     sides = run.sides or {"": run.velocity}
     told = (f"{way} {rounded(1e3 * speed, 'mm/s')}".strip() for way, speed in sides.items())
     return "at rest" if max(map(abs, sides.values())) < REST else f"{', '.join(told)} mm/s"

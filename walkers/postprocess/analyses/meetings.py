@@ -208,13 +208,10 @@ class Meetings(Analysis):
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """Numbers of meetings, and the groups at the end."""
         together = "; ".join(", ".join(map(str, group)) for group in result["groups_at_end"])
-        slow = result["slow_share"]
         return [
             f"  meetings   {result['merged']} merged, {result['parted']} parted, largest group "
-            f"{result['largest_group']}; at the end {f'joined: {together}' if together else 'none are joined'}",
-            f"             at the end {100.0 * result['clustered_share']:.0f} % in clusters"
-            f"{'' if slow is None else f', {100.0 * slow:.0f} % slow'}; nematic order {result['nematic_order']:.2f}, "
-            f"polar order {result['polar_order']:.2f}",
+            f"{result['largest_group']}; at the end {f'connected: {together}' if together else 'none are connected'}",
+            f"             nematic order {result['nematic_order']:.2f}, polar order {result['polar_order']:.2f}",
         ]
 
     def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:

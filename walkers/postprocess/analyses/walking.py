@@ -38,7 +38,7 @@ from walkers.postprocess.gait import (
     walk,
 )
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
-from walkers.postprocess.sides import REST, STEADY_SPEED, alike, sides_apart, ways
+from walkers.postprocess.sides import REST, STEADY_SPEED, alike, of_tray, sides, sides_apart, ways
 from walkers.postprocess.tables import NUMBERED, Columns, columns_of
 from walkers.postprocess.uncertainty import LEAST_PER_VALUE, band_of, band_text, bands_text, wrapped
 
@@ -84,7 +84,7 @@ class WalkerRows:
 
     walker: Annotated[IntArray, "", "index of the walker, from 0"]
     make: Annotated[IntArray, "", "index of the walker's make (body of the case), from 0: dimers, then clusters"]
-    facing: Annotated[IntArray, "", "direction at the start: 1 along the drive axis (right), -1 opposite (left)"]
+    facing: Annotated[IntArray, "", "1 along the drive axis (right), -1 opposite (left), but for start_angle"]
     start_angle: Annotated[FloatArray, "rad", "orientation at the start"]
     velocity: Annotated[
         FloatArray, "m/s", "velocity along the heading after the settling cycles, positive toward the large beads"
@@ -246,7 +246,7 @@ class Walking(Analysis):
             drive += f", Γ0 = {result['gamma0']:.3g}, sin δ = {result['sin_delta']:.3g}"
         beads = ", ".join(f"bead {place} {_speed(one)}" for place, one in enumerate(result["rotation"].values(), 1))
         sliding = ", ".join(f"{name} {_speed(result['sliding'][contact])}" for contact, name in names.items())
-        these = "facing up: " if result["goes_uphill"] and result["right_facing"]["n"] < result["walkers"] else ""
+        these = "facing up: " if result["goes_uphill"] and 0 < result["right_facing"]["n"] < result["walkers"] else ""
         lines = [
             *(_of_fallen(result, drive) if _fell(result) else _of_walkers(result, drive)),
             *wrapped(self.uncertainty(result)[told:]),
@@ -274,8 +274,8 @@ class Walking(Analysis):
     def warnings(self, result: Mapping[str, Any]) -> list[str]:
         """Reasons to doubt the velocity."""
         warnings = []
-        if lacking := result["walkers"] - result["steady"]:
-            told = f"{lacking} of {result['walkers']} walkers are not steady"
+        if (lacking := result["walkers"] - result["steady"]) and not result["meet"]:  # on trays walkers stop
+            told = f"{lacking} of {result['walkers']} walkers {'is' if lacking == 1 else 'are'} not steady"
             warnings.append(f"{told}: the velocity depends on the length of the run")
         if (share := result["separated_fraction"] or 0.0) > SEPARATED:
             told = f"for {100.0 * share:.0f} % of the time"
@@ -390,7 +390,8 @@ def _mean(values: FloatArray) -> float | None:
 
 def _summary(walkers: Columns, case: Case) -> dict[str, Any]:
     """Result of rows of the table of walkers."""
-    velocity, axial, facing = (walkers[name] for name in ("velocity", "axial_velocity", "facing"))
+    velocity, axial = walkers["velocity"], walkers["axial_velocity"]
+    facing = sides(walkers["facing"], walkers["start_angle"])
     turned, same = np.isfinite(walkers["turned_at"]), alike(facing, uphill=case.goes_uphill)
 
     def means(family: str, named: str) -> dict[str, float | None]:
@@ -450,6 +451,7 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
     velocity = result["velocity"]
     toward = {0.0: "toward bead 1", None: "along the heading"}.get(result["sin_delta"], "toward the large bead")
     headline = f"{_speed(velocity['mean'])} mm/s{_band(result)}, positive {toward}"
+    headline += "; mean of all, slow ones too" if result["meet"] else ""
     if velocity["n"] and abs(velocity["mean"]) < REST:
         headline = f"at rest (below {1e3 * REST:g} mm/s){_band(result)}"
     if apart := sides_apart(result):  # no walker has the mean velocity
@@ -468,9 +470,9 @@ def _of_sides(result: Mapping[str, Any]) -> list[str]:
         f"{_speed(side['mean'])} mm/s ({side['n']})" if side["n"] else "none"
         for side in (result["right_facing"], result["left_facing"])
     )
-    sentence = f"started facing {first} {right}, {second} {left}; {_steady(result)}"
+    told = "" if result["meet"] else f"started facing {first} {right}, {second} {left}; "
     turned = f"{result['turned_round']} of {result['walkers']} walkers turned by more than 90°"
-    return wrapped([sentence, turned] if result["turned_round"] else [sentence])
+    return wrapped([told + _steady(result), *([turned] if result["turned_round"] else [])])
 
 
 def _fell(result: Mapping[str, Any]) -> bool:
@@ -539,10 +541,12 @@ def _scatter(result: Mapping[str, Any]) -> list[str]:
 
 
 def _headlines(result: Mapping[str, Any], drive: str) -> list[str]:
-    """The drive; before it, on a slope, the posture of the walkers."""
+    """The drive; before it, on a slope, the posture of the walkers; after it what is true of a tray."""
+    speed, *end = of_tray(result) or [""]
+    tray = [fill(f"  tray       {speed}; at the end {', '.join(end)}", 110, subsequent_indent=" " * 13)] if end else []
     if result["posture"] is None:
-        return [f"{result['case']}: {drive}"]
-    return [f"{result['case']}: {_told_posture(result['posture'])}", f"  drive      {drive}"]
+        return [f"{result['case']}: {drive}", *tray]
+    return [f"{result['case']}: {_told_posture(result['posture'])}", f"  drive      {drive}", *tray]
 
 
 def _told_posture(summary: Mapping[str, Any]) -> str:

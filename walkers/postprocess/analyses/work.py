@@ -27,7 +27,7 @@ from walkers.postprocess.dump import FloatArray, IntArray
 from walkers.postprocess.figures import Line, Panel, nested_widths
 from walkers.postprocess.gait import walk
 from walkers.postprocess.motion import LEAST_SAMPLES, Group, Motion
-from walkers.postprocess.sides import STEADY_SPEED, alike
+from walkers.postprocess.sides import STEADY_SPEED, alike, sides
 from walkers.postprocess.tables import Columns, columns_of
 
 _PARTS = 10
@@ -64,8 +64,8 @@ class Working(Analysis):
         walker, cycles = [one.walker for group in groups for one in group.walkers], len(works[0])
         each = np.concatenate(works, axis=1).T.reshape(-1)
         rows = Work(np.repeat(walker, cycles), np.tile(np.arange(cycles), len(walker)), each)
-        facing = np.array([one.facing for group in groups for one in group.walkers])
-        these = alike(facing, uphill=motion.case.goes_uphill)
+        facing, angle = np.array([(one.facing, one.start_angle) for group in groups for one in group.walkers]).T
+        these = alike(sides(facing, angle), uphill=motion.case.goes_uphill)
         cost = np.concatenate(costs)[these]
         summary = {"work": spread(np.concatenate(means)[these]), "cost_of_transport": spread(cost[np.isfinite(cost)])}
         return {"work": columns_of(rows)}, summary

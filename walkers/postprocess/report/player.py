@@ -23,6 +23,7 @@ from walkers.postprocess.scene import (
     beach_ball,
     camera_axes,
     floor_lines,
+    from_the_side,
     mesh_of,
     plan_axes,
     round_below,
@@ -107,8 +108,8 @@ def cameras_of(motion: Motion, path: FloatArray | None = None) -> dict[str, list
 
     ``path`` is subtracted from the positions of the beads (`walkers.postprocess.scene.Scene`).
     """
-    upward = against_gravity(motion)
-    first = np.array([-0.25, -1.0, 0.2]) if motion.case.boundary.closed else camera_axes(motion)[2]
+    upward, sideways = against_gravity(motion), from_the_side(motion.case)
+    first = np.array([-0.25, -1.0, 0.2 if sideways else 2.0]) if motion.case.boundary.closed else camera_axes(motion)[2]
     views = {
         "as at first": axes_toward(first, upward),
         "from the side": axes_toward(np.array([0.0, -1.0, 0.0]), upward),
