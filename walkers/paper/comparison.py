@@ -174,7 +174,7 @@ def _row(number: Observation, value: Value) -> dict[str, Any]:
     agrees = bool(abs(ours - (number.value or 0.0)) <= allowed) if within is None else within
     why = number.depends_on
     if not isfinite(ours):
-        lost = "Of a run that it needs no walker is steady, stays on the axis and keeps its beads together."
+        lost = "In a run that it needs, no walker is steady, stays on the axis and keeps its beads together."
         why = lost if value.left_out else "A run that it needs is missing or failed."
     return {
         **{"key": number.key, "what": number.what, "unit": number.unit},
