@@ -154,6 +154,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     "pile-map": _of_climbs("pile-map"),
     "pile-beads": _of_climbs("pile-beads"),
     "pile-contacts": _of_climbs("pile-contacts"),
+    "pile-numerics": _of_climbs("pile-numerics"),
     "pile-calibrated": _of_climbs("pile-calibrated"),
     "pile-cylinder": _of_climbs("pile-cylinder"),
     "pile-paper": _of_climbs("pile-paper"),
