@@ -102,7 +102,7 @@ def _expected(hint: Any) -> str:
 
 def _refusal(validator: BeforeValidator | Kind) -> str | None:
     if isinstance(validator, Kind):
-        ends = f"{validator.smallest:g} to {validator.largest:g} {validator.unit}"
+        ends = f"{validator.smallest:g} to {validator.largest:g} {validator.unit} in absolute value"
         return f"{validator.expectation.removeprefix('expected ')}; {ends}"
     try:
         validator.func(object())  # type: ignore[call-arg]
@@ -261,7 +261,7 @@ def _commands() -> str:
     context = program.make_context("walkers", [], resilient_parsing=True, terminal_width=80)
     text = f"{_COMMANDS}```text\n$ walkers --help\n{program.get_help(context)}\n```\n"
     for name, command in program.commands.items():
-        inner = command.make_context(name, [], context, resilient_parsing=True, terminal_width=80)
+        inner = type(context)(command, context, name, terminal_width=80)  # a context for completion would offer cases
         text += f"\n## walkers {name}\n\n```text\n$ walkers {name} --help\n{command.get_help(inner)}\n```\n"
     return text
 

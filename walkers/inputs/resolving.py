@@ -319,7 +319,11 @@ def _spaced(case: Case, key: str, walkers: Walkers, notes: Notes) -> Walkers:
         raise unusable(blamed, "the beads overlap by more than 2 % of the smallest radius")
     if isinf(walkers.spacing):
         spacing = 2.0 * (walkers.length if walkers.meet else reach(case))
-        notes.derived(f"{key}.spacing", spacing, "so that walkers do not meet")
+        notes.derived(
+            f"{key}.spacing",
+            spacing,
+            "so that walkers do not touch at the start" if walkers.meet else "so that walkers do not meet",
+        )
         return replace(walkers, spacing=spacing)
     # Beads of different walkers may touch, but not overlap, if they are meant to meet.
     least = (1.0 if walkers.meet else 1.5) * walkers.length

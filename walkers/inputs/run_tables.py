@@ -127,7 +127,8 @@ def resolve_run(table: RunTable, case: Case, notes: Notes) -> Run:
 def _note_run(run: Run, table: RunTable, case: Case, notes: Notes, reason: str) -> None:
     often = run.samples_per_cycle if run.cycles_per_sample == 1 else f"1 in {run.cycles_per_sample} cycles"
     cycles = f"until constant within {percent(CONSTANT)}, at most {run.cycles}" if run.until_steady else run.cycles
-    whence = "from the duration" if table.duration else "checked after 12 and 24 cycles"
+    checked = "checked after 12 and 24 cycles" if run.until_steady else "not checked earlier"
+    whence = "from the duration" if table.duration else checked
     if run.cycles_per_sample > 1:
         whence += f", rounded up to a multiple of {run.cycles_per_sample} cycles (one sample)"
     settling = ", ".join(f"{settling_of(cycles)} of {cycles}" for cycles in run.attempts) if run.until_steady else ""

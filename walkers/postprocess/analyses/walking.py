@@ -84,7 +84,7 @@ class WalkerRows:
 
     walker: Annotated[IntArray, "", "index of the walker, from 0"]
     make: Annotated[IntArray, "", "index of the walker's make (body of the case), from 0: dimers, then clusters"]
-    facing: Annotated[IntArray, "", "1 along the drive axis (right), -1 opposite (left), but for start_angle"]
+    facing: Annotated[IntArray, "", "1 or -1: start_angle is from the drive axis (right) or opposite (left)"]
     start_angle: Annotated[FloatArray, "rad", "orientation at the start"]
     velocity: Annotated[
         FloatArray, "m/s", "velocity along the heading after the settling cycles, positive toward the large beads"
@@ -557,7 +557,7 @@ def _told_posture(summary: Mapping[str, Any]) -> str:
     when = f" after {first} s" if first == last else f" after {first} to {last} s"
     told = {
         "upright": "upright to the end",
-        "leaning": "leaning, may still turn over",
+        "leaning": "leaning at the end",
         "turned over": f"turned over{when if summary['turned_at'] else ''}",
     }
     there = [name for name in POSTURES if summary[name]]
