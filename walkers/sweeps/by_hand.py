@@ -15,7 +15,7 @@ from math import isclose, isfinite, nan, pi
 from pathlib import Path
 from typing import Any
 
-from walkers.inputs.case import CONSTANT, Case, Run, settling_of
+from walkers.inputs.case import CONSTANT, Case, settling_of
 from walkers.inputs.drive import Harmonic
 from walkers.inputs.errors import refused
 from walkers.inputs.origins import Origin
@@ -112,7 +112,7 @@ def take_in(folder: Path) -> None:
         notes = ["run by hand", *([f"the deck was edited: {'; '.join(changes)}"] if changes else [])]
         if (folder / DECK_NAME).stat().st_mtime_ns > log.stat().st_mtime_ns:
             notes.append(f"{DECK_NAME} is newer than {log.name}: if it was edited since, run it again")
-        _write(folder, ran, deck, segment, _judged(deck, folder, log), notes, case.run)
+        _write(folder, ran, deck, segment, _judged(deck, folder, log), notes, case)
     except (OSError, ValueError, KeyError, TypeError, DumpError) as error:
         raise refused(folder, f"the deck that was run by hand cannot be read ({error})") from error
 
@@ -272,9 +272,9 @@ def _values(case: Case) -> dict[str, Any]:
 
 
 def _write(
-    folder: Path, case: Case, deck: Deck, segment: Segment, report: EngineReport, notes: list[str], wanted: Run
+    folder: Path, case: Case, deck: Deck, segment: Segment, report: EngineReport, notes: list[str], before: Case
 ) -> None:
-    """Write the files of a run directory: case, layout, segment, tables, result, and last its manifest."""
+    """Write the files of a run directory of a deck, exported for ``before``: tables, result, last the manifest."""
     from walkers.postprocess.gait import are_constant
 
     (folder / MANIFEST_NAME).unlink(missing_ok=True)
@@ -282,10 +282,13 @@ def _write(
     write_json(folder / LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
     of_segment = {**vars(segment), "root_mean_square_velocity": None, **vars(report), "by_hand": notes}
     write_json(folder / SEGMENT_NAME, of_segment, at_once=False)
-    if wanted.until_steady and case.run.cycles < wanted.cycles and not are_constant(folder):
+    wanted = before.run
+    # Cycles that were enough for the finished run of a case may be too few for an edited deck.
+    doubtful = case.run.cycles < wanted.cycles if wanted.until_steady else case.apart and case != before
+    if doubtful and not are_constant(folder):
         reached = f"the velocities are not constant within {percent(CONSTANT)} after {case.run.cycles} cycles"
         further = f"walkers run continues to {wanted.cycles}: set cycles to {wanted.cycles} and run the deck again"
-        notes.append(f"{reached}; {further}")
+        notes.append(f"{reached}; {further if wanted.until_steady else 'set cycles to more and run the deck again'}")
         write_json(folder / SEGMENT_NAME, of_segment, at_once=False)
     tabulate(folder)
     about: dict[str, Any] = {"drive_from": segment.drive_from, "segments": 1, "by_hand": notes}
