@@ -104,6 +104,7 @@ def test_a_deck_that_is_edited_and_run_again_is_read_again(folder: Path) -> None
     assert again.result["velocity"]["mean"] < first
     assert "peak_acceleration 20, was 39.2; 1 other line(s)" in again.result["by_hand"][1]
     assert "is newer than" not in again.describe()
+    assert " finished: edited and run by hand " in call("list", "--out", str(folder.parent)).stdout
     _edit(folder, restitution="0.5")
     assert "walker.lig is newer than" in load(folder).result["by_hand"][-1]
     with pytest.raises(InputError, match="hand: its deck was edited and run by hand: --set is for cases"):

@@ -148,6 +148,8 @@ def _run(path: Path, now: float) -> Entry | None:
         sides = sides_apart(result)
         given = {"velocity": sides.get("up", velocity.get("mean")), "sides": sides, "tray": of_tray(result)}
         given["climbs"] = None if climbs is None else len(climbs)
+        if notes := result.get("by_hand"):
+            given["reason"] = "edited and run by hand" if "edited" in " ".join(notes) else notes[0]
     return Entry(name, case_name, "finished", path, _age(path / MANIFEST_NAME, now), size, parameters, **given)
 
 
