@@ -102,7 +102,7 @@ def with_bands(directory: Path, result: Mapping[str, Any]) -> dict[str, Any]:
     known, unknown = dict(result), (OSError, ValueError, KeyError, TypeError)
     with suppress(*unknown):
         known["bands"] = read_json(spread_of(directory.resolve()) / SPREAD_NAME)["bands"]
-    if result.get("numerical_error") is None and not result.get("by_hand"):
+    if result.get("numerical_error", 0) is None and not result.get("by_hand"):  # piles have no such error
         with suppress(*unknown):  # a result that is not shown where its case is
             case, name = read_json(directory / CASE_NAME), shlex.quote(str(directory))
             step, modulus = case["run"]["time_step"], case["contact"]["youngs_modulus"]

@@ -102,10 +102,7 @@ def _groups(directory: Path) -> list[tuple[dict[str, str], list[Path]]]:
         record = read_record(directory)
         for values, state in zip(record.values, states(record), strict=True):
             named = zip(record.units.items(), values, strict=True)
-            told = {
-                key: f"{value_text(value)} {'' if isinstance(value, str) else unit or ''}".strip()  # no unit: auto
-                for (key, unit), value in named
-            }
+            told = {key: value_text(value, unit) for (key, unit), value in named}
             if state.status == "finished" and state.directory is not None:
                 varied[state.directory] = {key: text for key, text in told.items() if key not in _NO_CONDITION}
     else:

@@ -142,7 +142,7 @@ def _of_axis(columns: Mapping[str, list[Any]], units: Mapping[str, str]) -> list
     whole = _count(zip(*columns.values(), strict=True))
     shown = next(([key] for key, values in columns.items() if _count(values) == whole), list(columns))
     rest = [key for key in columns if key not in shown]
-    texts = [[f"{value_text(value)} {units[key]}".strip() for value in columns[key]] for key in shown]
+    texts = [[value_text(value, units[key]) for value in columns[key]] for key in shown]
     label = ", ".join(map(readable_key, shown)) + _with(rest)
     return [Factor((*shown, *rest), label, [", ".join(row) for row in zip(*texts, strict=True)], False)]
 

@@ -381,11 +381,13 @@ def with_unit(words: str, unit: str | None) -> str:
     return f"{words} ({unit})" if unit else words
 
 
-def value_text(value: Any) -> str:
-    """A value of a key as text; several are separated by slashes."""
+def value_text(value: Any, unit: str | None = None) -> str:
+    """A value of a key as text, with its unit unless it is a word such as auto; several are separated by slashes."""
     if isinstance(value, list):
-        return "/".join(map(value_text, value))
-    return f"{value:g}" if isinstance(value, float) else str(value)
+        text = "/".join(map(value_text, value))
+    else:
+        text = f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{text} {unit}" if unit and not isinstance(value, str) else text
 
 
 def encoded(frame: pd.DataFrame, form: str) -> bytes:
