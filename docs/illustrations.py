@@ -37,10 +37,10 @@ from walkers.postprocess.analysis import analyses
 from walkers.postprocess.films import FilmOptions
 from walkers.postprocess.series import render_series
 from walkers.runner.files import read_json, write_json, write_text
+from walkers.runner.launch import cores_here
 from walkers.sweeps import climbing
 from walkers.sweeps.climbing_figure import write_climbs
 from walkers.sweeps.scheduler import Options
-from walkers.sweeps.site import cores_here
 from walkers.templates.deck import CONTENT_VERSION
 
 RECORD = Path("figures") / "made-from.json"

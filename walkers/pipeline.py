@@ -177,8 +177,8 @@ def sweep(
     {'liquid.name': ['Si AK5', 'Si AK10'], 'status': ['finished', 'finished']}
     """
     from walkers.inputs.sweep import load_sweep
+    from walkers.runner.launch import cores_here
     from walkers.sweeps.scheduler import Options, run_sweep
-    from walkers.sweeps.site import cores_here
 
     read = load_sweep(sweep, changes)
     with shown_if(progress, progress_of_sweep(read.name)) as advance:

@@ -82,8 +82,8 @@ def load_any(what: str, settings: list[str] | None, out: Path) -> FoundRun | Swe
 
 def on_cores(jobs: int | None) -> Options:
     """Options for a number of parallel decks on this machine; None: one per core."""
+    from walkers.runner.launch import cores_here
     from walkers.sweeps.scheduler import Options
-    from walkers.sweeps.site import cores_here
 
     return Options(jobs or cores_here())
 

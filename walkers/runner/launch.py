@@ -159,6 +159,11 @@ def check_room(folder: Path, needed: int) -> None:
         raise failures.DiskFull(needed, free, folder)
 
 
+def cores_here() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
 def _before(ranks: int) -> tuple[str, ...]:
     """Command that starts the engine so that it ends with its launcher; several ranks without access to the network."""
     mortal = _MORTAL if shutil.which(_MORTAL[0]) else ()
@@ -166,7 +171,7 @@ def _before(ranks: int) -> tuple[str, ...]:
     if ranks == 1:
         return (*mortal, *unless_orphan)
     # With --oversubscribe waiting ranks yield their core, to any program: beside one, steps take 30 times as long.
-    yields = int(ranks > len(os.sched_getaffinity(0)))
+    yields = int(ranks > cores_here())
     waiting = ("--mca", "mpi_yield_when_idle", str(yields))
     return (*_off_the_network(), *mortal, *unless_orphan, *_TOGETHER, str(ranks), *waiting, *mortal)
 

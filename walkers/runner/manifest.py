@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import platform
 import time
 from collections.abc import Collection, Iterable
@@ -15,7 +14,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.errors import WalkersError
 from walkers.runner.binary import Engine, plugin_of, read_audit
 from walkers.runner.files import read_json, write_json
-from walkers.runner.launch import EngineReport
+from walkers.runner.launch import EngineReport, cores_here
 from walkers.runner.provenance import software
 from walkers.templates.deck import CONTENT_VERSION
 
@@ -86,7 +85,7 @@ def checksums(directory: Path, names: Iterable[str]) -> dict[str, str]:
     paths = {name: directory / name for name in names}
     if sum(path.stat().st_size for path in paths.values()) < _SMALL_BYTES:
         return {name: checksum(path) for name, path in paths.items()}
-    with ThreadPoolExecutor(min(_MOST_THREADS, len(os.sched_getaffinity(0)))) as pool:
+    with ThreadPoolExecutor(min(_MOST_THREADS, cores_here())) as pool:
         return dict(zip(paths, pool.map(checksum, paths.values()), strict=True))
 
 

@@ -13,7 +13,6 @@ left.
 from __future__ import annotations
 
 import inspect
-import os
 import re
 import sys
 from collections.abc import Mapping
@@ -94,11 +93,6 @@ class Site(BaseModel):
         if info.field_name == "scheduler" and name not in (*_SCHEDULERS, *parsl.providers.__all__):
             raise ValueError(f"{expected_of(name, _SCHEDULERS)}, or a provider of Parsl's")
         return name
-
-
-def cores_here() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0))
 
 
 def load_site(path: str | Path) -> Site:
