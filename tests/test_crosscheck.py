@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from math import cos, inf, pi, sin, sqrt
 from pathlib import Path
 from typing import Any
@@ -37,12 +38,12 @@ from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped
 from walkers.physics.bridge import Surfaces
 from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.physics.laws import law_of
-from walkers.postprocess.dump import FloatArray, local_frames
+from walkers.postprocess.dump import BinaryDump, FloatArray, local_frames
 from walkers.postprocess.motion import Motion, read_motion
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import EngineError
 from walkers.templates.deck import Plan, compose
-from walkers.templates.layout import WALL_BRIDGES
+from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, FORCE_COLUMNS, WALL_BRIDGES
 from walkers.templates.scene import Bead
 
 RADIUS, STILL = 3e-4, (0.0, 0.0, 0.0)
@@ -309,3 +310,66 @@ def test_a_restart_with_other_walls_is_refused(bench: Bench) -> None:
     second = replace(first, recording=replace(recording(20), begin=10), restart_to=None, restart_from="half.restart")
     with pytest.raises(EngineError, match="another number of walls"):
         bench.run(replace(second, scene=scene), carry)
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_liquid_is_conserved(bench: Bench, ranks: int) -> None:
+    """Beads that fly through each other along a floor: their films are those that the rule of the bridges gives."""
+    steps, dt, draw = 4000, 1e-6, np.random.default_rng(3)
+    case = bench_case(liquid={"volume_fraction": 0.02})
+    case = replace(case, liquid=replace(case.liquid, conserved=True))
+    sizes = draw.choice([2e-4, 2.5e-4, 3e-4], 16)
+    start = np.column_stack([draw.uniform(-8e-4, 8e-4, (16, 2)), sizes + draw.uniform(-3e-5, 8e-5, 16)])
+    velocity = np.column_stack([draw.uniform(-0.3, 0.3, (16, 2)), draw.uniform(-0.03, 0.03, 16)])
+    places = [tuple(one) for one in start.tolist()]
+    beads = [Bead(0, *of) for of in zip(places, sizes.tolist(), map(tuple, velocity.tolist()), strict=True)]
+    plan = prescribed(case, standing(beads), steps, ranks=ranks)
+    plan = replace(plan, recording=replace(plan.recording, bead_columns=(*BEAD_COLUMNS, *FORCE_COLUMNS, FILM_COLUMN)))
+    dump = BinaryDump(bench.run(plan).directory / "beads.bin", plan.recording.bead_columns)
+    found = dump.stack()[:, :, -1]
+    places_then = start + np.arange(steps + 1)[:, None, None] * dt * velocity
+    own, held = 0.02 * 4.0 / 3.0 * np.pi * sizes**3, dict[tuple[int, int], float]()
+    film, expected, formed = np.ones(16), [], 0
+
+    def shares(one: int, other: int) -> tuple[float, float]:
+        """Of full films: half of that on a bead at a wall, half of that on a cap between beads."""
+        if other < 0:
+            return 0.5 * own[one], 0.0
+        cap = sizes[[other, one]] / (sizes[one] + sizes[other])
+        return tuple(0.5 * own[[one, other]] * (1.0 - np.sqrt(1.0 - cap**2)))
+
+    @cache
+    def rupture(one: int, other: int, volume: float) -> float:
+        meeting = Surfaces.of(sizes[one], sizes[other] if other >= 0 else inf, case.liquid, 0.01)
+        return law_of(case.liquid)(replace(meeting, volume=volume)).rupture
+
+    pairs = [(one, other) for one in range(16) for other in range(one + 1, 16)]
+    for step, place in enumerate(places_then):
+        before = film.copy()
+        for one, other in [*pairs, *((one, -1) for one in range(16))]:
+            if other < 0:
+                gap, films = place[one, 2] - sizes[one], film
+            else:
+                gap, films = np.linalg.norm(place[one] - place[other]) - sizes[one] - sizes[other], before
+            full = shares(one, other)
+            if (one, other) in held:
+                if gap < rupture(one, other, held[one, other]):
+                    continue
+                part = held.pop((one, other)) / sum(full)
+                offers = full
+            elif gap > 0.0 or (step == 0 and other >= 0):  # films are filled between pairs and walls
+                continue
+            else:
+                offers = full[0] * films[one], full[1] * films[other]
+                ratio = sum(offers) / sum(full)
+                level = min(max(round(2.0 * np.log2(ratio)), -8), 1)
+                held[one, other] = sum(full) * 2.0 ** (level / 2.0)
+                part, formed = -held[one, other] / sum(offers), formed + 1
+            film[one] += part * offers[0] / own[one]
+            film[other] += part * offers[1] / own[other] if other >= 0 else 0.0
+        expected.append(film.copy())
+        assert (own * film).sum() + sum(held.values()) == pytest.approx(own.sum(), rel=1e-12)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+    assert formed > len(held) + 40
+    assert np.min(expected) < 0.5
+    assert np.max(expected) > 1.0

@@ -18,6 +18,10 @@
 
    with the torques that conserve momentum and angular momentum. Overlapping surfaces have the bridge of gap 0.
 
+   Where tables have liquid, beads have films, and their liquid is conserved: a bridge that forms takes a volume, that of
+   one of the tables of its surfaces, and gives it back where it breaks (`move_liquid`). How full a film is, is the
+   property "film" of its bead (fix property/atom).
+
    Walls have the contacts of the pair style, with a surface of infinite radius: planes through a point, beads on the
    side of the normal; cylinders along z, beads within. They are shaken as one, from a step on, by the sum of
    A sin(2 pi f t + phase); in their own frame they rest, and beads have the inertial force instead. Gravity
@@ -32,6 +36,7 @@
 #include "contact_models.h"
 #include "fix_insert_stream.h"  // which pair_gran_base.h forgets
 #include "pair_gran_base.h"
+#include "fix_property_atom.h"
 #include "modify.h"
 #include "output.h"
 #include "comm.h"
@@ -50,6 +55,7 @@ namespace {
 
 enum { BRIDGE_ID = 21 };  // of a cohesion model; Debian's engine has none of this number
 enum { TABLE, SPRING, HISTORY = SPRING + 3 };
+enum { WALL = -1 };  // instead of a second bead
 const char *const NAME = "cohesion_model bridge";
 
 struct Vec {
@@ -84,7 +90,10 @@ struct Contact {
 
 class Law : protected Pointers {
 public:
-  Law(LAMMPS *lmp, const bool rolls) : Pointers(lmp), rolls_(rolls), formed_(0.) { known()[lmp] = this; }
+  Law(LAMMPS *lmp, const bool rolls) : Pointers(lmp), rolls_(rolls), formed_(0.), film_(0)
+  {
+    known()[lmp] = this;
+  }
   ~Law()
   {
     if (known()[lmp] == this) known().erase(lmp);
@@ -127,6 +136,9 @@ public:
       registry.connect("coeffRollFrict", rolling_friction_, NAME);
     }
     if (force->cg_active()) error->cg(FLERR, NAME);
+    if (tables_[0].volume > 0.)
+      film_ = static_cast<FixPropertyAtom *>(
+        modify->find_fix_property("film", "property/atom", "scalar", 0, 0, NAME));
     const int types = atom->ntypes + 1;
     dampings_.assign(types * types, Damping());
     for (int i = 1; i < types; i++)
@@ -155,18 +167,29 @@ public:
   /* The largest gap at which any bridge forms, m. */
   double formed() const { return formed_; }
 
-  /* The bridge of a contact whose surfaces touch or had one: its table, or none; the history is kept up. */
-  inline const bridge::Table *bridge_of(double *const history, const double gap, const int type_i, const int type_j,
-                                        const double radius_i, const double radius_j) const
+  /* Films at the begin of a step: in it, all bridges of a bead form from these, on all ranks alike. */
+  void begin_step()
+  {
+    if (!film_) return;
+    film_->do_forward_comm();
+    films_.assign(film_->vector_atom, film_->vector_atom + atom->nlocal + atom->nghost);
+  }
+
+  /* The bridge of a contact whose surfaces touch or had one: its table, or none; history and films are kept up. The
+     bead j of a wall is WALL. */
+  inline const bridge::Table *bridge_of(double *const history, const double gap, const int i, const int j,
+                                        const int type_j, const double radius_j) const
   {
     if (history[TABLE] == 0.) {
       if (gap > formed_) return 0;
-      const int number = find(type_i, type_j, radius_i, radius_j);
-      if (gap > tables_[number].formation) return 0;
-      history[TABLE] = tables_[number].begins_with(radius_i) ? 1. + number : -1. - number;
+      const int number = find(i, j, type_j, radius_j);
+      if (number < 0 || gap > tables_[number].formation) return 0;
+      history[TABLE] = tables_[number].begins_with(atom->radius[i]) ? 1. + number : -1. - number;
+      if (film_) move_liquid(history, i, j, true);
     }
     const bridge::Table *const table = &tables_[static_cast<int>(std::fabs(history[TABLE])) - 1];
     if (gap < table->rupture) return table;
+    if (film_) move_liquid(history, i, j, false);
     history[TABLE] = 0.;
     return 0;
   }
@@ -230,6 +253,8 @@ private:
   std::vector<Damping> dampings_;  // by both types
   std::string file_;
   std::vector<bridge::Table> tables_;
+  FixPropertyAtom *film_;
+  std::vector<double> films_;
 
   static std::map<LAMMPS *, const Law *> &known()
   {
@@ -237,16 +262,55 @@ private:
     return laws;
   }
 
-  __attribute__((noinline)) int find(const int type_i, const int type_j, const double radius_i,
-                                     const double radius_j) const
+  /* The table of a new bridge. Where liquid is conserved it is that of the volume nearest to what the films offer, up to
+     1.2 times as much (volumes are steps), or -1 if films are too thin for any. */
+  __attribute__((noinline)) int find(const int i, const int j, const int type_j, const double radius_j) const
   {
-    for (size_t number = 0; number < tables_.size(); number++)
-      if (tables_[number].joins(type_i, type_j, radius_i, radius_j)) return number;
+    const int type_i = atom->type[i];
+    const double radius_i = atom->radius[i];
+    int found = -1;
+    bool known = false;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (size_t number = 0; number < tables_.size(); number++) {
+      const bridge::Table &table = tables_[number];
+      if (!table.joins(type_i, type_j, radius_i, radius_j)) continue;
+      if (!film_) return number;
+      if (film_->just_created) return -1;  // the engine fills films after the forces before the first step, once
+      known = true;
+      const int first = table.begins_with(radius_i) ? 0 : 1;
+      const double offer = table.share[first] * film_of(i, j) + table.share[1 - first] * film_of(j, j);
+      const double off = std::fabs(std::log(offer / table.volume));
+      if (!(table.volume <= 1.2 * offer && off < nearest)) continue;
+      nearest = off;
+      found = number;
+    }
+    if (known) return found;
     char text[512];
     snprintf(text, sizeof(text), "cohesion bridge: %s has no table of types %d and %d, radii %g and %g m",
              file_.c_str(), type_i, type_j, radius_i, radius_j);
     error->one(FLERR, text);
     return -1;
+  }
+
+  /* How full the film of a bead is, for its bridge to j: at the begin of the step, for walls now, because bridges to
+     walls take half of a film. */
+  double film_of(const int bead, const int j) const
+  {
+    return bead == WALL ? 0. : j == WALL ? film_->vector_atom[bead] : films_[bead];
+  }
+
+  /* A bridge takes its volume from the films in proportion to what they offer, and gives it back in proportion to what
+     full films would. A rank has films of its own beads only. */
+  __attribute__((noinline)) void move_liquid(const double *const history, const int i, const int j,
+                                             const bool takes) const
+  {
+    const bridge::Table &table = tables_[static_cast<int>(std::fabs(history[TABLE])) - 1];
+    const int first = history[TABLE] > 0. ? 0 : 1;
+    const double offer_i = table.share[first] * (takes ? film_of(i, j) : 1.);
+    const double offer_j = table.share[1 - first] * (takes ? film_of(j, j) : 1.);
+    const double part = (takes ? -1. : 1.) * table.volume / (offer_i + offer_j);
+    film_->vector_atom[i] += part * offer_i / table.film[first];
+    if (j != WALL && j < atom->nlocal) film_->vector_atom[j] += part * offer_j / table.film[1 - first];
   }
 };
 
@@ -277,6 +341,7 @@ public:
   {
     if (energies || virial) pair->ev_setup(energies, virial);
     else pair->evflag = pair->vflag_fdotr = 0;
+    begin_step();
     if (pair->fr_pair() || pair->storeSumDelta() || pair->storeContactForces() || pair->storeContactForcesStress())
       error->all(FLERR, "cohesion bridge has no rigid bodies, multicontact or stored contact forces");
     double **const x = atom->x, **const f = atom->f, **const torque = atom->torque;
@@ -337,7 +402,7 @@ private:
     c.type_i = atom->type[i];
     c.type_j = atom->type[j];
     if (!touching) history[SPRING] = history[SPRING + 1] = history[SPRING + 2] = 0.;
-    const bridge::Table *const table = bridge_of(history, c.gap, c.type_i, c.type_j, ri, rj);
+    const bridge::Table *const table = bridge_of(history, c.gap, i, j, c.type_j, rj);
     flag = touching ? CONTACT_NORMAL_MODEL | CONTACT_COHESION_MODEL | CONTACT_TANGENTIAL_MODEL
          : table    ? CONTACT_COHESION_MODEL
                     : 0;
@@ -655,7 +720,7 @@ private:
     c.type_j = type_;
     if (!touching) history[SPRING] = history[SPRING + 1] = history[SPRING + 2] = 0.;
     const bridge::Table *const table =
-      law_->bridge_of(history, c.gap, c.type_i, c.type_j, radius, std::numeric_limits<double>::infinity());
+      law_->bridge_of(history, c.gap, i, WALL, type_, std::numeric_limits<double>::infinity());
     if (!touching && !table) return;
     const double arm = radius + 0.5 * c.gap;
     const Vec v = vec(atom->v[i]) - velocity_;

@@ -5,6 +5,7 @@
    A file holds one table for each two surfaces that may meet; '#' begins a comment. A table is
 
        bridge TYPE TYPE RADIUS RADIUS           atom types, radii in m; of a plane the radius is "inf"
+       [liquid VOLUME SHARE SHARE FILM FILM]    of beads whose liquid is conserved (README.md), m3
        range FORMATION RUPTURE SCALE OCTAVES CELLS
        GAP PULL NORMAL SLIDING COUPLING ROLLING (3 * CELLS * (OCTAVES + 2) + 1 such rows, by the gap)
 
@@ -76,6 +77,7 @@ class Table {
 public:
   int type[2];
   double radius[2], formation, rupture, contact[COLUMNS];
+  double volume, share[2], film[2];  // m3; the volume is 0 where liquid is not conserved
 
   void at(const double gap, double *const forces) const
   {
@@ -117,7 +119,15 @@ public:
     type[1] = static_cast<int>(words.number());
     radius[0] = words.number();
     radius[1] = words.number();
-    if (words.next() != "range") throw std::runtime_error("a table lacks its range");
+    std::string word = words.next();
+    volume = 0.;
+    if (word == "liquid") {
+      for (double *const number : {&volume, &share[0], &share[1], &film[0], &film[1]}) *number = words.number();
+      if (!(volume > 0. && share[0] > 0. && share[1] >= 0. && film[0] > 0. && film[1] > 0.))
+        throw std::runtime_error("the liquid of a table is not usable");
+      word = words.next();
+    }
+    if (word != "range") throw std::runtime_error("a table lacks its range");
     formation = words.number();
     rupture = words.number();
     const double scale = words.number();
@@ -190,6 +200,8 @@ inline std::vector<Table> read_tables(const std::string &file)
     if (word != "bridge") throw std::runtime_error("expected \"bridge\", not \"" + word + "\"");
     tables.push_back(Table());
     tables.back().read(words);
+    if ((tables.back().volume > 0.) != (tables[0].volume > 0.))
+      throw std::runtime_error("some tables have liquid, others none");
   }
   if (tables.empty()) throw std::runtime_error("holds no table");
   return tables;

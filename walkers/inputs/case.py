@@ -322,6 +322,8 @@ class Case:
         without = {**no_names, "boundary": {"material"}, "liquid": {"name"}}
         if self.liquid.law in LAWS:  # none of which asks for the density; one of a user's own may
             without["liquid"] = {"name", "density"}
+        if not self.liquid.conserved:  # cases of before this key keep their names
+            without["liquid"] = {*without["liquid"], "conserved"}
         values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude=without)
         return values
 

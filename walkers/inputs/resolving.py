@@ -340,6 +340,8 @@ def _check_bodies(case: Case, file: CaseFile) -> None:
         raise unusable("run.ranks", "expected 1: walkers on a plane run slower on several processes")
     if not case.walkers and mixture is None and "seed" in file.run.model_fields_set:
         raise unusable("run.seed", "expected none with placed beads: every start would be the same")
+    if case.liquid.conserved and (case.walkers or not boundary.closed):
+        raise unusable("liquid.conserved", "expected false: only loose beads in a container share their liquid")
     if mixture is not None:
         _check_pour(mixture, boundary, case.tops_of_others(mixture))
     if case.placed is not None or case.meets or (case.walkers and not boundary.bare):

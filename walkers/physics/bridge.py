@@ -23,13 +23,13 @@ Surfaces that overlap (h < 0) have the pull and the resistances of h = 0.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
 import numpy.typing as npt
 
-from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads
+from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, film_volume, share_of_bead
 from walkers.physics.matter import Liquid
 
 FloatArray = npt.NDArray[np.float64]
@@ -66,6 +66,26 @@ class Surfaces:
             radius, other_radius = sorted((radius, other_radius))
             volume = bridge_volume_between_beads(radius, other_radius, liquid.volume_fraction)
         return cls(radius, other_radius, volume, liquid, minimum_separation_ratio)
+
+    @property
+    def volumes(self) -> list[Surfaces]:
+        """The pair with each volume that its bridge may have: one, or where liquid is conserved, steps of √2.
+
+        The films of beads without other bridges give ``volume``; steps end at a sixteenth of it, and at √2 times it for
+        films that are fuller, because bridges that break leave them more than they took.
+        """
+        steps = range(-8, 2) if self.liquid.conserved else (0,)
+        return [replace(self, volume=self.volume * 2.0 ** (0.5 * step)) for step in steps]
+
+    @property
+    def films(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """What each surface contributes to a bridge of full films, and its liquid, m³ (a wall has none)."""
+        fraction, (small, large) = self.liquid.volume_fraction, (self.radius, self.other_radius)
+        own = film_volume(small, fraction)
+        if self.at_wall:
+            return (bridge_volume_at_wall(small, fraction), 0.0), (own, inf)
+        shares = share_of_bead(small, large, fraction), share_of_bead(large, small, fraction)
+        return shares, (own, film_volume(large, fraction))
 
     @property
     def at_wall(self) -> bool:

@@ -21,17 +21,24 @@ def bridge_volume_between_beads(radius_1: float, radius_2: float, volume_fractio
 
     Each bead contributes half of its liquid film in the cap that the other bead covers (Shi and McCarthy 2008).
     """
+    return share_of_bead(radius_1, radius_2, volume_fraction) + share_of_bead(radius_2, radius_1, volume_fraction)
 
-    def share(own: float, other: float) -> float:
-        film = 4.0 / 3.0 * pi * own**3 * volume_fraction
-        return 0.5 * film * (1.0 - sqrt(1.0 - (other / (own + other)) ** 2))
 
-    return share(radius_1, radius_2) + share(radius_2, radius_1)
+def share_of_bead(radius: float, other_radius: float, volume_fraction: float) -> float:
+    """Share of a bead's liquid in its bridge to another bead, m³."""
+    return (
+        0.5 * film_volume(radius, volume_fraction) * (1.0 - sqrt(1.0 - (other_radius / (radius + other_radius)) ** 2))
+    )
 
 
 def bridge_volume_at_wall(radius: float, volume_fraction: float) -> float:
     """Volume of the bridge between a bead and a wall, m³: half of the bead's liquid."""
-    return 0.5 * 4.0 / 3.0 * pi * radius**3 * volume_fraction
+    return 0.5 * film_volume(radius, volume_fraction)
+
+
+def film_volume(radius: float, volume_fraction: float) -> float:
+    """Volume of the liquid on a bead without bridges, m³."""
+    return 4.0 / 3.0 * pi * radius**3 * volume_fraction
 
 
 def capillary_force_limit_at_wall(surface_tension: float, radius: float) -> float:

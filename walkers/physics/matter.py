@@ -20,7 +20,9 @@ class Liquid:
 
     ``mass_fraction`` (of glycerol) and ``temperature`` (default: 20 °C) belong to ``water-glycerol``.
     ``volume_fraction`` is the volume of the liquid on a bead over that of the bead, ``viscosity_ratio`` the viscosity
-    of the bridges over that of the liquid. In a resolved case, ``dynamic_viscosity`` is that of the bridges. ``law`` is
+    of the bridges over that of the liquid. If liquid is ``conserved``, a bridge takes its volume from the films of its
+    beads and gives it back when it breaks (Shi and McCarthy 2008); otherwise its volume does not depend on other
+    bridges. In a resolved case, ``dynamic_viscosity`` is that of the bridges. ``law`` is
     the bridge law: one of `walkers.physics.laws`, or your own function, ``file.py:function``.
     """
 
@@ -34,6 +36,7 @@ class Liquid:
     volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)]
     viscosity_ratio: Annotated[Number, Field(ge=0, le=1e4, exclude=True)] = 1.0
     contact_angle: units.UpToRightAngle
+    conserved: bool = False
     law: str = DEFAULT_LAW
 
 

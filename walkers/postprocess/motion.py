@@ -27,15 +27,15 @@ from walkers.runner.directory import (
 )
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
-from walkers.templates.layout import MEAN_SPIN_COLUMNS, Layout, PlacedWalker
+from walkers.templates.layout import FILM_COLUMN, MEAN_SPIN_COLUMNS, Layout, PlacedWalker
 
 FLOOR = 0
 """Index of the floor among the walls of a container; the others are side walls."""
 LEAST_SAMPLES = 8
 """Smallest number of samples per cycle that resolves the motion within a cycle."""
 _LEFT_OUT = 0.02  # largest part of a run after the last of several evenly spaced times
-_OF_FRAMES = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "frames", "mean_spin")
-_OF_BEADS = ("position", "velocity", "spin", "mean_spin")
+_OF_FRAMES = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "frames", "mean_spin", "film")
+_OF_BEADS = ("position", "velocity", "spin", "mean_spin", "film")
 
 
 @dataclass(frozen=True, repr=False)
@@ -61,6 +61,8 @@ class Motion:
         Whether the dump ends within a frame; whether the run ended early because its velocities were constant.
     mean_spin : ndarray, shape (F, N, 3), or None
         Angular velocity averaged over the steps since the previous frame (zero in the first frame), if recorded.
+    film : ndarray, shape (F, N), or None
+        Liquid on each bead, without that in bridges, over its whole liquid, if liquid is conserved.
     """
 
     case: Case
@@ -76,6 +78,7 @@ class Motion:
     truncated: bool
     ended_early: bool = False
     mean_spin: FloatArray | None = None
+    film: FloatArray | None = None
 
     def __repr__(self) -> str:
         return f"<Motion of {self.case.name}: {len(self.time)} frames of {len(self.radius)} beads>"
@@ -412,6 +415,7 @@ def _of_frames(
         truncated=any(dump.truncated for _, _, dump in segments.values()),
         ended_early=cycles < case.run.cycles,
         mean_spin=vectors(MEAN_SPIN_COLUMNS[0]) if MEAN_SPIN_COLUMNS[0] in layout.bead_columns else None,
+        film=data[:, :, dump.column(FILM_COLUMN)] if FILM_COLUMN in layout.bead_columns else None,
     )
 
 

@@ -72,11 +72,12 @@ def predicted_overhead(cases: Iterable[Case]) -> float:
     cases = list(cases)
     kinds = {(one.liquid, one.contact.minimum_separation_ratio, tuple(sorted(set(one.radii)))) for one in cases}
     bridges = [
-        Surfaces.of(radius, other, liquid, ratio)
+        bridge
         for liquid, ratio, radii in kinds
         if liquid.law.startswith("young-laplace")
         for place, radius in enumerate(radii)
         for other in (inf, *radii[place:])
+        for bridge in Surfaces.of(radius, other, liquid, ratio).volumes
     ]
     return _SOLVING_SECONDS * unsolved(bridges) + _MEASURING_SECONDS * len(cases)
 

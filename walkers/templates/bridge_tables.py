@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import chain
 from math import inf, log2
 
 import numpy as np
@@ -20,6 +21,8 @@ from walkers.templates.scene import Bead, Surface
 
 TOLERANCE = 1e-6
 """Tolerance of interpolated forces, relative to a column's largest value within a factor of two of the gap."""
+_COARSE = 1e-4
+"""The same where liquid is conserved: volumes are steps, and there are ten times as many tables."""
 _COARSEST, _FINEST = 8, 256
 _COLUMNS = ("pull", "normal resistance", "sliding resistance", "coupling", "rolling resistance")
 
@@ -155,7 +158,10 @@ def bridge_tables(surfaces: Sequence[Surface], beads: Iterable[Bead]) -> str:
         sizes = [radius for of, radius in radii if of == kind]
         for number, radius in enumerate(sizes):
             for other_kind, other in [(len(surfaces) + 1, inf), *((kind, size) for size in sizes[number:])]:
-                meeting = Surfaces.of(radius, other, liquid, contact.minimum_separation_ratio)
-                table = tabulated(law_of(liquid), meeting)
-                parts.append(f'# law "{liquid.law}"\nbridge {kind} {other_kind} {radius!r} {other!r}\n{table.text()}')
+                for meeting in Surfaces.of(radius, other, liquid, contact.minimum_separation_ratio).volumes:
+                    parts.append(f'# law "{liquid.law}"\nbridge {kind} {other_kind} {radius!r} {other!r}\n')
+                    if liquid.conserved:
+                        numbers = " ".join(map(repr, (meeting.volume, *chain(*meeting.films))))
+                        parts.append(f"liquid {numbers}\n")
+                    parts.append(tabulated(law_of(liquid), meeting, _COARSE if liquid.conserved else TOLERANCE).text())
     return "".join(parts)

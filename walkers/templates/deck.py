@@ -16,6 +16,7 @@ from walkers.inputs.text import rendered
 from walkers.physics.matter import Contact
 from walkers.templates.layout import (
     BEAD_COLUMNS,
+    FILM_COLUMN,
     MEAN_SPIN_COLUMNS,
     PAIR_BRIDGE_COLUMNS,
     PAIR_BRIDGES,
@@ -185,7 +186,11 @@ def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
         sample_every=run.steps_per_sample,
         bridge_every=run.steps_per_sample * run.samples_per_bridge_sample,
         status_every=-(-run.steps_per_cycle // STATUS_LINES_PER_CYCLE),
-        bead_columns=(*BEAD_COLUMNS, *MEAN_SPIN_COLUMNS) if walkers else BEAD_COLUMNS,
+        bead_columns=(
+            *BEAD_COLUMNS,
+            *(MEAN_SPIN_COLUMNS if walkers else ()),
+            *([FILM_COLUMN] if case.liquid.conserved else ()),
+        ),
         begin=segment.begin,
     )
     restart = None if run.in_one else RESTART_NAME

@@ -9,6 +9,8 @@ BEAD_COLUMNS = ("id", "type", "radius", "x", "y", "z", "vx", "vy", "vz", "omegax
 """Columns of the bead dump, in the engine's names (m, m/s, rad/s)."""
 MEAN_SPIN_COLUMNS = ("f_mean_spin[1]", "f_mean_spin[2]", "f_mean_spin[3]")
 """Further columns for walkers: angular velocity, averaged over the steps since the last frame (rad/s)."""
+FILM_COLUMN = "f_film"
+"""Further column where liquid is conserved: liquid on the bead (not in bridges) over its whole liquid."""
 FORCE_COLUMNS = ("fx", "fy", "fz", "tqx", "tqy", "tqz")
 """Optional further columns (N, N m)."""
 

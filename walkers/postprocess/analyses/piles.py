@@ -12,7 +12,7 @@ import numpy as np
 
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
-from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads
+from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, film_volume
 from walkers.postprocess.analysis import Analysis, Described, Measured, Quantity, tables_of
 from walkers.postprocess.clusters import (
     Assembly,
@@ -132,7 +132,7 @@ class Pile(Analysis):
         for bridges in read_bridges(motion):
             labels = connected(len(motion.radius), bridges.beads)
             bulks.append(bulk_of(labels, bridges, heap=case.mixture is not None))
-            wet.append(liquid_of_beads(motion.radius, case.liquid.volume_fraction, bridges))
+            wet.append(_liquid(motion, bridges))
             # While the pile settles, most beads are free of the bulk.
             driven = motion.time[bridges.frame] >= 0.0
             held.append(list(held_clusters(labels, bridges, bulks[-1])) if driven else [])
@@ -256,7 +256,7 @@ class Pile(Analysis):
         track, climber = tracks_of(motion)
 
         def of_frame(bridges: Bridges) -> Columns:
-            liquid = liquid_of_beads(motion.radius, motion.case.liquid.volume_fraction, bridges)
+            liquid = _liquid(motion, bridges)
             component = connected(len(motion.radius), bridges.beads)
             own = {"track": track[bridges.frame], "is_climber": climber[bridges.frame].astype(np.int64)}
             return {"component": component, "liquid": liquid, **own}
@@ -411,6 +411,15 @@ def coordination_of_inner(bridges: Bridges, count: int) -> dict[str, float | Non
         "contacts": float(ends[bridges.gap <= 0.0].sum() / beads),
         "bridges": float(ends.sum() / beads),
     }
+
+
+def _liquid(motion: Motion, bridges: Bridges) -> FloatArray:
+    """Liquid in the bridges of each bead, m³, shape (N,): if liquid is conserved, that which its film lacks."""
+    fraction = motion.case.liquid.volume_fraction
+    if motion.film is None:
+        return liquid_of_beads(motion.radius, fraction, bridges)
+    own = np.array([film_volume(one, fraction) for one in motion.radius.tolist()])
+    return np.array(own * (1.0 - motion.film[bridges.frame]))
 
 
 def liquid_of_beads(radius: FloatArray, volume_fraction: float, bridges: Bridges) -> FloatArray:
