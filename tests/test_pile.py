@@ -63,6 +63,8 @@ Once = Callable[[str, Callable[[Path], object]], Path]
 QUICK = {"time_step": "3 us", "longest_settling": "0.05 s"}
 # Three segments of the drive, each as short as it can be and still have frames.
 BRIEF = {"duration": "0.045 s", "segment": "0.015 s", **QUICK}
+# Restarts must not lose how much liquid each bead has.
+OF_BRIEF: dict[str, dict[str, Any]] = {"run": BRIEF, "liquid": {"conserved": True, "law": "willett"}}
 
 
 @pytest.fixture
@@ -71,7 +73,7 @@ def run(pile_run: Path) -> Path:
 
 
 def brief() -> Case:
-    return resolve_case(document(run=BRIEF), name="brief")
+    return resolve_case(document(**OF_BRIEF), name="brief")
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,7 @@ def killed(once: Once) -> Killed:
         front.chmod(0o755)
         out.mkdir()
         (out / "halt-0001").touch()
-        (folder / "brief.toml").write_text(to_toml(document(run=BRIEF)))
+        (folder / "brief.toml").write_text(to_toml(document(**OF_BRIEF)))
         command = [PROGRAM, "run", str(folder / "brief.toml"), "--out", str(out), "--engine", str(front)]
         program = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
@@ -327,6 +329,7 @@ BAD: list[tuple[dict[str, dict[str, Any]], str]] = [
     ({"boundary": {"width": "1.5 mm"}}, "boundary.width"),
     ({"boundary": {"height": "2 mm"}}, "boundary.height"),
     ({"run": {"duration": "9000 s"}}, "run.duration"),
+    ({"dimers": {"radii": ["0.5 mm", "0.3 mm"], "replicates": 1}, "liquid": {"conserved": True}}, "liquid.conserved"),
 ]
 
 

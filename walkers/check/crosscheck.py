@@ -22,6 +22,7 @@ from walkers.check.kernels import FloatArray
 from walkers.check.report import Chapter, Line, Verdict
 from walkers.handles import Run
 from walkers.inputs.case import Case
+from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped, with_changes
 from walkers.inputs.text import rendered
 from walkers.pipeline import run
@@ -93,13 +94,19 @@ def crosscheck(
     """Compare the run of a case with the second engine; for a pile, runs with a number of ``seeds``.
 
     ``out`` is the folder of the run directories, ``without`` are terms that the second engine leaves out
-    (`walkers.check.engine.TERMS`), ``make`` makes a missing run. `EngineFailure` if the engine fails.
+    (`walkers.check.engine.TERMS`), ``make`` makes a missing run. `InputError` if liquid is conserved, which the second
+    engine does not do; `EngineFailure` if the engine fails.
 
     Examples
     --------
     >>> crosscheck(load_case("fig1b"), tmp).chapter().failures
     []
     """
+    if case.liquid.conserved:
+        problem = Problem(
+            "liquid.conserved", "true", "expected false: the bridges of the second engine do not share liquid"
+        )
+        raise InputError(case.name, [problem])
     cases = [with_changes(case, {"run.seed": case.seed + number} if number else {}) for number in range(seeds)]
     return compare([make(one, out).motion for one in cases], without)
 
