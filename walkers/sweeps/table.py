@@ -386,7 +386,7 @@ def value_text(value: Any, unit: str | None = None) -> str:
     if isinstance(value, list):
         text = "/".join(map(value_text, value))
     else:
-        text = f"{value:g}" if isinstance(value, float) else str(value)
+        text = f"{value:g}" if isinstance(value, float) else str(value).lower() if isinstance(value, bool) else str(value)
     return f"{text} {unit}" if unit and not isinstance(value, str) else text
 
 
