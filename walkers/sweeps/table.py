@@ -385,8 +385,10 @@ def value_text(value: Any, unit: str | None = None) -> str:
     """A value of a key as text, with its unit unless it is a word such as auto; several are separated by slashes."""
     if isinstance(value, list):
         text = "/".join(map(value_text, value))
+    elif isinstance(value, bool):
+        text = str(value).lower()
     else:
-        text = f"{value:g}" if isinstance(value, float) else str(value).lower() if isinstance(value, bool) else str(value)
+        text = f"{value:g}" if isinstance(value, float) else str(value)
     return f"{text} {unit}" if unit and not isinstance(value, str) else text
 
 
