@@ -22,6 +22,8 @@ SPREAD_NAME = "spread.json"
 """Name of the file with the bands in the directory of a spread (`spread_of`)."""
 LEAST_PER_VALUE = 3
 """Draws per varied value below which the band is approximate and rank correlations are not significant."""
+BANDS_ON_SLOPES = {"right_facing": "velocity, facing up,", "axial_velocity": "velocity up the slope"}
+"""Names of the bands of walkers on slopes."""
 _OVER = "over the ranges of uncertain values"
 _WIDTH = 110
 
@@ -138,6 +140,7 @@ def bands_text(result: Mapping[str, Any], units: Mapping[str, str], own: Mapping
     bands = {name: band for name in units if (band := band_of(result, name, own.get(name)))}
     if not bands:
         return ""
-    text = "; ".join(f"{name} {band_text(band, units[name])}" for name, band in bands.items())
+    named = ((BANDS_ON_SLOPES.get(name, name), band_text(band, units[name])) for name, band in bands.items())
+    text = "; ".join(map(" ".join, named))
     points = max(result["bands"][name]["points"] for name in bands)
     return f"{text} {_OVER} (5 to 95 % of {points} draws)"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from walkers.inputs.errors import refused
 from walkers.inputs.readable import differing, flattened, readable, readable_unit
 from walkers.inputs.rounding import percent, rounded
-from walkers.postprocess.sides import alike, sides, sides_apart, ways
+from walkers.postprocess.sides import alike, fell, sides, sides_apart, ways
 from walkers.postprocess.uncertainty import band_of, band_text, not_known, with_bands
 from walkers.runner.directory import case_of
 from walkers.sweeps.folder import aligned
@@ -39,7 +39,7 @@ _SIDES = ("first", "second")
 _SPREADS = ("smallest", "largest", "scatter")  # columns of a sweep's table that are not compared
 _VELOCITIES = ("velocity", "right_facing", "left_facing")
 """Columns whose scatter is in the result, and whose numerical error is that of the velocity."""
-_UPHILL = {"right_facing": "facing up", "left_facing": "facing down"}
+_UPHILL = {"right_facing": "facing up", "left_facing": "facing down", "axial_velocity": "velocity up the slope"}
 """Names of columns if the drive axis goes up a slope."""
 _FIRST_MAKE = ("rotation", "sliding", "open")
 _OF_ALL = ("orientation_end", "separated_fraction")
@@ -126,8 +126,8 @@ def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
     scatters = [_scatters(run, result) for run, result in zip(runs, results, strict=True)]
     numerical = hypot(*map(_numerical_error, results))
     units = result_columns([name for result in results for name in result["analyses"]])
-    if any(map(_up_and_down, results)):  # the mean over both sides means nothing
-        units = {name: entry for name, entry in units.items() if name != "velocity"}
+    meant = _VELOCITIES if any(map(fell, results)) else ("velocity",) if any(map(_up_and_down, results)) else ()
+    units = {name: entry for name, entry in units.items() if name not in meant}  # these are no walker's way
     uphill, pairs = all(result.get("goes_uphill") for result in results), []
     for name, (unit, _) in units.items():
         values = [_number_of(row.get(name)) for row in rows]
@@ -171,6 +171,8 @@ def _errors_text(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
     """Sentences that compare the difference of two velocities with numerical errors and bands."""
     results = [with_bands(run, result_in(run)) for run in runs]
     if not all("velocity" in result for result in results):
+        return []
+    if any(map(fell, results)):  # errors and bands are those of velocities along the heading
         return []
     name_of = "right_facing" if any(map(_up_and_down, results)) else "velocity"
     errors, own = [_numerical_error(one) for one in results], [_number_of(one[name_of]["mean"]) for one in results]

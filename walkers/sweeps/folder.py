@@ -24,7 +24,7 @@ from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.readable import agrees, check_wanted, differing, flattened, has_key, kind_of, readable
 from walkers.inputs.rounding import counted, duration_text, rounded
 from walkers.physics.units import Kind, parse_quantity
-from walkers.postprocess.sides import REST, of_tray, sides_apart
+from walkers.postprocess.sides import REST, fell, of_tray, sides_apart, uphill_velocities
 from walkers.postprocess.uncertainty import SPREAD_NAME
 from walkers.runner.directory import (
     CASE_NAME,
@@ -67,8 +67,8 @@ class Entry:
     The status is finished, running, failed, or interrupted (a run can be continued, or points of a sweep are missing).
     ``age`` (s) counts from the end of the run or from the last change, ``size`` (bytes) is that of the files, for a
     sweep of its runs. ``parameters`` are those of `walkers.inputs.readable.flattened`, for a sweep the number of values
-    of each varied key. A run has a velocity (m/s, mean over the walkers; if ``sides`` has velocities up and down a
-    slope, that of walkers facing up; ``tray`` has the text of `of_tray`) or a number of climbs; a sweep has numbers of
+    of each varied key. A run has a velocity (m/s, mean over the walkers; if ``sides`` has velocities of walkers on a
+    slope, the first of them; ``tray`` has the text of `of_tray`) or a number of climbs; a sweep has numbers of
     points by status.
     """
 
@@ -145,8 +145,9 @@ def _run(path: Path, now: float) -> Entry | None:
     with suppress(OSError, ValueError, AttributeError, TypeError):
         result = recorded_result(path)
         velocity, climbs = result.get("velocity") or {}, result.get("climbs")
-        sides = sides_apart(result)
-        given = {"velocity": sides.get("up", velocity.get("mean")), "sides": sides, "tray": of_tray(result)}
+        sides = uphill_velocities(result) if fell(result) else sides_apart(result)
+        own = next(iter(sides.values())) if result.get("goes_uphill") and sides else velocity.get("mean")
+        given = {"velocity": own, "sides": sides, "tray": of_tray(result)}
         given["climbs"] = None if climbs is None else len(climbs)
         if notes := result.get("by_hand"):
             given["reason"] = "edited and run by hand" if "edited" in " ".join(notes) else notes[0]

@@ -357,7 +357,9 @@ def sides_differ(frame: pd.DataFrame) -> bool:
 
 
 def main_columns(frame: pd.DataFrame) -> list[str]:
-    """The main results in order of preference."""
+    """The main results in order of preference; velocities up the slope where walkers turned over or lean."""
+    if "upright" in frame and (frame["upright"] < frame["walkers"]).any():
+        return ["axial_velocity", *_RESULTS]
     return ["right_facing", *_RESULTS] if sides_differ(frame) else list(_RESULTS)
 
 
