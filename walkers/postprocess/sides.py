@@ -78,8 +78,9 @@ def of_tray(result: Mapping[str, Any]) -> list[str]:
         return []
     free, count, joined, held = (result[key] for key in ("free_speed", "walkers", "clustered_share", "held_share"))
     shares = {"slow": result["slow_share"], "connected": joined, "held at a side": held or None}
+    speed = "" if free is None else f"free walkers {with_decimals(1e3 * free, 3)} mm/s, turning at the start included"
     return [
-        "no walker is free" if free is None else f"free walkers {with_decimals(1e3 * free, 3)} mm/s, settling included",
+        speed or "no walker is free",
         *(f"{round(count * share)} of {count} {what}" for what, share in shares.items() if share is not None),
         *(["none free"] if free is not None and max(joined, held) == 1.0 else []),
     ]
