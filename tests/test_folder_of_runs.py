@@ -99,9 +99,16 @@ def test_a_resting_walker_is_called_so_everywhere(out: Path) -> None:
     assert call("list", "--all", check=True).stdout.count(" at rest ") == 2
     shown = [repr(walkers.load(one)) for one in (table["run"][0], "rest")]
     assert shown == [f"Run({table['run'][0]}: finished, at rest)", "Sweep(rest: 2 points, 2 finished)"]
-    head, *rows = call("list", "rest", check=True).stdout.splitlines()[2:]
+    head, *rows = call("list", "rest", check=True).stdout.splitlines()[2:5]
     end = head.index(" (mm/s)") + len(" (mm/s)")
     assert [row[:end].split()[-1] for row in rows] == ["0", "0"]
+
+
+def test_list_hides_runs_of_sweeps_but_those_with_a_spread(out: Path) -> None:
+    run = Path(walkers.load(out / "grid").table()["run"][0]).name
+    assert run not in call("list", check=True).stdout
+    shutil.copytree(out / "rough", out / f"{run}-spread")
+    assert f"\n{run}  finished" in call("list", check=True).stdout
 
 
 def test_list_filters_and_sorts(out: Path) -> None:
