@@ -112,7 +112,7 @@ def with_bands(directory: Path, result: Mapping[str, Any]) -> dict[str, Any]:
     return known
 
 
-def has_numerical_error(result: Mapping[str, Any]) -> bool:
+def has_error(result: Mapping[str, Any]) -> bool:
     """Whether the mean velocity of walkers has a numerical error: not on a tray where none is steady."""
     return bool(result["steady"] or not result["meet"])
 

@@ -12,7 +12,7 @@ from walkers.inputs.errors import refused
 from walkers.inputs.readable import differing, flattened, readable, readable_unit
 from walkers.inputs.rounding import percent, rounded
 from walkers.postprocess.sides import STEADY_SPEED, alike, sides, sides_apart, ways
-from walkers.postprocess.uncertainty import band_of, band_text, has_numerical_error, not_known, with_bands
+from walkers.postprocess.uncertainty import band_of, band_text, has_error, not_known, with_bands
 from walkers.runner.directory import case_of
 from walkers.sweeps.folder import aligned
 from walkers.sweeps.table import (
@@ -189,7 +189,7 @@ def _errors_text(runs: Sequence[Path], names: Sequence[str], parameters: Mapping
     name_of = "right_facing" if any(map(_up_and_down, results)) else "velocity"
     errors, own = [_numerical_error(one) for one in results], [_number_of(one[name_of]["mean"]) for one in results]
     total = hypot(*errors)
-    measured = _measured(parameters, own) if all(map(has_numerical_error, results)) else []
+    measured = _measured(parameters, own) if all(map(has_error, results)) else []
     lines = list(measured)
     if not measured and isfinite(total + own[0] + own[1]) and total > 0.0:
         times = abs(own[1] - own[0]) / total
@@ -205,7 +205,7 @@ def _errors_text(runs: Sequence[Path], names: Sequence[str], parameters: Mapping
     lines += [
         f"{name}: the numerical error is not measured for this case"
         for name, one, error in zip(names, results, errors, strict=True)
-        if not (measured or isfinite(error)) and has_numerical_error(one)
+        if not (measured or isfinite(error)) and has_error(one)
     ]
     for name, one, value in zip(names, results, own, strict=True):
         if band := band_of(one, name_of, value):

@@ -433,7 +433,8 @@ def short_text(frame: pd.DataFrame) -> str:
     import pandas as pd
 
     left_out = (_LEFT_OUT - set(SIDES)) | {"velocity"} if sides_differ(frame) else _LEFT_OUT
-    shown = frame.drop(columns=[name for name in frame.columns if name in left_out])
+    names = [name for name in frame.columns if name not in left_out]
+    shown = frame[names].copy()
     units = dict(frame.attrs.get("units", {}))
     varied = varied_columns(frame)
     for name in shown.columns.difference(varied):
@@ -441,11 +442,11 @@ def short_text(frame: pd.DataFrame) -> str:
             units[name], factor = SHOWN_UNITS[units[name]]
             shown[name] = (shown[name].astype(float) * factor).map(partial(rounded, unit=units[name]), "ignore")
     kept = {"point", *varied, *main_columns(frame)} if "status" in shown else set(shown)
-    same = {name: shown.pop(name).dropna() for name in list(shown) if name not in kept and shown[name].nunique() < 2}
+    same = {name: shown.pop(name).dropna() for name in names if name not in kept and shown[name].nunique() < 2}
     first = {name: cells.iloc[0] for name, cells in same.items() if len(cells) and name != "status"}
     texts = {name: one if isinstance(one, str) else rounded(float(one)) for name, one in first.items()}
     words = [f"{name} {one} {units[name]}".rstrip() for name, one in texts.items()]
-    heads = dict(zip(varied, short_keys(varied, shown), strict=True))
+    heads = dict(zip(varied, short_keys(varied, names), strict=True))
     shown.columns = pd.Index([with_unit(heads.get(name, name), units.get(name)) for name in shown.columns])
     text = str(shown.to_string(index=False, float_format=lambda value: f"{value:.{DIGITS}g}", na_rep="-"))
     return f"{text}\n\nthe same at all points: {', '.join(words)}" if words else text

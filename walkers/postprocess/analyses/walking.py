@@ -40,14 +40,7 @@ from walkers.postprocess.gait import (
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
 from walkers.postprocess.sides import REST, STEADY_SPEED, alike, of_tray, sides, sides_apart, ways
 from walkers.postprocess.tables import NUMBERED, Columns, columns_of
-from walkers.postprocess.uncertainty import (
-    LEAST_PER_VALUE,
-    band_of,
-    band_text,
-    bands_text,
-    has_numerical_error,
-    wrapped,
-)
+from walkers.postprocess.uncertainty import LEAST_PER_VALUE, band_of, band_text, bands_text, has_error, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -520,7 +513,7 @@ def _numerical(result: Mapping[str, Any]) -> list[str]:
     if error is None:
         changes = ", ".join(result.get("checks", ()))
         told = f"numerical error not measured{': run and compare with ' * bool(changes)}{changes}"
-        return [told] if has_numerical_error(result) else []
+        return [told] if has_error(result) else []
     if own < STEADY_SPEED:
         return [f"numerical error {_error(error['total'])} (measured for this case: half the time step, {harder})"]
     half_step, stiffer, total = (100.0 * error[name] / own for name in ("half_step", "stiffer", "total"))
