@@ -68,7 +68,9 @@ _LEFT_OUT = {
     *("mass_asymmetry", "frequency", "peak_acceleration", "peak_velocity", "amplitude", "radius_1", "radius_2"),
     *("scatter", "right_facing", "left_facing", "sliding_2", "sliding_3", "open_1", "open_2", "open_3"),
     *("separated_fraction", "orientation_end", "turned_round", "walkers_met", "lost", "reason"),
-    *("smallest", "largest", "rotation_2", "cycles", "ended_early"),
+    *("smallest", "largest", "rotation_2", "cycles", "ended_early", "parted", "largest_group", "meeting_rate"),
+    *("pair_lifetime", "pair_time", "largest_cluster", "nematic_order", "polar_order", "joined_speed", "speed_ratio"),
+    *(f"{way}_{what}" for way in ("following", "side", "head_on") for what in ("met", "parted", "walking", "resting")),
 }
 """Columns that the printed table leaves out."""
 _VARIED = "varied"
