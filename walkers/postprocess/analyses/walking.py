@@ -40,7 +40,15 @@ from walkers.postprocess.gait import (
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
 from walkers.postprocess.sides import REST, STEADY_SPEED, alike, fell, of_tray, sides, sides_apart, ways
 from walkers.postprocess.tables import NUMBERED, Columns, columns_of
-from walkers.postprocess.uncertainty import LEAST_PER_VALUE, band_of, band_text, bands_text, not_known, wrapped
+from walkers.postprocess.uncertainty import (
+    LEAST_PER_VALUE,
+    band_of,
+    band_text,
+    bands_text,
+    has_error,
+    not_known,
+    wrapped,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -506,13 +514,13 @@ def _band(result: Mapping[str, Any]) -> str:
 
 
 def _numerical(result: Mapping[str, Any]) -> list[str]:
-    """Numerical error of the velocity in per cent, or in mm/s if it does not walk; if unknown, how to measure it."""
+    """Numerical error of the velocity in per cent, or in mm/s if it does not walk; if unknown, what measures it."""
     error, own = result["numerical_error"], abs(result["velocity"]["mean"] or 0.0)
     harder = f"{STIFFER:g} times Young's modulus"
     if error is None:
-        told = f"numerical error: not measured for this case; run it at half the time step and with {harder}"
-        checks = result.get("checks", [])
-        return [f"{told}, then walkers compare with the same arguments:" if checks else told, *checks]
+        changes = ", ".join(result.get("checks", ()))
+        told = f"numerical error not measured{': run and compare with ' * bool(changes)}{changes}"
+        return [told] if has_error(result) else []
     if own < STEADY_SPEED:
         return [f"numerical error {_error(error['total'])} (measured for this case: half the time step, {harder})"]
     half_step, stiffer, total = (100.0 * error[name] / own for name in ("half_step", "stiffer", "total"))
