@@ -58,9 +58,8 @@ def sides_apart(result: Mapping[str, Any]) -> dict[str, float]:
 
 def fell(result: Mapping[str, Any]) -> bool:
     """Whether walkers turned over or lean on a slope: then a velocity along the heading says little about their way."""
-    if not result.get("goes_uphill"):
-        return False
-    return bool(result["turned_round"] or result["posture"]["upright"] < result["walkers"])
+    posture = result.get("posture")  # none on level floors, and of piles
+    return bool(posture and (result["turned_round"] or posture["upright"] < result["walkers"]))
 
 
 def uphill_velocities(result: Mapping[str, Any]) -> dict[str, float]:
