@@ -342,7 +342,7 @@ def _check_held(case: Case, walkers: Walkers) -> None:
     for name, pull, overlap in zip(names, loads.capillary, loads.overlaps, strict=True):
         if pull < 0.0 == overlap:  # no overlap: the load is tensile
             angle = case.liquid.contact_angle
-            key, other = ("contact_angle", "a smaller angle") if angle else ("law", "a law that pulls")
+            key, other = ("contact_angle", "a smaller angle or less liquid") if angle else ("law", "a law that pulls")
             pushed = f"at rest, the bridge pushes {name} apart ({-1e6 * pull:.3g} uN)"
             raise unusable(f"liquid.{key}", f"expected {other}: {pushed}")
 
