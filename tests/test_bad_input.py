@@ -203,6 +203,7 @@ REFUSED: list[tuple[str, str]] = [
     ("list --out {runs} --older-than soon", "expected an age with its unit"),
     ("list --out {runs} --where frequency", "expected KEY=VALUE"),
     ("list --out {runs} --where frequenzy=2", "no run has such a key"),
+    ("list --out {runs} --where status=interrupted", '"status=interrupted": expected --status interrupted'),
     ("list --out {runs} --where frequency=60", '"frequency=60": expected a frequency with its unit'),
     ("list --out {runs} --where 'frequency=60 Hzz'", '"frequency=60 Hzz": expected a frequency with its unit'),
     ("list --out {runs} --where restitution=hard", '"restitution=hard": expected a number without a unit'),

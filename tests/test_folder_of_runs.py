@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -94,14 +95,21 @@ def test_a_resting_walker_is_called_so_everywhere(out: Path) -> None:
     assert (table["velocity"].abs() > 0.0).all()
     told = call("run", table["run"][0], check=True).stdout
     assert "at rest (below 0.002 mm/s)" in told
-    for half_or_harder in ("run.time_step=1us", "contact.youngs_modulus=500MPa"):
-        assert f"    walkers run {table['run'][0]} --set {half_or_harder}\n" in told
+    advice = "numerical error not measured: run and compare with run.time_step=1us, contact.youngs_modulus=500MPa\n"
+    assert f"    {advice}" in told
     assert call("list", "--all", check=True).stdout.count(" at rest ") == 2
     shown = [repr(walkers.load(one)) for one in (table["run"][0], "rest")]
     assert shown == [f"Run({table['run'][0]}: finished, at rest)", "Sweep(rest: 2 points, 2 finished)"]
-    head, *rows = call("list", "rest", check=True).stdout.splitlines()[2:]
+    head, *rows = call("list", "rest", check=True).stdout.splitlines()[2:5]
     end = head.index(" (mm/s)") + len(" (mm/s)")
     assert [row[:end].split()[-1] for row in rows] == ["0", "0"]
+
+
+def test_list_hides_runs_of_sweeps_but_those_with_a_spread(out: Path) -> None:
+    run = Path(walkers.load(out / "grid").table()["run"][0]).name
+    assert run not in call("list", check=True).stdout
+    shutil.copytree(out / "rough", out / f"{run}-spread")
+    assert f"\n{run}  finished" in call("list", check=True).stdout
 
 
 def test_list_filters_and_sorts(out: Path) -> None:
@@ -185,6 +193,21 @@ def test_compare_changes_the_second_case_alone(out: Path, sides: list[str]) -> N
     found = json.loads(call("compare", *sides, "--set", "drive.frequency=90Hz", "--json", check=True).stdout)
     assert {key: values[1] for key, values in found["parameters"].items()} == {"drive.frequency": 90.0}
     assert (found["second"], found["not_run"]) == ("base.toml drive.frequency=90Hz", ["base.toml drive.frequency=90Hz"])
+
+
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ("run.time_step=1us", r"mm/s \(.* %\), is the numerical error of the time step"),
+        ("contact.youngs_modulus=500MPa", r"mm/s \(.* %\), is the numerical error of the softened beads"),
+        ("drive.phase=90deg", "base.toml: the numerical error is not measured for this case"),
+    ],
+)
+def test_compare_measures_a_numerical_error(out: Path, setting: str, told: str) -> None:
+    call("run", "base.toml", "--set", setting, check=True)
+    text = call("compare", "base.toml", "--set", setting, check=True).stdout
+    assert re.search(told, text)
+    assert text.count("is the numerical error of") + text.count("is not measured") / 2 == 1
 
 
 def test_compare_matches_the_points_of_two_sweeps(out: Path) -> None:

@@ -208,9 +208,11 @@ def test_long_runs_are_thinned_out_and_say_so(walked_run: Path, pile_run: Path) 
 
 
 def test_words_and_numbers() -> None:
-    """Numbers have four digits at most, in units that one reads; a liquid without a name is told by its numbers."""
+    """Numbers have four digits at most and the decimals of their unit; a nameless liquid is told by its own."""
     given = [(1.38173201,), (1234.5678,), (-87654.3,), (0.0012345678,), (-3.2e-15, "mm/s"), (6,), (1e-12,), (nan,)]
-    assert [rounded(*one) for one in given] == ["1.382", "1235", "-87650", "0.001235", "0", "6", "0", "-"]
+    given += [(-0.002164, "mm/s"), (-0.00175, "mm/s"), (0.000414, "mm/s"), (0.0005927, "mm/s"), (3.08, "mm/s")]
+    expected = ["1.382", "1235", "-87650", "0.001235", "0", "6", "0", "-", "-0.002", "-0.002", "0", "0.001", "3.08"]
+    assert [rounded(*one) for one in given] == expected
     given = [(18.18654, 3), (1.08, 3), (-2e-6, 3), (99.99951, 3), (-179.957, 2), (0.0, 1)]
     assert [with_decimals(*one) for one in given] == ["18.19", "1.080", "0", "100.0", "-180.0", "0"]
     shown = {unit: number_of({"a": 0.25}, "a", unit) for unit in ("m", "m/s", "rad", "share")}

@@ -23,7 +23,7 @@ from walkers.paper.published import outside_of_the_paper
 from walkers.physics.units import parse_quantity
 from walkers.pipeline import find_side
 from walkers.postprocess.analysis import describe_result
-from walkers.postprocess.sides import sides_apart
+from walkers.postprocess.sides import sides_apart, uphill_velocities
 from walkers.postprocess.uncertainty import band_text
 from walkers.sweeps.comparison import compare_runs
 from walkers.sweeps.folder import as_text, inventory
@@ -151,6 +151,15 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     frame = pd.DataFrame([row_of(done.result)])
     assert default_column(frame) == "right_facing"
     assert default_column(frame.drop(columns="upright")) == "velocity"
+    # Of walkers that turned over it is the velocity up the slope that counts.
+    result = {**done.result, "turned_round": 1, "posture": {**done.result["posture"], "upright": 1, "turned over": 1}}
+    up, down = (done.result["axial_velocity"][f"{way}_facing"] for way in ("right", "left"))
+    assert uphill_velocities(result) == {"up the slope, started up": up, "started down": down}
+    assert default_column(pd.DataFrame([row_of(result)])) == "axial_velocity"
+    band = {"low": -1e-2, "high": 1e-2, "points": 64}
+    text = describe_result(done.directory, {**result, "bands": {"axial_velocity": band, "right_facing": band}})
+    assert "velocity up the slope -10 to 10 mm/s over the ranges" in text
+    assert "mm/s, positive toward" not in text
 
 
 @pytest.mark.parametrize(

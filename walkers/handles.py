@@ -323,7 +323,7 @@ class Sweep:
         """The status of the points, their failures, and the table in mm, mm/s, nJ and degrees."""
         from walkers.sweeps.table import describe_status, short_text
 
-        return f"{describe_status(self._record)}\n\n{short_text(self.table())}"
+        return f"{describe_status(self._record)}\n\n{short_text(self.table().drop(columns='run'))}"
 
     def _repr_html_(self) -> str:
         """The table in a notebook."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from math import isclose, pi
@@ -104,6 +104,13 @@ def differing(cases: Sequence[Mapping[str, Any]]) -> list[str]:
     varied = [key for key in keys if len({_comparable(case.get(key)) for case in cases}) > 1]
     given = [case.given if isinstance(case, FlatCase) else None for case in cases]
     return [key for key in varied if any(said is None or key in said for said in given)] or varied
+
+
+def short_keys(keys: Sequence[str], others: Iterable[str] = ("name",)) -> list[str]:
+    """The last parts of keys; whole keys where that is also the last part of another key, or one of ``others``."""
+    last = [key.rpartition(".")[2] for key in keys]
+    taken = set(others).difference(keys)
+    return [key if one in taken or last.count(one) > 1 else one for key, one in zip(keys, last, strict=True)]
 
 
 def _comparable(value: Any) -> Hashable:

@@ -1,4 +1,4 @@
-"""Rounding of printed numbers: at most four significant digits, in usual units."""
+"""Rounding of printed numbers: at most four significant digits and the decimals of their unit, in usual units."""
 
 from __future__ import annotations
 
@@ -14,26 +14,27 @@ SHOWN_UNITS = {
     "share": ("%", 100.0),
 }
 """For units of a result, those that are shown, and how many of them one is."""
-NOISE = {"": 1e-9, "mm/s": 5e-4, "mm": 1e-6, "°": 1e-3, "deg": 1e-3, "%": 1e-3, "nJ": 1e-6}
-"""In displayed units: smaller values are rounding errors and are printed as 0."""
+_DECIMALS = {"": 9, "mm/s": 3, "mm": 6, "°": 3, "deg": 3, "%": 3, "nJ": 6}
+"""Most decimals of a number in a displayed unit: values, their differences and their scatter have the same resolution,
+and rounding errors are printed as 0."""
 _LARGEST_WRITTEN_OUT = 1e7
 _LONGER = {"d": 86400.0, "h": 3600.0, "min": 60.0}
 
 
 def rounded(value: float, unit: str = "") -> str:
-    """A number as text: at most four significant digits; 0 for rounding errors in a unit; a dash for None.
+    """A number as text: at most four significant digits, and the decimals of its unit; a dash for NaN.
 
     Examples
     --------
-    >>> rounded(18.18654, "mm/s"), rounded(-3.2e-15, "mm/s"), rounded(123456.0)
-    ('18.19', '0', '123500')
+    >>> rounded(18.18654, "mm/s"), rounded(-0.002164, "mm/s"), rounded(-3.2e-15, "mm/s"), rounded(123456.0)
+    ('18.19', '-0.002', '0', '123500')
     """
     if isinstance(value, (bool, int)):
         return str(value)
     if not isfinite(value):
         return "-"
-    if abs(value) < NOISE.get(unit, 0.0):
-        return "0"
+    if unit in _DECIMALS:
+        value = round(value, _DECIMALS[unit]) + 0.0  # not -0
     text = f"{value:.{DIGITS}g}"
     return f"{float(text):.0f}" if 10**DIGITS <= abs(value) < _LARGEST_WRITTEN_OUT else text
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
-from walkers.inputs.rounding import NOISE
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, series_look, styled
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.gait import averages, distance_walked, fit_slopes, gait, walk
@@ -92,7 +91,7 @@ def nested_widths(count: int, largest: float = 3.0) -> list[float]:
 
 def velocity_text(value: float) -> str:
     """A velocity (mm/s) as text with three digits and at most three decimals."""
-    return "0" if abs(value) < NOISE["mm/s"] else f"{value:.3g}" if abs(value) >= 0.1 else f"{value:.3f}"
+    return "0" if round(value, 3) == 0.0 else f"{value:.3g}" if abs(value) >= 0.1 else f"{value:.3f}"
 
 
 def walk_panels(groups: list[Group]) -> list[Panel]:

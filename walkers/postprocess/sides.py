@@ -56,14 +56,31 @@ def sides_apart(result: Mapping[str, Any]) -> dict[str, float]:
     return dict(zip(ways(uphill=bool(result.get("goes_uphill"))), (right, left), strict=True))
 
 
+def fell(result: Mapping[str, Any]) -> bool:
+    """Whether walkers turned over or lean on a slope: then a velocity along the heading says little about their way."""
+    if not result.get("goes_uphill"):
+        return False
+    return bool(result["turned_round"] or result["posture"]["upright"] < result["walkers"])
+
+
+def uphill_velocities(result: Mapping[str, Any]) -> dict[str, float]:
+    """Mean velocities (m/s) up the slope, by direction at the start if they differ."""
+    axial = result["axial_velocity"]
+    up, down = axial["right_facing"], axial["left_facing"]
+    if up is None or down is None or not differ(up, down):
+        return {"up the slope": axial["mean"]}
+    return {"up the slope, started up": up, "started down": down}
+
+
 def of_tray(result: Mapping[str, Any]) -> list[str]:
     """Walkers that may meet: speed of free ones, then numbers at the end, as text; empty for other walkers."""
     if not result.get("meet") or "held_share" not in result:
         return []
     free, count, joined, held = (result[key] for key in ("free_speed", "walkers", "clustered_share", "held_share"))
     shares = {"slow": result["slow_share"], "connected": joined, "held at a side": held or None}
+    speed = "" if free is None else f"free walkers {with_decimals(1e3 * free, 3)} mm/s, turning at the start included"
     return [
-        "no walker is free" if free is None else f"free walkers {with_decimals(1e3 * free, 3)} mm/s, settling included",
+        speed or "no walker is free",
         *(f"{round(count * share)} of {count} {what}" for what, share in shares.items() if share is not None),
         *(["none free"] if free is not None and max(joined, held) == 1.0 else []),
     ]

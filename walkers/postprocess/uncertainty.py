@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shlex
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -18,10 +17,13 @@ from walkers.inputs.rounding import SHOWN_UNITS, rounded
 from walkers.runner.directory import CASE_NAME
 from walkers.runner.files import read_json
 
+SPREAD = "-spread"
 SPREAD_NAME = "spread.json"
-"""Name of the file with the bands in the directory of a spread (`spread_of`)."""
+"""End of the name of a spread's directory (`spread_of`), and name of the file with the bands in it."""
 LEAST_PER_VALUE = 3
 """Draws per varied value below which the band is approximate and rank correlations are not significant."""
+BANDS_ON_SLOPES = {"right_facing": "velocity, facing up,", "axial_velocity": "velocity up the slope"}
+"""Names of the bands of walkers on slopes."""
 _OVER = "over the ranges of uncertain values"
 _WIDTH = 110
 
@@ -72,9 +74,8 @@ def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
 def wrapped(sentences: Iterable[str]) -> list[str]:
     """Sentences as indented lines of a text."""
     wrapper = textwrap.TextWrapper(_WIDTH, "    ", "      ", break_on_hyphens=False, break_long_words=False)
-    # A number and its unit, and a command.
+    # A number and its unit.
     tied = (re.sub(r"(?<=\d) (?=[%a-z])", "\u00a0", sentence) for sentence in sentences)
-    tied = (re.sub(r"walkers run .*", lambda command: command[0].replace(" ", "\u00a0"), one) for one in tied)
     return [line.replace("\u00a0", " ") for sentence in tied for line in wrapper.wrap(sentence)]
 
 
@@ -92,27 +93,31 @@ def not_known(rests: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def spread_of(directory: Path) -> Path:
     """The directory of the spread of a run (`walkers.sweeps.spread`); it need not exist."""
-    return directory.with_name(f"{directory.name}-spread")
+    return directory.with_name(f"{directory.name}{SPREAD}")
 
 
 def with_bands(directory: Path, result: Mapping[str, Any]) -> dict[str, Any]:
     """A result with the ``bands`` of its quantities, if a spread of the run is beside it.
 
-    If its numerical error is not measured, it also has the commands that measure it, as ``checks``.
+    If its numerical error is not measured, it also has the changes of the case that measure it, as ``checks``.
     """
     known, unknown = dict(result), (OSError, ValueError, KeyError, TypeError)
     with suppress(*unknown):
         known["bands"] = read_json(spread_of(directory.resolve()) / SPREAD_NAME)["bands"]
     if result.get("numerical_error", 0) is None and not result.get("by_hand"):  # piles have no such error
         with suppress(*unknown):  # a result that is not shown where its case is
-            case, name = read_json(directory / CASE_NAME), shlex.quote(str(directory))
+            case = read_json(directory / CASE_NAME)
             step, modulus = case["run"]["time_step"], case["contact"]["youngs_modulus"]
-            changes = (
+            known["checks"] = [
                 f"run.time_step={0.5e6 * step:.4g}us",
                 f"contact.youngs_modulus={1e-6 * STIFFER * modulus:.4g}MPa",
-            )
-            known["checks"] = [f"walkers run {name} --set {change}" for change in changes]
+            ]
     return known
+
+
+def has_error(result: Mapping[str, Any]) -> bool:
+    """Whether the mean velocity of walkers has a numerical error: not on a tray where none is steady."""
+    return bool(result["steady"] or not result["meet"])
 
 
 def band_of(result: Mapping[str, Any], name: str, own: float | None) -> tuple[float, float] | None:
@@ -139,6 +144,7 @@ def bands_text(result: Mapping[str, Any], units: Mapping[str, str], own: Mapping
     bands = {name: band for name in units if (band := band_of(result, name, own.get(name)))}
     if not bands:
         return ""
-    text = "; ".join(f"{name} {band_text(band, units[name])}" for name, band in bands.items())
+    named = ((BANDS_ON_SLOPES.get(name, name), band_text(band, units[name])) for name, band in bands.items())
+    text = "; ".join(map(" ".join, named))
     points = max(result["bands"][name]["points"] for name in bands)
     return f"{text} {_OVER} (5 to 95 % of {points} draws)"

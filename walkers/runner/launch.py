@@ -333,9 +333,9 @@ class _Watch:
         if clearance is not None and clearance / seconds > fastest:
             return self._blow_up(clearance / seconds)
         sentence = (
-            f"{lost} bead(s) left the simulation box before step {step}: walkers left its sides (increase "
-            "dimers.spacing, shorten the run, or reduce the acceleration if beads fly off), or climbers rose above its "
-            "top, at twice boundary.height"
+            f"{lost} bead(s) left the simulation box before step {step}: walkers left its sides (increase their "
+            "spacing, shorten the run, or reduce the acceleration if beads fly off), or climbers rose above its top, "
+            "at twice boundary.height"
         )
         return (failures.BeadsOverTheTop if over else failures.BeadsLost)(sentence, self.directory, lost=lost)
 

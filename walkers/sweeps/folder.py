@@ -21,11 +21,11 @@ from stat import S_ISDIR
 from typing import Any, Literal
 
 from walkers.inputs.errors import InputError, Problem, refused
-from walkers.inputs.readable import agrees, check_wanted, differing, flattened, has_key, kind_of, readable
+from walkers.inputs.readable import agrees, check_wanted, differing, flattened, has_key, kind_of, readable, short_keys
 from walkers.inputs.rounding import counted, duration_text, rounded
 from walkers.physics.units import Kind, parse_quantity
-from walkers.postprocess.sides import REST, of_tray, sides_apart
-from walkers.postprocess.uncertainty import SPREAD_NAME
+from walkers.postprocess.sides import REST, fell, of_tray, sides_apart, uphill_velocities
+from walkers.postprocess.uncertainty import SPREAD, SPREAD_NAME
 from walkers.runner.directory import (
     CASE_NAME,
     REPLACED,
@@ -67,8 +67,8 @@ class Entry:
     The status is finished, running, failed, or interrupted (a run can be continued, or points of a sweep are missing).
     ``age`` (s) counts from the end of the run or from the last change, ``size`` (bytes) is that of the files, for a
     sweep of its runs. ``parameters`` are those of `walkers.inputs.readable.flattened`, for a sweep the number of values
-    of each varied key. A run has a velocity (m/s, mean over the walkers; if ``sides`` has velocities up and down a
-    slope, that of walkers facing up; ``tray`` has the text of `of_tray`) or a number of climbs; a sweep has numbers of
+    of each varied key. A run has a velocity (m/s, mean over the walkers; if ``sides`` has velocities of walkers on a
+    slope, the first of them; ``tray`` has the text of `of_tray`) or a number of climbs; a sweep has numbers of
     points by status.
     """
 
@@ -145,8 +145,9 @@ def _run(path: Path, now: float) -> Entry | None:
     with suppress(OSError, ValueError, AttributeError, TypeError):
         result = recorded_result(path)
         velocity, climbs = result.get("velocity") or {}, result.get("climbs")
-        sides = sides_apart(result)
-        given = {"velocity": sides.get("up", velocity.get("mean")), "sides": sides, "tray": of_tray(result)}
+        sides = uphill_velocities(result) if fell(result) else sides_apart(result)
+        own = next(iter(sides.values())) if result.get("goes_uphill") and sides else velocity.get("mean")
+        given = {"velocity": own, "sides": sides, "tray": of_tray(result)}
         given["climbs"] = None if climbs is None else len(climbs)
         if notes := result.get("by_hand"):
             given["reason"] = "edited and run by hand" if "edited" in " ".join(notes) else notes[0]
@@ -214,6 +215,8 @@ def select(
     runs = [entry for entry in entries if not entry.is_sweep]
     for text in where:
         key, _, value = (part.strip() for part in text.partition("="))
+        if key in ("case", "status"):
+            raise refused("--where", f'"{text}": expected --{key} {value}'.rstrip())
         if not (key and value):
             told = 'expected KEY=VALUE, such as "drive.frequency=80 Hz"'
             raise refused("--where", f'"{text}": {told}')
@@ -269,8 +272,9 @@ def as_json(entries: Sequence[Entry]) -> list[dict[str, Any]]:
 
 
 def members(entries: Sequence[Entry]) -> list[Entry]:
-    """The runs of sweeps."""
+    """The runs of sweeps, without those that have a spread of their own."""
     named = {run for entry in entries for run in entry.runs}
+    named -= {entry.name.removesuffix(SPREAD) for entry in entries if entry.is_sweep}
     return [entry for entry in entries if entry.name in named]
 
 
@@ -288,9 +292,7 @@ def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
         rows.append([sweep.name, points, duration_text(sweep.age), bytes_text(sweep.size), sweep.case, keys])
     blocks = [aligned(rows)] if sweeps else []
     for case, of_case, varied in _varied(runs):
-        last = [key.rpartition(".")[2] for key in varied]
-        names = [key if one == "name" or last.count(one) > 1 else one for key, one in zip(varied, last, strict=True)]
-        rows = [[f"{case} ({len(of_case)})", "status", "result", "age", "size", *names]]
+        rows = [[f"{case} ({len(of_case)})", "status", "result", "age", "size", *short_keys(varied)]]
         for run in of_case:
             status = f"{run.status}: {run.reason}" if run.reason else run.status
             values = [readable(key, run.parameters.get(key)) for key in varied]

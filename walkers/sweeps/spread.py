@@ -20,12 +20,12 @@ from walkers.inputs.sweep import Sweep, settings_in
 from walkers.physics.units import parse_quantity
 from walkers.postprocess.analysis import analyses, analyses_of
 from walkers.postprocess.gait import SEPARATED
-from walkers.postprocess.uncertainty import LEAST_PER_VALUE, SPREAD_NAME, spread_of
+from walkers.postprocess.uncertainty import BANDS_ON_SLOPES, LEAST_PER_VALUE, SPREAD_NAME, spread_of
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.runner.files import write_json
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
-from walkers.sweeps.table import load, sides_differ
+from walkers.sweeps.table import load, main_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -164,12 +164,11 @@ def run_spread(
     together, counts = table, {}
     if "velocity" in table:
         together = table[~(table["separated_fraction"] > SEPARATED)]
-        speeds = together["right_facing" if sides_differ(together) else "velocity"]
+        speeds = together[main_columns(together)[0]]
         counts = {"forward": int((speeds > _AT_REST).sum()), "backward": int((speeds < -_AT_REST).sum())}
         counts |= {"at_rest": int((speeds.abs() <= _AT_REST).sum()), "separated": len(table) - len(together)}
     shown = [name for one in analyses_of(case) for name in one.headlines if name in one.columns]
-    if sides_differ(together):  # the mean over both sides means nothing
-        shown = ["right_facing" if name == "velocity" else name for name in shown]
+    shown = [main_columns(together)[0] if name == "velocity" else name for name in shown]
     spread = Spread(
         directory=record.directory,
         varied=tuple(one for one in case.origins if one.range is not None),
@@ -216,13 +215,14 @@ def describe(spread: Spread) -> str:
             rounded(float(f"{one * factor:.3g}"), unit) for one in astuple(band)[:5]
         )
         ends = f"{low} to {high} {unit} (5 to 95 %), median {middle}; smallest {smallest}, largest {largest}"
-        lines.append(f"    {name:8} {ends}")
+        lines.append(f"    {BANDS_ON_SLOPES.get(name, name):8} {ends}")
         ranks = ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items())
         text = f"strongest dependence: {ranks} (rank correlation)" if ranks else "no clear dependence on any of them"
         if band.points < LEAST_PER_VALUE * len(spread.varied):
             text = "too few draws for rank correlations; the band is approximate"
         lines.append(f"{'':13}{text}")
-    found = [f"{count} {_WORDS[name]}" for name, count in spread.counts.items() if count]
-    found += [f"{len(spread.failures)} failed"] if spread.failures else []
+    words = _WORDS | ({"forward": "go up the slope", "backward": "go down"} if "axial_velocity" in spread.bands else {})
+    found = [f"{count} {words[name]}" for name, count in spread.counts.items() if count]
+    found += [f"{len(spread.failures)} failed, not in the band"] if spread.failures else []
     lines += [f"    draws    {', '.join(found)}"] if found else []
     return "\n".join([*lines, f"    table    {spread.directory}"])

@@ -17,6 +17,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,9 +27,10 @@ from walkers.inputs.case import Case
 from walkers.inputs.changes import flatten
 from walkers.inputs.errors import InputError, Problem, WalkersError, refused
 from walkers.inputs.library import suggestion
-from walkers.inputs.rounding import DIGITS, NOISE, SHOWN_UNITS
+from walkers.inputs.readable import short_keys
+from walkers.inputs.rounding import DIGITS, SHOWN_UNITS, rounded
 from walkers.postprocess.analysis import RESULT_NAME, Described, analyses, analyses_in, analyses_of, current_result
-from walkers.postprocess.sides import REST, differ
+from walkers.postprocess.sides import differ
 from walkers.runner.binary import Engine
 from walkers.runner.directory import FAILURE_NAME, finished_run, is_locked, run_place, unfinished
 from walkers.runner.files import json_bytes, read_json, write_bytes, write_json
@@ -66,6 +68,9 @@ _LEFT_OUT = {
     *("mass_asymmetry", "frequency", "peak_acceleration", "peak_velocity", "amplitude", "radius_1", "radius_2"),
     *("scatter", "right_facing", "left_facing", "sliding_2", "sliding_3", "open_1", "open_2", "open_3"),
     *("separated_fraction", "orientation_end", "turned_round", "walkers_met", "lost", "reason"),
+    *("smallest", "largest", "rotation_2", "cycles", "ended_early", "parted", "largest_group", "meeting_rate"),
+    *("pair_lifetime", "pair_time", "largest_cluster", "nematic_order", "polar_order", "joined_speed", "speed_ratio"),
+    *(f"{way}_{what}" for way in ("following", "side", "head_on") for what in ("met", "parted", "walking", "resting")),
 }
 """Columns that the printed table leaves out."""
 _VARIED = "varied"
@@ -357,7 +362,9 @@ def sides_differ(frame: pd.DataFrame) -> bool:
 
 
 def main_columns(frame: pd.DataFrame) -> list[str]:
-    """The main results in order of preference."""
+    """The main results in order of preference; velocities up the slope where walkers turned over or lean."""
+    if "upright" in frame and (frame["upright"] < frame["walkers"]).any():
+        return ["axial_velocity", *_RESULTS]
     return ["right_facing", *_RESULTS] if sides_differ(frame) else list(_RESULTS)
 
 
@@ -423,20 +430,30 @@ def write_table_file(frame: pd.DataFrame, path: Path) -> None:
 
 
 def short_text(frame: pd.DataFrame) -> str:
-    """A table as text: varied keys, Γ0, sin δ, results in mm, mm/s, nJ and degrees, status, run."""
+    """A table as text: varied keys, Γ0, sin δ, results in mm, mm/s, nJ and degrees, status.
+
+    Of a sweep's table, a line below has the results that are the same at all points.
+    """
     import pandas as pd
 
     left_out = (_LEFT_OUT - set(SIDES)) | {"velocity"} if sides_differ(frame) else _LEFT_OUT
-    shown = frame.drop(columns=[name for name in frame.columns if name in left_out])
+    names = [name for name in frame.columns if name not in left_out]
+    shown = frame[names].copy()
     units = dict(frame.attrs.get("units", {}))
-    for name in shown.columns.difference(varied_columns(frame)):
+    varied = varied_columns(frame)
+    for name in shown.columns.difference(varied):
         if units.get(name) in SHOWN_UNITS:
             units[name], factor = SHOWN_UNITS[units[name]]
-            values = shown[name].astype(float) * factor
-            least = 1e3 * REST if units[name] == "mm/s" else NOISE[units[name]]
-            shown[name] = values.mask(values.abs() < least, 0.0)
-    shown.columns = pd.Index([with_unit(name, units.get(name)) for name in shown.columns])
-    return str(shown.to_string(index=False, float_format=lambda value: f"{value:.{DIGITS}g}", na_rep="-"))
+            shown[name] = (shown[name].astype(float) * factor).map(partial(rounded, unit=units[name]), "ignore")
+    kept = {"point", *varied, *main_columns(frame)} if "status" in shown else set(shown)
+    same = {name: shown.pop(name).dropna() for name in names if name not in kept and shown[name].nunique() < 2}
+    first = {name: cells.iloc[0] for name, cells in same.items() if len(cells) and name != "status"}
+    texts = {name: one if isinstance(one, str) else rounded(float(one)) for name, one in first.items()}
+    words = [f"{name} {one} {units[name]}".rstrip() for name, one in texts.items()]
+    heads = dict(zip(varied, short_keys(varied, names), strict=True))
+    shown.columns = pd.Index([with_unit(heads.get(name, name), units.get(name)) for name in shown.columns])
+    text = str(shown.to_string(index=False, float_format=lambda value: f"{value:.{DIGITS}g}", na_rep="-"))
+    return f"{text}\n\nthe same at all points: {', '.join(words)}" if words else text
 
 
 def thresholds(directory: str | Path) -> pd.DataFrame:

@@ -38,9 +38,17 @@ from walkers.postprocess.gait import (
     walk,
 )
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
-from walkers.postprocess.sides import REST, STEADY_SPEED, alike, of_tray, sides, sides_apart, ways
+from walkers.postprocess.sides import REST, STEADY_SPEED, alike, fell, of_tray, sides, sides_apart, ways
 from walkers.postprocess.tables import NUMBERED, Columns, columns_of
-from walkers.postprocess.uncertainty import LEAST_PER_VALUE, band_of, band_text, bands_text, wrapped
+from walkers.postprocess.uncertainty import (
+    LEAST_PER_VALUE,
+    band_of,
+    band_text,
+    bands_text,
+    has_error,
+    not_known,
+    wrapped,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -196,15 +204,15 @@ class Walking(Analysis):
         told = "standard deviation of the velocities of the copies; not an error of the mean"
         yield Quantity("velocity.scatter", "", "m/s", "scatter", told)
         for name, way in (("right", first), ("left", second)):
-            label = f"velocity of walkers that started facing {way}"
+            label = f"velocity along the heading, walkers that started facing {way}"
             told = f"mean velocity of the walkers that started facing {name}"
             yield Quantity(f"{name}_facing", label, "m/s", f"{name}_facing", told)
-        if _fell(result):
+        if fell(result):
             yield Quantity("kept_heading", "velocity of walkers that kept their heading", "m/s")
         told = "mean velocity of the centres of mass along the drive axis; on a slope, uphill"
         yield Quantity("axial_velocity.mean", "velocity along the drive axis", "m/s", "axial_velocity", told)
         yield Quantity("lateral_velocity.mean", "velocity across the drive axis", "m/s")
-        these = ", walkers facing up" if result.get("goes_uphill") else ""
+        these = ", walkers that started facing up" if result.get("goes_uphill") else ""
         for bead in result.get("rotation", ("bead_1", "bead_2")):
             number = bead.partition("_")[2]
             label = f"rotation of bead {number}{these}, −R dφ/dt"
@@ -241,14 +249,15 @@ class Walking(Analysis):
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """Velocities, rotation, sliding and orientation of all walkers, and velocities of each make."""
         end, names, open_ones = result["orientation_end"], result["contacts"], result["open"]
-        drive, told = result["drive"], bool(_band(result)) and not _fell(result)  # the band, by the headline
+        drive, told = result["drive"], bool(_band(result)) and not fell(result)  # the band, by the headline
         if None not in (result["gamma0"], result["sin_delta"]):
             drive += f", Γ0 = {result['gamma0']:.3g}, sin δ = {result['sin_delta']:.3g}"
         beads = ", ".join(f"bead {place} {_speed(one)}" for place, one in enumerate(result["rotation"].values(), 1))
         sliding = ", ".join(f"{name} {_speed(result['sliding'][contact])}" for contact, name in names.items())
-        these = "facing up: " if result["goes_uphill"] and 0 < result["right_facing"]["n"] < result["walkers"] else ""
+        some = result["goes_uphill"] and 0 < result["right_facing"]["n"] < result["walkers"]
+        these = "started facing up: " if some else ""
         lines = [
-            *(_of_fallen(result, drive) if _fell(result) else _of_walkers(result, drive)),
+            *(_of_fallen(result, drive) if fell(result) else _of_walkers(result, drive)),
             *wrapped(self.uncertainty(result)[told:]),
             *_of_sides(result),
             fill(f"  rotation   {these}{beads} mm/s", 110, subsequent_indent=" " * 13),
@@ -266,6 +275,9 @@ class Walking(Analysis):
     def uncertainty(self, result: Mapping[str, Any]) -> list[str]:
         """Uncertainty of the velocity: unmeasured values, numerical error, and scatter of the copies."""
         known = super().uncertainty(result)
+        if fell(result):
+            told = bands_text(result, {"axial_velocity": "m/s"}, {"axial_velocity": result["axial_velocity"]["mean"]})
+            return [told] if told else not_known(result["rests_on"])
         if result.get("bands") and (apart := sides_apart(result)):
             told = bands_text(result, {"right_facing": "m/s"}, {"right_facing": next(iter(apart.values()))})
             known = [told or "no band: the spread has that of the mean over both ways, which is no walker's velocity"]
@@ -463,7 +475,7 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
 
 def _of_sides(result: Mapping[str, Any]) -> list[str]:
     """Velocities by direction at the start, and numbers of walkers that turned and that are steady."""
-    if _fell(result):
+    if fell(result):
         return []
     first, second = ways(uphill=result["goes_uphill"])
     right, left = (
@@ -475,13 +487,8 @@ def _of_sides(result: Mapping[str, Any]) -> list[str]:
     return wrapped([told + _steady(result), *([turned] if result["turned_round"] else [])])
 
 
-def _fell(result: Mapping[str, Any]) -> bool:
-    """Whether walkers turned over on a slope, so that no walker has the mean velocity."""
-    return bool(result.get("goes_uphill") and result["turned_round"])
-
-
 def _of_fallen(result: Mapping[str, Any], drive: str) -> list[str]:
-    """Posture of walkers some of which turned over, velocity up the slope, and velocity of the others."""
+    """Posture of walkers some of which turned over or lean, velocity up the slope, and velocity of the others."""
     axial, kept = result["axial_velocity"], result["kept_heading"]
     up, down = (
         "none" if speed is None else f"{_speed(speed)} mm/s" for speed in (axial["right_facing"], axial["left_facing"])
@@ -489,9 +496,9 @@ def _of_fallen(result: Mapping[str, Any], drive: str) -> list[str]:
     return [
         *_headlines(result, drive),
         f"  axial velocity, positive up: started facing up {up}, down {down}; {_steady(result)}",
-        f"  velocity   {_speed(kept['mean'])} mm/s along the heading, for the {kept['n']} that kept it"
+        f"  velocity   {_speed(kept['mean'])} mm/s along the heading, for the {kept['n']} that turned by less than 90°"
         if kept["n"]
-        else "  velocity   none: no walker kept its heading",
+        else "  velocity   none: all walkers turned by more than 90°",
     ]
 
 
@@ -507,13 +514,13 @@ def _band(result: Mapping[str, Any]) -> str:
 
 
 def _numerical(result: Mapping[str, Any]) -> list[str]:
-    """Numerical error of the velocity in per cent, or in mm/s if it does not walk; if unknown, how to measure it."""
+    """Numerical error of the velocity in per cent, or in mm/s if it does not walk; if unknown, what measures it."""
     error, own = result["numerical_error"], abs(result["velocity"]["mean"] or 0.0)
     harder = f"{STIFFER:g} times Young's modulus"
     if error is None:
-        told = f"numerical error: not measured for this case; run it at half the time step and with {harder}"
-        checks = result.get("checks", [])
-        return [f"{told}, then walkers compare with the same arguments:" if checks else told, *checks]
+        changes = ", ".join(result.get("checks", ()))
+        told = f"numerical error not measured{': run and compare with ' * bool(changes)}{changes}"
+        return [told] if has_error(result) else []
     if own < STEADY_SPEED:
         return [f"numerical error {_error(error['total'])} (measured for this case: half the time step, {harder})"]
     half_step, stiffer, total = (100.0 * error[name] / own for name in ("half_step", "stiffer", "total"))
@@ -524,7 +531,7 @@ def _numerical(result: Mapping[str, Any]) -> list[str]:
 def _scatter(result: Mapping[str, Any]) -> list[str]:
     """Scatter of several copies."""
     velocity, count = result["velocity"], result["velocity"]["n"]
-    if count < 2 or _fell(result):
+    if count < 2:
         return []
     what = "walkers" if result["meet"] or "makes" in result else "copies"
     if apart := sides_apart(result):  # the difference of the directions is not scatter
@@ -546,17 +553,18 @@ def _headlines(result: Mapping[str, Any], drive: str) -> list[str]:
     tray = [fill(f"  tray       {speed}; at the end {', '.join(end)}", 110, subsequent_indent=" " * 13)] if end else []
     if result["posture"] is None:
         return [f"{result['case']}: {drive}", *tray]
-    return [f"{result['case']}: {_told_posture(result['posture'])}", f"  drive      {drive}", *tray]
+    return [f"{result['case']}: {_told_posture(result)}", f"  drive      {drive}", *tray]
 
 
-def _told_posture(summary: Mapping[str, Any]) -> str:
-    """Postures as text: "upright to the end, within 0.1°"."""
+def _told_posture(result: Mapping[str, Any]) -> str:
+    """Postures as text: "upright to the end, within 0.1°"; walkers that face down keep their heading."""
+    summary = result["posture"]
     count = sum(summary[name] for name in POSTURES)
     within = "" if summary["ends_within"] is None else f", within {max(degrees(summary['ends_within']), 0.1):.1f}°"
     first, last = (f"{time:.2f}" for time in summary["turned_at"] or (nan, nan))
     when = f" after {first} s" if first == last else f" after {first} to {last} s"
     told = {
-        "upright": "upright to the end",
+        "upright": f"{'kept the heading' if result['left_facing']['n'] else 'upright'} to the end",
         "leaning": "leaning at the end",
         "turned over": f"turned over{when if summary['turned_at'] else ''}",
     }

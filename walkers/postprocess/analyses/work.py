@@ -72,11 +72,13 @@ class Working(Analysis):
 
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
         """Work per cycle and cost of transport."""
-        these = ", walkers facing up" if result.get("goes_uphill") else ""
-        text = "work of the drive on a walker per cycle, mean over the walkers (on a slope, those facing up)"
+        these = ", walkers that started facing up" if result.get("goes_uphill") else ""
+        mean = "mean over the walkers (on a slope, those that started facing up)"
+        text = f"work of the drive on a walker per cycle, {mean}"
         yield Quantity("work", f"work of the drive per cycle{these}", "J", "work", text)
-        text = "power of the drive over weight times walking speed, mean over the walkers (on a slope, those facing up)"
-        yield Quantity("cost_of_transport", f"cost of transport{these}", "", "cost_of_transport", text)
+        text = f"power of the drive, without that of gravity, over weight times walking speed, {mean}"
+        label = f"cost of transport{these and ' (without the work of gravity)'}"
+        yield Quantity("cost_of_transport", label, "", "cost_of_transport", text)
 
     def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
         """The work on each walker, cycle by cycle."""
