@@ -9,12 +9,13 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import call, document, make_case, to_toml
+from tests.conftest import SHORT, call, document, make_case, to_toml
 from walkers.commands import MOVED
 from walkers.inputs.errors import InputError
-from walkers.inputs.reading import resolve_case
+from walkers.inputs.reading import load_case, resolve_case
 from walkers.physics import units
 from walkers.physics.units import parse_quantity
+from walkers.postprocess.analysis import read_result
 from walkers.templates.deck import render_deck
 
 GLASS = {"material": "glass"}
@@ -74,6 +75,9 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"drive": {"gamma0": 0.5}}, "drive.gamma0 = 0.5: expected either peak_acceleration or gamma0, not both"),
     ({"drive": HARMONICS}, 'drive.frequency = "80 Hz": expected none beside drive.harmonics: write drive.harmonics['),
     ({"drive": {"phase": "10 deg", "frame": "lab"}}, 'drive.frame = "lab": expected "container"'),
+    ({"liquid": {"contact_angle": "84 deg"}}, "expected a smaller angle or less liquid: at rest, the"),
+    ({"liquid": {"contact_angle": "84 deg"}, "dimers": {"gap": "-1 nm"}}, 'liquid.contact_angle = "84 deg": exp'),
+    ({"liquid": {"contact_angle": "90 deg"}, "environment": {"gravity": "0 g"}}, "bead 1 and the boundary apart"),
     ({"run": {"time_step": "20 us"}}, 'run.time_step = "20 us": beyond the rayleigh'),
     ({"run": {"cycles": 10, "settling_cycles": 10}}, "run.settling_cycles = 10: expected at most"),
     ({"run": {"bridge_samples_per_cycle": 3}}, "run.bridge_samples_per_cycle = 3: expected a divisor"),
@@ -102,6 +106,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"dimers": {"radii": ["0.5 mm", "0.2 mm"]}, "boundary": {"shape": "groove", "opening": "30 deg"}},
      "the radii differ too much: the beads do not touch"),
     ({"boundary": {"shape": "groove", **GLASS}}, "boundary.opening: missing"),
+    ({"boundary": {"tilt": "-5 deg", **GLASS}}, 'must be zero or more; boundary.uphill = "180 deg" turns the slope'),
     ({"boundary": {"width": "1 mm", **GLASS}}, 'boundary.width = "1 mm": expected none of a plane'),
     ({**cluster("fan", "0.3 mm", "0.2 mm", "0.2 mm"), "boundary": {"shape": "channel", "width": "0.7 mm"}},
      "do not fit between the walls"),
@@ -171,6 +176,8 @@ REFUSED: list[tuple[str, str]] = [
     *((f"sweep {what}", "") for what in ("{bad}", "nosuch", "fig2 --site nosite.toml", "fig2 --out {case}")),
     *((f"{command} fig1b --set 'drive.frequency=70 mm'", 'fig1b: --set drive.frequency = "70 mm": expected a frequency')
       for command in ("show", "run", "export --to deck", "show --theory", "plot", "report", "check")),
+    *((f"{command} fig1b --set 'liquid.contact_angle=88 deg'", 'fig1b: --set liquid.contact_angle = "88 deg": expected')
+      for command in ("show", "run", "run --spread")),
     ("sweep fig4 --set 'liquid.name=Si AK5'", 'liquid.name = "Si AK5": varies in this sweep and cannot be set'),
     ("run fig1b --points 2", ""),
     ("run nosuch fig1c", 'nosuch: no such file\nfig1c: no such file'),
@@ -314,8 +321,15 @@ def test_a_substrate_of_ones_own_needs_its_friction(name: str) -> None:
         resolve_case(values)
 
 
-def test_a_liquid_may_have_no_viscosity_and_wet_no_better_than_to_90_degrees() -> None:
-    assert make_case(liquid={"contact_angle": "90 deg"}).liquid.contact_angle == pytest.approx(1.5707963)
+def test_bridges_may_push_loose_beads_but_hold_walkers(run_directory: Callable[..., Path]) -> None:
+    pile = load_case("pile-ci", {"liquid.contact_angle": "90 deg"})
+    assert pile.liquid.contact_angle == pytest.approx(1.5707963)
+    assert render_deck(pile).fastest > render_deck(load_case("pile-ci", {"liquid.contact_angle": "84 deg"})).fastest
+    run = run_directory(liquid={"contact_angle": "82.5 deg"}, run=SHORT)
+    assert abs(read_result(run)["velocity"]["mean"]) > 0.0
+
+
+def test_a_liquid_may_have_no_viscosity() -> None:
     assert make_case(run={"time_step": "20 us", "allow_unstable": True}).run.time_step > 19e-6
     case = make_case(liquid={"viscosity_ratio": 0})
     assert case.liquid.dynamic_viscosity == 0.0

@@ -299,4 +299,5 @@ def test_spread_on_the_command_line(in_folder: Path) -> None:
     (record,) = in_folder.glob("runs/*-spread/sweep.json")
     assert read_json(record)["file"]["set"]["run.cycles"] == 24
     assert "  guessed    " in told
+    assert "(not of these materials and this liquid)" in " ".join(told.split())
     assert "(5 to 95 %)" in told

@@ -621,6 +621,7 @@ def test_a_container_holds_its_beads(shape: str, walls: int, tmp_path: Path) -> 
         ({"mixture.small_share": 1}, ["no large beads"]),
         ({"mixture.small_share": 0}, ["no small beads"]),
         ({"run.duration": "10 s"}, [r"climbers faster than 7\.[67] mm/s"]),
+        ({"run.time_step": "4 us"}, [r"the time step is 2\.1 times the largest of auto \(0\.4 of the viscous"]),
     ],
 )
 def test_what_is_said_of_a_pile_before_it_is_shaken(changes: dict[str, Any], told: list[str]) -> None:
@@ -628,3 +629,4 @@ def test_what_is_said_of_a_pile_before_it_is_shaken(changes: dict[str, Any], tol
     found = notes(load_case("pile-small", changes))
     assert len(found) == len(told)
     assert all(re.match(one, other) for one, other in zip(told, found, strict=True))
+    assert notes(load_case("climber")) == [], "its error is measured"

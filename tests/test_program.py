@@ -106,7 +106,9 @@ def test_progress_is_plain_lines_without_a_terminal(in_folder: Path, monkeypatch
 
 
 @pytest.mark.parametrize("kind", ["walker", "cluster", "tray", "pile"])
-def test_a_new_case_runs_as_it_is_and_with_each_line_that_is_commented_out(kind: str, in_folder: Path) -> None:
+def test_a_new_case_runs_and_its_lines_that_are_commented_out_say_what_holds_without_them(
+    kind: str, in_folder: Path
+) -> None:
     assert call("new", "mine", "--kind", kind, check=True).stdout == "mine.toml\n"
     short = ["--set", "run.duration=0.05s"] if kind in ("tray", "pile") else []
     short += ["--set", "run.longest_settling=0s"] if kind == "pile" else []
@@ -116,7 +118,9 @@ def test_a_new_case_runs_as_it_is_and_with_each_line_that_is_commented_out(kind:
     for head, key, value in re.findall(r"(?m)^(?:(?:# )?\[+(\w+)\]+.*|# ([\w.]+) *= *(.+?)(?: *#.*)?)$", text):
         table = {"clusters": "clusters[0]"}.get(head, head) or table
         if key:
-            load_case("mine", {f"{table}.{key}": tomllib.loads(f"value = {value}")["value"]})
+            with_it = load_case("mine", {f"{table}.{key}": tomllib.loads(f"value = {value}")["value"]})
+            said, without = (json.dumps(one.determinants()) for one in (with_it, load_case("mine")))
+            assert re.sub(r"(\.\d{12})\d+", r"\1", said) == re.sub(r"(\.\d{12})\d+", r"\1", without), key
             tried += 1
     assert tried >= 3
     call("new", "copy.toml", "--from", "climber", check=True)

@@ -28,7 +28,7 @@ from walkers.inputs.reading import read_toml
 from walkers.inputs.resolving import SUPPLIED
 from walkers.inputs.schema import CaseFile, fields_of
 from walkers.main import _program
-from walkers.physics.units import ABSENT, AUTO, AUTO_FAR, Kind
+from walkers.physics.units import ABSENT, ACCELERATION, AUTO, AUTO_FAR, TEMPERATURE, Kind, quantity_text
 from walkers.postprocess.analysis import analyses
 from walkers.postprocess.tables import described
 from walkers.sweeps.table import STATE, derived_columns, result_columns
@@ -102,13 +102,20 @@ def _expected(hint: Any) -> str:
 
 def _refusal(validator: BeforeValidator | Kind) -> str | None:
     if isinstance(validator, Kind):
-        ends = f"{validator.smallest:g} to {validator.largest:g} {validator.unit} in absolute value"
-        return f"{validator.expectation.removeprefix('expected ')}; {ends}"
+        low, high = (_in_unit(end, validator) for end in (validator.smallest, validator.largest))
+        either = "" if validator.sign or validator.unit == TEMPERATURE.unit else " in absolute value"
+        return f"{validator.expectation.removeprefix('expected ')}; {low.split()[0]} to {high}{either}"
     try:
         validator.func(object())  # type: ignore[call-arg]
     except ValueError as error:
         return str(error).removeprefix("expected ")
     return None
+
+
+def _in_unit(value: float, kind: Kind) -> str:
+    """A value in the unit of its kind's example, four digits; accelerations, of which gravity is one, in m/s²."""
+    number, unit = (value, kind.unit) if kind.unit == ACCELERATION.unit else quantity_text(value, kind).split()
+    return f"{float(f'{float(number):.4g}'):g} {unit}"
 
 
 def _default(field: FieldInfo, hint: Any) -> str:
@@ -117,9 +124,9 @@ def _default(field: FieldInfo, hint: Any) -> str:
         return "required" if field.is_required() else ""
     if field.default is None or fields_of(type(field.default)) or field.default in ABSENT:
         return ""
-    unit = next((one.unit for one in _parts(hint) if isinstance(one, Kind)), "")
-    if isinstance(field.default, float) and unit:
-        return f"`{field.default:.4g} {unit}`"
+    kind = next((one for one in _parts(hint) if isinstance(one, Kind)), None)
+    if isinstance(field.default, float) and kind:
+        return f"`{_in_unit(field.default, kind)}`"
     return f"`{json.dumps(field.default)}`" if field.default != {} else ""
 
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 FLOOR = "floor"
 LOOSE = 1.03
 """Pitch of the places from which beads are poured, in diameters of the largest bead."""
+_SLOPE = f'{units.NOT_NEGATIVE}; boundary.uphill = "180 deg" turns the slope'
 _LEAST = 1e-13
 _RIM = 2e-4
 """m; the simulation box of a container reaches this far beyond its walls."""
@@ -119,7 +120,7 @@ class Boundary:
     opening: _Opening = pi
     width: _Size = inf
     height: _Size = inf
-    tilt: units.UpToRightAngle = 0.0
+    tilt: Annotated[float, replace(units.ANGLE, largest=1.5708, sign=_SLOPE)] = 0.0
     uphill: units.Angle = 0.0
 
     @property

@@ -313,6 +313,7 @@ def _spaced(case: Case, key: str, walkers: Walkers, notes: Notes) -> Walkers:
     gap = walkers.gap
     if gap is not None and gap > 0.0:
         raise unusable(f"{key}.gap", "expected zero or less: a bridge forms on contact, so beads with a gap have none")
+    _check_held(case, walkers)
     overlaps = contact_loads(case, walkers).overlaps if gap is None else (-gap,)
     if max(overlaps) * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):
         blamed = f"{key}.gap" if gap is not None else "contact.youngs_modulus"
@@ -331,6 +332,19 @@ def _spaced(case: Case, key: str, walkers: Walkers, notes: Notes) -> Walkers:
         message = f'neighbouring walkers would touch or overlap; expected at least {1e3 * least:.3g} mm, or "auto"'
         raise unusable(f"{key}.spacing", message)
     return walkers
+
+
+def _check_held(case: Case, walkers: Walkers) -> None:
+    """Refuse walkers that would not stay in contact at rest, because bridges push by more than weights press."""
+    loads = contact_loads(case, walkers)
+    names = [f"bead {bead} and the boundary" for bead in range(1, len(walkers.radii) + 1)]
+    names += [f"beads {one + 1} and {other + 1}" for one, other in walkers.pairs]
+    for name, pull, overlap in zip(names, loads.capillary, loads.overlaps, strict=True):
+        if pull < 0.0 == overlap:  # no overlap: the load is tensile
+            angle = case.liquid.contact_angle
+            key, other = ("contact_angle", "a smaller angle or less liquid") if angle else ("law", "a law that pulls")
+            pushed = f"at rest, the bridge pushes {name} apart ({-1e6 * pull:.3g} uN)"
+            raise unusable(f"liquid.{key}", f"expected {other}: {pushed}")
 
 
 def _check_bodies(case: Case, file: CaseFile) -> None:

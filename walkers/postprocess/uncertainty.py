@@ -51,12 +51,13 @@ def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
 def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
     """The uncertain values of a result (`rests_on`) as text, by origin."""
 
-    def listed(head: str, chosen: Iterable[Mapping[str, Any]]) -> list[str]:
-        text = ", ".join(f"{one['key'].partition('.')[2]} {one['value']}" for one in chosen)
+    def listed(head: str, chosen: Iterable[Mapping[str, Any]], ends: str = "") -> list[str]:
+        text = ", ".join(f"{one['key'].partition('.')[2]} {one['value']}" for one in chosen) + ends
         wrapper = textwrap.TextWrapper(_WIDTH, f"  {head:10} ", " " * 13, break_on_hyphens=False)
         return wrapper.wrap(text) if text else []
 
-    lines = listed("guessed", [one for one in rests if one["guessed"] and one["origin"] == "default"])
+    guessed = [one for one in rests if one["guessed"] and one["origin"] == "default"]
+    lines = listed("guessed", guessed, " (not of these materials and this liquid)") if guessed else []
     lines += listed("uncertain", [one for one in rests if one["guessed"] and one["origin"] != "default"])
     whence = {
         "given": "given",

@@ -14,6 +14,7 @@ from walkers.inputs.bodies import Walkers
 from walkers.inputs.case import CONSTANT, Case
 from walkers.inputs.library import Known, library_of
 from walkers.inputs.loads import contact_loads, dimer_of
+from walkers.inputs.numerical import numerical_error
 from walkers.inputs.rounding import percent
 from walkers.inputs.run_tables import limits_of
 from walkers.inputs.text import printable
@@ -88,11 +89,15 @@ def pairs_of_beads(case: Case) -> int:
 
 
 def notes(case: Case) -> list[str]:
-    """Notes on a pile before it is run: beads of one size, low walls."""
+    """Notes on a case before it is run: a long time step; of a pile, beads of one size and low walls."""
+    largest, reason = limits_of(case).recommended(loose=case.loose)
+    times, lines = case.run.time_step / largest, []
+    if times > 1.01 and numerical_error(case) is None:
+        lines = [f"the time step is {times:.2g} times the largest of auto ({reason})"]
     if not (case.loose and case.boundary.closed and case.mixture):
-        return []
+        return lines
     numbers = {"large": case.large, "small": case.count - case.large}
-    lines = [f"no {name} beads; in the paper, large beads lead small ones" for name, one in numbers.items() if not one]
+    lines += [f"no {name} beads; in the paper, large beads lead small ones" for name, one in numbers.items() if not one]
     room = 2.0 * case.boundary.height - _volume(case) / (_LOOSE_PACKING * case.boundary.cross_section)
     if (fastest := room / case.duration) < _FASTEST_CLIMB:
         lines.append(
@@ -192,7 +197,7 @@ def describe(summary: dict[str, Any]) -> str:
     beads, drive, dimer = summary["beads"], summary["drive"], summary.get("dimer")
     ratio = beads["stiffness_ratio"]
     factor = f"{float(f'{1 / ratio:.2g}'):,.0f}" if ratio and ratio < 1 else ""
-    softened = f"; Young's modulus reduced by a factor of {factor}" if factor else ""
+    softened = f"; Young's modulus of the beads reduced by a factor of {factor}" if factor else ""
     lines = [
         *_text_of_case(summary["case"]),
         f"beads      {beads['small']} small and {beads['large']} large, {beads['mass'] * 1e6:.4g} mg, "
@@ -241,7 +246,7 @@ def _whence(one: dict[str, Any]) -> str:
     origin, source = str(one["origin"]), str(one["source"])
     ends = f", range {one['range'][0]} to {one['range'][1]}" if one["range"] else ""
     if origin == "default" and ends:
-        return f"guessed ({source or 'not measured'}){ends}"
+        return f"guessed ({source or 'not measured'}){ends.replace('range', 'general range')}"
     ends = f", uncertain{ends}" if one["uncertain"] else ends
     if origin in ("calibrated", "assumed", "package"):
         return source + ends

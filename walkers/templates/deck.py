@@ -338,7 +338,7 @@ def fastest_of(case: Case, scene: Scene) -> float:
     sizes = sorted(bead.radius for bead in scene.beads)
     mass = 4.0 / 3.0 * pi * sizes[0] ** 3 * case.density
     bridge = bridge_at_rest(case, sizes[-1], inf)
-    work = bridge.pull * bridge.rupture
+    work = abs(bridge.pull) * bridge.rupture  # among loose beads, a bridge may push
     deep = hop_height(case) if case.boundary.tilt == 0.0 else reach(case)
     fall = sqrt(2.0 * case.gravity * (max(scene.upper[2], deep) if case.loose else deep))
     return (20.0 if case.loose else 10.0) * case.drive.peak_velocity + fall + sqrt(2.0 * work / mass)
