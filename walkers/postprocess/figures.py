@@ -187,7 +187,9 @@ def gait_panels(group: Group) -> list[Panel]:
         toward, named = np.array([0.0, 0.0, 1.0]), "along the normal of the floor"
     if velocity.any():  # much faster than the walkers, hence in a panel of its own
         line = Line(phase, (velocity * toward).sum(axis=-1) * 1e3, colour=_GREY, dashed=True)
-        panels.append(Panel(f"substrate, {named}", x, "velocity\n(mm/s)", [line], zero=True, least=_LEAST_SPEED))
+        panels.append(
+            Panel(f"velocity of the substrate {named}", x, "velocity\n(mm/s)", [line], zero=True, least=_LEAST_SPEED)
+        )
     return panels
 
 
@@ -397,7 +399,7 @@ def _draw_strobe(axes: Axes, group: Group, images: _Images) -> None:
         axes.add_patch(Circle((-place[1], place[0]) if uphill else place, float(radii[bead]), **look))
     labels = even_labels(group.time[shown])
     if long:
-        labels = [f"{time}\n{one:.1f} mm" for time, one in zip(labels, way, strict=True)]
+        labels = [f"{time}\n{one:z.1f} mm" for time, one in zip(labels, way, strict=True)]
     edges = float((along - radii).min() - radii.max()), float((along + radii).max() + radii.max())
     ends = -pitch * (len(shown) - 0.4), 0.6 * pitch
     name = "from the midpoint (mm)" if long else _ALONG.replace("along ", "along\n")
