@@ -282,7 +282,7 @@ def walk_figure(groups: list[Group], walked: Panel, turned: Panel) -> Figure:
     """Strobed positions of the first walker; distance and orientation of all (`walk_panels`)."""
     case, images = groups[0].case, _images(groups[0])
     rows, ratios = [["strobe", "walked"], ["strobe", "turned"]], {"width_ratios": [1.0, 1.6]}
-    if images.long and case.goes_uphill:  # images side by side
+    if images.wide:
         rows, ratios = [["strobe", "strobe"], ["walked", "turned"]], {"height_ratios": [1.0, 1.3]}
     figure, axes = new_figure(TWO_COLUMNS, 5.2, mosaic=rows, **ratios)
     figure.suptitle(_title(case))
@@ -357,13 +357,14 @@ def _title(case: Case) -> str:
 class _Images(NamedTuple):
     """Images of a walker: frames, positions of its beads along and across the drive axis (mm), largest extents (mm).
 
-    ``long`` is whether its path is too long for one scale.
+    ``long`` is whether its path is too long for one scale, ``wide`` whether images side by side are wider than high.
     """
 
     shown: list[int]
     position: FloatArray
     extent: FloatArray
     long: bool
+    wide: bool
 
 
 def _images(group: Group) -> _Images:
@@ -375,7 +376,8 @@ def _images(group: Group) -> _Images:
     long = float(np.ptp(position[shown].mean(axis=1)[:, 0])) > _LONG * extent[0]
     if uphill and not long:
         shown = even_frames(group.motion, _SHOWN - 3)
-    return _Images(shown, position[shown], extent, long)
+    height = extent[0] + (0.0 if long else float(np.ptp(position[shown].mean(axis=1)[:, 0])))
+    return _Images(shown, position[shown], extent, long, uphill and bool(height < len(shown) * extent[1]))
 
 
 def _draw_strobe(axes: Axes, group: Group, images: _Images) -> None:
@@ -387,7 +389,7 @@ def _draw_strobe(axes: Axes, group: Group, images: _Images) -> None:
     from matplotlib.patches import Circle
 
     radii, uphill = group.radii * 1e3, group.case.goes_uphill
-    shown, position, extent, long = images
+    shown, position, extent, long, wide = images
     middle = position.mean(axis=1)
     way = middle[:, 0] - middle[0, 0]
     pitch = max(float(extent[1]), 2.6 * float(radii.max())) + 0.1
@@ -407,7 +409,7 @@ def _draw_strobe(axes: Axes, group: Group, images: _Images) -> None:
     title = f"walker {group.walkers[0].walker}"
     if uphill:
         axes.set(xlim=(-ends[1], -ends[0]), ylim=edges, ylabel=name if long else "uphill (mm)")
-        axes.set_xticks(pitch * np.arange(len(shown)), labels, rotation=0 if long else 90)
+        axes.set_xticks(pitch * np.arange(len(shown)), labels, rotation=0 if wide else 90)
         axes.set_xlabel(named.replace("\n", " ") if long else "")
         arrow: dict[str, Any] = {"arrowprops": {"arrowstyle": "-|>", "color": "black"}, "fontsize": 7, "ha": "center"}
         axes.annotate(group.case.boundary.pull, (1.1, 0.2), (1.1, 0.7), "axes fraction", **arrow)
