@@ -228,7 +228,7 @@ def _captions(
     speed = speed_text(times.slowdown) + (", stroboscopic" if times.stroboscopic else "")
     drive = f"{case.drive.frequency:g} Hz, {case.drive.peak_acceleration:.3g} m/s²"
     bar = round_below(wide / 5.0 / pixels_per_mm)
-    toward, direction = _direction(scene.motion)
+    toward, direction = named_direction(scene.motion)
     left, right, level, thick = wide - edge - bar * pixels_per_mm, wide - edge, tall - edge, max(2, edge // 8)
 
     colours, beside = colours_text(case), from_the_side(case)  # beside the container or below the beads
@@ -260,7 +260,7 @@ def _captions(
     return written
 
 
-def _direction(motion: Motion) -> tuple[FloatArray, str]:
+def named_direction(motion: Motion) -> tuple[FloatArray, str]:
     """Direction of the displacement that is written into pictures, and its name."""
     if from_the_side(motion.case):
         return against_gravity(motion), "up"
