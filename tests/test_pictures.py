@@ -20,11 +20,11 @@ from walkers.inputs.boundary import Boundary
 from walkers.inputs.errors import InputError
 from walkers.postprocess.analysis import figures_of, plot_run
 from walkers.postprocess.drawing import series_look, styled
-from walkers.postprocess.films import FilmOptions, film_times
+from walkers.postprocess.films import FilmOptions, film_times, named_direction
 from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, read_motion
 from walkers.postprocess.paraview import write_paraview, write_vtk
 from walkers.postprocess.scene import Scene, Window, camera_axes, mesh_of, walls_of
-from walkers.postprocess.series import render_series
+from walkers.postprocess.series import _strips, render_series
 from walkers.postprocess.tables import read_table
 from walkers.postprocess.trajectory_files import box_of
 
@@ -250,6 +250,22 @@ def test_the_camera_follows_a_walker_that_walks_far(lengths: float, follows: boo
         ruby = picture[..., 0] > 1.3 * picture[..., 1]
         assert ruby.mean() > 0.07
         assert not ruby[:, [0, -1]].any()
+
+
+@pytest.mark.parametrize(("tilt", "name"), [(0.0, "along the drive axis"), (20.0, "uphill")])
+def test_displacements_have_a_sign_and_a_direction(tilt: float, name: str, motion: Motion) -> None:
+    one = motion.of_walkers(motion.walkers[:1])
+    case = replace(one.case, boundary=replace(one.case.boundary, tilt=np.radians(tilt)))
+    way = -40.0 * case.walkers[0].length * one.time / one.time[-1]
+    far = replace(one, case=case, position=one.position + way[:, None, None] * np.array(case.drive_axis))
+    toward, direction = named_direction(far)
+    assert direction == name
+    assert toward @ np.array(case.drive_axis) == pytest.approx(1.0)
+    figure = styled(_strips)(far, [0, len(far.time) - 1])
+    assert f"displacement {name}" in " ".join(figure.get_suptitle().split())
+    panel = figure.axes[-1]
+    (text,) = [panel.get_title()] if tilt else [one.get_text() for one in panel.texts]
+    assert float(text.split("\n")[1].removesuffix(" mm")) == pytest.approx(1e3 * way[-1], rel=0.05)
 
 
 def test_times_of_pictures_are_even(motion: Motion) -> None:

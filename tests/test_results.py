@@ -15,7 +15,7 @@ from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped
 from walkers.postprocess.analyses.walking import Walking, walkers_met
 from walkers.postprocess.analyses.work import Working
 from walkers.postprocess.analysis import RESULT_NAME, current_result, describe_result, read_result
-from walkers.postprocess.figures import walk_panels
+from walkers.postprocess.figures import gait_panels, walk_panels
 from walkers.postprocess.gait import Averages, averages, fit_slopes, gait, gaps, settled_samples, steady_walkers, walk
 from walkers.postprocess.motion import Group, read_motion
 from walkers.postprocess.sides import sides
@@ -224,6 +224,25 @@ def test_walkers_are_named_by_the_direction_in_which_they_face(run_directory: Ca
     result, [walked, *_] = read_result(turned), walk_panels(read_motion(turned).groups)
     assert (result["right_facing"]["n"], result["left_facing"]["n"]) == (0, 1)
     assert walked.lines[0].label.startswith("0: left at -30°, ")
+
+
+def test_panels_have_one_named_direction(run_directory: Callable[..., Path]) -> None:
+    """The substrate has that of the walker; orientations that of the legend, on trays that of the drive."""
+    group = read_motion(run_directory(dimers={"angle": "150 deg"}, run={"cycles": 6, "settling_cycles": 2})).groups[0]
+    *_, substrate = gait_panels(group)
+    last = slice(-len(substrate.lines[0].y), None)
+    along = 1e3 * np.einsum("fx,fx->f", group.motion.substrate_velocity[last], group.heading[last, 0])
+    assert "along the same heading" in substrate.title
+    np.testing.assert_allclose(substrate.lines[0].y, along)
+    _, turned, _ = walk_panels([group])
+    assert turned.lines[0].y[0] == pytest.approx(-30.0)
+    assert "from\nleft" in turned.y
+    tray = replace(group.case, walkers=tuple(replace(one, meet=True, facing=-1) for one in group.case.walkers))
+    left = [replace(one, facing=-1) for one in group.walkers]
+    (walked, turned, _) = walk_panels([replace(group, motion=replace(group.motion, case=tray), walkers=left)])
+    assert turned.lines[0].y[0] == pytest.approx(150.0)
+    assert "from\nthe drive axis" in turned.y
+    assert walked.lines[0].label.startswith("0: 150°, ")
 
 
 def test_walkers_that_come_close_are_reported(moved: Group, directory: Path) -> None:

@@ -61,6 +61,19 @@ def test_error_bars_that_symbols_would_hide_are_left_out_and_the_legend_says_so(
     ]
 
 
+def test_a_long_title_of_a_legend_stays_within_the_figure() -> None:
+    units = {"contact.friction.bead_bead": "", "drive.frequency": "Hz"}
+    rows = [[friction, frequency] for friction in (0.1, 0.3) for frequency in (60.0, 70.0, 80.0)]
+    table = _table(units, rows, [(name,) for name in units]).assign(velocity=1e-3 * np.arange(6.0), scatter=1e-9)
+    table.attrs["units"] |= {"velocity": "m/s", "scatter": "m/s"}
+    figure = draw(layout_of(table, table, x="drive.frequency"), drawn_column(table, "velocity"))
+    figure.draw_without_rendering()
+    (legend,) = figure.legends
+    title, whole = legend.get_title().get_window_extent(), figure.bbox
+    assert "friction bead bead" in legend.get_title().get_text()
+    assert whole.x0 <= title.x0 < title.x1 <= whole.x1
+
+
 def test_axes_do_not_magnify_rounding() -> None:
     table = _table({"dimers.angle": "deg"}, [[-30.0], [-3.2e-15], [30.0]], [("dimers.angle",)])
     for values in ([1e-3, 1e-3 * (1.0 + 1e-9), 1e-3], [3.2e-18, -3.2e-18, 0.0]):

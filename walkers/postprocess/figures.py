@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -95,36 +95,44 @@ def velocity_text(value: float) -> str:
 
 
 def walk_panels(groups: list[Group]) -> list[Panel]:
-    """Distance walked, orientation, and paths from above, of all walkers, once a cycle."""
+    """Distance along the heading, orientation, and paths from above, of all walkers, once a cycle.
+
+    Orientations are from the direction that the legend names; those of walkers that may meet are from the drive axis.
+    """
     case, uphill = groups[0].case, groups[0].case.goes_uphill
     strobe, settled, facing = case.run.samples_per_cycle, case.run.settled_strobes, ways(uphill=uphill)
     widths = nested_widths(sum(len(group.walkers) for group in groups))
     walked: list[Line] = []
     turned: list[Line] = []
     paths: list[Line] = []
+    references: dict[str, None] = {}
     for group in groups:
         time, distance = distance_walked(group)
         slope, _ = fit_slopes(time[settled:], distance[settled:])
         way = (group.mass_centre[::strobe] - group.mass_centre[0]) * 1e3
         for place, walker in enumerate(group.walkers):
             number = walker.walker
-            angle, side = float(np.degrees(group.orientation[0, place])), sides(walker.facing, walker.start_angle)
-            angle -= np.copysign(180.0, angle) if side != walker.facing else 0.0
-            at = f" at {angle:.0f}°" if abs(angle) > _ASIDE else ""
-            text = f"{number}: {facing[int(side < 0)]}{at}, {velocity_text(slope[place] * 1e3)} mm/s"
+            angles = np.degrees(group.orientation[::strobe, place])
+            side = 1 if case.meets else int(sides(walker.facing, walker.start_angle))
+            angles -= np.copysign(180.0, angles[0]) if side != walker.facing else 0.0
+            at, named_side = f"{angles[0]:.0f}°", facing[int(side < 0)]
+            start = at if case.meets else f"{named_side} at {at}" if abs(angles[0]) > _ASIDE else named_side
+            references[named_side] = None
+            text = f"{number}: {start}, {velocity_text(slope[place] * 1e3)} mm/s"
             look: dict[str, Any] = {"label": text if number < MOST_NAMED else "", "colour": number}
             look["width"] = widths[len(walked)]
             walked.append(Line(time, distance[:, place] * 1e3, **look))
-            turned.append(Line(time, np.degrees(group.orientation[::strobe, place]), **look))
+            turned.append(Line(time, angles, **look))
             along, across = way[:, place] @ group.drive_axis, way[:, place] @ group.across_axis
             paths.append(Line(-across, along, **look) if uphill else Line(along, across, **look))
     begin, named = walked[-1].x[settled], named_of(len(walked))
     names = ("across the slope (mm)", "uphill (mm)") if uphill else (_ALONG, "across it (mm)")
     seen = f"{case.boundary.tilted}, seen along its normal" if case.boundary.tilted else "seen from above"
-    title, y = f"Distance along the heading; grey: settling{named}", "distance walked (mm)"
+    title, y = f"Distance along the heading; grey: settling{named}", "distance along\nthe heading (mm)"
+    reference = f"orientation ψ from\n{'the drive axis' if case.meets else ' or '.join(references)} (°)"
     return [
         Panel(title, "time (s)", y, walked, settled=begin, least=_LEAST_DISTANCE),
-        Panel(f"Orientation{named}", "time (s)", "orientation ψ (°)", turned, settled=begin, least=_LEAST_ANGLE),
+        Panel(f"Orientation{named}", "time (s)", reference, turned, settled=begin, least=_LEAST_ANGLE),
         Panel(f"Paths of the centres of mass, {seen}{named}", *names, paths, least=_LEAST_DISTANCE),
     ]
 
@@ -171,12 +179,16 @@ def gait_panels(group: Group) -> list[Panel]:
     ]
     x = "time (cycles of the drive, last two)"
     title = f"walker {first.walker}; a bead rolls without sliding where its curve coincides with the walker's"
-    y = "velocity relative to the\nsubstrate; beads: −R dφ/dt (mm/s)"
+    y = "velocity along the heading of the moment,\nrelative to the substrate; beads: −R dφ/dt (mm/s)"
     panels = [Panel(title, x, y, lines, zero=True, height=2.5, least=_LEAST_SPEED)]
-    shaken = group.motion.substrate_velocity[last] @ np.array(group.case.drive.direction)
-    if np.any(shaken):  # much faster than the walkers, hence in a panel of its own
-        line = Line(phase, sides(first.facing, first.start_angle) * shaken * 1e3, colour=_GREY, dashed=True)
-        panels.append(Panel("substrate, along the start direction", x, "velocity\n(mm/s)", [line], zero=True))
+    velocity, toward, named = group.motion.substrate_velocity[last], group.heading[last, 0], "along the same heading"
+    if not velocity[:, :2].any():
+        toward, named = np.array([0.0, 0.0, 1.0]), "along the normal of the floor"
+    if velocity.any():  # much faster than the walkers, hence in a panel of its own
+        line = Line(phase, (velocity * toward).sum(axis=-1) * 1e3, colour=_GREY, dashed=True)
+        panels.append(
+            Panel(f"velocity of the substrate {named}", x, "velocity\n(mm/s)", [line], zero=True, least=_LEAST_SPEED)
+        )
     return panels
 
 
@@ -266,11 +278,14 @@ def _events(events: Columns) -> Iterator[Line]:
 
 @styled
 def walk_figure(groups: list[Group], walked: Panel, turned: Panel) -> Figure:
-    """Strobed positions of the first walker; distance walked and orientation of all (`walk_panels`)."""
-    rows = [["strobe", "walked"], ["strobe", "turned"]]
-    figure, axes = new_figure(TWO_COLUMNS, 5.2, mosaic=rows, width_ratios=[1, 1.6])
-    figure.suptitle(_title(groups[0].case))
-    _draw_strobe(axes["strobe"], groups[0])
+    """Strobed positions of the first walker; distance and orientation of all (`walk_panels`)."""
+    case, images = groups[0].case, _images(groups[0])
+    rows, ratios = [["strobe", "walked"], ["strobe", "turned"]], {"width_ratios": [1.0, 1.6]}
+    if images.wide:
+        rows, ratios = [["strobe", "strobe"], ["walked", "turned"]], {"height_ratios": [1.0, 1.3]}
+    figure, axes = new_figure(TWO_COLUMNS, 5.2, mosaic=rows, **ratios)
+    figure.suptitle(_title(case))
+    _draw_strobe(axes["strobe"], groups[0], images)
     for name, panel in (("walked", walked), ("turned", turned)):
         draw_panel(axes[name], panel)
         axes[name].set_xlabel(panel.x)
@@ -280,7 +295,8 @@ def walk_figure(groups: list[Group], walked: Panel, turned: Panel) -> Figure:
     axes["walked"].set_title("grey: settling")
     letter_panels(axes.values())
     lines, labels = axes["walked"].get_legend_handles_labels()
-    text = f"walker: facing at the start, velocity{named_of(len(walked.lines))}"
+    start = "orientation from the drive axis" if case.meets else "facing"
+    text = f"walker: {start} at the start, velocity{named_of(len(walked.lines))}"
     columns = 4 if max(map(len, labels)) < _WIDE else 3
     figure.legend(lines, labels, loc="outside lower center", ncols=columns, title=text)
     return figure
@@ -337,7 +353,33 @@ def _title(case: Case) -> str:
     return f"{title}\n{shown}{tilted}, {case.drive.described()}{gamma0}"
 
 
-def _draw_strobe(axes: Axes, group: Group) -> None:
+class _Images(NamedTuple):
+    """Images of a walker: frames, positions of its beads along and across the drive axis (mm), largest extents (mm).
+
+    ``long`` is whether its path is too long for one scale, ``wide`` whether images side by side are wider than high.
+    """
+
+    shown: list[int]
+    position: FloatArray
+    extent: FloatArray
+    long: bool
+    wide: bool
+
+
+def _images(group: Group) -> _Images:
+    """Images of the first walker of a group; fewer of a short path uphill."""
+    radius, uphill = 1e3 * float(group.radii.max()), group.case.goes_uphill
+    shown = even_frames(group.motion, _SHOWN)
+    position = group.position[:, 0] @ np.stack([group.drive_axis, group.across_axis], axis=-1) * 1e3
+    extent = np.ptp(position[shown], axis=1).max(axis=0) + 2.0 * radius
+    long = float(np.ptp(position[shown].mean(axis=1)[:, 0])) > _LONG * extent[0]
+    if uphill and not long:
+        shown = even_frames(group.motion, _SHOWN - 3)
+    height = extent[0] + (0.0 if long else float(np.ptp(position[shown].mean(axis=1)[:, 0])))
+    return _Images(shown, position[shown], extent, long, uphill and bool(height < len(shown) * extent[1]))
+
+
+def _draw_strobe(axes: Axes, group: Group, images: _Images) -> None:
     """The first walker seen along the normal of the floor, its beads to scale, at several times (Fig. 1b of the paper).
 
     Images are even: the way along the drive axis and the orientation are shown, not the drift across it. Uphill is up;
@@ -346,11 +388,9 @@ def _draw_strobe(axes: Axes, group: Group) -> None:
     from matplotlib.patches import Circle
 
     radii, uphill = group.radii * 1e3, group.case.goes_uphill
-    shown = even_frames(group.motion, _SHOWN - 3 * uphill)
-    position = group.position[shown, 0] @ np.stack([group.drive_axis, group.across_axis], axis=-1) * 1e3
+    shown, position, extent, long, wide = images
     middle = position.mean(axis=1)
-    way, extent = middle[:, 0] - middle[0, 0], np.ptp(position, axis=1).max(axis=0) + 2.0 * float(radii.max())
-    long = float(np.ptp(way)) > _LONG * extent[0]
+    way = middle[:, 0] - middle[0, 0]
     pitch = max(float(extent[1]), 2.6 * float(radii.max())) + 0.1
     along = position[..., 0] - (middle[:, :1] if long else middle[0, 0])
     across = position[..., 1] - middle[:, 1:] - pitch * np.arange(len(shown))[:, None]
@@ -360,18 +400,20 @@ def _draw_strobe(axes: Axes, group: Group) -> None:
         axes.add_patch(Circle((-place[1], place[0]) if uphill else place, float(radii[bead]), **look))
     labels = even_labels(group.time[shown])
     if long:
-        labels = [f"{time}\n{one:.1f} mm" for time, one in zip(labels, way, strict=True)]
+        labels = [f"{time}\n{one:z.1f} mm" for time, one in zip(labels, way, strict=True)]
     edges = float((along - radii).min() - radii.max()), float((along + radii).max() + radii.max())
     ends = -pitch * (len(shown) - 0.4), 0.6 * pitch
     name = "from the midpoint (mm)" if long else _ALONG.replace("along ", "along\n")
+    named = f"time and displacement\n{'uphill' if uphill else 'along the drive axis'}"
     title = f"walker {group.walkers[0].walker}"
     if uphill:
         axes.set(xlim=(-ends[1], -ends[0]), ylim=edges, ylabel=name if long else "uphill (mm)")
-        axes.set_xticks(pitch * np.arange(len(shown)), labels, rotation=90)
+        axes.set_xticks(pitch * np.arange(len(shown)), labels, rotation=0 if wide else 90)
+        axes.set_xlabel(named.replace("\n", " ") if long else "")
         arrow: dict[str, Any] = {"arrowprops": {"arrowstyle": "-|>", "color": "black"}, "fontsize": 7, "ha": "center"}
         axes.annotate(group.case.boundary.pull, (1.1, 0.2), (1.1, 0.7), "axes fraction", **arrow)
     else:
-        axes.set(xlim=edges, ylim=ends, yticks=[], xlabel=name)
+        axes.set(xlim=edges, ylim=ends, yticks=[], xlabel=f"{name};\nbeside: {named}" if long else name)
         for row, time in enumerate(labels):
             axes.annotate(time, (1.01, -row * pitch), xycoords=("axes fraction", "data"), fontsize=7, va="center")
     axes.set(aspect="equal", title=title)

@@ -22,12 +22,23 @@ from walkers.physics.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_place
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, read_motion
-from walkers.postprocess.scene import Picture, Scene, Window, camera_axes, round_below
+from walkers.postprocess.scene import (
+    Picture,
+    Scene,
+    Window,
+    against_gravity,
+    camera_axes,
+    colours_text,
+    from_above,
+    from_the_side,
+    plan_axes,
+    round_below,
+)
 from walkers.runner.files import beside
 
 _SIZES = {"360p": (640, 360), "480p": (854, 480), "720p": (1280, 720), "1080p": (1920, 1080)}
-_AROUND = 1.2  # extent of the picture over that of the paths of the beads
-_LETTERS, _LEAST_LETTERS = 24, 15  # lines of text per picture; smallest height of a line, pixels
+_AROUND, _AROUND_TRAY = 1.2, 1.3  # extent of the picture over that of the paths of the beads, or of the tray
+_LETTERS, _WIDE, _LEAST_LETTERS = 24, 42, 15  # lines and heights of a line per picture; smallest height, pixels
 _SECONDS = 10.0  # largest duration of a film without a given slowdown, s
 _LEAST_SEEN = 10.0  # smallest number of recorded frames per second of such a film, if they do not resolve the cycle
 _COLOURS, _SAMPLES = 40, 6  # colours of a GIF; pictures from which they are chosen
@@ -87,7 +98,8 @@ def render_film(
     times = film_times(motion, options)
     count, frames = len(times.time), slice(int(times.frame[0]), ceil(times.frame[-1]) + 1)
     wide, tall = options.size
-    whole = Scene.around(motion, camera_axes(motion), _AROUND, frames, rolling=True)
+    around = _AROUND_TRAY if from_above(motion.case) else _AROUND
+    whole = Scene.around(motion, camera_axes(motion), around, frames, rolling=True)
     scene = whole.following(wide / tall, _AROUND, frames)
     window = Window(scene, options.size)
     write = _captions(scene, times, window.pixels_per_mm, options.size)
@@ -206,7 +218,8 @@ def _captions(
     from matplotlib import get_data_path
     from PIL import Image, ImageDraw, ImageFont
 
-    (wide, tall), edge, case = size, max(_LEAST_LETTERS, size[1] // _LETTERS), scene.motion.case
+    (wide, tall), case, tray = size, scene.motion.case, from_above(scene.motion.case)
+    edge = max(_LEAST_LETTERS, min(tall // _LETTERS, wide // _WIDE))
     # Pillow's own font has no × and no ².
     font = Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
     large, small = (ImageFont.truetype(font, round(share * edge)) for share in (1.2, 0.85))
@@ -215,19 +228,27 @@ def _captions(
     speed = speed_text(times.slowdown) + (", stroboscopic" if times.stroboscopic else "")
     drive = f"{case.drive.frequency:g} Hz, {case.drive.peak_acceleration:.3g} m/s²"
     bar = round_below(wide / 5.0 / pixels_per_mm)
+    toward, direction = named_direction(scene.motion)
     left, right, level, thick = wide - edge - bar * pixels_per_mm, wide - edge, tall - edge, max(2, edge // 8)
+
+    colours, beside = colours_text(case), from_the_side(case)  # beside the container or below the beads
 
     def written(picture: Picture, number: int) -> Picture:
         page = Image.fromarray(picture)
         draw = ImageDraw.Draw(page)
-        draw.text((edge, edge), f"{times.time[number]:.{decimals}f} s", "black", large, anchor="lt")
-        draw.text((edge, 2.8 * edge), speed, "#333333", small, anchor="lt")
+        clock, said = f"{times.time[number]:.{decimals}f} s", [speed]
         if scene.path is not None:
-            way = float(np.linalg.norm(scene.moved(times.frame[number])))
-            draw.text((edge, 4.3 * edge), f"{way:.1f} mm from the start", "#333333", small, anchor="lt")
-        draw.text((edge, level), drive, "#333333", small, anchor="ls")
+            said.append(f"{scene.moved(times.frame[number]) @ toward:z.1f} mm {direction} from the start")
+        said += [case.boundary.tilted] if case.boundary.tilted else []
+        said += colours.split("; ") if beside else []
+        draw.text((edge, edge), clock, "black", large, anchor="lt")
+        if tray:  # above it
+            draw.text((2 * edge + large.getlength(clock), 1.2 * edge), ", ".join(said), "#333333", small, anchor="lt")
+        else:
+            for row, text in enumerate(said):
+                draw.text((edge, (2.8 + 1.5 * row) * edge), text, "#333333", small, anchor="lt")
+        draw.text((edge, level), drive if beside else f"{drive}; {colours}", "#333333", small, anchor="ls")
         if case.boundary.tilted and case.gravity:
-            draw.text((edge, level - 1.5 * edge), case.boundary.tilted, "#333333", small, anchor="ls")
             tip = 5.5 * edge
             draw.line([right, edge, right, tip - edge], "black", thick)
             draw.polygon([right - 0.4 * edge, tip - edge, right + 0.4 * edge, tip - edge, right, tip], "black")
@@ -237,6 +258,14 @@ def _captions(
         return np.asarray(page)
 
     return written
+
+
+def named_direction(motion: Motion) -> tuple[FloatArray, str]:
+    """Direction of the displacement that is written into pictures, and its name."""
+    if from_the_side(motion.case):
+        return against_gravity(motion), "up"
+    right, up, _ = plan_axes(motion, np.array(motion.case.drive_axis))
+    return (up, "uphill") if motion.case.boundary.tilt else (right, "along the drive axis")
 
 
 def speed_text(slowdown: float) -> str:

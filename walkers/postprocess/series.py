@@ -23,7 +23,7 @@ from walkers.physics.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_place, new_figure, plain_text, save_figure, styled
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, gathered, read_motion
-from walkers.postprocess.scene import Picture, Scene, Window, axes_toward, from_the_side, plan_axes
+from walkers.postprocess.scene import Picture, Scene, Window, axes_toward, colours_text, from_the_side, plan_axes
 from walkers.runner.directory import case_of
 
 if TYPE_CHECKING:
@@ -113,7 +113,8 @@ def _views(motion: Motion, frames: Sequence[int]) -> Figure:
     high += 0.05 * (high - low) if sideways else 0.0
     scene = replace(scene, high=np.array([right, high, scene.high[2]]))
     window = Window(scene, _pixels(right - left, high - low))
-    figure, panels = _panels(len(frames), right - left, high - low, motion.case.title or motion.case.name)
+    said = [motion.case.title or motion.case.name, colours_text(motion.case)]
+    figure, panels = _panels(len(frames), right - left, high - low, said)
     names = ("x", "height") if sideways else ("across the slope", "uphill") if boundary.tilt else ("x", "y")
     for panel, frame, time in zip(panels, frames, even_labels(motion.time[frames]), strict=True):
         panel.imshow(window.picture(frame), extent=(left, right, low, high), interpolation="antialiased")
@@ -141,7 +142,7 @@ def _strips(motion: Motion, frames: Sequence[int]) -> Figure:
     along = int(motion.case.boundary.tilt > 0.0 if still else extent[1] > extent[0])  # strips are upright, or level
     path, times = middle - middle[0], even_labels(motion.time[frames])
     if long := bool(extent[along] > _LONG * 2.0 * half[along]):
-        times = [f"{time}\n{np.linalg.norm(way):.1f} mm" for time, way in zip(times, path, strict=True)]
+        times = [f"{time}\n{way:z.1f} mm" for time, way in zip(times, path[:, along], strict=True)]
     else:
         path[:, along] = 0.0
     seen, margin = place - path[:, None], _MARGIN * half[1 - along]
@@ -158,9 +159,11 @@ def _strips(motion: Motion, frames: Sequence[int]) -> Figure:
     tilted = motion.case.boundary.tilted
     said = [motion.case.title or motion.case.name]
     said += [f"{tilted}, seen along its normal"] if tilted else []
-    said += ["centred on the beads; time and distance walked"] if long else []
+    direction = (("along the drive axis", "across the drive axis"), ("across the slope", "uphill"))[bool(tilted)][along]
+    said += [f"centred on the beads; time and displacement {direction}"] if long else []
+    said += [colours_text(motion.case)]
     figure, panels = _strip_panels(pictures, bounds, inches, along, said)
-    _describe_strips(figure, panels, motion.case, times, along)
+    _describe_strips(figure, panels, motion.case, times, along, f"{direction} (mm)")
     return figure
 
 
@@ -191,19 +194,21 @@ def _strip_panels(
     return figure, list(grid.flat)
 
 
-def _describe_strips(figure: Figure, panels: Sequence[Axes], case: Case, times: Sequence[str], along: int) -> None:
+def _describe_strips(
+    figure: Figure, panels: Sequence[Axes], case: Case, times: Sequence[str], along: int, label: str
+) -> None:
     """Add times, the label of the axis, and on a slope an arrow for the component of gravity."""
-    tilted, wide = case.boundary.tilted, figure.get_figwidth()
+    wide = figure.get_figwidth()
     for panel, time in zip(panels, times, strict=True):
         if along:
             panel.set_title(time)
         else:
             panel.text(1.03, 0.5, time, transform=panel.transAxes, va="center")
     if along:
-        panels[0].set_ylabel("uphill (mm)" if tilted else "across the drive axis (mm)")
+        panels[0].set_ylabel(label)
     else:
-        panels[-1].set_xlabel("across the slope (mm)" if tilted else "along the drive axis (mm)")
-    if tilted and case.gravity:
+        panels[-1].set_xlabel(label)
+    if case.boundary.tilted and case.gravity:
         place = 1.0 - 0.45 / wide
         figure.text(place, 0.56, case.boundary.pull, ha="center")
         how: dict[str, Any] = {"xycoords": "figure fraction", "arrowprops": {"arrowstyle": "-|>", "lw": 1.5, "fc": "k"}}
@@ -241,8 +246,8 @@ def top_view(group: Group, walker: int, frame: int, along: tuple[float, float], 
     return picture
 
 
-def _panels(count: int, wide: float, tall: float, title: str) -> tuple[Figure, list[Axes]]:
-    """A figure with a title and equal axes (width and height in mm), in the number of rows that makes them largest.
+def _panels(count: int, wide: float, tall: float, said: Sequence[str]) -> tuple[Figure, list[Axes]]:
+    """A figure with lines above and equal axes (width and height in mm), in the number of rows that makes them largest.
 
     Their positions are calculated here because layouts of matplotlib do not know the size of axes of a fixed aspect.
     """
@@ -256,7 +261,7 @@ def _panels(count: int, wide: float, tall: float, title: str) -> tuple[Figure, l
     rows = max(range(1, count + 1), key=lambda rows: (inches(rows), -rows))
     columns = ceil(count / rows)
     across, up = inches(rows) * wide + _BESIDE, inches(rows) * tall + _BENEATH
-    lines = wrap(plain_text(title), round(13.0 * (_EDGES[0] + columns * across)))
+    lines = [line for one in said for line in wrap(plain_text(one), round(13.0 * (_EDGES[0] + columns * across)))]
     size = (_EDGES[0] + columns * across, _EDGES[1] + 0.18 * len(lines) + rows * up)
     figure, axes = new_figure(*size, nrows=rows, ncols=columns, squeeze=False)
     figure.set_layout_engine("none")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil, prod
-from textwrap import wrap
+from textwrap import fill, wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -421,9 +421,11 @@ def _legend(figure: Figure, grid: npt.NDArray[Any], colours: _Colours, drawn: Dr
         handles.append(Line2D([], [], label=model, **_model_look(number, _MODELS[number][0] in lines, "0.3")))
     if np.isfinite(drawn.errors).any():
         bars = SCATTER + ("" if errors_seen(drawn.errors, drawn.values) else ", smaller than the symbols")
-        title = f"{title}; {bars}" if title else bars
+        most, whole = round(18.0 * figure.get_figwidth()), [title, bars] if title else [bars]
+        title = text if len(text := "; ".join(whole)) <= most else "\n".join(fill(one, most) for one in whole)
         handles = handles or [Line2D([], [], ls="none", label=" ")]
     if handles:
         longest = max(len(str(handle.get_label())) for handle in handles)
         columns = max(1, min(len(handles), int(13.0 * figure.get_figwidth() / (longest + 6))))
-        figure.legend(handles=handles, loc="outside lower center", title=title, ncols=columns)
+        legend = figure.legend(handles=handles, loc="outside lower center", title=title, ncols=columns)
+        legend.get_title().set_multialignment("center")

@@ -93,7 +93,7 @@ class WalkerRows:
     walker: Annotated[IntArray, "", "index of the walker, from 0"]
     make: Annotated[IntArray, "", "index of the walker's make (body of the case), from 0: dimers, then clusters"]
     facing: Annotated[IntArray, "", "1 or -1: start_angle is from the drive axis (right) or opposite (left)"]
-    start_angle: Annotated[FloatArray, "rad", "orientation at the start"]
+    start_angle: Annotated[FloatArray, "rad", "orientation at the start, from the direction given by facing"]
     velocity: Annotated[
         FloatArray, "m/s", "velocity along the heading after the settling cycles, positive toward the large beads"
     ]
@@ -104,7 +104,7 @@ class WalkerRows:
     axial_velocity: Annotated[FloatArray, "m/s", "velocity of the centre of mass along the drive axis"]
     lateral_velocity: Annotated[FloatArray, "m/s", "velocity of the centre of mass across the drive axis"]
     orientation_mean: Annotated[FloatArray, "rad", "mean orientation after the settling cycles"]
-    orientation_end: Annotated[FloatArray, "rad", "orientation at the end"]
+    orientation_end: Annotated[FloatArray, "rad", "orientation at the end, from the direction given by facing"]
     turned_at: Annotated[
         FloatArray, "s", "end of the first cycle with the heading more than 90° from that at the start; NaN if none"
     ]
@@ -224,8 +224,9 @@ class Walking(Analysis):
             yield Quantity(f"{family}.{contact}", f"{label}, {name}{these}", unit, column, told)
         label = "beads farther apart than the rupture distance"
         yield Quantity("separated_fraction", label, "share", "separated_fraction", _SEPARATED)
-        told = "mean orientation at the end of the run"
-        yield Quantity("orientation_end", "orientation at the end", "rad", "orientation_end", told)
+        label = "orientation at the end, from the direction of facing"
+        told = "mean orientation at the end of the run, from the direction given by facing"
+        yield Quantity("orientation_end", label, "rad", "orientation_end", told)
         for number, make in enumerate(result.get("makes", [])):
             yield Quantity(
                 f"makes.{number}.velocity", f"velocity of walkers with radii {radii_text(make['radii'])} mm", "m/s"
@@ -262,8 +263,10 @@ class Walking(Analysis):
             *_of_sides(result),
             fill(f"  rotation   {these}{beads} mm/s", 110, subsequent_indent=" " * 13),
             fill(f"  sliding    {these}{sliding} mm/s", 110, subsequent_indent=" " * 13),
-            f"  orientation at the end {_angle(end['smallest'])}° to {_angle(end['largest'])}°",
         ]
+        if not result["meet"]:  # on trays each from its own direction: the figure and the orders say more
+            angles = f"{_angle(end['smallest'])}° to {_angle(end['largest'])}°"
+            lines.append(f"  orientation at the end {angles} from the direction of facing")
         if any(open_ones.values()):
             shares = ", ".join(f"{name} {100 * open_ones[contact]:.1f} %" for contact, name in names.items())
             lines.append(f"  contacts open: {shares} of the time")
