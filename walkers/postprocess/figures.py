@@ -108,7 +108,8 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
     references: dict[str, None] = {}
     for group in groups:
         time, distance = distance_walked(group)
-        slope, _ = fit_slopes(time[settled:], distance[settled:])
+        uphills = group.mass_centre[::strobe] @ group.drive_axis
+        slope, _ = fit_slopes(time[settled:], (uphills if uphill else distance)[settled:])
         way = (group.mass_centre[::strobe] - group.mass_centre[0]) * 1e3
         for place, walker in enumerate(group.walkers):
             number = walker.walker
@@ -296,7 +297,8 @@ def walk_figure(groups: list[Group], walked: Panel, turned: Panel) -> Figure:
     letter_panels(axes.values())
     lines, labels = axes["walked"].get_legend_handles_labels()
     start = "orientation from the drive axis" if case.meets else "facing"
-    text = f"walker: {start} at the start, velocity{named_of(len(walked.lines))}"
+    velocity = "velocity up the slope" if case.goes_uphill else "velocity along the heading"
+    text = f"walker: {start} at the start, {velocity}{named_of(len(walked.lines))}"
     columns = 4 if max(map(len, labels)) < _WIDE else 3
     figure.legend(lines, labels, loc="outside lower center", ncols=columns, title=text)
     return figure

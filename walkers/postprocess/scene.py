@@ -209,7 +209,7 @@ def from_the_side(case: Case) -> bool:
 
 def colours_text(case: Case) -> str:
     """What the colours of beads mean."""
-    return f"{'red: walkers, climbers; ' if case.loose else ''}dark: large beads; colours not of the material"
+    return f"{'red: walkers, climbers; ' if case.loose else ''}dark: large beads"
 
 
 def from_above(case: Case) -> bool:
