@@ -28,7 +28,6 @@ from walkers.postprocess.scene import (
     Window,
     against_gravity,
     camera_axes,
-    colours_text,
     from_above,
     from_the_side,
     plan_axes,
@@ -231,8 +230,6 @@ def _captions(
     toward, direction = named_direction(scene.motion)
     left, right, level, thick = wide - edge - bar * pixels_per_mm, wide - edge, tall - edge, max(2, edge // 8)
 
-    colours, beside = colours_text(case), from_the_side(case)  # beside the container or below the beads
-
     def written(picture: Picture, number: int) -> Picture:
         page = Image.fromarray(picture)
         draw = ImageDraw.Draw(page)
@@ -240,14 +237,14 @@ def _captions(
         if scene.path is not None:
             said.append(f"{scene.moved(times.frame[number]) @ toward:z.1f} mm {direction} from the start")
         said += [case.boundary.tilted] if case.boundary.tilted else []
-        said += colours.split("; ") if beside else []
+        said += ["red: climbers"] if case.loose else []
         draw.text((edge, edge), clock, "black", large, anchor="lt")
         if tray:  # above it
             draw.text((2 * edge + large.getlength(clock), 1.2 * edge), ", ".join(said), "#333333", small, anchor="lt")
         else:
             for row, text in enumerate(said):
                 draw.text((edge, (2.8 + 1.5 * row) * edge), text, "#333333", small, anchor="lt")
-        draw.text((edge, level), drive if beside else f"{drive}; {colours}", "#333333", small, anchor="ls")
+        draw.text((edge, level), drive, "#333333", small, anchor="ls")
         if case.boundary.tilted and case.gravity:
             tip = 5.5 * edge
             draw.line([right, edge, right, tip - edge], "black", thick)

@@ -207,11 +207,6 @@ def from_the_side(case: Case) -> bool:
     return case.boundary.closed and (case.loose or not case.meets)
 
 
-def colours_text(case: Case) -> str:
-    """What the colours of beads mean."""
-    return f"{'red: walkers, climbers; ' if case.loose else ''}dark: large beads"
-
-
 def from_above(case: Case) -> bool:
     """Whether a run in a container is seen along the normal of its floor."""
     return case.boundary.closed and not from_the_side(case)

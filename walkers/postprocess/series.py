@@ -23,7 +23,7 @@ from walkers.physics.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_place, new_figure, plain_text, save_figure, styled
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, gathered, read_motion
-from walkers.postprocess.scene import Picture, Scene, Window, axes_toward, colours_text, from_the_side, plan_axes
+from walkers.postprocess.scene import Picture, Scene, Window, axes_toward, from_the_side, plan_axes
 from walkers.runner.directory import case_of
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def _views(motion: Motion, frames: Sequence[int]) -> Figure:
     high += 0.05 * (high - low) if sideways else 0.0
     scene = replace(scene, high=np.array([right, high, scene.high[2]]))
     window = Window(scene, _pixels(right - left, high - low))
-    said = [motion.case.title or motion.case.name, colours_text(motion.case)]
+    said = [motion.case.title or motion.case.name, *(["red: climbers"] if motion.case.loose else [])]
     figure, panels = _panels(len(frames), right - left, high - low, said)
     names = ("x", "height") if sideways else ("across the slope", "uphill") if boundary.tilt else ("x", "y")
     for panel, frame, time in zip(panels, frames, even_labels(motion.time[frames]), strict=True):
@@ -161,7 +161,6 @@ def _strips(motion: Motion, frames: Sequence[int]) -> Figure:
     said += [f"{tilted}, seen along its normal"] if tilted else []
     direction = (("along the drive axis", "across the drive axis"), ("across the slope", "uphill"))[bool(tilted)][along]
     said += [f"centred on the beads; time and displacement {direction}"] if long else []
-    said += [colours_text(motion.case)]
     figure, panels = _strip_panels(pictures, bounds, inches, along, said)
     _describe_strips(figure, panels, motion.case, times, along, f"{direction} (mm)")
     return figure

@@ -22,7 +22,6 @@ from walkers.postprocess.scene import (
     axes_toward,
     beach_ball,
     camera_axes,
-    colours_text,
     floor_lines,
     from_the_side,
     mesh_of,
@@ -72,7 +71,6 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
     motion = gathered(motion, lane=_LANE)
     scene = Scene.around(motion, camera_axes(motion), _AROUND, shaken=False, rolling=True).following(_ASPECT, _AROUND)
     shown, path = motion.select(slice(None, None, stride)), scene.path
-    captions.append(f"{colours_text(motion.case).capitalize()}.")
     if path is not None:
         path = path[::stride]
         shown = replace(shown, position=shown.position - 1e-3 * path[:, None])
