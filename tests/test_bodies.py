@@ -131,7 +131,7 @@ def test_a_chain_of_two_is_a_dimer() -> None:
     np.testing.assert_allclose(*([bead.centre for bead in place((case,))[0].beads] for case in cases), atol=1e-15)
 
 
-def test_a_raft_holds_together_and_stays(run_directory: Callable[..., Path]) -> None:
+def test_a_raft_holds_together_and_stays(run_directory: Callable[..., Path], tmp_path: Path) -> None:
     """Seven equal beads, each in the ring joined to three: none is large, and the drive has no direction."""
     run = {"cycles": 12, "settling_cycles": 6, "samples_per_cycle": 10}
     case = of_tables(cluster("raft", "sssssss"), drive={**FIG1B["drive"], "peak_acceleration": "10 g"}, run=run)
@@ -140,6 +140,17 @@ def test_a_raft_holds_together_and_stays(run_directory: Callable[..., Path]) -> 
     assert result["separated_fraction"] == 0.0
     assert result["work"]["mean"] > 1e-9
     assert abs(result["axial_velocity"]["mean"]) < 1e-6
+    # One that falls apart has no velocity, and a time step that is too long is not passed over in silence.
+    spoilt = {**result, "separated_fraction": 0.9, "beyond_limits": ["rayleigh"]}
+    told = describe_result(tmp_path, spoilt)
+    assert "velocity   none: walkers came apart: beads beyond the rupture distance for 90 % of the time" in told
+    assert "warning: the time step is beyond a limit of stability (rayleigh)" in told
+
+
+@pytest.mark.parametrize(("step", "beyond"), [("1 us", None), ("20 us", ["rayleigh"])])
+def test_results_know_a_time_step_beyond_its_limits(step: str, beyond: list[str] | None, tmp_path: Path) -> None:
+    run = {"cycles": 2, "settling_cycles": 0, "samples_per_cycle": 1, "time_step": step, "allow_unstable": True}
+    assert walkers.run(make_case(run=run), tmp_path).result.get("beyond_limits") == beyond
 
 
 def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
@@ -176,13 +187,13 @@ def test_walkers_on_a_tray_meet_and_stick(tmp_path: Path) -> None:
     assert "at the end connected" in told
     assert "spacing" not in told  # a meeting is no fault here
     speed, *end = of_tray(tray.result)
-    assert speed == f"free walkers {1e3 * tray.result['free_speed']:.3f} mm/s, turning at the start included"
+    assert speed == f"free walkers {1e3 * tray.result['free_speed']:.3f} mm/s from cycle to cycle, turning included"
     assert end[1] == f"{round(9 * tray.result['clustered_share'])} of 9 connected"
-    assert told.splitlines()[1].startswith(f"  tray       {speed}; at the end {end[0]}, {end[1]}")
+    assert told.splitlines()[1].startswith(f"  tray       {speed}; at the end {end[0]}, ")
     assert "facing" not in told
     assert "not steady" not in told  # walkers that have met stop
     assert ("numerical error" in told) == bool(tray.result["steady"])
-    assert f"{speed}, {end[0]}" in as_text(inventory(tmp_path))
+    assert f"{end[0]}, {end[1]}" in as_text(inventory(tmp_path))
     assert of_tray({**tray.result, "free_speed": None, "slow_share": None})[0] == "no walker is free"
     assert of_tray({**tray.result, "held_share": 1.0})[-1] == "none free"
     group = tray.motion.groups[0]

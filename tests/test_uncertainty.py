@@ -123,13 +123,13 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     done = walkers.run(case, tmp_path)
     told = done.describe()
     assert "plane tilted by 20°, right is up" in told
-    assert "started facing up" in told
     assert "scatter of" not in told  # of one walker a side there is none
     sides = sides_apart(done.result)
-    up, down = (rounded(1e3 * speed, "mm/s") for speed in sides.values())
+    up, down = (rounded(1e3 * speed, "mm/s") for speed in uphill_velocities(done.result).values())
     assert list(sides) == ["up", "down"]
     assert " mm/s, facing up\n" in describe(predict(case), done.result)
-    assert f"up {up}, down {down} mm/s" in as_text(inventory(tmp_path))
+    assert f"facing up {up}, facing down {down} mm/s, positive up the slope" in told
+    assert f"started up {up}, started down {down} mm/s" in as_text(inventory(tmp_path))
     # The band of a spread is that of one side, or is left out.
     band = {"low": sides["up"] - 1e-3, "high": sides["up"] + 1e-3, "points": 64}
     of_up, of_mean = (
@@ -145,7 +145,7 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     walkers.run(gentle, tmp_path)
     first, second = (find_side(walkers.load(one, tmp_path).directory) for one in (case, gentle))
     text = compare_runs(first, second).text
-    assert "facing up (mm/s)" in text
+    assert "along the heading, facing up (mm/s)" in text
     assert "right_facing" not in text
     assert "\nvelocity (mm/s)" not in text  # the mean over both is no walker's
     frame = pd.DataFrame([row_of(done.result)])

@@ -103,8 +103,11 @@ def _expected(hint: Any) -> str:
 def _refusal(validator: BeforeValidator | Kind) -> str | None:
     if isinstance(validator, Kind):
         low, high = (_in_unit(end, validator) for end in (validator.smallest, validator.largest))
+        words = validator.expectation.removeprefix("expected ")
+        if validator.unit == "rad" and validator.largest > 10.0:  # any angle
+            return words
         either = "" if validator.sign or validator.unit == TEMPERATURE.unit else " in absolute value"
-        return f"{validator.expectation.removeprefix('expected ')}; {low.split()[0]} to {high}{either}"
+        return f"{words}; {low.split()[0]} to {high}{either}"
     try:
         validator.func(object())  # type: ignore[call-arg]
     except ValueError as error:

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from walkers.inputs.caption import conditions
 from walkers.inputs.case import Case
 from walkers.inputs.rounding import SHOWN_UNITS, rounded
+from walkers.inputs.run_tables import limits_of
 from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.postprocess.uncertainty import bands_text, lines_of_rest, not_known, rests_on, with_bands
 from walkers.runner.directory import SEGMENT_NAME, case_of, files_of_segments, segment_directories
@@ -307,6 +308,8 @@ def _measured(directory: Path) -> tuple[dict[str, Any], dict[str, Columns]]:
         "truncated": motion.truncated,
         "rests_on": rests_on(case.origins),
     }
+    if beyond := limits_of(case).exceeded_by(case.run.time_step):
+        result["beyond_limits"] = beyond
     if notes := read_json(segment_directories(directory)[-1] / SEGMENT_NAME).get("by_hand"):
         result["by_hand"] = notes
     tables: dict[str, Columns] = {}
@@ -429,6 +432,8 @@ def warnings_of(result: Mapping[str, Any]) -> list[str]:
         *result.get("by_hand", ()),
         *(warning for one in analyses_in(result) for warning in one.warnings(result)),
     ]
+    if names := result.get("beyond_limits"):
+        warnings.append(f"the time step is beyond a limit of stability ({', '.join(names)}): the results are wrong")
     return [*warnings, "the dump ends within a frame"] if result["truncated"] else warnings
 
 

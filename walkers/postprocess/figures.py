@@ -95,7 +95,7 @@ def velocity_text(value: float) -> str:
 
 
 def walk_panels(groups: list[Group]) -> list[Panel]:
-    """Distance along the heading, orientation, and paths from above, of all walkers, once a cycle.
+    """Distance along the heading, on slopes uphill, orientation, and paths from above, of all walkers, once a cycle.
 
     Orientations are from the direction that the legend names; those of walkers that may meet are from the drive axis.
     """
@@ -108,8 +108,9 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
     references: dict[str, None] = {}
     for group in groups:
         time, distance = distance_walked(group)
-        uphills = group.mass_centre[::strobe] @ group.drive_axis
-        slope, _ = fit_slopes(time[settled:], (uphills if uphill else distance)[settled:])
+        if uphill:
+            distance = (group.mass_centre[::strobe] - group.mass_centre[0]) @ group.drive_axis
+        slope, _ = fit_slopes(time[settled:], distance[settled:])
         way = (group.mass_centre[::strobe] - group.mass_centre[0]) * 1e3
         for place, walker in enumerate(group.walkers):
             number = walker.walker
@@ -129,7 +130,8 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
     begin, named = walked[-1].x[settled], named_of(len(walked))
     names = ("across the slope (mm)", "uphill (mm)") if uphill else (_ALONG, "across it (mm)")
     seen = f"{case.boundary.tilted}, seen along its normal" if case.boundary.tilted else "seen from above"
-    title, y = f"Distance along the heading; grey: settling{named}", "distance along\nthe heading (mm)"
+    toward = "uphill" if uphill else "along the heading"
+    title, y = f"Distance {toward}; grey: settling{named}", f"distance\n{toward} (mm)"
     reference = f"orientation ψ from\n{'the drive axis' if case.meets else ' or '.join(references)} (°)"
     return [
         Panel(title, "time (s)", y, walked, settled=begin, least=_LEAST_DISTANCE),

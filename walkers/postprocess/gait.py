@@ -19,7 +19,7 @@ from walkers.inputs.case import CONSTANT
 from walkers.postprocess.analysis import read_result
 from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
 from walkers.postprocess.motion import Group, read_motion
-from walkers.postprocess.sides import REST, STEADY_SPEED
+from walkers.postprocess.sides import REST, SEPARATED, STEADY_SPEED
 from walkers.postprocess.tables import read_table
 
 if TYPE_CHECKING:
@@ -33,8 +33,6 @@ UPRIGHT = np.radians(15.0)
 _NO_MORE = np.radians(0.5)
 """Largest increase of its angle in the second half of a run, rad."""
 POSTURES = ("upright", "leaning", "turned over")
-SEPARATED = 0.1
-"""Share of the time with separated beads beyond which they are not a walker."""
 ASTRAY = np.pi / 4.0
 """Largest final angle of a walker that is on the axis, rad."""
 _LITTLE, _FADING, _NO_FASTER = 0.005, 0.9, 1e-4

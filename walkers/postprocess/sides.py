@@ -18,6 +18,8 @@ STEADY_SPEED = 1e-5
 """… and by more than this, m/s; halves of a run that differ by less are steady."""
 REST = 2e-6
 """m/s; slower walkers are at rest: velocities that count as constant may differ by as much."""
+SEPARATED = 0.1
+"""Share of the time with beads beyond the rupture distance above which a walker came apart."""
 _ACROSS = 0.02
 """Cosine: walkers that start across the drive axis, within about 1°, face as `facing` says."""
 
@@ -63,7 +65,9 @@ def fell(result: Mapping[str, Any]) -> bool:
 
 
 def uphill_velocities(result: Mapping[str, Any]) -> dict[str, float]:
-    """Mean velocities (m/s) up the slope, by direction at the start if they differ."""
+    """Mean velocities (m/s) up the slope, by direction at the start if they differ; none on level floors."""
+    if not result.get("posture"):
+        return {}
     axial = result["axial_velocity"]
     up, down = axial["right_facing"], axial["left_facing"]
     if up is None or down is None or not differ(up, down):
@@ -71,13 +75,23 @@ def uphill_velocities(result: Mapping[str, Any]) -> dict[str, float]:
     return {"up the slope, started up": up, "started down": down}
 
 
+def came_apart(result: Mapping[str, Any]) -> str:
+    """How long beads of walkers were farther apart than bridges reach, if too long for a velocity; otherwise empty."""
+    share = result.get("separated_fraction") or 0.0
+    if share <= SEPARATED or result.get("meet"):
+        return ""
+    return f"came apart: beads beyond the rupture distance for {100.0 * share:.0f} % of the time"
+
+
 def of_tray(result: Mapping[str, Any]) -> list[str]:
     """Walkers that may meet: speed of free ones, then numbers at the end, as text; empty for other walkers."""
     if not result.get("meet") or "held_share" not in result:
         return []
     free, count, joined, held = (result[key] for key in ("free_speed", "walkers", "clustered_share", "held_share"))
-    shares = {"slow": result["slow_share"], "connected": joined, "held at a side": held or None}
-    speed = "" if free is None else f"free walkers {with_decimals(1e3 * free, 3)} mm/s, turning at the start included"
+    by_side = "held by a side, directly or through others"
+    shares = {"slow": result["slow_share"], "connected": joined, by_side: held or None}
+    told = "mm/s from cycle to cycle, turning included"
+    speed = "" if free is None else f"free walkers {with_decimals(1e3 * free, 3)} {told}"
     return [
         speed or "no walker is free",
         *(f"{round(count * share)} of {count} {what}" for what, share in shares.items() if share is not None),

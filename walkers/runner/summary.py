@@ -92,7 +92,9 @@ def notes(case: Case) -> list[str]:
     """Notes on a case before it is run: a long time step; of a pile, beads of one size and low walls."""
     largest, reason = limits_of(case).recommended(loose=case.loose)
     times, lines = case.run.time_step / largest, []
-    if times > 1.01 and numerical_error(case) is None:
+    if times < 1e-2:
+        lines = [f"the time step is {_two_digits(1.0 / times)} times smaller than needed ({reason})"]
+    elif times > 1.01 and numerical_error(case) is None:
         lines = [f"the time step is {times:.2g} times the largest of auto ({reason})"]
     if not (case.loose and case.boundary.closed and case.mixture):
         return lines
@@ -104,6 +106,10 @@ def notes(case: Case) -> list[str]:
             f"climbers faster than {fastest * 1e3:.1f} mm/s rise above twice boundary.height, and end the run early"
         )
     return lines
+
+
+def _two_digits(number: float) -> str:
+    return f"{float(f'{number:.2g}'):,.0f}"
 
 
 def _volume(case: Case) -> float:

@@ -39,7 +39,11 @@ _SIDES = ("first", "second")
 _SPREADS = ("smallest", "largest", "scatter")  # columns of a sweep's table that are not compared
 _VELOCITIES = ("velocity", "right_facing", "left_facing")
 """Columns whose scatter is in the result, and whose numerical error is that of the velocity."""
-_UPHILL = {"right_facing": "facing up", "left_facing": "facing down", "axial_velocity": "velocity up the slope"}
+_UPHILL = {
+    "right_facing": "along the heading, facing up",
+    "left_facing": "along the heading, facing down",
+    "axial_velocity": "velocity up the slope",
+}
 """Names of columns if the drive axis goes up a slope."""
 _FIRST_MAKE = ("rotation", "sliding", "open")
 _OF_ALL = ("orientation_end", "separated_fraction")
@@ -74,7 +78,11 @@ def _pair(
     numbers = zip(names, (*values, *scatters, difference, numerical), strict=True)
     contents = {"quantity": quantity, "unit": unit, **{name: one if isfinite(one) else None for name, one in numbers}}
     usual, size = readable_unit(unit)
-    cells = [*(rounded(value / size, usual) for value in values), _difference(difference / size, usual)]
+    printed = [rounded(value / size, usual) for value in values]
+    apart = difference / size
+    if abs(difference) < 2e-3 * abs(values[0]):  # digits that are not printed would contradict the printed ones
+        apart = float(printed[1]) - float(printed[0])
+    cells = [*printed, _difference(apart, usual)]
     both = " and ".join(_two_digits(one / size, usual) for one in scatters if isfinite(one))
     return contents, [with_unit(quantity, usual), *cells, both or "-", _two_digits(numerical / size, usual)]
 

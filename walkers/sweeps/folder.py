@@ -24,7 +24,7 @@ from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.readable import agrees, check_wanted, differing, flattened, has_key, kind_of, readable, short_keys
 from walkers.inputs.rounding import counted, duration_text, rounded
 from walkers.physics.units import Kind, parse_quantity
-from walkers.postprocess.sides import REST, fell, of_tray, sides_apart, uphill_velocities
+from walkers.postprocess.sides import REST, came_apart, of_tray, sides_apart, uphill_velocities
 from walkers.postprocess.uncertainty import SPREAD, SPREAD_NAME
 from walkers.runner.directory import (
     CASE_NAME,
@@ -68,8 +68,8 @@ class Entry:
     ``age`` (s) counts from the end of the run or from the last change, ``size`` (bytes) is that of the files, for a
     sweep of its runs. ``parameters`` are those of `walkers.inputs.readable.flattened`, for a sweep the number of values
     of each varied key. A run has a velocity (m/s, mean over the walkers; if ``sides`` has velocities of walkers on a
-    slope, the first of them; ``tray`` has the text of `of_tray`) or a number of climbs; a sweep has numbers of
-    points by status.
+    slope, the first of them; ``words`` say what walkers on a tray do, or that they came apart) or a number of climbs; a
+    sweep has numbers of points by status.
     """
 
     name: str
@@ -83,7 +83,7 @@ class Entry:
     message: str | None = None
     velocity: float | None = None
     sides: Mapping[str, float] = field(default_factory=dict)
-    tray: Sequence[str] = ()
+    words: Sequence[str] = ()
     climbs: int | None = None
     points: Mapping[str, int] | None = None
     runs: Sequence[str] = ()
@@ -145,9 +145,10 @@ def _run(path: Path, now: float) -> Entry | None:
     with suppress(OSError, ValueError, AttributeError, TypeError):
         result = recorded_result(path)
         velocity, climbs = result.get("velocity") or {}, result.get("climbs")
-        sides = uphill_velocities(result) if fell(result) else sides_apart(result)
-        own = next(iter(sides.values())) if result.get("goes_uphill") and sides else velocity.get("mean")
-        given = {"velocity": own, "sides": sides, "tray": of_tray(result)}
+        sides = uphill_velocities(result)
+        own = next(iter(sides.values()), velocity.get("mean"))
+        words = [told.partition(":")[0]] if (told := came_apart(result)) else of_tray(result)[1:]
+        given = {"velocity": own, "sides": sides or sides_apart(result), "words": words}
         given["climbs"] = None if climbs is None else len(climbs)
         if notes := result.get("by_hand"):
             given["reason"] = "edited and run by hand" if "edited" in " ".join(notes) else notes[0]
@@ -308,8 +309,8 @@ def _result_text(run: Entry) -> str:
     """Climbs of a pile, what walkers on a tray do, or velocities; a dash if there is no result."""
     if run.velocity is None:
         return "-" if run.climbs is None else counted(run.climbs, "climb")
-    if run.tray:
-        return ", ".join(run.tray[:2])
+    if run.words:
+        return ", ".join(run.words[:2])
     sides = run.sides or {"": run.velocity}
     told = (f"{way} {rounded(1e3 * speed, 'mm/s')}".strip() for way, speed in sides.items())
     return "at rest" if max(map(abs, sides.values())) < REST else f"{', '.join(told)} mm/s"

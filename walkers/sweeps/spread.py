@@ -19,7 +19,7 @@ from walkers.inputs.rounding import SHOWN_UNITS, rounded
 from walkers.inputs.sweep import Sweep, settings_in
 from walkers.physics.units import parse_quantity
 from walkers.postprocess.analysis import analyses, analyses_of
-from walkers.postprocess.gait import SEPARATED
+from walkers.postprocess.sides import REST, SEPARATED
 from walkers.postprocess.uncertainty import BANDS_ON_SLOPES, LEAST_PER_VALUE, SPREAD_NAME, spread_of
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
@@ -35,11 +35,10 @@ POINTS = 32
 _SEEDS = range(1, 65)
 """Seeds of the scrambling; the one with the least correlated columns is used. With few points in many dimensions,
 correlations of columns reach 0.7, and the influences of the values could not be separated."""
-_AT_REST = 2e-5  # m/s: slower walkers are at rest, as in the sweeps for the threshold of motion
 _WORDS = {
     "forward": "walk toward the large bead",
     "backward": "walk toward the small bead",
-    "at_rest": "rest (below 0.02 mm/s)",
+    "at_rest": f"rest (below {1e3 * REST:g} mm/s)",
     "separated": "come apart",
 }
 
@@ -165,8 +164,8 @@ def run_spread(
     if "velocity" in table:
         together = table[~(table["separated_fraction"] > SEPARATED)]
         speeds = together[main_columns(together)[0]]
-        counts = {"forward": int((speeds > _AT_REST).sum()), "backward": int((speeds < -_AT_REST).sum())}
-        counts |= {"at_rest": int((speeds.abs() <= _AT_REST).sum()), "separated": len(table) - len(together)}
+        counts = {"forward": int((speeds > REST).sum()), "backward": int((speeds < -REST).sum())}
+        counts |= {"at_rest": int((speeds.abs() <= REST).sum()), "separated": len(table) - len(together)}
     shown = [name for one in analyses_of(case) for name in one.headlines if name in one.columns]
     shown = [main_columns(together)[0] if name == "velocity" else name for name in shown]
     spread = Spread(
@@ -221,7 +220,8 @@ def describe(spread: Spread) -> str:
         if band.points < LEAST_PER_VALUE * len(spread.varied):
             text = "too few draws for rank correlations; the band is approximate"
         lines.append(f"{'':13}{text}")
-    words = _WORDS | ({"forward": "go up the slope", "backward": "go down"} if "axial_velocity" in spread.bands else {})
+    slope = {"forward": "go up the slope", "backward": "go down"} if BANDS_ON_SLOPES.keys() & spread.bands else {}
+    words = _WORDS | slope
     found = [f"{count} {words[name]}" for name, count in spread.counts.items() if count]
     found += [f"{len(spread.failures)} failed, not in the band"] if spread.failures else []
     lines += [f"    draws    {', '.join(found)}"] if found else []

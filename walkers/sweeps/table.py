@@ -66,8 +66,8 @@ ERRORS = {"velocity": "scatter"}
 FORMATS = ("csv", "parquet", "json")
 _LEFT_OUT = {
     *("mass_asymmetry", "frequency", "peak_acceleration", "peak_velocity", "amplitude", "radius_1", "radius_2"),
-    *("scatter", "right_facing", "left_facing", "sliding_2", "sliding_3", "open_1", "open_2", "open_3"),
-    *("separated_fraction", "orientation_end", "turned_round", "walkers_met", "lost", "reason"),
+    *("scatter", "axial_velocity", "right_facing", "left_facing", "sliding_2", "sliding_3", "open_1", "open_2"),
+    *("open_3", "separated_fraction", "orientation_end", "turned_round", "walkers_met", "lost", "reason"),
     *("smallest", "largest", "rotation_2", "cycles", "ended_early", "parted", "largest_group", "meeting_rate"),
     *("pair_lifetime", "pair_time", "largest_cluster", "nematic_order", "polar_order", "joined_speed", "speed_ratio"),
     *(f"{way}_{what}" for way in ("following", "side", "head_on") for what in ("met", "parted", "walking", "resting")),
@@ -436,7 +436,7 @@ def short_text(frame: pd.DataFrame) -> str:
     """
     import pandas as pd
 
-    left_out = (_LEFT_OUT - set(SIDES)) | {"velocity"} if sides_differ(frame) else _LEFT_OUT
+    left_out = (_LEFT_OUT - set(SIDES)) | {"velocity"} if sides_differ(frame) else _LEFT_OUT - {default_column(frame)}
     names = [name for name in frame.columns if name not in left_out]
     shown = frame[names].copy()
     units = dict(frame.attrs.get("units", {}))

@@ -26,7 +26,6 @@ from walkers.postprocess.analysis import Analysis, Described, Measured, Quantity
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.gait import (
     POSTURES,
-    SEPARATED,
     STEADY_DIFFERENCE,
     Gait,
     averages,
@@ -38,7 +37,18 @@ from walkers.postprocess.gait import (
     walk,
 )
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
-from walkers.postprocess.sides import REST, STEADY_SPEED, alike, fell, of_tray, sides, sides_apart, ways
+from walkers.postprocess.sides import (
+    REST,
+    STEADY_SPEED,
+    alike,
+    came_apart,
+    fell,
+    of_tray,
+    sides,
+    sides_apart,
+    uphill_velocities,
+    ways,
+)
 from walkers.postprocess.tables import NUMBERED, Columns, columns_of
 from walkers.postprocess.uncertainty import (
     LEAST_PER_VALUE,
@@ -197,7 +207,8 @@ class Walking(Analysis):
         """Quantities of all walkers: velocities, contacts, makes, postures; sweeps have the contacts of dimers."""
         first, second = ways(uphill=result.get("goes_uphill", False))
         label = "along the heading, positive toward the large bead"
-        yield Quantity("velocity", f"velocity {label}", "m/s", "velocity", f"mean velocity of the walkers, {label}")
+        shown = "" if uphill_velocities(result) else f"velocity {label}"  # on slopes those by direction
+        yield Quantity("velocity", shown, "m/s", "velocity", f"mean velocity of the walkers, {label}")
         yield Quantity("velocity.smallest", "", "m/s", "smallest", "velocity of the slowest walker")
         told = "velocity of the fastest walker; the error bars of the paper are largest minus smallest"
         yield Quantity("velocity.largest", "", "m/s", "largest", told)
@@ -207,6 +218,9 @@ class Walking(Analysis):
             label = f"velocity along the heading, walkers that started facing {way}"
             told = f"mean velocity of the walkers that started facing {name}"
             yield Quantity(f"{name}_facing", label, "m/s", f"{name}_facing", told)
+            if uphill_velocities(result):
+                label = f"velocity up the slope, walkers that started facing {way}"
+                yield Quantity(f"axial_velocity.{name}_facing", label, "m/s")
         if fell(result):
             yield Quantity("kept_heading", "velocity of walkers that kept their heading", "m/s")
         told = "mean velocity of the centres of mass along the drive axis; on a slope, uphill"
@@ -292,9 +306,6 @@ class Walking(Analysis):
         if (lacking := result["walkers"] - result["steady"]) and not result["meet"]:  # on trays walkers stop
             told = f"{lacking} of {result['walkers']} walkers {'is' if lacking == 1 else 'are'} not steady"
             warnings.append(f"{told}: the velocity depends on the length of the run")
-        if (share := result["separated_fraction"] or 0.0) > SEPARATED:
-            told = f"for {100.0 * share:.0f} % of the time"
-            warnings.append(f"beads of walkers are farther apart than the rupture distance {told}")
         if result["walkers_met"] and not result["meet"]:
             warnings.append("walkers came close to each other and are not independent: increase the spacing")
         return warnings
@@ -469,10 +480,16 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
     headline += "; mean of all, slow ones too" if result["meet"] else ""
     if velocity["n"] and abs(velocity["mean"]) < REST:
         headline = f"at rest (below {1e3 * REST:g} mm/s){_band(result)}"
-    if apart := sides_apart(result):  # no walker has the mean velocity
-        (first, one), (second, other) = apart.items()
-        up = f"{_speed(one)} mm/s{band}" if (band := _band(result)) else _speed(one)
-        headline = f"facing {first} {up}, facing {second} {_speed(other)} mm/s, positive {toward}"
+    # On slopes velocities are positive up; where the directions differ, no walker has the mean velocity.
+    apart, uphill = sides_apart(result), list(uphill_velocities(result).values())
+    if apart or uphill:
+        toward, speeds = ("up the slope", uphill) if uphill else (toward, list(apart.values()))
+        named = [f"facing {way} " for way in ways(uphill=result["goes_uphill"])] if len(speeds) > 1 else [""]
+        own = [f"{way}{_speed(speed)}" for way, speed in zip(named, speeds, strict=True)]
+        own[0] += f" mm/s{band}" if (band := _band(result)) else ""
+        headline = f"{', '.join(own)}{' mm/s' if not band or len(own) > 1 else ''}, positive {toward}"
+    if told := came_apart(result):
+        headline = f"none: walkers {told}"
     return [*_headlines(result, drive), f"  velocity   {headline}"]
 
 
@@ -485,7 +502,7 @@ def _of_sides(result: Mapping[str, Any]) -> list[str]:
         f"{_speed(side['mean'])} mm/s ({side['n']})" if side["n"] else "none"
         for side in (result["right_facing"], result["left_facing"])
     )
-    told = "" if result["meet"] else f"started facing {first} {right}, {second} {left}; "
+    told = "" if result["meet"] or result["posture"] else f"started facing {first} {right}, {second} {left}; "
     turned = f"{result['turned_round']} of {result['walkers']} walkers turned by more than 90°"
     return wrapped([told + _steady(result), *([turned] if result["turned_round"] else [])])
 
