@@ -482,7 +482,7 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
         headline = f"at rest (below {1e3 * REST:g} mm/s){_band(result)}"
     # On slopes velocities are positive up; where the directions differ, no walker has the mean velocity.
     apart, uphill = sides_apart(result), list(uphill_velocities(result).values())
-    if apart or uphill:
+    if apart or max(map(abs, uphill), default=0.0) >= REST:
         toward, speeds = ("up the slope", uphill) if uphill else (toward, list(apart.values()))
         named = [f"facing {way} " for way in ways(uphill=result["goes_uphill"])] if len(speeds) > 1 else [""]
         own = [f"{way}{_speed(speed)}" for way, speed in zip(named, speeds, strict=True)]
