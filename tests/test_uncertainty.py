@@ -154,7 +154,7 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     # Of walkers that turned over it is the velocity up the slope that counts.
     result = {**done.result, "turned_round": 1, "posture": {**done.result["posture"], "upright": 1, "turned over": 1}}
     up, down = (done.result["axial_velocity"][f"{way}_facing"] for way in ("right", "left"))
-    assert uphill_velocities(result) == {"up the slope, started up": up, "started down": down}
+    assert uphill_velocities(result) == {"axial, started up": up, "started down": down}
     assert default_column(pd.DataFrame([row_of(result)])) == "axial_velocity"
     assert not fell({"goes_uphill": True, "climbs": []})  # a pile
     band = {"low": -1e-2, "high": 1e-2, "points": 64}

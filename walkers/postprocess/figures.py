@@ -174,7 +174,7 @@ def gait_panels(group: Group) -> list[Panel]:
     names = ["walker", *(f"bead {bead + 1}" for bead in range(motion.rotation.shape[-1]))]
     values = 1e3 * np.column_stack([motion.velocity[last, 0], motion.rotation[last, 0]])
     means = 1e3 * np.array([walk(group).velocity[0], *averages(group).rotation[0]])
-    labels = [f"{name} (mean {velocity_text(mean)} mm/s)" for name, mean in zip(names, means, strict=True)]
+    labels = [f"{name} (mean of the run {velocity_text(mean)} mm/s)" for name, mean in zip(names, means, strict=True)]
     widths, colours = nested_widths(len(names), 6.0), [_PALE, *range(1, len(names))]
     lines = [
         Line(phase, values[:, number], labels[number], colours[number], width=widths[number])

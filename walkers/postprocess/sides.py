@@ -71,8 +71,8 @@ def uphill_velocities(result: Mapping[str, Any]) -> dict[str, float]:
     axial = result["axial_velocity"]
     up, down = axial["right_facing"], axial["left_facing"]
     if up is None or down is None or not differ(up, down):
-        return {"up the slope": axial["mean"]}
-    return {"up the slope, started up": up, "started down": down}
+        return {"axial": axial["mean"]}
+    return {"axial, started up": up, "started down": down}
 
 
 def came_apart(result: Mapping[str, Any]) -> str:
@@ -90,7 +90,7 @@ def of_tray(result: Mapping[str, Any]) -> list[str]:
     free, count, joined, held = (result[key] for key in ("free_speed", "walkers", "clustered_share", "held_share"))
     by_side = "held by a side, directly or through others"
     shares = {"slow": result["slow_share"], "connected": joined, by_side: held or None}
-    told = "mm/s from cycle to cycle, turning included"
+    told = "mm/s from cycle to cycle, settling and turning included"
     speed = "" if free is None else f"free walkers {with_decimals(1e3 * free, 3)} {told}"
     return [
         speed or "no walker is free",

@@ -83,7 +83,8 @@ def _pair(
     if abs(difference) < 2e-3 * abs(values[0]):  # digits that are not printed would contradict the printed ones
         apart = float(printed[1]) - float(printed[0])
     cells = [*printed, _difference(apart, usual)]
-    both = " and ".join(_two_digits(one / size, usual) for one in scatters if isfinite(one))
+    spreads = [(one, _two_digits(one / size, usual)) for one in scatters if isfinite(one)]
+    both = " and ".join("<0.001" if one > 0.0 and text == "0" and usual == "mm/s" else text for one, text in spreads)
     return contents, [with_unit(quantity, usual), *cells, both or "-", _two_digits(numerical / size, usual)]
 
 

@@ -75,7 +75,7 @@ _NUMBERS = {
     "free_speed": (
         "speed of free walkers",
         "m/s",
-        "mean speed, from cycle to cycle, of walkers that are not joined to another walker or a side wall",
+        "mean speed from cycle to cycle, settling included, of walkers that are not joined to a walker or a side wall",
     ),
     "joined_speed": (
         "speed of joined walkers",
