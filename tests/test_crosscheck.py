@@ -16,7 +16,7 @@ import pytest
 from tests.conftest import call, to_toml
 from walkers import run
 from walkers.check import kernels
-from walkers.check.crosscheck import compare, full_cases, shortened, simulate
+from walkers.check.crosscheck import compare, crosscheck, full_cases, shortened, simulate
 from walkers.check.engine import TERMS, SecondEngine
 from walkers.check.scenes import (
     DRY,
@@ -34,6 +34,7 @@ from walkers.check.scenes import (
 from walkers.inputs.boundary import BOTTOM, Flat, Round, Wall
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
+from walkers.inputs.errors import InputError
 from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped
 from walkers.physics.bridge import Surfaces
 from walkers.physics.contact import hertz_overlap, reduced_modulus
@@ -373,3 +374,10 @@ def test_liquid_is_conserved(bench: Bench, ranks: int) -> None:
     assert formed > len(held) + 30
     assert np.min(expected) < 0.5
     assert np.max(expected) > 1.0
+
+
+def test_the_second_engine_refuses_conserved_liquid(tmp_path: Path) -> None:
+    case = load_case("pile-ci", {"liquid.conserved": True})
+    with pytest.raises(InputError, match=r"pile-ci: liquid\.conserved = true: expected false"):
+        crosscheck(case, tmp_path)
+    assert not any(tmp_path.iterdir())

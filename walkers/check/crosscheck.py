@@ -22,7 +22,8 @@ from walkers.check.kernels import FloatArray
 from walkers.check.report import Chapter, Line, Verdict
 from walkers.handles import Run
 from walkers.inputs.case import Case
-from walkers.inputs.errors import InputError, Problem
+from walkers.inputs.errors import unusable
+from walkers.inputs.messages import blaming
 from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped, with_changes
 from walkers.inputs.text import rendered
 from walkers.pipeline import run
@@ -103,10 +104,8 @@ def crosscheck(
     []
     """
     if case.liquid.conserved:
-        problem = Problem(
-            "liquid.conserved", "true", "expected false: the bridges of the second engine do not share liquid"
-        )
-        raise InputError(case.name, [problem])
+        with blaming(case.name, case.document):
+            raise unusable("liquid.conserved", "expected false: the bridges of the second engine do not share liquid")
     cases = [with_changes(case, {"run.seed": case.seed + number} if number else {}) for number in range(seeds)]
     return compare([make(one, out).motion for one in cases], without)
 

@@ -202,7 +202,7 @@ def describe(summary: dict[str, Any]) -> str:
     """The summary as text."""
     beads, drive, dimer = summary["beads"], summary["drive"], summary.get("dimer")
     ratio = beads["stiffness_ratio"]
-    factor = f"{float(f'{1 / ratio:.2g}'):,.0f}" if ratio and ratio < 1 else ""
+    factor = _two_digits(1.0 / ratio) if ratio and ratio < 1 else ""
     softened = f"; Young's modulus of the beads reduced by a factor of {factor}" if factor else ""
     lines = [
         *_text_of_case(summary["case"]),
