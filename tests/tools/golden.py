@@ -1,0 +1,187 @@
+"""Golden numbers: what shipped cases and sweeps compute, to compare before and after a change of the program.
+
+    python tests/tools/golden.py compare            # everything; exit status 1 and a list if anything differs
+    python tests/tools/golden.py compare decks      # one part: decks, runs or commands
+    python tests/tools/golden.py freeze [PART ...]  # write the golden numbers anew, after a change that is meant
+
+``decks``: what determines the run of each point of each shipped case and sweep, and of up to 25 points a sweep the
+deck's text, its tables and its layout. ``runs``: each column of each table (bytes) and each number of the result of a
+dozen finished runs. ``commands``: what commands print as JSON about these runs, about sweeps, and the comparison with
+the paper. Runs are kept in ``runs/golden``; ``compare`` makes them anew.
+
+Digests of tables are those of one machine's arithmetic: freeze on the machine that compares.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from walkers import load_case, run
+from walkers.inputs.case import Case
+from walkers.inputs.reading import shipped
+from walkers.inputs.sweep import load_sweep
+from walkers.templates.deck import render_deck, whole
+
+ROOT = Path(__file__).resolve().parents[2]
+GOLDEN = Path(__file__).with_name("golden.json")
+OUT = ROOT / "runs" / "golden"
+POINTS = 25
+"""Largest number of points of a sweep whose decks are rendered."""
+RUNS: dict[str, tuple[str, dict[str, Any]]] = {
+    **{name: (name, {}) for name in ("fig1b", "fig4a", "fig4b", "symmetric", "climber", "climber-dimer", "cluster")},
+    "tray": ("tray", {}),
+    "pile-ci": ("pile-ci", {}),
+    "slope": ("fig1b", {"boundary.tilt": "20 deg", "run.cycles": 24, "run.settling_cycles": 8}),
+    "groove": ("fig1b", {"boundary.shape": "groove", "boundary.opening": "120 deg", "dimers.replicates": 2}),
+    "two-tones": ("fig4a", {"drive.waveform": "triangle", "run.cycles": 24, "run.settling_cycles": 8}),
+}
+COMMANDS = (
+    ("sweep", "fig4"),
+    ("sweep", "zoo-corner"),
+    ("list", "fig4", "--json"),
+    ("list", "zoo-corner", "--json"),
+    ("compare", "fig4a", "fig4b", "--json"),
+    ("compare", "pile-ci", "--set", "run.seed=2", "--json"),
+    ("climb", "pile-ci", "--json"),
+    ("show", "fig1b", "--theory", "--json"),
+    ("show", "fig4b", "--theory", "--json"),
+    ("show", "pile-ci", "--json"),
+    ("show", "climber", "--json"),
+    ("paper", "figures", "--only", "comparison", "--to", str(OUT / "figures")),
+)
+"""Commands without ``--json`` only make what the later ones print."""
+VOLATILE = {"seconds", "age", "size", "directory", "run", "forecast", "predicted_seconds", "path", "wall_time"}
+"""Keys of printed JSON that say where and how fast."""
+
+
+def digest(content: str | bytes) -> str:
+    """A short digest of a text or of bytes."""
+    return hashlib.sha256(content if isinstance(content, bytes) else content.encode()).hexdigest()[:16]
+
+
+def _cases(sweep: str) -> Iterator[tuple[str, Case, bool]]:
+    """Name and case of each point, and whether its deck is rendered."""
+    points = load_sweep(sweep)
+    every = max(1, len(points.rows) // POINTS)
+    for number, case in enumerate(points.cases()):
+        yield f"{sweep}/{number}", case, number % every == 0
+
+
+def _of_deck(case: Case) -> list[str]:
+    """Digests of deck, tables and layout of the first segment and of the whole run."""
+    decks = [render_deck(case), render_deck(case, whole(case))]
+    return [
+        digest("".join(deck.text for deck in decks)),
+        digest("".join(f"{name}\n{text}" for deck in decks for name, text in deck.files.items())),
+        digest("".join(json.dumps(deck.layout.as_dict(), sort_keys=True) for deck in decks)),
+    ]
+
+
+def of_points(name: str) -> dict[str, list[str]]:
+    """Digests of the points of a shipped case or sweep."""
+    points = [(name, load_case(name), True)] if name in shipped("case") else _cases(name)
+    return {
+        key: [digest(json.dumps(case.determinants(), sort_keys=True)), *(_of_deck(case) if rendered else [])]
+        for key, case, rendered in points
+    }
+
+
+def decks() -> dict[str, Any]:
+    """Part ``decks``."""
+    with ProcessPoolExecutor(2) as pool:
+        parts = pool.map(of_points, [*shipped("case"), *shipped("sweep")])
+        return {key: digests for part in parts for key, digests in part.items()}
+
+
+def runs() -> dict[str, Any]:
+    """Part ``runs``."""
+    digests: dict[str, Any] = {}
+    for name, (case, changes) in RUNS.items():
+        place = run(load_case(case, changes), OUT).directory
+        for path in sorted(place.glob("*.parquet")):
+            table = pd.read_parquet(path)
+            digests |= {f"{name}/{path.stem}/{column}": _of_column(table[column]) for column in table}
+        result = json.loads((place / "result.json").read_text("utf-8"))
+        digests |= {f"{name}/result/{key}": value for key, value in leaves(result)}
+    return digests
+
+
+def _of_column(column: pd.Series) -> str:
+    values = column.to_numpy()
+    return digest("\n".join(map(repr, values.tolist())) if values.dtype == object else values.tobytes())
+
+
+def commands() -> dict[str, Any]:
+    """Part ``commands``."""
+    for case, changes in RUNS.values():
+        run(load_case(case, changes), OUT)
+    run(load_case("pile-ci", {"run.seed": 2}), OUT)
+    printed: dict[str, Any] = {}
+    for words in COMMANDS:
+        program = [str(Path(sys.executable).with_name("walkers")), *words, "--out", str(OUT)]
+        done = subprocess.run(program, capture_output=True, text=True, cwd=ROOT, check=False)
+        if done.returncode:
+            raise SystemExit(f"walkers {' '.join(words)}: status {done.returncode}\n{done.stderr}")
+        if words[-1] == "--json":
+            printed |= {f"{' '.join(words[:-1])}: {key}": value for key, value in leaves(json.loads(done.stdout))}
+    compared = json.loads((OUT / "figures" / "comparison.json").read_text("utf-8"))
+    return printed | {f"comparison: {key}": value for key, value in leaves(compared)}
+
+
+def leaves(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
+    """The values of nested JSON by dotted key, without those that say where and how fast."""
+    if isinstance(value, Mapping):
+        for name, part in value.items():
+            if name not in VOLATILE:
+                yield from leaves(part, f"{key}.{name}" if key else name)
+    elif isinstance(value, list):
+        for number, part in enumerate(value):
+            yield from leaves(part, f"{key}[{number}]")
+    else:
+        yield key, value
+
+
+PARTS = {"decks": decks, "runs": runs, "commands": commands}
+
+
+def differences(golden: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+    """What differs, a line each."""
+    gone = [f"gone: {key}" for key in golden if key not in now]
+    new = [f"new: {key}" for key in now if key not in golden]
+    changed = [f"{key}: {golden[key]} -> {now[key]}" for key in golden if key in now and golden[key] != now[key]]
+    return gone + new + changed
+
+
+def main(action: str, *names: str) -> int:
+    """Freeze or compare."""
+    golden = json.loads(GOLDEN.read_text("utf-8")) if GOLDEN.exists() else {}
+    chosen = names or tuple(PARTS)
+    if {"runs", "commands"} & set(chosen):
+        shutil.rmtree(OUT, ignore_errors=True)
+    status = 0
+    for name in chosen:
+        now = json.loads(json.dumps(PARTS[name]()))
+        if action == "freeze":
+            golden[name] = now
+            GOLDEN.write_text(json.dumps(golden, indent=0, sort_keys=True) + "\n", "utf-8")
+            print(f"{name}: {len(now)} values frozen")
+        elif different := differences(golden[name], now):
+            status = 1
+            print(f"{name}: {len(different)} of {len(golden[name])} values differ", *different, sep="\n  ")
+        else:
+            print(f"{name}: all {len(now)} values are the same")
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))
