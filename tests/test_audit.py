@@ -231,7 +231,7 @@ def test_a_quick_audit_does_not_displace_a_full_one(own_cache: Path) -> None:
 
 def test_a_damaged_record_is_no_record(own_cache: Path) -> None:
     write_audit(AuditRecord("e" * 64, "m", "3.8.0", "full", 90, (), 0, "2026-01-01T00:00:00Z"))
-    (path,) = own_cache.rglob("*.json")
+    (path,) = own_cache.rglob("audits/*.json")
     for contents in ("", "{", "[]", '{"engine": 1}'):
         path.write_text(contents)
         assert read_audit("e" * 64, "m") is None
