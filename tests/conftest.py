@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
-from platformdirs import user_cache_path
 from tomli_w import dumps as to_toml
 
 from walkers import run as run_case
 from walkers.archive.writing import write_archive
+from walkers.cache import make_cache_folder
 from walkers.inputs.axes import is_axis
 from walkers.inputs.case import Case
 from walkers.inputs.changes import flatten
@@ -65,11 +65,12 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 os.environ["OMPI_MCA_mpi_yield_when_idle"] = "1"  # noqa: SIM112
 # The user's cache is not ours to read or write, for audits of the engine are kept there; but for what is named by all
 # that it depends on: solutions of an equation, half a second each, and the compiled contact model, which takes four.
-_KEPT = user_cache_path("granular-walkers", ensure_exists=True)
-(_KEPT / "young-laplace").mkdir(exist_ok=True)
+_KEPT = make_cache_folder("young-laplace").parent
 os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="walkers-tests-")
-for _kept in (_KEPT / "young-laplace", *_KEPT.glob("bridge-*.so")):
-    user_cache_path("granular-walkers", ensure_exists=True).joinpath(_kept.name).symlink_to(_kept)
+_OURS = make_cache_folder()
+(_OURS / "young-laplace").symlink_to(_KEPT / "young-laplace")
+for _kept in _KEPT.glob("bridge-*"):  # a copy: a link to it is not loaded
+    shutil.copy(_kept, _OURS)
 
 T = TypeVar("T")
 PROGRAM = str(Path(sys.executable).with_name("walkers"))

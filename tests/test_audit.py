@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.conftest import SHORT, call, make_case
+from tests.conftest import SHORT, call, document, make_case, to_toml
 from walkers import Run
 from walkers import run as run_case
 from walkers.check.audit import CHECKS, AuditReport, record, run_audit, selected
-from walkers.check.report import Line, Verdict, count
+from walkers.check.report import Chapter, Line, Verdict, count
 from walkers.check.scenes import SCENES, Bench, full_case, in_walls, law, prescribed, second_engine, standing
 from walkers.inputs.errors import InputError
 from walkers.physics.bridge import Surfaces
@@ -45,7 +45,8 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     kept = binary.plugin_of(find_engine())
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "cache" / "granular-walkers").mkdir(parents=True)
-    shutil.copy(kept, tmp_path / "cache" / "granular-walkers")
+    for part in (kept, kept.with_suffix(".json")):
+        shutil.copy(part, tmp_path / "cache" / "granular-walkers")
     return tmp_path
 
 
@@ -105,11 +106,7 @@ def test_a_wrong_contact_model_is_found(wrong: str, own_cache: Path, monkeypatch
     assert text.count(right) == 1
     (sources / "bridge.cpp").write_text(text.replace(right, other))
     monkeypatch.setattr(binary, "SOURCES", sources)
-    binary._identity.cache_clear()
-    try:
-        report = run_audit(["scenes"])
-    finally:
-        binary._identity.cache_clear()
+    report = run_audit(["scenes"])
     assert count(report.chapters, Verdict.FAIL)
     assert not count(report.chapters, Verdict.ERROR)
 
@@ -174,7 +171,11 @@ def test_runs_name_the_audit_of_their_engine(own_cache: Path) -> None:
 def test_a_binary_that_failed_is_refused_unless_told_otherwise(own_cache: Path) -> None:
     engine = find_engine()
     write_audit(
-        AuditRecord(engine.sha256, "LIGGGHTS-PUBLIC 3.8.0", "full", 80, ("Hertz force",), 0, "2026-01-01T00:00:00Z")
+        AuditRecord(
+            engine.sha256,
+            binary.model_sha256(engine) or "",
+            *("LIGGGHTS-PUBLIC 3.8.0", "full", 80, ("Hertz force",), 0, "2026-01-01T00:00:00Z"),
+        )
     )
     case = make_case(run=SHORT)
     with pytest.raises(AuditFailed, match="Hertz force"):
@@ -185,27 +186,55 @@ def test_a_binary_that_failed_is_refused_unless_told_otherwise(own_cache: Path) 
     assert not audit["passed"]
 
 
+def test_a_check_that_failed_is_recorded_as_failed(own_cache: Path, tmp_path: Path) -> None:
+    """`walkers run` refuses the engine, and says which check failed."""
+    engine = find_engine()
+    lines = (Line("right", 1.0, 1.0, 0.1), Line("Hertz force", 1.0, 2.0, 0.1))
+    report = AuditReport(engine, binary.model_sha256(engine) or "", "3.8.0", (Chapter("stock", "", lines),))
+    kept = record(report, quick=True)
+    assert kept is not None
+    assert kept.failures == ("Hertz force",)
+    assert not kept.passed
+    (tmp_path / "case.toml").write_text(to_toml(document(run=SHORT)))
+    done = call("run", "case.toml", folder=tmp_path)
+    assert done.returncode == 1
+    assert "this engine failed its audit in 1 line(s), first: Hertz force" in done.stderr
+    assert not (tmp_path / "runs").exists()
+
+
+def test_a_run_with_another_contact_model_than_the_audited_is_not_audited(own_cache: Path) -> None:
+    case, engine = make_case(run=SHORT), find_engine()
+    write_audit(AuditRecord(engine.sha256, "0" * 64, "3.8.0", "full", 80, (), 0, "2026-01-01T00:00:00Z"))
+    with pytest.warns(UnauditedEngineWarning, match="never audited with its contact model"):
+        run = run_case(case, own_cache / "a")
+    assert _audit_of(run) is None
+    report = replace(run_audit(["stock"]), chapters=())
+    assert report.contact_model == FinishedRun(run.directory).manifest["contact_model"]["sha256"]
+    record(report, quick=False)
+    assert _audit_of(run_case(case, own_cache / "b")) is not None
+
+
 def test_a_quick_audit_does_not_displace_a_full_one(own_cache: Path) -> None:
-    full = AuditRecord("f" * 64, "3.8.0", "full", 90, (), 0, "2026-01-01T00:00:00Z")
+    full = AuditRecord("f" * 64, "m", "3.8.0", "full", 90, (), 0, "2026-01-01T00:00:00Z")
     failed = replace(full, failures=("something",))
     write_audit(full)
     write_audit(replace(full, scope="quick", lines=70))
-    assert read_audit("f" * 64) == full
+    assert read_audit("f" * 64, "m") == full
     write_audit(replace(failed, scope="quick"))
-    assert read_audit("f" * 64) == replace(failed, scope="quick")
+    assert read_audit("f" * 64, "m") == replace(failed, scope="quick")
     write_audit(full)
-    assert read_audit("f" * 64) == full
+    assert read_audit("f" * 64, "m") == full
     write_audit(failed)
     write_audit(replace(full, scope="quick"))
-    assert read_audit("f" * 64) == failed, "what only a full audit measures is not mended by a quick one"
+    assert read_audit("f" * 64, "m") == failed, "what only a full audit measures is not mended by a quick one"
 
 
 def test_a_damaged_record_is_no_record(own_cache: Path) -> None:
-    write_audit(AuditRecord("e" * 64, "3.8.0", "full", 90, (), 0, "2026-01-01T00:00:00Z"))
-    (path,) = own_cache.rglob("*.json")
+    write_audit(AuditRecord("e" * 64, "m", "3.8.0", "full", 90, (), 0, "2026-01-01T00:00:00Z"))
+    (path,) = own_cache.rglob("audits/*.json")
     for contents in ("", "{", "[]", '{"engine": 1}'):
         path.write_text(contents)
-        assert read_audit("e" * 64) is None
+        assert read_audit("e" * 64, "m") is None
 
 
 def test_without_mpirun_the_ranks_are_skipped_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:

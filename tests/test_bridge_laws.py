@@ -159,7 +159,7 @@ def test_resistances_vanish_with_the_bridge() -> None:
 
 def test_what_was_solved_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A bridge of one shape is solved once, and again if what was kept is damaged or cannot be kept."""
-    monkeypatch.setattr(young_laplace, "user_cache_path", lambda _: tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     solve, solved = young_laplace._solve, []
     monkeypatch.setattr(young_laplace, "_solve", lambda shape: solved.append(shape) or solve(shape))
 
@@ -170,12 +170,25 @@ def test_what_was_solved_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     first = pull(0.0123)
     assert pull(0.0123) == first
     assert len(solved) == 1
-    (kept,) = (tmp_path / "young-laplace").iterdir()
-    kept.write_bytes(kept.read_bytes()[:100])
+    folder = tmp_path / "granular-walkers" / "young-laplace"
+    (kept,) = folder.iterdir()
+    right, other = kept.read_bytes(), folder / "other"
+    numbers = np.frombuffer(right[32:])
+    damages = [right[:100], b"", b"text", right[:32] + (2.0 * numbers).tobytes()]
+    for save, values in [(np.save, 2.0 * numbers), (np.save, 1.0), (np.save, np.ones((2, 3))), (np.savez, numbers)]:
+        with other.open("wb") as file:
+            save(file, values)
+        damages.append(other.read_bytes())
+    for number, damage in enumerate(damages, 2):
+        kept.write_bytes(damage)
+        assert pull(0.0123) == first
+        assert len(solved) == number
+    pull(0.0124)
+    (another,) = set(folder.iterdir()) - {kept, other}
+    kept.write_bytes(another.read_bytes())  # the solution of another bridge
     assert pull(0.0123) == first
-    assert len(solved) == 2
-    shutil.rmtree(tmp_path / "young-laplace")
-    (tmp_path / "young-laplace").write_text("no folder")
+    shutil.rmtree(folder)
+    folder.write_text("no folder")
     assert pull(0.0123) == first
 
 

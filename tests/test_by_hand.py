@@ -143,6 +143,17 @@ def test_a_run_by_hand_that_failed_is_told_in_one_message(name: str, folder: Pat
     assert not (folder / "manifest.json").exists()
 
 
+def test_a_run_by_hand_whose_log_was_emptied_or_cut_is_refused(folder: Path) -> None:
+    _run(folder)
+    log = folder / "engine.log"
+    whole = log.read_text()
+    for contents in ("", whole[: whole.index("Loop time")]):
+        log.write_text(contents)
+        with pytest.raises(InputError, match=r"engine\.log is not the whole output of an engine"):
+            take_in(folder)
+        assert not (folder / "manifest.json").exists()
+
+
 def test_an_amplitude_with_which_beads_would_start_unlike_the_walls_is_refused(tmp_path: Path) -> None:
     folder = write_folder(make_case(run=SHORT, drive={"frame": "lab"}), tmp_path / "hand").parent
     _edit(folder, amplitude="1.2e-4")

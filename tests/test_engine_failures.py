@@ -8,9 +8,10 @@ import re
 import shutil
 import signal
 import subprocess
+import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
@@ -39,12 +40,13 @@ from tests.conftest import (
 from walkers import run as run_case
 from walkers.inputs.case import Case
 from walkers.inputs.reading import read_toml, resolve_case, shipped
-from walkers.runner import failures
+from walkers.runner import binary, failures
 from walkers.runner.binary import find_engine, plugin_of
 from walkers.runner.directory import write_deck
 from walkers.runner.failures import EngineNeverStarted
-from walkers.runner.launch import launch, postponed_interrupts
-from walkers.templates.deck import Deck, Segment, render_deck
+from walkers.runner.files import beside
+from walkers.runner.launch import _off_the_network, judge, launch, postponed_interrupts
+from walkers.templates.deck import Deck, Segment, render_deck, whole
 from walkers.templates.engine import ALONE
 
 Front = Callable[[str], str]
@@ -99,6 +101,115 @@ def test_a_contact_model_that_cannot_be_compiled_is_told(tmp_path: Path, monkeyp
     with pytest.raises(failures.ContactModelMissing, match=r"the compiler says: .*no such thing"):
         plugin_of(find_engine())
     assert not list((tmp_path / "cache").rglob("*.so"))
+
+
+@pytest.fixture
+def model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The contact model in a cache of the test's own."""
+    compiled, folder = plugin_of(find_engine()), tmp_path / "cache" / "granular-walkers"
+    folder.mkdir(parents=True, mode=0o700)
+    for part in (compiled, compiled.with_suffix(".json")):
+        shutil.copy(part, folder)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder.parent))
+    return folder / compiled.name
+
+
+def _grown(model: Path) -> None:
+    with model.open("ab") as file:
+        file.write(b"planted")
+
+
+def _linked(model: Path) -> None:
+    model.symlink_to(model.rename(model.with_name("other.so")))
+
+
+def _of_another_user(model: Path) -> None:
+    if os.geteuid():
+        pytest.skip("only root can give files away")
+    os.chown(model, 12345, 12345)
+
+
+def _unlike_its_name(model: Path) -> None:
+    record = model.with_suffix(".json")
+    record.write_text(json.dumps({**json.loads(record.read_text()), "compiled_from": "0" * 64}))
+
+
+UNTRUSTED: dict[str, Callable[[Path], object]] = {
+    "planted": _grown,
+    "cut": lambda model: os.truncate(model, 5000),
+    "empty": lambda model: os.truncate(model, 0),
+    "a symbolic link": _linked,
+    "of another user": _of_another_user,
+    "writable by others": lambda model: model.chmod(0o777),
+    "writable by the group": lambda model: model.chmod(0o775),
+    "without a checksum": lambda model: model.with_suffix(".json").unlink(),
+    "a checksum that others can write": lambda model: model.with_suffix(".json").chmod(0o666),
+    "compiled from something else": _unlike_its_name,
+    "in a folder that others can write": lambda model: model.parent.chmod(0o777),
+}
+
+
+@pytest.mark.parametrize("name", UNTRUSTED)
+def test_a_contact_model_that_may_not_be_the_compiled_is_compiled_anew(
+    name: str, model: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    right = model.read_bytes()
+    assert plugin_of(find_engine()) == model
+    before = model.stat().st_ino
+    assert plugin_of(find_engine()) == model
+    assert model.stat().st_ino == before, "what is right is not compiled again"
+    UNTRUSTED[name](model)
+    assert plugin_of(find_engine()) == model
+    assert model.read_bytes() == right
+    assert model.lstat().st_ino != before
+    about = model.lstat()
+    assert (about.st_uid, about.st_mode & 0o022, model.parent.stat().st_mode & 0o022) == (os.geteuid(), 0, 0)
+
+
+def test_the_cache_of_another_user_is_refused(model: Path) -> None:
+    if os.geteuid():
+        pytest.skip("only root can give files away")
+    os.chown(model.parent, 12345, 12345)
+    with pytest.raises(failures.ContactModelMissing, match=r"belongs to another user.*set XDG_CACHE_HOME"):
+        plugin_of(find_engine())
+
+
+def test_a_cache_that_cannot_be_used_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without one, without a home of a user whom the system does not know."""
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    with pytest.raises(failures.ContactModelMissing, match=r"cannot be written .*set XDG_CACHE_HOME"):
+        plugin_of(find_engine())
+    if os.geteuid():
+        pytest.skip("only root can become another user")
+    with subprocess.Popen([sys.executable, "-c", NOBODY], stdout=subprocess.PIPE, text=True) as program:
+        told, _ = program.communicate()
+    assert re.search("cannot be written .*set XDG_CACHE_HOME", told)
+
+
+NOBODY = """
+import os
+from walkers.runner.binary import find_engine, plugin_of
+from walkers.runner.failures import ContactModelMissing
+for name in ("HOME", "XDG_CACHE_HOME"):
+    os.environ.pop(name, None)
+os.setuid(12345)
+try:
+    plugin_of(find_engine())
+except ContactModelMissing as failure:
+    print(failure)
+"""
+
+
+def test_another_source_of_the_model_is_another_engine_within_a_session(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(binary.SOURCES, tmp_path / "engine")
+    monkeypatch.setattr(binary, "SOURCES", tmp_path / "engine")
+    before = find_engine()
+    with (tmp_path / "engine" / "bridge.cpp").open("a") as file:
+        file.write("// another line\n")
+    assert find_engine() != before
 
 
 # --- decks and engines that fail --------------------------------------------------------------------------------------
@@ -305,6 +416,66 @@ def test_variables_of_open_mpi_that_a_user_has_set_do_not_matter(
         monkeypatch.setenv(*f"OMPI_MCA_{name}".split("="))
     for case in (_brief_pile(ranks=2), make_case(run=SHORT)):
         assert not run_case(case, tmp_path, time_limit=PATIENCE).cached
+
+
+def _path_without(programs: Collection[str], folder: Path) -> str:
+    """A PATH with all programs but some."""
+    folder.mkdir()
+    for place in os.environ["PATH"].split(":"):
+        for path in Path(place).glob("*"):
+            if path.name not in programs and not (folder / path.name).is_symlink():
+                (folder / path.name).symlink_to(path)
+    return str(folder)
+
+
+def test_ranks_need_mpirun_but_neither_ssh_nor_unshare(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in containers; without `unshare` it is said that mpirun listens on the network."""
+    monkeypatch.setenv("PATH", _path_without(("ssh", "rsh", "unshare"), tmp_path / "bin"))
+    _off_the_network.cache_clear()
+    try:
+        with pytest.warns(UserWarning, match="listens on all networks"):
+            assert not run_case(_brief_pile(ranks=2), tmp_path / "runs", time_limit=PATIENCE).cached
+    finally:
+        _off_the_network.cache_clear()
+    (tmp_path / "bin" / "mpirun").unlink()
+    with pytest.raises(EngineNeverStarted, match=r"run\.ranks = 2 needs mpirun: apt-get install openmpi-bin"):
+        run_case(_brief_pile(ranks=2), tmp_path / "other")
+
+
+def test_a_library_to_preload_that_does_not_exist_does_not_matter(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LD_PRELOAD", "/no/such/library.so")
+    assert not run_case(make_case(run=SHORT), tmp_path).cached
+
+
+def test_a_script_of_a_run_starts_the_engine_that_ran(front: Front, tmp_path: Path) -> None:
+    engine = front('exec liggghts "$@"')
+    run = run_case(make_case(run=SHORT), tmp_path / "runs", engine=engine)
+    assert f" {engine} -in " in next(run.directory.rglob("run.sh")).read_text()
+
+
+def test_a_step_that_is_printed_twice_is_no_division_by_zero(tmp_path: Path) -> None:
+    deck = render_deck(make_case(run=SHORT), whole(make_case(run=SHORT)))
+    atoms, log = deck.layout.atoms, tmp_path / "engine.log"
+    lines = [f" 100 {count} 0.01 -1e-3 1e-3 -1e-3 1e-3 0 1e-3" for count in (atoms, atoms - 1)]
+    log.write_text("\n".join(["LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0, x)", *lines, ""]))
+    with pytest.raises((failures.BlowUp, failures.BeadsLost)):
+        judge(deck, tmp_path, log)
+
+
+def test_a_file_can_be_written_by_many_threads_at_once(tmp_path: Path) -> None:
+    barrier = threading.Barrier(2)
+
+    def write(text: str) -> None:
+        with beside(tmp_path / "file") as new:
+            new.write_text(text)
+            barrier.wait(PATIENCE)
+
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(write, ("a", "b")))
+    assert (tmp_path / "file").read_text() in ("a", "b")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_an_interrupt_while_the_engine_is_being_started_comes_after() -> None:

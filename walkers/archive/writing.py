@@ -19,8 +19,8 @@ from walkers.inputs.errors import WalkersError, refused
 from walkers.inputs.extras import require
 from walkers.postprocess.report.page import fill
 from walkers.runner.directory import CASE_NAME, FinishedRun, name_of
-from walkers.runner.files import beside, json_bytes
-from walkers.runner.manifest import MANIFEST_NAME, checksum
+from walkers.runner.files import beside, checksum, json_bytes
+from walkers.runner.manifest import MANIFEST_NAME
 from walkers.sweeps.table import RECORD_NAME, SweepRecord, read_record, states
 
 _STORED = ("/", ".parquet", ".png", ".mp4")

@@ -14,14 +14,15 @@ from walkers.check.report import Chapter, Line, Verdict, as_dict, count, outcome
 from walkers.check.scenes import CHECKS, LONG, Bench
 from walkers.inputs.errors import refused
 from walkers.inputs.library import expected_of
-from walkers.runner.binary import AuditRecord, Engine, find_engine, write_audit
+from walkers.runner.binary import AuditRecord, Engine, find_engine, model_sha256, write_audit
 
 
 @dataclass(frozen=True)
 class AuditReport:
-    """Results of an audit."""
+    """Results of an audit; ``contact_model`` is its SHA-256, empty without one."""
 
     engine: Engine
+    contact_model: str
     version: str
     chapters: tuple[Chapter, ...]
 
@@ -57,6 +58,7 @@ def run_audit(
 ) -> AuditReport:
     """Run some of the `CHECKS` on an engine, the installed one if None is given; ``on_done`` is called after each."""
     binary = engine or find_engine()
+    model = model_sha256(binary) or ""
     with tempfile.TemporaryDirectory(prefix="walkers-audit-") as folder:
         bench = Bench(binary, Path(folder))
 
@@ -78,7 +80,7 @@ def run_audit(
         finally:
             bench.stop.set()
             pool.shutdown(cancel_futures=True)
-        return AuditReport(binary, bench.version, chapters)
+        return AuditReport(binary, model, bench.version, chapters)
 
 
 def record(report: AuditReport, *, quick: bool) -> AuditRecord | None:
@@ -90,6 +92,7 @@ def record(report: AuditReport, *, quick: bool) -> AuditRecord | None:
         return None
     kept = AuditRecord(
         engine=report.engine.sha256,
+        contact_model=report.contact_model,
         version=report.version,
         scope="quick" if quick else "full",
         lines=sum(len(chapter.lines) for chapter in report.chapters),

@@ -2,7 +2,8 @@
 
 The contact model is a shared library. It is compiled on first use and kept in the user's cache, as are the records of
 audits. It is compiled with the headers and the library of this machine, since its binary interface must match the
-installed package, and only for the engine version that it was written for.
+installed package, and only for the engine version that it was written for. The engine executes it as the user:
+therefore nobody else but root may write it, and its checksum is kept beside it.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import os
 import re
 import shlex
 import shutil
+import stat
 import subprocess
 import tempfile
 from collections.abc import Mapping
@@ -23,10 +25,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from platformdirs import user_cache_path
-
+from walkers.cache import cache_folder, make_cache_folder
 from walkers.runner.failures import ContactModelMissing, EngineFailure, EngineMissing, OtherEngine
-from walkers.runner.files import read_json, write_json
+from walkers.runner.files import checksum, read_json, write_json
 from walkers.templates.deck import DECK_NAME, OUTPUT_NAME
 from walkers.templates.engine import AUDITED_VERSION
 
@@ -71,21 +72,21 @@ def find_engine(wanted: str | None = None) -> Engine:
     if found is None:
         text = "is not an executable file on this machine; install it with: sudo apt-get install liggghts"
         raise EngineMissing(f"no engine: {name} {text}")
-    path = Path(found).resolve()
-    return Engine(path, _identity(path, path.stat().st_mtime_ns))
+    path, digest = Path(found).resolve(), hashlib.sha256()
+    for part in [*_parts_of(path, path.stat().st_mtime_ns), *(SOURCES / name for name in _MODEL)]:
+        about = part.stat()
+        own = _sha256(part, about.st_mtime_ns, about.st_size)
+        digest.update(bytes.fromhex(_SAME_FORCES.get(own[:16], own)))
+    return Engine(path, digest.hexdigest())
+
+
+@lru_cache(maxsize=64)
+def _sha256(path: Path, _modified: int, _size: int) -> str:
+    return checksum(path)
 
 
 @lru_cache(maxsize=8)
-def _identity(path: Path, _modified: int) -> str:
-    digest = hashlib.sha256()
-    for part in [*_parts_of(path), *(SOURCES / name for name in _MODEL)]:
-        with part.open("rb") as file:
-            own = hashlib.file_digest(file, "sha256").hexdigest()
-            digest.update(bytes.fromhex(_SAME_FORCES.get(own[:16], own)))
-    return digest.hexdigest()
-
-
-def _parts_of(path: Path) -> tuple[Path, ...]:
+def _parts_of(path: Path, _modified: int) -> tuple[Path, ...]:
     """An executable and the ``libliggghts`` that it loads (Debian's executable is only a launcher of 18 kB)."""
     listing = subprocess.run(["ldd", str(path)], capture_output=True, text=True, errors="replace", check=False).stdout
     return path, *(Path(match) for match in _LIBRARY.findall(listing))
@@ -106,31 +107,82 @@ def plugin_of(engine: Engine) -> Path:
     Raises `OtherEngine` if the model was written for another version of the engine, and `ContactModelMissing` if it
     cannot be compiled.
     """
+    place, fingerprint = _place()
+    if set(str(place)) & set(": "):
+        raise ContactModelMissing(f"{place} has a space or a colon, which the system's loader takes for a separator")
+    _check_version(engine)
+    try:
+        _secure(place.parent)
+        if not _is_as_compiled(place, fingerprint):
+            _compile(place, fingerprint)
+    except OSError as error:
+        why = f"{place} cannot be written ({error.strerror}); set XDG_CACHE_HOME to a folder in which files can be"
+        raise ContactModelMissing(why) from error
+    return place
+
+
+def model_sha256(engine: Engine) -> str | None:
+    """SHA-256 of the contact model for an engine, compiled on first use; None if `plugin_of` fails."""
+    with suppress(EngineFailure):
+        return checksum(plugin_of(engine))
+    return None
+
+
+def _place() -> tuple[Path, str]:
+    """Path of the compiled model, and SHA-256 of options, sources and library from which it is compiled."""
     fingerprint = hashlib.sha256("\0".join(_OPTIONS).encode())
     for name in _MODEL:
         fingerprint.update((SOURCES / name).read_bytes())
     for library in sorted(Path("/usr/lib").glob("*/libliggghts.so.3")):  # another file after an upgrade
         fingerprint.update(f"{library.resolve()} {library.stat().st_mtime_ns} {library.stat().st_size}".encode())
-    place = user_cache_path("granular-walkers") / f"bridge-{fingerprint.hexdigest()[:16]}.so"
-    if set(str(place)) & set(": "):
-        raise ContactModelMissing(f"{place} has a space or a colon, which the system's loader takes for a separator")
-    _check_version(engine)
-    if not place.is_file():
-        _compile(place)
-    return place
+    return cache_folder() / f"bridge-{fingerprint.hexdigest()[:16]}.so", fingerprint.hexdigest()
+
+
+def _is_safe(path: Path) -> bool:
+    """Whether only the user and root can write a file or a folder, which is no symbolic link."""
+    about = path.lstat()
+    ours = about.st_uid in (0, os.geteuid()) and not stat.S_ISLNK(about.st_mode)
+    return ours and not about.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
+def _secure(folder: Path) -> None:
+    """Refuse the cache of another user; close the user's to others, and forget models that they could write."""
+    if not folder.exists() or _is_safe(folder):
+        return
+    if folder.stat().st_uid != os.geteuid():
+        raise ContactModelMissing(
+            f"{folder} belongs to another user, whose code the engine would run; set XDG_CACHE_HOME to a folder of "
+            "your own"
+        )
+    folder.chmod(0o700)
+    for record in folder.glob("bridge-*.json"):
+        record.unlink()
+
+
+def _is_as_compiled(place: Path, fingerprint: str) -> bool:
+    """Whether a compiled model is that of its record, and no other user can write the two."""
+    record = place.with_suffix(".json")
+    with suppress(OSError, ValueError):
+        return all(map(_is_safe, (place, record))) and read_json(record) == _record(place, fingerprint)
+    return False
+
+
+def _record(library: Path, fingerprint: str) -> dict[str, str]:
+    return {"compiled_from": fingerprint, "sha256": checksum(library)}
 
 
 @lru_cache(maxsize=8)
 def _check_version(engine: Engine) -> None:
     """Refuse a binary that contains another version; if it contains none, the banner is checked later."""
-    for part in _parts_of(engine.path):
+    for part in _parts_of(engine.path, engine.path.stat().st_mtime_ns):
         with part.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as contents:
             version = said[0].decode() if (said := _VERSION.search(contents)) else AUDITED_VERSION
         if version != AUDITED_VERSION:
             raise OtherEngine(engine.path, version)
 
 
-def _compile(place: Path) -> None:
+def _compile(place: Path, fingerprint: str) -> None:
+    """Compile the model, and write its checksum and what it was compiled from beside it."""
     compiler, mpi = shutil.which("g++"), shutil.which("mpicxx")
     if compiler is None or mpi is None or not _HEADERS.is_dir():
         raise ContactModelMissing(
@@ -139,26 +191,28 @@ def _compile(place: Path) -> None:
     asked = subprocess.run([mpi, "--showme:incdirs"], capture_output=True, text=True, check=False)
     included = [option for folder in (str(_HEADERS), *asked.stdout.split()) for option in ("-isystem", folder)]
     linked = [f"-Wl,--version-script={SOURCES / 'bridge.map'}", "-Wl,-Bsymbolic", "-l:libliggghts.so.3"]
-    try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=place.parent) as folder:
-            made = Path(folder) / place.name
-            command = [compiler, *_OPTIONS, f"-I{SOURCES}", *included, str(SOURCES / "bridge.cpp"), "-o", str(made)]
-            done = subprocess.run([*command, *linked], capture_output=True, text=True, errors="replace", check=False)
-            if done.returncode:
-                said = next((line for line in done.stderr.splitlines() if "error" in line), "nothing")
-                raise ContactModelMissing(f"the compiler says: {said}")
-            made.replace(place)
-    except OSError as error:
-        raise ContactModelMissing(f"{place} cannot be written ({error})") from error
+    with tempfile.TemporaryDirectory(dir=make_cache_folder()) as folder:
+        made = Path(folder) / place.name
+        command = [compiler, *_OPTIONS, f"-I{SOURCES}", *included, str(SOURCES / "bridge.cpp"), "-o", str(made)]
+        done = subprocess.run([*command, *linked], capture_output=True, text=True, errors="replace", check=False)
+        if done.returncode:
+            said = next((line for line in done.stderr.splitlines() if "error" in line), "nothing")
+            raise ContactModelMissing(f"the compiler says: {said}")
+        made.chmod(0o755)
+        record = Path(folder) / "record.json"
+        write_json(record, _record(made, fingerprint))
+        record.chmod(0o644)
+        made.replace(place)
+        record.replace(place.with_suffix(".json"))
 
 
-def run_script(plugin: Path, ranks: int) -> str:
+def run_script(engine: Engine, plugin: Path, ranks: int) -> str:
     """A shell script that runs a deck by hand: it loads the model into the engine and writes the output to a file."""
     parallel = f"mpirun -n {ranks} " if ranks > 1 else ""
     return (
-        f'# Runs {DECK_NAME} with the contact model "cohesion bridge", which is loaded into liggghts.\n'
-        f"exec {parallel}env LD_PRELOAD={shlex.quote(str(plugin))} liggghts -in {DECK_NAME} > {OUTPUT_NAME}\n"
+        f'# Runs {DECK_NAME} with the contact model "cohesion bridge", which is loaded into the engine.\n'
+        f"exec {parallel}env LD_PRELOAD={shlex.quote(str(plugin))} {shlex.quote(str(engine.path))} -in {DECK_NAME} "
+        f"> {OUTPUT_NAME}\n"
     )
 
 
@@ -177,11 +231,12 @@ def compile_model() -> None:
 class AuditRecord:
     """Outcome of an audit of a binary, identified by its hash (``engine``) and its banner (``version``).
 
-    ``scope`` is ``full`` or ``quick``, ``lines`` the number of checked lines, ``failures`` those that failed,
-    ``skipped`` the number of those that need a missing program.
+    ``contact_model`` is the SHA-256 of the library that it loaded, ``scope`` is ``full`` or ``quick``, ``lines`` the
+    number of checked lines, ``failures`` those that failed, ``skipped`` the number of those that lack a program.
     """
 
     engine: str
+    contact_model: str
     version: str
     scope: str
     lines: int
@@ -200,38 +255,39 @@ class AuditRecord:
 
 
 def _record_of(engine: str, scope: str) -> Path:
-    return user_cache_path("granular-walkers") / "audits" / f"{engine}.{scope}.json"
+    return cache_folder() / "audits" / f"{engine}.{scope}.json"
 
 
-def read_audit(engine: str) -> AuditRecord | None:
+def read_audit(engine: str, model: str | None) -> AuditRecord | None:
     """The record of a binary, by its hash: a failed one if it exists, else the full one, else the quick one.
 
-    None if the binary has no readable record.
+    None if it has no readable record with this contact model (its hash; None: unknown, any).
     """
     known = []
     for scope in ("full", "quick"):
         try:
             values = read_json(_record_of(engine, scope))
-            known.append(AuditRecord(**{**values, "failures": tuple(values["failures"])}))
+            record = AuditRecord(**{**values, "failures": tuple(values["failures"])})
+            known += [record] if model in (None, record.contact_model) else []
         except (OSError, ValueError, KeyError, TypeError):
             continue
     return min(known, key=lambda record: record.passed, default=None)
 
 
-def is_new(engine: str) -> bool:
-    """Whether this is the first call for a binary with this user's cache."""
-    place = _record_of(engine, "seen")
-    with suppress(OSError):  # a cache that cannot be written: it is new each time
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.open("x").close()
-        return True
-    return not place.exists()
+def is_new(engine: str, model: str | None) -> bool:
+    """Whether this is the first call for a binary and a contact model with this user's cache."""
+    try:
+        (make_cache_folder("audits") / f"{engine}.{model}.seen").open("x").close()
+    except FileExistsError:
+        return False
+    except OSError:  # a cache that cannot be written: it is new each time
+        pass
+    return True
 
 
 def write_audit(record: AuditRecord) -> None:
     """Save a record; a full one replaces a quick one. Raises `OSError` if the cache cannot be written."""
-    place = _record_of(record.engine, record.scope)
-    place.parent.mkdir(parents=True, exist_ok=True)
+    place = make_cache_folder("audits") / _record_of(record.engine, record.scope).name
     write_json(place, asdict(record))
     if record.scope == "full":
         _record_of(record.engine, "quick").unlink(missing_ok=True)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
+import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -47,6 +49,12 @@ def write_bytes(path: Path, contents: bytes, *, at_once: bool = True) -> None:
             os.fsync(file.fileno())
 
 
+def checksum(path: Path) -> str:
+    """SHA-256 of a file, hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 def link_or_copy(source: str | Path, to: str | Path) -> None:
     """Link a file to a second place; copy it if the file system has no links."""
     try:
@@ -58,8 +66,8 @@ def link_or_copy(source: str | Path, to: str | Path) -> None:
 @contextmanager
 def beside(path: Path) -> Iterator[Path]:
     """Yield a temporary path beside a file; it is renamed to the file at the end, or removed if the block fails."""
-    # Several processes may write it at once; writers of pictures and films need the suffix.
-    new = path.with_name(f".{path.stem}.{os.getpid()}.new{path.suffix}")
+    # Several processes and threads may write it at once; writers of pictures and films need the suffix.
+    new = path.with_name(f".{path.stem}.{os.getpid()}-{threading.get_ident()}.new{path.suffix}")
     try:
         yield new
         new.replace(path)

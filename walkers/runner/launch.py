@@ -10,6 +10,7 @@ import signal
 import subprocess
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -122,10 +123,12 @@ def launch(
     """
     ranks, temporary = deck.layout.ranks, Path(os.environ.get("TMPDIR", "/tmp"))
     check_room(directory, deck.layout.bead_dump_bytes)
+    if ranks > 1 and shutil.which("mpirun") is None:
+        raise failures.EngineNeverStarted(f"run.ranks = {ranks} needs mpirun: apt-get install openmpi-bin", directory)
     if ranks > 1 and temporary.is_dir():
         check_room(temporary, _TEMPORARY_BYTES)
     plugin = plugin_of(engine)
-    (directory / RUN_NAME).write_text(run_script(plugin, ranks), encoding="utf-8")
+    (directory / RUN_NAME).write_text(run_script(engine, plugin, ranks), encoding="utf-8")
     command = [*_before(ranks), "env", f"LD_PRELOAD={plugin}", str(engine.path), "-log", "none", "-in", DECK_NAME]
     while True:
         starts -= 1
@@ -149,7 +152,10 @@ def judge(deck: Deck, directory: Path, log: Path) -> EngineReport:
     """Check a deck that was run by hand, from its log and dumps; raises the failures of `launch`."""
     watch = _Watch(deck, directory, Path("liggghts"), None)
     watch.log = log
-    return watch.verdict(0)
+    report = watch.verdict(0)
+    if watch.version is None or math.isnan(watch.loop_seconds):
+        raise failures.MissingFrames(f"{log.name} is not the whole output of an engine", directory)
+    return report
 
 
 def check_room(folder: Path, needed: int) -> None:
@@ -184,6 +190,7 @@ def _off_the_network() -> tuple[str, ...]:
         with suppress(OSError, subprocess.CalledProcessError):
             subprocess.run([*prefix, "true"], stdin=subprocess.DEVNULL, capture_output=True, check=True)
             return prefix
+    warnings.warn("mpirun listens on all networks: unshare (util-linux) cannot take them away", stacklevel=2)
     return ()
 
 
@@ -256,7 +263,8 @@ class _Watch:
         # A user's Open MPI settings for a cluster, such as the network, may not work on one machine.
         ours = {name: value for name, value in os.environ.items() if not name.startswith("OMPI_MCA_")}
         environment = {**ours, **(RANKS if self.layout.ranks > 1 else ALONE)}
-        for name in STEP_VARIABLES:
+        # The engine does not get the user's LD_PRELOAD; the system's loader would report it as an ERROR before.
+        for name in (*STEP_VARIABLES, "LD_PRELOAD"):
             environment.pop(name, None)
         process = None
         try:
@@ -330,8 +338,8 @@ class _Watch:
         if self.deck.beyond_limits:
             return self._blow_up(0.0)
         # A bead that has left the box since the last line was at least as fast as this.
-        if clearance is not None and clearance / seconds > fastest:
-            return self._blow_up(clearance / seconds)
+        if clearance is not None and clearance > fastest * seconds:
+            return self._blow_up(clearance / seconds if seconds else math.inf)
         sentence = (
             f"{lost} bead(s) left the simulation box before step {step}: walkers left its sides (increase their "
             "spacing, shorten the run, or reduce the acceleration if beads fly off), or climbers rose above its top, "

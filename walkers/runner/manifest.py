@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import platform
 import time
 from collections.abc import Collection, Iterable
@@ -13,7 +12,7 @@ from typing import Any
 from walkers.inputs.case import Case
 from walkers.inputs.errors import WalkersError
 from walkers.runner.binary import Engine, plugin_of, read_audit
-from walkers.runner.files import read_json, write_json
+from walkers.runner.files import checksum, read_json, write_json
 from walkers.runner.launch import EngineReport, cores_here
 from walkers.runner.provenance import software
 from walkers.templates.deck import CONTENT_VERSION
@@ -34,8 +33,9 @@ def write_manifest(
     for a deck that was run by hand: only the version is known.
     """
     finished = time.time()
-    audit = read_audit(engine.sha256) if engine else None
     plugin = plugin_of(engine) if engine else None
+    model = {"path": str(plugin), "sha256": checksum(plugin)} if plugin else None
+    audit = read_audit(engine.sha256, model["sha256"]) if engine and model else None
     paths = [path for path in sorted(directory.rglob("*")) if path.is_file()]
     files = {path.relative_to(directory).as_posix(): path.stat().st_size for path in paths}
     contents = {
@@ -50,7 +50,7 @@ def write_manifest(
             "audit": audit.summary() if audit else None,
         },
         "deck_version": CONTENT_VERSION,
-        "contact_model": {"path": str(plugin), "sha256": checksum(plugin)} if plugin else None,
+        "contact_model": model,
         **_made_by(),
         "host": platform.node(),
         "platform": platform.platform(),
@@ -87,12 +87,6 @@ def checksums(directory: Path, names: Iterable[str]) -> dict[str, str]:
         return {name: checksum(path) for name, path in paths.items()}
     with ThreadPoolExecutor(min(_MOST_THREADS, cores_here())) as pool:
         return dict(zip(paths, pool.map(checksum, paths.values()), strict=True))
-
-
-def checksum(path: Path) -> str:
-    """SHA-256 of a file, hexadecimal."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 class FileChanged(WalkersError, ValueError):

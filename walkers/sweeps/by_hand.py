@@ -65,14 +65,15 @@ def write_folder(case: Case, folder: Path) -> Path:
 
     `InputError` if the folder exists or cannot be made; errors of `find_engine` and `plugin_of`.
     """
-    deck, plugin = render_deck(case, whole(case)), plugin_of(find_engine())
+    deck, engine = render_deck(case, whole(case)), find_engine()
+    plugin = plugin_of(engine)
     try:
         folder.mkdir(parents=True)
     except OSError as error:
         raise refused(folder, f"cannot make the folder ({error.strerror}): expected the name of a new one") from error
     write_deck(deck, folder)
     (folder / SCALE_NAME).write_text(_SCALE, encoding="utf-8")
-    (folder / RUN_NAME).write_text(run_script(plugin, deck.layout.ranks), encoding="utf-8")
+    (folder / RUN_NAME).write_text(run_script(engine, plugin, deck.layout.ranks), encoding="utf-8")
     write_json(folder / DECK_RECORD_NAME, {"case": case.as_dict(), "deck": deck.text})
     return folder / DECK_NAME
 

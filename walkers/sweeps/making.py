@@ -23,7 +23,7 @@ from typing import Any
 from walkers.inputs.case import Case, Run
 from walkers.inputs.errors import Stopped, WalkersError
 from walkers.postprocess.analysis import tabulate
-from walkers.runner.binary import Engine, is_new, read_audit
+from walkers.runner.binary import Engine, is_new, model_sha256, read_audit
 from walkers.runner.directory import (
     CASE_NAME,
     FAILURE_NAME,
@@ -80,9 +80,10 @@ class DamagedSegment(WalkersError):
 
 def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
     """Refuse an engine whose audit failed (`AuditFailed`), unless allowed; warn once of an engine without audit."""
-    audit = read_audit(engine.sha256)
-    if audit is None and is_new(engine.sha256):
-        message = "this engine was never audited; check its forces with: walkers check engine (shown once)"
+    model = model_sha256(engine)
+    audit = read_audit(engine.sha256, model)
+    if audit is None and is_new(engine.sha256, model):
+        message = "this engine was never audited with its contact model: walkers check engine (shown once)"
         warnings.warn(message, UnauditedEngineWarning, stacklevel=3)
     elif audit is not None and not audit.passed and not allow_failed_audit:
         raise AuditFailed(

@@ -19,7 +19,12 @@ ALONE = {
 }
 """Environment of an engine of one process; with only the first variable, 14 of 1,500 starts failed."""
 
-RANKS = {"OMPI_MCA_btl": "self,vader", "OMPI_MCA_pml": "ob1", "OMPI_MCA_mpi_yield_when_idle": "1"}
+RANKS = {
+    "OMPI_MCA_btl": "self,vader",
+    "OMPI_MCA_pml": "ob1",
+    "OMPI_MCA_mpi_yield_when_idle": "1",
+    "OMPI_MCA_plm": "isolated",  # no ssh, which containers lack
+}
 """Environment of an engine of several processes on one machine, which communicate by shared memory.
 
 `mpirun` itself listens on the network (`walkers.runner.launch` leaves it only the loopback). Two ranks start in 0.7 of

@@ -20,8 +20,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from platformdirs import user_cache_path
 
+from walkers.cache import cache_folder, make_cache_folder
 from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Surfaces
 
@@ -67,7 +67,7 @@ def _shape(surfaces: Surfaces) -> _Shape:
 def _place(shape: _Shape) -> Path:
     """Path of the cached solution of a shape."""
     name = sha256(_solver() + repr((NODES, _SMALL, shape)).encode()).hexdigest()[:24]
-    return user_cache_path("granular-walkers") / "young-laplace" / f"{name}.npy"
+    return cache_folder() / "young-laplace" / f"{name}.bin"
 
 
 @cache
@@ -79,17 +79,30 @@ def _solver() -> bytes:
 @lru_cache(maxsize=4096)
 def _solved(shape: _Shape) -> tuple[float, Chebyshev]:
     """Rupture distance, and F/γ as a polynomial in √(1 - h/rupture), in units of the bead's radius."""
-    place = _place(shape)
-    try:
-        numbers = np.load(place)
-    except (OSError, ValueError, EOFError):
+    numbers = _kept(place := _place(shape))
+    if numbers is None:
         numbers = _solve(shape)
         with suppress(OSError):  # renamed, because other processes may write it too
-            place.parent.mkdir(parents=True, exist_ok=True)
+            make_cache_folder(place.parent.name)
             with tempfile.NamedTemporaryFile(dir=place.parent, suffix=".part", delete=False) as file:
-                np.save(file, numbers)
+                file.write(_checksum(place, numbers.tobytes()) + numbers.tobytes())
             Path(file.name).replace(place)
     return float(numbers[0]), Chebyshev(numbers[1:], domain=[0.0, 1.0])
+
+
+def _kept(place: Path) -> FloatArray | None:
+    """The numbers of a cached solution; None if there are none, or they are not those that were written."""
+    with suppress(OSError):
+        contents = place.read_bytes()
+        sum_, numbers = contents[:32], contents[32:]
+        if sum_ == _checksum(place, numbers):
+            return np.frombuffer(numbers)
+    return None
+
+
+def _checksum(place: Path, numbers: bytes) -> bytes:
+    """SHA-256 of the numbers of a solution and of its name."""
+    return sha256(place.stem.encode() + numbers).digest()
 
 
 def _solve(shape: _Shape) -> FloatArray:
