@@ -95,8 +95,8 @@ def test_tabulated_solution_of_yade() -> None:
 def test_published_fits_between_equal_spheres(volume: float, degrees: float, tolerance: float) -> None:
     """Of rupture: Willett et al. (2000), Eq. 15, doi 10.1021/la000657y; Lian et al. (1993), doi 10.1006/jcis.1993.1452.
 
-    Their factor 1 + θ/2 is some 4 % too large at 20°, and Lian's lacks a term in the volume. Of the pull: two groups'
-    fits to their own solutions of the equation, Willett et al. (2000) and Bagheri et al. (2024).
+    Their factor 1 + θ/2 is some 4 % too large at 20°, and Lian's lacks a term in the volume. Of the pull: the fit
+    of Willett et al. (2000) to their own solutions of the equation.
     """
     given = (1.0, 1.0, volume, radians(degrees))
     rupture = rupture_distance(*given)
@@ -104,10 +104,8 @@ def test_published_fits_between_equal_spheres(volume: float, degrees: float, tol
     assert rupture == pytest.approx(rupture_of_lian(*given[2:]), rel=0.08)
     gaps = np.linspace(0.0, 0.9 * min(rupture, rupture_of_willett(*given)), 40)
     forces = force_curve(*given, gaps).forces
-    bagheri, willett = (law.pull(*given, gaps) for law in sorted(FITS, key=lambda law: law.name))
+    (willett,) = (law.pull(*given, gaps) for law in FITS)
     assert willett == pytest.approx(forces, abs=0.03 * forces[0])
-    assert bagheri == pytest.approx(forces, abs=0.02 * forces[0])
-    assert bagheri[0] == pytest.approx(forces[0], rel=0.008)
 
 
 @pytest.mark.parametrize("given", [BRIDGES[1], BRIDGES[4]])

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +10,9 @@ import pytest
 from tests.conftest import call, document, origins, to_toml
 from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError
-from walkers.inputs.library import _of_packages, library_of
+from walkers.inputs.library import library_of
 from walkers.inputs.reading import load_case, resolve_case
 from walkers.inputs.sweep import expand
-from walkers.packages import offers
 from walkers.physics.mixtures import water_glycerol
 from walkers.physics.units import TEMPERATURE, parse_quantity
 from walkers.sweeps.spread import spread_sweep
@@ -130,12 +126,11 @@ def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(own: Pat
         load_case("mine.toml")
 
 
-def test_a_library_elsewhere_is_named(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_library_elsewhere_is_named(own: Path) -> None:
     (own / "library.toml").rename(own / "other.toml")
-    monkeypatch.setenv("WALKERS_LIBRARY", "")
     assert "weighed" in call("--library", "other.toml", "show", "mine.toml", check=True).stdout
-    monkeypatch.setenv("WALKERS_LIBRARY", "other.toml")
-    assert "my beads  " in call("library", check=True).stdout
+    assert "my beads  " in call("--library", "other.toml", "library", check=True).stdout
+    assert "my beads  " not in call("library", check=True).stdout, "it is for one call"
 
 
 @pytest.mark.parametrize(
@@ -173,76 +168,3 @@ def test_a_library_that_is_none_is_one_message(own: Path, text: str, told: str) 
         assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
         assert "library.toml: " in done.stderr
         assert told in done.stderr
-
-
-# --- packages ---------------------------------------------------------------------------------------------------------
-
-MODULE = """
-from pathlib import Path
-from walkers.physics.laws.willett import law
-
-def library():
-    return {"materials": {"lab beads": {"density": {"value": "3 g/cm^3", "source": "supplier"}}}}
-
-def case():
-    return Path(__file__).with_name("lab_case.toml")
-"""
-ENTRIES = """
-[walkers.materials]
-lab = lab_of_tests:library
-[walkers.cases]
-lab-case = lab_of_tests:case
-[walkers.bridge_laws]
-lab-law = lab_of_tests:law
-"""
-BROKEN = "".join(
-    f"[walkers.{kind}]\nbroken-{kind} = lab_that_is_broken:thing\n" for kind in ("materials", "cases", "bridge_laws")
-)
-
-
-@pytest.fixture
-def packages(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """A package that brings a material, a case and a law, and one that cannot be imported."""
-    place = tmp_path_factory.mktemp("packages")
-    for name, entries in (("lab", ENTRIES), ("bad", BROKEN)):
-        about = place / f"{name}-1.2.dist-info"
-        about.mkdir()
-        (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.2\n")
-        (about / "entry_points.txt").write_text(entries)
-    (place / "lab_of_tests.py").write_text(MODULE)
-    (place / "lab_that_is_broken.py").write_text("import no_such_module\n")
-    tables = document(beads={"material": "lab beads"}, liquid={"law": "lab-law"})
-    (place / "lab_case.toml").write_text(to_toml(tables))
-    monkeypatch.syspath_prepend(place)
-    importlib.invalidate_caches()
-    offers.cache_clear(), _of_packages.cache_clear()
-    yield
-    sys.modules.pop("lab_of_tests", None)
-    offers.cache_clear(), _of_packages.cache_clear()
-
-
-def test_packages_bring_materials_cases_and_laws(packages: None, in_folder: Path) -> None:
-    assert load_case("fig1b").density == 4000.0
-    assert "lab_of_tests" not in sys.modules, "it is imported when something of it is asked for"
-    with pytest.warns(
-        match=r"^package bad 1\.2: walkers\.materials 'broken-materials' cannot be used: ModuleNotFoundError"
-    ):
-        case = load_case("lab-case")
-    density = origins(case)["beads.density"]
-    assert (case.name, case.density) == ("lab_case", 3000.0)
-    assert (density.origin, density.source) == ("package", "package lab 1.2, supplier")
-    shown = call("show", "lab-case", check=True)
-    assert "  package lab 1.2, supplier" in shown.stdout
-
-
-def test_a_broken_package_is_one_message_and_hinders_nothing(packages: None, in_folder: Path) -> None:
-    listed = call("library", check=True)
-    assert [listed.stderr.count(word) for word in ("\n", "package bad 1.2", "Traceback")] == [1, 1, 0]
-    marked = {line.split()[0]: line.split("[")[-1] for line in listed.stdout.splitlines() if line.endswith("1.2]")}
-    assert {"lab", "lab-law", "lab-case", "broken-cases"} <= marked.keys()
-    assert marked["lab-law"] == "package lab 1.2]"
-    for words in (("broken-cases",), ("fig1b", "--set", "liquid.law=broken-bridge_laws")):
-        done = call("show", *words)
-        assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-        assert "package bad 1.2: walkers." in done.stderr
-    assert call("show", "fig1b").stderr == ""

@@ -27,15 +27,13 @@ def offering(*kinds: str) -> Callable[[typer.Context, str], list[str]]:
 
     def offered(ctx: typer.Context, incomplete: str) -> list[str]:
         from walkers.inputs.reading import shipped
-        from walkers.packages import offers
 
         names: list[str] = []
         for kind in kinds:
             if kind in RECORDS:
                 names += [*_names(ctx, kind), *_typed(incomplete, f"*/{RECORDS[kind]}")]
             else:
-                known = [*shipped("case"), *offers("walkers.cases")] if kind == "case" else shipped("sweep")
-                names += [*known, *_typed(incomplete, "*.toml")]
+                names += [*shipped("case" if kind == "case" else "sweep"), *_typed(incomplete, "*.toml")]
         return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
 
     return offered

@@ -19,6 +19,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
+import walkers.inputs
 from walkers.commands import GROUPS, MOVED, SECTIONS
 from walkers.completion import offering
 
@@ -177,8 +178,7 @@ def _show_version(wanted: bool) -> None:
 
 
 def _use_library(file: Path | None) -> None:
-    if file is not None:
-        os.environ["WALKERS_LIBRARY"] = str(file)
+    walkers.inputs.chosen_library = file
 
 
 def _options(

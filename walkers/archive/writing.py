@@ -34,6 +34,7 @@ _MEANINGS = {
     RECORD_NAME: ("record", "the points of the sweep: varied keys, derived quantities, names of the runs"),
     "result.json": ("result", "the result of the run, SI units"),
     "walker.lig": ("deck", "the deck: input script of the engine"),
+    "law.py": ("deck", "the file of the user's bridge law"),
     "bridges.txt": ("deck", "forces of each bridge against its gap, which the engine reads"),
     "loads.txt": ("deck", "gravity and drive of each bead, if they differ between beads"),
     "run.sh": ("deck", "script that runs the deck by hand"),

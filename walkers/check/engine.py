@@ -15,7 +15,6 @@ from walkers.check.kernels import CELLS, Bridges, Constants, FloatArray, IntArra
 from walkers.inputs.boundary import Flat, Wall
 from walkers.inputs.case import Case
 from walkers.physics.bridge import BridgeLaw, Surfaces
-from walkers.physics.laws import law_of
 
 TERMS = ("capillary", "lubrication", "damping", "friction", "rolling-friction", "gravity", "drive")
 """Terms that can be left out: pull and resistances of bridges, damping of contacts, the tangential contact force, the
@@ -143,7 +142,7 @@ def _bridges(case: Case, radius: FloatArray, without: Collection[str]) -> Bridge
         for column, other in list(enumerate([*sizes.tolist(), inf]))[row:]:
             between[row, column] = len(made)
             surfaces = Surfaces.of(one, other, case.liquid, case.contact.minimum_separation_ratio)
-            made.append(_splined(law_of(case.liquid), surfaces))
+            made.append(_splined(case.law, surfaces))
     acts = np.array(["capillary" not in without, *["lubrication" not in without] * 4], dtype=np.float64)
     spans, splines = np.stack([one for one, _ in made]), np.stack([one for _, one in made]) * acts
     return Bridges(spans, splines, kind.astype(np.int64), between)

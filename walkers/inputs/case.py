@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from math import cos, hypot, inf, isclose, sin
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import to_jsonable_python
@@ -19,8 +19,11 @@ from walkers.inputs.boundary import Boundary
 from walkers.inputs.drive import AXES, Drive, Vector
 from walkers.inputs.origins import Origin
 from walkers.inputs.rounding import percent
-from walkers.physics.laws import LAWS
+from walkers.physics.laws import LAWS, law_of
 from walkers.physics.matter import Contact, Liquid
+
+if TYPE_CHECKING:
+    from walkers.physics.bridge import BridgeLaw
 
 _SILENCE = 600.0  # s; piles of 200 beads write some thirty lines a second, those of 20,000 one in four seconds
 _SLOWEST_STEP = 4e-5  # s a bead: thirty times what it takes with two beads alone, a hundred times that in a pile
@@ -31,7 +34,7 @@ FIRST_ATTEMPTS = (12, 24)
 BOUNDS = ("silence", "log_limit")
 """Fields of `Run` that limit the engine and do not change the result."""
 
-_SOURCES = ("document", "find_origins")
+_SOURCES = ("document", "find_origins", "recorded_law")
 
 
 def settling_of(cycles: int) -> int:
@@ -150,8 +153,9 @@ class Case:
     """Bodies on a boundary under a drive, resolved.
 
     Attributes are SI (``density`` of the beads in kg/m³, ``gravity`` in m/s²). ``seed`` is that of all that is drawn at
-    the start. ``document`` (the tables that the case was read from) and ``find_origins`` (which gives `origins`) are
-    part of no comparison, and are lost where `dataclasses.replace` changes the case: they would tell of another one.
+    the start. ``document`` (the tables that the case was read from), ``find_origins`` (which gives `origins`) and
+    ``recorded_law`` (a user's law as a run has recorded it) are part of no comparison, and are lost where
+    `dataclasses.replace` changes the case: they would tell of another one.
 
     Raises
     ------
@@ -175,6 +179,7 @@ class Case:
     run: Run
     document: Mapping[str, Any] = field(default_factory=dict, init=False, compare=False, repr=False)
     find_origins: Callable[[], tuple[Origin, ...]] = field(default=tuple, init=False, compare=False, repr=False)
+    recorded_law: Any = field(default=None, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """Refuse a drive that does not match time step and sampling."""
@@ -195,20 +200,35 @@ class Case:
         """Origins of the values; empty for a case that was not read or was changed afterwards."""
         return self.find_origins()
 
-    def read_from(self, document: Mapping[str, Any], find_origins: Callable[[], tuple[Origin, ...]]) -> Case:
-        """The same case with the tables from which it was read and notes on origins."""
+    def read_from(
+        self,
+        document: Mapping[str, Any],
+        find_origins: Callable[[], tuple[Origin, ...]],
+        recorded_law: BridgeLaw | None = None,
+    ) -> Case:
+        """The same case with the tables from which it was read, notes on origins, and the law of its run."""
         case = replace(self)
+        object.__setattr__(case, "recorded_law", recorded_law)
         object.__setattr__(case, "document", document)
         object.__setattr__(case, "find_origins", find_origins)
         return case
 
     def renamed(self, name: str, title: str | None = None) -> Case:
         """The same case under another name, or another title too."""
-        return replace(self, name=name, title=title or self.title).read_from(self.document, self.find_origins)
+        return replace(self, name=name, title=title or self.title).read_from(*self._sources)
 
     def for_cycles(self, cycles: int) -> Case:
         """The same case with a fixed number of cycles in one segment."""
-        return replace(self, run=self.run.for_cycles(cycles)).read_from(self.document, self.find_origins)
+        return replace(self, run=self.run.for_cycles(cycles)).read_from(*self._sources)
+
+    @property
+    def law(self) -> BridgeLaw:
+        """The law of its bridges: the one that its run has recorded, else that of the liquid."""
+        return self.recorded_law or law_of(self.liquid)
+
+    @property
+    def _sources(self) -> tuple[Mapping[str, Any], Callable[[], tuple[Origin, ...]], BridgeLaw | None]:
+        return self.document, self.find_origins, self.recorded_law
 
     @property
     def bodies(self) -> tuple[Body, ...]:

@@ -10,7 +10,6 @@ from pathlib import Path
 from walkers.inputs.errors import refused
 from walkers.inputs.library import HALF, Known, Library, read_library, suggestion, unmeasured
 from walkers.inputs.reading import read_toml, shipped
-from walkers.packages import offers
 from walkers.physics.laws import LAWS
 from walkers.physics.mixtures import MIXTURES
 from walkers.physics.units import TEMPERATURE, quantity_text
@@ -33,7 +32,7 @@ beads and at the boundary. For other surfaces, give a value and its range in [un
 
 @dataclass(frozen=True)
 class Entry:
-    """A name of a kind, with its numbers, or title and file; ``place``: the file or package, if not of the program."""
+    """A name of a kind, with its numbers, or title and file; ``place``: its file, if not of the program."""
 
     kind: str
     name: str
@@ -44,23 +43,21 @@ class Entry:
 
 
 def catalogue(*, of_others: bool = True) -> list[Entry]:
-    """All names: of the program, of the library in the working directory, and of packages.
+    """All names: of the program, and of the library in the working directory.
 
-    Raises `InputError` if that library cannot be used. What is wrong with a package is a warning.
+    Raises `InputError` if that library cannot be used.
     """
     found = list(_of_library(Library(read_library(Path()) if of_others else None)))
     found += [Entry("not measured", key, numbers={"default": one}) for key, one in unmeasured().items()]
     found += [Entry("bridge laws", name, text=_summary(name)) for name in LAWS]
-    found += [Entry("bridge laws", one.name, one.place) for one in offers("walkers.bridge_laws").values()]
     for kind in COMMANDS:
         files = shipped(kind[:-1]).items()
         found += [Entry(kind, name, "", {}, str(read_toml(file).get("title", "")), str(file)) for name, file in files]
-    found += [Entry("cases", one.name, one.place) for one in offers("walkers.cases").values()]
     return found if of_others else [one for one in found if not one.place]
 
 
 def _of_library(known_to: Library) -> Iterator[Entry]:
-    for one in known_to.collections():
+    for one in known_to.collections:
         for name in one.tables.get("materials", ()):
             yield Entry("materials", name, one.place, known_to.material(name))
         for name in one.tables.get("liquids", ()):
@@ -77,7 +74,7 @@ def _summary(law: str) -> str:
 
 
 def describe(found: Sequence[Entry]) -> str:
-    """All names as tables; names of other files and packages are marked."""
+    """All names as tables; names of other files are marked."""
     lines = []
     for kind, columns in _COLUMNS.items():
         if kind == "not measured":

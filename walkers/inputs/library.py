@@ -1,30 +1,27 @@
 """The library of materials, liquids and surface pairs (``library.toml``), each number with its source.
 
-Users add to it by a file of their own, and packages by entry points ``walkers.materials``: a function without arguments
-that returns the tables of such a file.
+Users add to it by a file of their own.
 """
 
 from __future__ import annotations
 
 import difflib
-import os
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from walkers import inputs
 from walkers.inputs.errors import InputError, Problem, refused, shown
 from walkers.inputs.origins import Whence
-from walkers.packages import offers, warn_of
 from walkers.physics import units
 from walkers.physics.mixtures import MIXTURES
 from walkers.physics.units import quantity_text
 
 FILE_NAME = "library.toml"
-VARIABLE = "WALKERS_LIBRARY"
 HALF = (0.5, 293.15)
 PAIR_KEYS = (
     *("friction", "rolling_friction", "viscosity_ratio", "minimum_separation_ratio", "volume_fraction"),
@@ -70,7 +67,7 @@ class Known:
 
 
 class Collection(NamedTuple):
-    """Tables of materials, liquids and surface pairs, and where they are from: a file, or a package."""
+    """Tables of materials, liquids and surface pairs, and the file that they are from."""
 
     origin: Whence
     place: str
@@ -80,9 +77,8 @@ class Collection(NamedTuple):
 class Library:
     """The materials, liquids and surface pairs that a case can name.
 
-    They are those of the user's own library, those that come with the program, and those of installed packages, which
-    are loaded when a name is among none of the others. No name has two meanings: others cannot bring one of the
-    program's.
+    They are those of the user's own library and those that come with the program. No name has two meanings: the user's
+    library cannot redefine a name of the program.
 
     Parameters
     ----------
@@ -91,22 +87,16 @@ class Library:
     """
 
     def __init__(self, own: Mapping[str, Any] | None = None) -> None:
-        self._near = [Collection("library", "", _contents())]
-        if own:
-            self._near.insert(0, Collection("own library", own.get("file", ""), own))
-
-    def collections(self) -> Iterator[Collection]:
-        """All collections, those of packages last."""
-        yield from self._near
-        yield from _of_packages()
+        mine = [Collection("own library", own.get("file", ""), own)] if own else []
+        self.collections = [*mine, Collection("library", "", _contents())]
 
     def names(self, kind: str) -> tuple[str, ...]:
         """Names of the ``materials`` or of the ``liquids``."""
-        return tuple(dict.fromkeys(name for one in self.collections() for name in one.tables.get(kind, ())))
+        return tuple(dict.fromkeys(name for one in self.collections for name in one.tables.get(kind, ())))
 
     def has(self, kind: str, name: str | None) -> bool:
         """Whether there is a material or liquid of a name."""
-        return any(name in one.tables.get(kind, ()) for one in self.collections())
+        return any(name in one.tables.get(kind, ()) for one in self.collections)
 
     def material(self, name: str) -> Mapping[str, Known]:
         """Density (kg/m³), Young's modulus (Pa) and Poisson's ratio of a material (KeyError: there is none)."""
@@ -120,7 +110,7 @@ class Library:
         return self._numbers("liquids", name, MIXTURES[name](*mixture or HALF) if name in MIXTURES else {})
 
     def _numbers(self, kind: str, name: str, computed: Mapping[str, float]) -> Mapping[str, Known]:
-        for one in self.collections():
+        for one in self.collections:
             if found := one.tables.get(kind, {}).get(name):
                 texts = {key: quantity_text(float(f"{value:.4g}"), _KINDS[key]) for key, value in computed.items()}
                 return {key: _known(key, {"value": texts.get(key), **entry}, one) for key, entry in found.items()}
@@ -132,7 +122,7 @@ class Library:
         ``friction``, ``rolling_friction`` and, where they are known, ``minimum_separation_ratio``, ``viscosity_ratio``,
         ``contact_angle`` (rad), ``volume_fraction`` and ``restitution``.
         """
-        for one in self.collections():
+        for one in self.collections:
             for pair in one.tables.get("surface_pairs", ()):
                 if sorted(pair["materials"]) == sorted([first or "", second or ""]):
                     liquids = tuple(pair.get("calibrated_with", ()))
@@ -143,20 +133,6 @@ class Library:
 @cache
 def _contents() -> dict[str, Any]:
     return tomllib.loads(resources.files("walkers.inputs").joinpath("library.toml").read_text("utf-8"))
-
-
-@cache
-def _of_packages() -> Sequence[Collection]:
-    """Collections of packages; broken packages are left out with a warning."""
-    found = []
-    for offer in offers("walkers.materials").values():
-        try:
-            tables = offer.load()
-            check_library(tables, offer.place)
-            found.append(Collection("package", offer.place, tables))
-        except (ValueError, InputError) as error:
-            warn_of(error)
-    return found
 
 
 def _known(key: str, entry: Mapping[str, Any], of: Collection, liquids: tuple[str, ...] = ()) -> Known:
@@ -211,15 +187,14 @@ def _shipped() -> Library:
 
 
 def read_library(folder: Path) -> dict[str, Any]:
-    """The user's own library: the file that the environment names in `VARIABLE`, else that in a folder, else nothing.
+    """The user's own library: the file of ``--library``, else that in a folder, else nothing.
 
     Raises `InputError` if it is none.
     """
     from walkers.inputs.reading import read_toml
 
-    named = os.environ.get(VARIABLE)
-    path = Path(named) if named else folder / FILE_NAME
-    if not (named or path.is_file()):
+    path = inputs.chosen_library or folder / FILE_NAME
+    if not (inputs.chosen_library or path.is_file()):
         return {}
     tables = read_toml(path)
     check_library(tables, str(path))

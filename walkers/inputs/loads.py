@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.physics.dimer import Dimer
-from walkers.physics.laws import law_of
 
 if TYPE_CHECKING:
     from walkers.inputs.bodies import Walkers
     from walkers.inputs.case import Case
-    from walkers.physics.bridge import Curve, Surfaces
+    from walkers.physics.bridge import BridgeLaw
+    from walkers.physics.matter import Liquid
 
 
 def dimer_of(case: Case) -> Dimer:
@@ -46,12 +46,19 @@ class BridgeAtRest(NamedTuple):
     rupture: float
 
 
-@lru_cache(maxsize=256)
 def bridge_at_rest(case: Case, radius: float, other_radius: float) -> BridgeAtRest:
     """The bridge of a bead to another, or to a plane (a radius of infinity), by the case's law; radii in m."""
+    return _at_rest(case.law, case.liquid, case.contact.minimum_separation_ratio, radius, other_radius)
+
+
+@lru_cache(maxsize=1024)
+def _at_rest(law: BridgeLaw, liquid: Liquid, separation: float, radius: float, other_radius: float) -> BridgeAtRest:
     import numpy as np
 
-    surfaces, curve = _bridge(case, radius, other_radius)
+    from walkers.physics.bridge import Surfaces
+
+    surfaces = Surfaces.of(radius, other_radius, liquid, separation)
+    curve = law(surfaces)
     touching = np.zeros(1)
     pull = curve.pull(touching) if curve.pull else curve.forces(touching).pull
     return BridgeAtRest(surfaces.volume, float(pull[0]), curve.rupture)
@@ -61,22 +68,22 @@ def resistances_at_rest(case: Case, radius: float, other_radius: float) -> tuple
     """S (N s/m), C (N s) and Q (N m s) of that bridge, the smaller bead as body 1 (`walkers.physics.bridge`)."""
     import numpy as np
 
-    _, curve = _bridge(case, radius, other_radius)
-    _, _, sliding, coupling, rolling = map(float, curve.forces(np.zeros(1)).columns()[0])
-    return sliding, coupling, rolling
-
-
-def _bridge(case: Case, radius: float, other_radius: float) -> tuple[Surfaces, Curve]:
     from walkers.physics.bridge import Surfaces
 
     surfaces = Surfaces.of(radius, other_radius, case.liquid, case.contact.minimum_separation_ratio)
-    return surfaces, law_of(case.liquid)(surfaces)
+    _, _, sliding, coupling, rolling = map(float, case.law(surfaces).forces(np.zeros(1)).columns()[0])
+    return sliding, coupling, rolling
+
+
+def contact_loads(case: Case, walkers: Walkers | None = None) -> ContactLoads:
+    """Capillary load of each contact of a case's first (or other) walkers, and the overlap at which it is carried."""
+    return _contact_loads(case.law, case, walkers or case.walkers[0])
 
 
 @lru_cache(maxsize=16)  # asked for at every stage of a deck
-def contact_loads(case: Case, walkers: Walkers | None = None) -> ContactLoads:
-    """Capillary load of each contact of a case's first (or other) walkers, and the overlap at which it is carried."""
-    walkers = walkers or case.walkers[0]
+def _contact_loads(law: BridgeLaw, case: Case, walkers: Walkers) -> ContactLoads:
+    """The law is a part of the key: an edited law is another one."""
+    del law
     radii, modulus = walkers.radii, reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
     bridges, overlaps = [], []
     for radius in radii:

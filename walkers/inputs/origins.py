@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from walkers.inputs.schema import CaseFile
     from walkers.physics.units import Kind
 
-Whence = Literal["given", "library", "own library", "package", "calibrated", "assumed", "default", "derived"]
+Whence = Literal["given", "library", "own library", "calibrated", "assumed", "default", "derived"]
 _LEFT_OUT = ("title", "uncertain", "placed")
 """What is no value, or hundreds of them."""
 
@@ -30,10 +30,9 @@ class Origin:
     key, text
         Dotted, such as ``contact.friction.bead_wall``, and the value as a case file would say it, with its unit.
     origin, source
-        ``given`` by the case (or beside it), from the ``library`` of the program, the user's ``own library`` or that of
-        a ``package``, ``calibrated``, ``assumed`` (fixed in the calibration), the ``default``, or ``derived`` from
-        other values; the library's source (after the file, or the package with its version), or from what it is
-        derived.
+        ``given`` by the case (or beside it), from the ``library`` of the program or the user's ``own library``,
+        ``calibrated``, ``assumed`` (fixed in the calibration), the ``default``, or ``derived`` from other values; the
+        library's source (after its file), or from what it is derived.
     range, logarithmic
         Both ends between which it may lie as well, as a case would write them, and whether they are of magnitudes: of
         what nobody measures, unless the case gives it, and of what the case calls ``uncertain``.

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.inputs.errors import InputError, check_utf8, each, refused, shortened
 from walkers.inputs.library import FILE_NAME, library_of, read_library, suggestion
-from walkers.packages import Offer, offers
 
 if TYPE_CHECKING:
     from walkers.inputs.case import Case
@@ -134,23 +133,8 @@ def find_input(name: str | Path, kind: str) -> Path:
         raise refused(shortened(str(name)), f"cannot be read: {error.strerror}") from error
     if str(name) in known:
         return known[str(name)]
-    offered = offers("walkers.cases") if kind == "case" else {}
-    if offer := offered.get(str(name)):
-        return _file_of(offer)
-    names = [*known, *offered]
     there = "no such file, run or sweep" if kind == "case" else "no such file"
-    raise refused(name, f"{there}, nor a shipped {kind} ({', '.join(names)}){suggestion(str(name), names)}")
-
-
-def _file_of(offer: Offer) -> Path:
-    """The file of a case that a package brings; raises `InputError` with the package's name if there is none."""
-    try:
-        path = Path(offer.load())
-        if not path.is_file():
-            raise offer.broken(f"no file {path}")
-    except (TypeError, ValueError) as error:
-        raise refused(offer.name, str(error)) from error
-    return path
+    raise refused(name, f"{there}, nor a shipped {kind} ({', '.join(known)}){suggestion(str(name), known)}")
 
 
 def _kind_of(path: Path) -> str | None:

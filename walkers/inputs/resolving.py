@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache, lru_cache, partial
 from itertools import islice
-from math import atan2, dist, isinf, isnan, pi
+from math import atan2, dist, inf, isinf, isnan, pi
 from typing import Any, Literal
 
 from walkers.inputs import library
@@ -20,12 +20,12 @@ from walkers.inputs.case import Case, Run
 from walkers.inputs.changes import MISSING, changed, parts_of, value_at
 from walkers.inputs.errors import unusable
 from walkers.inputs.library import Known, Library, expected_of
-from walkers.inputs.loads import contact_loads, reach
+from walkers.inputs.loads import bridge_at_rest, contact_loads, reach
 from walkers.inputs.origins import Notes, Origin, Whence, origins_of
 from walkers.inputs.run_tables import resolve_drive, resolve_run
 from walkers.inputs.schema import MOST_BEADS, CaseFile, MixtureTable
 from walkers.physics.dimer import Dimer
-from walkers.physics.laws import LAWS, by_name
+from walkers.physics.laws import LAWS
 from walkers.physics.matter import DEFAULT_LAW, Liquid
 from walkers.physics.mixtures import MIXTURES
 from walkers.physics.units import ABSENT, TEMPERATURE, parse_quantity
@@ -161,6 +161,8 @@ def resolve(file: CaseFile, name: str, document: Mapping[str, Any], notes: Notes
         seed=file.run.seed,
         run=Run(0.0, 1, 1, 0, False, 1, 1, 1, 1, 0.0, 0.0, 1),  # its step follows from the rest
     )
+    if liquid.law not in LAWS:
+        _check_law(case)
     case = replace(case, run=resolve_run(file.run, case, notes))
     along, across, _ = case.drive_axis
     uphill = atan2(across, along) + boundary.uphill if boundary.tilt else 0.0
@@ -173,6 +175,15 @@ def resolve(file: CaseFile, name: str, document: Mapping[str, Any], notes: Notes
     # Not in g: the paper's, 9.8 m/s², is not the case's gravity.
     notes["environment.gravity"] = Origin("", f"{case.gravity:g} m/s^2", "default", value=case.gravity)
     return case.read_from(document, partial(origins_of, file, document, notes))
+
+
+def _check_law(case: Case) -> None:
+    """Refuse a user's law that cannot be used for the beads of the case."""
+    try:
+        for radius in case.radii:
+            bridge_at_rest(case, radius, inf)
+    except ValueError as error:
+        raise unusable("liquid.law", str(error)) from error
 
 
 def _check_sizes(boundary: Boundary) -> None:
@@ -192,11 +203,6 @@ def _liquid_of(table: Liquid, notes: Notes) -> Liquid:
         assert table.density is not None
         dynamic = float(f"{kinematic * table.density:.15g}")
         notes.derived("liquid.dynamic_viscosity", dynamic, "from kinematic_viscosity and density")
-    if table.law not in LAWS:
-        try:
-            by_name(table.law)
-        except ValueError as error:
-            raise unusable("liquid.law", str(error)) from error
     of_bridges = float(f"{dynamic * table.viscosity_ratio:.15g}")
     bare = replace(table, kinematic_viscosity=None, mass_fraction=None, temperature=None)
     return replace(bare, dynamic_viscosity=of_bridges, viscosity_ratio=1.0)

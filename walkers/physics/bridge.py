@@ -33,6 +33,11 @@ from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_betwe
 from walkers.physics.matter import Liquid
 
 FloatArray = npt.NDArray[np.float64]
+_COLUMNS = ("pull", "normal resistance", "sliding resistance", "coupling", "rolling resistance")
+
+
+class UnusableLawError(ValueError):
+    """A law cannot be used; the message says why."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +137,7 @@ class Forces:
 
 @dataclass(frozen=True)
 class Curve:
-    """The law for two given surfaces.
+    """The law for two given surfaces; raises `UnusableLawError` if its gaps are none.
 
     Attributes
     ----------
@@ -151,6 +156,47 @@ class Curve:
     formation: float = 0.0
     scale: float = 0.0
     pull: Callable[[FloatArray], FloatArray] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse gaps that are no numbers, or not in their order."""
+        for name, gap in (("breaks", self.rupture), ("forms", self.formation), ("changes", self.scale)):
+            if not isinstance(gap, (int, float, np.integer, np.floating)):
+                raise UnusableLawError(f"the bridge {name} at a gap of {gap!r}; expected a number")
+        if not 0.0 < self.rupture < inf:
+            raise UnusableLawError(f"the bridge breaks at a gap of {self.rupture:g} m; expected a positive number")
+        if not 0.0 <= self.formation <= self.rupture:
+            expected = f"expected 0 to its rupture, {self.rupture:g} m"
+            raise UnusableLawError(f"the bridge forms at a gap of {self.formation:g} m; {expected}")
+        if not 0.0 <= self.scale < inf:
+            raise UnusableLawError(f"its forces vary over a gap of {self.scale:g} m; expected zero or more (scale)")
+
+
+def columns_at(curve: Curve, gaps: FloatArray) -> FloatArray:
+    """Pull and resistances at gaps (m), shape (n, 5); raises `UnusableLawError` if they are unusable."""
+    with np.errstate(all="ignore"):
+        forces = curve.forces(gaps)
+    if not isinstance(forces, Forces):
+        raise UnusableLawError(f"its forces are {type(forces).__name__}; expected walkers.physics.bridge.Forces")
+    columns = np.empty((len(gaps), len(_COLUMNS)))
+    for number, (name, given) in enumerate(zip(_COLUMNS, vars(forces).values(), strict=True)):
+        column = np.asarray(given)
+        if column.dtype.kind not in "fiu" or column.shape not in ((), gaps.shape):
+            raise UnusableLawError(
+                f"the {name} has type {column.dtype} and shape {column.shape}; expected real numbers (n,)"
+            )
+        columns[:, number] = column
+        if not np.isfinite(column := columns[:, number]).all():
+            raise UnusableLawError(f"the {name} is not a number at a gap of {gaps[~np.isfinite(column)][0]:g} m")
+        if name.endswith("resistance") and (column < 0.0).any():
+            raise UnusableLawError(f"the {name} is negative at a gap of {gaps[column < 0.0][0]:g} m")
+    _, _, sliding, coupling, rolling = columns.T
+    gains = coupling**2 > (1.0 + 1e-9) * sliding * rolling
+    if gains.any():
+        raise UnusableLawError(
+            f"sliding and rolling together generate energy at a gap of {gaps[gains][0]:g} m: the square of the "
+            "coupling exceeds the product of both resistances"
+        )
+    return columns
 
 
 BridgeLaw = Callable[[Surfaces], Curve]

@@ -64,7 +64,6 @@ def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
         "calibrated": "calibrated",
         "assumed": "assumed",
         "library": "own library",
-        "package": "package",
     }
     for head, origin in whence.items():
         lines += listed(head, [one for one in rests if not one["guessed"] and one["origin"] == origin])

@@ -28,16 +28,18 @@ from pathlib import Path
 from typing import Any
 
 from walkers.inputs.case import Case
-from walkers.physics.laws import source_sha256
+from walkers.physics.laws import LAWS, source_of, source_sha256
 from walkers.runner.binary import Engine
 from walkers.runner.failures import DiskFull, OutputGone
-from walkers.runner.files import fsync_path, link_or_copy, read_json, write_json
+from walkers.runner.files import fsync_path, link_or_copy, read_json, write_bytes, write_json
 from walkers.runner.launch import EngineReport
 from walkers.runner.manifest import FORMAT, MANIFEST_NAME, check_unchanged
-from walkers.templates.deck import CONTENT_VERSION, DECK_NAME, LAYOUT_NAME, Deck, Segment
+from walkers.templates.deck import BRIDGES_NAME, CONTENT_VERSION, DECK_NAME, LAYOUT_NAME, Deck, Segment, tables_of
 from walkers.templates.layout import Layout
 
 CASE_NAME = "case.json"
+LAW_NAME = "law.py"
+"""Copy of the file of a user's law."""
 FAILURE_NAME = "failure.json"
 SEGMENTS = "segments"
 FIRST_SEGMENT = Path(SEGMENTS) / "0000"
@@ -62,7 +64,7 @@ def run_name(case: Case, engine: Engine) -> str:
     user's own bridge law is hashed.
     """
     determinants = {"case": case.determinants(), "deck": CONTENT_VERSION, "engine": engine.sha256, "format": FORMAT}
-    if own := source_sha256(case.liquid.law):
+    if own := case.recorded_law.sha256 if case.recorded_law else source_sha256(case.liquid.law):
         determinants["law"] = own
     text = json.dumps(determinants, sort_keys=True, separators=(",", ":"))
     return f"{name_of(case.name)}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
@@ -130,7 +132,33 @@ class FinishedRun:
 def case_of(directory: Path) -> Case:
     """The resolved case of a run directory; raises `OSError` or `ValueError` if it is unreadable or was changed."""
     check_unchanged(directory, [CASE_NAME])
-    return Case.from_dict(read_json(directory / CASE_NAME))
+    case = Case.from_dict(read_json(directory / CASE_NAME))
+    return case if case.liquid.law in LAWS else _with_recorded_law(case, directory)
+
+
+def _with_recorded_law(case: Case, directory: Path) -> Case:
+    """A case with the bridges that its run has recorded: the file of its law is not executed."""
+    from walkers.templates.bridge_tables import RecordedLaw
+
+    places = (directory, *segment_directories(directory))
+    tables = next((place / BRIDGES_NAME for place in places if (place / BRIDGES_NAME).is_file()), None)
+    source = directory / LAW_NAME if (directory / LAW_NAME).is_file() else None
+    files = [file for file in (tables, source) if file]
+    check_unchanged(directory, [file.relative_to(directory).as_posix() for file in files])
+    law = RecordedLaw(tables.read_text("utf-8") if tables else "", source.read_bytes() if source else None)
+    return case.read_from(case.document, case.find_origins, law)
+
+
+def write_case(directory: Path, case: Case) -> None:
+    """Write the resolved case of a run, and of a user's law its file and the tables of its bridges."""
+    write_json(directory / CASE_NAME, case.as_dict(), at_once=False)
+    if case.liquid.law in LAWS:
+        return
+    tables = tables_of(case, [(case.contact, case.liquid)], {(1, radius) for radius in case.radii})
+    write_bytes(directory / BRIDGES_NAME, tables.encode("utf-8"), at_once=False)
+    file = None if case.recorded_law else source_of(case.liquid.law)
+    if (source := file.read_bytes() if file else getattr(case.recorded_law, "source", None)) is not None:
+        write_bytes(directory / LAW_NAME, source, at_once=False)
 
 
 def layout_of(segment: Path) -> Layout:

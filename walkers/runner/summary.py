@@ -254,7 +254,7 @@ def _whence(one: dict[str, Any]) -> str:
     if origin == "default" and ends:
         return f"guessed ({source or 'not measured'}){ends.replace('range', 'general range')}"
     ends = f", uncertain{ends}" if one["uncertain"] else ends
-    if origin in ("calibrated", "assumed", "package"):
+    if origin in ("calibrated", "assumed"):
         return source + ends
     return (f"{origin}: {source}" if source else origin) + ends
 

@@ -25,7 +25,6 @@ from walkers.inputs.errors import Stopped, WalkersError
 from walkers.postprocess.analysis import tabulate
 from walkers.runner.binary import Engine, is_new, model_sha256, read_audit
 from walkers.runner.directory import (
-    CASE_NAME,
     FAILURE_NAME,
     FIRST_SEGMENT,
     SEGMENT_NAME,
@@ -43,6 +42,7 @@ from walkers.runner.directory import (
     run_place,
     segment_directories,
     unfinished,
+    write_case,
     write_deck,
     write_segment_record,
 )
@@ -333,7 +333,7 @@ def open_locked(
                     path.unlink()
                 elif path.name != SEGMENTS:
                     shutil.rmtree(path)
-            write_json(directory / CASE_NAME, case.as_dict(), at_once=False)
+            write_case(directory, case)
             done = [_read_segment(path) for path in segment_directories(directory)]
             yield OpenRun(case, engine, directory, place, locks, done)
     except Stopped:
@@ -382,7 +382,7 @@ def _make_together(
             # For other processes the directory is the unfinished first run.
             for name, case in [(".", cases[first]), *cases.items()]:
                 (incomplete / name).mkdir(exist_ok=True)
-                write_json(incomplete / name / CASE_NAME, case.as_dict(), at_once=False)
+                write_case(incomplete / name, case)
             look_ahead()
             segment = first_segment(tried[first])
             tell = _teller(cases[first].run, cycles, segment, on_progress) if on_progress else None

@@ -7,7 +7,8 @@ and end with an infinite slope. Within a cell, the engine interpolates by a cubi
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import hashlib
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
@@ -15,20 +16,15 @@ from math import inf, log2
 
 import numpy as np
 
-from walkers.physics.bridge import BridgeLaw, Curve, FloatArray, Surfaces
+from walkers.physics.bridge import BridgeLaw, Curve, FloatArray, Forces, Surfaces, UnusableLawError, columns_at
 from walkers.physics.laws import law_of
-from walkers.templates.scene import Bead, Surface
+from walkers.templates.scene import Surface
 
 TOLERANCE = 1e-6
 """Tolerance of interpolated forces, relative to a column's largest value within a factor of two of the gap."""
 _COARSE = 1e-4
 """The same where liquid is conserved: volumes are steps, and there are ten times as many tables."""
 _COARSEST, _FINEST = 8, 256
-_COLUMNS = ("pull", "normal resistance", "sliding resistance", "coupling", "rolling resistance")
-
-
-class UnusableLawError(ValueError):
-    """A law cannot be tabulated; the message says why."""
 
 
 @dataclass(frozen=True)
@@ -73,22 +69,15 @@ def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) 
     Raises
     ------
     UnusableLawError
-        If forces are not numbers, resistances are negative or create energy, the rupture distance is not positive or
-        less than the formation distance, or no table is fine enough.
+        If the curve is unusable (`walkers.physics.bridge.columns_at`), or no table is fine enough.
     """
     curve = law(surfaces)
-    if not 0.0 < curve.rupture < inf:
-        raise UnusableLawError(f"the bridge breaks at a gap of {curve.rupture:g} m; expected a positive number")
-    if not 0.0 <= curve.formation <= curve.rupture:
-        raise UnusableLawError(
-            f"the bridge forms at a gap of {curve.formation:g} m; expected 0 to its rupture, {curve.rupture:g} m"
-        )
     scale = curve.scale or surfaces.closest
     octaves = max(int(log2(1.0 + 0.5 * curve.rupture / scale)), int(curve.rupture > scale))
     cells = _COARSEST
     while cells <= _FINEST:
         table = Table(curve, scale, octaves, cells, np.empty(0))
-        table = replace(table, rows=_checked(curve, table.gaps))
+        table = replace(table, rows=columns_at(curve, table.gaps))
         worst, gap = _error(table)
         if worst <= tolerance:
             return table
@@ -99,31 +88,11 @@ def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) 
     )
 
 
-def _checked(curve: Curve, gaps: FloatArray) -> FloatArray:
-    """Forces at gaps; raises `UnusableLawError` if they are unusable."""
-    with np.errstate(all="ignore"):
-        forces = curve.forces(gaps)
-    columns = np.array(np.broadcast_to(forces.columns(), (len(gaps), len(_COLUMNS))), dtype=np.float64)
-    for name, column in zip(_COLUMNS, columns.T, strict=True):
-        if not np.isfinite(column).all():
-            raise UnusableLawError(f"the {name} is not a number at a gap of {gaps[~np.isfinite(column)][0]:g} m")
-        if name.endswith("resistance") and (column < 0.0).any():
-            raise UnusableLawError(f"the {name} is negative at a gap of {gaps[column < 0.0][0]:g} m")
-    _, _, sliding, coupling, rolling = columns.T
-    gains = coupling**2 > (1.0 + 1e-9) * sliding * rolling
-    if gains.any():
-        raise UnusableLawError(
-            f"sliding and rolling together generate energy at a gap of {gaps[gains][0]:g} m: the square of the "
-            "coupling exceeds the product of both resistances"
-        )
-    return columns
-
-
 def _error(table: Table) -> tuple[float, float]:
     """The largest relative error of the engine's interpolation between rows, and its gap (m)."""
     parts = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])
     gaps = table.within(parts)
-    exact = _checked(table.curve, gaps)
+    exact = columns_at(table.curve, gaps)
     # Lagrange's polynomials through the four rows of a cell, at these parts of it.
     powers = np.arange(4)
     shares = parts[:, None] ** powers @ np.linalg.inv((powers[:, None] / 3.0) ** powers)
@@ -137,15 +106,19 @@ def _error(table: Table) -> tuple[float, float]:
     return float(relative[worst]), float(gaps[worst])
 
 
-def bridge_tables(surfaces: Sequence[Surface], beads: Iterable[Bead]) -> str:
+def bridge_tables(
+    surfaces: Sequence[Surface], sizes: Collection[tuple[int, float]], law: BridgeLaw | None = None
+) -> str:
     """The bridge tables of a deck: one for every two surfaces that may meet (beads of different types never meet).
 
     Parameters
     ----------
     surfaces
         Contact and liquid of each atom type; the type of the walls comes last.
-    beads
-        Beads of the deck; their atom types are their surfaces.
+    sizes
+        Atom type and radius (m) of the beads; their atom types are their surfaces.
+    law
+        Law of all bridges; default: that of each liquid.
 
     Raises
     ------
@@ -153,15 +126,60 @@ def bridge_tables(surfaces: Sequence[Surface], beads: Iterable[Bead]) -> str:
         As for `tabulated`.
     """
     parts = ["# Gap (m), pull (N), resistances: normal, sliding (N s/m), coupling (N s), rolling (N m s).\n"]
-    radii = sorted({(bead.surface, bead.radius) for bead in beads})
     for kind, (contact, liquid) in enumerate(surfaces, 1):
-        sizes = [radius for of, radius in radii if of == kind]
-        for number, radius in enumerate(sizes):
-            for other_kind, other in [(len(surfaces) + 1, inf), *((kind, size) for size in sizes[number:])]:
+        radii = sorted(radius for of, radius in sizes if of == kind)
+        for number, radius in enumerate(radii):
+            for other_kind, other in [(len(surfaces) + 1, inf), *((kind, size) for size in radii[number:])]:
                 for meeting in Surfaces.of(radius, other, liquid, contact.minimum_separation_ratio).volumes:
                     parts.append(f'# law "{liquid.law}"\nbridge {kind} {other_kind} {radius!r} {other!r}\n')
                     if liquid.conserved:
                         numbers = " ".join(map(repr, (meeting.volume, *chain(*meeting.films))))
                         parts.append(f"liquid {numbers}\n")
-                    parts.append(tabulated(law_of(liquid), meeting, _COARSE if liquid.conserved else TOLERANCE).text())
+                    tolerance = _COARSE if liquid.conserved else TOLERANCE
+                    parts.append(tabulated(law or law_of(liquid), meeting, tolerance).text())
     return "".join(parts)
+
+
+@dataclass(frozen=True)
+class RecordedLaw:
+    """A user's law as a run has recorded it: its bridge tables, for the radii of the run alone, and its file.
+
+    It is interpolated as by the engine; nothing of the user's is executed.
+    """
+
+    tables: str
+    source: bytes | None
+
+    @property
+    def sha256(self) -> str | None:
+        """SHA-256 of the file of the law."""
+        return hashlib.sha256(self.source).hexdigest() if self.source is not None else None
+
+    def __call__(self, surfaces: Surfaces) -> Curve:
+        """The curve of two surfaces; raises `UnusableLawError` if the run has no such bridge."""
+        for part in self.tables.split("\nbridge ")[1:]:
+            head, text = part.split("\nrange ")
+            if [float(word) for word in head.split()[2:4]] == [surfaces.radius, surfaces.other_radius]:
+                return _recorded(text)
+        raise UnusableLawError("the run has recorded no bridge between surfaces of these radii")
+
+
+@lru_cache(maxsize=256)
+def _recorded(text: str) -> Curve:
+    head, *lines = text.partition("\n#")[0].splitlines()
+    formation, rupture, scale, octaves, cells = map(float, head.split())
+    rows = np.array([[float(word) for word in line.split()] for line in lines])
+    fours = np.lib.stride_tricks.sliding_window_view(rows[:, 1:], 4, axis=0)[::3]
+    cubics = fours @ np.linalg.inv((np.arange(4)[:, None] / 3.0) ** np.arange(4)).T
+    middle = scale * (2.0**octaves - 1.0)
+
+    def forces(gaps: FloatArray) -> Forces:
+        gaps = np.clip(gaps, 0.0, rupture)
+        mantissa, exponent = np.frexp(1.0 + gaps / scale)
+        near = cells * ((exponent - 1) + 2.0 * mantissa - 1.0)
+        far = cells * (octaves + 2.0 * (1.0 - np.sqrt((rupture - gaps) / (rupture - middle))))
+        place = np.where(gaps < middle, near, far)
+        cell = np.minimum(place.astype(int), len(cubics) - 1)
+        return Forces(*np.einsum("nck,nk->cn", cubics[cell], (place - cell)[:, None] ** np.arange(4)))
+
+    return Curve(forces, rupture, formation, scale)

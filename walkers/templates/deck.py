@@ -216,8 +216,6 @@ def compose(plan: Plan) -> Deck:
     InputError
         If the law of the bridges cannot be tabulated.
     """
-    from walkers.templates.bridge_tables import UnusableLawError, bridge_tables
-
     case, scene = plan.case, plan.scene
     layout = _layout(plan)
     surfaces = scene.surfaces or (surface_of(case),)
@@ -275,14 +273,21 @@ def compose(plan: Plan) -> Deck:
         wide=not plan.skin and space > _MOST_BINS * largest**3,
     )  # fmt: skip
     files = {LOADS_NAME: _loads(scene)} if several else {}
-    try:
-        files[BRIDGES_NAME] = bridge_tables(surfaces, scene.beads)
-    except UnusableLawError as error:
-        raise InputError(case.name, [Problem("liquid.law", case.liquid.law, str(error))]) from error
+    files[BRIDGES_NAME] = tables_of(case, surfaces, {(bead.surface, bead.radius) for bead in scene.beads})
     fastest = plan.fastest or fastest_of(case, scene)
     beyond = bool(limits_of(case).exceeded_by(case.run.time_step))
     bounds = (case.run.longest_silence(len(scene.beads)), case.run.most_log)
     return Deck(text, files, layout, (scene.lower, scene.upper), fastest, *bounds, beyond)
+
+
+def tables_of(case: Case, surfaces: Sequence[Surface], sizes: Collection[tuple[int, float]]) -> str:
+    """`bridge_tables` of a case, or of cases with its law; raises `InputError` if the law cannot be used."""
+    from walkers.templates.bridge_tables import bridge_tables
+
+    try:
+        return bridge_tables(surfaces, sizes, case.recorded_law)
+    except ValueError as error:
+        raise InputError(case.name, [Problem("liquid.law", case.liquid.law, str(error))]) from error
 
 
 def _loads(scene: Scene) -> str:

@@ -1,23 +1,22 @@
 """Laws of liquid bridges by name: built-in laws and laws of users.
 
 A law is a function `Surfaces → Curve` (`walkers.physics.bridge`). A built-in law is the function ``law`` of a file in
-this folder, with its equation and source, and has the name of the file. Packages add laws by entry points
-``walkers.bridge_laws``. A user's own law is named ``package.module:function`` or ``path/to/file.py:function``.
+this folder, with its equation and source, and has the name of the file. A user's law is named
+``path/to/file.py:function`` or ``package.module:function``. It is checked whenever it is evaluated
+(`walkers.physics.user_law`).
 """
 
 from __future__ import annotations
 
 import hashlib
-import sys
+import warnings
+from functools import lru_cache
 from importlib import import_module
-from importlib.util import module_from_spec, spec_from_file_location
-from inspect import getsourcefile
+from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import iter_modules
-from types import ModuleType
 from typing import TYPE_CHECKING
 
-from walkers.packages import offers
 from walkers.physics.matter import Liquid
 
 if TYPE_CHECKING:  # numpy is not needed to find a law by name
@@ -27,38 +26,55 @@ LAWS = tuple(one.name.replace("_", "-") for one in iter_modules(__path__))
 """Names of the built-in laws."""
 
 
-def by_name(name: str) -> BridgeLaw:
-    """Find a law by name: one of `LAWS`, of an installed package, ``package.module:function`` or ``file.py:function``.
+class ExecutedLawWarning(UserWarning):
+    """The program executes the file of a user's bridge law."""
 
-    Paths of files are relative to the working directory.
+
+def by_name(name: str) -> BridgeLaw:
+    """Find a law by name: one of `LAWS`, ``file.py:function`` or ``package.module:function``.
+
+    Paths of files are relative to the working directory. A file is executed again only after it has changed.
 
     Raises
     ------
     ValueError
-        If there is no law with this name; an error in a user's file or module is its cause.
+        If there is no law with this name, or its file or module cannot be executed.
     """
-    place, _, function = name.rpartition(":")
     if name in LAWS:
-        place, function = f"{__name__}.{name.replace('-', '_')}", "law"
-    elif offer := offers("walkers.bridge_laws").get(name):
-        if not callable(law := offer.load(call=False)):
-            raise offer.broken("it is not a function")
-        return law  # type: ignore[no-any-return]
-    if not place or not function:
-        names = ", ".join([*LAWS, *offers("walkers.bridge_laws")])
-        raise ValueError(f"bridge law {name!r}: expected one of {names}, package.module:function or file.py:function")
-    law = getattr(_module(name, place), function, None)
-    if not callable(law):
-        raise ValueError(f"bridge law {name!r}: {place} has no function {function}")
-    return law  # type: ignore[no-any-return]
+        law: BridgeLaw = import_module(f"{__name__}.{name.replace('-', '_')}").law
+        return law
+    file = source_of(name)
+    place = name.rpartition(":")[0]
+    return _of_user(name, str(file) if file and place.endswith(".py") else place, file, source_sha256(name))
+
+
+def source_of(name: str) -> Path | None:
+    """The file of a user's law; None for a built-in law, and for a module without a file; errors as of `by_name`."""
+    if name in LAWS:
+        return None
+    place, _, function = name.rpartition(":")
+    if not place or not function or not name.isprintable():
+        message = f"expected one of {', '.join(LAWS)}, file.py:function or package.module:function"
+        raise ValueError(f"bridge law {name!r}: {message}")
+    if place.endswith(".py"):
+        return Path(place).resolve()
+    try:
+        found = find_spec(place)
+    except (ImportError, ValueError, AttributeError) as error:
+        raise ValueError(f"bridge law {name!r}: {place} cannot be imported: {error}") from error
+    if found is None:
+        raise ValueError(f"bridge law {name!r}: {place} cannot be imported: no such module")
+    return Path(found.origin) if found.has_location and found.origin else None
 
 
 def source_sha256(name: str) -> str | None:
-    """SHA-256 of the file of a user's own law, None for a built-in law; raises the errors of `by_name`."""
-    if name in LAWS:
+    """SHA-256 of the file of a user's law, None if it has none; errors as of `by_name`. Nothing is executed."""
+    if (file := source_of(name)) is None:
         return None
-    file = getsourcefile(by_name(name))
-    return hashlib.sha256(Path(file).read_bytes()).hexdigest() if file else None
+    try:
+        return hashlib.sha256(file.read_bytes()).hexdigest()
+    except OSError as error:
+        raise ValueError(f"bridge law {name!r}: {file} cannot be read: {error.strerror}") from error
 
 
 def law_of(liquid: Liquid) -> BridgeLaw:
@@ -66,20 +82,12 @@ def law_of(liquid: Liquid) -> BridgeLaw:
     return by_name(liquid.law)
 
 
-def _module(name: str, place: str) -> ModuleType:
-    """A module, or a file as one; a file is in `sys.modules` while it runs, where its dataclasses look for it."""
-    key = f"walkers_law_{Path(place).resolve()}"
-    try:
-        if not place.endswith(".py"):
-            return import_module(place)
-        specification = spec_from_file_location(key, place)
-        assert specification is not None
-        assert specification.loader is not None
-        module = sys.modules[key] = module_from_spec(specification)
-        specification.loader.exec_module(module)
-    except BaseException as error:
-        sys.modules.pop(key, None)
-        if isinstance(error, Exception):
-            raise ValueError(f"bridge law {name!r}: {place} cannot be imported: {error}") from error
-        raise
-    return module
+@lru_cache(maxsize=64)
+def _of_user(name: str, place: str, file: Path | None, sha256: str | None) -> BridgeLaw:
+    """A user's law with this content (``sha256``) of its file."""
+    from walkers.physics.user_law import checked, loaded
+
+    del sha256
+    if not place.startswith("walkers."):
+        warnings.warn(f"executes {file or place}, the bridge law of the case", ExecutedLawWarning, stacklevel=3)
+    return checked(loaded(name, place))
