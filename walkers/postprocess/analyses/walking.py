@@ -107,7 +107,6 @@ class WalkerRows:
     velocity: Annotated[
         FloatArray, "m/s", "velocity along the heading after the settling cycles, positive toward the large beads"
     ]
-    standard_error: Annotated[FloatArray, "m/s", "standard error of the fitted velocity"]
     first_half: Annotated[FloatArray, "m/s", "velocity in the first half of the fitted cycles"]
     second_half: Annotated[FloatArray, "m/s", "velocity in the second half of the fitted cycles"]
     steady: Annotated[BoolArray, "", f"whether first_half and second_half agree within {percent(STEADY_DIFFERENCE)}"]
@@ -147,7 +146,7 @@ class Walking(Analysis):
 
     order = 0
     name = "walking"
-    version = 7
+    version = 8
     tables: ClassVar[Mapping[str, type]] = {"trajectory": Trajectory, "walkers": WalkerRows, "bridges": BridgeRows}
     headlines = ("velocity",)
     derived: ClassVar[Described] = {
@@ -311,12 +310,11 @@ class Walking(Analysis):
         return warnings
 
     def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
-        """Panels of path, orientation and velocity; also of the gait if there are enough samples per cycle."""
-        from walkers.postprocess.figures import gait_panels, velocity_panel, walk_panels
+        """Panels of distance, orientation and path; also of the gait if there are enough samples per cycle."""
+        from walkers.postprocess.figures import gait_panels, walk_panels
 
         groups = run.motion.groups
-        walked = [*walk_panels(groups), velocity_panel(run.case, run.tables["walkers"])]
-        return {"walk": walked, "gait": gait_panels(groups[0])}
+        return {"walk": walk_panels(groups), "gait": gait_panels(groups[0])}
 
     def draw(self, name: str, panels: Sequence[Panel], run: Measured) -> Figure:
         """Figure of the walk, with the beads of one walker to scale."""
