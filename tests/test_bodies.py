@@ -505,7 +505,7 @@ def test_the_shipped_climber_comes_upright_and_climbs(upright: Path) -> None:
     assert result["posture"]["upright"] == result["walkers"] == 6
     assert result["velocity"]["mean"] == pytest.approx(3.62e-3, rel=0.03)
     lines = describe_result(upright, result).splitlines()
-    assert lines[0].startswith("climber: upright to the end, within 0.")
+    assert lines[0].startswith("climber: all 6 climb; upright to the end, within 0.")
 
 
 def test_posture_is_that_of_the_whole_run(upright: Path) -> None:

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from walkers.postprocess.analyses.piles import coordination_of_inner, segregation
+from walkers.postprocess.analyses.piles import segregation
 from walkers.postprocess.clusters import (
     Beads,
     Climb,
@@ -270,16 +270,6 @@ def test_the_bulk_is_what_is_on_the_floor_and_the_component_of_most_beads() -> N
     for walls, bulk in (({}, BULK), ({20: 0}, [*BULK, 20, 21])):
         bridges = bridges_of([*pairwise(BULK), (20, 21)], walls)
         assert np.flatnonzero(bulk_of(connected(24, bridges.beads), bridges)).tolist() == bulk
-
-
-def test_inner_beads_are_those_at_no_wall() -> None:
-    """A chain of four, the first on the floor; the third and the fourth do not touch."""
-    bridges = bridges_of([(0, 1), (1, 2), (2, 3)], {0: 0})
-    bridges.gap[2] = 1e-5
-    found = coordination_of_inner(bridges, 4)
-    assert found == pytest.approx({"beads": 3, "contacts": (2 + 1) / 3, "bridges": (2 + 2 + 1) / 3})
-    held = bridges_of([(0, 1)], {0: 0, 1: SIDE})
-    assert coordination_of_inner(held, 2) == {"beads": 0, "contacts": None, "bridges": None}
 
 
 def test_the_brazil_nut_index_is_one_with_all_small_beads_on_the_floor() -> None:

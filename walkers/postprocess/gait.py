@@ -18,7 +18,7 @@ import numpy as np
 from walkers.inputs.case import CONSTANT
 from walkers.postprocess.analysis import read_result
 from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
-from walkers.postprocess.motion import Group, read_motion
+from walkers.postprocess.motion import Group, Motion, read_motion
 from walkers.postprocess.sides import REST, SEPARATED, STEADY_SPEED
 from walkers.postprocess.tables import read_table
 
@@ -103,13 +103,18 @@ def averages(group: Group) -> Averages:
     """
     samples = settled_samples(group)
     mean = gait(Group(group.motion.averaged, group.make, group.walkers))
-    parts = _PARTS if group.motion.follows_cycles else 1
+    parts = looks_between(group.motion)
     looks = (Group(group.motion.between(part / parts), group.make, group.walkers) for part in range(parts))
     return Averages(
         rotation=mean.rotation[samples].mean(axis=0),
         sliding=mean.sliding[samples].mean(axis=0),
         open=np.mean([(gaps(look)[samples] > 0.0).mean(axis=0) for look in looks], axis=0),
     )
+
+
+def looks_between(motion: Motion) -> int:
+    """Number of times per interval between samples at which gaps are evaluated."""
+    return _PARTS if motion.follows_cycles else 1
 
 
 def gaps(group: Group, at_walls: FloatArray | None = None) -> FloatArray:
@@ -219,7 +224,7 @@ def postures(group: Group) -> list[str]:
 
     A walker with its large bead uphill can tip over like an inverted pendulum; then its velocity has no meaning. The
     angle is evaluated once per cycle. A walker has turned over if it turned by more than 90° from its start. It is
-    upright if it ends within 15° of the direction given by facing and its angle increased by less than half a degree in
+    upright if it ends less than 15° from the direction of facing and its angle increased by less than half a degree in
     the second half of the run. All others lean.
     """
     off = np.abs(group.orientation[:: group.case.run.samples_per_cycle])
