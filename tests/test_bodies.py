@@ -20,7 +20,7 @@ from walkers.inputs.drive import Drive, Harmonic, common_frequency
 from walkers.inputs.errors import InputError
 from walkers.inputs.loads import contact_loads
 from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped
-from walkers.postprocess.analyses.meetings import Course, Meeting, collective
+from walkers.postprocess.analyses.meetings import Course, collective
 from walkers.postprocess.analysis import describe_result, figures_of, read_result
 from walkers.postprocess.gait import postures, turned_over_at
 from walkers.postprocess.motion import read_motion
@@ -225,18 +225,11 @@ def test_what_walkers_do_as_many_is_counted() -> None:
     speed[50:, :2], speed[10:30, 2:] = 0.0, 0.5 * MM_PER_S
     way = np.concatenate([np.zeros((1, 4)), np.cumsum(0.1 * speed, axis=0)])
     course = Course(time, way[..., None] * heading, np.broadcast_to(heading, (101, 4, 2)), size, held)
-    told = ((1.0, "merged", 2, 3, pi / 2), (3.0, "parted", 2, 3, pi / 2), (5.0, "merged", 0, 1, pi))
-    meetings = [Meeting(at, event, one, other, 2, angle) for at, event, one, other, angle in told]
-    found = collective(course, meetings, np.array([1.0, 0.0]))
-    never = {"met": 0, "parted": 0, "walking": 0, "resting": 0}
-    fates = {"following": never, "side": {**never, "met": 1, "parted": 1}, "head_on": {**never, "met": 1, "resting": 1}}
-    assert {name: found.pop(name) for name in fates} == fates
+    found = collective(course, 2, np.array([1.0, 0.0]))
     joined = 40 * 0.5 / 140  # of 140 intervals between frames in which one was joined, 40 at half the speed
     assert found == pytest.approx(
         {
             "meeting_rate": 2 * 2 / (4 * 10.0),
-            "pair_lifetime": 2.0 + 5.0,
-            "pair_time": 2.0 + 5.0,
             "clustered_share": 0.5,
             "largest_cluster": 2,
             "held_share": 0.25,
@@ -512,7 +505,7 @@ def test_the_shipped_climber_comes_upright_and_climbs(upright: Path) -> None:
     assert result["posture"]["upright"] == result["walkers"] == 6
     assert result["velocity"]["mean"] == pytest.approx(3.62e-3, rel=0.03)
     lines = describe_result(upright, result).splitlines()
-    assert lines[0].startswith("climber: upright to the end, within 0.")
+    assert lines[0].startswith("climber: all 6 climb; upright to the end, within 0.")
 
 
 def test_posture_is_that_of_the_whole_run(upright: Path) -> None:

@@ -6,9 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from walkers.inputs.boundary import Boundary
-from walkers.physics.capillary import bridge_volume_between_beads
-from walkers.postprocess.analyses.piles import coordination_of_inner, liquid_of_beads, packing_profile, segregation
+from walkers.postprocess.analyses.piles import segregation
 from walkers.postprocess.clusters import (
     Beads,
     Climb,
@@ -272,40 +270,6 @@ def test_the_bulk_is_what_is_on_the_floor_and_the_component_of_most_beads() -> N
     for walls, bulk in (({}, BULK), ({20: 0}, [*BULK, 20, 21])):
         bridges = bridges_of([*pairwise(BULK), (20, 21)], walls)
         assert np.flatnonzero(bulk_of(connected(24, bridges.beads), bridges)).tolist() == bulk
-
-
-def test_the_packing_profile_holds_all_of_the_beads() -> None:
-    draw = np.random.default_rng(1)
-    radius, position = draw.uniform(3e-4, 6e-4, 50), draw.uniform(1e-3, 9e-3, (3, 50, 3))
-    container, liquid = (
-        Boundary(shape="box", material="glass", width=5e-3, height=20e-3),
-        draw.uniform(1e-12, 2e-12, (3, 50)),
-    )
-    found = packing_profile(position, radius, liquid, container, 2e-4)
-    room = container.cross_section * 2e-4
-    assert float(found.packing_fraction.sum() * room) == pytest.approx(float((4.0 / 3.0 * np.pi * radius**3).sum()))
-    assert float(found.liquid_fraction.sum() * room) == pytest.approx(liquid.sum() / 3.0)
-    assert found.height[0] == pytest.approx(1e-4)
-
-
-def test_liquid_is_that_of_the_bridges() -> None:
-    """Three beads in a chain, the first on the floor: halves of the bridges between them, all of that at the floor."""
-    radius, fraction = np.array([3e-4, 3e-4, 5e-4]), 0.01
-    bridges = bridges_of([(0, 1), (1, 2)], {0: 0})
-    equal, unequal = (bridge_volume_between_beads(3e-4, other, fraction) for other in (3e-4, 5e-4))
-    floor = 0.5 * fraction * 4.0 / 3.0 * np.pi * 3e-4**3
-    expected = [floor + equal / 2.0, (equal + unequal) / 2.0, unequal / 2.0]
-    np.testing.assert_allclose(liquid_of_beads(radius, fraction, bridges), expected)
-
-
-def test_inner_beads_are_those_at_no_wall() -> None:
-    """A chain of four, the first on the floor; the third and the fourth do not touch."""
-    bridges = bridges_of([(0, 1), (1, 2), (2, 3)], {0: 0})
-    bridges.gap[2] = 1e-5
-    found = coordination_of_inner(bridges, 4)
-    assert found == pytest.approx({"beads": 3, "contacts": (2 + 1) / 3, "bridges": (2 + 2 + 1) / 3})
-    held = bridges_of([(0, 1)], {0: 0, 1: SIDE})
-    assert coordination_of_inner(held, 2) == {"beads": 0, "contacts": None, "bridges": None}
 
 
 def test_the_brazil_nut_index_is_one_with_all_small_beads_on_the_floor() -> None:

@@ -186,25 +186,16 @@ def test_tables_of_a_pile(run: Path) -> None:
     assert members.groupby("time")["track"].nunique().sum() == bed["clusters"].sum()
     assert len(bed) == len(motion.time)
     assert bed["bridges"].iloc[-1] > 2.0
-    profile = read_table(run, "profile")
-    assert 0.2 < profile["packing_fraction"].max() < 0.75
-    # Bridges hold the caps of the films that neighbours cover: some of what was given.
-    given = motion.case.liquid.volume_fraction * float((4.0 / 3.0 * np.pi * motion.radius**3).sum())
-    assert 0.4 * given < bed["liquid_in_bridges"].iloc[-1] < 0.9 * given
 
 
 def test_contacts_and_bridges_are_counted_at_rest_and_while_shaken(run: Path) -> None:
-    """Of all beads, and of those with no bridge to a wall or the floor; bridges to these count for none."""
+    """Bridges to walls and the floor count for none."""
     motion, bed, found = read_motion(run), read_table(run, "bed"), current_result(run)["coordination"]
     rest = bed[bed["time"] <= 0.0].iloc[-1]
     assert found["rest"] == pytest.approx({"contacts": rest["contacts"], "bridges": rest["bridges"]})
     bridges = list(read_bridges(motion))[rest.name]
-    inner = set(range(len(motion.radius))) - set(bridges.wall_beads.tolist())
     ends = [bead for pair in bridges.beads.tolist() for bead in pair]
-    assert found["rest_inner"]["beads"] == len(inner) > 10
-    assert found["rest_inner"]["bridges"] == pytest.approx(sum(bead in inner for bead in ends) / len(inner))
     assert found["rest"]["bridges"] == pytest.approx(len(ends) / len(motion.radius))
-    assert found["rest"]["contacts"] < found["rest_inner"]["contacts"] <= found["rest_inner"]["bridges"]
     late = bed[bed["time"] >= bed["time"][bed["time"] >= 0.0].mean()]
     assert found["shaken"] == pytest.approx({"contacts": late["contacts"].mean(), "bridges": late["bridges"].mean()})
     # A sweep's onset is that by which a cluster first counted, not where its greatest gain began.

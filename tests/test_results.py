@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from errno import EROFS
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -40,54 +39,13 @@ def test_slopes_are_those_of_least_squares() -> None:
     rng = np.random.default_rng(5)
     time = np.linspace(3.0, 4.0, 30)
     values = np.outer(time, [2.0, -1.0]) + 0.1 * rng.standard_normal((30, 2)) + 1e3
-    slope, _ = fit_slopes(time, values)
+    slope = fit_slopes(time, values)
     for column in range(2):
         expected, _ = np.polyfit(time - 3.5, values[:, column] - 1e3, 1)
         assert slope[column] == pytest.approx(expected, rel=1e-9)
-    slope, error = fit_slopes(time, np.outer(time, [1e-3, 0.0]))  # a walker without noise
+    slope = fit_slopes(time, np.outer(time, [1e-3, 0.0]))  # a walker without noise
     np.testing.assert_allclose(slope, [1e-3, 0.0], atol=1e-15)
-    assert (error < 1e-12).all()
-    slope, error = fit_slopes(np.array([0.0, 2.0]), np.array([[1.0], [5.0]]))  # of two points nothing is known
-    assert slope[0] == 2.0
-    assert np.isnan(error[0])
-
-
-def _autocorrelated(rng: np.random.Generator, phi: float, shape: tuple[int, int]) -> np.ndarray[Any, Any]:
-    steps = rng.standard_normal((shape[0] + 100, shape[1]))
-    for number in range(1, len(steps)):
-        steps[number] += phi * steps[number - 1]
-    return np.cumsum(steps[100:], axis=0)
-
-
-@pytest.mark.parametrize("cycles", [40, 100])
-@pytest.mark.parametrize(
-    ("made", "least", "most"),
-    [
-        ("random steps", 0.8, 1.25),
-        ("autocorrelated steps", 0.8, 1.5),
-        ("noise about a steady walk", 0.8, 3.0),
-        ("noise and random steps", 0.8, 1.5),
-    ],
-)
-def test_the_error_of_a_slope_is_how_far_slopes_are_off(cycles: int, made: str, least: float, most: float) -> None:
-    """Stated over true error of 2,000 walkers. Noise alone is not told from noise with a few random steps in it."""
-    rng, shape = np.random.default_rng(7), (cycles + 1, 2000)
-    noise = rng.standard_normal(shape)
-    walked = {
-        "random steps": np.cumsum(noise, axis=0),
-        "autocorrelated steps": _autocorrelated(rng, 0.5, shape),
-        "noise about a steady walk": noise,
-        "noise and random steps": noise + 0.3 * np.cumsum(rng.standard_normal(shape), axis=0),
-    }[made]
-    time = np.arange(cycles + 1) / 80.0
-    slope, error = fit_slopes(time, walked + 5.0 * time[:, None])
-    ratio = float(np.sqrt(np.mean(error**2)) / np.std(slope - 5.0))
-    assert least < ratio < most
-    # The textbook's error of a fit, which takes residuals as independent, is several times too small for random steps.
-    if made == "random steps":
-        residuals = walked - walked.mean(axis=0) - np.outer(time - time.mean(), slope - 5.0)
-        naive = np.sqrt(np.mean(residuals**2) / np.sum((time - time.mean()) ** 2))
-        assert naive < 0.2 * np.std(slope)
+    assert fit_slopes(np.array([0.0, 2.0]), np.array([[1.0], [5.0]])) == 2.0
 
 
 def test_a_result_of_before_is_made_anew_if_it_can_be(
@@ -138,7 +96,6 @@ def test_velocity_is_the_strobed_displacement_over_time(moved: Group) -> None:
     np.testing.assert_allclose(walked.velocity, crude, rtol=0.01)
     assert np.abs(walked.lateral_velocity).max() < 0.1 * np.abs(walked.axial_velocity).min()
     assert np.all(walked.steady)
-    assert np.all(walked.standard_error < 1e-3 * walked.velocity)
     # Twenty samples a cycle represent the gait: their mean velocity is the displacement a cycle.
     through = gait(moved).velocity[settled_samples(moved)].mean(axis=0)
     np.testing.assert_allclose(through, walked.velocity, rtol=0.03)

@@ -18,12 +18,15 @@ from walkers.inputs.errors import InputError
 from walkers.inputs.numerical import INFLUENCE, STIFFER, measured, numerical_error
 from walkers.inputs.readable import kind_of
 from walkers.inputs.reading import load_case, resolve_case
-from walkers.inputs.rounding import rounded
+from walkers.inputs.rounding import rounded, with_decimals
 from walkers.paper.published import outside_of_the_paper
 from walkers.physics.units import parse_quantity
 from walkers.pipeline import find_side
-from walkers.postprocess.analysis import describe_result
+from walkers.postprocess.analyses.walking import _summary
+from walkers.postprocess.analysis import describe_result, quantities_of
+from walkers.postprocess.motion import read_motion
 from walkers.postprocess.sides import fell, sides_apart, uphill_velocities
+from walkers.postprocess.tables import read_columns
 from walkers.postprocess.uncertainty import band_text
 from walkers.sweeps.comparison import compare_runs
 from walkers.sweeps.folder import as_text, inventory
@@ -183,3 +186,109 @@ def test_theory_says_nothing_of_the_papers_fit_to_other_beads() -> None:
     case = make_case(liquid={"name": "ethylene glycol"})
     told = describe(predict(case), None)
     assert re.search(r"paper's fit, κ = 0.033 s/mm\s+none: the fit is to ruby on level", told)
+
+
+FOUR_BEADS = {
+    "clusters": [
+        {
+            "radii": ["0.5 mm", "0.3 mm", "0.3 mm", "0.3 mm"],
+            "at": [
+                ["0 mm", "0 mm"],
+                ["-0.67075 mm", "0.38726 mm"],
+                ["-0.7461 mm", "-0.20777 mm"],
+                ["-0.37418 mm", "-0.6782 mm"],
+            ],
+            "replicates": 2,
+        }
+    ],
+    "beads": {"material": "glass"},
+    "liquid": {"name": "glycerol 87 %", "volume_fraction": 0.01},
+    "contact": {"friction": {"bead_bead": 0.3, "bead_wall": 0.3}, "rolling_friction": 0.005},
+    "drive": {"frequency": "170 Hz", "peak_acceleration": "10 g"},
+    "run": {"cycles": 24, "settling_cycles": 8},
+}
+"""A cluster whose beads in front are 13° beside the way that it faces."""
+
+
+def test_no_mean_over_clusters_that_face_up_and_down_a_slope(tmp_path: Path) -> None:
+    steep = {**FOUR_BEADS, "boundary": {"material": "glass", "tilt": "30 deg"}}
+    done = walkers.run(resolve_case(steep, name="four"), tmp_path)
+    told, result, each = done.describe(), done.result, done.walkers
+    up, down = (each[each["facing"] == way] for way in (1, -1))
+    climbing = int((each["axial_velocity"] > 2e-6).sum())
+    assert climbing == 1
+    assert told.startswith("four: 1 climbs, 1 goes down; ")
+    posture = {**result["posture"], "climb": 0, "down": 2}
+    assert describe_result(done.directory, {**result, "posture": posture}).startswith("four: all 2 go down; ")
+    assert result["velocity"]["mean"] == pytest.approx(up["velocity"].mean())
+    assert result["axial_velocity"]["mean"] == pytest.approx(up["axial_velocity"].mean())
+    assert result["axial_velocity"]["left_facing"] == pytest.approx(down["axial_velocity"].mean())
+    speeds = [rounded(1e3 * one["axial_velocity"].mean(), "mm/s") for one in (up, down)]
+    assert re.search("velocity +facing up {}0*, facing down {}0* mm/s, positive up the slope".format(*speeds), told)
+    assert "along the heading" not in told
+    # A sweep that begins on a level floor is drawn by the same walkers.
+    level = walkers.run(resolve_case({**FOUR_BEADS, "boundary": {"material": "glass"}}, name="level"), tmp_path)
+    rightward = level.walkers[level.walkers["facing"] == 1]["axial_velocity"].mean()
+    assert row_of(level.result)["axial_velocity"] == pytest.approx(rightward) != 0.0
+
+
+def test_a_cluster_leans_by_how_far_it_turned(tmp_path: Path) -> None:
+    """Not by the angle between the way that it faces and its beads in front, which its arrangement contains."""
+    steep = {**FOUR_BEADS, "boundary": {"material": "glass", "tilt": "30 deg"}}
+    done = walkers.run(resolve_case(steep, name="four"), tmp_path)
+    begin = done.trajectory.groupby("walker")["orientation"].first()
+    np.testing.assert_allclose(begin, done.walkers["start_angle"], atol=2e-3)
+    heading = read_motion(done.directory).groups[0].heading[[0, -1]]
+    turned = np.abs(np.diff(np.unwrap(np.arctan2(heading[..., 1], heading[..., 0]), axis=0), axis=0))
+    assert done.result["posture"]["ends_within"] == pytest.approx(turned.max(), abs=np.radians(2.0))
+
+
+def test_walkers_that_came_apart_have_no_velocity_anywhere_in_the_text(runs_folder: Path) -> None:
+    done = walkers.run(load_case("fig1b"), runs_folder)
+    told = describe_result(done.directory, {**done.result, "separated_fraction": 0.5})
+    assert "velocity   none: walkers came apart: beads beyond the rupture distance for 50 % of the time" in told
+    for words in ("started facing", "steady (", "scatter", "numerical error"):
+        assert words in done.describe()
+        assert words not in told
+    names = [row.name for row in quantities_of({**done.result, "separated_fraction": 0.5})]
+    assert not [name for name in names if name.startswith("velocity")]
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.21351388, "0.214"), (12.3446, "12.34"), (0.0124996, "0.012"), (9.9996, "10"), (99.996, "100")],
+)
+def test_a_number_is_rounded_once(value: float, text: str) -> None:
+    assert rounded(value, "mm/s") == text
+    assert float(with_decimals(value, 3)) == float(text)
+
+
+def test_a_result_that_depends_on_the_start_says_so(runs_folder: Path) -> None:
+    """Of steady copies on a level floor those that face left are faster by 40 %, or those of one side differ."""
+    done = walkers.run(load_case("fig1b"), runs_folder)
+    assert not done.result["depends_on_start"]
+    columns = read_columns(done.directory, "walkers")
+    left = columns["facing"] < 0
+    for faster in (left, np.arange(len(left)) == 0):
+        changed = {**columns, "velocity": np.where(faster, 1.4, 1.0) * columns["velocity"]}
+        found = {**done.result, **_summary(changed, done.case)}
+        assert found["depends_on_start"]
+        told = describe_result(done.directory, found)
+        assert "; depends on the start\n" in told
+        assert "warning: steady copies differ by more than 5 %: the velocity depends on the start" in told
+        assert not _summary({**changed, "steady": ~columns["steady"]}, done.case)["depends_on_start"]
+
+
+def test_the_velocity_says_how_many_walkers_turned(runs_folder: Path) -> None:
+    done = walkers.run(load_case("fig1b"), runs_folder)
+    assert "turned by" not in done.describe()
+    told = describe_result(done.directory, {**done.result, "turned_round": 2})
+    assert "1.080 mm/s, positive toward the large bead; 2 of 6 turned by more than 90°" in told
+
+
+def test_shares_of_open_contacts_say_their_resolution_and_work_whose_it_is(runs_folder: Path) -> None:
+    done = walkers.run(load_case("fig1b"), runs_folder)
+    open_ones = dict.fromkeys(done.result["open"], 0.229)
+    told = describe_result(done.directory, {**done.result, "open": open_ones})
+    assert "22.9 % of the time, in steps of 0.5 %" in told
+    assert "inertial work of the drive per cycle" in told

@@ -34,7 +34,7 @@ def rounded(value: float, unit: str = "") -> str:
     if not isfinite(value):
         return "-"
     if unit in _DECIMALS:
-        value = round(value, _DECIMALS[unit]) + 0.0  # not -0
+        value = round(value, _decimals(value, _DECIMALS[unit])) + 0.0  # not -0
     text = f"{value:.{DIGITS}g}"
     return f"{float(text):.0f}" if 10**DIGITS <= abs(value) < _LARGEST_WRITTEN_OUT else text
 
@@ -49,11 +49,15 @@ def with_decimals(value: float, decimals: int) -> str:
     """
     if not isfinite(value):
         return "-"
-    value = float(f"{value:.{DIGITS}g}")
-    size = floor(log10(abs(value))) if value else 0
-    decimals = min(decimals, max(0, DIGITS - 1 - size))
-    text = f"{round(value, min(decimals, DIGITS - 1 - size)):.{decimals}f}"
+    decimals = _decimals(value, decimals)
+    text = f"{round(value, decimals):.{max(0, decimals)}f}"
     return "0" if float(text) == 0.0 else text
+
+
+def _decimals(value: float, most: int) -> int:
+    """Decimals of a number with at most four significant digits, so that it is rounded once."""
+    value = float(f"{value:.{DIGITS}g}")
+    return min(most, DIGITS - 1 - (floor(log10(abs(value))) if value else 0))
 
 
 def counted(number: int, noun: str) -> str:

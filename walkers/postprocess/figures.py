@@ -110,7 +110,7 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
         time, distance = distance_walked(group)
         if uphill:
             distance = (group.mass_centre[::strobe] - group.mass_centre[0]) @ group.drive_axis
-        slope, _ = fit_slopes(time[settled:], distance[settled:])
+        slope = fit_slopes(time[settled:], distance[settled:])
         way = (group.mass_centre[::strobe] - group.mass_centre[0]) * 1e3
         for place, walker in enumerate(group.walkers):
             number = walker.walker
@@ -143,20 +143,6 @@ def walk_panels(groups: list[Group]) -> list[Panel]:
 def named_of(count: int) -> str:
     """Number of walkers that a legend names, if not all."""
     return f" ({MOST_NAMED} of {count} walkers named)" if count > MOST_NAMED else ""
-
-
-def velocity_panel(case: Case, walkers: Columns) -> Panel:
-    """Velocity of each walker with the standard error of its fit."""
-    velocity, error, lines = 1e3 * walkers["velocity"], 1e3 * walkers["standard_error"], []
-    for way, direction in zip((1, -1), ways(uphill=case.goes_uphill), strict=True):
-        label, colour, marker = f"started facing {direction}", int(way < 0), "o" if way > 0 else "s"
-        these = sides(walkers["facing"], walkers["start_angle"]) == way
-        if not these.any():
-            continue
-        number = walkers["walker"][these]
-        lines.append(Line(number, velocity[these], label, colour, marker, width=0.0, error=error[these]))
-    names = ("Velocity of each walker", "number of the walker", "velocity (mm/s)")
-    return Panel(*names, lines, zero=True, least=_LEAST_SPEED)
 
 
 def gait_panels(group: Group) -> list[Panel]:

@@ -18,7 +18,7 @@ import numpy as np
 from walkers.inputs.case import CONSTANT
 from walkers.postprocess.analysis import read_result
 from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
-from walkers.postprocess.motion import Group, read_motion
+from walkers.postprocess.motion import Group, Motion, read_motion
 from walkers.postprocess.sides import REST, SEPARATED, STEADY_SPEED
 from walkers.postprocess.tables import read_table
 
@@ -39,19 +39,6 @@ _LITTLE, _FADING, _NO_FASTER = 0.005, 0.9, 1e-4
 """A walker of constant velocity turns by less than the first angle (rad) per cycle, and in the second half of the run
 by less than the third angle more than in the first half; or by at most the second number times what it turned before.
 """
-_PARTLY = np.linspace(-0.95, -0.1, 9)
-_LASTING = np.linspace(0.1, 0.9, 9)
-_MODELS = np.array(
-    [
-        (0.0, 0.0, 2.0),
-        (0.0, -1.0, 1.0),
-        *((0.0, theta, 1.0 / len(_PARTLY)) for theta in _PARTLY),
-        *((phi, 0.0, 1.0 / len(_LASTING)) for phi in _LASTING),
-    ]
-).T
-"""Models of the steps: φ, θ and prior weight. Independent steps (of twice the weight of the others); differences of
-independent positions; mixtures of both; autocorrelated steps."""
-_TINY = 1e-300
 
 
 @dataclass(frozen=True)
@@ -116,13 +103,18 @@ def averages(group: Group) -> Averages:
     """
     samples = settled_samples(group)
     mean = gait(Group(group.motion.averaged, group.make, group.walkers))
-    parts = _PARTS if group.motion.follows_cycles else 1
+    parts = looks_between(group.motion)
     looks = (Group(group.motion.between(part / parts), group.make, group.walkers) for part in range(parts))
     return Averages(
         rotation=mean.rotation[samples].mean(axis=0),
         sliding=mean.sliding[samples].mean(axis=0),
         open=np.mean([(gaps(look)[samples] > 0.0).mean(axis=0) for look in looks], axis=0),
     )
+
+
+def looks_between(motion: Motion) -> int:
+    """Number of times per interval between samples at which gaps are evaluated."""
+    return _PARTS if motion.follows_cycles else 1
 
 
 def gaps(group: Group, at_walls: FloatArray | None = None) -> FloatArray:
@@ -151,13 +143,12 @@ def _nearest_wall(group: Group) -> tuple[FloatArray, FloatArray | None]:
 class Walk:
     """Velocities of W walkers after the settling cycles, m/s, each of shape (W,).
 
-    ``velocity`` is the slope of the distance along the heading, one sample per cycle, with its standard error
-    (`fit_slopes`). Axial and lateral velocities are those of the mass centre along and across the drive axis.
-    ``steady`` is whether the first and the second half agree.
+    ``velocity`` is the slope of the distance along the heading, one sample per cycle (`fit_slopes`). Axial and lateral
+    velocities are those of the mass centre along and across the drive axis. ``steady`` is whether the first and the
+    second half agree.
     """
 
     velocity: FloatArray
-    standard_error: FloatArray
     first_half: FloatArray
     second_half: FloatArray
     axial_velocity: FloatArray
@@ -190,94 +181,28 @@ def walk(group: Group) -> Walk:
     if len(time) < settled + 2:
         raise DumpError(f"the dump holds {len(time) - 1} cycles, no more than the {settled} settling ones")
     time, distance = time[settled:], distance[settled:]
-    velocity, error = fit_slopes(time, distance)
+    velocity = fit_slopes(time, distance)
     first = second = velocity
     middle = (len(time) + 1) // 2
     if middle >= 2:
-        first, _ = fit_slopes(time[:middle], distance[:middle])
-        second, _ = fit_slopes(time[middle - 1 :], distance[middle - 1 :])
+        first = fit_slopes(time[:middle], distance[:middle])
+        second = fit_slopes(time[middle - 1 :], distance[middle - 1 :])
     centre = group.mass_centre[:: group.case.run.samples_per_cycle][settled:]
     return Walk(
         velocity=velocity,
-        standard_error=error,
         first_half=first,
         second_half=second,
-        axial_velocity=fit_slopes(time, centre @ group.drive_axis)[0],
-        lateral_velocity=fit_slopes(time, centre @ group.across_axis)[0],
+        axial_velocity=fit_slopes(time, centre @ group.drive_axis),
+        lateral_velocity=fit_slopes(time, centre @ group.across_axis),
         steady=np.abs(first - second) <= np.maximum(STEADY_DIFFERENCE * np.abs(velocity), STEADY_SPEED),
     )
 
 
-def fit_slopes(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Slopes of the columns of ``values`` against time (least squares) and their standard errors.
-
-    Values are sums of steps, so their residuals are not independent; the usual error of a fit assumes that they are and
-    is eight times too small for forty random steps. The slope is Σ c_s d_s with the steps d_s and
-    c_s = Σ_{t > s} (t − t̄)/Σ (t − t̄)²; its variance is cᵀ Γ c. Γ is the covariance of an autoregressive moving
-    average, d_s − v = φ (d_{s−1} − v) + e_s + θ e_{s−1}, averaged over φ and θ with their restricted likelihoods (v and
-    the variance of e integrated out; Patterson and Thompson 1971, doi 10.1093/biomet/58.3.545) from the innovations
-    (Brockwell and Davis 1991, doi 10.1007/978-1-4419-0320-4, chapter 5). A few steps do not distinguish random steps
-    from noise about a steady walk; then the error is close to that of random steps, the larger one.
-
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        s; equally spaced.
-    values : ndarray, shape (N, K)
-
-    Returns
-    -------
-    slope, standard_error : ndarray, shape (K,)
-        The error is NaN for fewer than three points.
-    """
+def fit_slopes(time: FloatArray, values: FloatArray) -> FloatArray:
+    """Slopes of the columns of ``values`` (shape (N, K)) against time (s, shape (N,)) by least squares, shape (K,)."""
     # Differences from the mean avoid rounding errors: positions reach metres, steps micrometres.
-    time, values = time - time.mean(), values - values.mean(axis=0)
-    square = float(np.sum(time**2))
-    slope = time @ values / square
-    if len(time) < 3:
-        return slope, np.full(slope.shape, np.nan)
-    weights = np.cumsum(time[::-1])[::-1][1:] / square
-    return slope, np.sqrt(_variance(np.diff(values, axis=0), weights))
-
-
-def _variance(steps: FloatArray, weights: FloatArray) -> FloatArray:
-    """Variance of weighted sums of steps (shape (N, K), weights (N,)), averaged over the models, shape (K,)."""
-    phi, theta, before = _MODELS
-    squares, logarithm = _innovations(steps - steps.mean(axis=0), phi, theta)
-    likelihood = np.log(before)[:, None] + logarithm[:, None] - 0.5 * (len(steps) - 1) * np.log(squares)
-    share = np.exp(likelihood - likelihood.max(axis=0))
-    share /= share.sum(axis=0)
-    # Autocovariances of steps (unit variance of e) times those of the weights.
-    own = np.correlate(weights, weights, "full")[len(weights) - 1 :]
-    next_one = (1.0 + phi * theta) * (phi + theta) / (1.0 - phi**2)
-    later = phi[:, None] ** np.arange(len(steps) - 1) @ own[1:]
-    variance = _of_one_step(phi, theta) * own[0] + 2.0 * next_one * later
-    return np.asarray((share * variance[:, None] * squares).sum(axis=0) / (len(steps) - 1))
-
-
-def _of_one_step(phi: FloatArray, theta: FloatArray) -> FloatArray:
-    """Variance of a step for unit variance of e."""
-    return np.asarray((1.0 + 2.0 * phi * theta + theta**2) / (1.0 - phi**2))
-
-
-def _innovations(steps: FloatArray, phi: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sums of squared standardised innovations, shape (M, K), and log-likelihoods without them, shape (M,).
-
-    The common mean of the steps is removed by generalised least squares, hence the column of ones.
-    """
-    columns = np.concatenate([steps, np.ones((len(steps), 1))], axis=1)
-    variance, expected = _of_one_step(phi, theta), np.zeros((len(phi), columns.shape[1]))
-    squares, cross, logarithm = np.zeros_like(expected), np.zeros_like(expected), np.zeros(len(phi))
-    for row in columns:
-        innovation = row - expected
-        squares += innovation**2 / variance[:, None]
-        cross += innovation * innovation[:, -1:] / variance[:, None]
-        logarithm -= 0.5 * np.log(variance)
-        expected = phi[:, None] * row + (theta / variance)[:, None] * innovation
-        variance = 1.0 + theta**2 - theta**2 / variance
-    ones = squares[:, -1]
-    left = squares[:, :-1] - cross[:, :-1] ** 2 / ones[:, None]
-    return np.maximum(left, _TINY), logarithm - 0.5 * np.log(ones)
+    time = time - time.mean()
+    return np.asarray(time @ (values - values.mean(axis=0)) / np.sum(time**2))
 
 
 def settled_samples(group: Group) -> slice:
@@ -299,7 +224,7 @@ def postures(group: Group) -> list[str]:
 
     A walker with its large bead uphill can tip over like an inverted pendulum; then its velocity has no meaning. The
     angle is evaluated once per cycle. A walker has turned over if it turned by more than 90° from its start. It is
-    upright if it ends within 15° of the direction given by facing and its angle increased by less than half a degree in
+    upright if it ends less than 15° from the direction of facing and its angle increased by less than half a degree in
     the second half of the run. All others lean.
     """
     off = np.abs(group.orientation[:: group.case.run.samples_per_cycle])

@@ -243,10 +243,16 @@ class Group:
 
     @cached_property
     def orientation(self) -> FloatArray:
-        """ψ, rad, shape (F, W): angle from the start direction to the foremost beads, unwrapped."""
+        """ψ, rad, shape (F, W): by how much walkers are turned from the direction that they face, unwrapped.
+
+        An arrangement that faces this direction has ψ = 0, also if its beads in front are beside its middle.
+        """
+        ahead, aside = np.array(self.make.front) @ np.array(self.make.design)
         arm = np.einsum("fwbx,b->fwx", self.position, np.array(self.make.front))
         facing = np.array([walker.facing for walker in self.walkers])
-        angle = np.arctan2(facing * (arm @ self.across_axis), facing * (arm @ self.drive_axis))
+        angle = np.arctan2(facing * (arm @ self.across_axis), facing * (arm @ self.drive_axis)) - np.arctan2(
+            aside, ahead
+        )
         unwrapped: FloatArray = np.unwrap(angle, axis=0)
         return unwrapped
 

@@ -31,7 +31,6 @@ _WIDE, _AROUND = 16.0 / 9.0, 1.15  # width over height of the view; its extent o
 _NECK = 0.45  # radius of what is drawn of a bridge over that of the smallest bead
 _UNITS = {
     **{"speed": "m/s", "velocity": "m/s", "omega": "rad/s", "radius": "m", "gap": "m", "normal_force": "N"},
-    "liquid": "m^3",
 }
 """Units of arrays."""
 

@@ -27,6 +27,7 @@ _NONE = "none"
 _SEEDS = ("run.seed", "seed")
 _SYMBOLS = {"gamma0": "Γ0", "sin_delta": "sin δ"}
 _SYMBOLS |= {"right_facing": "velocity, facing right (up)", "left_facing": "velocity, facing left (down)"}
+_SYMBOLS |= {"axial_velocity": "velocity along the axis (uphill), facing right (up)"}
 _LEAST_ASYMMETRIES = 3  # smallest number of pairs of radii that are shown by sin δ
 _MOST_PANELS = 12
 _MARKERS = "osD^vXP<>*"

@@ -69,8 +69,7 @@ _LEFT_OUT = {
     *("scatter", "axial_velocity", "right_facing", "left_facing", "sliding_2", "sliding_3", "open_1", "open_2"),
     *("open_3", "separated_fraction", "orientation_end", "turned_round", "walkers_met", "lost", "reason"),
     *("smallest", "largest", "rotation_2", "cycles", "ended_early", "parted", "largest_group", "meeting_rate"),
-    *("pair_lifetime", "pair_time", "largest_cluster", "nematic_order", "polar_order", "joined_speed", "speed_ratio"),
-    *(f"{way}_{what}" for way in ("following", "side", "head_on") for what in ("met", "parted", "walking", "resting")),
+    *("largest_cluster", "nematic_order", "polar_order", "joined_speed", "speed_ratio"),
 }
 """Columns that the printed table leaves out."""
 _VARIED = "varied"

@@ -30,29 +30,12 @@ if TYPE_CHECKING:
     from walkers.postprocess.figures import Panel
 
 _GREY = "#5b6770"
-_APPROACHES = {
-    "following": (0.0, "less than 60° apart"),
-    "side": (pi / 3.0, "60° to 120° apart"),
-    "head_on": (2.0 * pi / 3.0, "more than 120° apart"),
-}
-"""Classes of meetings by the angle between the headings: lower bound (rad) and description."""
-_FATES = {
-    "parted": "have separated",
-    "walking": "are joined at the end and move",
-    "resting": "are joined at the end and are slow",
-}
 _SLOW = 0.1
 """Walkers below this fraction of the speed of free walkers are slow."""
 _END = 0.1
 """Final fraction of the drive, over which the end is measured."""
 _NUMBERS = {
     "meeting_rate": ("meeting rate", "1/s", "number of meetings of a walker per second"),
-    "pair_lifetime": (
-        "mean lifetime of a pair",
-        "s",
-        "pair_time over the number of separations: mean lifetime if pairs separate at random; NaN without separations",
-    ),
-    "pair_time": ("total time of pairs", "s", "total time for which pairs are joined, over all meetings"),
     "clustered_share": ("walkers in clusters", "share", "share of walkers joined to others in the last frame"),
     "largest_cluster": ("walkers in the largest cluster", "", "cluster size in the last frame; 1 if none are joined"),
     "held_share": (
@@ -124,7 +107,7 @@ class Meetings(Analysis):
 
     order = 1
     name = "meetings"
-    version = 2
+    version = 3
     tables: ClassVar[Mapping[str, type]] = {"meetings": Meeting}
     derived: ClassVar[Described] = {
         "coverage": (
@@ -185,7 +168,7 @@ class Meetings(Analysis):
             "parted": events.count("parted"),
             "largest_group": int(np.max(sizes)),
             "groups_at_end": sorted((group for group in groups if len(group) > 1), key=len, reverse=True),
-            **collective(course, rows, np.array(motion.case.drive_axis)[:2]),
+            **collective(course, events.count("merged"), np.array(motion.case.drive_axis)[:2]),
         }
 
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
@@ -198,12 +181,6 @@ class Meetings(Analysis):
         yield Quantity("largest_group", "largest group of walkers", "", "largest_group", text)
         for name, (label, unit, text) in _NUMBERS.items():
             yield Quantity(name, label, unit, name, text)
-        for approach, (_, angle) in _APPROACHES.items():
-            text = f"meetings of two walkers with headings {angle}"
-            yield Quantity(f"{approach}.met", "", "", f"{approach}_met", text)
-            for fate, words in _FATES.items():
-                text = f"number of pairs of {approach}_met that {words}"
-                yield Quantity(f"{approach}.{fate}", "", "", f"{approach}_{fate}", text)
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """Numbers of meetings, and the groups at the end."""
@@ -284,10 +261,10 @@ def _places(motion: Motion) -> tuple[FloatArray, FloatArray]:
     return centre, heading
 
 
-def collective(course: Course, meetings: Sequence[Meeting], axis: FloatArray) -> dict[str, Any]:
+def collective(course: Course, merged: int, axis: FloatArray) -> dict[str, Any]:
     """Collective quantities of a result, defined by the columns of `Meetings`; None for undefined quantities.
 
-    ``axis`` is the unit vector of the drive.
+    ``merged`` is the number of meetings, ``axis`` the unit vector of the drive.
     """
     time, last = course.time, len(course.time) - 1
     begin = min(int(np.searchsorted(time, time[-1] - _END * (time[-1] - time[0]))), last - 1)
@@ -304,19 +281,8 @@ def collective(course: Course, meetings: Sequence[Meeting], axis: FloatArray) ->
     way = (course.centre[-1] - course.centre[begin]) / (time[-1] - time[begin])
     slow = np.linalg.norm(way, axis=-1) < _SLOW * free
     heading = course.heading[begin:]
-    fates = {name: dict.fromkeys(("met", *_FATES), 0) for name in _APPROACHES}
-    seconds = 0.0
-    for met, lasted, parted in _lives(meetings, float(time[-1])):
-        seconds += lasted
-        found = fates[[name for name, (least, _) in _APPROACHES.items() if met.angle >= least][-1]]
-        both = float(np.linalg.norm(way[met.walker] + way[met.other])) / 2.0
-        found["met"] += 1
-        found["parted" if parted else "walking" if both >= _SLOW * free else "resting"] += 1
-    partings, meets = (sum(one[what] for one in fates.values()) for what in ("parted", "met"))
     numbers = {
-        "meeting_rate": 2.0 * meets / (course.size.shape[1] * float(time[-1] - time[0])),
-        "pair_lifetime": seconds / partings if partings else nan,
-        "pair_time": seconds,
+        "meeting_rate": 2.0 * merged / (course.size.shape[1] * float(time[-1] - time[0])),
         "clustered_share": float((~alone[-1]).mean()),
         "largest_cluster": int(course.size[-1].max()),
         "held_share": float(course.held[-1].mean()),
@@ -327,18 +293,4 @@ def collective(course: Course, meetings: Sequence[Meeting], axis: FloatArray) ->
         "speed_ratio": joined / free if free else nan,
         "slow_share": float(slow.mean()) if isfinite(free) else nan,
     }
-    return {**{name: one if isfinite(one) else None for name, one in numbers.items()}, **fates}
-
-
-def _lives(meetings: Sequence[Meeting], end: float) -> Iterator[tuple[Meeting, float, bool]]:
-    """Each meeting, its duration (s), and whether the two separated before the end."""
-    together: dict[tuple[int, int], Meeting] = {}
-    for one in meetings:
-        pair = one.walker, one.other
-        if one.event == "merged":
-            together[pair] = one
-        else:
-            met = together.pop(pair)
-            yield met, one.time - met.time, True
-    for met in together.values():
-        yield met, end - met.time, False
+    return {name: one if isfinite(one) else None for name, one in numbers.items()}

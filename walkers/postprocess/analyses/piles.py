@@ -12,7 +12,6 @@ import numpy as np
 
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
-from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, film_volume
 from walkers.postprocess.analysis import Analysis, Described, Measured, Quantity, tables_of
 from walkers.postprocess.clusters import (
     Assembly,
@@ -33,7 +32,7 @@ from walkers.postprocess.clusters import (
 )
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import FLOOR, Bridges, Motion, read_bridges
-from walkers.postprocess.tables import Columns, columns_of, columns_of_rows
+from walkers.postprocess.tables import Columns, columns_of_rows
 from walkers.postprocess.uncertainty import wrapped
 
 if TYPE_CHECKING:
@@ -41,8 +40,6 @@ if TYPE_CHECKING:
 
 _WHOLE = 1.0 - 1e-6
 """Fraction of the duration below which a run ended early."""
-_LAYERS = 0.5
-"""Thickness of the layers of the packing profile, in diameters of the largest bead."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +66,6 @@ class Bed:
     touching: Annotated[int, "", "number of bridges between touching beads"]
     opened: Annotated[int, "", "number of open bridges between beads (the beads do not touch)"]
     mean_force: Annotated[float, "N", "mean normal force of the bridges between beads, positive for attraction"]
-    liquid_in_bridges: Annotated[float, "m^3", "total volume of all bridges, including those to walls"]
     bulk: Annotated[int, "", "number of beads in the bulk"]
     at_wall: Annotated[int, "", "number of beads with a bridge to a side wall"]
     large_at_wall: Annotated[int, "", "number of large beads with a bridge to a side wall"]
@@ -77,15 +73,6 @@ class Bed:
     highest: Annotated[
         float, "m", "height of the topmost bead of these clusters; height of the surface if there are none"
     ]
-
-
-@dataclass(frozen=True)
-class Profile:
-    """``profile.parquet``: one row per layer of a pile."""
-
-    height: Annotated[FloatArray, "m", "middle of the layer"]
-    packing_fraction: Annotated[FloatArray, "", "volume fraction of the beads, mean over the second half of the drive"]
-    liquid_fraction: Annotated[FloatArray, "", "volume fraction of the bridges, mean over the second half of the drive"]
 
 
 @dataclass(frozen=True)
@@ -104,12 +91,11 @@ class Pile(Analysis):
 
     order = 2
     name = "pile"
-    version = 11
+    version = 12
     tables: ClassVar[Mapping[str, type]] = {
         "bed": Bed,
         "clusters": Climb,
         "events": Event,
-        "profile": Profile,
         "members": Member,
         "assembly": Assembly,
     }
@@ -125,39 +111,31 @@ class Pile(Analysis):
         return case.loose and case.boundary.closed
 
     def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
-        """Tables and result: bed, clusters, events, packing."""
+        """Tables and result: bed, clusters, events."""
         case, first, definition = motion.case, motion.first_driven, ClimbCriteria()
-        rows, wet, bulks, held, joined = [], [], [], [], []
-        inner: dict[str, float | None] = {}
+        rows, bulks, held, joined = [], [], [], []
         for bridges in read_bridges(motion):
             labels = connected(len(motion.radius), bridges.beads)
             bulks.append(bulk_of(labels, bridges, heap=case.mixture is not None))
-            wet.append(_liquid(motion, bridges))
             # While the pile settles, most beads are free of the bulk.
             driven = motion.time[bridges.frame] >= 0.0
             held.append(list(held_clusters(labels, bridges, bulks[-1])) if driven else [])
             joined.append(_joined(bridges, len(motion.radius)))
-            rows.append(_bed(motion, bridges, joined[-1], bulks[-1], wet[-1], held[-1]))
-            if motion.time[bridges.frame] <= 0.0 or not inner:
-                inner = coordination_of_inner(bridges, len(motion.radius))
+            rows.append(_bed(motion, bridges, joined[-1], bulks[-1], held[-1]))
         bed, names = columns_of_rows(Bed, rows), [wall.name for wall in case.boundary.walls]
         beads = Beads(motion.time, motion.position[..., 2], motion.large, bed["surface"], bulks, first, names)
         tracks = follow(motion.time, held, definition)
         climbs = [classify(number, track, beads, definition) for number, track in enumerate(tracks)]
         events = events_of(tracks, climbs, beads, definition)
-        late = _late(motion)
-        layer, liquid = 2.0 * _LAYERS * float(motion.radius.max()), np.stack(wet)
-        profile = packing_profile(motion.position[late], motion.radius, liquid[late], case.boundary, layer)
         tables = {
             "bed": bed,
             "clusters": columns_of_rows(Climb, climbs),
             "events": columns_of_rows(Event, events),
-            "profile": columns_of(profile),
             "members": columns_of_rows(Member, _members(tracks, beads)),
             "assembly": columns_of_rows(Assembly, assembly_of(tracks, climbs, beads, joined)),
         }
         return tables, {
-            **_bed_result(motion, bed, inner),
+            **_bed_result(motion, bed),
             "clusters": len(tracks),
             "events": dict(Counter(event.event for event in events)),
             "climbs": [_climb_row(climb) for climb in climbs if climb.climbed],
@@ -204,7 +182,7 @@ class Pile(Analysis):
         label = "Brazil-nut index at the end"
         yield Quantity("brazil_nut.end", label, "", "brazil_nut_end", label)
         yield Quantity("settling", "settling time", "s", "settling", "settling time before the drive")
-        whens = {"rest": "at rest", "rest_inner": "at rest, beads away from walls", "shaken": "while shaken"}
+        whens = {"rest": "at rest", "shaken": "while shaken"}
         for when, text in whens.items():
             for what in ("contacts", "bridges"):
                 yield Quantity(f"coordination.{when}.{what}", f"{what} per bead, {text}")
@@ -219,10 +197,8 @@ class Pile(Analysis):
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """The bed, and the climbs with their times, speeds and leaders."""
         surface, nuts, bridges = result["surface"], result["brazil_nut"], result["coordination"]
-        rest, inner, shaken = bridges["rest"], bridges["rest_inner"], bridges["shaken"]
-        alone, early = "", result["driven"] < _WHOLE * result["duration"]
-        if inner["beads"]:
-            alone = f"; {inner['beads']} beads away from walls: {inner['bridges']:.2f} and {inner['contacts']:.2f}"
+        rest, shaken = bridges["rest"], bridges["shaken"]
+        early = result["driven"] < _WHOLE * result["duration"]
         lines = [
             f"{result['case']}: {result['beads']} beads ({result['large']} large), {result['drive']}",
             f"  time       {result['driven']:.3g} s shaken, after {result['settling']:.3g} s of settling"
@@ -230,7 +206,7 @@ class Pile(Analysis):
             f"  surface    {surface['start'] * 1e3:.2f} mm at the start, {surface['end'] * 1e3:.2f} mm at the end",
             f"  segregation (z_large - z_small)/(z_large + z_small): {nuts['start']:.3f} at the start, "
             f"{nuts['end']:.3f} at the end",
-            f"  bridges    between beads, at rest: {_bridges_text(rest)}{alone}",
+            f"  bridges    between beads, at rest: {_bridges_text(rest)}",
         ]
         if shaken:
             lines.append(f"             while shaken: {_bridges_text(shaken)}")
@@ -252,14 +228,13 @@ class Pile(Analysis):
         return lines + wrapped(self.uncertainty(result))
 
     def point_data(self, motion: Motion) -> Callable[[Bridges], Columns]:
-        """Cluster and track of each bead, liquid in its bridges (m³), and whether it climbs."""
+        """Cluster and track of each bead, and whether it climbs."""
         track, climber = tracks_of(motion)
 
         def of_frame(bridges: Bridges) -> Columns:
-            liquid = _liquid(motion, bridges)
             component = connected(len(motion.radius), bridges.beads)
             own = {"track": track[bridges.frame], "is_climber": climber[bridges.frame].astype(np.int64)}
-            return {"component": component, "liquid": liquid, **own}
+            return {"component": component, **own}
 
         return of_frame
 
@@ -277,8 +252,8 @@ def _late(motion: Motion) -> BoolArray:
     return late
 
 
-def _bed_result(motion: Motion, bed: Columns, inner: Mapping[str, float | None]) -> dict[str, Any]:
-    """The bed in a result; ``inner``: coordination away from walls, just before the drive."""
+def _bed_result(motion: Motion, bed: Columns) -> dict[str, Any]:
+    """The bed in a result."""
     first, end = motion.first_driven, motion.time[-1]
     rest = max(int(np.searchsorted(motion.time, 0.0, side="right")) - 1, 0)
     ends = ("surface", "brazil_nut")
@@ -292,7 +267,6 @@ def _bed_result(motion: Motion, bed: Columns, inner: Mapping[str, float | None])
         **{name: {"start": float(bed[name][first]), "end": float(bed[name][-1])} for name in ends},
         "coordination": {
             "rest": {name: float(values[rest]) for name, values in counts.items()},
-            "rest_inner": inner,
             "shaken": shaken if end > 0.0 else None,
         },
     }
@@ -362,10 +336,8 @@ def _joined(bridges: Bridges, count: int) -> Joined:
     return bridges.beads.astype(np.int32), at_wall
 
 
-def _bed(
-    motion: Motion, bridges: Bridges, joined: Joined, bulk: BoolArray, liquid: FloatArray, held: Sequence[Cluster]
-) -> Bed:
-    """State of a pile in a frame from its bulk, the liquid of each bead and the held clusters."""
+def _bed(motion: Motion, bridges: Bridges, joined: Joined, bulk: BoolArray, held: Sequence[Cluster]) -> Bed:
+    """State of a pile in a frame from its bulk and the held clusters."""
     frame = bridges.frame
     position, radius, large = motion.position[frame], motion.radius, motion.large
     # Cells of the cross-section are about four large radii wide. Without a bulk the floor is the surface.
@@ -385,58 +357,12 @@ def _bed(
         touching=touching,
         opened=len(bridges.gap) - touching,
         mean_force=float(bridges.force.mean()) if len(bridges.force) else 0.0,
-        liquid_in_bridges=float(liquid.sum()),
         bulk=int(bulk.sum()),
         at_wall=int(joined[1].sum()),
         large_at_wall=int((joined[1] & large).sum()),
         clusters=len(held),
         highest=max([middle, *(float(position[bead, 2]) for members, _ in held for bead in members)]),
     )
-
-
-def coordination_of_inner(bridges: Bridges, count: int) -> dict[str, float | None]:
-    """Contacts and bridges per bead to other beads, for beads without a bridge to a wall or the floor.
-
-    Beads at a wall have fewer neighbours. The result has the number of inner ``beads`` and their mean ``contacts`` and
-    ``bridges``, None if there are none.
-    """
-    inner = np.ones(count, dtype=bool)
-    inner[bridges.wall_beads] = False
-    beads = int(inner.sum())
-    ends = inner[bridges.beads]
-    if not beads:
-        return {"beads": 0, "contacts": None, "bridges": None}
-    return {
-        "beads": beads,
-        "contacts": float(ends[bridges.gap <= 0.0].sum() / beads),
-        "bridges": float(ends.sum() / beads),
-    }
-
-
-def _liquid(motion: Motion, bridges: Bridges) -> FloatArray:
-    """Liquid in the bridges of each bead, m³, shape (N,): if liquid is conserved, that which its film lacks."""
-    fraction = motion.case.liquid.volume_fraction
-    if motion.film is None:
-        return liquid_of_beads(motion.radius, fraction, bridges)
-    own = np.array([film_volume(one, fraction) for one in motion.radius.tolist()])
-    return np.array(own * (1.0 - motion.film[bridges.frame]))
-
-
-def liquid_of_beads(radius: FloatArray, volume_fraction: float, bridges: Bridges) -> FloatArray:
-    """Liquid in the bridges of each bead, m³, shape (N,): half of each bridge to a bead, all of a bridge to a wall.
-
-    A bridge between beads contains the films of the caps that the two beads cover of each other (Shi and McCarthy
-    2008); a bridge to a wall contains half of the film of its bead, independent of other bridges. Caps of touching
-    beads do not overlap, so the bridges of a frame contain only a part of the liquid; the rest is on the beads.
-    """
-    sizes, which = np.unique(radius, return_inverse=True)
-    between = np.array([[bridge_volume_between_beads(one, other, volume_fraction) for other in sizes] for one in sizes])
-    at_wall = np.array([bridge_volume_at_wall(size, volume_fraction) for size in sizes])
-    liquid = np.zeros(len(radius))
-    pairs = bridges.beads
-    np.add.at(liquid, pairs, between[which[pairs[:, 0]], which[pairs[:, 1]]][:, None] / 2.0)
-    np.add.at(liquid, bridges.wall_beads, at_wall[which[bridges.wall_beads]])
-    return liquid
 
 
 def _surface_cells(position: FloatArray, radius: FloatArray, container: Boundary, cell: float) -> FloatArray:
@@ -455,30 +381,3 @@ def segregation(height: FloatArray, large: BoolArray) -> float:
         return 0.0
     above, below = float(height[large].mean()), float(height[~large].mean())
     return (above - below) / (above + below)
-
-
-def packing_profile(
-    position: FloatArray, radius: FloatArray, liquid: FloatArray, container: Boundary, layer: float
-) -> Profile:
-    """Packing fraction and liquid fraction against height, mean over frames.
-
-    Parameters
-    ----------
-    position : ndarray, shape (F, N, 3)
-    radius : ndarray, shape (N,)
-    liquid : ndarray, shape (F, N)
-        Result of `liquid_of_beads`, located at the centres of the beads.
-    container
-        Boundary with the cross-section.
-    layer
-        Thickness of the layers, m. The volume of a sphere is divided exactly between the layers.
-    """
-    edges = np.arange(0.0, float((position[..., 2] + radius).max()) + layer, layer)
-    below = np.zeros(len(edges))
-    for frame in position:
-        # Volume of a sphere below an edge that lies h above its centre.
-        h = np.clip(edges[:, None] - frame[:, 2], -radius, radius)
-        below += (np.pi * (2.0 / 3.0 * radius**3 + radius**2 * h - h**3 / 3.0)).sum(axis=1) / len(position)
-    wet = np.histogram(position[..., 2], bins=edges, weights=liquid)[0] / len(position)
-    room = container.cross_section * layer
-    return Profile((edges[1:] + edges[:-1]) / 2.0, np.diff(below) / room, wet / room)

@@ -31,6 +31,7 @@ from walkers.postprocess.gait import (
     averages,
     came_near,
     gait,
+    looks_between,
     postures,
     settled_samples,
     turned_over_at,
@@ -39,9 +40,12 @@ from walkers.postprocess.gait import (
 from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
 from walkers.postprocess.sides import (
     REST,
+    SAME,
+    SEPARATED,
     STEADY_SPEED,
     alike,
     came_apart,
+    differ,
     fell,
     of_tray,
     sides,
@@ -68,10 +72,12 @@ if TYPE_CHECKING:
 NEAR = 1.5
 """Walkers whose centres of mass come closer than this multiple of their length have met."""
 
+_WAYS = {"climb": ("climbs", "climb"), "down": ("goes down", "go down")}
+"""Ways of walkers on slopes: of a single walker, of several."""
 _CONTACTS = "contacts: beads with the wall, in order, then pairs of beads that touch at the start"
 _ROTATION = "rotation velocity -R dphi/dt of a bead"
 _SLIDING = f"sliding velocity; {_CONTACTS}"
-_OPEN = f"fraction of the time during which the contact is open; {_CONTACTS}"
+_OPEN = f"fraction of the time during which the contact is open, in steps of a tenth of a sample; {_CONTACTS}"
 _SEPARATED = "fraction of the samples in which two beads are farther apart than the rupture distance of a bridge"
 
 
@@ -85,7 +91,7 @@ class Trajectory:
     x: Annotated[FloatArray, "m", "x of the centre of mass relative to the substrate"]
     y: Annotated[FloatArray, "m", "y of the centre of mass relative to the substrate"]
     z: Annotated[FloatArray, "m", "height of the centre of mass above the substrate"]
-    orientation: Annotated[FloatArray, "rad", "angle between the heading and the direction given by facing"]
+    orientation: Annotated[FloatArray, "rad", "angle by which the walker is turned from the direction given by facing"]
     velocity: Annotated[
         FloatArray,
         "m/s",
@@ -105,9 +111,10 @@ class WalkerRows:
     facing: Annotated[IntArray, "", "1 or -1: start_angle is from the drive axis (right) or opposite (left)"]
     start_angle: Annotated[FloatArray, "rad", "orientation at the start, from the direction given by facing"]
     velocity: Annotated[
-        FloatArray, "m/s", "velocity along the heading after the settling cycles, positive toward the large beads"
+        FloatArray,
+        "m/s",
+        "velocity along the heading after the settling cycles, positive toward the large (foremost) beads",
     ]
-    standard_error: Annotated[FloatArray, "m/s", "standard error of the fitted velocity"]
     first_half: Annotated[FloatArray, "m/s", "velocity in the first half of the fitted cycles"]
     second_half: Annotated[FloatArray, "m/s", "velocity in the second half of the fitted cycles"]
     steady: Annotated[BoolArray, "", f"whether first_half and second_half agree within {percent(STEADY_DIFFERENCE)}"]
@@ -147,7 +154,7 @@ class Walking(Analysis):
 
     order = 0
     name = "walking"
-    version = 7
+    version = 8
     tables: ClassVar[Mapping[str, type]] = {"trajectory": Trajectory, "walkers": WalkerRows, "bridges": BridgeRows}
     headlines = ("velocity",)
     derived: ClassVar[Described] = {
@@ -177,6 +184,7 @@ class Walking(Analysis):
             **_summary(tables["walkers"], case),
             # The numbers of contacts differ between makes: these are those of the first make.
             **{name: makes[0][name] for name in ("rotation", "sliding", "open")},
+            "open_resolution": 1.0 / (looks_between(motion) * case.run.samples_per_cycle),
             "walkers_met": walkers_met(groups),
             "meet": case.meets,
             "contacts": _contact_names(groups[0]),
@@ -206,26 +214,25 @@ class Walking(Analysis):
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
         """Quantities of all walkers: velocities, contacts, makes, postures; sweeps have the contacts of dimers."""
         first, second = ways(uphill=result.get("goes_uphill", False))
-        label = "along the heading, positive toward the large bead"
-        shown = "" if uphill_velocities(result) else f"velocity {label}"  # on slopes those by direction
-        yield Quantity("velocity", shown, "m/s", "velocity", f"mean velocity of the walkers, {label}")
+        label = f"along the heading, positive {_toward(result)}"
+        shown = "" if uphill_velocities(result) or came_apart(result) else f"velocity {label}"  # on slopes by direction
+        told = f"mean velocity of the walkers, on a slope of those that started facing up, {label}"
+        yield Quantity("velocity", shown, "m/s", "velocity", told)
         yield Quantity("velocity.smallest", "", "m/s", "smallest", "velocity of the slowest walker")
         told = "velocity of the fastest walker; the error bars of the paper are largest minus smallest"
         yield Quantity("velocity.largest", "", "m/s", "largest", told)
         told = "standard deviation of the velocities of the copies; not an error of the mean"
         yield Quantity("velocity.scatter", "", "m/s", "scatter", told)
-        for name, way in (("right", first), ("left", second)):
+        for name, way in () if came_apart(result) else (("right", first), ("left", second)):
             label = f"velocity along the heading, walkers that started facing {way}"
             told = f"mean velocity of the walkers that started facing {name}"
             yield Quantity(f"{name}_facing", label, "m/s", f"{name}_facing", told)
             if uphill_velocities(result):
                 label = f"velocity up the slope, walkers that started facing {way}"
                 yield Quantity(f"axial_velocity.{name}_facing", label, "m/s")
-        if fell(result):
-            yield Quantity("kept_heading", "velocity of walkers that kept their heading", "m/s")
-        told = "mean velocity of the centres of mass along the drive axis; on a slope, uphill"
-        yield Quantity("axial_velocity.mean", "velocity along the drive axis", "m/s", "axial_velocity", told)
-        yield Quantity("lateral_velocity.mean", "velocity across the drive axis", "m/s")
+        told = "mean velocity of the walkers that started facing right (on a slope, up) along the drive axis (uphill)"
+        yield Quantity("axial_velocity.mean", "", "m/s", "axial_velocity", told)
+        yield Quantity("lateral_velocity.mean", "" if came_apart(result) else "velocity across the drive axis", "m/s")
         these = ", walkers that started facing up" if result.get("goes_uphill") else ""
         for bead in result.get("rotation", ("bead_1", "bead_2")):
             number = bead.partition("_")[2]
@@ -253,6 +260,7 @@ class Walking(Analysis):
         told = "on a slope: number of walkers that end within 15° of the direction of facing and do not tilt further"
         yield Quantity("posture.upright", "walkers that are upright", column="upright", meaning=told)
         yield from (Quantity(f"posture.{one}", f"walkers that are {one}") for one in POSTURES[1:])
+        yield from (Quantity(f"posture.{way}", f"walkers that {words[1]}") for way, words in _WAYS.items())
         yield Quantity("cycles", "cycles driven", column="cycles", meaning="cycles of the drive, including settling")
         yield Quantity("settling_cycles", "settling cycles")
         told = f"whether the run ended early, with all velocities constant within {percent(CONSTANT)}"
@@ -264,7 +272,7 @@ class Walking(Analysis):
     def lines(self, result: Mapping[str, Any]) -> list[str]:
         """Velocities, rotation, sliding and orientation of all walkers, and velocities of each make."""
         end, names, open_ones = result["orientation_end"], result["contacts"], result["open"]
-        drive, told = result["drive"], bool(_band(result)) and not fell(result)  # the band, by the headline
+        drive, told = result["drive"], bool(_band(result))  # the band, by the headline
         if None not in (result["gamma0"], result["sin_delta"]):
             drive += f", Γ0 = {result['gamma0']:.3g}, sin δ = {result['sin_delta']:.3g}"
         beads = ", ".join(f"bead {place} {_speed(one)}" for place, one in enumerate(result["rotation"].values(), 1))
@@ -272,7 +280,7 @@ class Walking(Analysis):
         some = result["goes_uphill"] and 0 < result["right_facing"]["n"] < result["walkers"]
         these = "started facing up: " if some else ""
         lines = [
-            *(_of_fallen(result, drive) if fell(result) else _of_walkers(result, drive)),
+            *_of_walkers(result, drive),
             *wrapped(self.uncertainty(result)[told:]),
             *_of_sides(result),
             fill(f"  rotation   {these}{beads} mm/s", 110, subsequent_indent=" " * 13),
@@ -283,7 +291,8 @@ class Walking(Analysis):
             lines.append(f"  orientation at the end {angles} from the direction of facing")
         if any(open_ones.values()):
             shares = ", ".join(f"{name} {100 * open_ones[contact]:.1f} %" for contact, name in names.items())
-            lines.append(f"  contacts open: {shares} of the time")
+            text = f"  contacts open: {shares} of the time, in steps of {percent(result['open_resolution'])}"
+            lines.append(fill(text, 110, subsequent_indent=" " * 13))
         return lines + [
             f"  of {radii_text(one['radii'])} mm  {_speed(one['velocity']['mean'])} mm/s; {_steady(one)}"
             for one in result.get("makes", [])
@@ -292,6 +301,8 @@ class Walking(Analysis):
     def uncertainty(self, result: Mapping[str, Any]) -> list[str]:
         """Uncertainty of the velocity: unmeasured values, numerical error, and scatter of the copies."""
         known = super().uncertainty(result)
+        if came_apart(result):
+            return known
         if fell(result):
             told = bands_text(result, {"axial_velocity": "m/s"}, {"axial_velocity": result["axial_velocity"]["mean"]})
             return [told] if told else not_known(result["rests_on"])
@@ -306,17 +317,18 @@ class Walking(Analysis):
         if (lacking := result["walkers"] - result["steady"]) and not result["meet"]:  # on trays walkers stop
             told = f"{lacking} of {result['walkers']} walkers {'is' if lacking == 1 else 'are'} not steady"
             warnings.append(f"{told}: the velocity depends on the length of the run")
+        if result["depends_on_start"]:
+            warnings.append(f"steady copies differ by more than {percent(SAME)}: the velocity depends on the start")
         if result["walkers_met"] and not result["meet"]:
             warnings.append("walkers came close to each other and are not independent: increase the spacing")
         return warnings
 
     def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
-        """Panels of path, orientation and velocity; also of the gait if there are enough samples per cycle."""
-        from walkers.postprocess.figures import gait_panels, velocity_panel, walk_panels
+        """Panels of distance, orientation and path; also of the gait if there are enough samples per cycle."""
+        from walkers.postprocess.figures import gait_panels, walk_panels
 
         groups = run.motion.groups
-        walked = [*walk_panels(groups), velocity_panel(run.case, run.tables["walkers"])]
-        return {"walk": walked, "gait": gait_panels(groups[0])}
+        return {"walk": walk_panels(groups), "gait": gait_panels(groups[0])}
 
     def draw(self, name: str, panels: Sequence[Panel], run: Measured) -> Figure:
         """Figure of the walk, with the beads of one walker to scale."""
@@ -425,12 +437,11 @@ def _summary(walkers: Columns, case: Case) -> dict[str, Any]:
         return {f"{named}_{name.rpartition('_')[2]}": _mean(walkers[name][same]) for name in columns}
 
     return {
-        "velocity": spread(velocity),
+        "velocity": spread(velocity[same]),
         "right_facing": spread(velocity[facing > 0]),
         "left_facing": spread(velocity[facing < 0]),
-        "kept_heading": spread(velocity[~turned]),
         "axial_velocity": {
-            "mean": _mean(axial),
+            "mean": _mean(axial[alike(facing, uphill=case.goes_uphill or not case.meets)]),
             "right_facing": _mean(axial[facing > 0]),
             "left_facing": _mean(axial[facing < 0]),
         },
@@ -441,18 +452,32 @@ def _summary(walkers: Columns, case: Case) -> dict[str, Any]:
         "separated_fraction": _mean(walkers["separated_fraction"]),
         "orientation_end": spread(walkers["orientation_end"]),
         "steady": int(np.sum(walkers["steady"])),
+        "depends_on_start": _depends_on_start(walkers, facing, case),
         "turned_round": int(np.sum(turned)),
         "walkers": len(velocity),
     }
 
 
+def _depends_on_start(walkers: Columns, facing: IntArray, case: Case) -> bool:
+    """Whether steady walkers of one make differ; both directions are one if boundary and drive are symmetric."""
+    drive = case.drive.harmonics
+    symmetric = not case.boundary.tilt and len(drive) == 1 and abs(drive[0].direction[2]) in (0.0, 1.0)
+    kept = walkers["steady"] & np.isnan(walkers["turned_at"]) & (walkers["separated_fraction"] < SEPARATED)
+    kind = 2 * walkers["make"] + (0 if symmetric else facing > 0)
+    alike = (walkers["velocity"][kept & (kind == one)] for one in set(kind[kept].tolist()))
+    return not case.meets and any(differ(float(one.min()), float(one.max())) for one in alike)
+
+
 def _posture(groups: Iterable[Group], walkers: Columns) -> dict[str, Any]:
-    """Numbers of walkers by posture, times of turning over (s), and largest final angle of the others (rad)."""
+    """Numbers of walkers by posture and way, times of turning over (s), largest final angle of the others (rad)."""
     counts = Counter(posture for group in groups for posture in postures(group))
     turned_at, end = walkers["turned_at"], np.abs(walkers["orientation_end"])
+    uphill = walkers["axial_velocity"]
     over, kept = turned_at[np.isfinite(turned_at)], end[np.isnan(turned_at)]
     return {
         **{name: counts[name] for name in POSTURES},
+        "climb": int(np.sum(uphill > REST)),
+        "down": int(np.sum(uphill < -REST)),
         "turned_at": [float(over.min()), float(over.max())] if len(over) else None,
         "ends_within": float(kept.max()) if len(kept) else None,
     }
@@ -472,10 +497,14 @@ def walkers_met(groups: Iterable[Group]) -> bool:
     return came_near(centre, NEAR * max(one.make.length for one in groups))
 
 
+def _toward(result: Mapping[str, Any]) -> str:
+    """The positive direction of velocities along the heading, as text."""
+    return {0.0: "toward bead 1", None: "along the heading"}.get(result.get("sin_delta", nan), "toward the large bead")
+
+
 def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
-    """Drive and velocity of walkers that kept their heading."""
-    velocity = result["velocity"]
-    toward = {0.0: "toward bead 1", None: "along the heading"}.get(result["sin_delta"], "toward the large bead")
+    """Drive and velocity."""
+    velocity, toward = result["velocity"], _toward(result)
     headline = f"{_speed(velocity['mean'])} mm/s{_band(result)}, positive {toward}"
     headline += "; mean of all, slow ones too" if result["meet"] else ""
     if velocity["n"] and abs(velocity["mean"]) < REST:
@@ -488,14 +517,17 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
         own = [f"{way}{_speed(speed)}" for way, speed in zip(named, speeds, strict=True)]
         own[0] += f" mm/s{band}" if (band := _band(result)) else ""
         headline = f"{', '.join(own)}{' mm/s' if not band or len(own) > 1 else ''}, positive {toward}"
+    if result["turned_round"] and not result["posture"]:
+        headline += f"; {result['turned_round']} of {result['walkers']} turned by more than 90°"
+    headline += "; depends on the start" if result["depends_on_start"] else ""
     if told := came_apart(result):
         headline = f"none: walkers {told}"
-    return [*_headlines(result, drive), f"  velocity   {headline}"]
+    return [*_headlines(result, drive), fill(f"  velocity   {headline}", 110, subsequent_indent=" " * 13)]
 
 
 def _of_sides(result: Mapping[str, Any]) -> list[str]:
-    """Velocities by direction at the start, and numbers of walkers that turned and that are steady."""
-    if fell(result):
+    """Velocities by direction at the start, and number of walkers that are steady; nothing if they came apart."""
+    if came_apart(result):
         return []
     first, second = ways(uphill=result["goes_uphill"])
     right, left = (
@@ -503,30 +535,14 @@ def _of_sides(result: Mapping[str, Any]) -> list[str]:
         for side in (result["right_facing"], result["left_facing"])
     )
     told = "" if result["meet"] or result["posture"] else f"started facing {first} {right}, {second} {left}; "
-    turned = f"{result['turned_round']} of {result['walkers']} walkers turned by more than 90°"
-    return wrapped([told + _steady(result), *([turned] if result["turned_round"] else [])])
-
-
-def _of_fallen(result: Mapping[str, Any], drive: str) -> list[str]:
-    """Posture of walkers some of which turned over or lean, velocity up the slope, and velocity of the others."""
-    axial, kept = result["axial_velocity"], result["kept_heading"]
-    up, down = (
-        "none" if speed is None else f"{_speed(speed)} mm/s" for speed in (axial["right_facing"], axial["left_facing"])
-    )
-    return [
-        *_headlines(result, drive),
-        f"  axial velocity, positive up: started facing up {up}, down {down}; {_steady(result)}",
-        f"  velocity   {_speed(kept['mean'])} mm/s along the heading, for the {kept['n']} that turned by less than 90°"
-        if kept["n"]
-        else "  velocity   none: all walkers turned by more than 90°",
-    ]
+    return wrapped([told + _steady(result)])
 
 
 def _band(result: Mapping[str, Any]) -> str:
     """Band of the velocity from a spread; if the directions differ, that of walkers facing right or up."""
     name = "right_facing" if sides_apart(result) else "velocity"
     band = band_of(result, name, result[name]["mean"])
-    if band is None:
+    if band is None or fell(result):
         return ""
     points, values = result["bands"][name]["points"], sum(one["range"] is not None for one in result["rests_on"])
     draws = f" of {points} draws" if points < LEAST_PER_VALUE * values else ""
@@ -551,11 +567,12 @@ def _numerical(result: Mapping[str, Any]) -> list[str]:
 def _scatter(result: Mapping[str, Any]) -> list[str]:
     """Scatter of several copies."""
     velocity, count = result["velocity"], result["velocity"]["n"]
-    if count < 2:
+    if result["walkers"] < 2:
         return []
     what = "walkers" if result["meet"] or "makes" in result else "copies"
-    if apart := sides_apart(result):  # the difference of the directions is not scatter
-        sides = zip(apart, (result["right_facing"], result["left_facing"]), strict=True)
+    some = result["goes_uphill"] and count < result["walkers"]
+    if some or sides_apart(result):  # the difference of the directions is not scatter
+        sides = zip(ways(uphill=result["goes_uphill"]), (result["right_facing"], result["left_facing"]), strict=True)
         each = [
             f"the {side['n']} {what} facing {way} {_error(side['scatter'])}"
             for way, side in sides
@@ -573,7 +590,16 @@ def _headlines(result: Mapping[str, Any], drive: str) -> list[str]:
     tray = [fill(f"  tray       {speed}; at the end {', '.join(end)}", 110, subsequent_indent=" " * 13)] if end else []
     if result["posture"] is None:
         return [f"{result['case']}: {drive}", *tray]
-    return [f"{result['case']}: {_told_posture(result)}", f"  drive      {drive}", *tray]
+    first = "; ".join([*_told_ways(result), _told_posture(result)])
+    return [f"{result['case']}: {first}", f"  drive      {drive}", *tray]
+
+
+def _told_ways(result: Mapping[str, Any]) -> list[str]:
+    """Numbers of walkers by their way on a slope: "all 6 go down", or "3 climb, 3 rest"."""
+    count, numbers = result["walkers"], [result["posture"][way] for way in _WAYS]
+    told = zip([*numbers, count - sum(numbers)], [*_WAYS.values(), ("rests", "rest")], strict=True)
+    said = [f"{'all ' * (1 < number == count)}{number} {words[number > 1]}" for number, words in told if number]
+    return [] if came_apart(result) else [", ".join(said)]
 
 
 def _told_posture(result: Mapping[str, Any]) -> str:

@@ -2,7 +2,8 @@
 
 In the frame of the walls, which have the acceleration a(t), an inertial force -M a(t) acts at the mass centre of a
 walker. Its work per cycle is W = -M ∮ a · dx along the path x of the mass centre relative to the walls. Friction,
-bridges and collisions of a steady walker dissipate this work; in the laboratory it is the work of the walls' forces.
+bridges and collisions of a steady walker dissipate this work; in the laboratory it is the work of the walls' forces. If
+a walker turns or is not steady, the two differ; the results are those of the inertial force.
 The cost of transport is f W / (M g |v|) with the velocity v along the heading and the frequency f: the power over the
 power of lifting the walker as fast as it walks.
 
@@ -74,8 +75,8 @@ class Working(Analysis):
         """Work per cycle and cost of transport."""
         these = ", walkers that started facing up" if result.get("goes_uphill") else ""
         mean = "mean over the walkers (on a slope, those that started facing up)"
-        text = f"work of the drive on a walker per cycle, {mean}"
-        yield Quantity("work", f"work of the drive per cycle{these}", "J", "work", text)
+        text = f"work of the drive (of the inertial force in the frame of the walls) on a walker per cycle, {mean}"
+        yield Quantity("work", f"inertial work of the drive per cycle{these}", "J", "work", text)
         text = f"power of the drive, without that of gravity, over weight times walking speed, {mean}"
         label = f"cost of transport{these and ' (without the work of gravity)'}"
         yield Quantity("cost_of_transport", label, "", "cost_of_transport", text)
