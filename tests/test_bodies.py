@@ -163,7 +163,7 @@ def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
     assert done.walkers["make"].tolist() == [0, 0, 1, 1, 2]
     assert done.walkers["rotation_3"].isna().tolist() == [True, True, False, False, False]
     assert "of 0.3 / 0.2 / 0.2 mm" in done.describe()
-    assert {path.name for path in done.plot()} == {"walk.png", "gait.png", "work.png"}
+    assert {path.name for path in done.plot()} == {"walk.png", "gait.png"}
     assert done.export("vtk").exists()
     # Contact 3 is bead on bead of a dimer, and bead 3 on the floor of a trimer: they are not averaged.
     assert done.result["sliding"] == makes[0]["sliding"]

@@ -234,6 +234,6 @@ def test_runs_show_themselves(walked_run: Path, tmp_path: Path) -> None:
     assert "velocity.mean" in check_numbers(Page(shown), run.result)
     assert "<details>" in shown.read_text("utf-8")
     pictures = run.plot(tmp_path)
-    assert pictures == [tmp_path / f"{name}.png" for name in ("walk", "gait", "work")]
+    assert pictures == [tmp_path / f"{name}.png" for name in ("walk", "gait")]
     sources = re.findall(r'src="data:image/png;base64,([^"]+)"', pictures._repr_html_())
     assert [base64.b64decode(source) for source in sources] == [path.read_bytes() for path in pictures]
