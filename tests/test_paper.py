@@ -325,7 +325,6 @@ def test_the_papers_law_alone_gives_its_figures_and_with_inertia_less_at_the_lar
     assert (found.values["Fig. 4a, velocity"] or 0.0) > 2.0 * OBSERVATIONS["fig4a_velocity"].si
 
 
-@pytest.mark.slow
 def test_what_the_theory_made_is_found_again() -> None:
     wanted = [
         replace(one, value=value * (1.0 if one.over else 1e3))  # as published, in mm/s

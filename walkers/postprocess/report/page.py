@@ -39,8 +39,8 @@ _MARKERS = {"o": "circle", "s": "square", "^": "triangle", "v": "inverted_triang
 """Names of markers in Bokeh; others are diamonds."""
 _TITLE, _LETTER = 52, 11
 """Letters of a line of a title on a narrow page; height of a plot in pixels per letter of its y label."""
-_MOST_POINTS = 600
-"""Largest number of points of a line; longer lines are thinned out."""
+_MOST_POINTS, _MOST_OF_ALL = 600, 20_000
+"""Largest numbers of points of a line and of all lines of a plot; longer lines are thinned out."""
 
 
 def check_report(path: Path) -> None:
@@ -106,7 +106,8 @@ def drawn(panel: Panel) -> Figure:
         look: dict[str, Any] = {"legend_label": line.label.replace("\n", " ")} if line.label else {}
         look["color"] = line.colour if isinstance(line.colour, str) else COLOURS[line.colour % len(COLOURS)]
         if line.width:
-            thin = slice(None, None, -(-len(line.x) // _MOST_POINTS) or None)
+            most = min(_MOST_POINTS, max(2, _MOST_OF_ALL // len(panel.lines)))
+            thin = slice(None, None, -(-len(line.x) // most) or None)
             dash = "dashed" if line.dashed else "solid"
             plot.line(line.x[thin], line.y[thin], line_width=line.width, line_dash=dash, **look)
         else:
