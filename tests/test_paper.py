@@ -330,7 +330,7 @@ def test_what_the_theory_made_is_found_again() -> None:
         replace(one, value=value * (1.0 if one.over else 1e3))  # as published, in mm/s
         for one, value in zip(FITTED[:7], values_of(KNOWN, FITTED[:7]).values(), strict=True)
     ]
-    found = fit("", ALWAYS, wanted, generations=30)
+    found = fit("", ALWAYS, wanted, generations=20)
     assert (found.met, found.missed) == (len(wanted), [])
     assert found.misfit < 0.2
     assert found.parameters["friction_wall"] == pytest.approx(KNOWN["friction_wall"], rel=0.15)
