@@ -419,10 +419,11 @@ def test_a_sweep_that_is_killed_three_times(
     assert _sweep(name, "--engine", engine, "--out", "undisturbed").returncode == 0
     draw = random.Random(20)
     finished: set[str] = set()
-    for _ in range(3):
-        # By the third launch since then one of two decks has ended; moments between launches come by themselves.
-        then = len(launches()) + draw.choice((1, 2, 3, 3, 4))
+    for kill in range(3):
+        then = len(launches()) + draw.choice((1, 2, 3))
         program = _start(name, "--engine", engine)
+        if kill == 1:  # a point is finished
+            wait_for(lambda program=program: contents_of(in_folder / "runs") or program.poll() is not None)
         wait_for(lambda then=then, program=program: len(launches()) >= then or program.poll() is not None)
         time.sleep(draw.uniform(0.0, 0.2))
         if draw.random() < 0.3 and (engines := engines_in(in_folder)):
