@@ -22,6 +22,7 @@ from walkers.inputs.boundary import Boundary
 from walkers.inputs.errors import InputError
 from walkers.postprocess.analysis import figures_of, plot_run
 from walkers.postprocess.drawing import series_look, styled
+from walkers.postprocess.figures import _leaders
 from walkers.postprocess.films import FilmOptions, film_times, named_direction, parse_time
 from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, read_motion
 from walkers.postprocess.paraview import write_paraview, write_vtk
@@ -222,6 +223,17 @@ def test_a_dozen_walkers_are_told_apart() -> None:
     """By dashes or marker."""
     looks = styled(lambda: [series_look(number) for number in range(12)])()
     assert len({(look["linestyle"], look["marker"]) for look in looks}) == 12
+
+
+def test_each_climb_has_a_colour_and_the_thin_lines_are_named_once() -> None:
+    climbed = np.array([False, True, False, True])
+    clusters = {"climbed": climbed, "leader": np.arange(4), "leader_large": climbed, "size": np.full(4, 3)}
+    members = {"track": np.arange(4), "bead": np.arange(4), "time": np.zeros(4), "height": np.zeros(4)}
+    lines = list(_leaders({"clusters": clusters | {"speed": np.zeros(4)}, "members": members}))
+    assert len({lines[number].colour for number in (0, 1, 3)}) == 3
+    assert [line.label.replace("\n", " ").partition(" beads")[0] for line in lines] == [
+        *("clusters that did not climb", "3", "", "3"),
+    ]
 
 
 @pytest.mark.parametrize("walker", [None, 0])
