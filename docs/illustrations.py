@@ -35,7 +35,6 @@ from walkers.paper.make import COMPARED, FIGURES, make_figures
 from walkers.paper.model_terms import try_model_terms
 from walkers.postprocess.analysis import analyses
 from walkers.postprocess.films import FilmOptions
-from walkers.postprocess.series import render_series
 from walkers.runner.files import read_json, write_json, write_text
 from walkers.runner.launch import cores_here
 from walkers.sweeps import climbing
@@ -70,18 +69,14 @@ def _of_figure(name: str, *files: str, sweeps: Iterable[str]) -> Illustration:
     return Illustration(files, lambda: [case for sweep in sweeps for case in load_sweep(sweep).cases()], make)
 
 
-def _of_run(
-    name: str, case: str, changes: Mapping[str, Any] | None = None, apart: float | None = None, film: Any = None
-) -> Illustration:
-    """A picture of one run as `walkers render` makes it, views at an interval in s, or a film."""
+def _of_run(name: str, case: str, changes: Mapping[str, Any] | None = None, film: Any = None) -> Illustration:
+    """A picture of one run as `walkers render` makes it, or a film."""
     file = f"pictures/{name}.gif" if film else f"pictures/{name}.png"
 
     def make(out: Path, docs: Path) -> None:
         done = run(load_case(case, changes), out)
         if film:
             done.film(docs / file, film)
-        elif apart:
-            render_series(done.directory, docs / file, apart=apart)
         else:
             done.render(docs / file)
 
@@ -158,7 +153,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     "pile-calibrated": _of_climbs("pile-calibrated"),
     "pile-cylinder": _of_climbs("pile-cylinder"),
     "pile-paper": _of_climbs("pile-paper"),
-    "paper-pile": _of_run("pile-paper", "pile-fig1a", _PAPERS, apart=2.0),
+    "paper-pile": _of_run("pile-paper", "pile-fig1a", _PAPERS),
     "paper-pile-film": _of_run(
         *("pile-paper", "pile-fig1a", _PAPERS),
         film=FilmOptions(size=(360, 640), fps=10, slowdown=1.0, begin=4.0, end=10.0),
@@ -167,7 +162,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
         *("pile", "pile-small", _ASSEMBLES),
         film=FilmOptions(size=(360, 640), fps=10, slowdown=1.0, begin=2.5, end=8.5),
     ),
-    "pile": _of_run("pile", "pile-small", {"run.duration": "10 s"}, apart=2.0),
+    "pile": _of_run("pile", "pile-small", {"run.duration": "10 s"}),
     **{name: _of_figure(name, f"figures/{name}.png", sweeps=one.sweeps) for name, one in FIGURES.items()},
     "comparison": _of_figure("comparison", "figures/comparison.md", "figures/comparison.json", sweeps=COMPARED),
     "model-terms": Illustration(("figures/model_terms.md",), _shipped("fig1b", "fig4a"), _make_model_terms),

@@ -163,7 +163,7 @@ def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
     assert done.walkers["make"].tolist() == [0, 0, 1, 1, 2]
     assert done.walkers["rotation_3"].isna().tolist() == [True, True, False, False, False]
     assert "of 0.3 / 0.2 / 0.2 mm" in done.describe()
-    assert {path.name for path in done.plot()} == {"walk.png", "gait.png", "work.png"}
+    assert {path.name for path in done.plot()} == {"walk.png", "gait.png"}
     assert done.export("vtk").exists()
     # Contact 3 is bead on bead of a dimer, and bead 3 on the floor of a trimer: they are not averaged.
     assert done.result["sliding"] == makes[0]["sliding"]
@@ -207,6 +207,9 @@ def test_walkers_on_a_tray_meet_and_stick(tmp_path: Path) -> None:
     apart = np.linalg.norm(centre[-12:, first[1]] - centre[-12:, first[0]], axis=-1)
     assert apart.max() < 1.1 * group.make.length  # they hold on to each other, however they turn
     assert {path.name for path in tray.plot()} >= {"walk.png", "paths.png"}
+    short = {"size": (64, 64), "fps": 10, "end": 5e-3}
+    films = [tray.film(tmp_path / "film.gif", walkers.FilmOptions(walker=one, **short)).read_bytes() for one in (3, 4)]
+    assert films[0] != films[1]
     (axes,) = figures_of(tray.directory)["paths"].axes
     for walker, line in enumerate(axes.lines[:9]):  # in the plane, where they stood
         np.testing.assert_allclose(line.get_xydata(), 1e3 * centre[:, walker, :2])

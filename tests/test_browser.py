@@ -105,6 +105,42 @@ def test_beads_play_pause_and_turn(name: str, visit: Callable[..., Page], reques
     assert page.evaluate("Bokeh.documents.length") == 1
 
 
+_CUT = """() => {
+  const cut = [];
+  const context = document.createElement("canvas").getContext("2d");
+  const check = (text, font, room, what) => {
+    context.font = font;
+    for (const line of text.split("\\n")) {
+      if (context.measureText(line).width > room) cut.push(`${what}: ${line}`);
+    }
+  };
+  const walk = (view) => {
+    const model = view.model;
+    if (model.type === "Figure" || model.type === "Plot") {
+      seen += 1;
+      const {width, height} = view.el.getBoundingClientRect();
+      check(model.title.text, `bold ${model.title.text_font_size} Helvetica`, width, "title");
+      for (const axis of model.left) check(axis.axis_label, "italic 13px Helvetica", height, "y");
+      for (const axis of model.below) check(axis.axis_label, "italic 13px Helvetica", width, "x");
+    }
+    for (const child of view.child_views ?? []) walk(child);
+  };
+  let seen = 0;
+  for (const view of Object.values(Bokeh.index.roots ?? Bokeh.index)) walk(view);
+  return [seen, cut];
+}"""
+"""Number of plots of Bokeh; lines of their texts that are longer than the plot."""
+
+
+@pytest.mark.parametrize("name", ["walked_report", "pile_report", "swept_report"])
+def test_no_text_of_a_plot_is_cut(name: str, visit: Callable[..., Page], request: pytest.FixtureRequest) -> None:
+    page = visit(request.getfixturevalue(name))
+    page.wait_for_function("() => window.Bokeh && document.querySelector('[data-plots] > *')")
+    seen, cut = page.evaluate(_CUT)
+    assert seen >= 1
+    assert cut == []
+
+
 def test_tables_need_no_script(walked_report: Path, browser: Browser) -> None:
     context = browser.new_context(offline=True, java_script_enabled=False)
     page = context.new_page()

@@ -2,6 +2,7 @@
 
 import re
 import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,13 +15,15 @@ import pyvista as pv
 from ase.io import read
 from PIL import Image
 
+import walkers
 from tests.conftest import call
 from tests.printed import letters, spoilt
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.errors import InputError
 from walkers.postprocess.analysis import figures_of, plot_run
 from walkers.postprocess.drawing import series_look, styled
-from walkers.postprocess.films import FilmOptions, film_times, named_direction
+from walkers.postprocess.figures import _leaders
+from walkers.postprocess.films import FilmOptions, film_times, named_direction, parse_time
 from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, read_motion
 from walkers.postprocess.paraview import write_paraview, write_vtk
 from walkers.postprocess.scene import Scene, Window, camera_axes, mesh_of, walls_of
@@ -115,22 +118,94 @@ def test_walkers_are_drawn_side_by_side_once_a_cycle_and_the_camera_sees_them(
     assert np.ptp(beads[:, 1]) < 4e-3
 
 
-def test_a_folder_with_other_files_is_not_replaced(directory: Path, tmp_path: Path) -> None:
-    mine = tmp_path / "thesis.txt"
-    mine.write_text("years of work")
-    for place in (tmp_path, mine):
-        with pytest.raises(InputError, match="expected a new or empty folder"):
-            write_vtk(directory, destination=place)
-    assert mine.read_text() == "years of work"
+_FOREIGN: dict[str, Callable[[Path], object]] = {
+    "a text": lambda place: (place / "thesis.txt").write_text("years of work"),
+    "VTK files": lambda place: [(place / name).write_text("x") for name in ("turbine_0001.vtu", "turbine.pvd")],
+    "names as ours, without a collection": lambda place: (place / "beads_000000.vtp").write_text("x"),
+    "a collection that lists other files": lambda place: (place / "walkers.pvd").write_text("<VTKFile/>"),
+    "a frame that was not exported": lambda place: (
+        *(_listing(place, name) for name in ("walkers.pvd", "frame_000000.vtm")),
+        (place / "beads_000001.vtp").write_text("x"),
+    ),
+}
+
+
+def _listing(place: Path, name: str) -> None:
+    """A file of an export of frame 0."""
+    (place / name).write_text('<DataSet timestep="0.0" group="" part="0" file="frame_000000.vtm" />')
+
+
+@pytest.mark.parametrize("name", _FOREIGN)
+def test_an_export_replaces_its_own_files_alone(name: str, directory: Path, tmp_path: Path) -> None:
+    place = tmp_path / "vtk"
+    place.mkdir()
+    _FOREIGN[name](place)
+    before = {path: path.read_bytes() for path in place.iterdir()}
+    with pytest.raises(InputError, match="expected a new or empty folder"):
+        write_vtk(directory, destination=place)
+    assert {path: path.read_bytes() for path in place.iterdir()} == before
+    for path in place.iterdir():
+        path.unlink()
+    for every in (4, 40):  # an earlier export is replaced
+        write_vtk(directory, destination=place, every=every)
+        assert len(list(place.glob("frame_*.vtm"))) == 80 // every + 1
+    with pytest.raises(InputError, match="it is a file"):
+        write_vtk(directory, destination=place / "walkers.pvd")
+    (tmp_path / "link").symlink_to(place)
+    before = {path: path.read_bytes() for path in place.iterdir()}
+    with pytest.raises(InputError, match="it is a symbolic link"):
+        write_paraview(directory, tmp_path / "link")
+    assert {path: path.read_bytes() for path in place.iterdir()} == before
+
+
+def test_an_export_for_paraview_reads_each_dump_once(directory: Path, tmp_path: Path) -> None:
+    script = (
+        "import sys; from pathlib import Path; from walkers.postprocess.paraview import write_paraview; opened = []\n"
+    )
+    script += "sys.addaudithook(lambda event, given: event == 'open' and opened.append(str(given[0])))\n"
+    script += "write_paraview(Path(sys.argv[1]), Path(sys.argv[2]))\n"
+    script += "print(*(sum(one.endswith(name) for one in opened) for name in ('beads.bin', 'bridges.pairs.txt')))"
+    command = [sys.executable, "-c", script, str(directory), str(tmp_path / "vtk")]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.split() == ["1", "1"]
+
+
+_WRONG: list[tuple[Callable[[walkers.Run, Path], object], str]] = [
+    (lambda *_: FilmOptions(slowdown=0.0), "^slowdown: 0: expected more than 0$"),
+    (lambda *_: FilmOptions(fps=0), "^fps: 0: expected more than 0$"),
+    (lambda *_: FilmOptions(size=(0, 64)), "^size: 0: expected more than 0$"),
+    (lambda run, to: run.film(to / "a.gif", FilmOptions(walker=-1)), "^walker: -1: expected 0 to 1$"),
+    (lambda run, to: run.film(to / "a.gif", FilmOptions(begin=1.0)), "^begin, end: nothing to show"),
+    (lambda run, to: run.render(to / "a.png", walker=2), "^walker: 2: expected 0 to 1$"),
+    (lambda run, to: run.export("xyz", to / "a.xyz", every=0), "^every: 0: expected a whole number from 1$"),
+    (lambda run, to: run.export("vtk", to / "vtk", every=0), "^every: 0: expected a whole number from 1$"),
+    (lambda run, to: run.export("paraview", to / "vtk", colour="beauty"), "^colour: 'beauty': expected one of bead, "),
+    (lambda run, to: run.plot(to / "a.png"), r"a\.png: expected a folder"),
+    (lambda run, to: run.plot(to, "png,jpeg"), "^format: 'jpeg': expected one of png, svg, pdf$"),
+]
+
+
+@pytest.mark.parametrize(("use", "told"), _WRONG)
+def test_wrong_arguments_in_python_are_refused_by_their_names(
+    use: Callable[[walkers.Run, Path], object], told: str, directory: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=told):
+        use(walkers.load(directory), tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("text", "seconds"), [("0.001", 1e-3), ("1e-3", 1e-3), ("2E+0", 2.0), ("3 ms", 3e-3)])
+def test_times_are_numbers_of_seconds_or_have_a_unit(text: str, seconds: float) -> None:
+    assert parse_time("--begin", text) == pytest.approx(seconds)
 
 
 def test_figures_of_runs_come_in_other_formats_and_can_be_printed(
     directory: Path, run_directory: Callable[..., Path], tmp_path: Path
 ) -> None:
     paths = plot_run(directory, tmp_path, ["pdf", "svg", "png"])
-    names = [f"{name}.{form}" for name in ("walk", "gait", "work") for form in ("pdf", "svg", "png")]
+    names = [f"{name}.{form}" for name in ("walk", "gait") for form in ("pdf", "svg", "png")]
     assert [path.name for path in paths] == names
     assert all(directory.name.encode() in path.read_bytes() for path in paths)
+    assert plot_run(directory, tmp_path, "pdf,svg,png") == paths
     assert len(Image.open(paths[2]).convert("RGB").getcolors(maxcolors=1 << 24)) > 20
     strobed = run_directory(run={"cycles": 4, "settling_cycles": 1, "samples_per_cycle": 1})
     assert [path.name for path in plot_run(strobed, tmp_path)] == ["walk.png"]  # which shows no gait
@@ -150,11 +225,22 @@ def test_a_dozen_walkers_are_told_apart() -> None:
     assert len({(look["linestyle"], look["marker"]) for look in looks}) == 12
 
 
-@pytest.mark.parametrize("apart", [None, 0.025])
+def test_each_climb_has_a_colour_and_the_thin_lines_are_named_once() -> None:
+    climbed = np.array([False, True, False, True])
+    clusters = {"climbed": climbed, "leader": np.arange(4), "leader_large": climbed, "size": np.full(4, 3)}
+    members = {"track": np.arange(4), "bead": np.arange(4), "time": np.zeros(4), "height": np.zeros(4)}
+    lines = list(_leaders({"clusters": clusters | {"speed": np.zeros(4)}, "members": members}))
+    assert len({lines[number].colour for number in (0, 1, 3)}) == 3
+    assert [line.label.replace("\n", " ").partition(" beads")[0] for line in lines] == [
+        *("clusters that did not climb", "3", "", "3"),
+    ]
+
+
+@pytest.mark.parametrize("walker", [None, 0])
 def test_rendering_shows_ruby_beads_on_a_grey_floor_and_cuts_nothing(
-    apart: float | None, directory: Path, tmp_path: Path
+    walker: int | None, directory: Path, tmp_path: Path
 ) -> None:
-    (path,) = render_series(directory, tmp_path / "walker.png", images=3, apart=apart, walker=None if apart else 0)
+    (path,) = render_series(directory, tmp_path / "walker.png", images=3, walker=walker)
     pixels = np.asarray(Image.open(path).convert("RGB")).astype(int)
     assert 0.02 < np.mean((pixels[..., 0] > 1.8 * pixels[..., 1]) & (pixels[..., 0] > 60)) < 0.5
     assert np.mean(np.ptp(pixels, axis=-1) < 25) > 0.4

@@ -355,13 +355,15 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     motion = read_motion(run)
     assert "between beads, at rest" in told("run", str(run))
     assert told("plot", str(run), "--to", "here") == "here/climb.png"
-    assert spoilt(figures_of(run)["climb"]) == []
-    for name, option in (("box", ("--images", "2")), ("row", ("--interval", "0.1 s"))):
-        assert told("render", str(run), "--to", f"here/{name}.png", *option) == f"here/{name}.png"
-        picture = pv.read(in_folder / "here" / f"{name}.png")
-        across, up, _ = picture.dimensions
-        edges = picture.point_data.active_scalars.reshape(up, across, -1)[..., :3]
-        assert all((edge == 255).all() for edge in (edges[0], edges[-1], edges[:, 0], edges[:, -1]))  # nothing is cut
+    climb = figures_of(run)["climb"]
+    assert spoilt(climb) == []
+    between = float(re.findall(r"every (\S+) s", climb.axes[3].get_title(loc="left"))[0])
+    assert between == pytest.approx(np.diff(motion.time).mean(), rel=0.01) != pytest.approx(1.0 / 170.0, rel=0.1)
+    assert told("render", str(run), "--to", "here/box.png", "--images", "2") == "here/box.png"
+    picture = pv.read(in_folder / "here" / "box.png")
+    across, up, _ = picture.dimensions
+    edges = picture.point_data.active_scalars.reshape(up, across, -1)[..., :3]
+    assert all((edge == 255).all() for edge in (edges[0], edges[-1], edges[:, 0], edges[:, -1]))  # nothing is cut
     told(
         "render", "--film", str(run), "--to", "one.gif", "--fps", "10", "--size", "64x64", "--end", "8 ms"
     )  # within a frame

@@ -17,13 +17,15 @@ from scipy.spatial.transform import Rotation
 import walkers
 from tests.conftest import document, make_case, to_toml
 from walkers.inputs.caption import caption
+from walkers.inputs.reading import load_case
 from walkers.inputs.rounding import rounded, with_decimals
 from walkers.inputs.sweep import expand
 from walkers.postprocess.analysis import current_result, number_of
+from walkers.postprocess.figures import Line, Panel
 from walkers.postprocess.motion import gathered, read_motion
-from walkers.postprocess.report.page import LARGEST, overhead
+from walkers.postprocess.report.page import LARGEST, drawn, overhead, packed_plots
 from walkers.postprocess.report.player import cameras_of, player_of
-from walkers.postprocess.report.run import report_run
+from walkers.postprocess.report.run import report_run, shown_of
 from walkers.postprocess.scene import camera_axes
 from walkers.postprocess.tables import read_table
 from walkers.runner.provenance import software
@@ -207,6 +209,26 @@ def test_long_runs_are_thinned_out_and_say_so(walked_run: Path, pile_run: Path) 
     assert any("rolling of the beads is not shown" in caption for caption in pile.captions)
 
 
+def test_a_plot_of_many_long_lines_is_thinned_out() -> None:
+    time = np.linspace(0.0, 1.0, 2000)
+    lines = [Line(time, np.sin((9.0 + number) * time), colour=number) for number in range(400)]
+    packed = packed_plots(drawn(Panel("", "time (s)", "y", lines)))
+    assert len(packed) < 0.1 * LARGEST
+    few = drawn(Panel("", "time (s)", "y", lines[:2])).renderers[0]
+    assert len(few.data_source.data["x"]) == 500
+
+
+@pytest.mark.parametrize("value", [0.022, 0.03])
+def test_a_report_says_what_is_uncertain_in_the_case_that_was_asked_for(value: float, walked_run: Path) -> None:
+    """The run of a case may have been made for one whose values have other sources."""
+    case = load_case("fig1b", {"liquid.volume_fraction": value, "contact.rolling_friction": 0.0})
+    shown = shown_of(case, current_result(walked_run), case.origins)
+    others = shown_of(case, current_result(walked_run))
+    (said,) = (one for one in shown["uncertainty"] if one.startswith("uncertain parameters"))
+    assert "viscosity ratio" in said and "volume fraction" not in said
+    assert others["uncertainty"] != shown["uncertainty"]
+
+
 def test_words_and_numbers() -> None:
     """Numbers have four digits at most and the decimals of their unit; a nameless liquid is told by its own."""
     given = [(1.38173201,), (1234.5678,), (-87654.3,), (0.0012345678,), (-3.2e-15, "mm/s"), (6,), (1e-12,), (nan,)]
@@ -234,6 +256,6 @@ def test_runs_show_themselves(walked_run: Path, tmp_path: Path) -> None:
     assert "velocity.mean" in check_numbers(Page(shown), run.result)
     assert "<details>" in shown.read_text("utf-8")
     pictures = run.plot(tmp_path)
-    assert pictures == [tmp_path / f"{name}.png" for name in ("walk", "gait", "work")]
+    assert pictures == [tmp_path / f"{name}.png" for name in ("walk", "gait")]
     sources = re.findall(r'src="data:image/png;base64,([^"]+)"', pictures._repr_html_())
     assert [base64.b64decode(source) for source in sources] == [path.read_bytes() for path in pictures]

@@ -269,7 +269,6 @@ def _sweep(environment: dict[str, str]) -> subprocess.Popen[str]:
     return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-@pytest.mark.slow
 def test_a_sweep_through_slurm(cluster: dict[str, str], files: Path) -> None:
     """A failing point, a pilot cancelled midway, an interrupt and a resumption: bit for bit what this machine gives."""
 

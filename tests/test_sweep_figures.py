@@ -49,19 +49,18 @@ def _table(units: dict[str, str], rows: list[list[Any]], axes: list[tuple[str, .
 
 
 @pytest.mark.parametrize(("error", "bars"), [(2e-4, 3), (2e-6, 0)])
-def test_error_bars_that_symbols_would_hide_are_left_out_and_the_legend_says_so(error: float, bars: int) -> None:
+def test_error_bars_that_symbols_would_hide_are_left_out_and_the_figure_says_so(error: float, bars: int) -> None:
     table = _table({"drive.frequency": "Hz"}, [[60.0], [70.0], [80.0]], [("drive.frequency",)])
     table = table.assign(velocity=[1e-3, 2e-3, 3e-3], scatter=error)
     table.attrs["units"] |= {"velocity": "m/s", "scatter": "m/s"}
     figure = draw(layout_of(table, table), drawn_column(table, "velocity"))
     (panel,) = _panels(figure)
     assert sum(len(one.get_segments()) for one in panel.collections if isinstance(one, LineCollection)) == bars
-    assert [legend.get_title().get_text() for legend in figure.legends] == [
-        SCATTER if bars else f"{SCATTER}, smaller than the symbols"
-    ]
+    said = " ".join(figure.get_suptitle().split())
+    assert (said, figure.legends) == (SCATTER if bars else f"{SCATTER}, smaller than the symbols", [])
 
 
-def test_a_long_title_of_a_legend_stays_within_the_figure() -> None:
+def test_the_title_of_a_legend_is_the_name_of_the_colours_and_captions_stay_within_the_figure() -> None:
     units = {"contact.friction.bead_bead": "", "drive.frequency": "Hz"}
     rows = [[friction, frequency] for friction in (0.1, 0.3) for frequency in (60.0, 70.0, 80.0)]
     table = _table(units, rows, [(name,) for name in units]).assign(velocity=1e-3 * np.arange(6.0), scatter=1e-9)
@@ -69,9 +68,9 @@ def test_a_long_title_of_a_legend_stays_within_the_figure() -> None:
     figure = draw(layout_of(table, table, x="drive.frequency"), drawn_column(table, "velocity"))
     figure.draw_without_rendering()
     (legend,) = figure.legends
-    title, whole = legend.get_title().get_window_extent(), figure.bbox
-    assert "friction bead bead" in legend.get_title().get_text()
-    assert whole.x0 <= title.x0 < title.x1 <= whole.x1
+    assert legend.get_title().get_text() == "friction bead bead"
+    caption, whole = figure._suptitle.get_window_extent(), figure.bbox  # type: ignore[attr-defined]
+    assert whole.x0 <= caption.x0 < caption.x1 <= whole.x1
 
 
 def test_axes_do_not_magnify_rounding() -> None:

@@ -404,14 +404,13 @@ def test_a_worker_of_another_version_refuses(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.slow
-def test_a_sweep_that_is_killed_eight_times(
+def test_a_sweep_that_is_killed_three_times(
     sweep_file: Callable[..., str], in_folder: Path, counting_engine: tuple[str, Callable[[], list[str]]]
 ) -> None:
     """SIGKILL at random moments, of the sweep and at times of an engine: nothing lost, nothing twice, bit for bit."""
     text = """
     [axes]
-    drive.frequency         = { linspace = ["60 Hz", "85 Hz", 6] }
+    drive.frequency         = { linspace = ["60 Hz", "70 Hz", 3] }
     drive.peak_acceleration = ["2 g", "5 g"]
     dimers.angle            = ["0 deg", "20 deg"]
     """
@@ -420,10 +419,11 @@ def test_a_sweep_that_is_killed_eight_times(
     assert _sweep(name, "--engine", engine, "--out", "undisturbed").returncode == 0
     draw = random.Random(20)
     finished: set[str] = set()
-    for _ in range(8):
-        # By the third launch since then one of two decks has ended; moments between launches come by themselves.
-        then = len(launches()) + draw.choice((1, 2, 3, 3, 4))
+    for kill in range(3):
+        then = len(launches()) + draw.choice((1, 2, 3))
         program = _start(name, "--engine", engine)
+        if kill == 1:  # a point is finished
+            wait_for(lambda program=program: contents_of(in_folder / "runs") or program.poll() is not None)
         wait_for(lambda then=then, program=program: len(launches()) >= then or program.poll() is not None)
         time.sleep(draw.uniform(0.0, 0.2))
         if draw.random() < 0.3 and (engines := engines_in(in_folder)):
@@ -437,7 +437,7 @@ def test_a_sweep_that_is_killed_eight_times(
     assert finished
     before = len(launches())
     done = _sweep(name, "--engine", engine)
-    assert (done.returncode, "24 points, 24 finished" in done.stdout) == (0, True)
+    assert (done.returncode, "12 points, 12 finished" in done.stdout) == (0, True)
     assert contents_of(in_folder / "runs") == contents_of(in_folder / "undisturbed")
     # The last call made no finished point again: each of its decks holds points that were missing before.
     assert not {made_in(place) for place in launches()[before:]} & finished

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from walkers.inputs.loads import contact_loads, dimer_of
-from walkers.postprocess.analysis import current_result, describe_result, figures_of
+from walkers.postprocess.analysis import current_result, describe_result
 from walkers.postprocess.tables import read_table
 from walkers.runner.directory import case_of
 
@@ -25,4 +25,3 @@ def test_the_drive_pays_for_what_slides(run_directory: Callable[..., Path]) -> N
     assert result["cost_of_transport"]["n"] == 0
     assert read_table(directory, "work")["work"][50:].mean() == pytest.approx(result["work"]["mean"])
     assert f"of the drive per cycle {1e9 * result['work']['mean']:.4g} nJ\n" in describe_result(directory, result)
-    assert len(figures_of(directory)["work"].axes) == 1

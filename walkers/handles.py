@@ -186,17 +186,20 @@ class Run:
             return f"<p>{escape(self.describe())}</p>"
         return result_html(self.directory, self.result, self.origins)
 
-    def plot(self, to: str | Path | None = None, formats: Sequence[str] = ("png",)) -> Pictures:
+    def plot(self, to: str | Path | None = None, formats: str | Sequence[str] = ("png",)) -> Pictures:
         """Draw the figures and return their paths; see `walkers.postprocess.analysis.plot_run`."""
         from walkers.postprocess.analysis import plot_run
 
         return Pictures(plot_run(self.finished_directory, _path(to), formats))
 
-    def render(self, to: str | Path | None = None, *, images: int = 6) -> Pictures:
-        """Render the first of independent walkers, or all beads; see `walkers.postprocess.series.render_series`."""
+    def render(self, to: str | Path | None = None, *, images: int = 6, walker: int | None = None) -> Pictures:
+        """Render the first of independent walkers, all beads, or the walker with a number.
+
+        See `walkers.postprocess.series.render_series`.
+        """
         from walkers.postprocess.series import render_series
 
-        walker = 0 if self.case.apart else None
+        walker = 0 if walker is None and self.case.apart else walker
         return Pictures(render_series(self.finished_directory, _path(to), images=images, walker=walker))
 
     def film(

@@ -10,7 +10,6 @@ import warnings
 from contextlib import suppress
 from importlib import import_module
 from inspect import isfunction
-from io import BufferedWriter, FileIO, TextIOWrapper
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import FrameType
@@ -20,27 +19,12 @@ import typer
 from typer.core import TyperGroup
 
 import walkers.inputs
-from walkers.commands import GROUPS, MOVED, SECTIONS
+from walkers.commands import GROUPS, SECTIONS
 from walkers.completion import offering
 
 _INTERRUPTED = 130
-_STDOUT = "standard output"
 _ENGINE_SECONDS = 10.0
 """Longest time, s, for the engine to print its version."""
-
-
-class _Stream(FileIO):
-    """Standard output or error. A failed write to standard output names it; one to standard error is ignored."""
-
-    def write(self, data: Any) -> int:
-        try:
-            return super().write(data)
-        except OSError as error:
-            if self.fileno() == 2:
-                return len(data)
-            if not isinstance(error, BrokenPipeError):
-                error.filename = _STDOUT
-            raise
 
 
 class _Terminated(BaseException):
@@ -60,37 +44,13 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     signal.signal(signal.SIGTERM, _on_signal)
     if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
         signal.signal(signal.SIGHUP, _on_signal)
-    _open_streams()
     warnings.showwarning = lambda message, *_, **__: print(f"walkers: warning: {message}", file=sys.stderr)
     sys.exit(_status(arguments))
-
-
-def _open_streams() -> None:
-    """Open standard streams that were closed at the start, and let no stream fail on a character.
-
-    Otherwise, a file that is opened later gets the number of a closed stream and receives the printed text.
-    """
-    for number in range(3):
-        try:
-            os.fstat(number)
-        except OSError:
-            os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free
-    sys.stdin = sys.stdin or open(0, closefd=False)  # noqa: SIM115
-    for number, name in ((1, "stdout"), (2, "stderr")):
-        stream = getattr(sys, name)
-        if stream is not getattr(sys, f"__{name}__"):
-            continue  # the caller has replaced it
-        encoding = "utf-8" if stream is None else stream.encoding
-        writer = BufferedWriter(_Stream(number, "w", closefd=False))
-        at_once = number == 2 or os.isatty(number)
-        text = TextIOWrapper(writer, encoding, errors="backslashreplace", line_buffering=at_once)
-        setattr(sys, name, text)
 
 
 def _status(arguments: list[str] | None) -> int:
     """Run the program and return its exit status. Unexpected errors are raised."""
     try:
-        _check_words(sys.argv[1:] if arguments is None else arguments)
         outcome: Any = _program()(arguments, standalone_mode=False, prog_name="walkers")
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt, SystemExit, _Terminated) as stop:
@@ -98,17 +58,6 @@ def _status(arguments: list[str] | None) -> int:
     if outcome == _INTERRUPTED:  # typer turns Ctrl-C into a status
         return _tell("interrupted", _INTERRUPTED)
     return outcome if isinstance(outcome, int) else 0
-
-
-def _check_words(words: list[str]) -> None:
-    """Refuse arguments and folders that are not UTF-8 before anything is done."""
-    with suppress(OSError):  # a folder that is gone
-        words = [str(Path.cwd()), *words]
-    if not all(word.isascii() for word in words):
-        from walkers.inputs.errors import check_utf8
-
-        for word in words:
-            check_utf8(word)
 
 
 class _Grouped(TyperGroup):
@@ -128,8 +77,8 @@ class _Grouped(TyperGroup):
             from walkers.inputs.errors import refused
             from walkers.inputs.library import suggestion
 
-            now = f"; it is now: walkers {MOVED[args[0]]}" if args[0] in MOVED else suggestion(args[0], self.commands)
-            raise refused(args[0], f"no such command{now or '; walkers --help lists them'}")
+            other = suggestion(args[0], self.commands) or "; walkers --help lists them"
+            raise refused(args[0], f"no such command{other}")
         return super().resolve_command(ctx, args)
 
 
@@ -222,22 +171,15 @@ def _report_stop(stop: BaseException) -> int:
         return _tell(str(stop) or "interrupted", status)
     # The reader of the output, such as head, has closed it; this is not a failure.
     if isinstance(stop if isinstance(stop, OSError) else stop.__context__, BrokenPipeError):
-        _drop_stdout()
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # the end of the interpreter flushes it again
         return 0
     if isinstance(stop, OSError):  # a given path cannot be read or written
-        if stop.filename == _STDOUT:
-            _drop_stdout()
         return _tell(f"{stop.filename}: {stop.strerror}" if stop.filename else str(stop), 2)
     # Typer's usage errors print themselves and have their own exit status.
     if hasattr(stop, "show") and hasattr(stop, "exit_code"):
         stop.show()
         return int(stop.exit_code)
     raise stop
-
-
-def _drop_stdout() -> None:
-    """Discard the remaining output, so that the end of the interpreter raises no further error."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 
 def _tell(message: str, status: int) -> int:

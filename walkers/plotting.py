@@ -17,7 +17,7 @@ from walkers.inputs.changes import changed
 from walkers.inputs.errors import InputError, refused
 from walkers.inputs.readable import readable_unit
 from walkers.inputs.reading import resolve_case
-from walkers.postprocess.drawing import FORMATS, save_figure
+from walkers.postprocess.drawing import FORMATS, check_place, save_figure
 from walkers.runner.directory import case_of
 from walkers.sweeps.figure import Factor, draw, drawn_column, layout_of
 from walkers.sweeps.table import default_column, find_name, load
@@ -59,13 +59,10 @@ def plot_sweep(directory: str | Path, to: str | Path | None = None, **choices: A
     """
     table = load(directory)
     place = Path(to) if to is not None else Path(directory) / f"{_column(table, choices.get('y'))}.png"
-    form = place.suffix.lower().lstrip(".")
-    if form not in FORMATS or place.is_dir():
-        expected = f"expected the name of a file that ends in .{', .'.join(FORMATS)}"
-        raise refused("--to", f"{place}: {expected}")
+    check_place(place, *(f".{form}" for form in FORMATS))
     figure = _figure_of(table, directory, **choices)
     runs = [Path(run).name for run in table.loc[table["status"] == "finished", "run"]]
-    return save_figure(figure, place, runs, (form,), str(table.attrs["sweep"]))[0]
+    return save_figure(figure, place, runs, place.suffix.lower()[1:], str(table.attrs["sweep"]))[0]
 
 
 def sweep_figure(

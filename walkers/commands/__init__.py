@@ -10,18 +10,3 @@ SECTIONS = {
     "paper": "Compare with the published results: figures, numbers, and further terms of the theory.",
 }
 """Commands with sub-commands, and their help."""
-MOVED = {
-    "result": "run",
-    "theory": "show --theory",
-    "status": "list",
-    "table": "list",
-    "film": "render --film",
-    **{name: f"export --to {name}" for name in ("deck", "vtk", "paraview", "archive")},
-    "audit": "check engine",
-    "validate": "check literature",
-    "crosscheck": "check",
-    "verify": "check files",
-    "figures": "paper figures",
-    "model-terms": "paper terms",
-}
-"""Commands that replace old ones."""

@@ -32,7 +32,7 @@ _FORM = (
     "publish."
 )
 _OUTPUT = "File or folder to write; default: in the run's folder, archives in the current folder. Decks are printed."
-_EVERY = "vtk, paraview, xyz, lammps: write every Nth sample; default: one per cycle, for xyz and lammps every sample."
+_EVERY = "vtk, paraview, xyz, lammps: write every Nth sample; default: one per cycle; for xyz, lammps, piles all."
 _AS_PLACED = "vtk, paraview: keep independent walkers at their positions in the deck, not side by side."
 _WITHOUT_DUMPS = "archive: leave out the engine's dumps; tables and results are included."
 _LICENCE = "archive: CC-BY-4.0 (default), CC0-1.0, CC-BY-SA-4.0 or BSD-3-Clause."

@@ -42,7 +42,6 @@ _PILES = "Sweeps, folders of runs, runs or cases of piles."
 _NULL = "Runs in which nothing can climb: also print their false climbs. Repeatable."
 _SECOND = "Another run or sweep, named in the same way; default: the first with the values of --set."
 _SECOND_SET = "Replace a value of the second case, such as drive.frequency=70Hz. Repeatable."
-_INTERVAL = "Pictures: time between them, such as '2 s' or 'T/4' (T: period); default: evenly over the run."
 _SLOWDOWN = "Film: slow motion factor; default: chosen so that the film lasts 5 to 10 s."
 
 
@@ -126,7 +125,6 @@ def render(
     to: Path | None = Option(None, help="File to write: .png; films: .mp4, .gif; default: in the run's folder."),
     walker: int | None = Option(None, min=0, help="Walker to show, counted from 0; default: the first, or all beads."),
     images: int | None = Option(None, min=1, max=20, help="Largest number of pictures; default: 6."),
-    interval: str | None = Option(None, help=_INTERVAL),
     film: bool = Option(False, "--film", help="Render a film instead of pictures."),
     size: str | None = Option(None, help="Film: 360p, 480p, 720p, 1080p, or pixels such as 1280x720; default: 720p."),
     fps: int | None = Option(None, min=1, max=60, help="Film: frames per second; default: 25."),
@@ -136,15 +134,13 @@ def render(
 ) -> None:
     """Render pictures of a run at several times, or a film with --film."""
     from walkers.postprocess.films import FilmOptions, parse_size, parse_time
-    from walkers.postprocess.series import render_series, seconds_apart
     from walkers.progress import progress_of_film
 
     of_films = {"--size": size, "--fps": fps, "--slowdown": slowdown, "--begin": begin, "--end": end}
     if film:
-        refuse_given({"--images": images, "--interval": interval}, "is for pictures, not for --film")
+        refuse_given({"--images": images}, "is for pictures, not for --film")
     else:
         refuse_given(of_films, "is for --film")
-    refuse("--interval", interval is not None and walker is not None, "is for pictures of the whole")
     found = load_run(run, settings, out)
     if film:
         options = FilmOptions(
@@ -159,17 +155,7 @@ def render(
             path = found.film(to, options, on_progress=advance)
         print(path)
         return
-    number = images or 6
-    if walker is not None:
-        count = sum(make.replicates for make in found.case.walkers)
-        refuse("--walker", not count, "the run has none")
-        refuse("--walker", walker >= count, f"expected less than {count}, the run's number of walkers")
-        print_lines(render_series(found.directory, to, images=number, walker=walker))
-    elif interval is not None:
-        apart = seconds_apart(interval, found.directory)
-        print_lines(render_series(found.directory, to, images=number, apart=apart))
-    else:
-        print_lines(found.render(to, images=number))
+    print_lines(found.render(to, images=images or 6, walker=walker))
 
 
 def report(

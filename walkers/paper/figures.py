@@ -325,7 +325,7 @@ def _tornado(axes: Axes, found: pd.DataFrame, key: str) -> None:
     if known:
         axes.axvline(shipped, color="0.1", lw=1.0, label="shipped")
     else:
-        axes.set_title("shipped set: no walker on the axis")
+        axes.set_title("shipped set:\nno walker on the axis")
     axes.axvline(OBSERVATIONS[key].value or 0.0, color="C1", ls="--", lw=1.4, label="published")
     axes.margins(x=0.08)
     low, high = axes.get_xlim()

@@ -20,9 +20,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from walkers.inputs.caption import conditions
 from walkers.inputs.case import Case
+from walkers.inputs.errors import refused
 from walkers.inputs.rounding import SHOWN_UNITS, rounded
 from walkers.inputs.run_tables import limits_of
-from walkers.postprocess.drawing import check_formats, save_figure
+from walkers.postprocess.drawing import FORMATS, check_formats, save_figure
 from walkers.postprocess.uncertainty import bands_text, lines_of_rest, not_known, rests_on, with_bands
 from walkers.runner.directory import SEGMENT_NAME, case_of, files_of_segments, segment_directories
 from walkers.runner.files import read_json, write_json
@@ -455,14 +456,16 @@ def figures_of(directory: Path) -> dict[str, Figure]:
     return {name: one.draw(name, panels, run) for (name, one), panels in found.items() if panels}
 
 
-def plot_run(directory: Path, destination: Path | None = None, formats: Sequence[str] = ("png",)) -> list[Path]:
+def plot_run(directory: Path, destination: Path | None = None, formats: str | Sequence[str] = ("png",)) -> list[Path]:
     """Draw the figures of a run, such as ``walk`` for walkers and ``climb`` for piles.
 
     The files are written into ``destination``, by default the run directory. A format that is not in
-    `walkers.postprocess.drawing.FORMATS` raises ``InputError``.
+    `walkers.postprocess.drawing.FORMATS` raises ``InputError``, as does the name of a picture for the folder.
     """
-    check_formats(formats)
+    formats = check_formats(formats)
     destination = destination or directory
+    if destination.suffix.lower()[1:] in FORMATS and not destination.is_dir():
+        raise refused(destination, "expected a folder, because a run may have several figures")
     destination.mkdir(parents=True, exist_ok=True)
     return [
         path

@@ -103,21 +103,29 @@ def legend_below(axes: Axes, **options: Any) -> Legend:
     return axes.legend(loc="upper center", **options)
 
 
-def check_formats(formats: Sequence[str]) -> None:
-    """Raise `InputError` for formats that are not in `FORMATS`."""
-    for form in formats:
+def check_formats(formats: str | Sequence[str]) -> list[str]:
+    """Formats as a list; they may be joined by commas. Raises `InputError` for any that is not in `FORMATS`."""
+    given = [form for text in ([formats] if isinstance(formats, str) else formats) for form in text.split(",")]
+    for form in given:
         if form not in FORMATS:
-            raise refused("--format", f"{form!r}: expected one of {', '.join(FORMATS)}")
+            raise refused("format", f"{form!r}: expected one of {', '.join(FORMATS)}")
+    return list(dict.fromkeys(given))
 
 
-def check_place(path: Path, *suffixes: str, option: str = "--to") -> None:
-    """Raise `InputError` for an option whose path is a folder or has none of these suffixes."""
+def check_place(path: Path, *suffixes: str) -> None:
+    """Raise `InputError` for a path that is a folder or has none of these suffixes."""
     if path.suffix.lower() not in suffixes or path.is_dir():
-        raise refused(option, f"{path}: expected the name of a {' or '.join(suffixes)} file")
+        raise refused(path, f"expected the name of a {' or '.join(suffixes)} file")
+
+
+def check_every(every: int | None) -> None:
+    """Raise `InputError` if every ``every``-th sample cannot be written."""
+    if every is not None and every < 1:
+        raise refused("every", f"{every}: expected a whole number from 1")
 
 
 def save_figure(
-    figure: Figure, path: Path, sources: Sequence[str], formats: Sequence[str] = ("png",), title: str = ""
+    figure: Figure, path: Path, sources: Sequence[str], formats: str | Sequence[str] = ("png",), title: str = ""
 ) -> list[Path]:
     """Write a figure, in one or several formats, beside its final place and rename it.
 
@@ -128,7 +136,7 @@ def save_figure(
     sources, title
         Metadata of the file: names of the run directories, which end in the hash of case and engine; title.
     """
-    check_formats(formats)
+    formats = check_formats(formats)
     path.parent.mkdir(parents=True, exist_ok=True)
     name, runs = printable(title or path.stem), " ".join(dict.fromkeys(sources))
     # Without dates equal figures are equal files. PDF has no field for the source.
@@ -140,7 +148,7 @@ def save_figure(
     # One layout for all formats: each further one would begin with the last and give another result.
     styled(figure.draw_without_rendering)()
     figure.set_layout_engine("none")
-    written = [path.with_suffix(f".{form}") for form in dict.fromkeys(formats)]
+    written = [path.with_suffix(f".{form}") for form in formats]
     for place in written:
         form = place.suffix[1:]
         with beside(place) as new:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from walkers.inputs.loads import dimer_of
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, series_look, styled
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.gait import averages, distance_walked, fit_slopes, gait, walk
-from walkers.postprocess.motion import Group, even_frames, even_labels
+from walkers.postprocess.motion import Group
 from walkers.postprocess.sides import sides, ways
 from walkers.postprocess.tables import Columns
 
@@ -30,7 +30,6 @@ _LETTERS = 90  # letters of a line of a title
 _LEAST_DISTANCE, _LEAST_ANGLE, _LEAST_SPEED = 0.01, 0.1, 0.01
 """Smallest ranges of axes in mm, ° and mm/s, so that rounding errors do not look like motion."""
 _ASIDE, _WIDE = 10.0, 26  # smallest angle at the start (°) in a legend; letters of labels in three columns
-_SHOWN, _LONG = 8, 4.0  # images of a walker; lengths of a path beyond which they are centred on the walker
 _ALONG = "displacement along the drive axis (mm)"
 _GREY, _PALE, _OTHERS = "#5b6770", "#b4bec5", "#c78a2c"
 
@@ -199,7 +198,11 @@ def pile_panels(tables: Mapping[str, Columns]) -> list[Panel]:
     for title, y, columns in (
         ("Segregation: (z of large − z of small) / their sum", "Brazil-nut\nindex", segregation),
         ("Bridges and contacts with other beads", "number\nper bead", joined),
-        ("Mean square velocity, once per cycle", "mean square\nvelocity\n(m²/s²)", {"mean_square_velocity": ""}),
+        (
+            f"Mean square velocity, every {np.median(np.diff(time)):.3g} s",
+            "mean square\nvelocity\n(m²/s²)",
+            {"mean_square_velocity": ""},
+        ),
     ):
         named = enumerate(columns.items())
         lines = [Line(time, bed[name], label, 2 * number, dashed=number > 0) for number, (name, label) in named]
@@ -208,19 +211,23 @@ def pile_panels(tables: Mapping[str, Columns]) -> list[Panel]:
 
 
 def _leaders(tables: Mapping[str, Columns]) -> Iterator[Line]:
-    """Height of the leader of each cluster; thick lines for climbs."""
+    """Height of the leader of each cluster; thick lines, each of another colour, for climbs."""
     clusters, members = tables["clusters"], tables["members"]
     named = np.cumsum(clusters["climbed"])
+    others = "clusters that\ndid not climb"
     for track, (climbed, leader) in enumerate(zip(clusters["climbed"], clusters["leader"], strict=True)):
         own = (members["track"] == track) & (members["bead"] == leader)
         leads, speed = "large" if clusters["leader_large"][track] else "small", clusters["speed"][track] * 1e3
         text = f"{clusters['size'][track]} beads climb, led by a\n{leads} one: {speed:.1f} mm/s"
-        label = text if climbed and named[track] <= MOST_NAMED else ""
-        colour, width = (2, 1.6) if climbed else (_OTHERS, 0.6)
-        yield Line(members["time"][own], members["height"][own] * 1e3, label, colour, width=width)
+        look: dict[str, Any] = {"colour": _OTHERS, "width": 0.6, "label": others}
+        if climbed:
+            look = {"colour": int(named[track]), "width": 1.6, "label": text if named[track] <= MOST_NAMED else ""}
+        else:
+            others = ""  # named once
+        yield Line(members["time"][own], members["height"][own] * 1e3, **look)
     if len(named) and named[-1] > MOST_NAMED:
         nothing = np.empty(0)
-        yield Line(nothing, nothing, f"and {named[-1] - MOST_NAMED} more climbs", 2, width=1.6)
+        yield Line(nothing, nothing, f"and {named[-1] - MOST_NAMED} more climbs", _GREY, width=1.6)
 
 
 def assembly_panels(tables: Mapping[str, Columns]) -> list[Panel]:
@@ -266,27 +273,22 @@ def _events(events: Columns) -> Iterator[Line]:
 
 
 @styled
-def walk_figure(groups: list[Group], walked: Panel, turned: Panel) -> Figure:
-    """Strobed positions of the first walker; distance and orientation of all (`walk_panels`)."""
-    case, images = groups[0].case, _images(groups[0])
-    rows, ratios = [["strobe", "walked"], ["strobe", "turned"]], {"width_ratios": [1.0, 1.6]}
-    if images.wide:
-        rows, ratios = [["strobe", "strobe"], ["walked", "turned"]], {"height_ratios": [1.0, 1.3]}
-    figure, axes = new_figure(TWO_COLUMNS, 5.2, mosaic=rows, **ratios)
+def walk_figure(case: Case, panels: Sequence[Panel]) -> Figure:
+    """Distance, orientation and paths of all walkers (`walk_panels`)."""
+    figure, axes = new_figure(TWO_COLUMNS, 4.8, mosaic=[["walked", "turned"], ["paths", "paths"]])
     figure.suptitle(_title(case))
-    _draw_strobe(axes["strobe"], groups[0], images)
-    for name, panel in (("walked", walked), ("turned", turned)):
-        draw_panel(axes[name], panel)
-        axes[name].set_xlabel(panel.x)
-        for number, line in enumerate(axes[name].lines):
+    for one, panel in zip(axes.values(), panels, strict=False):
+        draw_panel(one, panel)
+        one.set(xlabel=panel.x, title="grey: settling" if one is axes["walked"] else "")
+        for number, line in enumerate(one.lines):
             # Markers of coinciding lines are next to each other.
             line.set(**series_look(number), markevery=(0.02 * (number % 6), 0.12), linewidth=0.9)
-    axes["walked"].set_title("grey: settling")
+    axes["paths"].set_title(panels[2].title.removesuffix(named_of(len(panels[2].lines))))
     letter_panels(axes.values())
     lines, labels = axes["walked"].get_legend_handles_labels()
     start = "orientation from the drive axis" if case.meets else "facing"
     velocity = "velocity up the slope" if case.goes_uphill else "velocity along the heading"
-    text = f"walker: {start} at the start, {velocity}{named_of(len(walked.lines))}"
+    text = f"walker: {start} at the start, {velocity}{named_of(len(panels[0].lines))}"
     columns = 4 if max(map(len, labels)) < _WIDE else 3
     figure.legend(lines, labels, loc="outside lower center", ncols=columns, title=text)
     return figure
@@ -341,71 +343,3 @@ def _title(case: Case) -> str:
     tilted = f", {case.boundary.tilted}" if case.boundary.tilted else ""
     title = "\n".join(wrap(plain_text(case.title or case.name), _LETTERS))
     return f"{title}\n{shown}{tilted}, {case.drive.described()}{gamma0}"
-
-
-class _Images(NamedTuple):
-    """Images of a walker: frames, positions of its beads along and across the drive axis (mm), largest extents (mm).
-
-    ``long`` is whether its path is too long for one scale, ``wide`` whether images side by side are wider than high.
-    """
-
-    shown: list[int]
-    position: FloatArray
-    extent: FloatArray
-    long: bool
-    wide: bool
-
-
-def _images(group: Group) -> _Images:
-    """Images of the first walker of a group; fewer of a short path uphill."""
-    radius, uphill = 1e3 * float(group.radii.max()), group.case.goes_uphill
-    shown = even_frames(group.motion, _SHOWN)
-    position = group.position[:, 0] @ np.stack([group.drive_axis, group.across_axis], axis=-1) * 1e3
-    extent = np.ptp(position[shown], axis=1).max(axis=0) + 2.0 * radius
-    long = float(np.ptp(position[shown].mean(axis=1)[:, 0])) > _LONG * extent[0]
-    if uphill and not long:
-        shown = even_frames(group.motion, _SHOWN - 3)
-    height = extent[0] + (0.0 if long else float(np.ptp(position[shown].mean(axis=1)[:, 0])))
-    return _Images(shown, position[shown], extent, long, uphill and bool(height < len(shown) * extent[1]))
-
-
-def _draw_strobe(axes: Axes, group: Group, images: _Images) -> None:
-    """The first walker seen along the normal of the floor, its beads to scale, at several times (Fig. 1b of the paper).
-
-    Images are even: the way along the drive axis and the orientation are shown, not the drift across it. Uphill is up;
-    on a long walk each image is in the middle.
-    """
-    from matplotlib.patches import Circle
-
-    radii, uphill = group.radii * 1e3, group.case.goes_uphill
-    shown, position, extent, long, wide = images
-    middle = position.mean(axis=1)
-    way = middle[:, 0] - middle[0, 0]
-    pitch = max(float(extent[1]), 2.6 * float(radii.max())) + 0.1
-    along = position[..., 0] - (middle[:, :1] if long else middle[0, 0])
-    across = position[..., 1] - middle[:, 1:] - pitch * np.arange(len(shown))[:, None]
-    for row, bead in np.ndindex(along.shape):
-        place = (along[row, bead], across[row, bead])
-        look: dict[str, Any] = {"fc": "0.45" if bead == 0 else "0.75", "ec": "0.2", "lw": 0.6}
-        axes.add_patch(Circle((-place[1], place[0]) if uphill else place, float(radii[bead]), **look))
-    labels = even_labels(group.time[shown])
-    if long:
-        labels = [f"{time}\n{one:z.1f} mm" for time, one in zip(labels, way, strict=True)]
-    edges = float((along - radii).min() - radii.max()), float((along + radii).max() + radii.max())
-    ends = -pitch * (len(shown) - 0.4), 0.6 * pitch
-    name = "from the midpoint (mm)" if long else _ALONG.replace("along ", "along\n")
-    named = f"time and displacement\n{'uphill' if uphill else 'along the drive axis'}"
-    title = f"walker {group.walkers[0].walker}"
-    if uphill:
-        axes.set(xlim=(-ends[1], -ends[0]), ylim=edges, ylabel=name if long else "uphill (mm)")
-        axes.set_xticks(pitch * np.arange(len(shown)), labels, rotation=0 if wide else 90)
-        axes.set_xlabel(named.replace("\n", " ") if long else "")
-        arrow: dict[str, Any] = {"arrowprops": {"arrowstyle": "-|>", "color": "black"}, "fontsize": 7, "ha": "center"}
-        axes.annotate(group.case.boundary.pull, (1.1, 0.2), (1.1, 0.7), "axes fraction", **arrow)
-    else:
-        axes.set(xlim=edges, ylim=ends, yticks=[], xlabel=f"{name};\nbeside: {named}" if long else name)
-        for row, time in enumerate(labels):
-            axes.annotate(time, (1.01, -row * pitch), xycoords=("axes fraction", "data"), fontsize=7, va="center")
-    axes.set(aspect="equal", title=title)
-    axes.set_anchor("N")
-    axes.grid(visible=False)

@@ -30,11 +30,13 @@ from walkers.postprocess.scene import (
     camera_axes,
     from_above,
     from_the_side,
+    one_walker,
     plan_axes,
     round_below,
 )
 from walkers.runner.files import beside
 
+_NUMBER = re.compile(r"[\d.]+(e[-+]?\d+)?", re.IGNORECASE)
 _SIZES = {"360p": (640, 360), "480p": (854, 480), "720p": (1280, 720), "1080p": (1920, 1080)}
 _AROUND, _AROUND_TRAY = 1.2, 1.3  # extent of the picture over that of the paths of the beads, or of the tray
 _LETTERS, _WIDE, _LEAST_LETTERS = 24, 42, 15  # lines and heights of a line per picture; smallest height, pixels
@@ -54,9 +56,14 @@ class FilmOptions:
     slowdown
         Slow motion factor; None: 1, 2, 5, 10, …, chosen so that the film lasts 5 to 10 s.
     walker
-        Number of the walker to show, if walkers are independent.
+        Number of a walker to show by itself; None: the first of independent walkers, otherwise all beads.
     begin, end
         Physical times of the first and the last frame, s; ``end`` None: the end of the run.
+
+    Raises
+    ------
+    InputError
+        If ``size``, ``fps`` or ``slowdown`` is not positive.
     """
 
     size: tuple[int, int] = _SIZES["720p"]
@@ -66,6 +73,12 @@ class FilmOptions:
     begin: float = 0.0
     end: float | None = None
 
+    def __post_init__(self) -> None:
+        """Check the numbers that do not depend on a run."""
+        for name, value in (("size", min(self.size)), ("fps", self.fps), ("slowdown", self.slowdown)):
+            if value is not None and not value > 0:
+                raise refused(name, f"{value:g}: expected more than 0")
+
 
 def render_film(
     directory: Path,
@@ -74,7 +87,7 @@ def render_film(
     *,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Render a film of one walker if walkers are independent, otherwise of all beads.
+    """Render a film of one walker if walkers are independent or one is chosen, otherwise of all beads.
 
     Parameters
     ----------
@@ -93,7 +106,9 @@ def render_film(
     _check_format(path, options)
     if path.suffix.lower() == ".mp4":
         require("film")
-    motion = _shown(read_motion(directory).driven, options.walker)
+    motion = read_motion(directory).driven
+    if motion.case.apart or options.walker is not None:
+        motion = one_walker(motion, options.walker or 0)
     times = film_times(motion, options)
     count, frames = len(times.time), slice(int(times.frame[0]), ceil(times.frame[-1]) + 1)
     wide, tall = options.size
@@ -139,7 +154,7 @@ def parse_size(text: str) -> tuple[int, int]:
 def parse_time(option: str, text: str) -> float:
     """Read the physical time of an option, such as ``0.1 s`` or a number, in s; otherwise `InputError`."""
     try:
-        return parse_quantity(f"{text} s" if text.replace(".", "", 1).isdigit() else text, DURATION)
+        return parse_quantity(f"{text} s" if _NUMBER.fullmatch(text) else text, DURATION)
     except ValueError as error:
         raise refused(option, f'{text!r}: expected a time such as "0.1 s"') from error
 
@@ -149,23 +164,9 @@ def _check_format(path: Path, options: FilmOptions) -> None:
     suffix, (wide, tall), fps = path.suffix.lower(), options.size, options.fps
     check_place(path, ".mp4", ".gif")
     if suffix == ".mp4" and (wide % 2 or tall % 2):
-        raise refused("--size", f"{wide}x{tall}: expected even numbers for an MP4")
+        raise refused("size", f"{wide}x{tall}: expected even numbers for an MP4")
     if suffix == ".gif" and (100 % fps or fps > 50):  # pictures last whole hundredths of a second
-        raise refused("--fps", f"{fps}: expected 1, 2, 4, 5, 10, 20, 25 or 50 for a GIF")
-
-
-def _shown(motion: Motion, walker: int | None) -> Motion:
-    """The motion of one of independent walkers, otherwise the whole motion."""
-    count = len(motion.walkers)
-    if not motion.case.apart:
-        if walker is not None:
-            raise refused(
-                "--walker", "the walkers of this run are shown together" if count else "the run has no walkers"
-            )
-        return motion
-    if walker is not None and walker >= count:
-        raise refused("--walker", f"{walker}: expected less than {count}, the run's walkers")
-    return motion.of_walkers(motion.walkers[walker or 0 :][:1])
+        raise refused("fps", f"{fps}: expected 1, 2, 4, 5, 10, 20, 25 or 50 for a GIF")
 
 
 class FilmTimes(NamedTuple):
@@ -190,8 +191,8 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
     last, begin = float(motion.time[-1]), options.begin
     end = last if options.end is None else min(options.end, last)
     if not 0.0 <= begin < end:
-        message = f"nothing to show: expected times within the drive, 0 to {last:.4g} s, --begin before --end"
-        raise refused("--begin, --end", message)
+        message = f"nothing to show: expected times within the drive, 0 to {last:.4g} s, begin before end"
+        raise refused("begin, end", message)
     follows, slowdown = motion.follows_cycles, options.slowdown
     if slowdown is None:
         largest = _SECONDS / (end - begin)

@@ -6,6 +6,7 @@ state file (``.pvsm``) is not written: it contains all properties of one version
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import tempfile
@@ -19,6 +20,7 @@ import numpy.typing as npt
 from walkers.inputs.errors import refused
 from walkers.inputs.text import rendered
 from walkers.postprocess.analysis import analyses_of
+from walkers.postprocess.drawing import check_every
 from walkers.postprocess.motion import Bridges, Motion, gathered, read_bridges, read_motion
 from walkers.postprocess.scene import Scene, camera_axes, mesh_of, walls_of
 from walkers.runner.files import write_bytes, write_text
@@ -27,6 +29,9 @@ if TYPE_CHECKING:
     import pyvista as pv
 
 _COLLECTION, _SCRIPT = "walkers.pvd", "show.py"
+_NUMBERED = re.compile(r'file="frame_(\d+)\.vtm"')
+_OURS = re.compile(r"(?:frame|beads|bridges|boundary)_(\d+)\.vt[mpu]")
+"""Numbers of the frames that a collection lists; names of the files of a frame."""
 _WIDE, _AROUND = 16.0 / 9.0, 1.15  # width over height of the view; its extent over that of what the beads reach
 _NECK = 0.45  # radius of what is drawn of a bridge over that of the smallest bead
 _UNITS = {
@@ -48,11 +53,12 @@ def write_vtk(
     Parameters
     ----------
     directory, destination
-        A run directory; the folder to write, ``vtk`` in the run directory if None. A folder with files of this
-        function alone is replaced; any other files in it raise an InputError.
+        A run directory; the folder to write, ``vtk`` in the run directory if None. A folder is replaced if it is
+        empty, or if it has no files but those of an earlier export, which its ``walkers.pvd`` lists. A folder with any
+        other file, a file, or a symbolic link raises an InputError.
     every
-        Write every ``every``-th sample of the drive; None: one per cycle. Bridges are in the frames that recorded
-        them.
+        Write every ``every``-th sample of the drive; None: one per cycle, or all samples if they are further apart.
+        Bridges are in the frames that recorded them.
     vtu
         Also write the beads as ``.vtu``.
     as_placed
@@ -64,15 +70,43 @@ def write_vtk(
         The ``.pvd`` file with times in s; each frame has the blocks ``beads``, ``boundary`` and, if recorded,
         ``bridges``.
     """
-    destination = destination or directory / "vtk"
-    motion, place = _shown(directory, as_placed=as_placed), destination.resolve()
-    _check_replaceable(place)
+    return _write(_shown(directory, as_placed=as_placed), destination or directory / "vtk", every, vtu=vtu)
+
+
+def write_paraview(
+    directory: Path,
+    destination: Path | None = None,
+    *,
+    colour: str | None = None,
+    every: int | None = None,
+    as_placed: bool = False,
+) -> Path:
+    """Write a run for ParaView, with a script that shows it.
+
+    ``colour`` is the array that colours the beads, by default ``walker`` if there are walkers, else ``speed``; an
+    unknown array raises an InputError. The other parameters are those of `write_vtk`. Returns the script.
+    """
+    motion = _shown(directory, as_placed=as_placed)
+    colour = colour or ("walker" if motion.walkers else "speed")
+    return _write(motion, destination or directory / "vtk", every, colour=colour).with_name(_SCRIPT)
+
+
+def _write(motion: Motion, destination: Path, every: int | None, *, vtu: bool = False, colour: str = "") -> Path:
+    """Write the files of `write_vtk`, with a ``colour`` also the script; return the ``.pvd`` file."""
+    check_every(every)
+    _check_replaceable(destination)
+    place = destination.absolute()
+    entries: list[str] = []
     place.parent.mkdir(parents=True, exist_ok=True)
     beside = Path(tempfile.mkdtemp(prefix=f".{place.name}-", dir=place.parent))
-    entries = []
     try:
         beside.chmod(0o755)
         for frame, meshes in _frames(motion, every or motion.case.run.samples_per_cycle):
+            if colour and not entries:
+                known = {name.partition(" (")[0] for name in meshes["beads"].array_names}
+                if colour not in known:
+                    raise refused("colour", f"{colour!r}: expected one of {', '.join(sorted(known))}")
+                write_text(beside / _SCRIPT, _script(motion.driven, colour, place))
             blocks: list[str] = []
             for kind, mesh in meshes.items():
                 _save(mesh, beside / f"{kind}_{frame:06d}.vtp")
@@ -94,32 +128,11 @@ def write_vtk(
     return destination / _COLLECTION
 
 
-def write_paraview(
-    directory: Path, destination: Path | None = None, *, colour: str | None = None, **options: Any
-) -> Path:
-    """Write a run for ParaView, with a script that shows it.
-
-    ``colour`` is the array that colours the beads, by default ``walker`` if there are walkers, else ``speed``; an
-    unknown array raises an InputError. ``options`` are those of `write_vtk`. Returns the script.
-    """
-    driven = _shown(directory, as_placed=options.get("as_placed", False)).driven
-    names = set(beads_at(driven, 0).array_names)
-    if (bridges := next(read_bridges(driven), None)) is not None:
-        names.update(*(one.point_data(driven)(bridges) for one in analyses_of(driven.case)))
-    known = {name.partition(" (")[0]: name for name in names}
-    colour = colour or ("walker" if driven.walkers else "speed")
-    if colour not in known:
-        raise refused("--colour", f"{colour!r}: expected one of {', '.join(sorted(known))}")
-    folder = write_vtk(directory, destination=destination, **options).parent
-    write_text(folder / _SCRIPT, _script(driven, colour, folder.resolve()))
-    return folder / _SCRIPT
-
-
 def open_paraview(script: Path) -> None:
     """Start ParaView with a script without waiting for its end; InputError if ParaView is not installed."""
     program = shutil.which("paraview")
     if program is None:
-        raise refused("--open", f"ParaView is not installed; open {script} in ParaView to show the run")
+        raise refused("paraview", f"is not installed; open {script} in ParaView to show the run")
     subprocess.Popen([program, f"--script={script}"], start_new_session=True)
 
 
@@ -142,14 +155,14 @@ def _save(mesh: pv.PolyData, path: Path) -> None:
 
 
 def _check_replaceable(place: Path) -> None:
-    """Refuse to replace anything but an empty folder or one that this module wrote."""
-    held = ""
-    if place.is_dir():
-        ours = {".vtp", ".vtm", ".vtu", Path(_COLLECTION).suffix}
-        names = [path.name for path in place.iterdir() if path.suffix not in ours and path.name != _SCRIPT]
-        held = f"it holds {names[0]}" if names else ""
-    elif place.exists():
-        held = "it is a file"
+    """Refuse to replace anything but an empty folder or the files of an earlier export, which its .pvd lists."""
+    held = "it is a symbolic link" if place.is_symlink() else "it is a file" if place.is_file() else ""
+    if not held and place.exists():
+        collection, names = place / _COLLECTION, {path.name for path in place.iterdir()}
+        listed = set(_NUMBERED.findall(collection.read_text("utf-8", "replace") if collection.is_file() else ""))
+        names -= {_COLLECTION, _SCRIPT} if listed else set()
+        others = sorted(name for name in names if not (match := _OURS.fullmatch(name)) or match[1] not in listed)
+        held = f"it holds {others[0]}" if others else ""
     if held:
         expected = "expected a new or empty folder, or a folder that walkers export has written"
         raise refused(place, f"{expected}; {held}")

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from walkers.inputs.boundary import Flat
 from walkers.inputs.case import Case
+from walkers.inputs.errors import refused
 from walkers.postprocess.analyses.piles import Pile, tracks_of
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, boundary_motion
@@ -42,6 +43,14 @@ _ELEVATION_OF_ONE, _ELEVATION = radians(35.0), radians(60.0)
 _LONG, _ABOUT = 1.5, 1.4
 """The camera follows the beads if a view of their whole path is larger by the first factor than a view that follows
 them; the second factor is the margin of that view."""
+
+
+def one_walker(motion: Motion, number: int) -> Motion:
+    """The motion of the walker with a number; `InputError` if there is none."""
+    count = len(motion.walkers)
+    if not 0 <= number < count:
+        raise refused("walker", f"{number}: " + (f"expected 0 to {count - 1}" if count else "the run has no walkers"))
+    return motion.of_walkers(motion.walkers[number : number + 1])
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,7 @@ if it walks up a slope. On a tilted plane up in the picture is uphill.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
 from math import ceil, isclose
 from pathlib import Path
@@ -18,13 +16,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.inputs.case import Case
-from walkers.inputs.errors import refused
-from walkers.physics.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_place, new_figure, plain_text, save_figure, styled
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, gathered, read_motion
-from walkers.postprocess.scene import Picture, Scene, Window, axes_toward, from_the_side, plan_axes
-from walkers.runner.directory import case_of
+from walkers.postprocess.scene import Picture, Scene, Window, axes_toward, from_the_side, one_walker, plan_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,8 +28,6 @@ if TYPE_CHECKING:
 SERIES_NAME, PICTURE_NAME = "series.png", "walker.png"
 SHOWN = 6
 """Pictures in a time series."""
-_TOLERANCE = 0.1
-"""Tolerance of the time between pictures, relative."""
 _PIXELS = 40.0
 """Smallest resolution of a view in pixels per mm, unless it becomes too large."""
 _TALL, _TALLEST, _WIDEST = 1000, 1600, 1900
@@ -65,7 +58,6 @@ def render_series(
     destination: Path | None = None,
     *,
     images: int = SHOWN,
-    apart: float | None = None,
     walker: int | None = None,
 ) -> list[Path]:
     """Render views of a run in rows, with times and scales; walkers and climbers are coloured.
@@ -78,23 +70,21 @@ def render_series(
         The PNG to write; ``series.png``, of one walker ``walker.png``, in the run directory if None.
     images
         Largest number of pictures, evenly spaced through the drive; fewer if the last is then nearer to its end.
-    apart
-        Time between pictures, s: the last ``images`` of the run.
     walker
         Number of a walker to show by itself.
 
     Raises
     ------
     InputError
-        If the destination is no PNG, frames were recorded less often, or the drive was shorter.
+        If the destination is no PNG, or the run has no walker with this number.
     """
     from matplotlib import rc_context
 
     path = destination or directory / (SERIES_NAME if walker is None else PICTURE_NAME)
     check_place(path, ".png")
     whole = read_motion(directory)
-    motion = gathered(whole if walker is None else whole.of_walkers(whole.walkers[walker : walker + 1]))
-    frames = even_frames(motion, images) if apart is None else _frames_apart(motion, images, apart, directory)
+    motion = gathered(whole if walker is None else one_walker(whole, walker))
+    frames = even_frames(motion, images)
     with rc_context(_LETTERS):
         figure = _views(motion, frames) if walker is None else _strips(motion, frames)
     return save_figure(figure, path, [directory.name])
@@ -274,31 +264,3 @@ def _panels(count: int, wide: float, tall: float, said: Sequence[str]) -> tuple[
         corner = (left / size[0], bottom / size[1])
         panel.set_position((*corner, (across - _BESIDE) / size[0], (up - _BENEATH) / size[1]))
     return figure, list(axes.flat)[:count]
-
-
-def _frames_apart(motion: Motion, images: int, apart: float, directory: Path) -> list[int]:
-    """The last frames of a run that are ``apart`` seconds apart, within the tolerance."""
-    last = len(motion.time) - 1
-    between = motion.case.run.steps_per_sample * motion.case.run.time_step
-    every, expected = round(apart / between), ""
-    if not every or abs(every * between / apart - 1.0) > _TOLERANCE:
-        expected = f"a multiple of the {between:.4g} s between frames"
-    elif every > last - motion.first_driven:
-        expected = f"less than the {max(motion.time[-1], 0.0):.3g} s of the drive"
-    if expected:
-        raise refused(directory, f"{apart:.4g} s between pictures: expected {expected}")
-    return list(range(last, motion.first_driven - 1, -every))[:images][::-1]
-
-
-def seconds_apart(text: str, directory: Path) -> float:
-    """Read a time between pictures: a duration, or a part or multiple of a cycle such as ``T/4``; else `InputError`."""
-    cycles = re.fullmatch(r"(?P<many>[\d.]*)\s*T\s*(/\s*(?P<parts>\d+))?", text.strip())
-    seconds = 0.0
-    with suppress(ValueError, ZeroDivisionError):
-        if cycles:
-            seconds = float(cycles["many"] or 1) / int(cycles["parts"] or 1) / case_of(directory).drive.frequency
-        else:
-            seconds = parse_quantity(text, DURATION)
-    if seconds > 0.0:
-        return seconds
-    raise refused("--interval", f'{text!r}: expected a time such as "2 s", or "T/4" of a cycle')

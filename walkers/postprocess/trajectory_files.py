@@ -12,7 +12,7 @@ from typing import TextIO
 import numpy as np
 
 from walkers.inputs.extras import require
-from walkers.postprocess.drawing import check_place
+from walkers.postprocess.drawing import check_every, check_place
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, read_motion
 from walkers.runner.files import beside
@@ -37,9 +37,10 @@ def write_trajectory(directory: Path, destination: Path, form: str, *, every: in
     Raises
     ------
     InputError
-        If the file has another suffix.
+        If the file has another suffix, or ``every`` is less than 1.
     """
-    check_place(destination, *SUFFIXES[form], option="-o")
+    check_place(destination, *SUFFIXES[form])
+    check_every(every)
     write = {"xyz": _write_xyz, "lammps": _write_lammps}[form]
     if form == "xyz":
         require("xyz")

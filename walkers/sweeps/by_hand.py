@@ -7,6 +7,7 @@ prints the parameters that it reads: a deck with edited parameters gives another
 from __future__ import annotations
 
 import re
+import shutil
 import time
 from collections.abc import Collection, Mapping
 from dataclasses import fields, replace
@@ -71,10 +72,15 @@ def write_folder(case: Case, folder: Path) -> Path:
         folder.mkdir(parents=True)
     except OSError as error:
         raise refused(folder, f"cannot make the folder ({error.strerror}): expected the name of a new one") from error
-    write_deck(deck, folder)
-    (folder / SCALE_NAME).write_text(_SCALE, encoding="utf-8")
-    (folder / RUN_NAME).write_text(run_script(engine, plugin, deck.layout.ranks), encoding="utf-8")
-    write_json(folder / DECK_RECORD_NAME, {"case": case.as_dict(), "deck": deck.text})
+    try:
+        write_deck(deck, folder)
+        (folder / SCALE_NAME).write_text(_SCALE, encoding="utf-8")
+        (folder / RUN_NAME).write_text(run_script(engine, plugin, deck.layout.ranks), encoding="utf-8")
+        write_json(folder / DECK_RECORD_NAME, {"case": case.as_dict(), "deck": deck.text})
+    except OSError as error:  # a disk that is full names no file
+        error.filename = str(folder)
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
     return folder / DECK_NAME
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil, prod
-from textwrap import fill, wrap
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -297,8 +297,11 @@ def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Fig
     for axes in grid.flat[len(parts) :]:
         axes.set_axis_off()
     _legend(figure, grid, colours, drawn)
-    if title:
-        figure.suptitle(plain_text("\n".join(wrap(title, round(14.0 * width)))))
+    said = [title]
+    if np.isfinite(drawn.errors).any():
+        said.append(SCATTER + ("" if errors_seen(drawn.errors, drawn.values) else ", smaller than the symbols"))
+    if lines := [line for one in said for line in wrap(one, round(14.0 * width))]:
+        figure.suptitle(plain_text("\n".join(lines)))
     return figure
 
 
@@ -420,13 +423,7 @@ def _legend(figure: Figure, grid: npt.NDArray[Any], colours: _Colours, drawn: Dr
     lines = {line.get_linestyle() for axes in grid.flat for line in axes.lines}
     for number, model in enumerate(drawn.theory):
         handles.append(Line2D([], [], label=model, **_model_look(number, _MODELS[number][0] in lines, "0.3")))
-    if np.isfinite(drawn.errors).any():
-        bars = SCATTER + ("" if errors_seen(drawn.errors, drawn.values) else ", smaller than the symbols")
-        most, whole = round(18.0 * figure.get_figwidth()), [title, bars] if title else [bars]
-        title = text if len(text := "; ".join(whole)) <= most else "\n".join(fill(one, most) for one in whole)
-        handles = handles or [Line2D([], [], ls="none", label=" ")]
     if handles:
         longest = max(len(str(handle.get_label())) for handle in handles)
         columns = max(1, min(len(handles), int(13.0 * figure.get_figwidth() / (longest + 6))))
-        legend = figure.legend(handles=handles, loc="outside lower center", title=title, ncols=columns)
-        legend.get_title().set_multialignment("center")
+        figure.legend(handles=handles, loc="outside lower center", title=title, ncols=columns)

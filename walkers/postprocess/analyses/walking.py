@@ -331,10 +331,10 @@ class Walking(Analysis):
         return {"walk": walk_panels(groups), "gait": gait_panels(groups[0])}
 
     def draw(self, name: str, panels: Sequence[Panel], run: Measured) -> Figure:
-        """Figure of the walk, with the beads of one walker to scale."""
+        """Figure of the walk."""
         from walkers.postprocess.figures import walk_figure
 
-        return walk_figure(run.motion.groups, *panels[:2]) if name == "walk" else super().draw(name, panels, run)
+        return walk_figure(run.case, panels) if name == "walk" else super().draw(name, panels, run)
 
 
 def _stacked(parts: list[Columns]) -> Columns:

@@ -12,7 +12,7 @@ Compared with 200 samples per cycle, the work with 20 samples is within 0.01 %, 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from math import pi
@@ -23,9 +23,8 @@ import numpy as np
 from walkers.inputs.case import Case
 from walkers.physics.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.analyses.walking import spread
-from walkers.postprocess.analysis import Analysis, Measured, Quantity
+from walkers.postprocess.analysis import Analysis, Quantity
 from walkers.postprocess.dump import FloatArray, IntArray
-from walkers.postprocess.figures import Line, Panel, nested_widths
 from walkers.postprocess.gait import walk
 from walkers.postprocess.motion import LEAST_SAMPLES, Group, Motion
 from walkers.postprocess.sides import STEADY_SPEED, alike, sides
@@ -33,7 +32,6 @@ from walkers.postprocess.tables import Columns, columns_of
 
 _PARTS = 10
 """Parts of an interval between samples; the force is evaluated in the middle of each part."""
-_MOST_NAMED = 6  # largest number of walkers in the legend
 
 
 @dataclass(frozen=True)
@@ -80,18 +78,6 @@ class Working(Analysis):
         text = f"power of the drive, without that of gravity, over weight times walking speed, {mean}"
         label = f"cost of transport{these and ' (without the work of gravity)'}"
         yield Quantity("cost_of_transport", label, "", "cost_of_transport", text)
-
-    def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
-        """The work on each walker, cycle by cycle."""
-        walker, cycle, work = run.tables["work"].values()
-        lines, widths = [], nested_widths(walker.max() + 1)
-        for number in range(walker.max() + 1):
-            these, label = walker == number, f"walker {number}" if walker.max() < _MOST_NAMED else ""
-            lines.append(Line(cycle[these], 1e9 * work[these], label, number, width=widths[number]))
-        settled = float(run.motion.case.run.settled_strobes)
-        title = "Work of the drive on each walker; grey: settling"
-        panel = Panel(title, "cycle of the drive", "work (nJ)", lines, settled=settled, zero=True)
-        return {"work": [panel]}
 
 
 def _mass(group: Group) -> float:

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,15 +37,17 @@ LARGEST = 5_000_000
 COLOURS = ("#b0203c", "#1f3b73", "#3f7f93", "#c78a2c", "#5b6770", "#7a4a8c", "#4c8c4a", "#1d2429")
 _MARKERS = {"o": "circle", "s": "square", "^": "triangle", "v": "inverted_triangle", "D": "diamond", "x": "x"}
 """Names of markers in Bokeh; others are diamonds."""
-_MOST_POINTS = 600
-"""Largest number of points of a line; longer lines are thinned out."""
+_TITLE, _LETTER = 52, 11
+"""Letters of a line of a title on a narrow page; height of a plot in pixels per letter of its y label."""
+_MOST_POINTS, _MOST_OF_ALL = 600, 20_000
+"""Largest numbers of points of a line and of all lines of a plot; longer lines are thinned out."""
 
 
 def check_report(path: Path) -> None:
     """Raise `InputError` unless a path is an .html file in an existing folder."""
     check_place(path, ".html", ".htm")
     if not path.absolute().parent.is_dir():
-        raise refused("--to", f"{path.absolute().parent}: there is no such folder")
+        raise refused(path.absolute().parent, "there is no such folder")
 
 
 def write_page(path: Path, title: str, body: str, carried: Mapping[str, str]) -> Path:
@@ -91,7 +94,7 @@ def drawn(panel: Panel) -> Figure:
     title = panel.title + (", with standard errors" if seen else f"; {UNSEEN}" if errors else "")
     options: dict[str, Any] = {"y_range": panel.limits} if panel.limits else {}
     scale = "log" if panel.log else "linear"
-    plot = new_plot(title, panel.x, panel.y.replace("\n", " "), y_axis_type=scale, **options)
+    plot = new_plot(title, panel.x, panel.y, height=round(300 * panel.height**0.5), y_axis_type=scale, **options)
     if panel.zero and (ends := [(line.x[0], line.x[-1]) for line in panel.lines if len(line.x)]):
         plot.line([min(ends)[0], max(end for _, end in ends)], [0.0, 0.0], color="#666666", line_width=0.6)
     if panel.settled:
@@ -103,7 +106,8 @@ def drawn(panel: Panel) -> Figure:
         look: dict[str, Any] = {"legend_label": line.label.replace("\n", " ")} if line.label else {}
         look["color"] = line.colour if isinstance(line.colour, str) else COLOURS[line.colour % len(COLOURS)]
         if line.width:
-            thin = slice(None, None, -(-len(line.x) // _MOST_POINTS) or None)
+            most = min(_MOST_POINTS, max(2, _MOST_OF_ALL // len(panel.lines)))
+            thin = slice(None, None, -(-len(line.x) // most) or None)
             dash = "dashed" if line.dashed else "solid"
             plot.line(line.x[thin], line.y[thin], line_width=line.width, line_dash=dash, **look)
         else:
@@ -119,9 +123,9 @@ def new_plot(title: str, x: str, y: str, *, height: int = 300, **options: Any) -
     from bokeh.plotting import figure
 
     plot = figure(
-        title=Title(text=title, text_font_size="14px"),
-        x_axis_label=x,
-        y_axis_label=y,
+        title=Title(text=_in_lines(title, _TITLE), text_font_size="14px"),
+        x_axis_label=_in_lines(x, _TITLE),
+        y_axis_label=_in_lines(y, round(height / _LETTER)),
         height=height,
         sizing_mode="stretch_width",
         tools="pan,box_zoom,wheel_zoom,reset,save,hover",
@@ -130,6 +134,11 @@ def new_plot(title: str, x: str, y: str, *, height: int = 300, **options: Any) -
     )
     plot.toolbar.logo = None
     return plot
+
+
+def _in_lines(text: str, letters: int) -> str:
+    """A text with line breaks: Bokeh cuts what is too long."""
+    return "\n".join(wrap(text, letters))
 
 
 def with_legend(plot: Figure) -> Figure:

@@ -22,7 +22,7 @@ from walkers.postprocess.analysis import (
 )
 from walkers.postprocess.report.page import NAME, check_report, drawn, fill, packed_plots, write_page
 from walkers.postprocess.report.player import MOST_PLACES, player_of
-from walkers.postprocess.uncertainty import with_bands
+from walkers.postprocess.uncertainty import rests_on, with_bands
 from walkers.runner.directory import case_of
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
@@ -77,8 +77,10 @@ def report_run(directory: Path, to: Path | None = None, origins: Origins = None)
 def shown_of(case: Case, result: dict[str, Any], origins: Origins = None) -> dict[str, Any]:
     """Warnings, quantities and uncertainties of a result; summary and parameters of a case.
 
-    Parameters without recorded origins are in SI units.
+    Parameters without recorded origins are in SI units. Given ``origins`` are also the source of what is uncertain.
     """
+    if origins is not None:
+        result = {**result, "rests_on": rests_on(origins)}
     parameters = [
         vars(one) | {"range": " … ".join(map(text_of, one.range or ())), "origin": one.word}
         for one in (case.origins if origins is None else origins)
