@@ -113,7 +113,7 @@ def _docstrings(
     """Texts of a module, its classes, functions and constants: each with what is at hand there."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.Expr) and isinstance(child.value, ast.Constant) and isinstance(child.value.value, str):
-            yield child.value.value, homes, {*arguments}
+            yield child.value.value, homes, arguments
         inside, known = homes, arguments
         if isinstance(child, ast.ClassDef) and hasattr(homes[0], child.name):
             inside = [getattr(homes[0], child.name), *homes]
@@ -153,8 +153,10 @@ def test_names_of_the_package_on_pages_and_in_templates_are_there() -> None:
 
 @pytest.mark.parametrize(
     ("name", "there"),
-    [("walkers.load", True), ("walkers.postprocess.motion.Motion.select", True), ("walkers.handles.Run.cached", True)]
-    + [
+    [
+        ("walkers.load", True),
+        ("walkers.postprocess.motion.Motion.select", True),
+        ("walkers.handles.Run.cached", True),
         ("walkers.handles.Run.origin", False),
         ("walkers.check.comparisons", False),
         ("walkers.inputs.case.Run.run", False),

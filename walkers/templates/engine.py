@@ -22,6 +22,6 @@ ALONE = {
 RANKS = {"OMPI_MCA_btl": "self,vader", "OMPI_MCA_pml": "ob1", "OMPI_MCA_mpi_yield_when_idle": "1"}
 """Environment of an engine of several processes on one machine, which communicate by shared memory.
 
-``mpirun`` itself listens on the network (`walkers.runner.launch` leaves it only the loopback). Two ranks start in 0.7 of
+mpirun itself listens on the network (`walkers.runner.launch` leaves it only the loopback). Two ranks start in 0.7 of
 the time. Waiting ranks yield their core: beside four busy processes, a pile took a quarter of the time.
 """
