@@ -422,6 +422,12 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     printed = call("climb", str(out), "--to", str(written.with_suffix(".svg")), "--within=10ms", check=True).stdout
     assert "0 of 2 runs climbed within 0.01 s" in printed
     assert "share that has climbed" in written.with_suffix(".svg").read_text()
+    manifest = out / record.runs[0] / "manifest.json"
+    manifest.rename(tmp_path / "manifest.json")
+    done = call("climb", record.name, "--out", str(out), check=True)
+    assert "0 of 1 runs climbed" in done.stdout
+    assert "walkers: warning: test: 1 of 2 points are not finished and left out\n" in done.stderr
+    (tmp_path / "manifest.json").rename(manifest)
     down = {"from": "3 g", "to": "1 g", "step": "1 g", "until_below": "1 mm/s"}
     descend = {"case": "base.toml", "descend": {"key": "drive.peak_acceleration", **down}}
     with pytest.raises(InputError, match="descend"):
