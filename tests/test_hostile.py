@@ -246,7 +246,7 @@ def test_with_a_site_file_odd_paths_are_refused_before_anything_is_done(
     assert sorted(in_folder.rglob("*")) == before
 
 
-@pytest.mark.parametrize("command", [f"run base.toml --out {NO_UTF8}", f"run {NO_UTF8}.toml", f"result runs/{NO_UTF8}"])
+@pytest.mark.parametrize("command", [f"run base.toml --out {NO_UTF8}", f"run {NO_UTF8}.toml", f"report runs/{NO_UTF8}"])
 def test_paths_that_are_no_utf8_are_refused_before_anything_is_done(
     command: str, case_file: Path, in_folder: Path
 ) -> None:
