@@ -31,7 +31,7 @@ from walkers.physics.laplace import force_curve, rupture_distance
 from walkers.physics.laws import LAWS, by_name, rabinovich, willett, young_laplace
 from walkers.physics.laws import soulie as soulie_law
 from walkers.physics.matter import Liquid
-from walkers.physics.time_step import AUTO_FRACTIONS, LONGEST_WALKER_STEP, WALKER_FRACTIONS
+from walkers.physics.time_step import AUTO_FRACTIONS, WALKER_FRACTIONS
 from walkers.templates.bridge_tables import TOLERANCE, tabulated
 
 pytestmark = pytest.mark.filterwarnings("ignore::walkers.physics.laws.ExecutedLawWarning")
@@ -401,8 +401,7 @@ def test_auto_respects_every_limit_with_margin(name: str) -> None:
     assert shares.keys() == limits.keys()
     assert all(0.0 < share <= 0.5 for share in shares.values())
     allowed = min(share * limits[limit] for limit, share in shares.items())
-    longest = allowed if case.loose else min(allowed, LONGEST_WALKER_STEP)
-    assert LONGEST_WALKER_STEP == 4e-6
+    longest = allowed if case.loose else min(allowed, 4e-6)
     # A cycle is so many whole samples of whole steps: a little less than what is allowed.
     assert 0.97 * longest < case.run.time_step <= longest
 

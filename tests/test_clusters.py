@@ -81,6 +81,17 @@ def test_a_rising_cluster_climbs() -> None:
     assert scene.events == []  # free and held from the begin to the end
 
 
+def test_a_climber_is_above_the_surface_as_it_is_then() -> None:
+    """The bed sinks from 3 to 1 mm, while the leader rises from 5 mm at 3 mm/s."""
+    scene = Scene()
+    scene.height[:, 20:22] += 3e-3 * TIME[:, None]
+    (track,), _ = scene.climbs()
+    beads = Beads(TIME, scene.height, scene.large, np.linspace(3e-3, 1e-3, FRAMES), wall_names=NAMES)
+    climb = classify(0, track, beads, ClimbCriteria())
+    assert climb.height == pytest.approx(5e-3 + 3e-3 * TIME[-1])
+    assert climb.above_surface == pytest.approx(4e-3 + 3e-3 * TIME[-1])
+
+
 def test_the_error_of_a_speed_is_its_scatter() -> None:
     """Climbs whose speed fluctuates from frame to frame: the stated error is the scatter over many of them."""
     draw, scene = np.random.default_rng(1), Scene()

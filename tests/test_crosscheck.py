@@ -280,6 +280,16 @@ def test_walls_are_as_far_as_the_boundary_says(bench: Bench) -> None:
         assert row[-1] == pytest.approx(RADIUS - distance, abs=1e-13)
 
 
+def test_a_wall_that_moves_meets_beads_that_do_not(bench: Bench) -> None:
+    """A quarter of a cycle, 1 mm up, beads have rested: neighbours are not listed anew, and must be there at first."""
+    up = {"axis": "z", "frame": "lab", "peak_acceleration": f"{1e-3 * (2.0 * pi * 80.0) ** 2!r} m/s^2"}
+    case = bench_case(liquid=DRY, drive=up, run={"time_step": "2 us", "samples_per_cycle": 4})
+    beads = [over(FLOOR, 1e-3 - 1e-6, RADIUS), over(FLOOR, 1e-3 + 1e-6, RADIUS, x=1e-3)]
+    (row,), _ = _rows(bench, prescribed(case, standing(beads), case.run.steps_per_cycle // 4))
+    told = dict(zip(WALL_BRIDGES, row.tolist(), strict=True))
+    assert (told["id"], told["overlap"]) == pytest.approx((1, 1e-6), rel=1e-5)
+
+
 REFUSED_WALLS = {
     "plane 0 0 0 0 0 1": "expected a type",
     "type 3 plane 0 0 0 0 0 1": "expected a type",

@@ -6,11 +6,13 @@ import ast
 import doctest
 import re
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import cache
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
+from typing import Any, get_args
 
 import pytest
 
@@ -30,6 +32,7 @@ from docs.illustrations import (
     without_hashes,
 )
 from walkers.inputs.reading import load_case
+from walkers.packages import Group
 from walkers.runner.files import read_json, write_json
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -73,6 +76,94 @@ def test_pages_named_in_the_code_are_there() -> None:
     named = {name for file in files for name in re.findall(r"\bdocs/[\w/-]+\.md", file.read_text("utf-8"))}
     assert named
     assert not {name for name in named if not (ROOT / name).is_file()}
+
+
+# --- names ------------------------------------------------------------------------------------------------------------
+
+_NAME = re.compile(r"(?<!`)`([A-Za-z_][\w.]*)`(?!`)")
+_OF_PACKAGE = re.compile(r"(?<![\w./-])walkers(?:\.[A-Za-z_]\w*)+")
+_FILES = ("pvd", "parquet", "sif", "def", "css")
+"""Suffixes of files that are named ``walkers``."""
+_ERRORS = tuple(import_module(one) for one in ("builtins", "walkers.inputs.errors", "walkers.runner.failures"))
+
+
+def _has(holder: object, parts: list[str]) -> bool:
+    """Whether attributes of attributes are there; fields of a dataclass without a default are annotations alone."""
+    for part in parts:
+        if not hasattr(holder, part):
+            return part in getattr(holder, "__annotations__", {})
+        holder = getattr(holder, part)
+    return True
+
+
+def is_there(name: str, *homes: object) -> bool:
+    """Whether a dotted name is that of a module or in it, or an attribute of a module or class at hand."""
+    parts = name.split(".")
+    if any(_has(home, parts) for home in homes):
+        return True
+    for count in range(len(parts), 0, -1):
+        with suppress(ImportError):
+            return _has(import_module(".".join(parts[:count])), parts[count:])
+    return False
+
+
+def _docstrings(
+    node: ast.AST, homes: list[Any], arguments: frozenset[str]
+) -> Iterator[tuple[str, list[Any], set[str]]]:
+    """Texts of a module, its classes, functions and constants: each with what is at hand there."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.Expr) and isinstance(child.value, ast.Constant) and isinstance(child.value.value, str):
+            yield child.value.value, homes, arguments
+        inside, known = homes, arguments
+        if isinstance(child, ast.ClassDef) and hasattr(homes[0], child.name):
+            inside = [getattr(homes[0], child.name), *homes]
+        if isinstance(child, ast.FunctionDef):
+            known = arguments | {one.arg for one in (*child.args.args, *child.args.kwonlyargs)}
+        yield from _docstrings(child, inside, known)
+
+
+def test_names_in_docstrings_are_there() -> None:
+    """Those in backquotes: of the module or the class, of a module beside it, of an error, or a full path."""
+    wrong, count = [], 0
+    for file in sorted((ROOT / "walkers").rglob("*.py")):
+        if file.stem == "__main__":
+            continue
+        module = ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        package = module if file.stem == "__init__" else module.rpartition(".")[0]
+        tree = ast.parse(file.read_text("utf-8"))
+        for text, homes, arguments in _docstrings(tree, [import_module(module), *_ERRORS], frozenset()):
+            for name in _NAME.findall(text):
+                count += 1
+                beside = is_there(f"{package}.{name}") and "." not in name
+                if not (name in arguments or beside or is_there(name, *homes)):
+                    wrong.append(f"{file.relative_to(ROOT)}: {name}")
+    assert count > 300
+    assert not wrong
+
+
+def test_names_of_the_package_on_pages_and_in_templates_are_there() -> None:
+    groups = get_args(Group)
+    places = {ROOT: ("README.md", "CONTRIBUTING.md", "walkers/**/*.j2"), DOCS: ("**/*.md", "**/*.rst", "_ext/*.toml")}
+    files = [file for folder, kinds in places.items() for kind in kinds for file in folder.glob(kind)]
+    found = {(file, name) for file in files for name in _OF_PACKAGE.findall(file.read_text("utf-8"))}
+    named = {(file, name) for file, name in found if name not in groups and name.split(".")[1] not in _FILES}
+    assert len(named) > 10
+    assert not sorted(f"{file.relative_to(ROOT)}: {name}" for file, name in named if not is_there(name))
+
+
+@pytest.mark.parametrize(
+    ("name", "there"),
+    [
+        ("walkers.load", True),
+        ("walkers.postprocess.motion.Motion.select", True),
+        ("walkers.handles.Run.cached", True),
+        ("walkers.handles.Run.origin", False),
+        ("walkers.check.comparisons", False),
+        ("walkers.inputs.case.Run.run", False),
+    ],
+)
+def test_a_name_that_is_not_there_is_seen(name: str, there: bool) -> None:
+    assert is_there(name) is there
 
 
 # --- pictures, outputs, numbers ---------------------------------------------------------------------------------------

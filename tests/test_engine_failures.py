@@ -522,6 +522,18 @@ def test_a_failed_run_is_reported_and_the_next_one_goes_on(in_folder: Path) -> N
     assert json.loads(done.stdout)["case"] == "good"
 
 
+def test_a_failed_run_is_remembered_when_the_spread_of_the_next_one_succeeds(in_folder: Path) -> None:
+    guessed = {"contact": {"restitution": 0.3}, "uncertain": {"contact.restitution": [0.2, 0.4]}}
+    (in_folder / "hot.toml").write_text(to_toml(document(**UNSTABLE, **guessed)))
+    (in_folder / "good.toml").write_text(to_toml(document(run=SHORT, **guessed)))
+    done = call("run", "hot.toml", "good.toml", "--spread", "--points", "2", "--json")
+    assert done.returncode == 1
+    assert "walkers: hot: blow-up" in done.stderr
+    (printed,) = map(json.loads, done.stdout.splitlines())
+    assert (printed["case"], "spread" in printed) == ("good", True)
+    assert call("run", "good.toml", "--spread", "--points", "2").returncode == 0
+
+
 # --- engines are born -------------------------------------------------------------------------------------------------
 
 

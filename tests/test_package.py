@@ -3,6 +3,8 @@
 import ast
 import importlib
 import os
+import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -207,3 +209,21 @@ def test_every_package_of_the_tests_is_pinned() -> None:
     pinned = {canonicalize_name(line.partition("==")[0]) for line in lines}
     assert all("==" in line for line in lines)
     assert not closure([*PROJECT["dependencies"], *OPTIONAL["dev"]]) - pinned
+
+
+def test_faults_to_plant_are_in_the_code_once_and_name_tests_that_are_there() -> None:
+    """A fault whose text has gone is planted nowhere; one whose tests have gone is seen by none."""
+    faults = tomllib.loads((ROOT / "tests" / "tools" / "faults.toml").read_text("utf-8"))["fault"]
+    wrong = []
+    for fault in faults:
+        path = ROOT / fault["file"]
+        times = path.read_text("utf-8").count(fault["old"]) if path.is_file() else 0
+        wrong += [] if times == 1 and fault["old"] != fault["new"] else [f"{fault['name']}: {times} times"]
+        for entry in fault["tests"]:
+            file, *options = shlex.split(entry)
+            text = (ROOT / file).read_text("utf-8") if (ROOT / file).is_file() else ""
+            words = {*re.findall(r"\w+", " ".join(options).replace("-k", " "))} - {"or", "and", "not"}
+            gone = sorted(word for word in words if word not in text)
+            wrong += [f"{fault['name']}: {file} {' '.join(gone)}"] if gone or not text else []
+    assert not wrong
+    assert len(faults) == len({fault["name"] for fault in faults}) >= 75

@@ -163,6 +163,7 @@ def test_figures_can_be_printed_and_say_what_they_were_made_from(sources: Source
     paths = save_figure(figure, tmp_path / name, runs, ("png", "svg", "pdf"), drawing.title)
     assert Image.open(paths[0]).info["Source"].split() == list(dict.fromkeys(runs))
     text = "".join(ElementTree.parse(paths[1]).getroot().itertext())
+    assert runs
     assert all(run in text for run in runs)
     contents = paths[2].read_bytes()
     assert all(run.encode() in contents for run in runs)

@@ -251,6 +251,17 @@ def test_means_do_not_depend_on_how_often_is_looked(groups: dict[int, Group]) ->
     assert np.abs(far.open - many.open).max() > 5e-3
 
 
+def test_mean_spins_are_those_of_all_steps_between_two_samples(groups: dict[int, Group]) -> None:
+    """As ten times as many samples give them, which one sample of the twenty does not."""
+    few, many = groups[20].motion, groups[200].motion
+    assert few.mean_spin is not None
+    between = (many.spin[1:] + many.spin[:-1]).reshape(len(few.time) - 1, 10, *few.spin.shape[1:]).mean(axis=1) / 2.0
+    size = float(np.sqrt(np.mean(between**2)))
+    off, sampled = (float(np.sqrt(np.mean((one[1:] - between) ** 2))) / size for one in (few.mean_spin, few.spin))
+    assert off < 0.01
+    assert sampled > 0.1
+
+
 def test_with_few_samples_a_cycle_gaps_are_looked_at_there_alone(groups: dict[int, Group]) -> None:
     """A cubic over a quarter of a cycle or more is no way of a bead that hops."""
     few = groups[20]

@@ -165,7 +165,7 @@ class Run:
         return self.table("walkers")
 
     def table(self, name: str) -> pd.DataFrame:
-        """A table of the run, see `walkers.postprocess.read_table`."""
+        """A table of the run, see `walkers.postprocess.tables.read_table`."""
         from walkers.postprocess.tables import read_table
 
         return read_table(self.finished_directory, name)
@@ -251,7 +251,7 @@ class Run:
             The file, or the folder for ``vtk``, ``paraview`` and ``deck``. None: in the run directory, for ``archive``
             and ``deck`` in the current folder.
         options
-            Arguments of these functions, such as ``every``; for an archive, the fields of `ArchiveOptions`.
+            Arguments of these functions, such as ``every``; for an archive, the fields of its ``ArchiveOptions``.
 
         Examples
         --------

@@ -1,6 +1,6 @@
 """Beads of a case: walkers on the boundary, a poured mixture, beads placed one by one.
 
-Each knows how to place itself (`stand`) and which of its beads bridges join; nothing else asks what it is. How the
+Each knows how to place itself (``stand``) and which of its beads bridges join; nothing else asks what it is. How the
 beads of a cluster stand beside each other is one of `ARRANGEMENTS`: in the cluster's own frame, seen from above, whose
 first axis points where it is to face and the second to the left. The beads are taken in the order of the case, and the
 point over which the first two touch is the origin.

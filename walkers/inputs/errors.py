@@ -64,7 +64,7 @@ def refused(source: object, expected: str) -> InputError:
 
 
 def unusable(key: str, expected: str, value: object = None) -> InputError:
-    """An error for an unusable value of a key; the reader adds file name and value (`messages.blaming`)."""
+    """An error for an unusable value of a key; the reader adds file name and value (`walkers.inputs.messages`)."""
     return InputError("", [Problem(key, None if value is None else shown(value), expected)])
 
 

@@ -21,7 +21,7 @@ REST = 2e-6
 SEPARATED = 0.1
 """Share of the time with beads beyond the rupture distance above which a walker came apart."""
 _ACROSS = 0.02
-"""Cosine: walkers that start across the drive axis, within about 1°, face as `facing` says."""
+"""Cosine: walkers that start across the drive axis, within about 1°, face as ``facing`` says."""
 
 
 def ways(*, uphill: bool) -> tuple[str, str]:

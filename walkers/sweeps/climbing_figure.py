@@ -21,7 +21,7 @@ _ROW = 2.1  # inches
 _MOST_LETTERS = 40  # in labels side by side below a panel
 _RATE = "climbs per run and second"
 _KINDS = (("all", "", "ko"), ("plain walls", "on_plain_walls", "C1s"), ("corners", "in_corners", "C2^"))
-"""All climbs and their parts: label, key in the results of `summarise_climbs`, colour and marker."""
+"""All climbs and their parts: label, key of `walkers.sweeps.climbing.summarise_climbs`, colour, marker."""
 
 
 @styled

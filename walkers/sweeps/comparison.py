@@ -98,7 +98,7 @@ def _two_digits(value: float, unit: str) -> str:
 
 
 def compare_runs(first: Side, second: Side) -> Comparison:
-    """Compare two runs, or cases that may not have been run; `DamagedRunError` if a run's result is lost."""
+    """Compare two runs, or cases not yet run; `walkers.sweeps.table.DamagedRunError` if a result is lost."""
     sides = (first, second)
     names = [side.name for side in sides]
     parameters, differences = _different([side.case for side in sides], names)

@@ -27,6 +27,6 @@ RANKS = {
 }
 """Environment of an engine of several processes on one machine, which communicate by shared memory.
 
-`mpirun` itself listens on the network (`walkers.runner.launch` leaves it only the loopback). Two ranks start in 0.7 of
+mpirun itself listens on the network (`walkers.runner.launch` leaves it only the loopback). Two ranks start in 0.7 of
 the time. Waiting ranks yield their core: beside four busy processes, a pile took a quarter of the time.
 """

@@ -1,0 +1,395 @@
+"""Numbers worked out by hand, or by a second formula, on motions that no engine has made."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from math import cos, inf, pi, radians, sin, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import walkers
+from tests.conftest import document, make_case
+from walkers.inputs.axes import Range
+from walkers.inputs.boundary import Boundary, Round
+from walkers.inputs.case import Case
+from walkers.inputs.changes import changed
+from walkers.inputs.drive import Harmonic, waveform
+from walkers.inputs.loads import bridge_at_rest, contact_loads
+from walkers.inputs.reading import resolve_case
+from walkers.physics import units
+from walkers.physics.units import Kind, quantity_text
+from walkers.postprocess.analyses.piles import _bed, _joined
+from walkers.postprocess.analyses.walking import _rows, spread
+from walkers.postprocess.analyses.work import work_of
+from walkers.postprocess.films import speed_text
+from walkers.postprocess.gait import gait, settled_samples, turned_over_at
+from walkers.postprocess.motion import Bridges, Group, Motion
+from walkers.postprocess.report.player import _points
+from walkers.postprocess.scene import Scene, turns_of
+from walkers.postprocess.uncertainty import band_of
+from walkers.runner.launch import Progress
+from walkers.runner.manifest import _iso
+from walkers.runner.summary import describe, summarise
+from walkers.templates.deck import render_deck, render_shared_deck
+from walkers.templates.scene import place
+
+DENSITY, TENSION, LARGE, SMALL = 4000.0, 19.2e-3, 3e-4, 2e-4
+"""Of the reference case: kg/m³, N/m, m, m."""
+FLOOR, SIDE = 0, 3
+FEW = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
+PILE: dict[str, Any] = {
+    "placed": [
+        {"radius": f"{radius} mm", "at": [f"{x} mm", "0 mm", "1 mm"]} for x, radius in enumerate((0.5, 0.5, 0.3, 0.3))
+    ],
+    "boundary": {"shape": "box", "width": "20 mm", "height": "10 mm", "material": "chromium-coated glass"},
+    "run": {"duration": "0.1 s"},
+}
+
+
+def case_of(**changes: Any) -> Case:
+    """The reference's liquid, contacts and drive with other bodies, boundary or run."""
+    tables = {name: table for name, table in document().items() if name not in {"dimers", "boundary", "run"}}
+    return resolve_case(
+        {**tables, "boundary": {"material": "chromium-coated glass"}, "run": FEW, **changes}, name="made up"
+    )
+
+
+def resting(case: Case, frames: int | None = None) -> Motion:
+    """The beads of a case at their starts, in all samples of its run."""
+    scene, placed = place((case,))
+    count = case.run.cycles * case.run.samples_per_cycle + 1 if frames is None else frames
+    time = np.arange(count) / (case.run.samples_per_cycle * case.drive.frequency)
+    position = np.tile([bead.centre for bead in scene.beads], (count, 1, 1))
+    nothing = np.zeros_like(position)
+    return Motion(
+        case=case,
+        time=time,
+        position=position,
+        velocity=nothing,
+        spin=nothing,
+        substrate=nothing[:, 0],
+        substrate_velocity=nothing[:, 0],
+        radius=np.array([bead.radius for bead in scene.beads]),
+        walkers=tuple(replace(one, beads=tuple(bead - 1 for bead in one.beads)) for one in placed),
+        frames=[(Path("made-up"), number) for number in range(count)],
+        truncated=False,
+    )
+
+
+# --- inputs -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("value", "kind", "text"),
+    [
+        (293.15, units.TEMPERATURE, "20 degC"),
+        (273.15, units.TEMPERATURE, "0 degC"),
+        (3e-4, units.LENGTH, "0.3 mm"),
+        (39.2, units.ACCELERATION, "4 g"),
+        (pi / 18.0, units.ANGLE, "10 deg"),
+        (4.6e-3, units.DYNAMIC_VISCOSITY, "4.6 mPa*s"),
+        (4000.0, units.DENSITY, "4 g/cm^3"),
+        (2e-6, units.TIME, "2 us"),
+        (6.4e7, units.FILE_SIZE, "64 MB"),
+    ],
+)
+def test_quantities_are_written_in_the_unit_of_their_example(value: float, kind: Kind, text: str) -> None:
+    assert quantity_text(value, kind) == text
+    assert units.parse_quantity(text, kind) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("scale", "median", "quarters"),
+    [
+        (True, None, [0.01, 0.1**1.5, 0.1, 0.1**0.5, 1.0]),
+        (False, None, [0.01, 0.2575, 0.505, 0.7525, 1.0]),
+        (True, 0.25, [0.01, 0.05, 0.25, 0.5, 1.0]),
+        (False, 0.21, [0.01, 0.11, 0.21, 0.605, 1.0]),
+    ],
+)
+def test_quarters_of_a_range(scale: bool, median: float | None, quarters: list[float]) -> None:
+    found = Range(0.01, 1.0, None, scale, median).at(np.linspace(0.0, 1.0, 5))
+    np.testing.assert_allclose(found, quarters, rtol=1e-12)
+
+
+def test_a_key_within_a_list_puts_what_says_the_same_out_of_force() -> None:
+    tables = {"drive": {"harmonics": [{"gamma0": 0.4, "axis": "x"}, {"gamma0": 0.2}]}}
+    found = changed(tables, {"drive.harmonics[1].peak_acceleration": "2 g"})
+    assert found["drive"]["harmonics"] == [{"gamma0": 0.4, "axis": "x"}, {"peak_acceleration": "2 g"}]
+    both = {"drive.harmonics[0].peak_acceleration": "2 g", "drive.harmonics[0].gamma0": 0.3}
+    assert changed(tables, both)["drive"]["harmonics"][0] == {"gamma0": 0.3, "axis": "x", "peak_acceleration": "2 g"}
+
+
+@pytest.mark.parametrize("name", ["triangle", "sawtooth"])
+def test_a_phase_of_a_waveform_is_an_earlier_begin_of_the_whole(name: str) -> None:
+    time, frequency, phase = np.linspace(0.0, 0.1, 200), 20.0, radians(50.0)
+
+    def acceleration(first: Harmonic, time: Any) -> Any:
+        waves = waveform(name, first)
+        return sum(one.peak_acceleration * np.sin(one.angular_frequency * time + one.phase) for one in waves)
+
+    plain = Harmonic((1.0, 0.0, 0.0), frequency, 10.0)
+    earlier = acceleration(plain, time + phase / (2.0 * pi * frequency))
+    np.testing.assert_allclose(acceleration(replace(plain, phase=phase), time), earlier, atol=1e-9)
+    assert np.abs(earlier).max() > 9.0
+
+
+@pytest.mark.parametrize("uphill", [0.0, 60.0, 90.0, 200.0])
+def test_gravity_points_down_the_slope_whichever_way_that_is(uphill: float) -> None:
+    slope = Boundary(material="glass", tilt=radians(30.0), uphill=radians(uphill))
+    along, up = np.array([cos(slope.uphill), sin(slope.uphill), 0.0]), np.array([0.0, 0.0, 1.0])
+    np.testing.assert_allclose(slope.gravity(9.81), -4.905 * along - 9.81 * sqrt(0.75) * up, atol=1e-12)
+
+
+def test_a_bead_on_a_slope_presses_with_a_part_of_its_weight() -> None:
+    """At 60° with half of it: the overlap is Hertz's, 4/3 E* √R δ^1.5 = F."""
+    case = make_case(boundary={"tilt": "60 deg"})
+    loads, modulus = contact_loads(case), 5e7 / (2.0 * (1.0 - 0.09))
+    for number, radius in enumerate((LARGE, SMALL)):
+        weight = 4.0 / 3.0 * pi * radius**3 * case.density * case.gravity
+        pressed = 4.0 / 3.0 * modulus * sqrt(radius) * loads.overlaps[number] ** 1.5
+        assert pressed - bridge_at_rest(case, radius, inf).pull == pytest.approx(0.5 * weight, rel=1e-6)
+    reduced = LARGE * SMALL / (LARGE + SMALL)
+    assert 4.0 / 3.0 * modulus * sqrt(reduced) * loads.overlaps[2] ** 1.5 == pytest.approx(loads.capillary[2])
+
+
+def test_inside_a_cylinder_normals_point_to_its_axis() -> None:
+    wall, places = Round(5e-3), np.array([[3e-3, 0.0, 1e-3], [0.0, -4e-3, 0.0], [2.4e-3, 3.2e-3, 0.0]])
+    np.testing.assert_allclose(wall.distances(places), [2e-3, 1e-3, 1e-3], atol=1e-15)
+    np.testing.assert_allclose(wall.normals(places), [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.6, -0.8, 0.0]], atol=1e-12)
+
+
+@pytest.mark.parametrize(("angle", "facing", "ways"), [("30 deg", "both", (30, 210)), ("-20 deg", "left", (160, 160))])
+def test_walkers_start_at_their_angle_to_the_left_of_where_they_face(
+    angle: str, facing: str, ways: tuple[int, int]
+) -> None:
+    start = {"replicates": 2, "facing": facing, "angle": angle, "angle_spread": "0 deg"}
+    group = resting(make_case(dimers=start)).groups[0]
+    arm = group.position[0, :, 0] - group.position[0, :, 1]
+    assert np.degrees(np.arctan2(arm[:, 1], arm[:, 0])) % 360.0 == pytest.approx(ways)
+    np.testing.assert_allclose(np.degrees(group.orientation), float(angle.removesuffix(" deg")), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("frequency", "duration", "cycles"),
+    [("100 Hz", "0.07 s", 7), ("80 Hz", "0.1 s", 8), ("80 Hz", "0.101 s", 9), ("100 Hz", "0.29 s", 29)],
+)
+def test_a_duration_is_whole_cycles(frequency: str, duration: str, cycles: int) -> None:
+    """0.07 · 100 is 7 and a rounding error."""
+    tables = {"dimers": {"radii": ["0.3 mm", "0.2 mm"]}, "drive": {"frequency": frequency, "peak_acceleration": "4 g"}}
+    assert case_of(**tables, run={"duration": duration}).run.cycles == cycles
+
+
+def test_measuring_begins_after_all_of_the_settling_cycles() -> None:
+    """A frame in two cycles, seven cycles to settle: frame 4, of cycle 8, is the first."""
+    tables = {"dimers": {"radii": ["0.3 mm", "0.2 mm"]}}
+    case = case_of(**tables, run={"frames_per_second": 40, "cycles": 20, "settling_cycles": 7})
+    assert (case.run.cycles_per_sample, case.run.samples_per_cycle, case.run.settled_strobes) == (2, 1, 4)
+    samples = settled_samples(Group(resting(case, 11), case.walkers[0], []))
+    assert (samples.start, samples.stop) == (4, 10)
+
+
+# --- decks ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_deck_of_several_cases_is_watched_with_the_highest_of_their_limits() -> None:
+    slow, fast = (make_case(drive={"peak_acceleration": peak}) for peak in ("2 g", "8 g"))
+    alone = [render_deck(one).fastest for one in (slow, fast)]
+    assert alone[0] < 0.9 * alone[1]
+    assert render_shared_deck([slow, fast]).fastest == pytest.approx(alone[1])
+    assert render_shared_deck([fast, slow]).fastest == pytest.approx(alone[1])
+
+
+def test_what_show_prints_of_a_case_is_in_its_units() -> None:
+    """Beads of 0.3 and 0.2 mm, 1 % of liquid, 4 g at 80 Hz: masses, volumes, forces and the amplitude by hand."""
+    case = make_case()
+    text, volume = describe(summarise(case)), 4.0 / 3.0 * pi * (LARGE**3 + SMALL**3)
+    assert f"1 small and 1 large, {1e6 * DENSITY * volume:.4g} mg, {1e9 * volume:.4g} µL with " in text
+    assert f"with {1e7 * volume:.3g} µL of liquid" in text
+    omega = 2.0 * pi * 80.0
+    assert f"a0 = 4 g (g = 9.8 m/s², as in the paper; gravity is {case.gravity:g} m/s²), " in text
+    assert f"amplitude {1e3 * 39.2 / omega**2:.4g} mm, peak velocity {1e3 * 39.2 / omega:.4g} mm/s" in text
+    wall = next(line for line in text.splitlines() if "bead 1 on substrate" in line)
+    assert f" {1e6 * 4.0 * pi * case.liquid.surface_tension * LARGE:.4g} µN" in wall
+    assert f" {1e12 * 0.5 * 0.01 * 4.0 / 3.0 * pi * LARGE**3:.3g} nL" in wall  # half of the bead's liquid
+    assert f" {1e6 * bridge_at_rest(case, LARGE, inf).rupture:.3g} µm " in wall
+    assert wall.endswith(f" {1e9 * contact_loads(case).overlaps[0]:.4g} nm")
+    large, small = LARGE**3, SMALL**3
+    assert f"sin δ = 0.2, mass asymmetry (m1 - m2)/M = {(large - small) / (large + small):.4g}" in text
+
+
+# --- runs -------------------------------------------------------------------------------------------------------------
+
+
+def test_the_speed_of_a_run_that_goes_on_is_that_of_this_call() -> None:
+    """900 steps were there: 50 took a second, so 50 more take another."""
+    told = str(Progress(step=950, steps=1000, simulated=0.25, elapsed=1.0, made=50))
+    assert told == "95 %, 0.250 s simulated, 50 steps/s, 1 s left"
+    assert str(Progress(step=900, steps=1000, simulated=0.25, elapsed=0.0)).endswith(", 0 steps/s, starting")
+    assert str(Progress(950, 1000, 0.25, 1.0, 50, may_end_early=True)).endswith(", at most 1 s left")
+
+
+def test_times_of_a_manifest_are_utc(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TZ", "Asia/Tokyo")
+    try:
+        time.tzset()
+        assert _iso(1e9) == "2001-09-09T01:46:40Z"
+    finally:
+        monkeypatch.undo()
+        time.tzset()
+
+
+def test_a_result_rests_on_the_values_of_the_case_that_is_asked_for(
+    run_directory: Callable[..., Path], runs_folder: Path
+) -> None:
+    """Two cases of the same numbers have a run in common; one says a value that the other leaves out."""
+    tables = document(run=FEW)
+    tables["contact"] = {name: value for name, value in tables["contact"].items() if name != "rolling_friction"}
+    plain = resolve_case(tables, name="test")
+    contact = {**tables["contact"], "rolling_friction": plain.contact.rolling_friction}
+    said = resolve_case({**tables, "contact": contact}, name="test")
+    assert said == plain
+    run_directory(plain)
+    found = []
+    for case in (plain, said):
+        rests = walkers.load(case, runs_folder).result["rests_on"]
+        found += [one["origin"] for one in rests if one["key"] == "contact.rolling_friction"]
+    assert found == [next(one.origin for one in plain.origins if one.key == "contact.rolling_friction"), "given"]
+    assert found[0] != "given"
+
+
+# --- walkers ----------------------------------------------------------------------------------------------------------
+
+
+def test_scatter_is_the_deviation_of_a_sample() -> None:
+    found = spread(np.array([1.0, 2.0, 4.0]))
+    assert (found["mean"], found["scatter"]) == pytest.approx((7.0 / 3.0, sqrt(7.0 / 3.0)))
+    assert (found["n"], found["smallest"], found["largest"]) == (3, 1.0, 4.0)
+    assert spread(np.array([1.0]))["scatter"] is None
+
+
+def test_a_walker_is_separated_where_any_of_its_pairs_is() -> None:
+    """The last bead of three goes away for the last ten of 40 measured samples, the others touch."""
+    case = case_of(clusters=[{"arrangement": "chain", "radii": ["0.3 mm", "0.2 mm", "0.2 mm"], "replicates": 1}])
+    motion = resting(case)
+    position = motion.position.copy()
+    position[50:, 2, 0] -= 1e-3
+    (group,) = replace(motion, position=position).groups
+    assert _rows(group, gait(group)).separated_fraction == pytest.approx(10.0 / 40.0)
+    (group,) = motion.groups
+    assert _rows(group, gait(group)).separated_fraction == 0.0
+
+
+def test_a_walker_has_turned_over_90_degrees_from_its_start() -> None:
+    """It starts at 100° to the axis: 80° further it has not, but at -10°, after four of six cycles."""
+    case = make_case(dimers={"angle": "100 deg"}, run=FEW)
+    (group,) = resting(case).groups
+    for end, over in ((180.0, np.nan), (100.0, np.nan), (-60.0, 4.0 / 80.0)):  # 26.7° a cycle: 106.7° after four
+        turned = replace(group)
+        turned.__dict__["orientation"] = np.radians(np.linspace(100.0, end, len(group.time)))[:, None]
+        assert turned_over_at(turned) == pytest.approx(over, nan_ok=True)
+
+
+def test_the_work_of_two_harmonics_with_phases() -> None:
+    """Mass centres that move as -b cos(ωt + φ) along the force M a sin(ωt + φ): π M a b in a period."""
+    first = {"frequency": "80 Hz", "peak_acceleration": "4 g", "phase": "70 deg"}
+    second = {"frequency": "160 Hz", "peak_acceleration": "2 g", "phase": "-40 deg", "axis": "y"}
+    case = case_of(
+        dimers={"radii": ["0.3 mm", "0.2 mm"], "replicates": 1},
+        drive={"harmonics": [first, second]},
+        run={**FEW, "samples_per_cycle": 40},
+    )
+    motion = resting(case)
+    position, velocity = motion.position.copy(), motion.velocity.copy()
+    ways = {0: (1e-4, 2.0 * pi * 80.0, radians(70.0)), 1: (3e-5, 2.0 * pi * 160.0, radians(-40.0))}
+    for axis, (way, omega, phase) in ways.items():
+        position[..., axis] -= way * np.cos(omega * motion.time + phase)[:, None]
+        velocity[..., axis] += way * omega * np.sin(omega * motion.time + phase)[:, None]
+    (group,) = replace(motion, position=position, velocity=velocity).groups
+    mass = 4.0 / 3.0 * pi * (LARGE**3 + SMALL**3) * case.density
+    expected = pi * mass * (39.2 * 1e-4 + 2.0 * 19.6 * 3e-5)  # the second one has two periods in a cycle
+    np.testing.assert_allclose(work_of(group), np.full((6, 1), expected), rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("own", "ends"), [(1.5, (1.0, 2.0)), (2.5, (1.0, 2.5)), (0.5, (0.5, 2.0)), (None, (1.0, 2.0)), (inf, (1.0, 2.0))]
+)
+def test_a_band_holds_the_result(own: float | None, ends: tuple[float, float]) -> None:
+    assert band_of({"bands": {"velocity": {"low": 1.0, "high": 2.0}}}, "velocity", own) == ends
+    assert band_of({"bands": {}}, "velocity", own) is None
+
+
+# --- piles ------------------------------------------------------------------------------------------------------------
+
+
+def test_the_state_of_a_bed() -> None:
+    """Two large beads that touch, one on the floor; a small one at a side wall, with an open bridge; one alone."""
+    motion = resting(case_of(**PILE), 2)
+    position, velocity = motion.position.copy(), motion.velocity.copy()
+    position[1, :, 2] = [1e-3, 2e-3, 5e-3, 4e-3]
+    velocity[1] = 1e-3 * np.array([(1.0, 2.0, 2.0), (0.0, 0.0, 0.0), (0.0, 3.0, 4.0), (0.0, 0.0, 0.0)])
+    bridges = Bridges(
+        frame=1,
+        beads=np.array([(0, 1), (1, 2)]),
+        force=np.array([1e-6, 3e-6]),
+        gap=np.array([-1e-9, 2e-6]),
+        wall_beads=np.array([0, 2]),
+        walls=np.array([FLOOR, SIDE]),
+        wall_force=np.array([1e-6, 1e-6]),
+        wall_gap=np.array([-1e-9, -1e-9]),
+    )
+    joined, bulk = _joined(bridges, 4), np.array([True, True, False, False])
+    assert joined[1].tolist() == [False, False, True, False]
+    moved = replace(motion, position=position, velocity=velocity)
+    bed = _bed(moved, bridges, joined, bulk, np.full(4, 2e-12), [(frozenset({2, 3}), frozenset({SIDE}))])
+    assert (bed.touching, bed.opened, bed.contacts, bed.bridges) == (1, 1, 0.5, 1.0)
+    assert (bed.at_wall, bed.large_at_wall, bed.bulk, bed.clusters) == (1, 0, 2, 1)
+    assert bed.mean_square_velocity == pytest.approx((9e-6 + 25e-6) / 4.0)
+    assert bed.brazil_nut == pytest.approx((1.5 - 4.5) / 6.0)
+    assert bed.brazil_nut_of_bulk == 0.0
+    assert (bed.mean_force, bed.liquid_in_bridges, bed.highest) == pytest.approx((2e-6, 8e-12, 5e-3))
+    assert bed.surface == pytest.approx(2.5e-3)  # both large beads are in one cell, 2 mm wide
+
+
+# --- pictures ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("slowdown", "text"), [(20.0, "20 × slower"), (1.5, "1.5 × slower"), (1.0, "real time"), (0.25, "4 × faster")]
+)
+def test_slow_motion_in_words(slowdown: float, text: str) -> None:
+    assert speed_text(slowdown) == text
+
+
+def test_a_bead_turns_about_axes_that_stay_where_they_are() -> None:
+    """A quarter turn about z, then one about x: what was x is y, then z. The other bead does not turn."""
+    motion = resting(make_case(run=FEW), 3)
+    spin = np.zeros_like(motion.spin)
+    quarter = 0.5 * pi / (motion.time[1] - motion.time[0])
+    spin[1, 0], spin[2, 0] = (0.0, 0.0, quarter), (quarter, 0.0, 0.0)  # means since the frame before
+    turns = turns_of(replace(motion, mean_spin=spin))
+    assert turns is not None
+    for frame, share, expected in ((0, 0.0, [1, 0, 0]), (1, 0.0, [0, 1, 0]), (2, 0.0, [0, 0, 1]), (0, 1.0, [0, 1, 0])):
+        np.testing.assert_allclose(turns.at(frame, share)[0] @ [1.0, 0.0, 0.0], expected, atol=1e-12)
+        np.testing.assert_allclose(turns.at(frame, share)[1], np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(turns.at(1, 0.5)[0] @ [1.0, 0.0, 0.0], [0.0, sqrt(0.5), sqrt(0.5)], atol=1e-12)
+
+
+def test_beads_have_the_colours_of_their_class() -> None:
+    """Ruby for those pointed out, grey for the others; in both the large one is the darker."""
+    motion = resting(make_case(run=FEW), 2)
+    scene = Scene.around(motion, np.eye(3))
+    ruby, grey = (scene.colours(np.full(2, chosen))[0].tolist() for chosen in (True, False))
+    assert ruby == [[0xB0, 0x20, 0x3C], [0xE0, 0x56, 0x6C]]
+    assert grey == [[0x8C, 0x9A, 0xA5], [0xC9, 0xD2, 0xD8]]
+
+
+def test_points_of_a_player_are_as_wide_as_the_beads() -> None:
+    points = _points(resting(case_of(**PILE), 2), np.zeros(4))
+    np.testing.assert_allclose(points.point_sizes, [1.0, 1.0, 0.6, 0.6], rtol=1e-6)  # mm
+    np.testing.assert_allclose(points.positions["0.000000"][3], [3.0, 0.0, 1.0], atol=1e-3)
