@@ -144,7 +144,9 @@ def test_the_record_has_quantiles_errors_and_agreement_of_a_known_outcome(known:
         assert (row["engine"], row["half_step"], row["twice_as_long"]) == pytest.approx(
             [1e3 * wave.outcome[0, place] for wave in waves]
         )
-        assert (row["low"], row["high"]) == pytest.approx((row["value"] - row["deviation"], row["value"] + row["deviation"]))
+        assert (row["low"], row["high"]) == pytest.approx(
+            (row["value"] - row["deviation"], row["value"] + row["deviation"])
+        )
         # sinh(m + s) - sinh(m - s) = 2 cosh m sinh s
         half = np.cosh(mean[place]) * np.sinh(width[place]) * 1e3 * deviation[place]
         assert row["error"] == pytest.approx(half)

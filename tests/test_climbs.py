@@ -119,4 +119,6 @@ def test_the_table_of_climbs_has_a_row_of_numbers_for_each_part(pile: list[Path]
         assert (row["runs"], row["climbs"], row["rate"]) == (4, climbs, pytest.approx(climbs / 40.0))
         assert (row["rate_low"] * 40.0, row["rate_high"] * 40.0) == pytest.approx(GARWOOD[climbs], abs=6e-5)
     assert (rows["probability"]["all"], rows["probability"]["corners"]) == (0.5, 0.25)
-    assert (rows["probability_low"]["all"], rows["probability_high"]["all"]) == pytest.approx((0.0676, 0.9324), abs=6e-5)
+    assert (rows["probability_low"]["all"], rows["probability_high"]["all"]) == pytest.approx(
+        (0.0676, 0.9324), abs=6e-5
+    )
