@@ -26,7 +26,7 @@ from tests.conftest import SHORT, call, document, make_case, to_toml
 from walkers import Run, load_case
 from walkers.archive import writing
 from walkers.archive.crate import PAPER
-from walkers.archive.writing import ArchiveOptions, ArchiveRefused, write_archive
+from walkers.archive.writing import ArchiveOptions, ArchiveRefused, Contents, PackedRun, write_archive
 from walkers.inputs.reading import resolve_case
 from walkers.runner.directory import FinishedRun
 from walkers.runner.provenance import commit_of, software
@@ -209,6 +209,12 @@ def test_an_archive_of_a_run(run: Path, tmp_path: Path) -> None:
         f"  missing    runs/{run.name}/result.json",
         f"  not listed runs/{run.name}/segments/0001/",
     ]
+
+
+def test_an_archive_has_the_date_of_its_last_run() -> None:
+    dates = ("2026-03-01T10:00:00Z", "2026-03-02T09:00:00Z", "2026-02-28T23:00:00Z")
+    runs = [PackedRun(Path(date), f"runs/{date}", {"finished": date}, []) for date in dates]
+    assert Contents("three", "", runs).finished == dates[1]
 
 
 def test_what_an_archive_says_of_its_run(run: Path, tmp_path: Path) -> None:

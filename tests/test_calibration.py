@@ -15,7 +15,17 @@ from scipy.stats import multivariate_normal, norm
 
 from tests.conftest import call, to_toml
 from tests.printed import spoilt
-from walkers.calibration.calibrate import FINAL, Wave, calibrate, next_wave, ranking, run_wave, wave_sweep
+from walkers.calibration.calibrate import (
+    FINAL,
+    Outcome,
+    Wave,
+    _finer_and_longer,
+    calibrate,
+    next_wave,
+    ranking,
+    run_wave,
+    wave_sweep,
+)
 from walkers.calibration.emulator import Emulator, Emulators, FloatArray, Space, fit_emulators
 from walkers.calibration.posterior import Density, Posterior, log_likelihood, observation_covariance, sample_posterior
 from walkers.calibration.report import figures_of, record_of, words_of
@@ -95,6 +105,64 @@ def test_emulators_know_their_error(known: Emulators) -> None:
         assert np.median(miss) < 0.05
         assert np.mean(miss <= 1.5 * (high - low) + 1e-6) > 0.9
         assert emulator.explained > 0.9
+
+
+def test_errors_are_widened_as_the_later_sets_have_them(known: Emulators) -> None:
+    """A plane of 40 sets, and 24 later ones with noise: the process takes its variance for 24/64 of theirs, at all."""
+    design, draw = SPACE.design(64, 1), np.random.default_rng(3)
+    plane, noise = design.sum(axis=1), 0.05 * draw.standard_normal(64)
+    noise *= 0.05 / np.sqrt(np.mean(noise[40:] ** 2))
+    late, early = np.arange(64) >= 40, np.arange(64) < 24
+    (one,) = emulated(design, (plane + noise * late)[:, None], 1.0, deviation=100.0, filling=40).each
+    assert one.error_inflation == pytest.approx(np.sqrt(64.0 / 24.0), rel=0.15)
+    (other,) = emulated(design, (plane + noise * early)[:, None], 1.0, deviation=100.0, filling=24).each
+    assert other.error_inflation == 1.0
+    plain = known.each[0].process.predict(design, return_std=True)[1]
+    np.testing.assert_allclose(replace(known.each[0], error_inflation=3.0).predict(design)[1], 3.0 * plain)
+
+
+def test_the_record_has_quantiles_errors_and_agreement_of_a_known_outcome(known: Emulators, tmp_path: Path) -> None:
+    """A posterior even in a from 0.4 to 0.6 of its logarithmic range and in b over all; one of two numbers agrees."""
+    number = np.arange(101) / 100.0
+    unit = np.stack([0.4 + 0.2 * number, number], axis=1)
+    even = Posterior(unit, np.zeros((101, 2)), np.zeros(101), ("a", "b"), unit[50], 5000, 1000.0)
+    best = np.array([[0.5, 0.5]])
+    value, deviation = np.array([(one.observation.value, one.observation.deviation) for one in known.each]).T
+    waves = [Wave(best, value + np.array([[way, -0.9]]) * deviation, pd.DataFrame(), []) for way in (1.5, 1.0, 0.5)]
+    checks = dict(zip(("best", "half-step", "twice-as-long"), waves, strict=True))
+    drawn = Wave(unit[[0, 100]], np.array([value - deviation, value + deviation]), pd.DataFrame(), [])
+    calibration = small(tmp_path, held_out={})
+    found = record_of(Outcome(calibration, SPACE, unit, known, even, {}, drawn, checks, {}))
+    assert found["best"] == {"a": pytest.approx(1.0), "b": pytest.approx(1.0)}
+    assert found["intervals"]["a"] == pytest.approx([0.1 * 100.0**at for at in (0.41, 0.5, 0.59)])
+    assert found["intervals"]["b"] == pytest.approx([-0.8, 1.0, 2.8])
+    assert found["narrowing"] == {"a": pytest.approx(0.2), "b": pytest.approx(1.0)}
+    assert found["words"] == {"a": "identified", "b": "not identified"}
+    assert (found["agree"], found["of"], [row["agrees"] for row in found["observations"]]) == (1, 2, [False, True])
+    mean, width = (numbers[0] for numbers in known.predict(best))
+    for place, row in enumerate(found["observations"]):
+        assert (row["engine"], row["half_step"], row["twice_as_long"]) == pytest.approx(
+            [1e3 * wave.outcome[0, place] for wave in waves]
+        )
+        assert (row["low"], row["high"]) == pytest.approx(
+            (row["value"] - row["deviation"], row["value"] + row["deviation"])
+        )
+        # sinh(m + s) - sinh(m - s) = 2 cosh m sinh s
+        half = np.cosh(mean[place]) * np.sinh(width[place]) * 1e3 * deviation[place]
+        assert row["error"] == pytest.approx(half)
+
+
+def test_the_checks_have_half_the_time_step_and_twice_the_cycles(tmp_path: Path) -> None:
+    found, values = small(tmp_path), np.array([[0.1, 2.0]])
+    extras = _finer_and_longer(found, values)
+    assert list(extras) == ["best", "half-step", "twice-as-long"]
+    usual, finer, longer = (
+        [case.run for case in wave_sweep(found, values, name, extra).cases()] for name, extra in extras.items()
+    )
+    assert len(usual) == 3
+    for one, half, twice in zip(usual, finer, longer, strict=True):
+        assert half.time_step == pytest.approx(one.time_step / 2.0, rel=0.02)  # whole steps in a cycle
+        assert (half.cycles, twice.time_step, twice.cycles) == (one.cycles, one.time_step, 2 * one.cycles)
 
 
 def test_later_waves_look_around_the_best_sets(tmp_path: Path) -> None:

@@ -21,12 +21,12 @@ from walkers.inputs.changes import flatten
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case, read_toml, shipped
 from walkers.paper import model_terms, published
-from walkers.paper.comparison import as_dict, as_markdown, compare, count
+from walkers.paper.comparison import Value, _row, as_dict, as_markdown, compare, count, evaluate
 from walkers.paper.figures import OBSERVED, PARAMETERS, sensitivities, theory_of_cycles
 from walkers.paper.make import FIGURES, make_figures
 from walkers.paper.maps import MODES, POSTURES, classify, climber, paper_drives, postures, sliding_share
 from walkers.paper.model_terms import ALWAYS, FITTED, KAPPA, NOTHING_ELSE, TERMS, fit, values_of
-from walkers.paper.published import OBSERVATIONS, NothingFinishedError, Sources
+from walkers.paper.published import OBSERVATIONS, NothingFinishedError, Observation, Point, Sources
 from walkers.postprocess.drawing import save_figure
 from walkers.postprocess.gait import gait, steady_walkers
 from walkers.sweeps.scheduler import Options
@@ -135,6 +135,40 @@ def test_compared_numbers_are_those_of_the_runs(sources: Sources) -> None:
     # Theory is of many cycles: it does not know the shortened runs.
     predicted = float(motion_of(load_case("fig4a")).velocity[0]) * 1e3
     assert rows["fig4a_velocity"]["theory"] == pytest.approx(predicted)
+
+
+def test_ratios_and_agreement_are_those_by_hand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Γc of 0.2 to 0.3 at 60 Hz and 0.4 to 0.6 at 90 Hz: the ratio is 2, from 0.4/0.3 to 0.6/0.2."""
+    ends = pd.DataFrame(
+        {
+            "drive.frequency": [90.0, 60.0],
+            "gamma0_at_rest": [0.4, 0.2],
+            "gamma0_moving": [0.6, 0.3],
+            "status": "finished",
+        }
+    )
+    monkeypatch.setattr("walkers.paper.comparison.thresholds", lambda _: ends)
+    sources, none = Sources(tmp_path), pd.DataFrame({"status": []})
+    sources.table = lambda name: ends if name == "fig2-threshold" else none
+    row = next(row for row in compare(sources) if row["key"] == "fig2_threshold_frequency")
+    assert [row[name] for name in ("engine", "low", "high")] == pytest.approx([2.0, 4.0 / 3.0, 3.0])
+    # Speeds of 2 and 8 mm/s at 6 g over 1 and 2 mm/s at 3 g, at 60 and 90 Hz: ratios of 2 and 4.
+    speeds = {(60.0, 6.0): 2e-3, (90.0, 6.0): 8e-3, (60.0, 3.0): 1e-3, (90.0, 3.0): 2e-3}
+    table = pd.DataFrame([*speeds], columns=["frequency", "peak_acceleration"]).assign(radius_1=3e-4, radius_2=2e-4)
+    table["peak_acceleration"] *= published.GRAVITY
+    table["velocity"] = table["smallest"] = table["largest"] = [*speeds.values()]
+    of, over = (tuple(Point("fig2", (0.3, 0.2), frequency, peak) for frequency in (60.0, 90.0)) for peak in (6.0, 3.0))
+    found = evaluate(Observation("x", "x", of=of, over=over, quantity="velocity_of_all"), table)
+    assert (found.engine, found.low, found.high) == pytest.approx((3.0, 2.0, 4.0))
+    # Within 15 % of the published value, or 0.05 mm/s of zero.
+    for value, ours, agrees in (
+        (4.0, 4.5, True),
+        (4.0, 4.7, False),
+        (0.5, 0.6, False),
+        (0.0, 0.04, True),
+        (0.0, 0.06, False),
+    ):
+        assert _row(Observation("x", "x", value), Value(ours))["agrees"] is agrees, (value, ours)
 
 
 PANELS = {

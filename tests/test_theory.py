@@ -23,8 +23,8 @@ from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import thresholds
 from walkers.theory.mathieu import Alignment, alignment, is_stable, largest_stable_v, time_to_turn
 from walkers.theory.motion import Friction, Walker, walk
-from walkers.theory.prediction import alignment_of, describe_alignment, motion_of, threshold
-from walkers.theory.quasistatic import detachment, mass_asymmetry, mean_velocity
+from walkers.theory.prediction import alignment_of, describe_alignment, motion_of, predict, threshold
+from walkers.theory.quasistatic import CONTACTS, detachment, mass_asymmetry, mean_velocity
 
 RUBY = Dimer((0.3e-3, 0.2e-3), 4000.0, 19.2e-3)
 
@@ -153,6 +153,29 @@ def test_theory_and_engine_agree_on_the_threshold(tmp_path: Path, friction: floa
     (end,) = thresholds(record.directory).to_dict("records")
     assert end["at_rest"] < end["moving"]
     assert (end["at_rest"] + end["moving"]) / 2.0 == pytest.approx(expected, rel=0.3)
+
+
+@pytest.mark.parametrize(
+    "changes", [{}, {"boundary": {"tilt": "3 deg"}}, {"contact": {"friction": {"bead_wall": 0.3}}}]
+)
+def test_walkers_rest_just_below_the_threshold_and_move_just_above(changes: dict[str, Any]) -> None:
+    """Slower and faster than 1 µm/s, at drives 0.2 % off."""
+    case = make_case(**changes)
+    found = threshold(case)
+    drives = [f"{dimer_of(case).peak_acceleration(share * found):.9g} m/s^2" for share in (0.998, 1.002)]
+    speeds = motion_of(*(make_case(**changes, drive={"peak_acceleration": one}) for one in drives)).velocity
+    assert 0.0 <= speeds[0] < 1e-6 < speeds[1] < 2e-6
+
+
+def test_a_prediction_names_the_contact_that_opens() -> None:
+    """At the weakest drive, in steps of 1 g, at which one does: the two others stay closed."""
+    cases = [load_case("fig4b", {"drive.peak_acceleration": f"{peak} g"}) for peak in range(4, 12)]
+    motion = motion_of(*cases)
+    place = int(np.argmax(motion.opened))
+    (opened,) = np.flatnonzero(motion.smallest_normal_force[:, place] <= 0.0)
+    assert motion.solved[place]
+    assert predict(cases[place])["viscous"]["reason"] == f"{CONTACTS[opened]} would open"
+    assert predict(cases[0])["viscous"]["reason"] is None
 
 
 def test_mathieu_parameters_of_the_papers_drives() -> None:

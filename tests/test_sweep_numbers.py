@@ -1,0 +1,186 @@
+"""Numbers of sweeps by a second formula: bands of spreads, thresholds of descents, comparisons, plans of decks."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from collections.abc import Callable, Sequence
+from math import hypot
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import spearmanr
+
+from tests.conftest import call, document, make_case, to_toml
+from walkers.inputs.loads import dimer_of
+from walkers.inputs.sweep import Descent, expand
+from walkers.runner.directory import case_of
+from walkers.runner.files import read_json, write_json
+from walkers.runner.manifest import MANIFEST_NAME, checksums
+from walkers.sweeps.comparison import Side, compare_runs
+from walkers.sweeps.scheduler import Options, makespan, pack, run_sweep
+from walkers.sweeps.spread import run_spread
+from walkers.sweeps.table import SweepRecord, load, thresholds, write_record
+
+# --- spread -----------------------------------------------------------------------------------------------------------
+
+FRICTION, RESTITUTION, ROLLING = "contact.friction.bead_wall", "contact.restitution", "contact.rolling_friction"
+UNCERTAIN = {FRICTION: [0.05, 0.3], RESTITUTION: [0.2, 0.8], ROLLING: [0.0, 0.01]}
+
+
+def _with_rank(order: np.ndarray[Any, Any], seed: int, low: float, high: float) -> list[float]:
+    """Numbers from 0 to 1 whose rank correlation with an order is between two values, by trial."""
+    draw = np.random.default_rng(seed)
+    while True:
+        values = draw.random(len(order))
+        if low < spearmanr(values, order).statistic < high:
+            return [*map(float, values)]
+
+
+def test_a_spread_has_the_quantiles_and_the_signed_ranks_of_its_draws(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """32 speeds 0.1 × 1.2ⁿ - 0.5 mm/s that fall with friction; two walkers came apart, a point failed."""
+    number = np.arange(32)
+    speeds = 1e-4 * 1.2**number - 5e-4
+    strong, weak = _with_rank(number, 1, 0.55, 0.6), _with_rank(number, 2, 0.25, 0.3)
+    whole = pd.DataFrame({"velocity": speeds, FRICTION: 0.3 - 0.005 * number, RESTITUTION: strong, ROLLING: weak})
+    whole["status"], whole["separated_fraction"] = "finished", 0.0
+    others = pd.DataFrame({"velocity": [1.0, -1.0, 2.0], "separated_fraction": [0.5, 0.2, 0.0]})
+    others = others.assign(status=["finished", "finished", "failed"], **dict.fromkeys(UNCERTAIN, 0.2))
+    table = pd.concat([whole, others]).sample(frac=1.0, random_state=1).reset_index(drop=True)
+    record = SweepRecord(tmp_path, "spread", "", {}, [], [], [], None, [], {})
+    monkeypatch.setattr("walkers.sweeps.spread.run_sweep", lambda *_, **__: (record, []))
+    monkeypatch.setattr("walkers.sweeps.spread.load", lambda _: table)
+    spread = run_spread(make_case(uncertain=UNCERTAIN), tmp_path, Options(1))
+    band = spread.bands["velocity"]
+    # Of 32 sorted numbers, from 0 to 31, 5 and 95 % are at 1.55 and 29.45, the median between the two in the middle.
+    assert band.low == pytest.approx(speeds[1] + 0.55 * (speeds[2] - speeds[1]))
+    assert band.median == pytest.approx((speeds[15] + speeds[16]) / 2.0)
+    assert band.high == pytest.approx(speeds[29] + 0.45 * (speeds[30] - speeds[29]))
+    assert (band.smallest, band.largest, band.points) == (speeds[0], speeds[31], 32)
+    # 0.1 × 1.2ⁿ is below 0.5 up to n = 8.
+    assert spread.counts == {"forward": 23, "backward": 9, "at_rest": 0, "separated": 2}
+    # Two standard errors are 0.36: rolling friction is left out.
+    depends = spread.depends["velocity"]
+    assert list(depends.items()) == [
+        (FRICTION, pytest.approx(-1.0)),
+        (RESTITUTION, pytest.approx(spearmanr(strong, speeds).statistic)),
+    ]
+    assert read_json(tmp_path / "spread.json")["bands"]["velocity"]["low"] == band.low
+
+
+# --- descents ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_descents_thresholds_have_the_gamma0_of_their_own_drives(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two descents from 1.2 g in steps of 0.2 g; the walkers of the first go toward their small beads."""
+    speeds = [[-3e-4, -1e-4, 1e-6], [2e-4, -1e-6]]
+    dimer = dimer_of(make_case())
+    rows = [
+        {"point": 5 * descent + step, "drive.frequency": 60.0 + 30.0 * descent, "velocity": speed, "status": "finished"}
+        for descent, of in enumerate(speeds)
+        for step, speed in enumerate(of)
+    ]
+    rows.append({"point": 3, "drive.frequency": 60.0, "velocity": np.nan, "status": "failed"})
+    table = pd.DataFrame(rows).sort_values("point", ignore_index=True)
+    table["drive.peak_acceleration"] = 1.2 - 0.2 * (table["point"] % 5)
+    table["gamma0"] = [dimer.gamma0(9.80665 * g) for g in table["drive.peak_acceleration"]]
+    units = {"drive.frequency": "Hz", "drive.peak_acceleration": "g"}
+    table.attrs |= {"units": units, "meanings": dict.fromkeys(units, "varied")}
+    descent = Descent("drive.peak_acceleration", 5, 1e-5)
+    write_record(SweepRecord(tmp_path, "down", "", units, [], [], [], descent, [], {}))
+    monkeypatch.setattr("walkers.sweeps.table.load", lambda _: table)
+    first, second = thresholds(tmp_path).to_dict("records")
+    for row, moving, at_rest in ((first, 1.0, 0.8), (second, 1.2, 1.0)):
+        assert (row["moving"], row["at_rest"]) == pytest.approx((moving, at_rest))
+        # Γ0 = M a0/4πγR̄ is proportional to the drive.
+        mass, force = 4000.0 * 4.0 / 3.0 * np.pi * (0.3e-3**3 + 0.2e-3**3), 4.0 * np.pi * 19.2e-3 * 0.25e-3
+        expected = [mass * 9.80665 * g / force for g in (moving, at_rest)]
+        assert [row["gamma0_moving"], row["gamma0_at_rest"]] == pytest.approx(expected, rel=0.05)
+        assert row["gamma0_moving"] / row["gamma0_at_rest"] == pytest.approx(moving / at_rest)
+
+
+def test_a_descent_goes_on_no_further_than_the_batch_in_which_it_rests(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two steps a batch: those at 1 g and 0.8 g, the second at rest, are the last."""
+    monkeypatch.setattr("walkers.sweeps.scheduler.MOST_WALKERS", 2)
+    run = {"time_step": "2 us", "cycles": 20, "settling_cycles": 10, "samples_per_cycle": 5}
+    (tmp_path / "base.toml").write_text(to_toml(document(run=run)))
+    down = {"from": "1.4 g", "to": "0.2 g", "step": "0.2 g", "until_below": "0.002 mm/s"}
+    tables = {"case": "base.toml", "descend": {"key": "drive.peak_acceleration", **down}}
+    record, _ = run_sweep(expand(tables, source="t", name="t", folder=tmp_path), tmp_path / "runs", Options(1))
+    speeds = load(record.directory)["velocity"]
+    rest = int(np.argmax(speeds < 2e-6))
+    assert rest % 2 == 1  # the second of a batch
+    assert [(record.out / name / MANIFEST_NAME).exists() for name in record.runs] == [step <= rest for step in range(7)]
+
+
+# --- plans of decks ---------------------------------------------------------------------------------------------------
+
+
+def test_of_plans_that_take_as_long_the_smallest_decks_are_made() -> None:
+    """A long point takes a core for as long as eight short ones would take together, however they are dealt."""
+    run = {"time_step": "2 us", "cycles": 12}
+    cases = dict.fromkeys(range(8), make_case(run=run)) | {8: make_case(run=run | {"cycles": 160})}
+    decks = pack(cases, 2)
+    assert [deck.points for deck in decks] == [(8,), *((number,) for number in range(8))]
+    assert makespan((deck.seconds for deck in decks), 2) == decks[0].seconds
+
+
+# --- comparisons ------------------------------------------------------------------------------------------------------
+
+
+def _changed(run: Path, to: Path, name: str, speed: float, error: float) -> Side:
+    """A copy of a run whose result has another velocity and numerical error (m/s), as if measured so."""
+    shutil.copytree(run, to / name)
+    result = read_json(to / name / "result.json")
+    result["velocity"]["mean"] = speed
+    result["numerical_error"] = {"half_step": 0.0, "stiffer": error, "total": error}
+    write_json(to / name / "result.json", result)
+    manifest = read_json(to / name / MANIFEST_NAME)
+    manifest["sha256"] |= checksums(to / name, ["result.json"])
+    write_json(to / name / MANIFEST_NAME, manifest)
+    return Side(name, case_of(run), to / name)
+
+
+def test_compared_runs_differ_by_so_many_times_both_their_numerical_errors(
+    run_directory: Callable[..., Path], tmp_path: Path
+) -> None:
+    """Errors of 3 and 4 µm/s make 5 µm/s of a difference of -50 µm/s."""
+    run = run_directory(run={"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5})
+    fast, slow = _changed(run, tmp_path, "fast", 1.05e-3, 3e-6), _changed(run, tmp_path, "slow", 1e-3, 4e-6)
+    found = compare_runs(fast, slow)
+    (velocity,) = (one for one in found.contents["results"] if one["quantity"] == "velocity")
+    assert velocity["difference"] == pytest.approx(-5e-5)
+    assert velocity["numerical_error"] == pytest.approx(hypot(3e-6, 4e-6))
+    assert "the velocities differ by 10 times their numerical error" in found.text
+    assert re.search(r"\nvelocity \(mm/s\) +1\.05 +1 +-0\.05 ", found.text)
+
+
+def test_compared_sweeps_differ_most_at_the_largest_change_of_either_sign(tmp_path: Path) -> None:
+    """With more friction the walker is faster under a weak drive, and slower by more under a strong one."""
+    run = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
+    tables = {"case": "base.toml", "axes": {"drive.peak_acceleration": ["3 g", "6 g"]}}
+    speeds: list[Sequence[float]] = []
+    for friction in (0.05, 0.2):
+        contact = {"friction": {"bead_bead": 0.1, "bead_wall": friction}}
+        (tmp_path / "base.toml").write_text(to_toml(document(run=run, contact=contact)))
+        name = f"rough-{friction}"
+        record, _ = run_sweep(expand(tables, source="t", name=name, folder=tmp_path), tmp_path / "runs", Options(1))
+        speeds.append(load(record.directory)["velocity"])
+    sides = [str(tmp_path / "runs" / f"rough-{friction}") for friction in (0.05, 0.2)]
+    found = json.loads(call("compare", *sides, "--json", check=True).stdout)
+    away = [one["difference"] for one in found["points"]]
+    assert away == pytest.approx(list(speeds[1] - speeds[0]))
+    assert away[0] > 1e-4
+    assert away[1] < -2.0 * away[0]
+    told = call("compare", *sides, check=True).stdout
+    assert f"2 points in both; largest difference {1e3 * away[1]:.4g} mm/s" in told
