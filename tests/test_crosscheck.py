@@ -299,8 +299,10 @@ REFUSED_WALLS = {
     "type 2 cylinder 0 0": "ends early",
     "type 2 wobble": "unknown keyword wobble",
     "type 2 plane 0 0 0 0 0 1 frame moon": "expected lab or walls, not moon",
-    "type 2 plane 0 0 0 0 0 1 loads missing.txt": "missing.txt has no loads",
-    "type 2 plane 0 0 0 0 0 1 loads bridges.txt": "bridges.txt has no loads",
+    "type 2 plane 0 0 0 0 0 1 frame walls loads missing.txt": "missing.txt has no loads",
+    "type 2 plane 0 0 0 0 0 1 frame walls loads bridges.txt": "bridges.txt has no loads",
+    "type 2 plane 0 0 0 0 0 1 loads bridges.txt": "expected frame walls",
+    "type 2 plane 0 0 0 0 0 1 frame lab loads bridges.txt": "expected frame walls",
 }
 
 
@@ -311,6 +313,26 @@ def test_commands_that_are_refused(bench: Bench, command: str) -> None:
     changed = [f"fix walls all wall/bridge {command}" if "wall/bridge" in line else line for line in lines]
     with pytest.raises(EngineError, match=REFUSED_WALLS[command]):
         bench.run(replace(deck, text="\n".join([*changed, ""])))
+
+
+def test_a_dry_contact_with_a_wall_begins_without_friction(bench: Bench) -> None:
+    """Sheared, lifted and put down again, where films are empty: the spring of the first contact has ended."""
+    case = bench_case(liquid={"law": "willett"}, contact={"friction": {"bead_bead": 0.3, "bead_wall": 0.3}})
+    case = replace(case, liquid=replace(case.liquid, conserved=True))
+    deck = compose(prescribed(case, standing([over(FLOOR, -1e-6, RADIUS, spin=STILL)]), 60))
+    empty = deck.text.replace("scalar yes yes no 1.0", "scalar yes yes no 0.0")
+    assert empty != deck.text
+    before, _, after = empty.partition("\nrun ")
+    ways = ("1e-2 0 0", "0 0 2.0", "0 0 -2.0")  # m/s, each for 20 steps
+    runs = [f"fix way all move linear {way} units box\nrun 20\nunfix way" for way in ways]
+    text = "\n".join([before, *runs, after.partition("\n")[2]])
+    series = bench.run(replace(deck, text=text))
+    (shear, *_), height = series.forces[20, 0], series.frames[:, 0, 2]
+    assert shear < -1e-6
+    assert height[40] - RADIUS > 3e-5
+    assert height[60] == pytest.approx(height[0], rel=1e-12)
+    assert series.forces[60, 0, 2] > 1e-6
+    assert np.abs(series.forces[41:, 0, :2]).max() < 1e-9 * abs(shear)
 
 
 def test_a_restart_with_other_walls_is_refused(bench: Bench) -> None:

@@ -468,6 +468,7 @@ public:
     }
     if (walls_.empty()) error->fix_error(FLERR, this, "expected a plane or a cylinder");
     if (type_ < 1 || type_ > atom->ntypes) error->fix_error(FLERR, this, "expected a type, of those of the box");
+    if (moves_ && !file.empty()) error->fix_error(FLERR, this, "loads need the walls' frame: expected frame walls");
     load_width_ = 3 * (1 + waves_.size());
     if (!file.empty()) read_loads(file);
     width_ = HISTORY * walls_.size();
@@ -702,6 +703,7 @@ private:
       double *const history = history_of(one.bead, one.wall);
       Vec n;
       const double gap = gap_at(one.wall, one.bead, n);
+      if (!(gap < 0.)) std::fill_n(history + SPRING, HISTORY - SPRING, 0.);
       if (gap > formed && history[TABLE] == 0.) continue;
       touch(one.bead, one.wall, gap, n, history, add, stretch, told);
     }
@@ -718,7 +720,6 @@ private:
     c.n = n;
     c.type_i = atom->type[i];
     c.type_j = type_;
-    if (!touching) history[SPRING] = history[SPRING + 1] = history[SPRING + 2] = 0.;
     const bridge::Table *const table =
       law_->bridge_of(history, c.gap, i, WALL, type_, std::numeric_limits<double>::infinity());
     if (!touching && !table) return;
