@@ -43,10 +43,6 @@ figures: setup .venv/with-theory ## The paper's figures and published numbers be
 calibrate: setup .venv/with-calibrate ## Calibrate friction and drag to the published numbers (CALIBRATION=ruby); goes on where it was interrupted
 	@$(WALKERS) calibrate $(CALIBRATION) --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
 
-.PHONY: model-terms
-model-terms: setup .venv/with-theory ## Which physics is missing: the theory fitted to the published numbers with each further term
-	@$(WALKERS) paper terms
-
 .PHONY: test
 test: setup cluster chromium .venv/with-dev ## Lint, check types, run the tests (a 2-bead smoke test first)
 	.venv/bin/ruff check .

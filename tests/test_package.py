@@ -24,7 +24,6 @@ from walkers.calibration.calibrate import calibrate
 from walkers.inputs.calibration import load_calibration
 from walkers.inputs.extras import EXTRAS, ExtraMissing, module_of
 from walkers.paper.make import make_figures
-from walkers.paper.model_terms import try_model_terms
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.site import load_site
 from walkers.theory.prediction import predict
@@ -157,7 +156,6 @@ NEEDING: dict[str, list[Callable[[walkers.Run, Path], object]]] = {
     "report": [lambda run, out: run.report(out / "run.html"), lambda run, _: run.view()],
     "theory": [
         lambda *_: predict(walkers.load_case("fig1b")),
-        lambda _, out: try_model_terms(out),
         lambda _, out: make_figures(out / "runs", out / "figures", Options(1)),
     ],
     "xyz": [lambda run, out: run.export("xyz", out / "run.xyz")],

@@ -176,15 +176,6 @@ def paper_figures(
     return 1 if made.failures or made.left_out else 0
 
 
-def paper_terms(to: Path = Option(Path("figures"), help="Folder to write the table to.")) -> None:
-    """Fit the theory with further terms, one at a time, to the published numbers. Needs no engine."""
-    from walkers.paper.model_terms import PAGE_NAME, try_model_terms
-
-    check_folder("--to", to)
-    print_lines(f"misfit {one.misfit:5.1f}, {one.met:2d} met: {one.name}" for one in try_model_terms(to))
-    print(to / PAGE_NAME)
-
-
 def calibrate(
     calibration: str = Argument(metavar="CALIBRATION", help=_CALIBRATION),
     out: Out = DEFAULT_OUT,
