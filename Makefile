@@ -33,7 +33,7 @@ sweep: setup $(if $(SITE),.venv/with-cluster) ## Run what is missing of SWEEP=fi
 
 .PHONY: pile
 pile: setup ## Shake the small pile (or PILE=pile-fig1a): what climbed, pictures, a film; goes on where it was interrupted
-	@$(MAKE) --no-print-directory walker CASE=$(PILE) OUT=$(OUT) FILM=720p
+	@$(MAKE) --no-print-directory walker CASE=$(PILE) OUT=$(OUT) FILM=$(if $(filter file,$(origin FILM)),720p,$(FILM))
 
 .PHONY: figures
 figures: setup .venv/with-theory ## The paper's figures and published numbers beside ours, in figures/ (runs what is missing)

@@ -3,6 +3,8 @@
 import ast
 import importlib
 import os
+import pkgutil
+import re
 import shutil
 import subprocess
 import sys
@@ -205,3 +207,40 @@ def test_every_package_of_the_tests_is_pinned() -> None:
     pinned = {canonicalize_name(line.partition("==")[0]) for line in lines}
     assert all("==" in line for line in lines)
     assert not closure([*PROJECT["dependencies"], *OPTIONAL["dev"]]) - pinned
+
+
+def test_lists_of_debian_packages_agree() -> None:
+    """The Makefile has them; recipes of containers add Python, the guide for contributors repeats them."""
+    (engine,) = re.findall(r"^ENGINE := (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    packages = set(engine.split())
+    recipes = [(ROOT / "containers" / name).read_text() for name in ("Dockerfile", "walkers.def")]
+    listed = [re.findall(r"--no-install-recommends \\\n(.*?)(?: \\)?$", text, re.MULTILINE)[0] for text in recipes]
+    assert [set(text.split()) - {"python3", "python3-venv"} for text in listed] == [packages] * 2
+    (guide,) = re.findall(r"Debian packages: `([^`]*)`", (ROOT / "CONTRIBUTING.md").read_text())
+    assert set(guide.split()) == packages
+
+
+@pytest.mark.parametrize(("words", "size"), [([], "720p"), (["FILM=1080p"], "1080p")])
+def test_a_film_of_a_pile_has_the_size_that_is_asked_for(words: list[str], size: str) -> None:
+    done = subprocess.run(["make", "-n", "pile", *words], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert re.findall(r"--size (\S+)", done.stdout) == [size]
+
+
+def test_names_in_docstrings_exist() -> None:
+    """Each `walkers.…` in the texts of the package is a module, or a name in one."""
+    missing = []
+    for path in sorted((ROOT / "walkers").rglob("*.py")):
+        for name in re.findall(r"(?<!`)`(walkers(?:\.\w+)+)`(?!`)", path.read_text()):
+            try:
+                pkgutil.resolve_name(name)
+            except (ImportError, AttributeError):
+                missing.append(f"{path.relative_to(ROOT)}: {name}")
+    assert not missing
+
+
+def test_modules_that_a_package_describes_are_there() -> None:
+    """Words in backticks without a dot, at the head of a package, are its modules or other packages."""
+    for path in sorted((ROOT / "walkers").glob("*/__init__.py")):
+        words = re.findall(r"(?<!`)`([a-z_]+)`(?!`)", ast.get_docstring(ast.parse(path.read_text())) or "")
+        places = {word: [path.with_name(f"{word}.py"), path.parent.with_name(word)] for word in words}
+        assert [word for word, some in places.items() if not any(one.exists() for one in some)] == []

@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -30,8 +31,8 @@ from walkers.runner.directory import FIRST_SEGMENT, finished_run, locked
 from walkers.runner.failures import WalkersMet
 from walkers.runner.summary import predicted_overhead
 from walkers.sweeps.making import make_runs
-from walkers.sweeps.scheduler import Options, SweepStopped, plan_sweep, run_sweep, work
-from walkers.sweeps.table import load, thresholds
+from walkers.sweeps.scheduler import Options, SweepReplacedWarning, SweepStopped, plan_sweep, run_sweep, work
+from walkers.sweeps.table import load, thresholds, write_record
 from walkers.templates.deck import render_deck
 
 TINY = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
@@ -487,3 +488,19 @@ def test_a_program_that_is_missing_or_wrong_stops_the_sweep(
     with pytest.raises(KeyError, match="not there"):
         run_sweep(load_sweep(sweep_file("again", SIXTEEN)), in_folder / "runs", Options(1))
     assert len(calls) == 1
+
+
+def test_another_sweep_of_the_same_name_is_told(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    """Afterwards by a warning, at the same time by an error; an edit that keeps a point is neither."""
+    axis = "[axes]\ndrive.peak_acceleration = "
+    first, edited, other = (load_sweep(sweep_file("map", axis + a)) for a in ('["2 g"]', '["2 g", "3 g"]', '["4 g"]'))
+    out = in_folder / "runs"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", SweepReplacedWarning)
+        run_sweep(first, out, Options(1))
+        run_sweep(edited, out, Options(1))
+    with pytest.warns(SweepReplacedWarning, match="same name"):
+        run_sweep(other, out, Options(1))
+    record = plan_sweep(first, out / "new", Options(1)).record
+    with pytest.raises(SweepStopped, match="same name"):
+        run_sweep(edited, out / "new", Options(1), on_progress=lambda _: write_record(record))

@@ -165,7 +165,7 @@ class Run:
         return self.table("walkers")
 
     def table(self, name: str) -> pd.DataFrame:
-        """A table of the run, see `walkers.postprocess.read_table`."""
+        """A table of the run, see `walkers.postprocess.tables.read_table`."""
         from walkers.postprocess.tables import read_table
 
         return read_table(self.finished_directory, name)

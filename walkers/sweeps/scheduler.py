@@ -17,6 +17,7 @@ import heapq
 import resource
 import threading
 import time
+import warnings
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -31,7 +32,7 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
 from walkers.inputs.case import Case
-from walkers.inputs.errors import Stopped, WalkersError, check_utf8, refused
+from walkers.inputs.errors import InputError, Stopped, WalkersError, check_utf8, refused
 from walkers.inputs.rounding import counted, duration_text
 from walkers.inputs.sweep import Sweep
 from walkers.postprocess.analysis import current_result
@@ -46,6 +47,7 @@ from walkers.sweeps.table import (
     RECORD_NAME,
     SweepRecord,
     describe_sweep,
+    read_record,
     states,
     velocity_in,
     velocity_of,
@@ -69,21 +71,18 @@ _LOOK_SECONDS = 0.25
 
 _OF_ALL = frozenset(
     [
-        "EngineMissing",
-        "OtherEngine",
-        "ContactModelMissing",
-        "AuditFailed",
-        "EngineDiffers",
-        "ProgramDiffers",
-        "DiskFull",
-        "OutputGone",
-        "FileNotFoundError",
-    ]  # the last for mpirun
+        *("EngineMissing", "OtherEngine", "ContactModelMissing", "AuditFailed", "EngineDiffers", "ProgramDiffers"),
+        *("DiskFull", "OutputGone", "FileNotFoundError"),  # the last of mpirun
+    ]
 )
 """Failures that hit every point."""
 _OF_POINTS = frozenset(["BlowUp", "BeadsLost", "BeadsOverTheTop", "WalkersMet", "TimeLimitExceeded", "RunBusy"])
 """Failures that come from the parameters of a point, or from another process."""
 _MOST_ALIKE = 3  # points that fail alone in the same way, before any point is finished
+
+
+class SweepReplacedWarning(UserWarning):
+    """Another sweep file of the same name had the directory of a sweep."""
 
 
 class SweepStopped(WalkersError):
@@ -335,6 +334,10 @@ def run_sweep(
     record = plan.record
     if plan.decks:
         check_audit(plan.engine, allow_failed_audit)
+    with suppress(InputError):  # no sweep of this name, or none that can be read
+        if not set(read_record(record.directory).runs) & set(record.runs):
+            text = "replaces a sweep of the same name without common runs; figures and reports there show that one"
+            warnings.warn(f"{record.directory}: {text}", SweepReplacedWarning, stacklevel=2)
     write_record(record)
     if not plan.decks:
         return record, plan.final
@@ -345,6 +348,8 @@ def run_sweep(
         failures = _Scheduler(plan, submit).run(on_progress or (lambda _: None))
     if not (record.directory / RECORD_NAME).is_file():
         raise OutputGone(record.directory)
+    if list(read_record(record.directory).runs) != list(record.runs):
+        raise SweepStopped(f"{record.directory} was replaced by another sweep of the same name; the runs are kept")
     return record, failures
 
 
