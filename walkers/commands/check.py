@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from walkers.check.report import Chapter
     from walkers.inputs.case import Case as Resolved
 
-_FILES = "An archive, or a run or a sweep (folder, name in --out, or case)."
+_FILES = "An unpacked archive, or a run or a sweep (folder, name in --out, or case)."
 _NAME = "A material, a liquid, a bridge law, a case, a sweep or a calibration."
 _CHAPTER = "benchmarks, bridges or crosscheck; default: all."
 _CALIBRATION = "A calibration file, or the name of a shipped calibration such as ruby."

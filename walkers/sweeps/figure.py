@@ -12,8 +12,16 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.inputs.errors import refused
+from walkers.inputs.library import unmeasured
 from walkers.inputs.readable import readable_unit
-from walkers.postprocess.drawing import SCATTER, errors_seen, letter_panels, new_figure, plain_text, styled
+from walkers.postprocess.drawing import (
+    SCATTER,
+    errors_seen,
+    letter_panels,
+    new_figure,
+    plain_text,
+    styled,
+)
 from walkers.sweeps.table import ERRORS, find_name, value_text, varied_columns, with_unit
 
 if TYPE_CHECKING:
@@ -89,8 +97,9 @@ class Layout:
     undistinguished: Sequence[str] = ()
 
 
-Curves = Callable[[npt.NDArray[np.int64], Factor, FloatArray], Mapping[str, FloatArray]]
-"""Function of rows that differ only in x, of the factor x and of values of x: the predictions of models there."""
+Curves = Callable[[npt.NDArray[np.int64], Factor, FloatArray], tuple[FloatArray, Mapping[str, FloatArray]]]
+"""Function of rows that differ only in x, of the factor x and of values of x: values of x, predictions of models there.
+"""
 
 
 @dataclass(frozen=True)
@@ -101,6 +110,7 @@ class Drawn:
     values: FloatArray
     errors: FloatArray
     theory: Mapping[str, FloatArray] = field(default_factory=dict)
+    bars: str = SCATTER
     curves: Curves | None = None
     """Predictions of models between and beyond the points."""
 
@@ -174,7 +184,8 @@ def drawn_column(rows: pd.DataFrame, name: str, theory: Mapping[str, FloatArray]
     if name in ERRORS:
         errors = rows[ERRORS[name]].to_numpy(dtype=float, na_value=np.nan) / size
     predicted = {model: numbers / size for model, numbers in (theory or {}).items()}
-    return Drawn(column.label, np.array(column.values), errors, predicted)
+    bars = SCATTER.partition(" (")[0] if {*unmeasured()} & {*varied_columns(rows)} else SCATTER
+    return Drawn(column.label, np.array(column.values), errors, predicted, bars)
 
 
 def _numbers(rows: pd.DataFrame, name: str, option: str) -> Factor:
@@ -338,10 +349,10 @@ def _panel(axes: Axes, x: Factor, here: npt.NDArray[np.bool_], drawn: Drawn, col
         line = "-" if joined and not drawn.theory else "none"
         axes.errorbar(places[rows] + aside, y, yerr=bars, capsize=2, lw=0.9, ls=line, **look)
         along = _along_axis(x, log) if joined and drawn.curves else places[rows] + aside
-        curves = drawn.curves(rows, x, along) if joined and drawn.curves else {}
+        along, curves = drawn.curves(rows, x, along) if joined and drawn.curves else (along, {})
         for model, (name, values) in enumerate(drawn.theory.items()):
             at, shown = (along, curves[name]) if name in curves else (places[rows] + aside, values[rows])
-            axes.plot(at, shown, zorder=1, **_model_look(model, joined, look["color"]))
+            axes.plot(at, shown, zorder=1, **_model_look(model, name in curves, look["color"]))
     if np.nanmin(drawn.values) <= 0.0 <= np.nanmax(drawn.values):
         axes.axhline(0.0, color="0.4", lw=0.6, zorder=0)
 
@@ -420,7 +431,7 @@ def _legend(figure: Figure, grid: npt.NDArray[Any], colours: _Colours, drawn: Dr
     for number, model in enumerate(drawn.theory):
         handles.append(Line2D([], [], label=model, **_model_look(number, _MODELS[number][0] in lines, "0.3")))
     if np.isfinite(drawn.errors).any():
-        bars = SCATTER + ("" if errors_seen(drawn.errors, drawn.values) else ", smaller than the symbols")
+        bars = drawn.bars + ("" if errors_seen(drawn.errors, drawn.values) else ", smaller than the symbols")
         most, whole = round(18.0 * figure.get_figwidth()), [title, bars] if title else [bars]
         title = text if len(text := "; ".join(whole)) <= most else "\n".join(fill(one, most) for one in whole)
         handles = handles or [Line2D([], [], ls="none", label=" ")]
