@@ -264,7 +264,8 @@ def _peak(case: Any, x: str, value: float) -> float:
 
 
 def test_theory_is_not_joined_where_it_has_no_curve(looked_through: Path) -> None:
-    figure = walkers.load(looked_through / "grid").figure(x="scatter", theory=True)
+    """The radii, shown by sin δ: each pair has bridges of its own, and there is no walker between them."""
+    figure = walkers.load(looked_through / "beads").figure(theory=True)
     assert not [line for axes in _panels(figure) for line in axes.lines if line.get_linestyle() in ("--", ":")]
 
 
