@@ -646,7 +646,8 @@ def test_a_band_of_the_share_that_has_climbed_does_not_fall(monkeypatch: pytest.
     for seed in range(40):
         random = np.random.default_rng(seed)
         found = summed_up(monkeypatch, as_results(random.exponential(4.0, 14), random.uniform(1.0, 9.0, 14), takes=0.0))
-        curve = pd.DataFrame(found["curve"])
+        json.dumps(found["curve"], allow_nan=False)
+        curve = pd.DataFrame(found["curve"]).astype(float)
         assert curve["probability"].is_monotonic_increasing
         inside = curve.dropna()
         assert ((inside["low"] <= inside["probability"]) & (inside["probability"] <= inside["high"])).all()

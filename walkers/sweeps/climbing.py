@@ -12,6 +12,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -323,17 +324,17 @@ def _greenwood(share: Any) -> Any:
         return share.confidence_interval(_CONFIDENCE, method="log-log")
 
 
-def survival_curve(first: FloatArray, watched: FloatArray) -> dict[str, list[float]]:
+def survival_curve(first: FloatArray, watched: FloatArray) -> dict[str, list[float | None]]:
     """The share of `survival` at every time (s) at which it changes: ``time``, ``probability``, ``low``, ``high``.
 
-    The band is by Greenwood's variance at all times; NaN while none or all have climbed.
+    The band is by Greenwood's variance at all times; None while none or all have climbed.
     """
     share = _share(first, watched)
     time = np.array([0.0, *np.unique(share.quantiles)])
     ends = _greenwood(share)
     found = {"time": time, "probability": share.evaluate(time)}
     found |= {"low": ends.low.evaluate(time), "high": ends.high.evaluate(time)}
-    return {name: values.tolist() for name, values in found.items()}
+    return {name: [one if isfinite(one) else None for one in values.tolist()] for name, values in found.items()}
 
 
 def summarise(condition: Condition, within: float | None = None) -> dict[str, Any]:
