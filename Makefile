@@ -33,7 +33,7 @@ sweep: setup $(if $(SITE),.venv/with-cluster) ## Run what is missing of SWEEP=fi
 
 .PHONY: pile
 pile: setup ## Shake the small pile (or PILE=pile-fig1a): what climbed, pictures, a film; goes on where it was interrupted
-	@$(MAKE) --no-print-directory walker CASE=$(PILE) OUT=$(OUT) FILM=720p
+	@$(MAKE) --no-print-directory walker CASE=$(PILE) OUT=$(OUT) FILM=$(if $(filter file,$(origin FILM)),720p,$(FILM))
 
 .PHONY: figures
 figures: setup .venv/with-theory ## The paper's figures and published numbers beside ours, in figures/ (runs what is missing)
@@ -42,10 +42,6 @@ figures: setup .venv/with-theory ## The paper's figures and published numbers be
 .PHONY: calibrate
 calibrate: setup .venv/with-calibrate ## Calibrate friction and drag to the published numbers (CALIBRATION=ruby); goes on where it was interrupted
 	@$(WALKERS) calibrate $(CALIBRATION) --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
-
-.PHONY: model-terms
-model-terms: setup .venv/with-theory ## Which physics is missing: the theory fitted to the published numbers with each further term
-	@$(WALKERS) paper terms
 
 .PHONY: test
 test: setup cluster chromium .venv/with-dev ## Lint, check types, run the tests (a 2-bead smoke test first)

@@ -32,7 +32,6 @@ from walkers.inputs.changes import flatten
 from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.make import COMPARED, FIGURES, make_figures
-from walkers.paper.model_terms import try_model_terms
 from walkers.postprocess.analysis import analyses
 from walkers.postprocess.films import FilmOptions
 from walkers.runner.files import read_json, write_json, write_text
@@ -106,10 +105,6 @@ def _of_climbs(name: str, *others: str, assembly: Mapping[str, Any] | None = Non
     return Illustration(tuple(files), lambda: [one for each in names for one in load_sweep(each).cases()], make)
 
 
-def _make_model_terms(_: Path, docs: Path) -> None:
-    try_model_terms(docs / "figures")
-
-
 def _make_validation(out: Path, docs: Path) -> None:
     made = validate(out, docs / "explanation", jobs=cores_here())
     for statement in made.failed:
@@ -165,7 +160,6 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     "pile": _of_run("pile", "pile-small", {"run.duration": "10 s"}),
     **{name: _of_figure(name, f"figures/{name}.png", sweeps=one.sweeps) for name, one in FIGURES.items()},
     "comparison": _of_figure("comparison", "figures/comparison.md", "figures/comparison.json", sweeps=COMPARED),
-    "model-terms": Illustration(("figures/model_terms.md",), _shipped("fig1b", "fig4a"), _make_model_terms),
     "validation": Illustration(
         ("explanation/validation.md",),
         _shipped("fig1b", "fig4a", "fig4b", "climber", "climber-dimer", "pile-ci"),

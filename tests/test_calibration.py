@@ -382,7 +382,9 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     said = json.loads((tmp_path / "here" / "calibration.json").read_text())
     assert said["sets"] == 22
     assert said["posterior"]["converged"]
-    assert "not converged" not in (tmp_path / "here" / "calibration.md").read_text()
+    page = (tmp_path / "here" / "calibration.md").read_text()
+    assert "not converged" not in page
+    assert ("published" in page, "| observation | measured |" in page) == (False, True)
     for name, true in TRUE.items():
         low, middle, high = said["intervals"][name]
         assert low * 0.97 < true < high * 1.03, name
@@ -469,6 +471,7 @@ def test_shipped_calibrations_can_be_run(name: str) -> None:
     sweep = wave_sweep(found, Space(found.parameters).values(np.full((1, len(found.parameters)), 0.5)), name)
     cases = list(sweep.cases())
     assert len(cases) == len(found.experiments)
+    assert found.file.published  # not measured by the reader
 
 
 def _bad(path: str, value: Any, folder: Path) -> Calibration:

@@ -330,3 +330,28 @@ def test_a_file_with_two_names_weighs_once(tmp_path: Path) -> None:
     (tmp_path / "table").write_bytes(b"0" * 1000)
     (tmp_path / "other").hardlink_to(tmp_path / "table")
     assert weigh(tmp_path)[0] == 1000
+
+
+def test_sweeps_over_lists_of_different_lengths_are_compared_either_way(in_folder: Path) -> None:
+    """Clusters of three beads and of two: the longer list has a column that the other sweep has not."""
+    tables = document(run=SHORTEST)
+    del tables["dimers"]
+    radii = ["0.3 mm", "0.2 mm"]
+    (in_folder / "base.toml").write_text(
+        to_toml({**tables, "clusters": [{"radii": radii, "arrangement": "chain", "replicates": 1}]})
+    )
+    for name, levels in (("long", [[*radii, "0.2 mm"], radii]), ("short", [radii, ["0.3 mm", "0.25 mm"]])):
+        Path(f"{name}.toml").write_text(f'case = "base.toml"\naxes."clusters[0].radii" = {json.dumps(levels)}\n')
+        call("sweep", f"{name}.toml", check=True)
+    for names in (["long", "short"], ["short", "long"]):
+        found = json.loads(call("compare", *names, "--json", check=True).stdout)
+        assert [len(one["point"]["clusters[0].radii"]) for one in found["points"]] == [2]
+        assert found["points"][0]["difference"] == 0.0
+
+
+def test_a_sweep_of_another_format_is_refused(out: Path) -> None:
+    record = read_json(out / "rough" / "sweep.json")
+    write_json(out / "rough" / "sweep.json", {**record, "format": 99})
+    done = call("list", "rough")
+    assert (done.returncode, "Traceback" in done.stderr) == (2, False)
+    assert "format 99, expected 2" in done.stderr

@@ -301,3 +301,16 @@ def test_spread_on_the_command_line(in_folder: Path) -> None:
     assert "  guessed    " in told
     assert "(not of these materials and this liquid)" in " ".join(told.split())
     assert "(5 to 95 %)" in told
+
+
+def test_a_band_is_shown_for_its_ranges_alone(tmp_path: Path) -> None:
+    """A run keeps its name when ranges change, and is not said to have the band of the former ones."""
+
+    def case(*friction: float) -> Case:
+        return make_case(run={"cycles": 6, "settling_cycles": 2}, uncertain={"contact.friction.bead_wall": [*friction]})
+
+    run_spread(case(0.05, 0.6), tmp_path, Options(2), points=2)
+    for ranges, shown in (((0.05, 0.6), True), ((0.1, 0.3), False)):
+        done = walkers.run(case(*ranges), tmp_path)
+        assert ("5 to 95 %" in done.describe()) == shown
+        assert ("5 to 95 %" in done.report(tmp_path / "page.html").read_text()) == shown

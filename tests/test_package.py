@@ -26,7 +26,6 @@ from walkers.calibration.calibrate import calibrate
 from walkers.inputs.calibration import load_calibration
 from walkers.inputs.extras import EXTRAS, ExtraMissing, module_of
 from walkers.paper.make import make_figures
-from walkers.paper.model_terms import try_model_terms
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.site import load_site
 from walkers.theory.prediction import predict
@@ -159,7 +158,6 @@ NEEDING: dict[str, list[Callable[[walkers.Run, Path], object]]] = {
     "report": [lambda run, out: run.report(out / "run.html"), lambda run, _: run.view()],
     "theory": [
         lambda *_: predict(walkers.load_case("fig1b")),
-        lambda _, out: try_model_terms(out),
         lambda _, out: make_figures(out / "runs", out / "figures", Options(1)),
     ],
     "xyz": [lambda run, out: run.export("xyz", out / "run.xyz")],
@@ -227,3 +225,28 @@ def test_faults_to_plant_are_in_the_code_once_and_name_tests_that_are_there() ->
             wrong += [f"{fault['name']}: {file} {' '.join(gone)}"] if gone or not text else []
     assert not wrong
     assert len(faults) == len({fault["name"] for fault in faults}) >= 75
+
+
+def test_lists_of_debian_packages_agree() -> None:
+    """The Makefile has them; recipes of containers add Python, the guide for contributors repeats them."""
+    (engine,) = re.findall(r"^ENGINE := (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    packages = set(engine.split())
+    recipes = [(ROOT / "containers" / name).read_text() for name in ("Dockerfile", "walkers.def")]
+    listed = [re.findall(r"--no-install-recommends \\\n(.*?)(?: \\)?$", text, re.MULTILINE)[0] for text in recipes]
+    assert [set(text.split()) - {"python3", "python3-venv"} for text in listed] == [packages] * 2
+    (guide,) = re.findall(r"Debian packages: `([^`]*)`", (ROOT / "CONTRIBUTING.md").read_text())
+    assert set(guide.split()) == packages
+
+
+@pytest.mark.parametrize(("words", "size"), [([], "720p"), (["FILM=1080p"], "1080p")])
+def test_a_film_of_a_pile_has_the_size_that_is_asked_for(words: list[str], size: str) -> None:
+    done = subprocess.run(["make", "-n", "pile", *words], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert re.findall(r"--size (\S+)", done.stdout) == [size]
+
+
+def test_modules_that_a_package_describes_are_there() -> None:
+    """Words in backticks without a dot, at the head of a package, are its modules or other packages."""
+    for path in sorted((ROOT / "walkers").glob("*/__init__.py")):
+        words = re.findall(r"(?<!`)`([a-z_]+)`(?!`)", ast.get_docstring(ast.parse(path.read_text())) or "")
+        places = {word: [path.with_name(f"{word}.py"), path.parent.with_name(word)] for word in words}
+        assert [word for word, some in places.items() if not any(one.exists() for one in some)] == []

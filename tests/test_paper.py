@@ -3,8 +3,6 @@
 import json
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -20,12 +18,11 @@ from walkers.inputs.axes import is_axis
 from walkers.inputs.changes import flatten
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case, read_toml, shipped
-from walkers.paper import model_terms, published
+from walkers.paper import published
 from walkers.paper.comparison import Value, _row, as_dict, as_markdown, compare, count, evaluate
 from walkers.paper.figures import OBSERVED, PARAMETERS, sensitivities, theory_of_cycles
 from walkers.paper.make import FIGURES, make_figures
 from walkers.paper.maps import MODES, POSTURES, classify, climber, paper_drives, postures, sliding_share
-from walkers.paper.model_terms import ALWAYS, FITTED, KAPPA, NOTHING_ELSE, TERMS, fit, values_of
 from walkers.paper.published import OBSERVATIONS, NothingFinishedError, Observation, Point, Sources
 from walkers.postprocess.drawing import save_figure
 from walkers.postprocess.gait import gait, steady_walkers
@@ -330,53 +327,3 @@ def test_a_run_that_failed_is_left_out_and_told(tmp_path: Path) -> None:
     assert {failure.reason for failure in made.failures["fig3"]} == {"TimeLimitExceeded"}
     assert list(made.left_out) == ["fig3"]
     assert not made.files
-
-
-# --- which physics is missing -----------------------------------------------------------------------------------------
-
-KNOWN = {"friction_wall": 0.25, "friction_slide": 0.2, "friction_bead": 0.12, "log10_viscosity_ratio": 1.0}
-
-
-def test_speeds_that_are_fitted_are_those_of_the_theory_beside_the_engine() -> None:
-    """For a case with its bridges and friction the same velocity as `walkers show --theory` gives."""
-    point = OBSERVATIONS["fig4a_velocity"].of[0]
-    bare = model_terms.walkers_of_the_paper()[point]
-    liquid = replace(bare.liquid, dynamic_viscosity=7.0 * bare.liquid.dynamic_viscosity)
-    contact = replace(bare.contact, friction_bead_wall=0.3, friction_bead_bead=0.1)
-    expected = float(motion_of(replace(bare, liquid=liquid, contact=contact)).velocity[0])
-    parameters = {**KNOWN, "friction_slide": 0.3, "friction_bead": 0.1, "log10_viscosity_ratio": float(np.log10(7.0))}
-    assert expected > 1e-3
-    assert model_terms.speeds(parameters)["velocity"][point] == pytest.approx(expected, rel=1e-6)
-
-
-def test_the_papers_law_alone_gives_its_figures_and_with_inertia_less_at_the_largest_asymmetry() -> None:
-    """Of Fig. 4a and of the plateau it gives nothing."""
-    found = fit("the paper's law", KAPPA, fixed=NOTHING_ELSE, generations=3)
-    assert len(FITTED) == 16
-    assert found.parameters.keys() == {"log10_kappa"}
-    assert not {"Fig. 2, 4 g", "Fig. 2, 6 g", "Fig. 3, 0.3/0.2 mm"} & set(found.missed)
-    assert {"Fig. 2, plateau", "Fig. 4a, velocity", "Fig. 3, 0.4/0.2 mm"} <= set(found.missed)
-    assert (found.values["Fig. 3, 0.4/0.2 mm"] or 0.0) < OBSERVATIONS["fig3_0.4_0.2"].si
-    assert (found.values["Fig. 4a, velocity"] or 0.0) > 2.0 * OBSERVATIONS["fig4a_velocity"].si
-
-
-def test_what_the_theory_made_is_found_again() -> None:
-    wanted = [
-        replace(one, value=value * (1.0 if one.over else 1e3))  # as published, in mm/s
-        for one, value in zip(FITTED[:7], values_of(KNOWN, FITTED[:7]).values(), strict=True)
-    ]
-    found = fit("", ALWAYS, wanted, generations=20)
-    assert (found.met, found.missed) == (len(wanted), [])
-    assert found.misfit < 0.2
-    assert found.parameters["friction_wall"] == pytest.approx(KNOWN["friction_wall"], rel=0.15)
-
-
-def test_the_program_fits_each_term(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As many searches as there are terms, and three more; here of a few walkers and trials."""
-    monkeypatch.setattr(model_terms, "_CYCLES", 2)
-    monkeypatch.setattr(model_terms, "fit", partial(fit, generations=1))
-    done = call("paper", "terms", check=True).stdout
-    assert done.splitlines()[-1] == "figures/model_terms.md"
-    assert done.count("misfit") == len(TERMS) + 3
-    table = Path("figures/model_terms.md").read_text()
-    assert all(f"\n| {name} |" in table for name in TERMS)

@@ -26,7 +26,7 @@ from tests.conftest import HALF, PROGRAM, call, engines_in, open_run, to_toml, w
 from tests.printed import spoilt
 from walkers.inputs.case import Case
 from walkers.inputs.errors import InputError
-from walkers.inputs.reading import load_case, resolve_case, shipped
+from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped
 from walkers.inputs.sweep import expand
 from walkers.postprocess.analyses.piles import Pile
 from walkers.postprocess.analysis import current_result, figures_of, tables_of, tabulate
@@ -374,8 +374,7 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(film)
     assert frames == int(50.0 * motion.time[-1]) + 1
     assert seconds == pytest.approx(5.0 * motion.time[-1], abs=0.1)
-    whole, begun = (told("climb", str(run), "--sensitivity", *cut) for cut in ([], ["--within", "1 ms"]))
-    assert "as defined" in whole
+    whole, begun = (told("climb", str(run), *cut) for cut in ([], ["--within", "1 ms"]))
     assert float(re.findall(r"\(0 to (\S+) with", begun)[0]) > float(re.findall(r"\(0 to (\S+) with", whole)[0])
     reader = pv.get_reader(told("export", str(run), "--to", "vtk", "--every", "4", "-o", "here/vtk"))
     driven = np.flatnonzero(motion.time >= 0.0)[::4]
@@ -408,8 +407,8 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     assert found["interval"] == pytest.approx([0.0, 1.0 - 0.025**0.5])  # none of two, Clopper and Pearson
     upper = 3.6889 / found["seconds"]  # of no event (Garwood 1936)
     assert found["rate_interval"] == pytest.approx([0.0, upper], rel=1e-4)
-    printed = call("climb", record.name, "--null", str(out), "--out", str(out), check=True).stdout
-    assert printed.count(f"runs climbed; climbs 0: 0 per run and second (0 to {upper:.2g} with 95 % confidence)") == 16
+    printed = call("climb", record.name, "--out", str(out), check=True).stdout
+    assert printed.count(f"climbs     0: 0 per run and second (0 to {upper:.2g} with 95 % confidence)") == 1
     written = tmp_path / "climbs.csv"
     assert call("climb", str(out), "--to", str(written), check=True).stdout.count("0 of 2 runs climbed") == 1
     assert pd.read_csv(written)["rate_high"].to_list() == pytest.approx([upper] * 3, rel=1e-4)
@@ -493,7 +492,7 @@ def test_of_runs_that_begin_alike_the_longest_counts(tmp_path: Path, monkeypatch
     runs = [("a-1", 1, 40, 7), ("b-2", 1, 80, 7), ("c-3", 2, 40, 7), ("d-4", 2, 20, 7), ("e-5", 1, 80, 6)]
     for name, seed, cycles, version in runs:
         (tmp_path / name).mkdir()
-        told = {"seed": seed, "run": {"cycles": cycles, "cycles_per_segment": 20}, "gravity": 9.81}
+        told = {"seed": seed, "run": {"cycles": cycles, "cycles_per_segment": min(cycles, 30)}, "gravity": 9.81}
         (tmp_path / name / "manifest.json").write_text("{}")
         case = SimpleNamespace(determinants=lambda told=told: told)
         manifest = {"deck_version": version, "engine": {"sha256": "0" * 64}}
@@ -630,3 +629,38 @@ def test_what_is_said_of_a_pile_before_it_is_shaken(changes: dict[str, Any], tol
     assert len(found) == len(told)
     assert all(re.match(one, other) for one, other in zip(told, found, strict=True))
     assert notes(load_case("climber")) == [], "its error is measured"
+
+
+def test_the_parts_of_climbs_are_judged_at_the_time_of_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three runs: two climb, on a plain wall after 6 s and in a corner after 2 s; the third ends at 8 s."""
+    results = as_results(np.array([5.0, 1.0, 20.0]), np.array([9.0, 7.0, 8.0]), takes=1.0)
+    results[Path("1")]["climbs"][0]["walls"] = ["+x", "+y"]
+    found = summed_up(monkeypatch, results)
+    parts = [found, found["on_plain_walls"], found["in_corners"]]
+    assert [one["within"] for one in parts] == [8.0] * 3
+    assert [one["probability"] for one in parts] == pytest.approx([2 / 3, 1 / 3, 1 / 3])
+
+
+def test_a_band_of_the_share_that_has_climbed_does_not_fall(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Greenwood's band: both ends of it grow with time, as the share does."""
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        found = summed_up(monkeypatch, as_results(random.exponential(4.0, 14), random.uniform(1.0, 9.0, 14), takes=0.0))
+        json.dumps(found["curve"], allow_nan=False)
+        curve = pd.DataFrame(found["curve"]).astype(float)
+        assert curve["probability"].is_monotonic_increasing
+        inside = curve.dropna()
+        assert ((inside["low"] <= inside["probability"]) & (inside["probability"] <= inside["high"])).all()
+        assert inside["high"].is_monotonic_increasing, seed
+
+
+def test_a_run_shorter_than_a_segment_is_of_the_same_condition(run: Path) -> None:
+    """And counts no more, beside the longer one with the same beginning."""
+    tables = read_toml(shipped("case")["pile-ci"])
+    short = resolve_case({**tables, "run": {**tables["run"], **QUICK, "duration": "0.01 s"}}, name="pile-ci")
+    longer = resolve_case({**tables, "run": {**tables["run"], **QUICK, "duration": "0.1 s"}}, name="pile-ci")
+    assert short.run.cycles_per_segment < longer.run.cycles_per_segment
+    out = run.parent / "lengths"
+    made = [walkers.run(case, out).directory for case in (short, longer)]
+    (condition,) = conditions_in([out])
+    assert condition.runs == made[1:]

@@ -28,6 +28,7 @@ from tests.conftest import (
 from tests.test_hostile import HOSTILE
 from tests.test_sweeps import SLOW, TINY, contents_of
 from walkers.inputs.errors import InputError
+from walkers.inputs.sweep import load_sweep
 from walkers.runner.launch import _off_the_network
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.site import check_path, load_site, pilots
@@ -92,7 +93,7 @@ def test_texts_that_a_shell_would_take_for_more_are_refused_or_quoted(in_folder:
         with pytest.raises(InputError, match=rf"site\.toml: {key} = .*: expected letters"):
             _load(in_folder, SLURM + f"{key} = {json.dumps(text, ensure_ascii=False)}\n")
     with pytest.raises(InputError, match=r"--out: .* expected letters"):
-        check_path(in_folder / text)
+        check_path(in_folder / text / "fig2")
     (in_folder / "site.toml").write_text(SLURM + f"modules = [{json.dumps(text, ensure_ascii=False)}]\n")
     script = pilots(load_site(in_folder / "site.toml"), in_folder / "parsl").executors[0].provider.worker_init
     told = subprocess.run(
@@ -315,3 +316,14 @@ def test_engines_within_a_job(cluster: dict[str, str], in_folder: Path) -> None:
     assert (in_folder / "ended").read_text() == 2 * "ended with 0\n", told
     assert told.count("lines pass") == 2
     assert "skip" not in told
+
+
+def test_a_sweep_with_many_changes_has_a_name_that_a_cluster_takes(in_folder: Path) -> None:
+    """A long name is cut; and a name that cannot be used is not blamed on the folder of runs."""
+    changes = {f"contact.friction.bead_{one}": 0.1 for one in ("wall", "bead")}
+    changes |= {"contact.rolling_friction": 0.01, "contact.restitution": 0.5, "liquid.volume_fraction": 0.01}
+    name = load_sweep("fig4", changes).name
+    assert len(name) < len(str(changes))  # it is cut
+    check_path(in_folder / "runs" / name)
+    with pytest.raises(InputError, match=r"^a sweep: .* expected letters"):
+        check_path(in_folder / "runs" / "a sweep")

@@ -1,6 +1,7 @@
 """Figures of sweeps: what goes where, what is drawn, what is left out and said."""
 
 import shutil
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from matplotlib.figure import Figure
 import walkers
 from tests.conftest import call
 from walkers.inputs.errors import InputError
+from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
 from walkers.plotting import LeftOutWarning
 from walkers.postprocess.drawing import SCATTER
@@ -232,3 +234,43 @@ def test_plot_writes_what_the_suffix_says(looked_through: Path, tmp_path: Path) 
         done = call("plot", "grid", "--out", str(looked_through), "--to", str(to), check=True)
         assert (done.stdout, done.stderr) == (f"{to}\n", "")
         assert to.read_bytes().startswith(begin)
+
+
+@pytest.mark.parametrize(("x", "size"), [("gamma0", 1.0), ("peak_acceleration", 9.8)])
+def test_theory_is_a_curve_along_what_follows_from_a_key(looked_through: Path, x: str, size: float) -> None:
+    """Not straight lines between the points."""
+    directory = looked_through / "grid"
+    figure = walkers.load(directory).figure(x=x, hue="drive.frequency", theory=True)
+    (axes,) = _panels(figure)
+    lines = [line for line in axes.lines if line.get_linestyle() == "--"]
+    table = walkers.load(directory).table()
+    assert [len(np.asarray(line.get_xdata())) for line in lines] == [61] * table["drive.frequency"].nunique()
+    for line, (_, rows) in zip(lines, table.groupby("drive.frequency"), strict=True):
+        along, values = map(np.asarray, line.get_data())
+        points = np.sort(rows[x]) / size
+        assert (along[0], along[-1]) == pytest.approx((points[0], points[-1]))
+        middle = len(along) // 2
+        (run, *_) = rows["run"]
+        near = case_of(Path(run))
+        assert values[middle] == pytest.approx(
+            1e3
+            * predict(replace(near, drive=near.drive.with_peak(_peak(near, x, along[middle]))))["viscous"]["velocity"]
+        )
+
+
+def _peak(case: Any, x: str, value: float) -> float:
+    return value * 9.8 if x == "peak_acceleration" else float(dimer_of(case).peak_acceleration(value))
+
+
+def test_theory_is_not_joined_where_it_has_no_curve(looked_through: Path) -> None:
+    """The radii, shown by sin δ: each pair has bridges of its own, and there is no walker between them."""
+    figure = walkers.load(looked_through / "beads").figure(theory=True)
+    assert not [line for axes in _panels(figure) for line in axes.lines if line.get_linestyle() in ("--", ":")]
+
+
+@pytest.mark.parametrize(("sweep", "varied"), [("sampled", True), ("grid", False)])
+def test_a_figure_does_not_deny_what_it_varies(looked_through: Path, sweep: str, varied: bool) -> None:
+    """The sample varies the friction, which nobody measured."""
+    figure = walkers.load(looked_through / sweep).figure()
+    (title,) = [legend.get_title().get_text() for legend in figure.legends]
+    assert ("standard deviation" in title, "not varied" in title) == (True, not varied)

@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -30,8 +31,8 @@ from walkers.runner.directory import FIRST_SEGMENT, finished_run, locked
 from walkers.runner.failures import WalkersMet
 from walkers.runner.summary import predicted_overhead
 from walkers.sweeps.making import make_runs
-from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep, work
-from walkers.sweeps.table import load, thresholds
+from walkers.sweeps.scheduler import Options, SweepReplacedWarning, SweepStopped, plan_sweep, run_sweep, work
+from walkers.sweeps.table import load, thresholds, write_record
 from walkers.templates.deck import render_deck
 
 TINY = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
@@ -442,3 +443,64 @@ def test_a_sweep_that_is_killed_three_times(
     # The last call made no finished point again: each of its decks holds points that were missing before.
     assert not {made_in(place) for place in launches()[before:]} & finished
     assert not [*in_folder.glob("runs/**/*.incomplete"), *in_folder.glob("runs/**/*.lock")]
+
+
+SIXTEEN = "[axes]\ncontact.restitution = { linspace = [0.3, 0.6, 16] }"
+HITS_ALL = {
+    # Script of an engine that is noted at each start, launches at most, message.
+    "no licence": ("echo 'LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0'; echo 'ERROR: no licence'", 8, "no licence"),
+    "dies at once": ("exit 7", 3, "never started"),
+    "another version": ('liggghts "$@" | sed "s/LIGGGHTS-PUBLIC 3.8.0/LIGGGHTS-PUBLIC 4.0.0/"', 1, "4.0.0"),
+}
+
+
+@pytest.mark.parametrize("name", HITS_ALL)
+def test_a_failure_of_every_point_stops_the_sweep(
+    name: str, sweep_file: Callable[..., str], in_folder: Path, front: Callable[[str], str]
+) -> None:
+    script, most, message = HITS_ALL[name]
+    launches = in_folder / "launches"
+    launches.touch()
+    engine = front(f"echo >> {launches}\n{script}")
+    done = _sweep(sweep_file(text=SIXTEEN), "-j", "1", "--engine", engine)
+    assert (done.returncode, "Traceback" in done.stderr, done.stderr.count(message)) == (1, False, 1), done.stderr
+    assert 1 <= len(launches.read_text().splitlines()) <= most
+    assert _sweep("test.toml", "-j", "1").returncode == 0  # the next call makes all points
+
+
+def test_a_program_that_is_missing_or_wrong_stops_the_sweep(
+    sweep_file: Callable[..., str], in_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without mpirun; with an error of the program itself, which is raised as it is."""
+    (in_folder / "piles.toml").write_text('case = "pile-ci"\nset.run.ranks = 2\naxes."run.seed" = [1, 2, 3, 4]\n')
+    engine = str(find_engine().path)
+    with monkeypatch.context() as patch:
+        patch.setenv("PATH", "/nothing")
+        with pytest.raises(SweepStopped, match="mpirun"):
+            run_sweep(load_sweep("piles.toml"), in_folder / "runs", Options(2), engine=engine)
+    calls = []
+
+    def wrong(*_: Any, **__: Any) -> Any:
+        calls.append(1)
+        raise KeyError("a name that is not there")
+
+    monkeypatch.setattr("walkers.sweeps.scheduler.make_runs", wrong)
+    with pytest.raises(KeyError, match="not there"):
+        run_sweep(load_sweep(sweep_file("again", SIXTEEN)), in_folder / "runs", Options(1))
+    assert len(calls) == 1
+
+
+def test_another_sweep_of_the_same_name_is_told(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    """Afterwards by a warning, at the same time by an error; an edit that keeps a point is neither."""
+    axis = "[axes]\ndrive.peak_acceleration = "
+    first, edited, other = (load_sweep(sweep_file("map", axis + a)) for a in ('["2 g"]', '["2 g", "3 g"]', '["4 g"]'))
+    out = in_folder / "runs"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", SweepReplacedWarning)
+        run_sweep(first, out, Options(1))
+        run_sweep(edited, out, Options(1))
+    with pytest.warns(SweepReplacedWarning, match="same name"):
+        run_sweep(other, out, Options(1))
+    record = plan_sweep(first, out / "new", Options(1)).record
+    with pytest.raises(SweepStopped, match="same name"):
+        run_sweep(edited, out / "new", Options(1), on_progress=lambda _: write_record(record))

@@ -96,20 +96,6 @@ def test_the_motion_under_the_papers_friction_is_quasistatic_at_low_frequency() 
     assert float(found.velocity[0]) == pytest.approx(expected, rel=0.01)
 
 
-def test_static_friction_raises_the_threshold_and_fades_as_fine_steps_have_it() -> None:
-    walker, accelerations = Walker.of_dimer(RUBY), np.linspace(1.0, 30.0, 59)
-    laws = Friction.coulomb(0.07, 0.07), Friction(kinetic=0.07, static=0.14)
-    dry, sticky = (
-        accelerations[np.argmax(np.abs(walk(walker, law, 80.0, accelerations).velocity) > 1e-6)] for law in laws
-    )
-    assert sticky > 1.5 * dry
-    law, accelerations = Friction(kinetic=0.07, static=0.14, stribeck_velocity=1e-2), np.linspace(20.0, 70.0, 40)
-    fine, coarse = (walk(walker, law, 80.0, accelerations, steps_per_cycle=steps) for steps in (1024, 128))
-    repeated = fine.periodic & coarse.periodic
-    assert repeated.mean() > 0.5
-    assert np.median(np.abs(fine.velocity - coarse.velocity)[repeated]) < 2e-5
-
-
 def test_a_symmetric_dimer_goes_nowhere() -> None:
     case = load_case("symmetric")
     assert float(motion_of(case, viscous=False).velocity[0]) == 0.0

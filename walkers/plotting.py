@@ -20,7 +20,7 @@ from walkers.inputs.reading import resolve_case
 from walkers.postprocess.drawing import FORMATS, check_place, save_figure
 from walkers.runner.directory import case_of
 from walkers.sweeps.figure import Factor, draw, drawn_column, layout_of
-from walkers.sweeps.table import default_column, find_name, load
+from walkers.sweeps.table import default_column, derived_of, find_name, load, varied_columns
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -138,8 +138,7 @@ def _figure_of(
             _tell(f"{len(beyond)} of {len(done)} points are {beyond[0]}" + (", …" if len(beyond) > 1 else ""))
     drawn = drawn_column(done, column, predicted)
     if predicted:
-        size = readable_unit(done.attrs["units"][column])[1]
-        drawn = replace(drawn, curves=partial(_curves, cases, column, size, gaps))
+        drawn = replace(drawn, curves=partial(_curves, done, cases, column, gaps))
     figure = draw(laid_out, drawn, title=table.attrs["title"], log=log)
     for reason in gaps.keys() - reasons.keys():
         _tell(f"the theory's curve has gaps: {reason}")
@@ -147,28 +146,39 @@ def _figure_of(
 
 
 def _curves(
+    table: pd.DataFrame,
     cases: Sequence[Case],
     column: str,
-    size: float,
     gaps: dict[str, int],
     rows: npt.NDArray[np.int64],
     x: Factor,
     places: FloatArray,
-) -> dict[str, FloatArray]:
-    """Predictions of the theory between the points of a key; empty if they take too long. Adds reasons for ``gaps``.
+) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Predictions of the theory between points, and their x; empty if they take too long. Adds reasons for ``gaps``.
 
-    Each new shape of bridges takes a quarter of a second to solve.
+    If x is no key, such as Γ0, the key that varies is changed. Each new shape of bridges takes a quarter of a second to
+    solve.
     """
+    from pandas.api.types import is_numeric_dtype
+
     from walkers.theory.prediction import predicted_column
 
-    key, case = x.keys[0], cases[rows[0]]
+    name, case, units = x.keys[0], cases[rows[0]], table.attrs["units"]
+    varied, key, unit = varied_columns(table), name, x.unit
+    if name not in varied:
+        keys = [one for one in varied if table[one].iloc[rows].nunique() > 1]
+        if len(keys) != 1 or name not in derived_of(case) or not is_numeric_dtype(table[keys[0]]):
+            return places, {}
+        key, unit = keys[0], units[keys[0]]
+        low, high = (float(end) for end in table[key].iloc[rows].agg(["min", "max"]))
+        places = np.linspace(low, high, len(places))
     if len(x.keys) > 1 or not case.document or key.endswith(_OF_SHAPE):
-        return {}
+        return places, {}
     at: list[int] = []
     between: list[Case] = []
     for number, place in enumerate(places.tolist()):
         with suppress(InputError, ValueError):  # a value that no case may have
-            value = f"{place!r} {x.unit}" if x.unit else place
+            value = f"{place!r} {unit}" if unit else place
             between.append(resolve_case(changed(case.document, {key: value}), name=case.name))
             at.append(number)
     found: dict[str, FloatArray] = {}
@@ -176,8 +186,12 @@ def _curves(
     gaps.update(reasons)
     for model, values in predicted.items():
         found[model] = np.full(len(places), np.nan)
-        found[model][at] = values / size
-    return found
+        found[model][at] = values / readable_unit(units[column])[1]
+    if key != name:
+        size = readable_unit(units[name])[1]
+        places = np.full(len(places), np.nan)
+        places[at] = [derived_of(one)[name] / size for one in between]
+    return places, found
 
 
 def _column(table: pd.DataFrame, wanted: str | None) -> str:

@@ -47,8 +47,6 @@ def progress_of_sweep(name: str) -> Iterator[Callable[[SweepProgress], None]]:
             elif made:
                 words += f", {duration_text(each)} per point"
             words += f", {duration_text(sweep.left)} left" if sweep.left is not None else ""
-            if (worst := sweep.worst_failure) is not None:
-                words += f", worst failure: point {worst.point}, {worst.reason}"
             show(sweep.points, sweep.done + sweep.failed, words, sweep.elapsed)
 
         yield advance

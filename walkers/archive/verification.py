@@ -1,18 +1,12 @@
-"""Check whether the files of a run, a sweep or an archive are unchanged.
-
-Archives may be hostile: they are not unpacked for the check, and only their list of checksums is read as a whole.
-"""
+"""Check whether the files of a run, a sweep or an unpacked archive are unchanged."""
 
 from __future__ import annotations
 
 import hashlib
-import zipfile
-import zlib
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
-from typing import IO
 
 from walkers.archive.crate import METADATA_NAME
 from walkers.inputs.errors import refused, shortened
@@ -25,10 +19,6 @@ from walkers.sweeps.table import PARSL, RECORD_NAME, read_record, states
 
 SUMS_NAME = "sha256sums.txt"
 """List of checksums in an archive, in the format of ``sha256sum -c``."""
-_MOST_TIMES = 100
-"""Zip files that unpack to more than this many times their size are refused; archives of runs unpack to five times."""
-_MOST_ANYWAY = 1 << 28
-"""Size in bytes below which archives are always accepted, because reading takes a second."""
 _SHOWN = (
     *(".png", ".pdf", ".svg", ".gif", ".mp4", ".html", ".htm"),
     *(".vtp", ".vtm", ".vtu", ".pvd", ".py", ".xyz", ".lammpstrj", ".csv"),
@@ -67,26 +57,23 @@ class Verification:
 
 
 def verify(path: Path) -> list[Verification]:
-    """Compare a run, a sweep, or an archive (.zip, or unpacked) with the checksums in manifests or in the archive.
+    """Compare a run, a sweep, or an unpacked archive with the checksums in manifests or in the archive.
 
     All listed files must exist and be unchanged, and there must be no other files. Files that were made from finished
     runs and are never read (pictures, films, pages, files for ParaView, exports, hidden files) are named and are no
-    failure, except in a zip file. The same applies to a sweep's directory; its record has a checksum only in archives.
+    failure. The same applies to a sweep's directory; its record has a checksum only in archives.
 
     Runs and archives have one verification; sweeps have one of the points, and one of each finished run. `InputError`
-    if the path is none of these, cannot be read, or unpacks to far more than its size.
+    if the path is none of these or cannot be read.
     """
     if (path / RECORD_NAME).is_file():
         return _verify_sweep(path)
     if (path / SUMS_NAME).is_file():
-        folder = path.resolve()
-        there = _files_below(folder)
-        files = [name for name in there if (folder / name).is_file()]
-        return [_verify_archive(folder, there, files, lambda name: (folder / name).open("rb"), _made_since)]
+        return [_verify_archive(path.resolve())]
     if (path / MANIFEST_NAME).is_file():
         return [_verify_run(path)]
     if path.is_file():
-        return [_verify_zip(path)]
+        raise refused(path, "not a folder; unpack an archive, then: walkers check files FOLDER")
     told = f"expected a run directory (with a {MANIFEST_NAME}), a sweep's ({RECORD_NAME}), or an archive ({SUMS_NAME})"
     raise refused(path, told)
 
@@ -125,32 +112,9 @@ def _verify_sweep(directory: Path) -> list[Verification]:
     return [points, *map(_verify_run, dict.fromkeys(runs))]
 
 
-def _verify_zip(path: Path) -> Verification:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            unpacked, size = sum(member.file_size for member in archive.infolist()), path.stat().st_size
-            if unpacked > max(_MOST_TIMES * size, _MOST_ANYWAY):
-                told = f"expected at most {_MOST_TIMES} times its {size / 1e6:.1f} MB"
-                raise refused(path, f"unpacks to {unpacked / 1e6:.0f} MB, {told}")
-            files = [name for name in archive.namelist() if not name.endswith("/")]
-            folders = {f"{parent}/" for name in files for parent in Path(name).parents}
-            there = [name for name in archive.namelist() if name not in folders]
-            return _verify_archive(path, there, files, archive.open, lambda _: False)
-    except (OSError, zipfile.BadZipFile, RuntimeError, ValueError) as error:
-        raise refused(path, f"not a zip file that can be read ({error})") from error
-
-
-def _verify_archive(
-    path: Path,
-    there: Sequence[str],
-    files: Sequence[str],
-    opened: Callable[[str], IO[bytes]],
-    added: Callable[[str], bool],
-) -> Verification:
-    if SUMS_NAME not in files:
-        raise refused(path, f"no archive of runs: it has no {SUMS_NAME}")
-    with opened(SUMS_NAME) as file:
-        text = file.read().decode("utf-8", "replace")
+def _verify_archive(path: Path) -> Verification:
+    there = _files_below(path)
+    text = (path / SUMS_NAME).read_bytes().decode("utf-8", "replace")
     listed: dict[str, str] = {}
     for line in text.removesuffix("\n").split("\n"):
         checksum, _, place = line.partition("  ")
@@ -159,18 +123,9 @@ def _verify_archive(
         listed[place] = checksum
     has_run = any(place.count("/") == 2 and place.endswith(f"/{MANIFEST_NAME}") for place in listed)
     doubtful = [] if has_run else [f"{SUMS_NAME} (it lists no run)"]
-    now = {place: _checksum(opened, place) for place in files if place in listed}
+    now = checksums(path, [place for place in there if place in listed and (path / place).is_file()])
     listed.setdefault(METADATA_NAME, "")  # every archive has metadata
-    return _compared(path.name, listed, now, set(there) - {SUMS_NAME}, added, doubtful=doubtful)
-
-
-def _checksum(opened: Callable[[str], IO[bytes]], place: str) -> str:
-    """SHA-256 of a file; empty if it is damaged in the zip file."""
-    try:
-        with opened(place) as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()  # type: ignore[arg-type]
-    except (zipfile.BadZipFile, zlib.error, EOFError):
-        return ""
+    return _compared(path.name, listed, now, set(there) - {SUMS_NAME}, _made_since, doubtful=doubtful)
 
 
 def _compared(

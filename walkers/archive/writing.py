@@ -15,7 +15,7 @@ from typing import Any
 
 from walkers.archive.crate import LICENCES, METADATA_NAME, PAPER, PREVIEW_NAME, Author, describe_crate
 from walkers.archive.verification import SUMS_NAME, verify
-from walkers.inputs.errors import WalkersError, refused
+from walkers.inputs.errors import InputError, Problem, WalkersError, refused
 from walkers.inputs.extras import require
 from walkers.postprocess.report.page import fill
 from walkers.runner.directory import CASE_NAME, FinishedRun, name_of
@@ -26,6 +26,7 @@ from walkers.sweeps.table import RECORD_NAME, SweepRecord, read_record, states
 _STORED = ("/", ".parquet", ".png", ".mp4")
 """Suffixes of names that are not compressed again, and of folders."""
 _CHUNK_BYTES = 1 << 20
+_MOMENT = "%Y-%m-%dT%H:%M:%SZ"
 RUNS = "runs"
 """Folder of the run directories in an archive: the default folder of the program."""
 _MEANINGS = {
@@ -86,7 +87,7 @@ def write_archive(directory: str | Path, to: Path | None = None, options: Archiv
     metadata = json_bytes(describe_crate(contents, options.authors, options.licence))
     about = [item(METADATA_NAME, metadata), item(PREVIEW_NAME, _preview(contents, options))]
     sums = "".join(f"{one.sha256}  {one.place}\n" for one in [*contents.items, *about])
-    moment = time.strptime(contents.finished, "%Y-%m-%dT%H:%M:%SZ")[:6]  # of all files, for the same bytes again
+    moment = time.strptime(contents.finished, _MOMENT)[:6]  # of all files, for the same bytes again
     with beside(to) as new, zipfile.ZipFile(new, "w") as archive:
         items = [*about, item(SUMS_NAME, sums.encode("utf-8")), *contents.items]
         folders = [f"{parent}/" for one in items for parent in reversed(Path(one.place).parents) if parent != Path()]
@@ -274,6 +275,12 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
 def _packed(directory: Path, dumps: bool) -> PackedRun:
     """The files of a manifest, the manifest, and the case file, if it is known."""
     run = FinishedRun(directory)
+    for key in ("started", "finished"):
+        try:
+            time.strptime(run.manifest[key], _MOMENT)
+        except (ValueError, TypeError) as error:
+            text = "expected a time such as 2026-01-31T12:00:00Z"
+            raise InputError(str(directory / MANIFEST_NAME), [Problem(key, f'"{run.manifest[key]}"', text)]) from error
     manifest, case, place = run.manifest, run.case, f"{RUNS}/{directory.resolve().name}"
     before, sums = set(manifest.get("left_out", ())), manifest["sha256"]
     named = {name: item(f"{place}/{name}", directory / name, sums.get(name)) for name in manifest["files"]}

@@ -46,13 +46,19 @@ def write_outcome(found: Outcome, to: Path) -> list[Path]:
     write_bytes(files[0], samples.to_parquet(index=False))
     write_json(files[1], record)
     discrepancies = np.percentile(posterior.discrepancy, (5.0, 50.0, 95.0), axis=0).T.tolist()
-    more = {"samples": len(found.predictive.unit), "least": LEAST_SAMPLES, "narrow": _NARROW}
+    more: dict[str, Any] = {"observed": _observed(found)}
+    more |= {"samples": len(found.predictive.unit), "least": LEAST_SAMPLES, "narrow": _NARROW}
     page = rendered("walkers.calibration", "report.md.j2", found=record, discrepancies=discrepancies, **more)
     write_text(files[2], page)
     sources = [Path(run).name for run in found.predictive.table["run"]]
     for name, figure in figures_of(found, record["observations"]).items():
         files += save_figure(figure, to / f"{name}.png", sources, title=f"{found.calibration.file.title}: {name}")
     return files
+
+
+def _observed(found: Outcome) -> str:
+    """What the observations are called."""
+    return "published" if found.calibration.file.published else "measured"
 
 
 def record_of(found: Outcome) -> dict[str, Any]:
@@ -168,7 +174,7 @@ def words_of(share: float, *, converged: bool) -> str:
 def figures_of(found: Outcome, rows: list[dict[str, Any]]) -> dict[str, Figure]:
     """``corner`` and ``predictions``; rows are the record's observations."""
     corners = draw_corners(found.space, found.posterior.unit, found.checks["best"].unit[0])
-    return {"corner": corners, "predictions": _predictions(rows)}
+    return {"corner": corners, "predictions": _predictions(rows, _observed(found))}
 
 
 @styled
@@ -220,27 +226,27 @@ def draw_corners(space: Space, sets: FloatArray, best: FloatArray) -> Figure:
 
 
 @styled
-def _predictions(rows: list[dict[str, Any]]) -> Figure:
+def _predictions(rows: list[dict[str, Any]], observed: str) -> Figure:
     """Residuals in standard deviations: the engine at the best set and over the posterior, and what was held out."""
     figure, axes = new_figure(TWO_COLUMNS, 0.3 * len(rows) + 1.2)
     places = np.arange(len(rows))[::-1]
     axes.axvspan(-1.0, 1.0, color="0.9", lw=0)
     axes.axvline(0.0, color="0.4", lw=0.8)
-    published, deviation, low, high, best = (
+    value, deviation, low, high, best = (
         np.array([row[name] for row in rows], dtype=np.float64)  # None is NaN
         for name in ("value", "deviation", "low", "high", "engine")
     )
-    ends = ((one - published) / deviation for one in (low, high))
+    ends = ((one - value) / deviation for one in (low, high))
     axes.hlines(places, *ends, color="C0", lw=4.0, alpha=0.5, label="engine over the posterior")
-    axes.plot((best - published) / deviation, places, "o", ms=5, color="C1", label="engine at the best set")
+    axes.plot((best - value) / deviation, places, "o", ms=5, color="C1", label="engine at the best set")
     for number, trial in enumerate(dict.fromkeys(trial for row in rows for trial in row["held_out"])):
         seen = [place for place, row in enumerate(rows) if trial in row["held_out"]]
         middle, width = np.array([rows[place]["held_out"][trial] for place in seen]).T
-        residual, error = (middle - published[seen]) / deviation[seen], width / deviation[seen]
+        residual, error = (middle - value[seen]) / deviation[seen], width / deviation[seen]
         look = {"fmt": "s", "ms": 4, "color": f"C{number + 2}", "lw": 1.0}
         axes.errorbar(residual, places[seen] - 0.22, xerr=error, label=trial, **look)
     axes.set_yticks(places, [row["title"] for row in rows], fontsize=7)
-    axes.set(xlabel="(predicted - published)/standard deviation", ylim=(-0.8, len(rows) - 0.2))
+    axes.set(xlabel=f"(predicted - {observed})/standard deviation", ylim=(-0.8, len(rows) - 0.2))
     axes.set_xscale("symlog", linthresh=3.0)
     figure.legend(loc="outside upper center", ncols=2)
     return figure

@@ -7,6 +7,6 @@ GROUPS = {"run": "Run", "look": "Look at results", "keep": "Keep and share", "ch
 """The modules, with their headings in the help."""
 SECTIONS = {
     "check": "Check the engine, the contact model, one case, or files. Exit status 1 if something differs.",
-    "paper": "Compare with the published results: figures, numbers, and further terms of the theory.",
+    "paper": "Compare with the published results: figures and numbers.",
 }
 """Commands with sub-commands, and their help."""

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from walkers.check.report import Chapter
     from walkers.inputs.case import Case as Resolved
 
-_FILES = "An archive, or a run or a sweep (folder, name in --out, or case)."
+_FILES = "An unpacked archive, or a run or a sweep (folder, name in --out, or case)."
 _NAME = "A material, a liquid, a bridge law, a case, a sweep or a calibration."
 _CHAPTER = "benchmarks, bridges or crosscheck; default: all."
 _CALIBRATION = "A calibration file, or the name of a shipped calibration such as ruby."
@@ -174,15 +174,6 @@ def paper_figures(
     if made.compared:
         print(f"{made.agree} of {made.compared} published numbers agree: {to / 'comparison.md'}")
     return 1 if made.failures or made.left_out else 0
-
-
-def paper_terms(to: Path = Option(Path("figures"), help="Folder to write the table to.")) -> None:
-    """Fit the theory with further terms, one at a time, to the published numbers. Needs no engine."""
-    from walkers.paper.model_terms import PAGE_NAME, try_model_terms
-
-    check_folder("--to", to)
-    print_lines(f"misfit {one.misfit:5.1f}, {one.met:2d} met: {one.name}" for one in try_model_terms(to))
-    print(to / PAGE_NAME)
 
 
 def calibrate(

@@ -37,9 +37,7 @@ _ALL = "Include the runs of sweeps."
 _WHERE = 'Only runs with this value, such as "drive.frequency=80 Hz". Repeatable.'
 _TABLE = "Write the table of the sweep, with units, to this file (.csv, .parquet, .json)."
 _WITHIN = "Count climbs up to this time of the drive, such as '5 s'; default: end of the shortest run without a climb."
-_THRESHOLDS = "Print the number of climbs for other definitions of a climb."
 _PILES = "Sweeps, folders of runs, runs or cases of piles."
-_NULL = "Runs in which nothing can climb: also print their false climbs. Repeatable."
 _SECOND = "Another run or sweep, named in the same way; default: the first with the values of --set."
 _SECOND_SET = "Replace a value of the second case, such as drive.frequency=70Hz. Repeatable."
 _SLOWDOWN = "Film: slow motion factor; default: chosen so that the film lasts 5 to 10 s."
@@ -206,8 +204,6 @@ def climb(
     settings: Set = None,
     out: Out = DEFAULT_OUT,
     within: str | None = Option(None, help=_WITHIN),
-    thresholds: bool = Option(False, "--sensitivity", help=_THRESHOLDS),
-    null: list[str] | None = Option(None, help=_NULL),
     to: Path | None = Option(None, help="Write the figure (.png, .svg, .pdf) or the table (.csv) to this file."),
     as_json: Json = False,
 ) -> None:
@@ -226,18 +222,7 @@ def climb(
     places = each(lambda one: find(one, out, changes).path, what)
     conditions = climbing.conditions_in(places)
     tell(*(f"warning: {left}" for place in places if (left := climbing.unfinished_points(place))))
-    lines: list[str] = []
-    found: list[dict[str, Any]] = []
-    if thresholds or null:
-        refuse_given({"--to": to}, "has no meaning with --sensitivity or --null")
-        nulls = climbing.conditions_in([find(one, out).path for one in null]) if null else []
-        named = [(one.label, one) for one in conditions] + [(f"null: {one.label}".rstrip(), one) for one in nulls]
-        for label, one in named:
-            found.append({"condition": label, "thresholds": climbing.sensitivity(one.runs, until)})
-            lines += filter(None, [label, climbing.describe_sensitivity(found[-1]["thresholds"])])
-    else:
-        found = [climbing.summarise(one, until) for one in conditions]
-        lines += map(climbing.describe, found)
-        if to is not None:
-            write_climbs(conditions, found, to)
-    print_as(as_json, lambda: found, lambda: "\n".join(lines))
+    found = [climbing.summarise(one, until) for one in conditions]
+    if to is not None:
+        write_climbs(conditions, found, to)
+    print_as(as_json, lambda: found, lambda: "\n".join(map(climbing.describe, found)))

@@ -132,9 +132,10 @@ class DesignTable(Table):
 
 
 class CalibrationFile(Table):
-    """A calibration file."""
+    """A calibration file; ``published`` is what tables and figures call the observations, instead of measured."""
 
     title: str = ""
+    published: bool = False
     case: str
     set: dict[str, Any] = Field({})
     parameters: Annotated[dict[str, ParameterTable], Field(min_length=1)]

@@ -187,7 +187,7 @@ def _name_with(name: str, changes: Mapping[str, Value]) -> str:
     if len(encoded) <= _LONGEST_NAME:
         return full
     digest = hashlib.sha256(f"{name},{text}".encode("utf-8", "surrogateescape")).hexdigest()[:12]
-    return f"{encoded[: _LONGEST_NAME - 13].decode('utf-8', 'ignore')}~{digest}"  # with a hyphen it might be a run's
+    return f"{encoded[: _LONGEST_NAME - 13].decode('utf-8', 'ignore')}@{digest}"  # with a hyphen it might be a run's
 
 
 def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Sweep:

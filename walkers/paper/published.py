@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 GRAVITY = ACCELERATION_OF_ONE_G
 """The value of g in the paper, m/s²."""
-_DEVIATION = 0.15
 
 
 class Point(NamedTuple):
@@ -89,9 +88,6 @@ class Observation:
     of, over, quantity
         The observation is the mean of a quantity over walkers, or its ratio to that over others, pair by pair; see
         `walkers.paper.comparison.evaluate`. Without a quantity, `walkers.paper.comparison` has a function for it.
-    fitted, deviation
-        Its name among the numbers to which the theory is fitted (`walkers.paper.model_terms`), if any, and its error
-        there, in ``unit``; 15 % if None.
     compared
         Whether it is part of the comparison.
     """
@@ -106,21 +102,12 @@ class Observation:
     of: tuple[Point, ...] = ()
     over: tuple[Point, ...] = ()
     quantity: str = ""
-    fitted: str = ""
-    deviation: float | None = None
     compared: bool = True
 
     @property
     def si(self) -> float:
         """The value in SI units, with the published digits."""
         return float(f"{self.value or 0.0}e-3") if self.unit == "mm/s" else self.value or 0.0
-
-    @property
-    def si_deviation(self) -> float:
-        """Its error for fits of the theory, in SI units."""
-        if self.deviation is None:
-            return _DEVIATION * abs(self.si)
-        return self.deviation * (1.0 if self.over else 1e-3)
 
 
 def _read(given: dict[str, Any], reasons: Mapping[str, str]) -> Observation:

@@ -96,13 +96,18 @@ def spread_of(directory: Path) -> Path:
 
 
 def with_bands(directory: Path, result: Mapping[str, Any]) -> dict[str, Any]:
-    """A result with the ``bands`` of its quantities, if a spread of the run is beside it.
+    """A result with the ``bands`` of its quantities, if a spread of the run over the same ranges is beside it.
 
     If its numerical error is not measured, it also has the changes of the case that measure it, as ``checks``.
     """
     known, unknown = dict(result), (OSError, ValueError, KeyError, TypeError)
     with suppress(*unknown):
-        known["bands"] = read_json(spread_of(directory.resolve()) / SPREAD_NAME)["bands"]
+        spread = read_json(spread_of(directory.resolve()) / SPREAD_NAME)
+        drawn, ranges = (
+            {one["key"]: one["range"] for one in origins if one["range"]}
+            for origins in (spread["varied"], result["rests_on"])
+        )
+        known |= {"bands": spread["bands"]} if drawn == ranges else {}
     if result.get("numerical_error", 0) is None and not result.get("by_hand"):  # piles have no such error
         with suppress(*unknown):  # a result that is not shown where its case is
             case = read_json(directory / CASE_NAME)

@@ -11,9 +11,9 @@ from __future__ import annotations
 import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 import numpy as np
@@ -22,17 +22,15 @@ import numpy.typing as npt
 from walkers.inputs.changes import dotted
 from walkers.inputs.errors import refused
 from walkers.inputs.rounding import percent
-from walkers.postprocess.analyses.piles import Pile, climbs_by
-from walkers.postprocess.analysis import tables_of
-from walkers.postprocess.clusters import Climb, ClimbCriteria
+from walkers.postprocess.analyses.piles import Pile
 from walkers.runner.directory import CASE_NAME, FinishedRun, finished_places, finished_run
 from walkers.sweeps.table import RECORD_NAME, read_record, result_in, states, value_text
 
 FloatArray = npt.NDArray[np.float64]
 
 _CONFIDENCE = 0.95
-_NO_CONDITION = ("name", "title", "seed", "run.seed", "run.cycles", "run.duration")
-"""Keys of a case that do not define a condition: names, seeds and lengths."""
+_NO_CONDITION = ("name", "title", "seed", "run.seed", "run.cycles", "run.duration", "run.cycles_per_segment")
+"""Keys of a case that do not define a condition: names, seeds and lengths (a segment is as long as a short run)."""
 _DRAWS = 10_000
 _PARTS: Mapping[str, Callable[[Mapping[str, Any]], bool]] = {
     "on_plain_walls": lambda climb: len(climb["walls"]) == 1,
@@ -163,7 +161,7 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
         ``each`` has each climb as in the results, whenever it qualified, with the name of its run.
 
         ``on_plain_walls``, ``in_corners`` and ``out_of_pile`` (without clusters that hang on a wall since the pouring)
-        have all of these items for a part of the climbs.
+        have all of these items for a part of the climbs, by the same time.
     """
     results = [result_in(run) for run in runs]
     found = _summary(results, within)
@@ -172,16 +170,18 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
     ]
     for name, belongs in _PARTS.items():
         some = [{**result, "climbs": list(filter(belongs, result["climbs"]))} for result in results]
-        found[name] = _summary(some, within)
+        found[name] = _summary(some, within, found["within"])
     return found
 
 
-def _summary(results: Sequence[Mapping[str, Any]], within: float | None) -> dict[str, Any]:
-    """`summarise_climbs` of results."""
+def _summary(results: Sequence[Mapping[str, Any]], within: float | None, at: float | None = None) -> dict[str, Any]:
+    """`summarise_climbs` of results, with the probability by the time ``at`` (s)."""
     driven = np.array([result["driven"] for result in results])
     # A run that ended because a climber left the container shows its first climb as a longer run does.
     still = [float(result["driven"]) for result in results if not result["climbs"]]
-    at, cut = (min(still, default=float(driven.max())), np.inf) if within is None else (within, within)
+    cut = np.inf if within is None else within
+    at = within if at is None else at
+    at = min(still, default=float(driven.max())) if at is None else at
     watched = np.minimum(driven, cut)
     counted = [[climb for climb in result["climbs"] if climb["qualified"] <= cut] for result in results]
     firsts = [min(climbs, key=lambda climb: climb["qualified"]) for climbs in counted if climbs]
@@ -220,88 +220,6 @@ def _rate(name: str, events: int, seconds: float) -> dict[str, Any]:
     low = float(chi2.ppf(tail, 2 * events) / 2.0) if events else 0.0
     high = float(chi2.ppf(1.0 - tail, 2 * events + 2) / 2.0)
     return {name: events / seconds, f"{name}_interval": [low / seconds, high / seconds]}
-
-
-def origins(run: Path, within: float | None = None) -> list[dict[str, Any]]:
-    """Origin of the beads of each climb of a run that qualified ``within`` a time (s), from the run's tables.
-
-    Returns
-    -------
-    list of dict
-        One row per climb: ``size`` and ``out_of_pile``; at rest, before the drive: ``bridges_at_rest`` between its
-        beads, ``leader_at_wall_at_rest`` and ``at_wall_at_rest`` (beads bridged to a side wall), ``share_at_wall`` of
-        all beads of the leader's size; ``bridges`` between its beads when it qualified; ``whole_before`` (s, time from
-        when the last bead joined the others for good until the cluster left the pile; negative if later).
-    """
-    import pandas as pd
-
-    tables = tables_of(run)
-    bed, clusters = tables["bed"], pd.DataFrame(tables["clusters"]).set_index("track")
-    rest = max(int(np.searchsorted(bed["time"], 0.0)) - 1, 0)
-    result, rows = result_in(run), []
-    large, small = bed["large_at_wall"][rest], bed["at_wall"][rest] - bed["large_at_wall"][rest]
-    share = {True: large / max(result["large"], 1), False: small / max(result["beads"] - result["large"], 1)}
-    for track, past in pd.DataFrame(tables["assembly"]).groupby("track"):
-        if within is not None and clusters["qualified"][track] > within:
-            continue
-        leader, frames = clusters["leader"][track], past.groupby("time")
-        first, last = (frames.get_group(time) for time in (past["time"].min(), past["time"].max()))
-        apart = past.loc[~past["joined"], "time"].max()
-        whole = past["time"].min() if np.isnan(apart) else apart
-        rows.append(
-            {
-                "size": len(first),
-                "out_of_pile": bool(clusters["out_of_pile"][track]),
-                "bridges_at_rest": int(first["neighbours"].sum() // 2),
-                "bridges": int(last["neighbours"].sum() // 2),
-                "leader_at_wall_at_rest": bool(first.set_index("bead")["at_wall"].get(leader, False)),
-                "at_wall_at_rest": int(first["at_wall"].sum()),
-                "share_at_wall": float(share[bool(clusters["leader_large"][track])]),
-                "whole_before": float(clusters["first"][track] - whole),
-            }
-        )
-    return rows
-
-
-def summarise_origins(runs: Sequence[Path], within: float | None = None) -> dict[str, Any]:
-    """Whether climbers assemble while the pile is shaken: `origins` over several runs.
-
-    Returns
-    -------
-    dict
-        ``climbs``; ``strangers`` (climbs without beads that were neighbours at rest), ``share_of_bridges`` (share of
-        the climbers' bridges that existed at rest), ``leaders_at_wall`` (at rest), ``share_at_wall`` (of all beads of
-        the leaders' sizes, at rest) with ``p_at_wall``, the probability of at least as many leaders at a wall by
-        chance, for independent leaders; ``whole_before`` (s, median).
-    """
-    rows = [row for run in runs for row in origins(run, within)]
-    if not rows:
-        return {"climbs": 0}
-    chances = np.array([row["share_at_wall"] for row in rows])
-    at_wall = sum(row["leader_at_wall_at_rest"] for row in rows)
-    drawn = (np.random.default_rng(0).random((_DRAWS, len(rows))) < chances).sum(axis=1)
-    return {
-        "climbs": len(rows),
-        "strangers": sum(row["bridges_at_rest"] == 0 for row in rows),
-        "share_of_bridges": sum(row["bridges_at_rest"] for row in rows) / sum(row["bridges"] for row in rows),
-        "leaders_at_wall": at_wall,
-        "share_at_wall": float(chances.mean()),
-        "p_at_wall": float((1 + (drawn >= at_wall).sum()) / (1 + _DRAWS)),
-        "whole_before": median(row["whole_before"] for row in rows),
-    }
-
-
-def describe_origins(found: Mapping[str, Any]) -> str:
-    """`summarise_origins` as text; empty without climbs."""
-    if not found["climbs"]:
-        return ""
-    return (
-        f"  assembly   in {found['strangers']} of {found['climbs']} climbers no two beads were neighbours at rest; "
-        f"{100 * found['share_of_bridges']:.0f} % of the climbers' bridges existed then\n"
-        f"             the last bead joined {found['whole_before']:.2f} s before the cluster came free (median)\n"
-        f"             {found['leaders_at_wall']} leaders were at a wall at rest, as were "
-        f"{100 * found['share_at_wall']:.0f} % of all beads of their size class ({_p_text(found['p_at_wall'])})"
-    )
 
 
 def leaders(climbs: Sequence[tuple[int, int, Sequence[Mapping[str, Any]]]]) -> dict[str, Any]:
@@ -376,9 +294,7 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
     climbed, ended = int((~censored & (first <= at)).sum()), int((censored & ~watched_so_long).sum())
     interval, estimator = None, "Clopper-Pearson"
     if ended and probability is not None and 0.0 < probability < 1.0:
-        with warnings.catch_warnings():  # at times at which all have climbed
-            warnings.filterwarnings("ignore", "The confidence interval is undefined", RuntimeWarning)
-            ends = share.confidence_interval(_CONFIDENCE, method="log-log")
+        ends = _greenwood(share)
         interval, estimator = [float(ends.low.evaluate(at)), float(ends.high.evaluate(at))], "Kaplan-Meier"
     elif probability is not None:
         exact = binomtest(climbed, followed).proportion_ci(_CONFIDENCE)
@@ -401,73 +317,34 @@ def _share(first: FloatArray, watched: FloatArray) -> Any:
     return ecdf(CensoredData.right_censored(np.minimum(first, watched), first > watched)).cdf
 
 
-def survival_curve(first: FloatArray, watched: FloatArray) -> dict[str, list[float]]:
-    """The share of `survival` at every time (s) at which it changes: ``time``, ``probability``, ``low``, ``high``."""
-    time = [0.0, *np.unique(_share(first, watched).quantiles).tolist()]
-    found = [survival(first, watched, at) for at in time]
-    low, high = zip(*(one["interval"] or (np.nan, np.nan) for one in found), strict=True)
-    return {"time": time, "probability": [one["probability"] for one in found], "low": [*low], "high": [*high]}
+def _greenwood(share: Any) -> Any:
+    """The 95 % interval of a share by Greenwood's variance of log(-log) of the survival."""
+    with warnings.catch_warnings():  # at times at which all have climbed
+        warnings.filterwarnings("ignore", "The confidence interval is undefined", RuntimeWarning)
+        return share.confidence_interval(_CONFIDENCE, method="log-log")
 
 
-VARIATIONS = {"min_rise": (1e-3, 2e-3, 3e-3, 5e-3), "max_gap": (0.03, 0.1, 0.2), "min_overlap": (0.3, 0.5, 0.7)}
-"""Other thresholds of `walkers.postprocess.clusters.ClimbCriteria`, varied one at a time."""
-_UNITS = {"min_rise": " m", "max_gap": " s"}
+def survival_curve(first: FloatArray, watched: FloatArray) -> dict[str, list[float | None]]:
+    """The share of `survival` at every time (s) at which it changes: ``time``, ``probability``, ``low``, ``high``.
 
-
-def sensitivity(runs: Sequence[Path], within: float | None = None) -> list[dict[str, Any]]:
-    """Dependence of the climb statistics on the thresholds of a climb; ``within`` as of `summarise_climbs`.
-
-    Returns
-    -------
-    list of dict
-        One row per definition, the default first: ``threshold`` and ``value`` (empty and None for the default),
-        ``runs``, ``climbed`` (runs with a climb), ``climbs``, ``led_by_large``, ``median_speed`` (m/s); ``rate``
-        (climbs per run and second) with its exact ``rate_interval``.
+    The band is by Greenwood's variance at all times; None while none or all have climbed.
     """
-    usual = ClimbCriteria()
-    tried: list[tuple[str, Any]] = [("", None)]
-    tried += [(name, one) for name, ones in VARIATIONS.items() for one in ones if one != getattr(usual, name)]
-    found: list[list[list[Climb]]] = [[] for _ in tried]  # by definition and run
-    seconds, cut = 0.0, np.inf if within is None else within
-    for run in runs:  # one at a time: their tables are large
-        tables = tables_of(run)
-        seconds += min(max(float(tables["bed"]["time"][-1]), 0.0), cut)
-        for of_runs, (name, value) in zip(found, tried, strict=True):
-            climbs = climbs_by(tables, replace(usual, **{name: value}) if name else usual)
-            of_runs.append([climb for climb in climbs if climb.qualified <= cut])
-    rows = []
-    for of_runs, (name, value) in zip(found, tried, strict=True):
-        climbs = [climb for of_run in of_runs for climb in of_run]
-        row: dict[str, Any] = {"threshold": name, "value": value, "runs": len(runs), "climbed": sum(map(bool, of_runs))}
-        row |= {"climbs": len(climbs), "led_by_large": sum(climb.leader_large for climb in climbs)}
-        row["median_speed"] = median(climb.speed for climb in climbs) if climbs else None
-        rows.append(row | _rate("rate", len(climbs), seconds))
-    return rows
-
-
-def describe_sensitivity(rows: Sequence[dict[str, Any]]) -> str:
-    """`sensitivity` as text; mm, s, mm/s."""
-    lines = []
-    for row in rows:
-        unit = _UNITS.get(row["threshold"], "")
-        told = "as defined" if row["value"] is None else f"{row['threshold']} = {row['value']:g}{unit}"
-        speed = f", median speed {row['median_speed'] * 1e3:.2f} mm/s" if row["climbs"] else ""
-        lines.append(
-            f"  {told:20} {row['climbed']} of {row['runs']} runs climbed; climbs {_rate_text(row)}, "
-            f"{row['led_by_large']} led by a large bead{speed}"
-        )
-    return "\n".join(lines)
+    share = _share(first, watched)
+    time = np.array([0.0, *np.unique(share.quantiles)])
+    ends = _greenwood(share)
+    found = {"time": time, "probability": share.evaluate(time)}
+    found |= {"low": ends.low.evaluate(time), "high": ends.high.evaluate(time)}
+    return {name: [one if isfinite(one) else None for one in values.tolist()] for name, values in found.items()}
 
 
 def summarise(condition: Condition, within: float | None = None) -> dict[str, Any]:
-    """`summarise_climbs` of a condition, with its label as ``condition`` and `summarise_origins` as ``assembly``."""
-    found = summarise_climbs(condition.runs, within)
-    return found | {"condition": condition.label, "assembly": summarise_origins(condition.runs, within)}
+    """`summarise_climbs` of a condition, with its label as ``condition``."""
+    return summarise_climbs(condition.runs, within) | {"condition": condition.label}
 
 
 def describe(found: Mapping[str, Any]) -> str:
     """`summarise` as text; s, mm, mm/s."""
-    return "\n".join(filter(None, [found["condition"], describe_climbs(found), describe_origins(found["assembly"])]))
+    return "\n".join(filter(None, [found["condition"], describe_climbs(found)]))
 
 
 def describe_climbs(found: Mapping[str, Any]) -> str:

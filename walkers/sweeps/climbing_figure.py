@@ -97,7 +97,7 @@ def _grid(conditions: Sequence[Condition], keys: Sequence[str]) -> tuple[list[st
 
 
 def _draw_survival(panel: Axes, found: Mapping[str, Any]) -> None:
-    curve = found["curve"]
+    curve = {name: np.array(values, dtype=float) for name, values in found["curve"].items()}
     panel.step(curve["time"], curve["probability"], "k", where="post")
     panel.fill_between(curve["time"], curve["low"], curve["high"], step="post", color="0.85")
     panel.set(xlabel="time of drive (s)", ylabel="share that has climbed", ylim=(0.0, 1.02), xlim=(0.0, None))

@@ -99,17 +99,17 @@ def _two_digits(value: float, unit: str) -> str:
 
 def compare_runs(first: Side, second: Side) -> Comparison:
     """Compare two runs, or cases not yet run; `walkers.sweeps.table.DamagedRunError` if a result is lost."""
-    sides = (first, second)
-    names = [side.name for side in sides]
-    parameters, differences = _different([side.case for side in sides], names)
-    not_run = [side.name for side in sides if side.directory is None]
-    pairs = [] if not_run else _pairs([side.directory for side in sides if side.directory])
+    names = [side.name for side in (first, second)]
+    parameters, differences = _different([first.case, second.case], names)
+    not_run = [side.name for side in (first, second) if side.directory is None]
+    runs = [side.directory for side in (first, second) if side.directory]
+    pairs = [] if not_run else _pairs(runs)
     lengths = [cells[1:3] for one, cells in pairs if one["quantity"] == "cycles" and one["first"] != one["second"]]
     same_cases = "".join(["the cases are the same", *(f", but ran {' and '.join(one)} cycles" for one in lengths)])
     text = [differences or same_cases]
     if apart := [cells for one, cells in pairs if one["first"] != one["second"]]:
         text.append(aligned([["result", *names, "difference", "scatter of copies", "numerical error"], *apart]))
-        text += _errors_text([side.directory for side in sides if side.directory], names, parameters)
+        text += _errors_text(runs, names, parameters)
     if same := [one["quantity"] for one, _ in pairs if one["first"] == one["second"]]:
         text.append(f"the same in both: {', '.join(same)}" if apart else "all results are the same")
     text += [f"{name}: no finished run; only the parameters are compared" for name in not_run]
@@ -240,7 +240,8 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
     numbers = [name for name in tables[0].columns if name in tables[1] and tables[0][name].dtype.kind in "fiu"]
     default = default_column(max(tables, key=sides_differ))
     column = find_name("--y", column, numbers) if column else default
-    both = _matched([table[table["status"] == "finished"] for table in tables], varied_columns(tables[0]))
+    varied = list(dict.fromkeys(name for table in tables for name in varied_columns(table)))  # of the longest lists
+    both = _matched([table[table["status"] == "finished"] for table in tables], varied)
     if both.empty:
         raise refused(source, "have no finished point in common")
     names = [record.name for record in records]
@@ -268,6 +269,7 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
 
 def _matched(tables: Sequence[pd.DataFrame], keys: list[str]) -> pd.DataFrame:
     """The rows of two tables with the same values of the keys, the columns of both side by side."""
-    first, second = (table.astype(dict.fromkeys(keys, object)) for table in tables)
+    columns = list(dict.fromkeys([*keys, *tables[0].columns, *tables[1].columns]))
+    first, second = (table.reindex(columns=columns).astype(dict.fromkeys(keys, object)) for table in tables)
     how: dict[str, Any] = {"on": keys} if keys else {"how": "cross"}
     return first.merge(second, suffixes=(f"_{_SIDES[0]}", f"_{_SIDES[1]}"), **how)

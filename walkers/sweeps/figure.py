@@ -12,8 +12,16 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.inputs.errors import refused
+from walkers.inputs.library import unmeasured
 from walkers.inputs.readable import readable_unit
-from walkers.postprocess.drawing import SCATTER, errors_seen, letter_panels, new_figure, plain_text, styled
+from walkers.postprocess.drawing import (
+    SCATTER,
+    errors_seen,
+    letter_panels,
+    new_figure,
+    plain_text,
+    styled,
+)
 from walkers.sweeps.table import ERRORS, find_name, value_text, varied_columns, with_unit
 
 if TYPE_CHECKING:
@@ -90,8 +98,9 @@ class Layout:
     undistinguished: Sequence[str] = ()
 
 
-Curves = Callable[[npt.NDArray[np.int64], Factor, FloatArray], Mapping[str, FloatArray]]
-"""Function of rows that differ only in x, of the factor x and of values of x: the predictions of models there."""
+Curves = Callable[[npt.NDArray[np.int64], Factor, FloatArray], tuple[FloatArray, Mapping[str, FloatArray]]]
+"""Function of rows that differ only in x, of the factor x and of values of x: values of x, predictions of models there.
+"""
 
 
 @dataclass(frozen=True)
@@ -102,6 +111,7 @@ class Drawn:
     values: FloatArray
     errors: FloatArray
     theory: Mapping[str, FloatArray] = field(default_factory=dict)
+    bars: str = SCATTER
     curves: Curves | None = None
     """Predictions of models between and beyond the points."""
 
@@ -175,7 +185,8 @@ def drawn_column(rows: pd.DataFrame, name: str, theory: Mapping[str, FloatArray]
     if name in ERRORS:
         errors = rows[ERRORS[name]].to_numpy(dtype=float, na_value=np.nan) / size
     predicted = {model: numbers / size for model, numbers in (theory or {}).items()}
-    return Drawn(column.label, np.array(column.values), errors, predicted)
+    bars = SCATTER.partition(" (")[0] if {*unmeasured()} & {*varied_columns(rows)} else SCATTER
+    return Drawn(column.label, np.array(column.values), errors, predicted, bars)
 
 
 def _numbers(rows: pd.DataFrame, name: str, option: str) -> Factor:
@@ -299,7 +310,7 @@ def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Fig
     _legend(figure, grid, colours, drawn)
     said = [title]
     if np.isfinite(drawn.errors).any():
-        said.append(SCATTER + ("" if errors_seen(drawn.errors, drawn.values) else ", smaller than the symbols"))
+        said.append(drawn.bars + ("" if errors_seen(drawn.errors, drawn.values) else ", smaller than the symbols"))
     if lines := [line for one in said for line in wrap(one, round(14.0 * width))]:
         figure.suptitle(plain_text("\n".join(lines)))
     return figure
@@ -342,10 +353,10 @@ def _panel(axes: Axes, x: Factor, here: npt.NDArray[np.bool_], drawn: Drawn, col
         line = "-" if joined and not drawn.theory else "none"
         axes.errorbar(places[rows] + aside, y, yerr=bars, capsize=2, lw=0.9, ls=line, **look)
         along = _along_axis(x, log) if joined and drawn.curves else places[rows] + aside
-        curves = drawn.curves(rows, x, along) if joined and drawn.curves else {}
+        along, curves = drawn.curves(rows, x, along) if joined and drawn.curves else (along, {})
         for model, (name, values) in enumerate(drawn.theory.items()):
             at, shown = (along, curves[name]) if name in curves else (places[rows] + aside, values[rows])
-            axes.plot(at, shown, zorder=1, **_model_look(model, joined, look["color"]))
+            axes.plot(at, shown, zorder=1, **_model_look(model, name in curves, look["color"]))
     if np.nanmin(drawn.values) <= 0.0 <= np.nanmax(drawn.values):
         axes.axhline(0.0, color="0.4", lw=0.6, zorder=0)
 

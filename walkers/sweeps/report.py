@@ -12,7 +12,7 @@ import numpy as np
 from walkers.inputs.extras import require
 from walkers.inputs.readable import readable_unit
 from walkers.inputs.rounding import rounded
-from walkers.postprocess.drawing import SCATTER, errors_seen
+from walkers.postprocess.drawing import errors_seen
 from walkers.postprocess.report.page import (
     COLOURS,
     LARGEST,
@@ -142,7 +142,7 @@ def _overview(frame: pd.DataFrame) -> Model | None:
     x = max(numbers, key=lambda one: len(one.levels))
     others, drawn = joined([one for one in factors if one is not x]), drawn_column(frame, result)
     seen = errors_seen(drawn.errors, drawn.values)
-    text = f"; {SCATTER}" + ("" if seen else ", smaller than the symbols") if np.isfinite(drawn.errors).any() else ""
+    text = f"; {drawn.bars}" + ("" if seen else ", smaller than the symbols") if np.isfinite(drawn.errors).any() else ""
     plot = new_plot(f"{drawn.label} against {x.name}{text}", x.label.replace("\n", " "), drawn.label, height=380)
     places, known = np.array(x.values), np.isfinite(drawn.values)
     levels = others.levels if others else [None]

@@ -6,7 +6,8 @@ together. The packing depends on the whole sweep and the number of workers, not 
 sweep continues with the same decks.
 
 Workers are threads on this machine, or Parsl's workers on a cluster. Parsl repeats a deck whose worker was lost. A deck
-that fails is repeated here, as two halves.
+that fails is repeated here, as two halves; until a point is finished, the second half waits for the first. A failure
+that hits every point stops the sweep.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import heapq
 import resource
 import threading
 import time
+import warnings
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -30,7 +32,7 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
 from walkers.inputs.case import Case
-from walkers.inputs.errors import Stopped, WalkersError, check_utf8, refused
+from walkers.inputs.errors import InputError, Stopped, WalkersError, check_utf8, refused
 from walkers.inputs.rounding import counted, duration_text
 from walkers.inputs.sweep import Sweep
 from walkers.postprocess.analysis import current_result
@@ -45,6 +47,7 @@ from walkers.sweeps.table import (
     RECORD_NAME,
     SweepRecord,
     describe_sweep,
+    read_record,
     states,
     velocity_in,
     velocity_of,
@@ -66,8 +69,24 @@ _AS_GOOD = 1.02
 _LOOK_SECONDS = 0.25
 
 
-class ClusterFailed(WalkersError):
-    """The jobs of the cluster end without doing any work."""
+_OF_ALL = frozenset(
+    [
+        *("EngineMissing", "OtherEngine", "ContactModelMissing", "AuditFailed", "EngineDiffers", "ProgramDiffers"),
+        *("DiskFull", "OutputGone", "FileNotFoundError"),  # the last of mpirun
+    ]
+)
+"""Failures that hit every point."""
+_OF_POINTS = frozenset(["BlowUp", "BeadsLost", "BeadsOverTheTop", "WalkersMet", "TimeLimitExceeded", "RunBusy"])
+"""Failures that come from the parameters of a point, or from another process."""
+_MOST_ALIKE = 3  # points that fail alone in the same way, before any point is finished
+
+
+class SweepReplacedWarning(UserWarning):
+    """Another sweep file of the same name had the directory of a sweep."""
+
+
+class SweepStopped(WalkersError):
+    """A failure that hits every point, or jobs of a cluster that end without doing any work."""
 
 
 @dataclass(frozen=True)
@@ -123,17 +142,6 @@ class SweepProgress:
     decks: int
     elapsed: float
     left: float | None
-    worst_failure: Failure | None
-
-
-_WORST_FIRST = (
-    # Failures that can hit every point.
-    *("EngineMissing", "EngineDiffers", "ProgramDiffers", "DiskFull", "OutputGone", "EngineNeverStarted"),
-    *("EngineError", "MissingFrames", "EngineKilled", "EngineSilent", "LogTooLong"),
-    "",  # all others
-    *("BlowUp", "BeadsLost", "BeadsOverTheTop", "WalkersMet", "TimeLimitExceeded", "RunBusy"),
-)
-_SEVERITY = {name: rank for rank, name in enumerate(_WORST_FIRST)}
 
 
 @dataclass(frozen=True)
@@ -319,13 +327,17 @@ def run_sweep(
         If a point is invalid, or the path of the folder cannot be used in the shell scripts of a cluster.
     runner.EngineFailure
         If there is no engine, its audit failed, or the sweep's directory was removed during the sweep.
-    sweeps.scheduler.ClusterFailed
-        If the jobs of the cluster end without doing any work.
+    sweeps.scheduler.SweepStopped
+        If a failure hits every point, or the jobs of the cluster end without doing any work.
     """
     plan = plan_sweep(sweep, out, options, engine)
     record = plan.record
     if plan.decks:
         check_audit(plan.engine, allow_failed_audit)
+    with suppress(InputError):  # no sweep of this name, or none that can be read
+        if not set(read_record(record.directory).runs) & set(record.runs):
+            text = "replaces a sweep of the same name without common runs; figures and reports there show that one"
+            warnings.warn(f"{record.directory}: {text}", SweepReplacedWarning, stacklevel=2)
     write_record(record)
     if not plan.decks:
         return record, plan.final
@@ -336,6 +348,8 @@ def run_sweep(
         failures = _Scheduler(plan, submit).run(on_progress or (lambda _: None))
     if not (record.directory / RECORD_NAME).is_file():
         raise OutputGone(record.directory)
+    if list(read_record(record.directory).runs) != list(record.runs):
+        raise SweepStopped(f"{record.directory} was replaced by another sweep of the same name; the runs are kept")
     return record, failures
 
 
@@ -409,7 +423,7 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[Callable[..., Fu
     except Exception as error:  # any class: an address that this machine does not have, ports in use
         text = " ".join(str(error).split())
         text = f"Parsl cannot start ({text}); see {folder}, and [executor] address in the site file"
-        raise ClusterFailed(text) from error
+        raise SweepStopped(text) from error
     try:
         yield partial(parsl.python_app(work, data_flow_kernel=kernel), None)
     finally:
@@ -417,12 +431,12 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[Callable[..., Fu
 
 
 def _check_cluster(error: BaseException) -> None:
-    """Raise `ClusterFailed` if the jobs of the cluster fail, and not only this deck."""
+    """Raise `SweepStopped` if the jobs of the cluster fail, and not only this deck."""
     from parsl.executors.errors import BadStateException
 
     if isinstance(error, BadStateException):
         first = " ".join(str(error).partition("Error 2:")[0].split())  # the other errors repeat the first
-        raise ClusterFailed(f"the cluster's jobs fail: {first}") from error
+        raise SweepStopped(f"the cluster's jobs fail: {first}") from error
 
 
 class _Scheduler:
@@ -442,6 +456,10 @@ class _Scheduler:
         for chain in self.record.chains:  # one group for all points, or for all descents that may share decks
             groups.setdefault(sharing_key(self.cases[chain[0]]) if self.record.descent else None, []).append(chain)
         self.batches = [self._batches(chains) for chains in groups.values()]
+        self.halves: list[tuple[PlannedDeck, int]] = []
+        """Halves of failed decks, with their group, while no point is finished."""
+        self.alone: Counter[tuple[str, str]] = Counter()
+        """Failures of points alone, by name and message."""
         self.begin, self.seconds_done = time.perf_counter(), 0.0
         self.found = self.done = len(finished)
 
@@ -450,7 +468,10 @@ class _Scheduler:
         shown = 0.0
         for group in range(len(self.batches)):
             self._advance(group)
-        while self.groups_of:
+        while self.groups_of or self.halves:
+            if self.halves and (self.done > self.found or not self.groups_of):
+                self._hand_out(*self.halves.pop())
+                continue
             with suppress(Empty):
                 deck, future = self.ended.get(timeout=_LOOK_SECONDS)
                 group = self.groups_of.pop(deck)
@@ -490,7 +511,7 @@ class _Scheduler:
 
     def _advance(self, group: int) -> None:
         """Submit the next batch of a group that has no submitted deck."""
-        while group not in self.groups_of.values():
+        while group not in [*self.groups_of.values(), *(number for _, number in self.halves)]:
             batch = next(self.batches[group], None)
             if batch is None:
                 return
@@ -511,10 +532,9 @@ class _Scheduler:
 
     def _take_in(self, deck: PlannedDeck, group: int, future: Future[Report]) -> None:
         """Count finished points, and submit the others again: in halves if the deck failed."""
-        error = future.exception()
-        if error is not None and self.plan.options.site is not None:
-            _check_cluster(error)
-        report = Report(failure=type(error).__name__, message=str(error) or repr(error)) if error else future.result()
+        report = self._report(future)
+        if report.failure in _OF_ALL or (report.failure == "EngineNeverStarted" and self.done == self.found):
+            raise SweepStopped(f"{report.message}; this would hit every point, and the sweep is stopped")
         self.settled |= set(report.finished)
         self.velocities |= report.finished
         left = [point for point in deck.points if not self._is_settled(point)]
@@ -526,14 +546,37 @@ class _Scheduler:
             self.failures.append(Failure(left[0], run, report.failure, report.message, report.directory))
             self.settled.add(run)
             self.seconds_done += deck.seconds
+            self._check_alike(report.failure, report.message.partition(" (see ")[0])
         elif left:  # without a failure another process was making these points
-            for part in _parts(left, 2) if report.failure else [left]:
-                self._hand_out(PlannedDeck(tuple(part), deck.seconds * len(part) / len(deck.points)), group)
+            first, *second = _parts(left, 2) if report.failure else [left]
+            parts = [PlannedDeck(tuple(part), deck.seconds * len(part) / len(deck.points)) for part in (first, *second)]
+            self._hand_out(parts[0], group)
+            self.halves += [(part, group) for part in parts[1:]]
+
+    def _report(self, future: Future[Report]) -> Report:
+        """The report of a deck, or a failure if the cluster lost it; an error of the program is raised."""
+        error = future.exception()
+        if error is None:
+            return future.result()
+        if self.plan.options.site is not None:
+            from parsl.errors import ParslError
+
+            _check_cluster(error)
+            if isinstance(error, ParslError):
+                return Report(failure=type(error).__name__, message=str(error) or repr(error))
+        raise error
+
+    def _check_alike(self, reason: str, message: str) -> None:
+        """Raise `SweepStopped` if the first points all failed alone in the same way, but not by their parameters."""
+        self.alone[reason, message] += 1
+        if self.alone[reason, message] >= _MOST_ALIKE and self.done == self.found and reason not in _OF_POINTS:
+            text = f"the first {_MOST_ALIKE} points failed in the same way, and the sweep is stopped"
+            raise SweepStopped(f"{message}; {text}")
 
     def _progress(self) -> SweepProgress:
         first = list(self.groups_of)[: 4 * self.plan.options.decks_at_once]  # later decks have not started
         made = [deck for deck in first if is_locked(self.record.out / self.record.runs[deck.points[0]])]
-        waiting = sum(deck.seconds for deck in self.groups_of)
+        waiting = sum(deck.seconds for deck in [*self.groups_of, *(half for half, _ in self.halves)])
         elapsed = time.perf_counter() - self.begin
         return SweepProgress(
             points=len(self.record.runs),
@@ -544,5 +587,4 @@ class _Scheduler:
             decks=len(made),
             elapsed=elapsed,
             left=waiting / self.seconds_done * elapsed if self.seconds_done else None,
-            worst_failure=min(self.failures, key=lambda one: _SEVERITY.get(one.reason, _SEVERITY[""]), default=None),
         )

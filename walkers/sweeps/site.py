@@ -123,10 +123,10 @@ def _launchers() -> Mapping[str, str]:
 
 
 def check_path(folder: Path) -> None:
-    """Refuse a folder whose path contains a space, a quote or the like: Parsl writes it into shell scripts unquoted."""
-    whole = str(folder.resolve())
-    if odd := _ODD.search(whole):
-        raise refused("--out", f"with a site file {_TAKEN} in the path, found {odd[0]!r} in {whole!r}")
+    """Refuse a sweep's folder with a space, a quote or the like in it: Parsl writes it into shell scripts unquoted."""
+    for source, text in (("--out", str(folder.parent.resolve())), (folder.name, folder.name)):
+        if odd := _ODD.search(text):
+            raise refused(source, f"with a site file {_TAKEN} in the path, found {odd[0]!r} in {text!r}")
 
 
 def pilots(site: Site, run_dir: Path, ranks: int = 1) -> Config:

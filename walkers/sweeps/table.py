@@ -137,24 +137,26 @@ def row_of(result: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for one in analyses_in(result) for key, value in one.row(result).items()}
 
 
+def derived_of(case: Case) -> dict[str, float]:
+    """The columns `derived_columns` of a case, SI units."""
+    known = {key: value for one in analyses_of(case) for key, value in one.derived_of(case).items()}
+    return known | {key: getattr(case.drive, key) for key in _DRIVE}
+
+
 def describe_sweep(sweep: Sweep, cases: Sequence[Case], engine: Engine, out: Path) -> SweepRecord:
     """The record of a sweep with resolved points; `InputError` for descents of piles, which have no velocity."""
     found = {one.name for case in cases for one in analyses_of(case)}
     names = [one.name for one in analyses() if one.name in found]
     if sweep.descent is not None and "velocity" not in result_columns(names):
         raise InputError(sweep.source, [Problem("descend", None, "expected walkers: a pile has no velocity")])
-    columns, derived = derived_columns(names), []
-    for case in cases:
-        known = {key: value for one in analyses_of(case) for key, value in one.derived_of(case).items()}
-        known |= {key: getattr(case.drive, key) for key in _DRIVE}
-        derived.append({key: known.get(key, nan) for key in columns})
+    columns, derived = derived_columns(names), [derived_of(case) for case in cases]
     return SweepRecord(
         directory=out / sweep.name,
         name=sweep.name,
         title=sweep.title,
         units=dict(zip(sweep.keys, sweep.units, strict=True)),
         values=[[list(map(plain, one)) if isinstance(one, list) else plain(one) for one in row] for row in sweep.rows],
-        derived=derived,
+        derived=[{key: known.get(key, nan) for key in columns} for known in derived],
         runs=[run_place(case, engine, out).name for case in cases],
         descent=sweep.descent,
         analyses=names,
@@ -191,6 +193,8 @@ def read_record(directory: str | Path) -> SweepRecord:
     try:
         contents = read_json(directory / RECORD_NAME)
         points = contents["points"]
+        if contents["format"] != _FORMAT:
+            raise ValueError(f"format {contents['format']!r}, expected {_FORMAT}; run the sweep again")
         return SweepRecord(
             directory=directory,
             **{key: contents[key] for key in ("name", "title", "units", "analyses")},

@@ -41,16 +41,14 @@ CYCLES = 60
 
 @dataclass(frozen=True)
 class Friction:
-    """F∥ = F (μ(v) sign v + κ v) at each of the three contacts; at v = 0 any force up to F μs.
+    """F∥ = F (μ sign v + κ v) at each of the three contacts; at v = 0 any force up to F μ.
 
-    μ(v) = μk + (μs - μk) exp(-(v/vs)²), after Stribeck. Each is a number, or an array that broadcasts to (3, N) for N
-    parameter sets: contacts 1, 2 (beads on the substrate) and 3 (bead on bead). F is that of rigid beads; the Coulomb
-    limit of the engine includes contact damping, which vanishes while the gap is constant.
+    Each is a number, or an array that broadcasts to (3, N) for N parameter sets: contacts 1, 2 (beads on the substrate)
+    and 3 (bead on bead). F is that of rigid beads; the Coulomb limit of the engine includes contact damping, which
+    vanishes while the gap is constant.
     """
 
-    kinetic: npt.ArrayLike = 0.0  # μk, Coulomb's coefficient
-    static: npt.ArrayLike | None = None  # μs; default: μk
-    stribeck_velocity: float = 1e-3  # vs, m/s
+    kinetic: npt.ArrayLike = 0.0  # μ, Coulomb's coefficient
     linear: npt.ArrayLike = 0.0  # κ, s/m: the paper's law
 
     @classmethod
@@ -161,8 +159,7 @@ def walk(
 
     given = (frequency, peak_acceleration, steady_acceleration, walker.scale)
     drive = np.stack(np.broadcast_arrays(*(np.asarray(one, np.float64).reshape(-1) for one in given))[:3], axis=-1)
-    static = friction.kinetic if friction.static is None else friction.static
-    laws = (friction.kinetic, static, friction.stribeck_velocity, friction.linear)
+    laws = (friction.kinetic, friction.linear)
     law = np.stack([np.broadcast_to(np.asarray(one, np.float64), (3, len(drive))).T for one in laws], axis=1)
     tables = _tables(walker, drive[:, 0] * steps_per_cycle)
     mean, least, repeated, solved, series = integrate(tables, law, drive, cycles, steps_per_cycle)

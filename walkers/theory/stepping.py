@@ -42,8 +42,8 @@ def integrate(
     tables : ndarray, shape (N, 3, 13, 3)
         For each walker, and for stages (of h seconds) of a step, of an 8th and of a 64th of it: velocities v0 become
         P v0 - h G F∥, normal forces are F0 + B P v0 + D F∥. Three rows of P, G (m/s²), D and B (s/m), and F0.
-    law : ndarray, shape (N, 4, 3)
-        μk, μs, vs (m/s), κ (s/m) of each walker and contact.
+    law : ndarray, shape (N, 2, 3)
+        μ and κ (s/m) of each walker and contact.
     drive : ndarray, shape (N, 3)
         Frequency (Hz), peak acceleration and steady acceleration (m/s²).
     cycles, steps
@@ -169,7 +169,7 @@ def _settle(table: FloatArray, law: FloatArray, seconds: float, free: Three, res
             speed = free[at] - seconds * _row(table, _GAIN + at, parallel)
             own = seconds * table[_GAIN + at, at]
             wanted = parallel[at] + speed / own
-            if abs(wanted) <= normal * law[1, at]:
+            if abs(wanted) <= normal * law[0, at]:
                 modes[at] = 0.0
                 for by in range(3):
                     rows[at, by] = table[_GAIN + at, by] / table[_GAIN + at, at]
@@ -177,17 +177,12 @@ def _settle(table: FloatArray, law: FloatArray, seconds: float, free: Three, res
                 continue
             side = np.sign(wanted)
             modes[at] = side
-            fade = law[1, at] - law[0, at]
-            if fade != 0.0:
-                fade *= np.exp(-((speed / law[2, at]) ** 2))
-            kinetic, drag = law[0, at] + fade, normal * law[3, at]
-            slope = side * kinetic + law[3, at] * speed
-            # Friction force over normal force: falls with the speed (Stribeck) and grows with it by κ.
-            steep = drag - 2.0 * side * normal * fade * speed / law[2, at] ** 2
+            drag = normal * law[1, at]
+            slope = side * law[0, at] + law[1, at] * speed
             for by in range(3):
-                rows[at, by] = steep * seconds * table[_GAIN + at, by] - slope * table[_PRESS + at, by]
+                rows[at, by] = drag * seconds * table[_GAIN + at, by] - slope * table[_PRESS + at, by]
             rows[at, at] += 1.0
-            right[at] = side * kinetic * normal + drag * speed - parallel[at]
+            right[at] = side * law[0, at] * normal + drag * speed - parallel[at]
         change = _solved(rows, right)
         for at in range(3):
             parallel[at] += change[at]

@@ -290,23 +290,6 @@ def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
     return track, np.append(climbed, False)[track]
 
 
-def climbs_by(tables: Mapping[str, Columns], definition: ClimbCriteria) -> list[Climb]:
-    """Climbs in a pile by another definition, from its tables; walls and bulk are not known."""
-    time, members = tables["bed"]["time"], tables["members"]
-    frame, bead = np.searchsorted(time, members["time"]), members["bead"]
-    height = np.full((len(time), bead.max(initial=0) + 1), nan)
-    height[frame, bead] = members["height"]
-    large = np.zeros(height.shape[1], dtype=np.bool_)
-    large[bead] = members["large"]
-    held: list[dict[int, set[int]]] = [{} for _ in time]
-    for now, track, one in zip(frame.tolist(), members["track"].tolist(), bead.tolist(), strict=True):
-        held[now].setdefault(track, set()).add(one)
-    clusters: list[list[Cluster]] = [[(frozenset(one), frozenset()) for one in found.values()] for found in held]
-    beads = Beads(time, height, large, tables["bed"]["surface"])
-    tracks = enumerate(follow(time, clusters, definition))
-    return [one for track in tracks if (one := classify(*track, beads, definition)).climbed]
-
-
 def _members(tracks: Sequence[Track], beads: Beads) -> list[Member]:
     """Rows by frame and, within a frame, in the order in which `held_clusters` finds clusters."""
     found = [

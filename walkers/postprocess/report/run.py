@@ -42,7 +42,8 @@ class RunReport:
         run = Measured(directory)
         case = run.motion.case
         self.id, self.name, self.title = section, directory.resolve().name, case.title or case.name
-        self.shown = shown_of(case, with_bands(directory, current_result(directory)), origins)
+        rests = {"rests_on": rests_on(origins)} if origins is not None else {}
+        self.shown = shown_of(case, with_bands(directory, current_result(directory) | rests), origins)
         self.manifest = read_json(directory / MANIFEST_NAME)
         self.player = player_of(run.motion, places=places)
         self.carried = {f"player-{section}": base64.b64encode(self.player.plot.get_binary_snapshot(9)).decode()}
