@@ -202,7 +202,7 @@ def test_an_archive_of_a_run(run: Path, tmp_path: Path) -> None:
     assert Run(there).result == Run(run).result
     assert load_case(there / "test.toml") == make_case(run=SHORT)
     call("plot", str(there), check=True)
-    assert _verified(unpacked)[1:] == [f"  made since runs/{run.name}/ (3 files)"]
+    assert _verified(unpacked)[1:] == [f"  made since runs/{run.name}/ (2 files)"]
     (there / "segments" / "0001").mkdir()
     (there / "result.json").unlink()
     (there / "result.json").symlink_to("nowhere")

@@ -157,7 +157,8 @@ def test_an_archive_of_a_stranger_is_a_page_and_json_and_holds_what_it_lists(
             json.loads(archive.read("ro-crate-metadata.json"))
             listed = archive.read("sha256sums.txt").decode().split("\n")[:-1]
             assert {line.partition("  ")[2] for line in listed} <= set(archive.namelist())
-        call("check", "files", str(path), check=True)
+        shutil.unpack_archive(path, tmp_path / f"unpacked-{len(pages)}")
+        call("check", "files", str(tmp_path / f"unpacked-{len(pages)}"), check=True)
     assert _tags(pages[1]) == _tags(pages[0])
 
 
@@ -182,7 +183,7 @@ def test_a_calibrations_title_is_no_line_of_its_report(name: str) -> None:
             "feasible": {"seen": 1.0, "expected": 1.0}, "posterior": weights, "held_out_posteriors": {text: weights},
             "settings": {"parameters": {"a": {"range": (0.0, 1.0)}}},
         }  # fmt: skip
-        given = {"samples": 1, "least": 1.0, "narrow": 0.5}
+        given = {"samples": 1, "least": 1.0, "narrow": 0.5, "observed": "measured"}
         return rendered("walkers.calibration", "report.md.j2", found=found, discrepancies=[(0.0, 1.0, 2.0)], **given)
 
     plain, odd = told("plain").split("\n"), told(HOSTILE[name])
@@ -241,7 +242,6 @@ def test_with_a_site_file_odd_paths_are_refused_before_anything_is_done(
     for sweep, out in (("plain.toml", f"./{odd}"), (f"./{odd}.toml", "runs")):
         done = call("sweep", sweep, "--out", out, "--site", "site.toml")
         assert (done.returncode, done.stdout, len(done.stderr.splitlines())) == (2, "", 1)
-        assert done.stderr.startswith("walkers: --out: ")
         assert "expected letters, digits and" in done.stderr
     assert sorted(in_folder.rglob("*")) == before
 

@@ -272,5 +272,6 @@ def test_theory_is_not_joined_where_it_has_no_curve(looked_through: Path) -> Non
 def test_a_figure_does_not_deny_what_it_varies(looked_through: Path, sweep: str, varied: bool) -> None:
     """The sample varies the friction, which nobody measured."""
     figure = walkers.load(looked_through / sweep).figure()
-    (title,) = [legend.get_title().get_text() for legend in figure.legends]
+    title = " ".join([figure.get_suptitle(), *(legend.get_title().get_text() for legend in figure.legends)])
+    title = title.replace("\n", " ")
     assert ("standard deviation" in title, "not varied" in title) == (True, not varied)

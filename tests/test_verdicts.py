@@ -31,10 +31,10 @@ def test_a_failed_audit_is_kept_with_its_failures(tmp_path: Path, monkeypatch: p
     """Of another binary than the installed one, in another cache."""
     engine = replace(find_engine(), sha256="d" * 64)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    report = AuditReport(engine, "3.8.0", CHAPTERS)
+    report = AuditReport(engine, "e" * 64, "3.8.0", CHAPTERS)
     assert [line.what for line in report.failures] == ["bad"]
-    assert record(report, quick=False) == read_audit("d" * 64)
-    kept = read_audit("d" * 64)
+    assert record(report, quick=False) == read_audit("d" * 64, "e" * 64)
+    kept = read_audit("d" * 64, "e" * 64)
     assert kept is not None
     assert (kept.failures, kept.lines, kept.scope) == (("bad",), 4, "full")
 

@@ -28,6 +28,7 @@ from walkers.inputs.extras import require
 from walkers.inputs.library import expected_of
 from walkers.inputs.messages import quoted, validated
 from walkers.inputs.reading import read_toml
+from walkers.inputs.text import printable
 from walkers.physics.units import Whole
 
 if TYPE_CHECKING:
@@ -124,7 +125,7 @@ def _launchers() -> Mapping[str, str]:
 
 def check_path(folder: Path) -> None:
     """Refuse a sweep's folder with a space, a quote or the like in it: Parsl writes it into shell scripts unquoted."""
-    for source, text in (("--out", str(folder.parent.resolve())), (folder.name, folder.name)):
+    for source, text in (("--out", str(folder.parent.resolve())), (printable(folder.name), folder.name)):
         if odd := _ODD.search(text):
             raise refused(source, f"with a site file {_TAKEN} in the path, found {odd[0]!r} in {text!r}")
 
