@@ -136,7 +136,7 @@ def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]], definition: 
 
 @dataclass(frozen=True)
 class Beads:
-    """Beads of a pile: time (s, shape (F,)), height (m, shape (F, N); clusters alone need it), and which are large.
+    """Beads of a pile: time (s, shape (F,)), height (m, shape (F, N)), and which are large.
 
     ``surface`` and ``bulk`` are the height of the surface and the beads of the bulk in each frame, ``first`` is the
     first frame of the drive.

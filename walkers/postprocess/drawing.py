@@ -27,8 +27,6 @@ _DASHES = ("-", (0, (5, 1.5)), (0, (1, 1.2)))
 _MARKERS = "os^Dv"
 _MAKER = "granular-walkers"
 _LEAST_ERROR = 0.02  # about half of the height of a symbol, over the range of values
-UNSEEN = "error bars are smaller than the symbols"
-"""Note where error bars are left out."""
 SCATTER = "bars: standard deviation of the copies (uncertain parameters not varied)"
 """What the error bars of a sweep are."""
 _Given = ParamSpec("_Given")

@@ -39,7 +39,7 @@ class Line:
     """A line of K points in the units of its panel.
 
     ``colour`` is a number of a colour of the figure, or a colour; ``marker`` is one of matplotlib; a ``width`` (points)
-    of 0 means markers alone; ``error`` is the error of each y.
+    of 0 means markers alone.
     """
 
     x: FloatArray
@@ -49,7 +49,6 @@ class Line:
     marker: str = ""
     dashed: bool = False
     width: float = 1.1
-    error: FloatArray | None = None
 
 
 @dataclass(frozen=True)

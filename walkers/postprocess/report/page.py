@@ -20,7 +20,7 @@ import numpy as np
 
 from walkers.inputs.errors import refused
 from walkers.inputs.text import environment
-from walkers.postprocess.drawing import UNSEEN, check_place, errors_seen
+from walkers.postprocess.drawing import check_place
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.figures import Panel
 from walkers.runner.files import write_text
@@ -88,13 +88,9 @@ def drawn(panel: Panel) -> Figure:
     """A panel as an interactive plot (Bokeh)."""
     from bokeh.models.annotations import BoxAnnotation
 
-    errors = [line.error for line in panel.lines if line.error is not None]
-    values = np.concatenate([[0.0] if panel.zero else [], *(line.y for line in panel.lines)])
-    seen = bool(errors) and errors_seen(np.concatenate(errors), values)
-    title = panel.title + (", with standard errors" if seen else f"; {UNSEEN}" if errors else "")
     options: dict[str, Any] = {"y_range": panel.limits} if panel.limits else {}
     scale = "log" if panel.log else "linear"
-    plot = new_plot(title, panel.x, panel.y, height=round(300 * panel.height**0.5), y_axis_type=scale, **options)
+    plot = new_plot(panel.title, panel.x, panel.y, height=round(300 * panel.height**0.5), y_axis_type=scale, **options)
     if panel.zero and (ends := [(line.x[0], line.x[-1]) for line in panel.lines if len(line.x)]):
         plot.line([min(ends)[0], max(end for _, end in ends)], [0.0, 0.0], color="#666666", line_width=0.6)
     if panel.settled:
@@ -112,8 +108,6 @@ def drawn(panel: Panel) -> Figure:
             plot.line(line.x[thin], line.y[thin], line_width=line.width, line_dash=dash, **look)
         else:
             plot.scatter(line.x, line.y, marker=_MARKERS.get(line.marker, "diamond"), size=8, **look)
-        if line.error is not None and seen:
-            error_bars(plot, line.x, line.y, line.error)
     return with_legend(plot)
 
 
