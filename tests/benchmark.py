@@ -264,9 +264,9 @@ def measure_theory() -> None:
         "Coulomb, dry": (dry, coulomb),
     }
     for name, (walker, friction) in laws.items():
-        walk(walker, friction, case.drive.frequency, 5.0)
+        walk(walker, friction, case.excitation.frequency, 5.0)
         begin = time.perf_counter()
-        walk(walker, friction, case.drive.frequency, accelerations)
+        walk(walker, friction, case.excitation.frequency, accelerations)
         print(f"| {name} | {count / (time.perf_counter() - begin):.0f} |")
 
 

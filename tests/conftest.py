@@ -26,10 +26,11 @@ from walkers.archive.writing import write_archive
 from walkers.cache import make_cache_folder
 from walkers.inputs.axes import is_axis
 from walkers.inputs.case import Case
-from walkers.inputs.changes import flatten
+from walkers.inputs.keys import flatten
 from walkers.inputs.origins import Origin
-from walkers.inputs.reading import read_toml, resolve_case, shipped
+from walkers.inputs.reading import shipped
 from walkers.inputs.sweep import expand
+from walkers.inputs.toml import read_toml
 from walkers.main import main
 from walkers.postprocess import series
 from walkers.postprocess.gait import Walk, walk
@@ -102,7 +103,7 @@ def document(**changes: Any) -> dict[str, Any]:
 
 def make_case(**changes: Any) -> Case:
     """`document`, resolved."""
-    return resolve_case(document(**changes), name="test")
+    return Case.read(document(**changes), name="test")
 
 
 def origins(case: Case) -> dict[str, Origin]:
@@ -230,7 +231,7 @@ def pile_run(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
     def make(out: Path) -> None:
         tables = read_toml(shipped("case")["pile-ci"])
         tables["run"] |= HALF
-        assert not run_case(resolve_case(tables, name="pile-ci"), out).cached
+        assert not run_case(Case.read(tables, name="pile-ci"), out).cached
 
     (directory,) = once("piles", make).glob("pile-ci-*")
     return directory

@@ -27,7 +27,7 @@ from walkers import Run, load_case
 from walkers.archive import writing
 from walkers.archive.crate import PAPER
 from walkers.archive.writing import ArchiveOptions, ArchiveRefused, Contents, PackedRun, write_archive
-from walkers.inputs.reading import resolve_case
+from walkers.inputs.case import Case
 from walkers.runner.directory import FinishedRun
 from walkers.runner.provenance import commit_of, software
 from walkers.sweeps.table import load
@@ -274,7 +274,7 @@ def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
     assert [place.name for place in places] == [Path(place).name for place in load(shared / "angles")["run"]]
     for place, angle in zip(places, ("0 deg", "10 deg"), strict=True):
         assert (place / "shared_deck" / "walker.lig").is_file()
-        assert load_case(place / "base.toml") == resolve_case(document(run=SHORT, dimers={"angle": angle}), name="base")
+        assert load_case(place / "base.toml") == Case.read(document(run=SHORT, dimers={"angle": angle}), name="base")
     assert (there / "angles.toml").read_text().startswith('case = "base.toml"\n')
     actions = [action["name"].split()[0] for action in ROCrate(unpacked).root_dataset["mentions"]]
     assert actions == [*("Deck", "Simulation", "Tables"), *("Deck", "Simulation", "Tables"), "Table"]

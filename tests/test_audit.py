@@ -20,7 +20,7 @@ from walkers import run as run_case
 from walkers.check.audit import CHECKS, AuditReport, record, run_audit, selected
 from walkers.check.report import Chapter, Line, Verdict, count
 from walkers.check.scenes import SCENES, Bench, full_case, in_walls, law, prescribed, second_engine, standing
-from walkers.inputs.errors import InputError
+from walkers.errors import InputError
 from walkers.physics.bridge import Surfaces
 from walkers.runner import binary
 from walkers.runner.binary import AuditRecord, find_engine, read_audit, write_audit

@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 
 from tests.conftest import SHORT, call, document, make_case, to_toml
-from walkers.inputs.errors import InputError
-from walkers.inputs.reading import load_case, resolve_case
-from walkers.physics import units
-from walkers.physics.units import parse_quantity
+from walkers.errors import InputError
+from walkers.inputs import units
+from walkers.inputs.case import Case
+from walkers.inputs.reading import load_case
+from walkers.inputs.units import parse_quantity
 from walkers.postprocess.analysis import read_result
 from walkers.templates.deck import render_deck
 
@@ -129,7 +130,7 @@ def _said(tables: dict[str, Any]) -> dict[str, Any]:
 @pytest.mark.parametrize(("changes", "told"), BAD)
 def test_bad_values(changes: dict[str, Any], told: str) -> None:
     with pytest.raises(InputError) as caught:
-        resolve_case(_said(document(**changes)), source="bad.toml")
+        Case.read(_said(document(**changes)), source="bad.toml")
     message = str(caught.value)
     assert told in message
     assert message.startswith("bad.toml: ")
@@ -314,10 +315,10 @@ def test_several_mistakes_are_told_at_once_and_before_the_first_run(in_folder: P
 @pytest.mark.parametrize("name", ["teflon", "rough glass"])
 def test_a_substrate_of_ones_own_needs_its_friction(name: str) -> None:
     values = document(boundary={"material": name})
-    assert resolve_case(values).boundary.material == name
+    assert Case.read(values).boundary.material == name
     del values["contact"]["rolling_friction"]
     with pytest.raises(InputError, match=rf'boundary\.material = "{name}": not in the library'):
-        resolve_case(values)
+        Case.read(values)
 
 
 def test_bridges_may_push_loose_beads_but_hold_walkers(run_directory: Callable[..., Path]) -> None:

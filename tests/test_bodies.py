@@ -14,12 +14,13 @@ import pytest
 
 import walkers
 from tests.conftest import REFERENCE, document, make_case
+from walkers.errors import InputError
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
-from walkers.inputs.drive import Drive, Harmonic, common_frequency
-from walkers.inputs.errors import InputError
+from walkers.inputs.drive import Excitation, Harmonic, common_frequency
 from walkers.inputs.loads import contact_loads
-from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped
+from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.toml import read_toml
 from walkers.postprocess.analyses.meetings import Course, collective
 from walkers.postprocess.analysis import describe_result, figures_of, read_result
 from walkers.postprocess.gait import postures, turned_over_at
@@ -72,7 +73,7 @@ def dimers(replicates: int, **start: Any) -> dict[str, Any]:
 
 def of_tables(*clusters: dict[str, Any], **tables: Any) -> Case:
     """The conditions of Fig. 1b with other tables."""
-    return resolve_case({**FIG1B, "clusters": list(clusters), **tables}, name="cluster")
+    return Case.read({**FIG1B, "clusters": list(clusters), **tables}, name="cluster")
 
 
 def fig1b(**changes: Any) -> Any:
@@ -126,7 +127,7 @@ def test_a_cluster_heads_to_its_large_bead_or_where_its_first_one_is() -> None:
 def test_a_chain_of_two_is_a_dimer() -> None:
     tables = {key: value for key, value in REFERENCE.items() if key != "dimers"}
     start = {"replicates": 1, "angle_spread": "0 deg", "gap_spread": 0.0}
-    assert resolve_case({**tables, "clusters": [cluster("chain", "Ls", **start)]}, name="test") == make_case()
+    assert Case.read({**tables, "clusters": [cluster("chain", "Ls", **start)]}, name="test") == make_case()
     cases = [of_tables(cluster(arrangement, "Ls")) for arrangement in ("fan", "chain")]
     np.testing.assert_allclose(*([bead.centre for bead in place((case,))[0].beads] for case in cases), atol=1e-15)
 
@@ -201,8 +202,8 @@ def test_walkers_on_a_tray_meet_and_stick(tmp_path: Path) -> None:
     assert of_tray({**tray.result, "held_share": 1.0})[-1] == "none free"
     group = tray.motion.groups[0]
     centre = group.mass_centre[:: group.case.run.samples_per_cycle]
-    speed = np.linalg.norm(np.diff(centre, axis=0), axis=-1) * group.case.drive.frequency
-    assert speed[5:].max() < 0.1 * group.case.drive.peak_velocity
+    speed = np.linalg.norm(np.diff(centre, axis=0), axis=-1) * group.case.excitation.frequency
+    assert speed[5:].max() < 0.1 * group.case.excitation.peak_velocity
     first = tray.result["groups_at_end"][0]
     apart = np.linalg.norm(centre[-12:, first[1]] - centre[-12:, first[0]], axis=-1)
     assert apart.max() < 1.1 * group.make.length  # they hold on to each other, however they turn
@@ -302,7 +303,7 @@ def test_a_rest_before_the_drive_is_one(tmp_path: Path, frequency: str) -> None:
 
 def test_walkers_placed_beads_and_a_mixture_share_a_box(tmp_path: Path) -> None:
     """All analyses that mean something are in the result, and nobody starts within another."""
-    case = resolve_case(EVERYTHING, name="everything")
+    case = Case.read(EVERYTHING, name="everything")
     assert Case.from_dict(case.as_dict()) == case
     assert case.all_radii[:2] == [5e-4, 3e-4]
     for one, other in combinations(place((case,))[0].beads, 2):
@@ -346,7 +347,7 @@ def test_frequencies_without_a_cycle_are_refused() -> None:
 
 
 def test_a_drive_is_its_largest_harmonic_where_one_number_is_asked_for() -> None:
-    drive = Drive((Harmonic((1.0, 0.0, 0.0), 160.0, 10.0), Harmonic((0.0, 0.0, 1.0), 80.0, 30.0, 1.0)), "container")
+    drive = Excitation((Harmonic((1.0, 0.0, 0.0), 160.0, 10.0), Harmonic((0.0, 0.0, 1.0), 80.0, 30.0, 1.0)), "container")
     assert (drive.direction, drive.peak_acceleration, drive.frequency) == ((0.0, 0.0, 1.0), 30.0, 80.0)
     assert [one.peak_acceleration for one in drive.with_peak(60.0).harmonics] == [20.0, 60.0]
     case = replace(make_case(), drive=drive)
@@ -356,7 +357,7 @@ def test_a_drive_is_its_largest_harmonic_where_one_number_is_asked_for() -> None
 def test_one_harmonic_is_the_drive_that_its_keys_describe() -> None:
     written = document(run=DRIVEN)
     written["drive"] = {"harmonics": [{"frequency": "80 Hz", "peak_acceleration": "4 g", "axis": "x"}]}
-    assert resolve_case(written, name="test") == make_case(run=DRIVEN)
+    assert Case.read(written, name="test") == make_case(run=DRIVEN)
 
 
 def test_a_phase_and_an_axis_aslant_change_the_start_and_not_the_walk(run_directory: Callable[..., Path]) -> None:
@@ -370,11 +371,11 @@ def test_a_phase_and_an_axis_aslant_change_the_start_and_not_the_walk(run_direct
 def test_a_triangle_is_the_sum_of_its_harmonics() -> None:
     """Of the acceleration: odd harmonics as 1/k², within 4 % of the peak everywhere and 1 % on the flanks."""
     case = make_case(drive={"waveform": "triangle"})
-    assert [one.frequency for one in case.drive.harmonics] == [80.0, 240.0, 400.0, 560.0, 720.0]
+    assert [one.frequency for one in case.excitation.harmonics] == [80.0, 240.0, 400.0, 560.0, 720.0]
     assert case.drive.frame == "container"
     cycle = np.linspace(0.0, 1.0, 401)
-    phases = [one.angular_frequency * cycle / 80.0 + one.phase for one in case.drive.harmonics]
-    summed = sum(one.peak_acceleration * np.sin(phase) for one, phase in zip(case.drive.harmonics, phases, strict=True))
+    phases = [one.angular_frequency * cycle / 80.0 + one.phase for one in case.excitation.harmonics]
+    summed = sum(one.peak_acceleration * np.sin(phase) for one, phase in zip(case.excitation.harmonics, phases, strict=True))
     triangle = 39.2 * 2.0 / np.pi * np.arcsin(np.sin(2.0 * np.pi * cycle))
     assert np.abs(summed - triangle).max() < 0.045 * 39.2
     flank = np.abs(triangle) < 0.8 * 39.2
@@ -386,7 +387,7 @@ def test_a_sawtooth_moves_a_symmetric_dimer(run_directory: Callable[..., Path]) 
     drive = {"waveform": "sawtooth", "peak_acceleration": "4 g", "axis": "x"}
     case = make_case(dimers={"radii": ["0.25 mm", "0.25 mm"], "replicates": 2}, drive=drive, run=DRIVEN)
     time = np.linspace(-0.5, 0.5, 201)[20:-20] / 80.0
-    waves = [one.peak_acceleration * np.sin(one.angular_frequency * time + one.phase) for one in case.drive.harmonics]
+    waves = [one.peak_acceleration * np.sin(one.angular_frequency * time + one.phase) for one in case.excitation.harmonics]
     np.testing.assert_allclose(sum(waves), 39.2 * 2.0 * 80.0 * time, atol=0.12 * 39.2)
     result = read_result(run_directory(case))
     assert result["axial_velocity"]["mean"] == pytest.approx(0.206e-3, rel=0.03)
@@ -400,7 +401,7 @@ def test_two_tones_move_a_symmetric_dimer_and_their_phase_says_which_way(run_dir
 
     def speed(phase: float) -> float:
         x = (1.0, 0.0, 0.0)
-        drive = Drive((Harmonic(x, 80.0, 39.2), Harmonic(x, 160.0, 29.4, phase)), "container")
+        drive = Excitation((Harmonic(x, 80.0, 39.2), Harmonic(x, 160.0, 29.4, phase)), "container")
         return float(read_result(run_directory(replace(case, drive=drive)))["velocity"]["mean"])
 
     one_way = speed(pi / 2.0)
@@ -440,7 +441,7 @@ CLIMB = {"time_step": "4 us", "cycles": 24, "settling_cycles": 12}
 
 
 def on_a_wall(friction: float = 0.3, **start: Any) -> Case:
-    case = resolve_case({**read_toml(shipped("case")["climber-dimer"]), "run": CLIMB}, name="climber-dimer")
+    case = Case.read({**read_toml(shipped("case")["climber-dimer"]), "run": CLIMB}, name="climber-dimer")
     contact = replace(case.contact, friction_bead_wall=friction, friction_bead_bead=friction)
     begin = {"replicates": 1, "angle_spread": 0.0, "gap_spread": 0.0, "spacing": 0.1, **start}
     return replace(case, contact=contact, walkers=(replace(case.walkers[0], **begin),))
@@ -464,7 +465,7 @@ def test_a_dimer_on_a_wall_is_one_on_a_plane_at_90_degrees() -> None:
     tables = read_toml(shipped("case")["climber-dimer"])
     assert tables["boundary"]["tilt"] == "90 deg"
     tables["dimers"]["facing"] = "right"
-    assert resolve_case(tables).determinants() == load_case("climber-dimer").determinants()
+    assert Case.read(tables).determinants() == load_case("climber-dimer").determinants()
 
 
 @pytest.mark.parametrize("friction", list(FRICTIONS))
@@ -483,12 +484,12 @@ def test_with_the_large_bead_below_it_falls(climbers: dict[str, Path], friction:
 
 def test_a_climbers_weight_pulls_along_the_axis() -> None:
     case = on_a_wall()
-    assert (case.pressing_gravity, case.axial_gravity) == (0.0, case.gravity)
+    assert (case.pressing_gravity, case.axial_gravity) == (0.0, case.environment.gravity)
     assert predict(case)["alignment"]["u"] < 0.0  # it stands on its head
     with pytest.raises(InputError, match=r"dimers\.facing"):
-        resolve_case(document(boundary={"uphill": "90 deg", "tilt": "90 deg"}, dimers={"facing": "up"}))
+        Case.read(document(boundary={"uphill": "90 deg", "tilt": "90 deg"}, dimers={"facing": "up"}))
     with pytest.raises(InputError, match=r"dimers\.facing"):
-        resolve_case(document(dimers={"facing": "up"}))
+        Case.read(document(dimers={"facing": "up"}))
 
 
 @pytest.fixture(scope="module")
@@ -496,7 +497,7 @@ def upright(once: Callable[..., Path]) -> Path:
     """The shipped climber, with its spread of starts, for a fifth of its time."""
     run = {"time_step": "2 us", "cycles": 36, "settling_cycles": 24, "samples_per_cycle": 1}
     tables = {**read_toml(shipped("case")["climber"]), "run": run}
-    case, engine = resolve_case(tables, name="climber"), find_engine(None)
+    case, engine = Case.read(tables, name="climber"), find_engine(None)
     out = once("upright", lambda folder: make_runs([case], folder, engine))
     return finished_places(out)[run_place(case, engine, out).name]
 

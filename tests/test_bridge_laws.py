@@ -17,10 +17,11 @@ import pytest
 from tests.conftest import call, make_case, to_toml
 from walkers import run as run_case
 from walkers.check.bridges import willett_simple
-from walkers.inputs.errors import InputError
+from walkers.errors import InputError
+from walkers.inputs.case import Liquid
 from walkers.inputs.loads import bridge_at_rest, dimer_of
 from walkers.inputs.reading import load_case
-from walkers.inputs.run_tables import limits_of
+from walkers.inputs.run import limits_of
 from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces, UnusableLawError
 from walkers.physics.capillary import (
@@ -30,7 +31,6 @@ from walkers.physics.capillary import rupture_distance as rupture_of_lian
 from walkers.physics.laplace import force_curve, rupture_distance
 from walkers.physics.laws import LAWS, by_name, rabinovich, willett, young_laplace
 from walkers.physics.laws import soulie as soulie_law
-from walkers.physics.matter import Liquid
 from walkers.physics.time_step import AUTO_FRACTIONS, WALKER_FRACTIONS
 from walkers.templates.bridge_tables import TOLERANCE, tabulated
 
@@ -364,10 +364,10 @@ def test_published_gamma0() -> None:
     """Of the walker of Fig. 2 at 2 to 6 g, and of those of Fig. 4."""
     for acceleration, gamma0 in ((2, 0.191), (3, 0.286), (4, 0.381), (5, 0.476), (6, 0.572)):
         case = make_case(drive={"peak_acceleration": f"{acceleration} g"})
-        assert dimer_of(case).gamma0(case.drive.peak_acceleration) == pytest.approx(gamma0, abs=6e-4)
+        assert dimer_of(case).gamma0(case.excitation.peak_acceleration) == pytest.approx(gamma0, abs=6e-4)
     for name, gamma0 in (("fig4a", 0.74), ("fig4b", 3.5)):
         case = load_case(name)
-        assert dimer_of(case).gamma0(case.drive.peak_acceleration) == pytest.approx(gamma0, rel=0.01)
+        assert dimer_of(case).gamma0(case.excitation.peak_acceleration) == pytest.approx(gamma0, rel=0.01)
 
 
 def test_time_step_limits_of_the_walker() -> None:

@@ -10,10 +10,10 @@ import pytest
 from tests.conftest import SHORT, call, document, make_case
 from walkers import load
 from walkers import run as run_case
-from walkers.inputs.errors import InputError
-from walkers.inputs.readable import differing, flattened
-from walkers.inputs.reading import resolve_case
+from walkers.errors import InputError
+from walkers.inputs.case import Case
 from walkers.sweeps.by_hand import take_in, write_folder
+from walkers.sweeps.readable import differing, flattened
 
 
 def _edit(folder: Path, **values: str) -> None:
@@ -79,11 +79,11 @@ def test_an_edited_parameter_is_another_case(name: str, folder: Path, run_direct
     found, same = load(folder), load(run_directory(**{"run": SHORT, **changes}))
     # Where the walker stands at first and its time step are those of the case as it was.
     assert found.result["velocity"]["mean"] == pytest.approx(same.result["velocity"]["mean"], rel=5e-3)
-    assert found.case.drive.peak_acceleration == pytest.approx(same.case.drive.peak_acceleration, rel=1e-3)
+    assert found.case.excitation.peak_acceleration == pytest.approx(same.case.excitation.peak_acceleration, rel=1e-3)
     assert found.case.contact == same.case.contact
     # What has another number is no longer what the library calls so.
     assert found.case.liquid.name == (None if "liquid" in changes else "Si AK5")
-    assert found.case.material == (None if "beads" in changes else "ruby")
+    assert found.case.beads.material == (None if "beads" in changes else "ruby")
     assert found.case.run.period == pytest.approx(same.case.run.period)
     told, *constant = found.result["by_hand"][1:]
     assert told.startswith("the deck was edited: ")
@@ -92,7 +92,7 @@ def test_an_edited_parameter_is_another_case(name: str, folder: Path, run_direct
     assert "other line" not in told
     # What commands show and compare.
     values = flattened(found.case.as_dict())
-    assert values["drive.peak_acceleration"] == found.case.drive.peak_acceleration
+    assert values["drive.peak_acceleration"] == found.case.excitation.peak_acceleration
     assert values["run.time_step"] == found.case.run.time_step
     assert differing([flattened(make_case(run=SHORT).as_dict()), values])
 
@@ -183,7 +183,7 @@ def test_a_deck_says_how_a_run_would_go_on(name: str, tmp_path: Path) -> None:
 def test_a_deck_has_the_cycles_of_the_run_that_exists(tmp_path: Path) -> None:
     """Otherwise those tried first, and what is read of it says so."""
     turning = {"dimers": {"angle": "4 deg"}, "drive": {"peak_acceleration": "8 g"}, "run": {"most_cycles": 14}}
-    case = resolve_case({**document(**turning), "run": turning["run"]}, name="turning")
+    case = Case.read({**document(**turning), "run": turning["run"]}, name="turning")
     first = write_folder(case, tmp_path / "first").parent
     made = run_case(case, tmp_path)
     again = made.export("deck", tmp_path / "again").parent

@@ -14,15 +14,14 @@ import pytest
 
 import walkers
 from tests.conftest import document, make_case
+from walkers.inputs import units
 from walkers.inputs.axes import Range
 from walkers.inputs.boundary import Boundary, Round
 from walkers.inputs.case import Case
-from walkers.inputs.changes import changed
-from walkers.inputs.drive import Harmonic, waveform
+from walkers.inputs.drive import Sine, waveform
+from walkers.inputs.keys import changed
 from walkers.inputs.loads import bridge_at_rest, contact_loads
-from walkers.inputs.reading import resolve_case
-from walkers.physics import units
-from walkers.physics.units import Kind, quantity_text
+from walkers.inputs.units import Kind, quantity_text
 from walkers.postprocess.analyses.piles import _bed, _joined
 from walkers.postprocess.analyses.walking import _rows, spread
 from walkers.postprocess.analyses.work import work_of
@@ -34,7 +33,7 @@ from walkers.postprocess.scene import Scene, turns_of
 from walkers.postprocess.uncertainty import band_of
 from walkers.runner.launch import Progress
 from walkers.runner.manifest import _iso
-from walkers.runner.summary import describe, summarise
+from walkers.show import describe, summarise
 from walkers.templates.deck import render_deck, render_shared_deck
 from walkers.templates.scene import place
 
@@ -54,7 +53,7 @@ PILE: dict[str, Any] = {
 def case_of(**changes: Any) -> Case:
     """The reference's liquid, contacts and drive with other bodies, boundary or run."""
     tables = {name: table for name, table in document().items() if name not in {"dimers", "boundary", "run"}}
-    return resolve_case(
+    return Case.read(
         {**tables, "boundary": {"material": "chromium-coated glass"}, "run": FEW, **changes}, name="made up"
     )
 
@@ -63,7 +62,7 @@ def resting(case: Case, frames: int | None = None) -> Motion:
     """The beads of a case at their starts, in all samples of its run."""
     scene, placed = place((case,))
     count = case.run.cycles * case.run.samples_per_cycle + 1 if frames is None else frames
-    time = np.arange(count) / (case.run.samples_per_cycle * case.drive.frequency)
+    time = np.arange(count) / (case.run.samples_per_cycle * case.excitation.frequency)
     position = np.tile([bead.centre for bead in scene.beads], (count, 1, 1))
     nothing = np.zeros_like(position)
     return Motion(
@@ -129,11 +128,11 @@ def test_a_key_within_a_list_puts_what_says_the_same_out_of_force() -> None:
 def test_a_phase_of_a_waveform_is_an_earlier_begin_of_the_whole(name: str) -> None:
     time, frequency, phase = np.linspace(0.0, 0.1, 200), 20.0, radians(50.0)
 
-    def acceleration(first: Harmonic, time: Any) -> Any:
+    def acceleration(first: Sine, time: Any) -> Any:
         waves = waveform(name, first)
         return sum(one.peak_acceleration * np.sin(one.angular_frequency * time + one.phase) for one in waves)
 
-    plain = Harmonic((1.0, 0.0, 0.0), frequency, 10.0)
+    plain = Sine((1.0, 0.0, 0.0), frequency, 10.0)
     earlier = acceleration(plain, time + phase / (2.0 * pi * frequency))
     np.testing.assert_allclose(acceleration(replace(plain, phase=phase), time), earlier, atol=1e-9)
     assert np.abs(earlier).max() > 9.0
@@ -151,7 +150,7 @@ def test_a_bead_on_a_slope_presses_with_a_part_of_its_weight() -> None:
     case = make_case(boundary={"tilt": "60 deg"})
     loads, modulus = contact_loads(case), 5e7 / (2.0 * (1.0 - 0.09))
     for number, radius in enumerate((LARGE, SMALL)):
-        weight = 4.0 / 3.0 * pi * radius**3 * case.density * case.gravity
+        weight = 4.0 / 3.0 * pi * radius**3 * case.beads.density * case.environment.gravity
         pressed = 4.0 / 3.0 * modulus * sqrt(radius) * loads.overlaps[number] ** 1.5
         assert pressed - bridge_at_rest(case, radius, inf).pull == pytest.approx(0.5 * weight, rel=1e-6)
     reduced = LARGE * SMALL / (LARGE + SMALL)
@@ -212,7 +211,7 @@ def test_what_show_prints_of_a_case_is_in_its_units() -> None:
     assert f"1 small and 1 large, {1e6 * DENSITY * volume:.4g} mg, {1e9 * volume:.4g} µL with " in text
     assert f"with {1e7 * volume:.3g} µL of liquid" in text
     omega = 2.0 * pi * 80.0
-    assert f"a0 = 4 g (g = 9.8 m/s², as in the paper; gravity is {case.gravity:g} m/s²), " in text
+    assert f"a0 = 4 g (g = 9.8 m/s², as in the paper; gravity is {case.environment.gravity:g} m/s²), " in text
     assert f"amplitude {1e3 * 39.2 / omega**2:.4g} mm, peak velocity {1e3 * 39.2 / omega:.4g} mm/s" in text
     wall = next(line for line in text.splitlines() if "bead 1 on substrate" in line)
     assert f" {1e6 * 4.0 * pi * case.liquid.surface_tension * LARGE:.4g} µN" in wall
@@ -250,9 +249,9 @@ def test_a_result_rests_on_the_values_of_the_case_that_is_asked_for(
     """Two cases of the same numbers have a run in common; one says a value that the other leaves out."""
     tables = document(run=FEW)
     tables["contact"] = {name: value for name, value in tables["contact"].items() if name != "rolling_friction"}
-    plain = resolve_case(tables, name="test")
+    plain = Case.read(tables, name="test")
     contact = {**tables["contact"], "rolling_friction": plain.contact.rolling_friction}
-    said = resolve_case({**tables, "contact": contact}, name="test")
+    said = Case.read({**tables, "contact": contact}, name="test")
     assert said == plain
     run_directory(plain)
     found = []
@@ -311,7 +310,7 @@ def test_the_work_of_two_harmonics_with_phases() -> None:
         position[..., axis] -= way * np.cos(omega * motion.time + phase)[:, None]
         velocity[..., axis] += way * omega * np.sin(omega * motion.time + phase)[:, None]
     (group,) = replace(motion, position=position, velocity=velocity).groups
-    mass = 4.0 / 3.0 * pi * (LARGE**3 + SMALL**3) * case.density
+    mass = 4.0 / 3.0 * pi * (LARGE**3 + SMALL**3) * case.beads.density
     expected = pi * mass * (39.2 * 1e-4 + 2.0 * 19.6 * 3e-5)  # the second one has two periods in a cycle
     np.testing.assert_allclose(work_of(group), np.full((6, 1), expected), rtol=1e-3)
 

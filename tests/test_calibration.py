@@ -27,9 +27,7 @@ from walkers.calibration.calibrate import (
     wave_sweep,
 )
 from walkers.calibration.emulator import Emulator, Emulators, FloatArray, Space, fit_emulators
-from walkers.calibration.posterior import Density, Posterior, log_likelihood, observation_covariance, sample_posterior
-from walkers.calibration.report import figures_of, record_of, words_of
-from walkers.inputs.calibration import (
+from walkers.calibration.file import (
     Calibration,
     Observation,
     Parameter,
@@ -37,7 +35,9 @@ from walkers.inputs.calibration import (
     load_calibration,
     read_calibration,
 )
-from walkers.inputs.errors import InputError
+from walkers.calibration.posterior import Density, Posterior, log_likelihood, observation_covariance, sample_posterior
+from walkers.calibration.report import figures_of, record_of, words_of
+from walkers.errors import InputError
 from walkers.inputs.reading import shipped
 from walkers.sweeps.scheduler import Options
 

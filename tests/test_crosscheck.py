@@ -31,14 +31,15 @@ from walkers.check.scenes import (
     second_engine,
     standing,
 )
+from walkers.errors import InputError
 from walkers.inputs.boundary import BOTTOM, Flat, Round, Wall
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
-from walkers.inputs.errors import InputError
-from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped
+from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.toml import read_toml
 from walkers.physics.bridge import Surfaces
 from walkers.physics.contact import hertz_overlap, reduced_modulus
-from walkers.physics.laws import law_of
+from walkers.physics.laws import by_name
 from walkers.postprocess.dump import BinaryDump, FloatArray, local_frames
 from walkers.postprocess.motion import Motion, read_motion
 from walkers.runner.binary import find_engine
@@ -126,7 +127,7 @@ def test_bridges_are_the_law_between_its_knots() -> None:
     case = matter()
     case = replace(case, liquid=replace(case.liquid, dynamic_viscosity=0.01))
     bridges = one_bead(case, (0.0, 0.0, RADIUS), without=()).constants.bridges
-    curve = law_of(case.liquid)(Surfaces.of(RADIUS, inf, case.liquid, case.contact.minimum_separation_ratio))
+    curve = by_name(case.liquid.law)(Surfaces.of(RADIUS, inf, case.liquid, case.contact.minimum_separation_ratio))
     for gap in np.linspace(0.0, 0.999 * curve.rupture, 777):
         expected = curve.forces(np.array([gap])).columns()[0]
         assert kernels.bridge_forces(bridges, bridges.between[0, -1], gap) == pytest.approx(expected, rel=1e-8)
@@ -188,7 +189,7 @@ def test_other_kinds_of_cases_agree(name: str, tmp_path: Path) -> None:
 
 def test_a_restart_keeps_what_is_between_beads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A settling pile follows LIGGGHTS through a restart; it would not if springs between beads were forgotten."""
-    motion = run(shortened(resolve_case(pile(24), name="pile"), 9), tmp_path).motion
+    motion = run(shortened(Case.read(pile(24), name="pile"), 9), tmp_path).motion
     settling = replace(
         motion, **{name: getattr(motion, name)[:7] for name in ("time", "position", "velocity", "spin", "frames")}
     )
@@ -255,7 +256,7 @@ def test_a_bead_at_rest_in_a_cylinder_presses_with_its_weight(bench: Bench) -> N
         liquid=DRY, contact={"restitution": 0.3}, environment={"gravity": f"{GRAVITY} m/s^2"},
         boundary={"tilt": "90 deg", "uphill": "90 deg"},
     )  # fmt: skip
-    wall, weight = Round(3e-3), 4.0 / 3.0 * pi * RADIUS**3 * case.density * GRAVITY
+    wall, weight = Round(3e-3), 4.0 / 3.0 * pi * RADIUS**3 * case.beads.density * GRAVITY
     overlap = hertz_overlap(weight, RADIUS, reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio))
     bead = Bead(0, (0.0, -(wall.radius - RADIUS + overlap), 5e-3), RADIUS)
     (row,), _ = _rows(bench, Plan(case, standing([bead], [FLOOR, wall]), recording(20_000, 20_000)))
@@ -374,7 +375,7 @@ def test_liquid_is_conserved(bench: Bench, ranks: int) -> None:
     @cache
     def rupture(one: int, other: int, volume: float) -> float:
         meeting = Surfaces.of(sizes[one], sizes[other] if other >= 0 else inf, case.liquid, 0.01)
-        return law_of(case.liquid)(replace(meeting, volume=volume)).rupture
+        return by_name(case.liquid.law)(replace(meeting, volume=volume)).rupture
 
     pairs = [(one, other) for one in range(16) for other in range(one + 1, 16)]
     for step, place in enumerate(places_then):

@@ -8,7 +8,8 @@ import pytest
 
 from tests.conftest import document, make_case
 from walkers.inputs.boundary import Boundary
-from walkers.inputs.reading import load_case, resolve_case, shipped
+from walkers.inputs.case import Case
+from walkers.inputs.reading import load_case, shipped
 from walkers.templates.deck import CONTENT_VERSION, Deck, Segment, render_deck, render_shared_deck, settling_steps
 from walkers.templates.scene import place
 
@@ -29,7 +30,7 @@ def test_numbers_are_rendered_in_full_precision(name: str) -> None:
     given = dict(re.findall(r"^variable +(\w+) string (\S+)", deck, re.MULTILINE))
     assert "timestep        ${time_step}\n" in deck
     assert 1.0 / (float(given["frequency"]) * int(given["steps_per_cycle"])) == case.run.time_step
-    assert float(given["friction_bead_wall"]) == case.contact.friction_bead_wall
+    assert float(given["friction_bead_wall"]) == case.contact.friction.bead_wall
     scene, _ = place((case,))
     starts = [tuple(map(float, line[3:6])) for line in _lines(deck, "create_atoms")]
     assert starts == [bead.centre for bead in scene.beads]
@@ -61,7 +62,7 @@ def test_a_change_of_what_decks_compute_asks_for_another_version() -> None:
     several = document(contact={"rolling_friction": 0.01}, boundary={"tilt": "20 deg"})
     several["drive"] = {"harmonics": [*harmonics, {"frequency": "120 Hz", "peak_acceleration": "1 g"}]}
     thick = {"liquid": {"viscosity_ratio": 2.0}, "dimers": {"replicates": 3, "angle": "10 deg"}}
-    decks = [render_deck(case) for case in (make_case(), make_case(**thick), resolve_case(several))]
+    decks = [render_deck(case) for case in (make_case(), make_case(**thick), Case.read(several))]
     decks += [render_deck(make_case(**thick, drive={"frame": "lab", "axis": axis})) for axis in "xyz"]
     shared = [
         make_case(),

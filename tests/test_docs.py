@@ -83,7 +83,7 @@ _NAME = re.compile(r"(?<!`)`([A-Za-z_][\w.]*)`(?!`)")
 _OF_PACKAGE = re.compile(r"(?<![\w./-])walkers(?:\.[A-Za-z_]\w*)+")
 _FILES = ("pvd", "parquet", "sif", "def", "css")
 """Suffixes of files that are named ``walkers``."""
-_ERRORS = tuple(import_module(one) for one in ("builtins", "walkers.inputs.errors", "walkers.runner.failures"))
+_ERRORS = tuple(import_module(one) for one in ("builtins", "walkers.errors", "walkers.runner.failures"))
 
 
 def _has(holder: object, parts: list[str]) -> bool:

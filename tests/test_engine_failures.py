@@ -39,7 +39,8 @@ from tests.conftest import (
 )
 from walkers import run as run_case
 from walkers.inputs.case import Case
-from walkers.inputs.reading import read_toml, resolve_case, shipped
+from walkers.inputs.reading import shipped
+from walkers.inputs.toml import read_toml
 from walkers.runner import binary, failures
 from walkers.runner.binary import find_engine, plugin_of
 from walkers.runner.directory import write_deck
@@ -377,7 +378,7 @@ def test_a_disk_without_room_for_the_dump_and_one_that_fills_up_during_the_run(t
 def _brief_pile(**run: object) -> Case:
     """Settled and shaken for some hundredths of a second."""
     brief = {"duration": "0.03 s", "time_step": "3 us", "longest_settling": "0.02 s", "segment": "0.01 s"}
-    return resolve_case({**read_toml(shipped("case")["pile-ci"]), "run": {**brief, **run}}, name="brief")
+    return Case.read({**read_toml(shipped("case")["pile-ci"]), "run": {**brief, **run}}, name="brief")
 
 
 def test_a_full_folder_of_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,11 +22,12 @@ from tests.conftest import PROGRAM, SHORT, call, document, fill, make_case, moun
 from tests.test_calibration import reduced
 from walkers import run as run_case
 from walkers.calibration.calibrate import _determinants, _kept, calibrate
-from walkers.inputs.calibration import read_calibration
-from walkers.inputs.errors import InputError
-from walkers.inputs.reading import load_case, read_toml
+from walkers.calibration.file import read_calibration
+from walkers.errors import InputError
+from walkers.inputs.reading import load_case
+from walkers.inputs.toml import read_toml
 from walkers.physics.bridge import Surfaces
-from walkers.physics.laws import law_of
+from walkers.physics.laws import by_name
 from walkers.postprocess.analysis import current_result, read_result, tabulate
 from walkers.postprocess.dump import BinaryDump, DumpError, local_frames
 from walkers.postprocess.motion import read_bridges, read_motion
@@ -435,6 +436,6 @@ def test_an_open_bridge_pulls_with_the_capillary_force(tmp_path: Path) -> None:
     ends = {1: (large, inf), 2: (small, inf), 3: (small, large)}
     for contact, gap, found in opened[["contact", "gap", "normal_force"]].itertuples(index=False):
         surfaces = Surfaces.of(*ends[contact], case.liquid, case.contact.minimum_separation_ratio)
-        curve = law_of(case.liquid)(surfaces)
+        curve = by_name(case.liquid.law)(surfaces)
         assert gap < curve.rupture
         assert found == pytest.approx(curve.forces(np.array([gap])).pull[0], rel=1e-6)

@@ -15,10 +15,10 @@ import pytest
 
 import walkers
 from tests.conftest import call, document, mounted, to_toml
-from walkers.inputs.readable import differing, flattened
 from walkers.runner.directory import MANIFEST_NAME, finished_places, locked
 from walkers.runner.files import read_json, write_json
 from walkers.sweeps.folder import bytes_text, weigh
+from walkers.sweeps.readable import differing, flattened
 
 OTHER, FASTER = {"liquid.name": "Si AK10"}, {"drive.frequency": "90 Hz"}
 SHORTEST = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}

@@ -20,11 +20,10 @@ import pytest
 from tests.conftest import PROGRAM, SHORT, call, document, make_case, to_toml
 from walkers import run as run_case
 from walkers.archive.writing import write_archive
+from walkers.errors import InputError
 from walkers.inputs.case import Case
-from walkers.inputs.errors import InputError
-from walkers.inputs.reading import load_case, resolve_case
+from walkers.inputs.reading import load_case
 from walkers.inputs.sweep import load_sweep
-from walkers.inputs.text import rendered
 from walkers.postprocess.analysis import current_result
 from walkers.postprocess.drawing import new_figure, plain_text, save_figure
 from walkers.postprocess.motion import read_motion
@@ -33,9 +32,10 @@ from walkers.postprocess.report.run import result_html
 from walkers.runner.directory import CASE_NAME, case_of
 from walkers.runner.files import write_json
 from walkers.runner.manifest import record_tables
-from walkers.runner.summary import describe, summarise
+from walkers.show import describe, summarise
 from walkers.sweeps.table import load
 from walkers.templates.deck import render_deck
+from walkers.text import rendered
 
 HOSTILE: dict[str, str] = {
     "three double quotes": '"""; open("pwned", "w"); """',
@@ -117,8 +117,8 @@ def stranger(run_directory: Callable[..., Path], tmp_path: Path) -> Callable[[st
 @EACH
 def test_a_title_is_no_line_of_a_deck(name: str) -> None:
     tables = document(run=SHORT, beads={"density": "4 g/cm^3"})
-    plain, text = resolve_case(tables, name="plain"), HOSTILE[name]
-    odd = _with_texts(resolve_case({**tables, "title": text}, name=text), text)
+    plain, text = Case.read(tables, name="plain"), HOSTILE[name]
+    odd = _with_texts(Case.read({**tables, "title": text}, name=text), text)
     decks = [render_deck(case) for case in (plain, odd)]
     assert (decks[1].text, decks[1].files) == (decks[0].text, decks[0].files)
 

@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 
 from tests.conftest import call, document, origins, to_toml
+from walkers.errors import InputError
 from walkers.inputs.case import Case
-from walkers.inputs.errors import InputError
 from walkers.inputs.library import library_of
-from walkers.inputs.reading import load_case, resolve_case
+from walkers.inputs.reading import load_case
 from walkers.inputs.sweep import expand
+from walkers.inputs.units import TEMPERATURE, parse_quantity
 from walkers.physics.mixtures import water_glycerol
-from walkers.physics.units import TEMPERATURE, parse_quantity
 from walkers.sweeps.spread import spread_sweep
 
 SHIPPED = library_of({})
@@ -69,7 +69,7 @@ def test_water_and_glycerol_as_tabulated(
 def test_a_mixture_follows_its_fraction_and_temperature() -> None:
     def of(**liquid: Any) -> Case:
         tables = document(liquid={"name": "water-glycerol", "mass_fraction": 0.87, **liquid})
-        return resolve_case(tables, name="mixed")
+        return Case.read(tables, name="mixed")
 
     case = of()
     assert case.liquid.dynamic_viscosity == pytest.approx(0.1448)  # Cheng's formula by hand
@@ -108,7 +108,7 @@ def own(in_folder: Path) -> Path:
 def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(own: Path) -> None:
     case = load_case("mine.toml")
     friction, density = (origins(case)[key] for key in ("contact.friction.bead_wall", "beads.density"))
-    assert (case.density, case.contact.friction_bead_wall) == (2450.0, 0.21)
+    assert (case.beads.density, case.contact.friction.bead_wall) == (2450.0, 0.21)
     assert (density.origin, density.source) == ("own library", "library.toml, weighed")
     assert (friction.range, friction.guessed) == ((0.18, 0.24), False)
     assert origins(load_case("fig1b", {"beads.material": "my beads"}))["beads.density"].origin == "own library"
@@ -117,7 +117,7 @@ def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(own: Pat
     assert "contact.friction.bead_wall" in varied.keys
     sweep = expand({"case": "mine.toml", "axes": {"dimers.replicates": [1, 2]}}, source="s", name="s", folder=own)
     (own / "library.toml").unlink()
-    again = resolve_case(Case.from_dict(case.as_dict()).document, name="mine")
+    again = Case.read(Case.from_dict(case.as_dict()).document, name="mine")
     assert (again, again.determinants()) == (case, case.determinants())
     assert [point.density for point in sweep.cases()] == [2450.0, 2450.0]
     spread = expand({**varied.file, "case": "mine.toml"}, source="s", name="s", folder=own)

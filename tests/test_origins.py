@@ -12,12 +12,12 @@ import pytest
 
 import walkers
 from tests.conftest import REFERENCE, call, document, make_case, origins, to_toml
+from walkers.errors import InputError
 from walkers.inputs import library
 from walkers.inputs.case import Case
-from walkers.inputs.changes import changed, settings_of
-from walkers.inputs.errors import InputError
+from walkers.inputs.keys import changed, settings_of
 from walkers.inputs.origins import Origin
-from walkers.inputs.reading import load_case, resolve_case, shipped
+from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.gait import SEPARATED
 from walkers.postprocess.uncertainty import SPREAD_NAME, band_of, band_text, lines_of_rest, rests_on
@@ -87,12 +87,12 @@ def test_the_origins_tell_the_numbers_of_the_case(name: str) -> None:
     assert len(matter) >= 10
     told = settings_of(f"{one.key} = {one.text}" for one in matter)
     again = load_case(name, told)
-    assert (again.liquid, again.contact, again.density) == (case.liquid, case.contact, case.density)
+    assert (again.liquid, again.contact, again.density) == (case.liquid, case.contact, case.beads.density)
     assert {one.origin for one in again.origins if one.key in told} == {"given"}
 
 
 def test_another_material_loses_what_was_calibrated_and_says_so() -> None:
-    found = origins(resolve_case(GLASS))
+    found = origins(Case.read(GLASS))
     guessed = {key: one.text for key, one in found.items() if one.guessed}
     assert guessed == {
         "liquid.volume_fraction": "0.01",
@@ -120,13 +120,13 @@ def test_another_material_loses_what_was_calibrated_and_says_so() -> None:
 )
 def test_ranges_that_are_none_are_refused(ranges: dict[str, object], told: str) -> None:
     with pytest.raises(InputError) as caught:
-        resolve_case({**GLASS, "uncertain": ranges})
+        Case.read({**GLASS, "uncertain": ranges})
     assert told in str(caught.value)
 
 
 def test_a_changed_value_is_validated_like_a_file() -> None:
     case = load_case("fig1b", {"drive.frequency": "70 Hz"})
-    assert case == resolve_case(case.document, name="fig1b")
+    assert case == Case.read(case.document, name="fig1b")
     assert case.run.period == pytest.approx(1.0 / 70.0, rel=1e-12)
     for changes, told in (
         ({"drive.frequenzy": "70 Hz"}, 'did you mean "frequency"?'),
@@ -164,7 +164,7 @@ def test_a_case_changed_after_it_was_read_tells_nothing_of_its_values(tmp_path: 
     assert replace(again, gravity=0.0).origins == ()
     with pytest.raises(InputError, match="changed after it was read"):
         spread_sweep(changed)
-    faster = replace(case.drive, harmonics=(replace(case.drive.largest, frequency=120.0),))
+    faster = replace(case.drive, harmonics=(replace(case.excitation.largest, frequency=120.0),))
     with pytest.raises(ValueError, match=r'120 Hz, but time step and sampling of one of 80 Hz: use load_case\("fig1b"'):
         replace(case, drive=faster)
     stiff = replace(case, contact=replace(case.contact, youngs_modulus=1e10))
@@ -179,7 +179,7 @@ def test_what_is_called_uncertain_keeps_where_it_comes_from(tmp_path: Path) -> N
     ranges = {"liquid.surface_tension": ["15 mN/m", "25 mN/m"], "contact.friction.bead_wall": [0.2, 0.4]}
     tables = load_case("fig1b").document
     tables = {**tables, "uncertain": {**ranges, "dimers.radii[1]": ["0.19 mm", "0.21 mm"]}}
-    case, file = resolve_case(tables), tmp_path / "ranges.toml"
+    case, file = Case.read(tables), tmp_path / "ranges.toml"
     file.write_text(to_toml(tables))
     found = origins(case)
     tension, friction, radius = (found[key] for key in (*ranges, "dimers.radii[1]"))
@@ -236,7 +236,7 @@ def test_names_and_what_no_law_asks_for_do_not_determine_a_run() -> None:
         run={"settled_below": "1 mm/s", "silence": "20 s"},
     )
     del tables["liquid"]["name"]
-    named = resolve_case(tables)
+    named = Case.read(tables)
     assert named != case
     assert named.determinants() == case.determinants()
     assert make_case(run={"seed": 2}).determinants() != make_case().determinants()
@@ -256,7 +256,7 @@ def test_a_result_says_what_it_rests_on(run_directory: Callable[..., Path], tmp_
 
 def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     """Glass on polystyrene at 10 g walks or not as one guesses; the single number, exact to 1e-5, does not say so."""
-    case = resolve_case(GLASS, name="guessed")
+    case = Case.read(GLASS, name="guessed")
     spread = run_spread(case, runs_folder, Options(2), points=4)
     assert {one.key for one in spread.varied} == {one.key for one in case.origins if one.guessed}
     assert {one.key for one in spread.held} == {"contact.friction.bead_bead", "contact.rolling_friction"}
@@ -281,15 +281,15 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     own = done.result["velocity"]["mean"]
     assert f"({band_text((min(low, own), max(high, own)), 'm/s')}, 5 to 95 % of {band.points} draws" in done.describe()
     assert "uncertain parameters:" not in done.describe()
-    unspread = walkers.run(resolve_case({**GLASS, "run": {"cycles": 5}}, name="guessed"), runs_folder)
+    unspread = walkers.run(Case.read({**GLASS, "run": {"cycles": 5}}, name="guessed"), runs_folder)
     assert "uncertain parameters: volume fraction, viscosity ratio, contact angle, friction, restitution" in " ".join(
         unspread.describe().split()
     )
     with pytest.raises(InputError, match=r"uncertain.contact.restitution.*: expected a range that holds"):
-        spread_sweep(resolve_case({**GLASS, "uncertain": {"contact.restitution": [0.4, 0.8]}}, name="beside"))
+        spread_sweep(Case.read({**GLASS, "uncertain": {"contact.restitution": [0.4, 0.8]}}, name="beside"))
     # A case of which all is given has none.
     with pytest.raises(InputError, match="no value is uncertain"):
-        run_spread(resolve_case(REFERENCE), runs_folder, Options(2))
+        run_spread(Case.read(REFERENCE), runs_folder, Options(2))
 
 
 def test_spread_on_the_command_line(in_folder: Path) -> None:

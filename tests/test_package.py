@@ -23,8 +23,8 @@ from packaging.utils import canonicalize_name
 import walkers
 from tests.conftest import SHORT, call, document, to_toml
 from walkers.calibration.calibrate import calibrate
-from walkers.inputs.calibration import load_calibration
-from walkers.inputs.extras import EXTRAS, ExtraMissing, module_of
+from walkers.calibration.file import load_calibration
+from walkers.extras import EXTRAS, ExtraMissing, module_of
 from walkers.paper.make import make_figures
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.site import load_site

@@ -15,9 +15,10 @@ from PIL import Image
 from tests.conftest import call, run_shipped, shipped_sweep
 from tests.printed import letters, spoilt
 from walkers.inputs.axes import is_axis
-from walkers.inputs.changes import flatten
+from walkers.inputs.keys import flatten
 from walkers.inputs.loads import dimer_of
-from walkers.inputs.reading import load_case, read_toml, shipped
+from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.toml import read_toml
 from walkers.paper import published
 from walkers.paper.comparison import Value, _row, as_dict, as_markdown, compare, count, evaluate
 from walkers.paper.figures import OBSERVED, PARAMETERS, sensitivities, theory_of_cycles
@@ -292,7 +293,7 @@ def test_dimers_turn_as_the_pendulum_does_but_as_much_faster_as_their_beads_are_
     free = alignment_of(case)
     for number, walker in enumerate(trajectory.walkers):
         psi = trajectory.orientation[: end + 1, number]
-        theta = np.pi * case.drive.frequency * trajectory.time[: end + 1]
+        theta = np.pi * case.excitation.frequency * trajectory.time[: end + 1]
         predicted = turning(pendulum_of(case), float(psi[0]), theta, np.pi / 2.0 * walker.facing)
         turned = (psi[-1] - psi[begin]) / (predicted[-1] - predicted[begin])
         assert turned == pytest.approx(free["rate"] / free["rolling_rate"], rel=0.3)

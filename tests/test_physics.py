@@ -13,7 +13,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
 from walkers.physics.bridge import Surfaces
-from walkers.physics.laws import law_of
+from walkers.physics.laws import by_name
 from walkers.postprocess.gait import Walk, gait, settled_samples, walk
 from walkers.postprocess.motion import Group
 from walkers.runner.binary import find_engine
@@ -91,8 +91,8 @@ def test_bridges_drag_rolling_beads_that_nothing_else_holds(trajectory: Moved, f
     case, dimer = moved.case, dimer_of(moved.case)
     inertia = np.diag([dimer.total_mass, *(0.4 * mass for mass in dimer.masses)])
     answer = np.linalg.solve(
-        1j * case.drive.largest.angular_frequency * inertia + _resistance(case),
-        np.array([dimer.total_mass * case.drive.peak_acceleration, 0.0, 0.0]),
+        1j * case.excitation.largest.angular_frequency * inertia + _resistance(case),
+        np.array([dimer.total_mass * case.excitation.peak_acceleration, 0.0, 0.0]),
     )
     settled = settled_samples(moved)
     found = np.sqrt(2.0 * np.mean(moved.velocity[settled, 0, :, 0] ** 2, axis=0))
@@ -112,7 +112,7 @@ def _resistance(case: Case) -> np.ndarray:
         (small, large, [0.0, 1.0, 1.0], [0.0, -1.0 / large, 1.0 / small]),
     ):
         surfaces = Surfaces.of(radius, other, case.liquid, case.contact.minimum_separation_ratio)
-        _, _, sliding, coupling, rolling = law_of(case.liquid)(surfaces).forces(np.zeros(1)).columns()[0]
+        _, _, sliding, coupling, rolling = by_name(case.liquid.law)(surfaces).forces(np.zeros(1)).columns()[0]
         motions = np.array([slides, rolls])
         total += motions.T @ np.array([[sliding, coupling], [coupling, rolling]]) @ motions
     return total
@@ -122,7 +122,7 @@ def _resistance(case: Case) -> np.ndarray:
 def test_a_cycle_is_a_whole_multiple_of_the_sampling_interval(frequency: str, step: str, samples: int) -> None:
     case = make_case(drive={"frequency": frequency}, run={"time_step": step, "samples_per_cycle": samples})
     assert case.run.steps_per_cycle % samples == 0
-    assert case.run.steps_per_cycle * case.run.time_step * case.drive.frequency == pytest.approx(1.0, rel=1e-14)
+    assert case.run.steps_per_cycle * case.run.time_step * case.excitation.frequency == pytest.approx(1.0, rel=1e-14)
     assert step == "auto" or case.run.time_step <= 1.7e-6 * (1 + 1e-12)
 
 

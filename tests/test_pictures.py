@@ -18,8 +18,8 @@ from PIL import Image
 import walkers
 from tests.conftest import call
 from tests.printed import letters, spoilt
+from walkers.errors import InputError
 from walkers.inputs.boundary import Boundary
-from walkers.inputs.errors import InputError
 from walkers.postprocess.analysis import figures_of, plot_run
 from walkers.postprocess.drawing import series_look, styled
 from walkers.postprocess.figures import _leaders
@@ -276,7 +276,7 @@ def test_pictures_are_as_far_apart_as_the_slow_motion_says(motion: Motion) -> No
     np.testing.assert_allclose(times.frame * np.median(np.diff(motion.time)), times.time, atol=1e-12)
     assert film_times(motion, FilmOptions()).slowdown == 100.0  # 0.1 s in ten seconds
     strobed = film_times(motion, FilmOptions(slowdown=1.0))
-    cycles = strobed.time * motion.case.drive.frequency
+    cycles = strobed.time * motion.case.excitation.frequency
     assert strobed.stroboscopic
     np.testing.assert_allclose(cycles, np.round(cycles), atol=1e-9)
     part = film_times(motion, FilmOptions(slowdown=20.0, begin=0.02, end=0.05))

@@ -24,10 +24,11 @@ import pytest
 import walkers
 from tests.conftest import HALF, PROGRAM, call, engines_in, open_run, to_toml, wait_for
 from tests.printed import spoilt
+from walkers.errors import InputError
 from walkers.inputs.case import Case
-from walkers.inputs.errors import InputError
-from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped
+from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.sweep import expand
+from walkers.inputs.toml import read_toml
 from walkers.postprocess.analyses.piles import Pile
 from walkers.postprocess.analysis import current_result, figures_of, tables_of, tabulate
 from walkers.postprocess.motion import FLOOR, read_bridges, read_motion
@@ -37,7 +38,7 @@ from walkers.runner.directory import run_place, segment_directories
 from walkers.runner.failures import EngineError, EngineKilled, RunBusy
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
-from walkers.runner.summary import notes
+from walkers.show import notes
 from walkers.sweeps.climbing import Condition, conditions_in, describe_climbs, leaders, summarise_climbs, survival
 from walkers.sweeps.climbing_figure import climbs_figure
 from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep
@@ -54,7 +55,7 @@ def document(**changes: dict[str, Any]) -> dict[str, Any]:
 
 
 def small(**changes: dict[str, Any]) -> Case:
-    return resolve_case(document(**changes), name="pile-ci")
+    return Case.read(document(**changes), name="pile-ci")
 
 
 FloatArray = npt.NDArray[np.float64]
@@ -73,7 +74,7 @@ def run(pile_run: Path) -> Path:
 
 
 def brief() -> Case:
-    return resolve_case(document(**OF_BRIEF), name="brief")
+    return Case.read(document(**OF_BRIEF), name="brief")
 
 
 @dataclass(frozen=True)
@@ -150,7 +151,7 @@ def test_a_pile_settles_is_shaken_and_is_whole(run: Path) -> None:
     assert sorted(motion.radius) == pytest.approx(sorted(case.all_radii))
     assert int(motion.large.sum()) == case.mixture.counts[1]
     assert motion.time[0] < 0.0
-    assert motion.time[-1] == pytest.approx(case.run.cycles / case.drive.frequency)
+    assert motion.time[-1] == pytest.approx(case.run.cycles / case.excitation.frequency)
     every = case.run.steps_per_sample * case.run.time_step
     np.testing.assert_allclose(np.diff(motion.time), every)
     # All beads are within the container, but for overlaps, and on its floor.
@@ -330,14 +331,14 @@ def test_a_bad_pile_is_told_by_its_key(changes: dict[str, dict[str, Any]], key: 
     tables = document(**changes)
     tables["mixture"] = {name: value for name, value in tables["mixture"].items() if value is not None}
     with pytest.raises(InputError, match=re.escape(key)):
-        resolve_case(tables, source="bad.toml", name="bad")
+        Case.read(tables, source="bad.toml", name="bad")
 
 
 def test_counts_of_beads_by_fill_height_mass_and_number() -> None:
     tables = document()
     del tables["mixture"]["count"]
     tables["mixture"]["fill_height"] = "2 mm"
-    by_height = resolve_case(tables, name="filled").mixture
+    by_height = Case.read(tables, name="filled").mixture
     by_mass, by_number = load_case("pile-fig1a").mixture, small(mixture={"mixed_by": "number"}).mixture
     assert None not in (by_height, by_mass, by_number)
     assert 60 <= sum(by_height.counts) <= 90  # a packing fraction of 0.55, with beads of 0.24 mm³ in the mean
@@ -543,7 +544,7 @@ def test_a_climber_that_leaves_the_container_ends_the_run(tmp_path: Path) -> Non
     tables["placed"] = [{"radius": f"{r} mm", "at": [f"{2.5001 - r} mm", "0 mm", f"{z} mm"]} for r, z in places]
     tables["boundary"]["height"] = "2.6 mm"
     tables["run"] |= {"duration": "1 s", "segment": "0.05 s"}
-    finished = walkers.run(resolve_case(tables, name="cluster"), tmp_path)
+    finished = walkers.run(Case.read(tables, name="cluster"), tmp_path)
     assert finished.result["driven"] == pytest.approx(3.2e-3 / 4.79e-3, abs=0.1)
     assert "over its walls" in read_json(finished.directory / MANIFEST_NAME)["ended"]
     assert "climbers left the container" in finished.describe()
@@ -564,7 +565,7 @@ def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(tm
         for radius, height in zip(beads, (8.0, 7.18135), strict=True)
     ]
     tables["run"]["duration"] = "0.5 s"
-    finished = walkers.run(resolve_case(tables, name="cluster"), tmp_path)
+    finished = walkers.run(Case.read(tables, name="cluster"), tmp_path)
     (climb,) = finished.result["climbs"]
     assert climb["speed"] * 1e3 == pytest.approx(4.79, rel=0.03)
     assert (climb["size"], climb["large"], climb["leader_large"], climb["walls"]) == (2, 1, True, ["+x"])
@@ -577,14 +578,14 @@ def test_placed_beads_reach_the_side_of_a_cylinder() -> None:
     tables["boundary"]["shape"] = "cylinder"
     for number, bead in enumerate(tables["placed"]):
         bead["at"] = ["0 mm", "0 mm", f"{8 - 2 * number} mm"]
-    case = resolve_case(tables, name="cylinder")
+    case = Case.read(tables, name="cylinder")
     assert [radius > case.border for radius in case.all_radii] == [True, False, False]
     for turn, beyond in product((0.0, 0.3), (-1e-3, 0.02)):
         reach = 2.5 - 0.545 + beyond
         place = [f"{reach * np.cos(turn)} mm", f"{reach * np.sin(turn)} mm", "8 mm"]
         tables["placed"] = [{"radius": "0.545 mm", "at": place}]
         with pytest.raises(InputError, match="within the boundary") if beyond > 0.0 else nullcontext():
-            resolve_case(tables, name="cylinder")
+            Case.read(tables, name="cylinder")
 
 
 def test_ranks_take_cores_of_this_machine_and_of_a_cluster() -> None:
@@ -657,8 +658,8 @@ def test_a_band_of_the_share_that_has_climbed_does_not_fall(monkeypatch: pytest.
 def test_a_run_shorter_than_a_segment_is_of_the_same_condition(run: Path) -> None:
     """And counts no more, beside the longer one with the same beginning."""
     tables = read_toml(shipped("case")["pile-ci"])
-    short = resolve_case({**tables, "run": {**tables["run"], **QUICK, "duration": "0.01 s"}}, name="pile-ci")
-    longer = resolve_case({**tables, "run": {**tables["run"], **QUICK, "duration": "0.1 s"}}, name="pile-ci")
+    short = Case.read({**tables, "run": {**tables["run"], **QUICK, "duration": "0.01 s"}}, name="pile-ci")
+    longer = Case.read({**tables, "run": {**tables["run"], **QUICK, "duration": "0.1 s"}}, name="pile-ci")
     assert short.run.cycles_per_segment < longer.run.cycles_per_segment
     out = run.parent / "lengths"
     made = [walkers.run(case, out).directory for case in (short, longer)]

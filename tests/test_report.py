@@ -16,11 +16,10 @@ from scipy.spatial.transform import Rotation
 
 import walkers
 from tests.conftest import document, make_case, to_toml
-from walkers.inputs.caption import caption
 from walkers.inputs.reading import load_case
-from walkers.inputs.rounding import rounded, with_decimals
 from walkers.inputs.sweep import expand
 from walkers.postprocess.analysis import current_result, number_of
+from walkers.postprocess.caption import caption
 from walkers.postprocess.figures import Line, Panel
 from walkers.postprocess.motion import gathered, read_motion
 from walkers.postprocess.report.page import LARGEST, drawn, overhead, packed_plots
@@ -28,6 +27,7 @@ from walkers.postprocess.report.player import cameras_of, player_of
 from walkers.postprocess.report.run import report_run, shown_of
 from walkers.postprocess.scene import camera_axes
 from walkers.postprocess.tables import read_table
+from walkers.rounding import rounded, with_decimals
 from walkers.runner.provenance import software
 from walkers.sweeps.report import report_sweep
 from walkers.sweeps.scheduler import Options, run_sweep

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from walkers.inputs.case import Case
-from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped
+from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.toml import read_toml
 from walkers.postprocess.analyses.walking import Walking, walkers_met
 from walkers.postprocess.analyses.work import Working
 from walkers.postprocess.analysis import RESULT_NAME, current_result, describe_result, read_result
@@ -88,7 +89,7 @@ def test_symmetric_dimers_need_not_be_on_the_axis_to_be_kept(run_directory: Call
 def test_velocity_is_the_strobed_displacement_over_time(moved: Group) -> None:
     run = moved.case.run
     strobed = moved.mass_centre[:: run.samples_per_cycle][run.settling_cycles :]
-    seconds = (run.cycles - run.settling_cycles) / moved.case.drive.frequency
+    seconds = (run.cycles - run.settling_cycles) / moved.case.excitation.frequency
     facing = np.array([walker.facing for walker in moved.walkers])
     crude = facing * (strobed[-1, :, 0] - strobed[0, :, 0]) / seconds
     walked = walk(moved)
@@ -227,7 +228,7 @@ def _hopping(samples: int, **run: object) -> Case:
     tables = read_toml(shipped("case")["fig4b"])
     tables["dimers"]["replicates"] = 1
     tables["run"] = {"time_step": "3 us", "cycles": 12, "settling_cycles": 4, "samples_per_cycle": samples, **run}
-    return resolve_case(tables, source="test", name=f"hopping-{samples}")
+    return Case.read(tables, source="test", name=f"hopping-{samples}")
 
 
 def _sampled(group: Group) -> Averages:

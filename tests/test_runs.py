@@ -33,7 +33,7 @@ from tests.conftest import (
     wait_for,
 )
 from walkers import run as run_case
-from walkers.inputs.errors import InputError
+from walkers.errors import InputError
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import (
     FIRST_SEGMENT,

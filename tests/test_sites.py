@@ -27,7 +27,7 @@ from tests.conftest import (
 )
 from tests.test_hostile import HOSTILE
 from tests.test_sweeps import SLOW, TINY, contents_of
-from walkers.inputs.errors import InputError
+from walkers.errors import InputError
 from walkers.inputs.sweep import load_sweep
 from walkers.runner.launch import _off_the_network
 from walkers.sweeps.scheduler import Options

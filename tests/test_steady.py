@@ -12,10 +12,10 @@ import pytest
 
 from tests.conftest import document
 from walkers import run as run_case
+from walkers.errors import InputError, Stopped
 from walkers.inputs.case import Case
 from walkers.inputs.drive import AXES
-from walkers.inputs.errors import InputError, Stopped
-from walkers.inputs.reading import load_case, resolve_case
+from walkers.inputs.reading import load_case
 from walkers.postprocess.gait import are_constant, walk
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.tables import read_table
@@ -29,7 +29,7 @@ from walkers.templates.scene import sharing_key
 def _until_steady(**changes: Any) -> Case:
     """The reference walker with `document`'s changes, driven until its velocity is constant."""
     tables = {**document(**changes), "run": {**changes.get("run", {})}}
-    return resolve_case(tables, name="test")
+    return Case.read(tables, name="test")
 
 
 def _shipped(angle: float = 0.0, **drive: Any) -> Case:
@@ -41,7 +41,7 @@ def _shipped(angle: float = 0.0, **drive: Any) -> Case:
         "boundary": {"material": "chromium-coated glass"},
         "drive": {"frequency": "80 Hz", "peak_acceleration": "4 g", **drive},
     }
-    return resolve_case(tables, name="shipped")
+    return Case.read(tables, name="shipped")
 
 
 def _turning() -> Case:
@@ -88,7 +88,7 @@ def test_a_walker_that_turns_ever_faster_is_not_steady_however_even_its_speed(tm
         "drive": {"frequency": "80 Hz", "peak_acceleration": "6 g"},
         "run": {"cycles": 12, "settling_cycles": 4},
     }
-    directory = run_case(resolve_case(tables, name="turning"), tmp_path).directory
+    directory = run_case(Case.read(tables, name="turning"), tmp_path).directory
     (group,) = read_motion(directory).groups
     found = walk(group)
     assert np.abs(found.first_half - found.second_half).max() < 0.002 * np.abs(found.velocity).max()

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 import walkers
 from tests.conftest import call
-from walkers.inputs.errors import InputError
+from walkers.errors import InputError
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
 from walkers.plotting import LeftOutWarning

@@ -10,8 +10,8 @@ import pytest
 from scipy.stats import qmc
 
 from tests.conftest import document, make_case, to_toml
+from walkers.errors import InputError
 from walkers.inputs.case import Case
-from walkers.inputs.errors import InputError
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.sweep import Sweep, expand, load_sweep
 from walkers.postprocess.analyses.meetings import Meetings
@@ -39,7 +39,7 @@ def _cases(sweep: Sweep) -> list[Case]:
 
 def test_axes_multiply_and_the_last_runs_fastest(make: Make) -> None:
     sweep = make(axes={"drive": {"frequency": ["60 Hz", "80 Hz"], "peak_acceleration": ["1 g", "2 g", "4 g"]}})
-    found = [(case.drive.frequency, case.drive.peak_acceleration) for case in _cases(sweep)]
+    found = [(case.excitation.frequency, case.excitation.peak_acceleration) for case in _cases(sweep)]
     assert found == [(f, pytest.approx(9.8 * a)) for f in (60.0, 80.0) for a in (1, 2, 4)]
     assert sweep.units == ("Hz", "g")
     assert _cases(sweep)[1].title == "test: drive.frequency = 60 Hz, drive.peak_acceleration = 2 g"
@@ -57,7 +57,7 @@ def test_linspace_and_geomspace_are_numpys(make: Make) -> None:
     cases = _cases(sweep)
     assert len(cases) == 100
     assert sweep.rows[1][0] == "0.5 g"
-    accelerations = np.array([case.drive.peak_acceleration for case in cases[::5]]) / 9.8
+    accelerations = np.array([case.excitation.peak_acceleration for case in cases[::5]]) / 9.8
     np.testing.assert_allclose(accelerations, np.linspace(0.5, 10, 20), rtol=1e-12)
     fractions = [case.liquid.volume_fraction for case in cases[:5]]
     np.testing.assert_allclose(fractions, np.geomspace(1e-3, 1e-1, 5), rtol=1e-11)
@@ -74,7 +74,7 @@ def test_one_key_at_a_time(make: Make) -> None:
 def test_zipped_keys_go_together(make: Make) -> None:
     pairs = [["0.3 mm", "0.2 mm"], ["0.4 mm", "0.2 mm"]]
     sweep = make(zip=[{"dimers.radii": pairs, "run": {"seed": [3, 4]}}], axes={"drive.frequency": ["60 Hz", "90 Hz"]})
-    found = [(case.drive.frequency, case.walkers[0].radii, case.seed) for case in _cases(sweep)]
+    found = [(case.excitation.frequency, case.walkers[0].radii, case.run.seed) for case in _cases(sweep)]
     assert found == [(f, r, s) for f in (60.0, 90.0) for r, s in (((3e-4, 2e-4), 3), ((4e-4, 2e-4), 4))]
 
 
@@ -98,7 +98,7 @@ def test_samplers_are_scipys_and_seeded(make: Make, method: str, sampler: type[q
 
 def test_a_key_that_says_the_same_in_other_words_gives_way(make: Make) -> None:
     (case,) = _cases(make(axes={"drive.gamma0": [0.5]}))
-    assert dimer_of(case).gamma0(case.drive.peak_acceleration) == pytest.approx(0.5)
+    assert dimer_of(case).gamma0(case.excitation.peak_acceleration) == pytest.approx(0.5)
     (case,) = _cases(make(set={"dimers.mean_radius": "0.25 mm"}, axes={"dimers.sin_delta": [0.2]}))
     assert case.walkers[0].radii == (3e-4, 2e-4)
 
@@ -120,10 +120,10 @@ def test_a_descent_is_the_last_axis_downward(make: Make) -> None:
 def test_shipped_sweeps_are_the_papers() -> None:
     fig2 = _cases(load_sweep("fig2"))
     assert len(fig2) == 80
-    assert {case.drive.frequency for case in fig2} == {60.0, 70.0, 80.0, 90.0}
-    accelerations = {round(case.drive.peak_acceleration / 9.8, 9) for case in fig2}
+    assert {case.excitation.frequency for case in fig2} == {60.0, 70.0, 80.0, 90.0}
+    accelerations = {round(case.excitation.peak_acceleration / 9.8, 9) for case in fig2}
     assert (min(accelerations), max(accelerations)) == (0.5, 10.0)
-    fig3 = [(dimer_of(case), case.drive.peak_acceleration) for case in load_sweep("fig3").cases()]
+    fig3 = [(dimer_of(case), case.excitation.peak_acceleration) for case in load_sweep("fig3").cases()]
     assert [round(dimer.sin_delta, 3) for dimer, _ in fig3] == [0.0, 0.111, 0.143, 0.2, 0.273, 0.333]
     assert all(dimer.gamma0(peak) == pytest.approx(0.5) for dimer, peak in fig3)
     turned = _cases(load_sweep("alignment"))

@@ -29,7 +29,7 @@ from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import FIRST_SEGMENT, finished_run, locked
 from walkers.runner.failures import WalkersMet
-from walkers.runner.summary import predicted_overhead
+from walkers.show import predicted_overhead
 from walkers.sweeps.making import make_runs
 from walkers.sweeps.scheduler import Options, SweepReplacedWarning, SweepStopped, plan_sweep, run_sweep, work
 from walkers.sweeps.table import load, thresholds, write_record
@@ -154,7 +154,7 @@ def test_the_table_of_a_sweep(sweep_file: Callable[..., str], monkeypatch: pytes
         run = finished_run(Path(row.run))
         velocity = json.loads((run.directory / "result.json").read_text())["velocity"]
         assert [row.velocity, row.smallest] == [velocity["mean"], velocity["smallest"]]
-        assert row.gamma0 == pytest.approx(dimer_of(run.case).gamma0(run.case.drive.peak_acceleration))
+        assert row.gamma0 == pytest.approx(dimer_of(run.case).gamma0(run.case.excitation.peak_acceleration))
     call("list", directory, "--to", "table.csv", check=True)
     read = pd.read_csv("table.csv")
     assert list(read["drive.peak_acceleration (g)"]) == [2.0, 4.0, 2.0, 4.0]

@@ -12,8 +12,9 @@ import pytest
 from tests.conftest import call, document, make_case, to_toml
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of, resistances_at_rest
-from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped
+from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.sweep import expand
+from walkers.inputs.toml import read_toml
 from walkers.physics.dimer import Dimer
 from walkers.postprocess.analysis import read_result
 from walkers.postprocess.gait import gait
@@ -42,7 +43,7 @@ def test_a_dimer_without_friction_comes_to_its_speed_on_a_slope_as_in_the_engine
         drive={"peak_acceleration": "0 g"},
         run={"cycles": 3, "settling_cycles": 1, "samples_per_cycle": 20},
     )
-    case, steps, frequency = moved.case, 1000, moved.case.drive.frequency
+    case, steps, frequency = moved.case, 1000, moved.case.excitation.frequency
     pull = case.axial_gravity
     motion = walk(
         Walker.of_case(case), Friction(), frequency, 0.0, steady_acceleration=pull, cycles=1, steps_per_cycle=steps
@@ -130,7 +131,7 @@ def test_theory_and_engine_agree_on_the_threshold(tmp_path: Path, friction: floa
     tables = document(contact={"friction": {"bead_bead": friction, "bead_wall": friction}})
     tables["run"] = {"cycles": 12, "settling_cycles": 8}
     (tmp_path / "base.toml").write_text(to_toml(tables))
-    expected = threshold(resolve_case(tables))
+    expected = threshold(Case.read(tables))
     step = 0.1 * expected
     descend = {"key": "drive.gamma0", "from": 13 * step, "to": 7 * step, "step": step, "until_below": "2 um/s"}
     sweep = expand({"case": "base.toml", "descend": descend}, source="test", name="test", folder=tmp_path)
@@ -201,7 +202,7 @@ def climber(viscosity: float, tilt: str = "90 deg", **drive: str) -> Case:
     tables["contact"] |= {"friction": {"bead_bead": 0.5, "bead_wall": 0.5}, "rolling_friction": 0.0}
     tables["drive"] |= {"frequency": "170 Hz", "peak_acceleration": "16.2 g", **drive}
     tables["run"] = {"cycles": 20, "settling_cycles": 10, "samples_per_cycle": 1}
-    return resolve_case(tables, name="climber")
+    return Case.read(tables, name="climber")
 
 
 def test_in_viscous_bridges_a_dimer_turns_over_as_its_beads_settle() -> None:
@@ -234,7 +235,7 @@ def test_theory_and_engine_agree_on_how_fast_a_climber_turns_over(
 ) -> None:
     case = climber(viscosity, peak_acceleration=acceleration)
     angles = np.abs(read_table(run_directory(case), "trajectory")["orientation"].to_numpy())
-    grown = np.log(angles[-1] / angles[8]) / (len(angles) - 9) * case.drive.frequency
+    grown = np.log(angles[-1] / angles[8]) / (len(angles) - 9) * case.excitation.frequency
     assert grown == pytest.approx(alignment_of(case)["rate"], rel=0.02)
 
 

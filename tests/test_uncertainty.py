@@ -11,16 +11,15 @@ import pytest
 
 import walkers
 from tests.conftest import make_case
+from walkers.commands.catalogue import catalogue
+from walkers.errors import InputError
 from walkers.inputs import library
 from walkers.inputs.axes import ranges_of
-from walkers.inputs.catalogue import catalogue
-from walkers.inputs.errors import InputError
+from walkers.inputs.case import Case
 from walkers.inputs.numerical import INFLUENCE, STIFFER, measured, numerical_error
-from walkers.inputs.readable import kind_of
-from walkers.inputs.reading import load_case, resolve_case
-from walkers.inputs.rounding import rounded, with_decimals
+from walkers.inputs.reading import load_case
+from walkers.inputs.units import parse_quantity
 from walkers.paper.published import outside_of_the_paper
-from walkers.physics.units import parse_quantity
 from walkers.pipeline import find_side
 from walkers.postprocess.analyses.walking import _summary
 from walkers.postprocess.analysis import describe_result, quantities_of
@@ -28,8 +27,10 @@ from walkers.postprocess.motion import read_motion
 from walkers.postprocess.sides import fell, sides_apart, uphill_velocities
 from walkers.postprocess.tables import read_columns
 from walkers.postprocess.uncertainty import band_text
+from walkers.rounding import rounded, with_decimals
 from walkers.sweeps.comparison import compare_runs
 from walkers.sweeps.folder import as_text, inventory
+from walkers.sweeps.readable import kind_of
 from walkers.sweeps.table import default_column, row_of
 from walkers.templates.deck import render_deck
 from walkers.theory.prediction import describe, predict
@@ -122,7 +123,7 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
         "contact": {"rolling_friction": 0.0},
         "run": {"cycles": 4},
     }
-    case = resolve_case(tables, name="steep")
+    case = Case.read(tables, name="steep")
     done = walkers.run(case, tmp_path)
     told = done.describe()
     assert "plane tilted by 20°, right is up" in told
@@ -144,7 +145,7 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     page = done.report(tmp_path / "report.html").read_text("utf-8")
     assert "liquid of 20 mN/m; 80 Hz" in page
     assert "plane tilted by 20°" in page
-    gentle = resolve_case({**tables, "boundary": {"material": "glass", "tilt": "10 deg"}}, name="gentle")
+    gentle = Case.read({**tables, "boundary": {"material": "glass", "tilt": "10 deg"}}, name="gentle")
     walkers.run(gentle, tmp_path)
     first, second = (find_side(walkers.load(one, tmp_path).directory) for one in (case, gentle))
     text = compare_runs(first, second).text
@@ -212,7 +213,7 @@ FOUR_BEADS = {
 
 def test_no_mean_over_clusters_that_face_up_and_down_a_slope(tmp_path: Path) -> None:
     steep = {**FOUR_BEADS, "boundary": {"material": "glass", "tilt": "30 deg"}}
-    done = walkers.run(resolve_case(steep, name="four"), tmp_path)
+    done = walkers.run(Case.read(steep, name="four"), tmp_path)
     told, result, each = done.describe(), done.result, done.walkers
     up, down = (each[each["facing"] == way] for way in (1, -1))
     climbing = int((each["axial_velocity"] > 2e-6).sum())
@@ -227,7 +228,7 @@ def test_no_mean_over_clusters_that_face_up_and_down_a_slope(tmp_path: Path) -> 
     assert re.search("velocity +facing up {}0*, facing down {}0* mm/s, positive up the slope".format(*speeds), told)
     assert "along the heading" not in told
     # A sweep that begins on a level floor is drawn by the same walkers.
-    level = walkers.run(resolve_case({**FOUR_BEADS, "boundary": {"material": "glass"}}, name="level"), tmp_path)
+    level = walkers.run(Case.read({**FOUR_BEADS, "boundary": {"material": "glass"}}, name="level"), tmp_path)
     rightward = level.walkers[level.walkers["facing"] == 1]["axial_velocity"].mean()
     assert row_of(level.result)["axial_velocity"] == pytest.approx(rightward) != 0.0
 
@@ -235,7 +236,7 @@ def test_no_mean_over_clusters_that_face_up_and_down_a_slope(tmp_path: Path) -> 
 def test_a_cluster_leans_by_how_far_it_turned(tmp_path: Path) -> None:
     """Not by the angle between the way that it faces and its beads in front, which its arrangement contains."""
     steep = {**FOUR_BEADS, "boundary": {"material": "glass", "tilt": "30 deg"}}
-    done = walkers.run(resolve_case(steep, name="four"), tmp_path)
+    done = walkers.run(Case.read(steep, name="four"), tmp_path)
     begin = done.trajectory.groupby("walker")["orientation"].first()
     np.testing.assert_allclose(begin, done.walkers["start_angle"], atol=2e-3)
     heading = read_motion(done.directory).groups[0].heading[[0, -1]]

@@ -44,7 +44,7 @@ def _pile(cycles: list[float]) -> Motion:
     case, frames = load_case("pile-ci"), len(cycles)
     still = np.zeros((frames, 3, 3))
     position = still + 1e-3 * np.arange(3.0)[:, None]
-    time = np.array(cycles) / case.drive.frequency
+    time = np.array(cycles) / case.excitation.frequency
     walls = np.zeros((frames, 3))
     radius = np.array([0.6e-3, 0.3e-3, 0.6e-3])
     return Motion(

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers import DEFAULT_OUT, RECORDS
-from walkers.inputs.errors import WalkersError, refused
-from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped, with_changes
+from walkers.errors import WalkersError, refused
+from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import (
     CASE_NAME,
@@ -104,7 +104,7 @@ def case_at(
     """
     out = Path(out)
     if not isinstance(what, (str, Path)):
-        return with_changes(what, changes), out
+        return what.changed(changes or {}), out
     there = placed(what, out)
     if there and there.kind in RECORDS and there.kind != "run":
         find_input(what if is_sweep_file(Path(what)) else there.path, "case")
@@ -115,10 +115,7 @@ def case_at(
         return load_case(what, changes), out
     with _refusing_damage(there.path, "the case of the run cannot be read"):
         case = case_of(files_of(there.path))
-    if changes and not case.as_read and is_deck_folder(there.path):
-        reason = "its deck was edited and run by hand: --set is for cases, and for runs of unedited ones"
-        raise refused(what, reason)
-    return with_changes(case, changes), there.path.parent
+    return case.changed(changes or {}), there.path.parent
 
 
 def find(what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None) -> Place:

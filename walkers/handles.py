@@ -10,8 +10,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from walkers.errors import refused
 from walkers.finding import files_of
-from walkers.inputs.errors import refused
 from walkers.runner.directory import FAILURE_NAME, ask_to_stop, case_of, finished_run, is_locked
 from walkers.runner.files import read_json
 

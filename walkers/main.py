@@ -74,8 +74,7 @@ class _Grouped(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the first argument names."""
         if args[0] not in self.commands and not ctx.resilient_parsing:
-            from walkers.inputs.errors import refused
-            from walkers.inputs.library import suggestion
+            from walkers.errors import refused, suggestion
 
             other = suggestion(args[0], self.commands) or "; walkers --help lists them"
             raise refused(args[0], f"no such command{other}")
@@ -163,7 +162,7 @@ def describe_version() -> str:
 
 def _report_stop(stop: BaseException) -> int:
     """Print why the program stopped, and return its exit status."""
-    from walkers.inputs.errors import InputError, WalkersError
+    from walkers.errors import InputError, WalkersError
 
     known = ((InputError, 2), (WalkersError, 1), (KeyboardInterrupt, _INTERRUPTED), (typer.Abort, _INTERRUPTED))
     status = stop.status if isinstance(stop, _Terminated) else next((s for k, s in known if isinstance(stop, k)), None)

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers import DEFAULT_OUT
+from walkers.errors import InputError, Problem, WalkersError, check_utf8, refused
 from walkers.finding import NOT_A_RUN, Place, case_at, check_run, find, placed
 from walkers.handles import Run, Sweep
-from walkers.inputs.errors import InputError, Problem, WalkersError, check_utf8, refused
 from walkers.progress import progress_of, progress_of_sweep, shown_if
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import finished_run, is_locked, run_place, unfinished
@@ -73,7 +73,7 @@ def run(
     >>> one.walkers[["facing", "steady"]].drop_duplicates("facing").to_dict("list")
     {'facing': [1, -1], 'steady': [True, True]}
     """
-    from walkers.inputs.run_tables import limits_of
+    from walkers.inputs.run import limits_of
     from walkers.sweeps.making import check_audit, make_runs
 
     out = Path(out)
@@ -82,8 +82,8 @@ def run(
     case, out = case_at(case, out)
     for one in (out.absolute(), case.name):
         check_utf8(one)
-    if exceeded := [] if case.as_read else limits_of(case).exceeded_by(case.run.time_step):
-        message = f"beyond the {' and the '.join(exceeded)} limit of the case as changed: use load_case(name, changes)"
+    if exceeded := [] if case.run.allow_unstable else limits_of(case).exceeded_by(case.run.time_step):
+        message = f"beyond the {' and the '.join(exceeded)} limit of the case as changed: use case.changed(changes)"
         raise InputError(case.name, [Problem("run.time_step", f"{case.run.time_step:.3g} s", message)])
     binary = find_engine(engine)
     place = run_place(case, binary, out)

@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkers.inputs.changes import changed
-from walkers.inputs.errors import InputError, refused
-from walkers.inputs.readable import readable_unit
-from walkers.inputs.reading import resolve_case
+from walkers.errors import InputError, refused
+from walkers.inputs.case import Case
 from walkers.postprocess.drawing import FORMATS, check_place, save_figure
 from walkers.runner.directory import case_of
 from walkers.sweeps.figure import Factor, draw, drawn_column, layout_of
+from walkers.sweeps.readable import readable_unit
 from walkers.sweeps.table import default_column, derived_of, find_name, load, varied_columns
 
 if TYPE_CHECKING:
@@ -179,7 +178,7 @@ def _curves(
     for number, place in enumerate(places.tolist()):
         with suppress(InputError, ValueError):  # a value that no case may have
             value = f"{place!r} {unit}" if unit else place
-            between.append(resolve_case(changed(case.document, {key: value}), name=case.name))
+            between.append(case.changed({key: value}))
             at.append(number)
     found: dict[str, FloatArray] = {}
     predicted, reasons = predicted_column(between, column) if between else ({}, {})

@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from html import escape
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from walkers.inputs.rounding import duration_text
+from walkers.rounding import duration_text
 
 if TYPE_CHECKING:
     from walkers.runner.launch import Progress

@@ -20,15 +20,15 @@ from pydantic import BeforeValidator
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 from typer.main import get_command
-
 from walkers.inputs.catalogue import COMMANDS, NOT_KNOWN, catalogue
+from walkers.inputs.schema import CaseFile, fields_of
+from walkers.physics.units import ABSENT, ACCELERATION, AUTO, AUTO_FAR, TEMPERATURE, Kind, quantity_text
+
 from walkers.inputs.library import Known
 from walkers.inputs.numerical import measured
-from walkers.inputs.reading import read_toml
 from walkers.inputs.resolving import SUPPLIED
-from walkers.inputs.schema import CaseFile, fields_of
+from walkers.inputs.toml import read_toml
 from walkers.main import _program
-from walkers.physics.units import ABSENT, ACCELERATION, AUTO, AUTO_FAR, TEMPERATURE, Kind, quantity_text
 from walkers.postprocess.analysis import analyses
 from walkers.postprocess.tables import described
 from walkers.sweeps.table import STATE, derived_columns, result_columns

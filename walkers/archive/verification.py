@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from walkers.archive.crate import METADATA_NAME
-from walkers.inputs.errors import refused, shortened
-from walkers.inputs.text import printable
+from walkers.errors import refused, shortened
 from walkers.postprocess.uncertainty import SPREAD_NAME
 from walkers.runner.directory import CASE_NAME, SEGMENTS
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.sweeps.table import PARSL, RECORD_NAME, read_record, states
+from walkers.text import printable
 
 SUMS_NAME = "sha256sums.txt"
 """List of checksums in an archive, in the format of ``sha256sum -c``."""

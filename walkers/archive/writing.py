@@ -15,8 +15,8 @@ from typing import Any
 
 from walkers.archive.crate import LICENCES, METADATA_NAME, PAPER, PREVIEW_NAME, Author, describe_crate
 from walkers.archive.verification import SUMS_NAME, verify
-from walkers.inputs.errors import InputError, Problem, WalkersError, refused
-from walkers.inputs.extras import require
+from walkers.errors import InputError, Problem, WalkersError, refused
+from walkers.extras import require
 from walkers.postprocess.report.page import fill
 from walkers.runner.directory import CASE_NAME, FinishedRun, name_of
 from walkers.runner.files import beside, checksum, json_bytes

@@ -14,13 +14,14 @@ import numpy.typing as npt
 from scipy.stats import norm
 
 from walkers.calibration.emulator import LARGEST, Emulators, FloatArray, Space, fit_emulators, spread_out
+from walkers.calibration.file import QUANTITIES, Calibration, Speed
 from walkers.calibration.posterior import Density, Posterior, sample_posterior
-from walkers.inputs.calibration import QUANTITIES, Calibration, Speed
-from walkers.inputs.changes import flatten
-from walkers.inputs.errors import InputError, Problem, WalkersError, refused
-from walkers.inputs.extras import require
-from walkers.inputs.schema import ALTERNATIVES
+from walkers.errors import InputError, Problem, WalkersError, refused
+from walkers.extras import require
+from walkers.inputs.case import Case
+from walkers.inputs.keys import flatten
 from walkers.inputs.sweep import Sweep, expand
+from walkers.inputs.table import alternatives
 from walkers.paper.comparison import misalignment
 from walkers.paper.published import ProgressOf
 from walkers.postprocess.gait import steady_walkers, together
@@ -71,7 +72,7 @@ def wave_sweep(
     for row in values:
         for label, keys in calibration.experiments.items():
             more = (extra or {}).get(label, {})
-            replaced = {other for key in more for other in ALTERNATIVES.get(key, ())}
+            replaced = {other for key in more for other in alternatives(Case, key)}
             point = {**{key: value for key, value in keys.items() if key not in replaced}, **more}
             for parameter, value in zip(calibration.parameters, row, strict=True):
                 if label in parameter.experiments:
@@ -149,7 +150,7 @@ def calibrate(
     Parameters
     ----------
     calibration, options, how
-        From `walkers.inputs.calibration.load_calibration`; as for `walkers.sweeps.scheduler.run_sweep`.
+        From `walkers.calibration.file.load_calibration`; as for `walkers.sweeps.scheduler.run_sweep`.
     out
         Folder of the run directories; each wave is a sweep there, and its design is in a folder with the name of the
         calibration.

@@ -15,8 +15,8 @@ from scipy.spatial.distance import cdist
 from scipy.special import log_expit
 from scipy.stats import truncnorm, uniform
 
+from walkers.calibration.file import Observation, Parameter
 from walkers.inputs.axes import unit_cube
-from walkers.inputs.calibration import Observation, Parameter
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

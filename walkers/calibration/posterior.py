@@ -10,7 +10,7 @@ from scipy.special import logsumexp, ndtr, softmax
 from scipy.stats import multivariate_normal
 
 from walkers.calibration.emulator import LARGEST, Emulators, FloatArray, Space
-from walkers.inputs.calibration import Observation, SharedError
+from walkers.calibration.file import Observation, SharedError
 
 LEAST_SAMPLES = 400.0
 """Smallest effective sample size of a converged posterior."""

@@ -10,12 +10,12 @@ import numpy as np
 
 from walkers.calibration.calibrate import Outcome
 from walkers.calibration.emulator import FloatArray, Space, transformed
+from walkers.calibration.file import QUANTITIES, Parameter
 from walkers.calibration.posterior import LEAST_SAMPLES, Posterior
-from walkers.inputs.calibration import QUANTITIES, Parameter
-from walkers.inputs.text import rendered
-from walkers.physics.units import SPEED
+from walkers.inputs.units import SPEED
 from walkers.postprocess.drawing import TWO_COLUMNS, new_figure, save_figure, styled
 from walkers.runner.files import write_bytes, write_json, write_text
+from walkers.text import rendered
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

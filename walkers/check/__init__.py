@@ -5,6 +5,6 @@ exact solutions. The second engine is `engine` and its formulas, `kernels`: of t
 (`walkers.physics.laws`), which it interpolates in its own way, and nothing of the decks.
 """
 
-from walkers.inputs.extras import require
+from walkers.extras import require
 
 require("check")

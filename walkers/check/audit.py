@@ -12,8 +12,7 @@ from typing import Any
 
 from walkers.check.report import Chapter, Line, Verdict, as_dict, count, outcome
 from walkers.check.scenes import CHECKS, LONG, Bench
-from walkers.inputs.errors import refused
-from walkers.inputs.library import expected_of
+from walkers.errors import expected_of, refused
 from walkers.runner.binary import AuditRecord, Engine, find_engine, model_sha256, write_audit
 
 

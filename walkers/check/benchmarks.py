@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from importlib.resources import files
 from math import ceil, pi
 from pathlib import Path
@@ -24,10 +23,10 @@ from walkers.check.engine import SecondEngine
 from walkers.check.kernels import FloatArray
 from walkers.check.report import Chapter, Line
 from walkers.check.scenes import DRY, FLOOR, bench_case
-from walkers.inputs.text import rendered
+from walkers.inputs.case import Friction
 from walkers.physics.contact import Impact, reduced_modulus
-from walkers.physics.matter import Contact
 from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
+from walkers.text import rendered
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,17 +62,15 @@ class Sphere(NamedTuple):
     def engine(self, start: FloatArray, step: float, restitution: float, friction: float, *, on_plane: bool) -> Any:
         """The second engine with such spheres; a modulus twice theirs is a rigid plane's other side."""
         modulus = (2.0 if on_plane else 1.0) * self.youngs_modulus
-        contact = Contact(
-            friction_bead_bead=friction,
-            friction_bead_wall=friction,
-            rolling_friction=0.0,
+        case = bench_case(liquid=DRY)
+        contact = case.contact.but(
+            friction=Friction(bead_bead=friction, bead_wall=friction),
             restitution=restitution,
             youngs_modulus=modulus,
             poissons_ratio=self.poissons_ratio,
             minimum_separation_ratio=0.01,
         )
-        case = replace(bench_case(liquid=DRY), density=self.density, contact=contact)
-        case = replace(case, run=replace(case.run, time_step=step, steps_per_cycle=0))
+        case = case.but(contact=contact).put("beads.density", self.density).put("run.time_step", step)
         return SecondEngine(case, np.full(len(start), self.radius), start, walls=[FLOOR])
 
 

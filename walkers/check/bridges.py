@@ -25,7 +25,6 @@ import numpy as np
 from walkers.check.report import Chapter, Line
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
-from walkers.inputs.text import rendered
 from walkers.physics import capillary, laws
 from walkers.physics.bridge import FloatArray, Surfaces
 from walkers.physics.capillary import derjaguin_radius
@@ -33,6 +32,7 @@ from walkers.physics.laplace import force_curve
 from walkers.physics.laws import rabinovich, soulie, willett, young_laplace
 from walkers.pipeline import run
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, series_look, styled
+from walkers.text import rendered
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -105,7 +105,9 @@ def shapes(names: tuple[str, ...]) -> dict[str, Surfaces]:
         case = load_case(name)
         large, small = dimer_of(case).radii
         for place, other in (("beads", small), ("wall", inf)):
-            found[f"{name}, {place}"] = Surfaces.of(large, other, case.liquid, case.contact.minimum_separation_ratio)
+            found[f"{name}, {place}"] = Surfaces.of(
+                large, other, case.liquid.of_bridges, case.contact.minimum_separation_ratio
+            )
     return found
 
 
@@ -178,7 +180,11 @@ def chapter(out: Path, *, quick: bool = False) -> Chapter:
 def _walls() -> list[Surfaces]:
     """Bridges at a wall with small and large volumes and contact angles."""
     case = load_case(COMPARED[0])
-    liquids = [replace(case.liquid, volume_fraction=part, contact_angle=one) for part in _FRACTIONS for one in _ANGLES]
+    liquids = [
+        replace(case.liquid.of_bridges, volume_fraction=part, contact_angle=one)
+        for part in _FRACTIONS
+        for one in _ANGLES
+    ]
     return [Surfaces.of(1.0, inf, liquid, case.contact.minimum_separation_ratio) for liquid in liquids]
 
 

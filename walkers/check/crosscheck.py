@@ -18,15 +18,16 @@ import numpy as np
 from walkers.check.engine import TERMS, SecondEngine, close_pairs
 from walkers.check.kernels import FloatArray
 from walkers.check.report import Chapter, Line, Verdict
+from walkers.errors import unusable
 from walkers.handles import Run
 from walkers.inputs.case import Case
-from walkers.inputs.errors import unusable
 from walkers.inputs.messages import blaming
-from walkers.inputs.reading import load_case, read_toml, resolve_case, shipped, with_changes
-from walkers.inputs.text import rendered
+from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.toml import read_toml
 from walkers.pipeline import run
 from walkers.postprocess.gait import averages, walk
 from walkers.postprocess.motion import Group, Motion
+from walkers.text import rendered
 
 SPEED, GAIT, ORIENTATION = 1e-4, 1e-3, 0.1
 """Tolerances: velocities of walkers (relative); rotation and sliding, relative to the fastest of them; final
@@ -55,13 +56,13 @@ class Start:
     def together(self) -> float | None:
         """Cycles of the drive during which both motions agree; None if they agree to the end."""
         over = np.flatnonzero(self.apart > ONE * float(self.first.radius.min()))
-        return float(self.first.time[over[0]]) * self.first.case.drive.frequency if len(over) else None
+        return float(self.first.time[over[0]]) * self.first.case.excitation.frequency if len(over) else None
 
     def line(self) -> Line:
         """When the motions diverge; piles, which are chaotic, fail if they diverge in the first cycle."""
         case, cycles = self.first.case, self.together
         agreement = "same motion to the end" if cycles is None else f"same motion until cycle {cycles:.1f}"
-        name = f"start {case.seed}, " if case.mixture is not None else ""
+        name = f"start {case.run.seed}, " if case.mixture is not None else ""
         early = case.mixture is not None and cycles is not None and cycles < 1.0
         farthest = 1e6 * float(self.apart.max())
         given = Verdict.FAIL if early else None
@@ -81,7 +82,7 @@ class Comparison:
         """The comparison as a chapter."""
         case = self.case
         laws = f"without {', '.join(self.without)}" if self.without else "with the same laws"
-        title = f"{case.drive.described()}, {case.run.cycles} cycles; LIGGGHTS and the second engine {laws}"
+        title = f"{case.excitation.described()}, {case.run.cycles} cycles; LIGGGHTS and the second engine {laws}"
         return Chapter(case.name, title, (*self.lines, *(start.line() for start in self.starts)))
 
 
@@ -102,7 +103,7 @@ def crosscheck(
     if case.liquid.conserved:
         with blaming(case.name, case.document):
             raise unusable("liquid.conserved", "expected false: the bridges of the second engine do not share liquid")
-    cases = [with_changes(case, {"run.seed": case.seed + number} if number else {}) for number in range(seeds)]
+    cases = [case.changed({"run.seed": case.run.seed + number} if number else {}) for number in range(seeds)]
     return compare([make(one, out).motion for one in cases], without)
 
 
@@ -128,11 +129,9 @@ def shortened(case: Case, cycles: int) -> Case:
     least = 3 * rare
     if cycles < least or cycles % rare:
         raise ValueError(f"expected at least {least}" + (f", a multiple of {rare}" if rare > 1 else ""))
-    if not case.as_read:
-        raise ValueError("is for cases, and for runs of unedited ones")
     lengths = ("cycles", "most_cycles", "duration", "settling_cycles")
     run = {key: value for key, value in case.document.get("run", {}).items() if key not in lengths}
-    return resolve_case({**case.document, "run": {**run, "cycles": cycles}}, source=case.name, name=case.name)
+    return Case.read({**case.document, "run": {**run, "cycles": cycles}}, source=case.name, name=case.name)
 
 
 def simulate(motion: Motion, without: Collection[str] = ()) -> Motion:
@@ -243,8 +242,8 @@ def full_cases() -> dict[str, Case]:
     shorter = {
         "alignment from 30°": (load_case("fig1b", {"dimers.angle": "30 deg", **alone}), 40),
         "symmetric from 30°": (load_case("symmetric", {"dimers.angle": "30 deg", **alone}), 40),
-        "fan of three": (resolve_case(clusters, name="fig1b"), 24),
-        "two tones": (resolve_case({**symmetric, "drive": {"harmonics": tones}}, name="symmetric"), 24),
+        "fan of three": (Case.read(clusters, name="fig1b"), 24),
+        "two tones": (Case.read({**symmetric, "drive": {"harmonics": tones}}, name="symmetric"), 24),
         "slope of 5°": (load_case("fig1b", {"boundary.tilt": "5 deg"}), 24),
         "groove of 120°": (load_case("fig1b", {"boundary.shape": "groove", "boundary.opening": "120 deg"}), 24),
         "climber": (load_case("climber"), 20),

@@ -141,7 +141,7 @@ def _bridges(case: Case, radius: FloatArray, without: Collection[str]) -> Bridge
         between[row, :row] = between[:row, row]
         for column, other in list(enumerate([*sizes.tolist(), inf]))[row:]:
             between[row, column] = len(made)
-            surfaces = Surfaces.of(one, other, case.liquid, case.contact.minimum_separation_ratio)
+            surfaces = Surfaces.of(one, other, case.liquid.of_bridges, case.contact.minimum_separation_ratio)
             made.append(_splined(case.law, surfaces))
     acts = np.array(["capillary" not in without, *["lubrication" not in without] * 4], dtype=np.float64)
     spans, splines = np.stack([one for one, _ in made]), np.stack([one for _, one in made]) * acts
@@ -152,13 +152,15 @@ def _constants(case: Case, radius: FloatArray, walls: Sequence[Wall], without: C
     contact = case.contact
     modulus, ratio, loss = contact.youngs_modulus, contact.poissons_ratio, log(contact.restitution)
     damping, friction, rolling, gravity, drive = (term not in without for term in TERMS[2:])
-    waves = [(*one.direction, one.angular_frequency, one.peak_acceleration, one.phase) for one in case.drive.harmonics]
+    waves = [
+        (*one.direction, one.angular_frequency, one.peak_acceleration, one.phase) for one in case.excitation.harmonics
+    ]
     none = (0.0, 0.0, 0.0)
     flat = [(wall.point, wall.normal) if isinstance(wall, Flat) else (none, none) for wall in walls]
     return Constants(
         step=case.run.time_step,
         radius=radius,
-        mass=4.0 / 3.0 * pi * radius**3 * case.density,
+        mass=4.0 / 3.0 * pi * radius**3 * case.beads.density,
         point=np.array([point for point, _ in flat]).reshape(-1, 3),
         normal=np.array([normal for _, normal in flat]).reshape(-1, 3),
         hollow=np.array([0.0 if isinstance(wall, Flat) else wall.radius for wall in walls]),
@@ -167,8 +169,8 @@ def _constants(case: Case, radius: FloatArray, walls: Sequence[Wall], without: C
         modulus=modulus / (2.0 * (1.0 - ratio**2)),
         shear_modulus=modulus / (4.0 * (1.0 + ratio) * (2.0 - ratio)),
         damping=-loss / sqrt(loss**2 + pi**2) * damping,
-        friction_beads=contact.friction_bead_bead * friction,
-        friction_walls=contact.friction_bead_wall * friction,
+        friction_beads=contact.friction.bead_bead * friction,
+        friction_walls=contact.friction.bead_wall * friction,
         rolling=contact.rolling_friction * rolling,
         bridges=_bridges(case, radius, without),
     )

@@ -13,11 +13,10 @@ from math import inf, isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.errors import WalkersError, refused
-from walkers.inputs.library import expected_of
-from walkers.inputs.text import rendered
+from walkers.errors import WalkersError, expected_of, refused
 from walkers.postprocess.drawing import save_figure
 from walkers.runner.files import write_text
+from walkers.text import rendered
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

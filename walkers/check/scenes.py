@@ -22,14 +22,13 @@ import numpy as np
 from walkers.check.engine import SecondEngine
 from walkers.check.kernels import FloatArray
 from walkers.check.report import Line, Verdict
+from walkers.errors import Stopped
 from walkers.inputs.boundary import BOTTOM, Flat, Round, Wall
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
-from walkers.inputs.errors import Stopped
-from walkers.inputs.reading import load_case, resolve_case
-from walkers.inputs.text import rendered
+from walkers.inputs.reading import load_case
 from walkers.physics.bridge import Curve, Forces, Surfaces
-from walkers.physics.laws import LAWS, law_of
+from walkers.physics.laws import LAWS, by_name
 from walkers.postprocess.dump import BinaryDump
 from walkers.postprocess.motion import prescribed_motion
 from walkers.runner.binary import Engine
@@ -39,6 +38,7 @@ from walkers.templates.bridge_tables import tabulated
 from walkers.templates.deck import BRIDGES_NAME, Deck, Plan, Recording, compose, plan_of
 from walkers.templates.layout import BEAD_COLUMNS, FORCE_COLUMNS
 from walkers.templates.scene import Bead, Scene
+from walkers.text import rendered
 
 EQUAL = 1e-6
 """Tolerance between the engines, relative to the largest force, torque or displacement (interpolation errors)."""
@@ -96,7 +96,7 @@ _FULL: dict[str, dict[str, Any]] = {
 
 def bench_case(**changes: Mapping[str, Any]) -> Case:
     """A case without friction, damping, viscosity, gravity and drive, with changes."""
-    return resolve_case(_merged(_BARE, changes), source="<audit>", name="audit")
+    return Case.read(_merged(_BARE, changes), source="<audit>", name="audit")
 
 
 def full_case(**changes: Mapping[str, Any]) -> Case:
@@ -240,9 +240,9 @@ class Setting:
 def in_walls(case: Case, series: Measured) -> FloatArray:
     """Frames after the first in the frame of the walls, with the velocities used for the forces."""
     frames = series.frames[1:].copy()
-    frames[..., :3] -= prescribed_motion(case.drive, series.time[1:])[0][:, None]
+    frames[..., :3] -= prescribed_motion(case.excitation, series.time[1:])[0][:, None]
     # Velocities are those of half a step before, of beads and of walls.
-    frames[..., 3:6] -= prescribed_motion(case.drive, series.time[1:] - 0.5 * case.run.time_step)[1][:, None]
+    frames[..., 3:6] -= prescribed_motion(case.excitation, series.time[1:] - 0.5 * case.run.time_step)[1][:, None]
     return frames
 
 
@@ -370,8 +370,8 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
     bare = bench_case(liquid=liquid, contact={"restitution": 0.5})
     scene = standing(pair(-DEEP, 0.05, STILL, (STILL, STILL)))
     deck = compose(prescribed(bare, scene))
-    meeting = Surfaces.of(S, R, bare.liquid, bare.contact.minimum_separation_ratio)
-    fine = tabulated(law_of(bare.liquid), meeting, tolerance=1e-10).text()
+    meeting = Surfaces.of(S, R, bare.liquid.of_bridges, bare.contact.minimum_separation_ratio)
+    fine = tabulated(by_name(bare.liquid.law), meeting, tolerance=1e-10).text()
     tables = deck.files[BRIDGES_NAME].split("bridge ")
     tables = [f"1 1 {S!r} {R!r}\n{fine}" if one.startswith(f"1 1 {S!r} {R!r}") else one for one in tables]
     ours = bench.run(replace(deck, files={**deck.files, BRIDGES_NAME: "bridge ".join(tables)}))
@@ -385,15 +385,15 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
 def _walker(cycles: int) -> Case:
     """A single walker of Fig. 1b for a number of cycles."""
     case = load_case("fig1b", {"dimers.replicates": 1})
-    return replace(case, run=replace(case.run, cycles=cycles, cycles_per_segment=cycles, until_steady=False))
+    return case.but(run=case.run.but(cycles=cycles, cycles_per_segment=cycles, until_steady=False))
 
 
 def company_lines(bench: Bench) -> Iterator[Line]:
     """A walker in a shared deck against the same walker in a deck of its own; and a repeated run."""
     alone = _walker(10)
-    alone = replace(alone, contact=replace(alone.contact, rolling_friction=0.0))  # which amplifies rounding
-    other = replace(alone, drive=alone.drive.with_peak(2.0 * alone.drive.peak_acceleration))
-    sloping = replace(alone, boundary=replace(alone.boundary, tilt=0.3))
+    alone = alone.put("contact.rolling_friction", 0.0)  # which amplifies rounding
+    other = alone.put("drive.peak_acceleration", 2.0 * alone.drive.peak_acceleration)
+    sloping = alone.put("boundary.tilt", 0.3)
 
     def ran(*cases: Case) -> Measured:
         plan = plan_of(*cases)
@@ -413,8 +413,8 @@ def step_lines(bench: Bench) -> Iterator[Line]:
     case, ways = _walker(4), []
     for finer in (1, 2, 4):
         cycle = case.run.steps_per_cycle * finer
-        run = replace(case.run, time_step=case.run.time_step / finer, steps_per_cycle=cycle)
-        plan, steps = plan_of(replace(case, run=run)), 4 * cycle
+        run = case.run.but(time_step=case.run.time_step / finer, steps_per_cycle=cycle)
+        plan, steps = plan_of(case.but(run=run)), 4 * cycle
         frames = bench.run(replace(plan, recording=recording(steps, steps))).frames
         ways.append(frames[-1, :, :3] - frames[0, :, :3])
     coarse, fine = farthest(ways[0], ways[2]), farthest(ways[1], ways[2])

@@ -54,7 +54,7 @@ class By(TypedDict):
 
 def changes_of(settings: list[str] | None) -> dict[str, Any]:
     """The values given by ``--set``, by their keys."""
-    from walkers.inputs.changes import settings_of
+    from walkers.inputs.keys import settings_of
 
     return settings_of(settings or ())
 
@@ -90,7 +90,7 @@ def on_cores(jobs: int | None) -> Options:
 
 def refuse(option: str, wrong: bool, why: str) -> None:
     """Raise an `InputError` with the reason if an option is ``wrong``."""
-    from walkers.inputs.errors import refused
+    from walkers.errors import refused
 
     if wrong:
         raise refused(option, why)

@@ -48,7 +48,7 @@ def check_engine(
 ) -> int:
     """Compare the forces of the engine and its contact model with a second engine and exact formulas."""
     from walkers.check.audit import record, run_audit, selected
-    from walkers.inputs.errors import refused
+    from walkers.errors import refused
     from walkers.runner.binary import find_engine
     from walkers.runner.failures import EngineMissing
 
@@ -118,7 +118,7 @@ def check_case(
     from walkers.check.crosscheck import crosscheck, shortened
     from walkers.check.engine import TERMS
     from walkers.check.report import as_dict
-    from walkers.inputs.errors import refused
+    from walkers.errors import refused
     from walkers.progress import progress_of
 
     loaded = load_case(str(context.info_name), settings, out)
@@ -145,7 +145,7 @@ def check_case(
 
 def library(name: str | None = Argument(None, metavar="NAME", help=_NAME)) -> None:
     """List materials, liquids, friction, bridge laws, cases, sweeps and calibrations, or print one with its sources."""
-    from walkers.inputs.catalogue import catalogue, describe, describe_one
+    from walkers.commands.catalogue import catalogue, describe, describe_one
 
     found = catalogue()
     print(describe_one(found, name) if name else describe(found))
@@ -186,8 +186,8 @@ def calibrate(
 ) -> int:
     """Calibrate unknown parameters to published numbers. An interrupted calibration continues."""
     from walkers.calibration.calibrate import calibrate
+    from walkers.calibration.file import load_calibration
     from walkers.calibration.report import write_outcome
-    from walkers.inputs.calibration import load_calibration
     from walkers.progress import progress_of_sweep
 
     read = load_calibration(calibration)

@@ -122,8 +122,8 @@ def clean(
     yes: bool = Option(False, "--yes", "-y", help="Do not ask for confirmation."),
 ) -> int:
     """Remove interrupted and failed runs, or the given runs and sweeps. Asks first. Runs in progress stay."""
+    from walkers.errors import each
     from walkers.finding import find
-    from walkers.inputs.errors import each
     from walkers.runner.directory import UNFINISHED
     from walkers.sweeps.folder import clean, plan_cleaning
 

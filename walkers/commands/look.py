@@ -179,8 +179,8 @@ def compare(
     as_json: Json = False,
 ) -> None:
     """Compare two runs or cases in parameters and results, or two sweeps point by point."""
+    from walkers.errors import each
     from walkers.finding import placed
-    from walkers.inputs.errors import each
     from walkers.pipeline import find_side
     from walkers.sweeps.comparison import compare_runs, compare_sweeps
 
@@ -208,8 +208,8 @@ def climb(
     as_json: Json = False,
 ) -> None:
     """Print probability, rate and speed of climbs in piles for each condition, with confidence intervals."""
+    from walkers.errors import each
     from walkers.finding import find
-    from walkers.inputs.errors import each
     from walkers.postprocess.drawing import FORMATS, check_place
     from walkers.postprocess.films import parse_time
     from walkers.sweeps import climbing

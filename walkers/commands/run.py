@@ -66,12 +66,12 @@ def show(
     """Show all values of a case with their sources, the forces, the time step and the predicted run time."""
     loaded = load_case(case, settings, out)
     if not theory:
-        from walkers.runner.summary import describe, summarise
+        from walkers.show import describe, summarise
 
         summary = summarise(loaded)
         print_as(as_json, lambda: summary, lambda: describe(summary))
         return
-    from walkers.inputs.errors import InputError, Problem
+    from walkers.errors import InputError, Problem
     from walkers.paper.published import outside_of_the_paper
     from walkers.pipeline import load_run
     from walkers.runner.failures import EngineMissing
@@ -101,12 +101,12 @@ def run(
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
     """Run cases and print the results. A finished run is only printed, an interrupted run continues."""
+    from walkers.errors import each
     from walkers.finding import case_at
-    from walkers.inputs.errors import each
     from walkers.pipeline import finished_at
     from walkers.progress import progress_of, progress_of_sweep
     from walkers.runner.failures import EngineFailure
-    from walkers.runner.summary import notes
+    from walkers.show import notes
 
     refuse("--points", points is not None and not spread, "is for --spread")
     # Report a mistake in the last file before the first run starts.

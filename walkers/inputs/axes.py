@@ -13,9 +13,9 @@ from itertools import product
 from math import isfinite, prod
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.changes import Value, flatten
-from walkers.inputs.errors import unusable
-from walkers.physics.units import split_quantity
+from walkers.errors import unusable
+from walkers.inputs.keys import Value, flatten
+from walkers.inputs.units import split_quantity
 
 if TYPE_CHECKING:
     import numpy as np

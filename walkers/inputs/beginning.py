@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from walkers.errors import check_utf8, refused
 from walkers.inputs.bodies import ARRANGEMENTS
-from walkers.inputs.errors import check_utf8, refused
 from walkers.inputs.reading import shipped
-from walkers.inputs.text import printable
+from walkers.text import printable
 
 _FOLDER = Path(__file__).with_name("beginnings")
 
@@ -29,7 +29,7 @@ def write_case(path: Path, kind: str = "walker", source: str | None = None) -> P
     Path
         The file. `InputError` if there is such a file already, or no such shipped case.
     """
-    from walkers.inputs.library import expected_of
+    from walkers.errors import expected_of
 
     check_utf8(path)
     path = path if path.suffix == ".toml" else path.with_name(f"{path.name}.toml")

@@ -1,34 +1,32 @@
 """Beads of a case: walkers on the boundary, a poured mixture, beads placed one by one.
 
-Each knows how to place itself (``stand``) and which of its beads bridges join; nothing else asks what it is. How the
-beads of a cluster stand beside each other is one of `ARRANGEMENTS`: in the cluster's own frame, seen from above, whose
-first axis points where it is to face and the second to the left. The beads are taken in the order of the case, and the
-point over which the first two touch is the origin.
+Each knows its radii and which of its beads bridges join; `walkers.inputs.standing` says where they start. How the beads
+of a cluster stand beside each other is one of `ARRANGEMENTS`: in the cluster's frame, seen from above, whose first axis
+points where it is to face and the second to the left. The beads are taken in the order of the case, and the point over
+which the first two touch is the origin.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import combinations
-from math import acos, asin, atan2, cos, dist, hypot, inf, pi, sin, sqrt
-from typing import TYPE_CHECKING, Annotated, Literal
+from math import acos, asin, atan2, cos, dist, hypot, pi, sin, sqrt
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from walkers.inputs.boundary import LOOSE, Boundary
-from walkers.inputs.loads import contact_loads
-from walkers.physics import units
-
-if TYPE_CHECKING:
-    from walkers.inputs.case import Case
+from walkers.inputs import units
+from walkers.inputs.table import SAME_RUN, Choice, Filled, Flag, Table, key
+from walkers.inputs.units import Diameter, Length, Number, Radius, SignedLength, Whole
 
 Apart = Callable[[int, int], float]
 """Distance of two touching beads seen from above, m, by their numbers."""
 Places = list[tuple[float, float]]
 Pairs = tuple[tuple[int, int], ...]
-_Place = tuple[units.SignedLength, units.SignedLength]
+_Place = tuple[SignedLength, SignedLength]
+MOST_BEADS = 20_000
 _LEAST_LEVER = 0.1
 """Of a cluster's extent: large and small beads whose centroids are nearer than that give no heading."""
 _TOUCHING = 0.02
@@ -159,55 +157,31 @@ ARRANGEMENTS: Mapping[str, Arrangement] = {
 """Arrangements by their names in case files."""
 
 
-@dataclass(frozen=True)
-class StandingBead:
-    """Centre (m) and radius (m) of a bead at the start."""
-
-    x: float
-    y: float
-    z: float
-    radius: float
-
-
-@dataclass(frozen=True)
-class Standing:
-    """Beads that start together; positions relative to the walker's place (chosen by the deck) or to the boundary.
-
-    ``facing`` is +1 along the drive axis or −1, and ``angle`` that to it (rad); 0 and 0 of what is no walker.
-    """
-
-    beads: tuple[StandingBead, ...]
-    facing: int = 0
-    angle: float = 0.0
-    walks: bool = False
-
-
-@dataclass(frozen=True, kw_only=True)
-class Walkers:
-    """``[dimers]`` or one of ``[[clusters]]``: walkers of one make, their number and initial state.
+class Walkers(Table):
+    """What ``[dimers]`` and ``[[clusters]]`` share: walkers of one make, their number and initial state.
 
     ``meet = true`` says that they may stand and come as near as they like; without it they are replicates. They face
     along the drive axis (right, up a slope), against it (left, down), or every other one (both), but for an ``angle``.
     The ``gap`` is that of all contacts at the start (negative: touching), where forces balance unless it is given.
-
-    Radii are those of the beads, first the one that leads (the large one, as in the paper). Those of dimers may be
-    given by their mean and the asymmetry parameter sin δ = (R1 - R2)/(R1 + R2). The beads of clusters stand in an
-    ``arrangement``, or ``at`` a place for each, ahead and to the left, in the direction that the walker faces.
+    ``radii`` are those of the beads, first the one that leads (the large one, as in the paper).
     """
 
-    replicates: Annotated[units.Whole, Field(ge=1, le=1000)] = 6
-    facing: Literal["both", "right", "left", "up", "down"] = "both"
-    angle: units.Angle = 0.0
-    angle_spread: units.NonNegativeAngle = pi / 180.0
-    gap: Annotated[units.SignedLength | None, units.AUTO] = None
-    gap_spread: Annotated[units.Number, Field(ge=0, lt=1)] = 0.2
-    spacing: Annotated[units.Length, units.AUTO_FAR] = inf
-    meet: bool = False
-    radii: tuple[units.Radius, ...] = ()
-    mean_radius: Annotated[units.Radius | None, Field(exclude=True)] = None
-    sin_delta: Annotated[units.Number | None, Field(gt=-0.9, lt=0.9, exclude=True)] = None
-    arrangement: str = ""
-    places: Annotated[tuple[_Place, ...], Field(max_length=100, alias="at")] = ()
+    if TYPE_CHECKING:
+        radii: tuple[float, ...]
+
+        @property
+        def arrangement(self) -> str: ...  # noqa: D102
+        @property
+        def at(self) -> tuple[tuple[float, float], ...]: ...  # noqa: D102
+
+    replicates: Annotated[Whole, Field(ge=1, le=1000)] = key("§", 6)
+    facing: Literal["both", "right", "left", "up", "down"] = key("§", "both")
+    angle: units.Angle = key("§", 0.0)
+    angle_spread: units.NonNegativeAngle = key("§", pi / 180.0)
+    gap: Annotated[Filled[SignedLength], units.AUTO] = key("§", None)
+    gap_spread: Annotated[Number, Field(ge=0, lt=1)] = key("§", 0.2)
+    spacing: Annotated[Filled[Length], units.AUTO] = key("§", None)
+    meet: Flag = key("§", False)
 
     @property
     def all_radii(self) -> list[float]:
@@ -217,8 +191,8 @@ class Walkers:
     @cached_property
     def pairs(self) -> Pairs:
         """The beads of a walker that touch at the start, numbered from 0."""
-        if self.places:
-            return touching(self.places, self.radii, _TOUCHING)
+        if self.at:
+            return touching(self.at, self.radii, _TOUCHING)
         return ARRANGEMENTS[self.arrangement].pairs(len(self.radii))
 
     @property
@@ -233,9 +207,9 @@ class Walkers:
     @cached_property
     def design(self) -> Places:
         """Positions of rigid beads on a plane in the frame of the walker, m."""
-        return list(self.places) or ARRANGEMENTS[self.arrangement].places(self.radii, self._rigid)
+        return list(self.at) or ARRANGEMENTS[self.arrangement].places(self.radii, self.rigid)
 
-    def _rigid(self, one: int, other: int) -> float:
+    def rigid(self, one: int, other: int) -> float:
         """Distance seen from above of two beads that touch each other and the floor without overlap, m."""
         first, second = self.radii[one], self.radii[other]
         return (first + second) * cos(asin((first - second) / (first + second)))
@@ -243,7 +217,7 @@ class Walkers:
     @cached_property
     def length(self) -> float:
         """Length of the walker seen from above, m."""
-        known = {} if self.places else {pair: self._rigid(*pair) for pair in self.pairs}
+        known = {} if self.at else {pair: self.rigid(*pair) for pair in self.pairs}
         extents = []
         for one, other in combinations(range(len(self.radii)), 2):
             apart = known.get((one, other), dist(self.design[one], self.design[other]))
@@ -277,36 +251,10 @@ class Walkers:
         ]
         return weights if hypot(*lever) > _LEAST_LEVER * self.length else self.front
 
-    def stand(self, case: Case, first: int) -> list[Standing]:
-        """Place each walker around the contact of its first two beads; ``first``: index of the first walker.
-
-        Its angle and contacts are drawn from a stream of its own, whoever shares the deck.
-        """
-        standing, (x, y, _) = [], case.drive_axis
-        for number in range(first, first + self.replicates):
-            facing = {"right": 1, "left": -1}.get(self.facing, 1 if number % 2 == 0 else -1)
-            turn, press = _draws(case.seed, number)
-            angle, factor = self.angle + self.angle_spread * turn, 1.0 + self.gap_spread * press
-            resting = contact_loads(case, self).overlaps
-            overlaps = [(overlap if self.gap is None else -self.gap) * factor for overlap in resting]
-            heading = atan2(y, x) + angle + (0.0 if facing > 0 else pi)
-            heights = [
-                case.boundary.rest_height(radius - overlap)
-                for radius, overlap in zip(self.radii, overlaps, strict=False)
-            ]
-            beads = [
-                StandingBead(
-                    along * cos(heading) - aside * sin(heading), along * sin(heading) + aside * cos(heading), *rest
-                )
-                for (along, aside), *rest in zip(self._places(heights, overlaps), heights, self.radii, strict=True)
-            ]
-            standing.append(Standing(tuple(beads), facing, angle, walks=True))
-        return standing
-
-    def _places(self, heights: Sequence[float], overlaps: Sequence[float]) -> Places:
+    def places(self, heights: Sequence[float], overlaps: Sequence[float]) -> Places:
         """Positions of the beads of a walker in its frame, from heights and overlaps, m."""
-        if self.places:
-            return list(self.places)
+        if self.at:
+            return list(self.at)
         known = {pair: overlaps[len(self.radii) + number] for number, pair in enumerate(self.pairs)}
 
         def apart(one: int, other: int) -> float:
@@ -318,12 +266,36 @@ class Walkers:
         return ARRANGEMENTS[self.arrangement].places(self.radii, apart)
 
 
-@lru_cache(maxsize=4096)
-def _draws(seed: int, number: int) -> tuple[float, float]:
-    from numpy.random import default_rng
+class Dimers(Walkers):
+    """``[dimers]``: walkers of two beads, the first of which leads.
 
-    turn, press = default_rng([seed, number]).uniform(-1.0, 1.0, size=2)
-    return float(turn), float(press)
+    Their radii may be given by their mean and the asymmetry parameter sin δ = (R1 - R2)/(R1 + R2).
+    """
+
+    choices: ClassVar = (Choice((("radii",), ("diameters",), ("mean_radius", "sin_delta"))),)
+    arrangement: ClassVar[str] = "chain"
+    at: ClassVar[tuple[_Place, ...]] = ()
+    radii: Filled[tuple[Radius, Radius]] = key("§", None, ["0.3 mm", "0.2 mm"])
+    diameters: Annotated[Filled[tuple[Diameter, Diameter]], SAME_RUN] = key("§", None, ["0.6 mm", "0.4 mm"])
+    mean_radius: Annotated[Filled[Radius], SAME_RUN] = key("§", None, "0.25 mm")
+    sin_delta: Annotated[Filled[Annotated[Number, Field(gt=-0.9, lt=0.9)]], SAME_RUN] = key("§", None, 0.2)
+
+
+class Cluster(Walkers):
+    """One of ``[[clusters]]``: walkers of several beads, in an ``arrangement``, or ``at`` a place for each.
+
+    The places are ahead and to the left, in the direction that the walker faces.
+    """
+
+    choices: ClassVar = (Choice((("radii",), ("diameters",))), Choice((("arrangement",), ("at",))))
+    radii: Filled[Annotated[tuple[Radius, ...], Field(min_length=2, max_length=100)]] = key(
+        "§", None, ["0.3 mm", "0.2 mm", "0.2 mm"]
+    )
+    diameters: Annotated[Filled[Annotated[tuple[Diameter, ...], Field(min_length=2, max_length=100)]], SAME_RUN] = key(
+        "§", None, ["0.6 mm", "0.4 mm", "0.4 mm"]
+    )
+    arrangement: str = key("§", "", "fan")
+    at: Annotated[tuple[_Place, ...], Field(max_length=100)] = key("§", (), [["0.2 mm", "0 mm"], ["-0.3 mm", "0 mm"]])
 
 
 def _beside(one: float, other: float) -> list[tuple[float, list[float]]]:
@@ -331,26 +303,66 @@ def _beside(one: float, other: float) -> list[tuple[float, list[float]]]:
     return [(one, [other]), (other, [one])]
 
 
-@dataclass(frozen=True)
-class Mixture:
-    """Poured beads of two size classes: radii of each class, m, and numbers of beads.
+_Range = tuple[Radius, Radius]
+_RangeOfDiameters = tuple[Diameter, Diameter]
 
-    Each of its radii occurs equally often (the engine is given no distributions).
+
+class Mixture(Table):
+    """``[mixture]``: beads that are poured: two classes, each a range of radii filled with ``sizes`` constant radii.
+
+    Each of these radii occurs equally often (the engine is given no distributions).
     """
 
-    small: tuple[float, ...]
-    large: tuple[float, ...]
-    counts: tuple[int, int]
+    choices: ClassVar = (
+        Choice((("small",), ("small_diameters",))),
+        Choice((("large",), ("large_diameters",))),
+        Choice((("count",), ("fill_height",))),
+    )
+    small: Filled[_Range] = key("§", None, ["0.3 mm", "0.315 mm"])
+    large: Filled[_Range] = key("§", None, ["0.5 mm", "0.59 mm"])
+    small_diameters: Annotated[Filled[_RangeOfDiameters], SAME_RUN] = key("§", None, ["0.6 mm", "0.63 mm"])
+    large_diameters: Annotated[Filled[_RangeOfDiameters], SAME_RUN] = key("§", None, ["1 mm", "1.18 mm"])
+    small_share: Annotated[Number, Field(ge=0, le=1)] = key("§", 0.5)
+    mixed_by: Literal["mass", "volume", "number"] = key("§", "mass")
+    sizes: Annotated[Whole, Field(ge=1, le=20)] = key("§", 4)
+    count: Filled[Annotated[Whole, Field(ge=1, le=MOST_BEADS)]] = key("§", None, 200)
+    fill_height: Annotated[Filled[Length], SAME_RUN] = key("§", None, "3 mm")
+
+    @cached_property
+    def small_radii(self) -> tuple[float, ...]:
+        """The radii of the small beads, m."""
+        return _middles(self.small, self.sizes)
+
+    @cached_property
+    def large_radii(self) -> tuple[float, ...]:
+        """The radii of the large beads, m."""
+        return _middles(self.large, self.sizes)
 
     @property
-    def count(self) -> int:
-        """Number of beads."""
-        return sum(self.counts)
+    def _shares(self) -> tuple[float, float]:
+        """Share of the small beads by number, and the mean volume of a bead, m³."""
+        volumes = [_mean_volume(radii) for radii in (self.small_radii, self.large_radii)]
+        share = self.small_share
+        if self.mixed_by != "number":  # one density: by mass is by volume
+            by_number = [share / volumes[0], (1.0 - share) / volumes[1]]
+            share = by_number[0] / sum(by_number)
+        return share, share * volumes[0] + (1.0 - share) * volumes[1]
+
+    @property
+    def mean_volume(self) -> float:
+        """Mean volume of a bead, m³."""
+        return self._shares[1]
+
+    @cached_property
+    def counts(self) -> tuple[int, int]:
+        """Numbers of small and of large beads."""
+        few = round(self.count * self._shares[0])
+        return few, self.count - few
 
     @property
     def radii(self) -> tuple[float, ...]:
         """The different radii, m."""
-        return self.small + self.large
+        return self.small_radii + self.large_radii
 
     @property
     def bridged(self) -> list[tuple[float, list[float]]]:
@@ -359,63 +371,55 @@ class Mixture:
         Beads of a pile have more neighbours, and its viscous limit is lower; ``auto``'s share of the limit allows for
         it: a glycerol pile at 0.4 of it is agitated as at a quarter of that step, within 0.1 %, and at 0.8 it heats up.
         """
-        return _beside(max(self.large), min(self.small))
+        return _beside(max(self.large_radii), min(self.small_radii))
 
     @property
     def all_radii(self) -> list[float]:
         """Radius of every bead, m: the small ones first."""
-        classes = ((self.small, self.counts[0]), (self.large, self.counts[1]))
+        classes = ((self.small_radii, self.counts[0]), (self.large_radii, self.counts[1]))
         return [sizes[number % len(sizes)] for sizes, count in classes for number in range(count)]
 
-    def level(self, boundary: Boundary) -> float:
-        """Height of the layers from which beads are poured, m; infinite if there is no room."""
-        places = len(boundary.layer(max(self.radii)).places)
-        return -(-self.count // places) * 2.0 * LOOSE * max(self.radii) if places else inf
 
-    def stand(self, case: Case, first: int) -> list[Standing]:
-        """Beads on a loose lattice with random order and displacements (seed of the case); they fall and settle."""
-        del first
-        from numpy.random import default_rng
+def _middles(ends: tuple[float, float], number: int) -> tuple[float, ...]:
+    """The middles of equal shares of a range of radii, m."""
+    low, high = ends
+    return tuple(dict.fromkeys(float(f"{low + (high - low) * (k + 0.5) / number:.12g}") for k in range(number)))
 
-        largest, draw = max(self.radii), default_rng(case.seed)
-        layer = case.boundary.layer(largest)
-        floor = case.tops_of_others(self)
-        beads = []
-        for number, radius in enumerate(float(one) for one in draw.permutation(self.all_radii)):
-            level, place = divmod(number, len(layer.places))
-            x, y = layer.places[place]
-            shift = draw.uniform(-1.0, 1.0, 2) * 0.9 * layer.play(radius, largest)
-            height = (level + 0.5) * 2.0 * LOOSE * largest
-            beads.append(StandingBead(x + float(shift[0]), y + float(shift[1]), floor + height, radius))
-        return [Standing(tuple(beads))]
+
+def _mean_volume(radii: Sequence[float]) -> float:
+    return sum(4.0 / 3.0 * pi * radius**3 for radius in radii) / len(radii)
+
+
+class PlacedBead(Table):
+    """One of ``[[placed]]``: a bead and where it begins, from the middle of the floor."""
+
+    choices: ClassVar = (Choice((("radius",), ("diameter",))),)
+    radius: Filled[Radius] = key("§", None, "0.3 mm")
+    diameter: Annotated[Filled[Diameter], SAME_RUN] = key("§", None, "0.6 mm")
+    at: tuple[SignedLength, SignedLength, SignedLength] = key("§", example=["5 mm", "-3 mm", "0.3 mm"])
 
 
 @dataclass(frozen=True)
-class Placed:
-    """Beads placed one by one: x, y, z (m, from the middle of the floor) and radius (m) of each."""
+class PlacedBeads:
+    """All beads that are placed one by one, at least one."""
 
-    beads: tuple[tuple[float, float, float, float], ...]
+    beads: tuple[PlacedBead, ...]
 
     @property
     def all_radii(self) -> list[float]:
         """Radius of every bead, m."""
-        return [bead[3] for bead in self.beads]
+        return [bead.radius for bead in self.beads]
 
     @property
     def radii(self) -> tuple[float, ...]:
         """The different radii, m."""
-        return tuple(sorted({bead[3] for bead in self.beads}))
+        return tuple(sorted(set(self.all_radii)))
 
     @property
     def bridged(self) -> list[tuple[float, list[float]]]:
         """The largest bead beside the smallest."""
         return _beside(self.radii[-1], self.radii[0])
 
-    def stand(self, case: Case, first: int) -> list[Standing]:
-        """The beads at their given positions."""
-        del case, first
-        return [Standing(tuple(StandingBead(*bead) for bead in self.beads))]
 
-
-Body = Walkers | Mixture | Placed
+Body = Walkers | Mixture | PlacedBeads
 """Kinds of bodies."""

@@ -6,15 +6,16 @@ Most have a floor, the plane z = 0 in their own frame, and may have side walls. 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import ceil, cos, degrees, inf, isinf, pi, sin, sqrt
+from math import ceil, cos, degrees, inf, pi, sin, sqrt
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field
-
+from walkers.errors import Problem
+from walkers.inputs import units
 from walkers.inputs.drive import Vector
-from walkers.physics import units
+from walkers.inputs.keys import joined, parts_of
+from walkers.inputs.table import SAME_RUN, Filled, Table, example_of, key
 
 if TYPE_CHECKING:
     import numpy as np
@@ -96,16 +97,9 @@ SIZES: Mapping[str, Collection[str]] = {
 _AREAS = {"box": 1.0, "cylinder": pi / 4.0, "octagon": 2.0 * (sqrt(2.0) - 1.0)}
 """Of the cross-sections of containers, in squares of their width."""
 _CORNERS = {"+x+y": (1.0, 1.0), "+x-y": (1.0, -1.0), "-x+y": (-1.0, 1.0), "-x-y": (-1.0, -1.0)}
-_Opening = Annotated[
-    float,
-    replace(units.ANGLE, smallest=0.5, largest=3.1, sign=units.POSITIVE),
-    Field(exclude_if=lambda opening: opening == pi),
-]
-_Size = Annotated[units.Length, Field(exclude_if=isinf)]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Boundary:
+class Boundary(Table):
     """``[boundary]``: the walls.
 
     A plane, a channel (a floor and two upright walls, a ``width`` apart), a groove (two walls that meet in the x axis,
@@ -115,13 +109,30 @@ class Boundary:
     the floor; of a resolved case from its x axis toward y.
     """
 
-    shape: Shape = "plane"
-    material: str
-    opening: _Opening = pi
-    width: _Size = inf
-    height: _Size = inf
-    tilt: Annotated[float, replace(units.ANGLE, largest=1.5708, sign=_SLOPE)] = 0.0
-    uphill: units.Angle = 0.0
+    shape: Shape = key("Shape of the boundary. See [](../cases.md#boundaries).", "plane")
+    material: Annotated[str, SAME_RUN] = key(
+        "Material of the boundary, from the library. Any other name is possible if the case gives all friction "
+        "coefficients.",
+        example="chromium-coated glass",
+    )
+    opening: Filled[Annotated[float, replace(units.ANGLE, smallest=0.5, largest=3.1, sign=units.POSITIVE)]] = key(
+        "Angle between the walls of a groove.", None, "120 deg"
+    )
+    width: Filled[units.Length] = key("Width of a channel, inner side of a box, or diameter.", None, "5.3 mm")
+    height: Filled[units.Length] = key("Height of a container.", None, "5.3 mm")
+    tilt: Annotated[float, replace(units.ANGLE, largest=1.5708, sign=_SLOPE)] = key("Tilt of the boundary.", 0.0)
+    uphill: units.Angle = key("Direction of the steepest way up, from that of the drive.", 0.0)
+
+    @classmethod
+    def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
+        """Sizes that the shape lacks, or that are those of another shape."""
+        sizes = SIZES.get(shape := str(given.get("shape", "plane")), ())
+        for name in ("opening", "width", "height") if shape in SIZES else ():
+            where = joined([*parts_of(place), name])
+            if name in sizes and name not in given:
+                yield Problem(where, None, f"missing; expected {example_of(cls.model_fields[name])}")
+            elif name in given and name not in sizes:
+                yield Problem(where, None, f"expected none of a {shape}")
 
     @property
     def closed(self) -> bool:
@@ -151,10 +162,11 @@ class Boundary:
     @property
     def walls(self) -> tuple[Wall, ...]:
         """The floor first, if there is one, then the side walls."""
-        half, across, up = self.width / 2.0, cos(self.opening / 2.0), sin(self.opening / 2.0)
         if self.shape == "groove":
+            across, up = cos(self.opening / 2.0), sin(self.opening / 2.0)
             return (Flat(BOTTOM.point, (0.0, across, up), "-y"), Flat(BOTTOM.point, (0.0, -across, up), "+y"))
         walls: list[Wall] = [BOTTOM]
+        half = (self.width or inf) / 2.0
         if self.shape == "cylinder":
             walls += [Round(half)]
         if self.shape in ("box", "octagon"):
@@ -209,7 +221,7 @@ class Boundary:
 
     def rest_height(self, radius: float) -> float:
         """Height above the origin at which a bead of a radius (m) rests on the floor or on both walls, m."""
-        return radius / sin(self.opening / 2.0)
+        return radius / sin((self.opening or pi) / 2.0)
 
     @property
     def cross_section(self) -> float:

@@ -1,241 +1,342 @@
-"""A resolved case: all numbers in SI units.
+"""A case: bodies on a boundary under a drive, with a liquid and contacts; a file's keys are its fields.
 
-This is what the deck is rendered from, what a run directory stores as ``case.json`` and what its hash is made of.
+Values are numbers in SI units. What the file leaves out comes from the library, from defaults or from other values
+(`walkers.inputs.resolving`), and ``sources`` says from where. The deck is rendered from it, a run directory stores it as
+``case.json``, and the hash in a run's name is made of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from functools import cache, cached_property, partial
-from math import cos, hypot, inf, isclose, sin
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cached_property
+from math import cos, hypot, inf, sin
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from pydantic import TypeAdapter, ValidationError
-from pydantic_core import to_jsonable_python
+from pydantic import BeforeValidator, Field, ValidationError
 
-from walkers.inputs.bodies import Body, Mixture, Placed, Standing, Walkers
+from walkers.errors import InputError, Problem, each, refused
+from walkers.inputs import units
+from walkers.inputs.axes import is_axis, ranges_of
+from walkers.inputs.bodies import MOST_BEADS, Body, Cluster, Dimers, Mixture, PlacedBead, PlacedBeads, Walkers
 from walkers.inputs.boundary import Boundary
-from walkers.inputs.drive import AXES, Drive, Vector
-from walkers.inputs.origins import Origin
-from walkers.inputs.rounding import percent
-from walkers.physics.laws import LAWS, law_of
-from walkers.physics.matter import Contact, Liquid
+from walkers.inputs.drive import AXES, Drive, Excitation, Vector
+from walkers.inputs.keys import MISSING, flatten, parts_of, value_at
+from walkers.inputs.library import library_of
+from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
+from walkers.inputs.origins import Origin, Source, Whence, text_of
+from walkers.inputs.resolving import SUPPLIED, resolve, supplied
+from walkers.inputs.run import Run
+from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Flag, Table, changed, contradictions, key
+from walkers.inputs.units import Coefficient, Number, kind_in
+from walkers.physics.laws import by_name
+from walkers.physics.liquid import BridgeLiquid
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from walkers.physics.bridge import BridgeLaw
 
-_SILENCE = 600.0  # s; piles of 200 beads write some thirty lines a second, those of 20,000 one in four seconds
-_SLOWEST_STEP = 4e-5  # s a bead: thirty times what it takes with two beads alone, a hundred times that in a pile
-_LOG_BYTES = 64e6  # walkers write some 50 kB, a segment of a pile as much …
-_LOG_BYTES_PER_CYCLE = 1e4  # … and a cycle some 500 bytes
-FIRST_ATTEMPTS = (12, 24)
-"""Cycles after which it is asked whether velocities are constant. After 36 hardly any are that were not after 24."""
-BOUNDS = ("silence", "log_limit")
-"""Fields of `Run` that limit the engine and do not change the result."""
-
-_SOURCES = ("document", "find_origins", "recorded_law")
+DEFAULT_LAW = "young-laplace"
 
 
-def settling_of(cycles: int) -> int:
-    """Default number of settling cycles of walkers: a third of the cycles, at most 20."""
-    return min(20, cycles // 3)
+class Beads(Table):
+    """``[beads]``: what all beads are made of."""
+
+    material: Annotated[str | None, SAME_RUN] = key("§", None, "ruby")
+    density: units.Density = key("§")
 
 
-CONSTANT = 0.002
-"""Share within which the velocities of the halves of a walker's cycles agree where a run ends early: they are constant.
+class Liquid(Table):
+    """``[liquid]``: a name from the library, numbers, or both (numbers take precedence).
 
-A walker is called steady at a looser criterion, that of `walkers.postprocess.gait.walk`.
-"""
-
-
-@dataclass(frozen=True)
-class Run:
-    """Duration, time step, sampling and segments; a cycle is a whole multiple of the sampling interval.
-
-    Before the drive loose beads rest until their root mean square velocity is below `settled_below` (m/s), or for
-    `longest_settling` (s; 0 of walkers, which stand from the first). Beads are recorded `samples_per_cycle` times a
-    cycle, or once in `cycles_per_sample` (one of the two is 1), bridges with one of so many samples. If there are
-    several segments, each has a restart file at its end.
+    ``mass_fraction`` (of glycerol) and ``temperature`` (default: 20 °C) belong to ``water-glycerol``.
+    ``volume_fraction`` is the volume of the liquid on a bead over that of the bead, ``viscosity_ratio`` the viscosity
+    of the bridges over that of the liquid. If liquid is ``conserved``, a bridge takes its volume from the films of its
+    beads and gives it back when it breaks (Shi and McCarthy 2008); otherwise its volume does not depend on other
+    bridges. ``law`` is the bridge law: one of `walkers.physics.laws`, or your own function, ``file.py:function``.
     """
 
-    time_step: float
-    """s."""
-    steps_per_cycle: int
-    cycles: int
-    settling_cycles: int
-    """Of the cycles, those before velocities are measured."""
-    until_steady: bool
-    """Whether fewer do if velocities are constant after them (`walkers.postprocess.gait.are_constant`)."""
-    samples_per_cycle: int
-    cycles_per_sample: int
-    samples_per_bridge_sample: int
-    cycles_per_segment: int
-    settled_below: float
-    longest_settling: float
-    ranks: int
-    """MPI processes."""
-    silence: float | None = None
-    """s for which an engine may write nothing before it is ended; None: as `longest_silence` says."""
-    log_limit: float | None = None
-    """Bytes of a log beyond which an engine is ended; None: as `most_log` says."""
-
-    @property
-    def period(self) -> float:
-        """Period of a cycle, s."""
-        return self.time_step * self.steps_per_cycle
-
-    @property
-    def steps(self) -> int:
-        """Steps of the whole drive."""
-        return self.steps_per_cycle * self.cycles
-
-    @property
-    def steps_per_sample(self) -> int:
-        """Steps between samples."""
-        return self.steps_per_cycle * self.cycles_per_sample // self.samples_per_cycle
-
-    @property
-    def settled_strobes(self) -> int:
-        """Number of stroboscopic samples before velocities are measured."""
-        return -(-self.settling_cycles // self.cycles_per_sample)
-
-    @property
-    def attempts(self) -> tuple[int, ...]:
-        """Cycles for which the run is made, and made again from its begin if its walkers are not steady after them."""
-        fewer = FIRST_ATTEMPTS if self.until_steady else ()
-        return (*(cycles for cycles in fewer if cycles < self.cycles), self.cycles)
-
-    @property
-    def continuation(self) -> str:
-        """What `walkers run` does after the cycles tried first; empty for a fixed number of cycles."""
-        further = (
-            f"walkers run continues to {self.cycles} if the velocities are not constant within {percent(CONSTANT)}"
-        )
-        return f"{further}: then set cycles to {self.cycles}" if len(self.attempts) > 1 else ""
-
-    def steps_until(self, cycles: int) -> int:
-        """Steps of the attempts up to the one for so many cycles."""
-        return self.steps_per_cycle * sum(one for one in self.attempts if one <= cycles)
-
-    def for_cycles(self, cycles: int) -> Run:
-        """The same run with a fixed number of cycles in one segment."""
-        if not self.until_steady:
-            return self
-        settling = settling_of(cycles)
-        return replace(self, cycles=cycles, settling_cycles=settling, until_steady=False, cycles_per_segment=cycles)
-
-    def longest_silence(self, beads: int) -> float:
-        """Longest time, s, for which an engine with a number of beads may write nothing to log and dump."""
-        if self.silence is not None:
-            return self.silence
-        # It writes once a sample, and several times a cycle.
-        return max(_SILENCE, min(self.steps_per_sample, self.steps_per_cycle) * beads * _SLOWEST_STEP)
-
-    @property
-    def most_log(self) -> float:
-        """Largest size of the engine's log, bytes."""
-        return self.log_limit or max(_LOG_BYTES, self.cycles * _LOG_BYTES_PER_CYCLE)
-
-    @property
-    def rests(self) -> bool:
-        """Whether the beads rest before the drive."""
-        return self.longest_settling > 0.0
-
-    @property
-    def in_one(self) -> bool:
-        """Whether the run has a single segment."""
-        return not self.rests and self.cycles_per_segment >= self.cycles
-
-
-@dataclass(frozen=True)
-class Case:
-    """Bodies on a boundary under a drive, resolved.
-
-    Attributes are SI (``density`` of the beads in kg/m³, ``gravity`` in m/s²). ``seed`` is that of all that is drawn at
-    the start. ``document`` (the tables that the case was read from), ``find_origins`` (which gives `origins`) and
-    ``recorded_law`` (a user's law as a run has recorded it) are part of no comparison, and are lost where
-    `dataclasses.replace` changes the case: they would tell of another one.
-
-    Raises
-    ------
-    ValueError
-        If the run is not one for the drive, whose cycles it has other steps for.
-    """
-
-    name: str
-    title: str
-    walkers: tuple[Walkers, ...]
-    mixture: Mixture | None
-    placed: Placed | None
-    boundary: Boundary
-    drive: Drive
-    gravity: float
-    material: str | None
-    density: float
-    liquid: Liquid
-    contact: Contact
-    seed: int
-    run: Run
-    document: Mapping[str, Any] = field(default_factory=dict, init=False, compare=False, repr=False)
-    find_origins: Callable[[], tuple[Origin, ...]] = field(default=tuple, init=False, compare=False, repr=False)
-    recorded_law: Any = field(default=None, init=False, compare=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Refuse a drive that does not match time step and sampling."""
-        period, frequency = self.run.period, self.drive.frequency
-        if period and not isclose(period * frequency, 1.0, rel_tol=1e-9):
-            raise ValueError(
-                f"drive of {frequency:g} Hz, but time step and sampling of one of {1.0 / period:g} Hz: "
-                f'use load_case("{self.name}", {{"drive.frequency": "{frequency:g} Hz"}})'
-            )
-
-    @property
-    def as_read(self) -> bool:
-        """Whether the case equals its document, that is, was not changed after reading."""
-        return bool(self.document)
+    choices: ClassVar = (Choice((("dynamic_viscosity",), ("kinematic_viscosity",))),)
+    name: Annotated[str | None, SAME_RUN] = key("§", None, "Si AK5")
+    mass_fraction: Annotated[Filled[Annotated[Number, Field(ge=0, le=1)]], SAME_RUN] = key("§", None, 0.87)
+    temperature: Annotated[Filled[units.Temperature], SAME_RUN] = key("§", None)
+    surface_tension: units.SurfaceTension = key("§")
+    density: Annotated[Filled[units.Density], SAME_RUN] = key("§", None)
+    kinematic_viscosity: Annotated[Filled[units.KinematicViscosity], SAME_RUN] = key("§", None)
+    dynamic_viscosity: Filled[units.DynamicViscosity] = key("§", None)
+    volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)] = key("§", example=0.01)
+    viscosity_ratio: Annotated[Number, Field(ge=0, le=1e4)] = key("§", 1.0)
+    contact_angle: units.UpToRightAngle = key("§")
+    conserved: Flag = key("§", False)
+    law: str = key("§", DEFAULT_LAW)
 
     @cached_property
-    def origins(self) -> tuple[Origin, ...]:
-        """Origins of the values; empty for a case that was not read or was changed afterwards."""
-        return self.find_origins()
+    def of_bridges(self) -> BridgeLiquid:
+        """What the bridges' law and their tables need of it."""
+        return BridgeLiquid(
+            surface_tension=self.surface_tension,
+            viscosity=float(f"{self.dynamic_viscosity * self.viscosity_ratio:.15g}"),
+            volume_fraction=self.volume_fraction,
+            contact_angle=self.contact_angle,
+            conserved=self.conserved,
+            law=self.law,
+        )
 
-    def read_from(
-        self,
+
+class Friction(Table):
+    """``[contact.friction]``: Coulomb coefficients."""
+
+    bead_bead: Coefficient = key("§", example=0.25)
+    bead_wall: Coefficient = key("§", example=0.25)
+
+
+class Contact(Table):
+    """``[contact]``: the model of the contacts; the Young's modulus is that of the softened beads and walls.
+
+    The engine requires a restitution above 0.05 and a modulus up to 1 GPa; a modulus below 5 MPa changes velocities.
+    """
+
+    friction: Friction = key("")
+    rolling_friction: Coefficient = key("§", example=0.01)
+    restitution: Annotated[Number, Field(gt=0.05, le=1)] = key("§", example=0.5)
+    youngs_modulus: Annotated[float, replace(units.MODULUS, smallest=5e6, largest=1e9)] = key("§", 5e7)
+    poissons_ratio: Annotated[Number, Field(ge=0, lt=0.5)] = key("§", 0.3)
+    minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)] = key("§", example=0.05)
+
+
+class Environment(Table):
+    """``[environment]``."""
+
+    gravity: units.Acceleration = key("§", 9.81)
+
+
+def _ranges(value: object) -> object:
+    """Ranges by dotted keys: each two values of one unit, the smaller first."""
+    if not isinstance(value, dict):
+        return value
+    try:
+        ranges = {name: one if is_axis(one) else {"uniform": one} for name, one in flatten(value, is_axis).items()}
+        ends = ranges_of(ranges)
+    except InputError as error:
+        (problem,) = error.problems
+        message = problem.expected.replace("{ uniform = [low, high] }", "[low, high]")
+        raise ValueError(f"{problem.key}: {message}") from error
+    for name, one in ends.items():
+        if one.median is not None:
+            raise ValueError(f"{name}: expected [low, high]: the case's own value is the median")
+    return ranges
+
+
+Ranges = Annotated[dict[str, Any], BeforeValidator(_ranges)]
+"""As a sweep's samplers take them: for each key ``{"uniform": [low, high]}`` or ``{"loguniform": [low, high]}``."""
+_BODIES = ("dimers", "clusters", "mixture", "placed")
+_ABOUT = ("document", "sources", "recorded_law", "uncertain")
+"""Fields that are part of no comparison: where values are from, and the law as its run has recorded it."""
+
+
+class Case(Table):
+    """A case file: bodies on a boundary under a drive, with a liquid and contacts.
+
+    ``uncertain`` has, for keys whose values are guesses, the range in which the truth may lie: ``[low, high]``, or
+    ``{ loguniform = [low, high] }`` for one of magnitudes. ``document`` has the tables that the case was read from,
+    ``sources`` the `Source` of each value that they do not give, and ``recorded_law`` is a user's law as a run has
+    recorded it.
+    """
+
+    title: Annotated[str, SAME_RUN] = key("§", "")
+    beads: Beads = key("")
+    dimers: Dimers | None = key("", None)
+    clusters: Annotated[tuple[Cluster, ...], Field(max_length=100)] = key("", ())
+    mixture: Mixture | None = key("", None)
+    placed: Annotated[tuple[PlacedBead, ...], Field(max_length=MOST_BEADS)] = key("", ())
+    boundary: Boundary = key("")
+    drive: Drive = key("")
+    liquid: Liquid = key("")
+    contact: Contact = key("")
+    run: Run = key("", Run())
+    environment: Environment = key("", Environment())
+    uncertain: Annotated[Ranges, SAME_RUN] = key("§", {})
+    name: Annotated[Derived[str], SAME_RUN] = "case"
+    document: Annotated[Derived[dict[str, Any]], SAME_RUN] = {}
+    sources: Annotated[Derived[dict[str, Source]], SAME_RUN] = {}
+    recorded_law: Annotated[Derived[Any], SAME_RUN, Field(exclude=True)] = None
+
+    @classmethod
+    def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
+        """Bodies that are missing, and the length of a run of loose beads."""
+        if not any(body in given for body in _BODIES):
+            yield Problem("dimers", None, "missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]")
+        run = given.get("run", {})
+        if (
+            ("mixture" in given or "placed" in given)
+            and isinstance(run, Mapping)
+            and not run.keys() & {"duration", "cycles"}
+        ):
+            yield Problem("run.duration", None, 'missing; expected such as "4 s"')
+        if isinstance(drive := given.get("drive"), Mapping) and drive.get("harmonics"):
+            for name in sorted(drive.keys() - {"harmonics", "frame"}):
+                instead = f": write drive.harmonics[0].{name}" if name != "waveform" else ""
+                yield Problem(f"drive.{name}", None, f"expected none beside drive.harmonics{instead}")
+        yield from super().problems(given, place)
+
+    @cached_property
+    def _values(self) -> tuple[Any, ...]:
+        return tuple(getattr(self, name) for name in type(self).model_fields if name not in _ABOUT)
+
+    # --- reading and changing -------------------------------------------------------------------------------------
+
+    @classmethod
+    def read(
+        cls,
         document: Mapping[str, Any],
-        find_origins: Callable[[], tuple[Origin, ...]],
-        recorded_law: BridgeLaw | None = None,
+        *,
+        source: str = "<case>",
+        name: str = "case",
+        changes: Mapping[str, Any] | None = None,
     ) -> Case:
-        """The same case with the tables from which it was read, notes on origins, and the law of its run."""
-        case = replace(self)
-        object.__setattr__(case, "recorded_law", recorded_law)
-        object.__setattr__(case, "document", document)
-        object.__setattr__(case, "find_origins", find_origins)
+        """A case given as the tables of a case file, quantities as strings with units.
+
+        ``source`` is what messages call it; run directories begin with its ``name``; ``changes`` are other values by
+        dotted keys. Raises `InputError` with all that is wrong in the tables, or with what contradicts something else.
+        """
+        if changes:
+            with blaming_changes(changes):
+                with blaming(source):
+                    each(lambda one: check_key(cls, one), changes)
+                    document = changed(cls, document, changes)
+                return cls.read(document, source=source, name=name)
+        with blaming(source, document):
+            tables, sources, unknown = supplied(document, library_of(document, source))
+            try:
+                case = validated(cls, tables, source, further=[*unknown, *contradictions(cls, tables)])
+            except InputError as error:  # what an unknown name would have given is not missing too
+                problems = [one for one in error.problems if not (unknown and one.key in SUPPLIED and not one.value)]
+                raise InputError(source, problems or unknown) from error
+            try:
+                case = resolve(case.but(name=name, document=dict(document), sources=sources))
+            except ArithmeticError as error:
+                raise refused(source, f"inconsistent values: {error}") from error
+            case._check_uncertain(tables, source)
         return case
 
-    def renamed(self, name: str, title: str | None = None) -> Case:
-        """The same case under another name, or another title too."""
-        return replace(self, name=name, title=title or self.title).read_from(*self._sources)
+    def _check_uncertain(self, tables: Mapping[str, Any], source: str) -> None:
+        """Uncertain values are keys of the case, which could say both ends of the range and lie between them."""
+        for name, given in self.uncertain.items():
+            ends = next(iter(given.values()))
+            try:
+                check_key(type(self), name)
+                low, high = (validated(Case, changed(Case, tables, {name: end}), source).value_of(name) for end in ends)
+            except InputError as error:
+                problems = [replace(one, key=f"uncertain.{one.key}") for one in error.problems]
+                raise InputError(source, problems) from error
+            value = self.value_of(name)
+            if isinstance(value, (int, float)) and not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9):
+                text = next((one.text for one in self.origins if one.key == name), str(value))
+                message = f"expected a range with the value of the case in it, {text}"
+                raise InputError(source, [Problem(f"uncertain.{name}", None, message)])
+
+    def changed(self, changes: Mapping[str, Any]) -> Case:
+        """The case with other values of its file, by dotted keys and as a case file has them.
+
+        Raises `InputError` if a key or a value cannot be used.
+
+        Examples
+        --------
+        >>> from walkers import load_case
+        >>> load_case("fig1b").changed({"drive.frequency": "70 Hz", "dimers.radii[1]": "0.25 mm"}).dimers.radii
+        (0.0003, 0.00025)
+        """
+        return Case.read(self.document, source=self.name, name=self.name, changes=changes) if changes else self
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Case:
+        """A case from `as_dict` (a run directory's ``case.json``); raises `ValueError` if it is none."""
+        try:
+            return cls.model_validate(values)
+        except ValidationError as error:
+            first = error.errors()[0]
+            raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+
+    def as_dict(self) -> dict[str, Any]:
+        """The whole case as plain JSON types, SI units, with the tables it was read from and its values' sources."""
+        return self.model_dump(mode="json", by_alias=True)
+
+    def filled(self, name: str, value: Any, why: str = "", origin: Whence = "derived") -> Case:
+        """The case with a value of a key that its file does not give."""
+        return self.put(name, value).noted(name, why, origin)
+
+    def noted(self, name: str, why: str, origin: Whence = "derived", text: str = "") -> Case:
+        """The case with the source of a value of a key."""
+        return self.but(sources={**self.sources, name: Source(origin, why, text)})
 
     def for_cycles(self, cycles: int) -> Case:
         """The same case with a fixed number of cycles in one segment."""
-        return replace(self, run=self.run.for_cycles(cycles)).read_from(*self._sources)
+        return self.but(run=self.run.for_cycles(cycles))
+
+    def determinants(self) -> dict[str, Any]:
+        """All values that determine the results, as plain JSON types: without names and limits of the engine.
+
+        A field of another name, or another default of a key that a file leaves out, renames all runs.
+        """
+        return super().determinants()
+
+    @cached_property
+    def origins(self) -> tuple[Origin, ...]:
+        """Origins of the values, in the order of the tables of a case file."""
+        origins: dict[str, Origin] = {}
+        for name, value, field in self.leaves():
+            if name in ("title", "uncertain") or name.startswith("placed["):  # no value, or hundreds
+                continue
+            raw, kind = value_at(self.document, parts_of(name)), kind_in([*field.metadata, field.annotation])
+            if raw is not MISSING and not (isinstance(raw, str) and raw.strip().lower() == "auto"):
+                origins[name] = Origin(name, text_of(raw), "given", value=value)
+            elif source := self.sources.get(name):
+                text = source.text or text_of(value, kind)
+                about = (source.origin, source.why, source.range, source.logarithmic)
+                origins[name] = Origin(name, text, *about, value=value)
+            elif value not in (None, "", ()):
+                origins[name] = Origin(name, text_of(value, kind), "default", value=value)
+        for name, given in self.uncertain.items():
+            ((distribution, (low, high)),) = given.items()
+            # What has no line of its own, such as one of two radii, has one if the case calls it uncertain.
+            raw = value_at(self.document, parts_of(name))
+            one = origins.get(name) or Origin(name, "-" if raw is MISSING else text_of(raw), "given")
+            logarithmic = distribution == "loguniform"
+            origins[name] = replace(one, range=(low, high), logarithmic=logarithmic, uncertain=True)
+        return tuple(origins.values())
+
+    # --- questions ------------------------------------------------------------------------------------------------
+
+    @property
+    def walkers_by_key(self) -> dict[str, Walkers]:
+        """All makes of walkers by their keys, dimers first."""
+        dimers: dict[str, Walkers] = {} if self.dimers is None else {"dimers": self.dimers}
+        return {**dimers, **{f"clusters[{number}]": cluster for number, cluster in enumerate(self.clusters)}}
+
+    @cached_property
+    def walkers(self) -> tuple[Walkers, ...]:
+        """All makes of walkers, dimers first."""
+        return tuple(self.walkers_by_key.values())
+
+    @property
+    def excitation(self) -> Excitation:
+        """The oscillations of the drive."""
+        return self.drive.excitation
 
     @property
     def law(self) -> BridgeLaw:
         """The law of its bridges: the one that its run has recorded, else that of the liquid."""
-        return self.recorded_law or law_of(self.liquid)
+        law: BridgeLaw = self.recorded_law or by_name(self.liquid.law)
+        return law
 
-    @property
-    def _sources(self) -> tuple[Mapping[str, Any], Callable[[], tuple[Origin, ...]], BridgeLaw | None]:
-        return self.document, self.find_origins, self.recorded_law
-
-    @property
+    @cached_property
     def bodies(self) -> tuple[Body, ...]:
         """All bodies, the walkers first."""
-        return (*self.walkers, *(body for body in (self.mixture, self.placed) if body is not None))
+        placed = (PlacedBeads(self.placed),) if self.placed else ()
+        return (*self.walkers, *((self.mixture,) if self.mixture else ()), *placed)
 
-    @property
+    @cached_property
     def all_radii(self) -> list[float]:
         """Radius of every bead, m."""
         return [radius for body in self.bodies for radius in body.all_radii]
@@ -253,7 +354,7 @@ class Case:
     @property
     def duration(self) -> float:
         """Duration of the drive, s; an upper limit if the run ends at constant velocities."""
-        return self.run.cycles / self.drive.frequency
+        return self.run.cycles / self.excitation.frequency
 
     @property
     def radii(self) -> list[float]:
@@ -263,34 +364,17 @@ class Case:
     @property
     def loose(self) -> bool:
         """Whether there are loose beads, which may form clusters."""
-        return self.mixture is not None or self.placed is not None
+        return self.mixture is not None or bool(self.placed)
 
-    @property
+    @cached_property
     def border(self) -> float:
         """A radius between those of small and large beads, m; infinite for a single class."""
         if self.mixture is not None:
-            return (max(self.mixture.small) + min(self.mixture.large)) / 2.0
+            return (max(self.mixture.small_radii) + min(self.mixture.large_radii)) / 2.0
         sizes = sorted(self.radii)
         middle = (sizes[0] + sizes[-1]) / 2.0
         small, large = ([size for size in sizes if (size > middle) is above] for above in (False, True))
         return (small[-1] + large[0]) / 2.0 if large else inf
-
-    def standing(self) -> Iterator[tuple[int, Standing]]:
-        """What stands at the start, each with the number of its body; walkers come first and are numbered through.
-
-        Raises `ValueError` if the beads of a walker cannot stand so.
-        """
-        first = 0
-        for number, body in enumerate(self.bodies):
-            stood = body.stand(self, first)
-            yield from ((number, one) for one in stood)
-            first += len(stood)
-
-    def tops_of_others(self, body: Body) -> float:
-        """Largest height of the other bodies at the start, m."""
-        walkers = [2.0 * max(one.radii) for one in self.walkers if one is not body]
-        placed = self.placed.beads if self.placed is not None and self.placed is not body else ()
-        return max([*walkers, *(z + radius for _, _, z, radius in placed)], default=0.0)
 
     @property
     def apart(self) -> bool:
@@ -310,7 +394,7 @@ class Case:
     @property
     def drive_axis(self) -> Vector:
         """Reference direction of orientations: the drive in the plane of the floor, or x if it has none there."""
-        x, y, _ = self.drive.direction
+        x, y, _ = self.excitation.direction
         length = hypot(x, y)
         return (x / length, y / length, 0.0) if length else AXES["x"]
 
@@ -324,7 +408,7 @@ class Case:
     @property
     def gravity_vector(self) -> Vector:
         """Acceleration of gravity in the frame of the boundary, m/s²."""
-        return self.boundary.gravity(self.gravity)
+        return self.boundary.gravity(self.environment.gravity)
 
     @property
     def pressing_gravity(self) -> float:
@@ -335,41 +419,3 @@ class Case:
     def axial_gravity(self) -> float:
         """Component of gravity against the drive axis, m/s²."""
         return -sum(one * along for one, along in zip(self.gravity_vector, self.drive_axis, strict=True))
-
-    def determinants(self) -> dict[str, Any]:
-        """All values that determine the results, as plain JSON types: without names and limits of the engine."""
-        no_names: dict[str, Any] = {**dict.fromkeys(("name", "title", "material", *_SOURCES), True), "run": set(BOUNDS)}
-        without = {**no_names, "boundary": {"material"}, "liquid": {"name"}}
-        if self.liquid.law in LAWS:  # none of which asks for the density; one of a user's own may
-            without["liquid"] = {"name", "density"}
-        if not self.liquid.conserved:  # cases of before this key keep their names
-            without["liquid"] = {*without["liquid"], "conserved"}
-        values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude=without)
-        return values
-
-    def as_dict(self) -> dict[str, Any]:
-        """The whole case as plain JSON types, SI units, with the tables it was read from and its values' origins."""
-        about: dict[str, Any] = to_jsonable_python({"document": self.document, "origins": self.origins})
-        return {**_adapter().dump_python(self, mode="json", exclude=set(_SOURCES)), **about}
-
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> Case:
-        """Rebuild a case from `as_dict` (a run directory's ``case.json``); raises `ValueError` if it is none."""
-        try:
-            case = _adapter().validate_python(values, by_alias=False, by_name=True)
-            about = values.get("document", {}), values.get("origins", ())
-            document, origins = _origins_adapter().validate_python(about)
-            return case.read_from(document, partial(tuple, origins))
-        except ValidationError as error:
-            first = error.errors()[0]
-            raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
-
-
-@cache
-def _adapter() -> TypeAdapter[Case]:
-    return TypeAdapter(Case)
-
-
-@cache
-def _origins_adapter() -> TypeAdapter[tuple[dict[str, Any], tuple[Origin, ...]]]:
-    return TypeAdapter(tuple[dict[str, Any], tuple[Origin, ...]])

@@ -1,6 +1,6 @@
-"""Drive of the boundary: harmonics A sin(2π f t + φ), each with its own direction.
+"""Drive of the boundary: the table ``[drive]``, and the sum of sines A sin(2π f t + φ) that it stands for.
 
-The cycle of a drive is the common period of its harmonics; its peak acceleration, and Γ0, are those of the largest.
+The cycle of a drive is the common period of its sines; its peak acceleration, and Γ0, are those of the largest.
 """
 
 from __future__ import annotations
@@ -8,8 +8,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import degrees, gcd, hypot, isclose, lcm, pi
-from typing import Literal
+from functools import cached_property
+from math import degrees, gcd, hypot, isclose, isfinite, lcm, pi
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BeforeValidator, Field
+
+from walkers.inputs import units
+from walkers.inputs.table import SAME_RUN, Choice, Filled, Table, key
+from walkers.inputs.units import Angle, Coefficient
 
 Vector = tuple[float, float, float]
 Frame = Literal["lab", "container"]
@@ -24,11 +31,68 @@ WAVEFORMS: Mapping[str, tuple[tuple[int, float], ...]] = {
 """Of the acceleration: multiples of the frequency and shares of the peak. A triangle's series is cut at 0.96 of it."""
 _FEW = 3
 MOST_PERIODS = 1000
-"""Largest number of periods of the fastest harmonic in a cycle."""
+"""Largest number of periods of the fastest sine in a cycle."""
+
+
+def _axis(value: object) -> object:
+    """An axis by its name, or a direction by its components."""
+    if value in ("x", "y", "z"):
+        return value
+    if isinstance(value, (list, tuple)) and len(value) == 3 and any(value):
+        numbers = tuple(float(one) for one in value if type(one) in (int, float) and isfinite(one))
+        if len(numbers) == 3:
+            return numbers
+    raise ValueError("expected 'x', 'y' or 'z', or a direction such as [1, 0, 1]")
+
+
+class Harmonic(Table):
+    """One of ``[[drive.harmonics]]``; exactly one of ``peak_acceleration`` and ``gamma0``."""
+
+    choices: ClassVar[tuple[Choice, ...]] = (Choice((("peak_acceleration",), ("gamma0",))),)
+    axis: Annotated[Any, BeforeValidator(_axis)] = key(
+        "Direction of the drive: `x`, `y`, `z`, or components such as `[1, 0, 1]`. Default: `x` on planes, `z` in "
+        "containers.",
+        None,
+    )
+    frequency: units.Frequency = key("Frequency of the drive.")
+    peak_acceleration: Filled[units.Acceleration] = key("Peak acceleration.", None)
+    gamma0: Annotated[Filled[Coefficient], SAME_RUN] = key(
+        "Peak acceleration as Γ0 = a0 M/(4πγR̄) of the dimer, instead of `peak_acceleration`.", None, 0.5
+    )
+    phase: Angle = key("Phase φ of the displacement sin(2π f t + φ).", 0.0)
+
+    @property
+    def sine(self) -> Sine:
+        """The oscillation that the resolved keys describe."""
+        direction = AXES[self.axis] if isinstance(self.axis, str) else unit_vector(self.axis)
+        return Sine(direction, self.frequency, self.peak_acceleration, self.phase)
+
+
+class Drive(Harmonic):
+    """``[drive]``: one harmonic by its keys, or several as ``[[drive.harmonics]]``.
+
+    In the ``frame`` of the container, as is usual, the beads feel the inertial force; in that of the laboratory the
+    walls move, which they can for one harmonic without a phase.
+    """
+
+    choices: ClassVar[tuple[Choice, ...]] = (
+        Choice((("peak_acceleration",), ("gamma0",), ("harmonics",))),
+        Choice((("frequency",), ("harmonics",))),
+    )
+    frequency: Filled[units.Frequency] = key("Frequency of the drive.", None)
+    waveform: Literal["sine", "triangle", "sawtooth"] = key("Waveform of the acceleration.", "sine")
+    frame: Frame = key("Frame in which the equations are solved; the laboratory's is for checks.", "container")
+    harmonics: Annotated[tuple[Harmonic, ...], Field(max_length=24)] = key("Several harmonics.", ())
+
+    @cached_property
+    def excitation(self) -> Excitation:
+        """The sum of sines that the resolved keys describe."""
+        sines = tuple(one.sine for one in self.harmonics) or waveform(self.waveform, self.sine)
+        return Excitation(sines, self.frame)
 
 
 @dataclass(frozen=True)
-class Harmonic:
+class Sine:
     """A sin(2π f t + φ) along a unit vector: frequency f (Hz), peak acceleration A (2πf)² (m/s²), phase φ (rad)."""
 
     direction: Vector
@@ -53,14 +117,14 @@ class Harmonic:
 
 
 @dataclass(frozen=True)
-class Drive:
-    """A sum of harmonics, and the frame: moving walls, or an inertial force on the beads."""
+class Excitation:
+    """A sum of sines, and the frame: moving walls, or an inertial force on the beads."""
 
-    harmonics: tuple[Harmonic, ...]
+    harmonics: tuple[Sine, ...]
     frame: Frame
 
     @property
-    def largest(self) -> Harmonic:
+    def largest(self) -> Sine:
         """The harmonic of the largest peak acceleration, the first of equal ones."""
         return max(self.harmonics, key=lambda one: one.peak_acceleration)
 
@@ -93,15 +157,6 @@ class Drive:
     def peak_velocity(self) -> float:
         """Largest speed that the harmonics could add up to, m/s."""
         return sum(one.peak_velocity for one in self.harmonics)
-
-    def with_peak(self, peak_acceleration: float) -> Drive:
-        """The same drive, its largest harmonic with another peak acceleration (m/s²) and the others in proportion."""
-        peaks = [peak_acceleration]
-        if len(self.harmonics) > 1:
-            share = peak_acceleration / self.peak_acceleration
-            peaks = [share * one.peak_acceleration for one in self.harmonics]
-        made = [replace(one, peak_acceleration=peak) for one, peak in zip(self.harmonics, peaks, strict=True)]
-        return replace(self, harmonics=tuple(made))
 
     def described(self) -> str:
         """The harmonics in a few words, such as ``80 Hz, a0 = 39.2 m/s² + 160 Hz, a0 = 29.4 m/s², 90°``."""
@@ -137,7 +192,7 @@ def common_frequency(frequencies: list[float]) -> float:
     return first * common / below
 
 
-def waveform(name: str, first: Harmonic) -> tuple[Harmonic, ...]:
+def waveform(name: str, first: Sine) -> tuple[Sine, ...]:
     """The harmonics of a periodic acceleration of `WAVEFORMS`, given its frequency, peak, direction and phase."""
     return tuple(
         replace(

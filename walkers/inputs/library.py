@@ -5,9 +5,8 @@ Users add to it by a file of their own.
 
 from __future__ import annotations
 
-import difflib
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
@@ -15,11 +14,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from walkers import inputs
-from walkers.inputs.errors import InputError, Problem, refused, shown
+from walkers.errors import InputError, Problem, expected_of, refused, shown
+from walkers.inputs import units
+from walkers.inputs.messages import validated
 from walkers.inputs.origins import Whence
-from walkers.physics import units
+from walkers.inputs.toml import read_toml
+from walkers.inputs.units import quantity_text
 from walkers.physics.mixtures import MIXTURES
-from walkers.physics.units import quantity_text
 
 FILE_NAME = "library.toml"
 HALF = (0.5, 293.15)
@@ -147,7 +148,6 @@ def _known(key: str, entry: Mapping[str, Any], of: Collection, liquids: tuple[st
 def check_library(tables: object, source: str) -> None:
     """Check a library: raises `InputError` with ``source`` and the keys at fault."""
     from walkers.inputs.library_file import LibraryFile
-    from walkers.inputs.messages import validated
 
     if not isinstance(tables, Mapping):
         raise refused(source, "expected the tables of a library: materials, liquids, surface_pairs")
@@ -191,8 +191,6 @@ def read_library(folder: Path) -> dict[str, Any]:
 
     Raises `InputError` if it is none.
     """
-    from walkers.inputs.reading import read_toml
-
     path = inputs.chosen_library or folder / FILE_NAME
     if not (inputs.chosen_library or path.is_file()):
         return {}
@@ -220,17 +218,3 @@ def unmeasured() -> Mapping[str, Known]:
     """Defaults and ranges of the unmeasured values that a case may leave out, by keys of a case."""
     program = Collection("library", "", {})
     return {key: _known(key, entry, program) for key, entry in _contents()["unmeasured"].items()}
-
-
-def expected_of(word: str, known: Iterable[str]) -> str:
-    """``expected one of …``, with a suggestion if a known name is similar."""
-    names = list(known)
-    return f"expected one of {', '.join(names)}{suggestion(word, names)}"
-
-
-def suggestion(word: str, known: Iterable[str]) -> str:
-    """``; did you mean "…"?`` if a known name is similar, otherwise empty."""
-    names = list(known)
-    begun = [name for name in names if len(word) > 2 and name.startswith(word)]
-    close = begun or difflib.get_close_matches(word, names, n=1, cutoff=0.6)
-    return f'; did you mean "{close[0]}"?' if close else ""

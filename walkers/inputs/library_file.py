@@ -6,9 +6,9 @@ from typing import Annotated, Any, Generic, TypeVar
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from walkers.inputs.schema import Table
-from walkers.physics import units
-from walkers.physics.units import Coefficient, Number
+from walkers.inputs import units
+from walkers.inputs.table import Table
+from walkers.inputs.units import Coefficient, Number
 
 Q = TypeVar("Q")
 

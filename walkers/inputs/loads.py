@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from walkers.inputs.bodies import Walkers
     from walkers.inputs.case import Case
     from walkers.physics.bridge import BridgeLaw
-    from walkers.physics.matter import Liquid
+    from walkers.physics.liquid import BridgeLiquid
 
 
 def dimer_of(case: Case) -> Dimer:
@@ -22,7 +22,7 @@ def dimer_of(case: Case) -> Dimer:
     radii = case.walkers[0].radii if case.walkers else ()
     if len(radii) != 2:
         raise ValueError("bodies: expected dimers; the theory is for dimers only")
-    return Dimer((radii[0], radii[1]), case.density, case.liquid.surface_tension)
+    return Dimer((radii[0], radii[1]), case.beads.density, case.liquid.surface_tension)
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,14 @@ class BridgeAtRest(NamedTuple):
 
 def bridge_at_rest(case: Case, radius: float, other_radius: float) -> BridgeAtRest:
     """The bridge of a bead to another, or to a plane (a radius of infinity), by the case's law; radii in m."""
-    return _at_rest(case.law, case.liquid, case.contact.minimum_separation_ratio, radius, other_radius)
+    separation = case.contact.minimum_separation_ratio
+    return _at_rest(case.law, case.liquid.of_bridges, separation, radius, other_radius)
 
 
-@lru_cache(maxsize=1024)
-def _at_rest(law: BridgeLaw, liquid: Liquid, separation: float, radius: float, other_radius: float) -> BridgeAtRest:
+@lru_cache(maxsize=1024)  # points of a sweep have the same few bridges
+def _at_rest(
+    law: BridgeLaw, liquid: BridgeLiquid, separation: float, radius: float, other_radius: float
+) -> BridgeAtRest:
     import numpy as np
 
     from walkers.physics.bridge import Surfaces
@@ -70,27 +73,21 @@ def resistances_at_rest(case: Case, radius: float, other_radius: float) -> tuple
 
     from walkers.physics.bridge import Surfaces
 
-    surfaces = Surfaces.of(radius, other_radius, case.liquid, case.contact.minimum_separation_ratio)
+    surfaces = Surfaces.of(radius, other_radius, case.liquid.of_bridges, case.contact.minimum_separation_ratio)
     _, _, sliding, coupling, rolling = map(float, case.law(surfaces).forces(np.zeros(1)).columns()[0])
     return sliding, coupling, rolling
 
 
 def contact_loads(case: Case, walkers: Walkers | None = None) -> ContactLoads:
     """Capillary load of each contact of a case's first (or other) walkers, and the overlap at which it is carried."""
-    return _contact_loads(case.law, case, walkers or case.walkers[0])
-
-
-@lru_cache(maxsize=16)  # asked for at every stage of a deck
-def _contact_loads(law: BridgeLaw, case: Case, walkers: Walkers) -> ContactLoads:
-    """The law is a part of the key: an edited law is another one."""
-    del law
-    radii, modulus = walkers.radii, reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
+    make, contact = walkers or case.walkers[0], case.contact
+    radii, modulus = make.radii, reduced_modulus(contact.youngs_modulus, contact.poissons_ratio)
     bridges, overlaps = [], []
     for radius in radii:
         bridges.append(bridge_at_rest(case, radius, inf))
-        weight = 4.0 / 3.0 * pi * radius**3 * case.density * case.pressing_gravity
+        weight = 4.0 / 3.0 * pi * radius**3 * case.beads.density * case.pressing_gravity
         overlaps.append(hertz_overlap(bridges[-1].pull + weight, radius, modulus))
-    for one, other in walkers.pairs:
+    for one, other in make.pairs:
         pair = (radii[one], radii[other])
         bridges.append(bridge_at_rest(case, *pair))
         overlaps.append(hertz_overlap(bridges[-1].pull, pair[0] * pair[1] / sum(pair), modulus))
@@ -105,11 +102,11 @@ def reach(case: Case) -> float:
     and friction 0.5); 0.3 of it through the whole run leaves room for those that hop, and sideways as well.
     """
     longest = max((walkers.length for walkers in case.walkers), default=0.0)
-    return 0.3 * case.drive.peak_velocity * case.duration + 2.0 * longest
+    return 0.3 * case.excitation.peak_velocity * case.duration + 2.0 * longest
 
 
 def hop_height(case: Case) -> float:
     """Height that a bead thrown up at twice the substrate's peak velocity reaches, m (its reach without gravity)."""
     if case.pressing_gravity <= 0.0:
         return reach(case)
-    return min((2.0 * case.drive.peak_velocity) ** 2 / (2.0 * case.pressing_gravity), reach(case))
+    return min((2.0 * case.excitation.peak_velocity) ** 2 / (2.0 * case.pressing_gravity), reach(case))

@@ -1,4 +1,4 @@
-"""From what pydantic says of an unusable case to sentences that name key, value and what was expected."""
+"""From pydantic's errors to sentences that name key, value and what was expected, by the type of the error."""
 
 from __future__ import annotations
 
@@ -10,53 +10,36 @@ from functools import cache
 from typing import Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from walkers.inputs.changes import MISSING, joined, parts_of, value_at
-from walkers.inputs.errors import InputError, Problem, shown, unusable
-from walkers.inputs.library import suggestion
-from walkers.inputs.schema import CaseFile, fields_of
-from walkers.physics.units import WRITTEN
+from walkers.errors import InputError, Problem, shown, suggestion, unusable
+from walkers.inputs.keys import MISSING, joined, parts_of, value_at
+from walkers.inputs.table import Table, example_of, keys_in
+from walkers.inputs.units import AUTO, WRITTEN, shown_in_file
 
 File = TypeVar("File", bound=BaseModel)
 
-_EXAMPLES = {
-    "beads": 'a [beads] table, such as material = "ruby"',
-    "dimers.radii": 'two radii, such as ["0.3 mm", "0.2 mm"]',
-    "mixture.small": 'two radii, such as ["0.3 mm", "0.315 mm"]',
-    "mixture.large": 'two radii, such as ["0.5 mm", "0.59 mm"]',
-    "clusters.at": 'two places, ahead and to the left, such as ["0.2 mm", "0 mm"]',
-    "placed.at": 'three places, x, y and z, such as ["5 mm", "-3 mm", "0.3 mm"]',
-    "beads.density": 'such as "4.0 g/cm^3", or a material of the library',
-    "liquid.surface_tension": 'such as "19.2 mN/m", or a liquid of the library by name',
-    "*.source": 'where the number is from, such as "weighed"',
-    "liquid": 'a [liquid] table, such as name = "Si AK5"',
-    "boundary": 'a [boundary] table, such as material = "chromium-coated glass"',
-    "boundary.material": 'such as "chromium-coated glass"',
-    "drive": "a [drive] table with a frequency and a peak_acceleration or gamma0",
-    "run.cycles": 'or "auto"',
-    "walltime": 'hours, minutes and seconds, such as "02:00:00"',
-    "case": 'a case file, or the name of a shipped case, such as "fig1b"',
-    "descend.from": 'where the descent begins, such as "4 g"',
-    "descend.to": 'where it ends at the latest, such as "0.5 g"',
-    "descend.step": 'such as "0.1 g"',
-    "descend.until_below": 'the speed below which walkers count as at rest, such as "0.02 mm/s"',
+_SENTENCES = {
+    "greater_than": "expected more than {gt:g}",
+    "greater_than_equal": "expected at least {ge:g}",
+    "less_than": "expected less than {lt:g}",
+    "less_than_equal": "expected at most {le:g}",
+    "finite_number": "expected a finite number",
+    "string_type": "expected text in quotes",
+    "string_too_short": "expected text in quotes",
+    "float_type": "expected a plain number without a unit",
+    "int_type": "expected a whole number",
+    "bool_type": "expected true or false",
+    "list_type": "expected a list",
+    "tuple_type": "expected a list",
+    "literal_error": "expected {expected}",
+    "value_error": "{error}",
+    **dict.fromkeys(("model_type", "dict_type", "model_attributes_type"), "expected a table [{key}]"),
 }
-_WORDS = {
-    "Input should be": "expected",
-    "greater than or equal to": "at least",
-    "greater than": "more than",
-    "less than or equal to": "at most",
-    "a valid tuple": "a list",
-    "a valid list": "a list (a table of tables is written [[name]])",
-    "a valid string": "text in quotes",
-    "a valid number": "a plain number without a unit",
-    "a valid integer": "a whole number",
-    "a valid boolean": "true or false",
-}
-"""What pydantic says, and what this does."""
-_LISTS = re.compile(r"^(clusters|placed|drive\.harmonics)\.")
-"""Keys in a table of which a case may have several."""
+"""By the type of an error of pydantic, with the values of its context."""
+_GIVEN_ELSEWHERE = {"beads": "a material", "liquid": "a liquid", "contact": "surfaces"}
+"""What the library knows that gives keys of these tables."""
 
 
 def quoted(document: Mapping[str, Any], parts: Sequence[str | int]) -> str | None:
@@ -88,10 +71,9 @@ def blaming_changes(changes: Mapping[str, Any]) -> Iterator[None]:
         ours = [any(of and of[: len(one)] == one[: len(of)] for one in given) for of in parts]
         if not any(ours):
             raise
-        told = [
-            replace(one, key=f"--set {one.key}") if of else one for one, of in zip(error.problems, ours, strict=True)
-        ]
-        raise InputError(error.source, told) from error
+        problems = zip(error.problems, ours, strict=True)
+        named = [replace(one, key=f"--set {one.key}") if of else one for one, of in problems]
+        raise InputError(error.source, named) from error
 
 
 def validated(
@@ -101,51 +83,79 @@ def validated(
 
     Raises `InputError` with all that pydantic finds wrong, and with ``further`` problems.
     """
+    problems = {one.key: replace(one, value=one.value or quoted(document, parts_of(one.key))) for one in further}
     try:
-        file = model.model_validate(document, extra="forbid", context=WRITTEN)
+        file = model.model_validate(document, context=WRITTEN)
     except ValidationError as error:
-        found = {one.key: one for one in further}
-        found |= {one.key: one for one in (_problem_of(each, document, model, whole) for each in error.errors())}
-        raise InputError(source, list(found.values())) from error
-    if further:
-        raise InputError(source, further)
+        found = [_problem_of(each, document, model, whole) for each in error.errors()]
+        problems = {one.key: one for one in found} | problems
+    if problems:
+        raise InputError(source, list(problems.values()))
     return file
 
 
 def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[BaseModel], whole: str) -> Problem:
     location, kind, context = details["loc"], details["type"], details.get("ctx", {})
-    message = details["msg"]
-    for pydantics, ours in _WORDS.items():
-        message = message.replace(pydantics, ours)
-    short_list = kind == "missing" and isinstance(location[-1], int)
-    key = joined(location[:-1] if short_list else location)
-    example = _EXAMPLES.get(re.sub(r"\[\d+\]", "", key)) or _EXAMPLES.get(f"*.{location[-1]}")
-    if kind == "missing":
-        message = (
-            f"too short; expected {example or 'two numbers'}"
-            if short_list
-            else f"missing; expected {example or 'a value'}"
-        )
-    elif kind == "too_long":
-        most = context["max_length"]
-        message = f"too long; expected {example or ('two numbers' if most == 2 else f'at most {most} entries')}"
-    elif kind == "value_error":
-        message = str(context["error"])
-    elif kind in ("extra_forbidden", "unexpected_keyword_argument"):
+    of_list = kind == "missing" and isinstance(location[-1], int)
+    parts: tuple[str | int, ...] = location[:-1] if of_list else location
+    key, field = joined(parts), _field_at(file, parts)
+    example = example_of(field) if field else "a value"
+    if kind == "extra_forbidden":
         message = _unknown_key([str(part) for part in location if isinstance(part, str)], file, whole)
-    elif kind == "literal_error":
-        message += suggestion(str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"])))
-    elif kind in ("model_type", "dict_type", "model_attributes_type", "dataclass_type"):
-        a_number = str(context.get("class_name", "")).startswith("Sourced")
-        message = 'expected { value = ..., source = "..." }' if a_number else f"expected a table [{key}]"
-    elif example:
-        message = f"{message}, {example}" if message.startswith("expected") else f"expected {example}"
+    elif of_list or kind in ("too_long", "too_short"):
+        value = value_at(document, parts_of(key))
+        number = len(value) if isinstance(value, list) else 0
+        message = f"has {number} values; expected {_many(field, context)}{example}"
+    elif kind == "missing":
+        message = f"missing; expected {example}{_elsewhere(parts, field)}"
+    else:
+        form = _SENTENCES.get(kind, "expected {example}")
+        message = form.format(**{"example": example, "key": key, **context})
+        if kind == "literal_error":
+            message += suggestion(str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"])))
+        elif kind in ("list_type", "tuple_type") and field and field.examples:
+            message = f"expected a list, {example}"
+        elif kind in ("model_type", "dict_type") and str(context.get("class_name", "")).startswith("Sourced"):
+            message = 'expected { value = ..., source = "..." }'
+        if field and AUTO in field.metadata and kind != "value_error":
+            message += ', or "auto"'
     return Problem(key, quoted(document, parts_of(key)), message)
 
 
-def _table_in(annotation: Any) -> tuple[type | None, str]:
+def _many(field: FieldInfo | None, context: Mapping[str, Any]) -> str:
+    """How many values a list has: ``2, ``."""
+    if "max_length" in context:
+        return f"at most {context['max_length']}, "
+    if "min_length" in context:
+        return f"at least {context['min_length']}, "
+    return f"{len(field.examples[0])}, " if field and field.examples else ""
+
+
+def _elsewhere(parts: Sequence[str | int], field: FieldInfo | None) -> str:
+    """What else may give a key: a name that the library knows; or how a table begins."""
+    if field is not None and (table := _table_in(field.annotation)[0]) is not None:
+        return f": a table [{joined(parts)}]{_first_key(table)}"
+    return f", or {known} of the library" if (known := _GIVEN_ELSEWHERE.get(str(parts[0]))) and len(parts) > 1 else ""
+
+
+def _first_key(table: type[BaseModel]) -> str:
+    name, field = next(((name, one) for name, one in keys_in(table).items() if one.examples), ("", None))
+    return f", such as {name} = {shown_in_file(field.examples[0])}" if field and field.examples else ""
+
+
+def _field_at(file: type[BaseModel], parts: Sequence[str | int]) -> FieldInfo | None:
+    """The field of a key of a file; None if it has none."""
+    model: type[BaseModel] | None = file
+    field = None
+    for part in (part for part in parts if isinstance(part, str)):
+        field = keys_in(model).get(part) if model else None
+        model = _table_in(field.annotation)[0] if field else None
+    return field
+
+
+def _table_in(annotation: Any) -> tuple[type[BaseModel] | None, str]:
     """The model that a field holds, alone or in a list, or by names of the user's (then with ``.*``), or None."""
-    if isinstance(annotation, type) and fields_of(annotation):
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation, ""
     for inner in get_args(annotation):
         table, named = _table_in(inner)
@@ -155,24 +165,24 @@ def _table_in(annotation: Any) -> tuple[type | None, str]:
 
 
 @cache
-def keys_of(file: type) -> Mapping[str, type | None]:
+def keys_of(file: type[BaseModel]) -> Mapping[str, type[BaseModel] | None]:
     """All dotted keys of a kind of file; those of tables with the table's model."""
-    found: dict[str, type | None] = {"": file}
-    for name, (_, field) in fields_of(file).items():
+    keys: dict[str, type[BaseModel] | None] = {"": file}
+    for name, field in keys_in(file).items():
         table, named = _table_in(field.annotation)
-        found[name] = None if named else table
+        keys[name] = None if named else table
         below = keys_of(table) if table else {}
-        found |= {f"{name}{named}.{key}".rstrip("."): one for key, one in below.items()}
-    return found
+        keys |= {f"{name}{named}.{key}".rstrip("."): one for key, one in below.items()}
+    return keys
 
 
-def check_key(key: str) -> None:
+def check_key(model: type[Table], key: str) -> None:
     """Refuse a key that no case has; raises `InputError` if it is one."""
-    parts, known = re.sub(r"\[\d+\]", "", key).split("."), keys_of(CaseFile)
+    parts, known = re.sub(r"\[\d+\]", "", key).split("."), keys_of(model)
     if "" in parts:
         raise unusable(key, "is not a key of a case")
     if ".".join(parts) not in known:
-        raise unusable(key, _unknown_key(parts, CaseFile, "a case"))
+        raise unusable(key, _unknown_key(parts, model, "a case"))
     if known[".".join(parts)]:
         raise unusable(key, "is a table of a case; expected one of its keys")
 
@@ -184,8 +194,8 @@ def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
         below = f"{place}.{part}".lstrip(".")
         place = below if below in known or f"{below}.*" in known else f"{place}.*"
     table = known.get(place)
-    siblings = list(fields_of(table)) if table else []
-    keys = {_LISTS.sub(r"\1[0].", key): inner for key, inner in known.items()}
+    siblings = list(keys_in(table)) if table else []
+    keys = {re.sub(r"^(clusters|placed|drive\.harmonics)\.", r"\1[0].", key): inner for key, inner in known.items()}
     hint = suggestion(word, siblings) if siblings else suggestion(".".join(location), keys)
     elsewhere = [key for key, inner in keys.items() if inner is None and "*" not in key and key.split(".")[-1] == word]
     if not hint and elsewhere:

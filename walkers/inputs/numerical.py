@@ -54,7 +54,8 @@ def numerical_error(case: Case) -> dict[str, float] | None:
 
 def digest(case: Case) -> str:
     """Twelve hex digits of what the numerical error depends on: a run's determinants but length, room and sampling."""
-    found = case.determinants()
-    makes = [{**one, "spacing": one["spacing"] if one["meet"] else None} for one in found["walkers"]]
-    text = json.dumps({**found, "walkers": makes, "run": found["run"]["time_step"]}, sort_keys=True)
+    for key, walkers in case.walkers_by_key.items():
+        case = case if walkers.meet else case.put(f"{key}.spacing", None)
+    run = {"time_step": case.run.time_step, "seed": case.run.seed}
+    text = json.dumps({**case.determinants(), "run": run}, sort_keys=True)
     return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()[:12]

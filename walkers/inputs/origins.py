@@ -1,24 +1,32 @@
 """Origin of each value of a case: the case, the library, a calibration, a default, or other values.
 
-Unmeasured values (friction, drag of the bridges, volume of liquid) are distinguished from known values,
-with the range in which it may lie: a speed that rests on such values is worth no more than they are.
+Unmeasured values (friction, drag of the bridges, volume of liquid) are distinguished from known values, with the range
+in which they may lie: a speed that rests on such values is worth no more than they are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, NamedTuple
 
-from walkers.inputs.changes import MISSING, parts_of, value_at
-
-if TYPE_CHECKING:
-    from walkers.inputs.schema import CaseFile
-    from walkers.physics.units import Kind
+from walkers.inputs.units import Kind, quantity_text
 
 Whence = Literal["given", "library", "own library", "calibrated", "assumed", "default", "derived"]
-_LEFT_OUT = ("title", "uncertain", "placed")
-"""What is no value, or hundreds of them."""
+
+
+class Source(NamedTuple):
+    """Where a value is from that a file does not give.
+
+    ``origin`` as in `Origin`; ``why``: the library's source, or what it is derived from; ``text``: the value as a case
+    file would say it, empty for its number in the unit of its key; ``range`` and ``logarithmic`` as in `Origin`.
+    """
+
+    origin: Whence
+    why: str = ""
+    text: str = ""
+    range: tuple[Any, Any] | None = None
+    logarithmic: bool = False
 
 
 @dataclass(frozen=True)
@@ -34,8 +42,8 @@ class Origin:
         ``calibrated``, ``assumed`` (fixed in the calibration), the ``default``, or ``derived`` from other values; the
         library's source (after its file), or from what it is derived.
     range, logarithmic
-        Both ends between which it may lie as well, as a case would write them, and whether they are of magnitudes: of
-        what nobody measures, unless the case gives it, and of what the case calls ``uncertain``.
+        Both ends between which an unmeasured or ``uncertain`` value may lie, as a case would write them, and whether
+        the range is of magnitudes.
     uncertain
         Whether the case calls it so.
     value
@@ -64,69 +72,6 @@ class Origin:
         return f"{self.origin}, uncertain" if self.uncertain else self.origin
 
 
-class Notes(dict[str, Origin]):
-    """Where values come from that a case leaves out, by their keys, noted as they are filled in.
-
-    Without a text, the value itself is shown in the unit of its key.
-    """
-
-    def derived(self, key: str, value: Any, source: str) -> None:
-        """Note what follows from other values."""
-        self[key] = Origin(key, "", "derived", source, value=value)
-
-    def default(self, key: str, value: Any, source: str = "") -> None:
-        """Note a default that depends on other values."""
-        self[key] = Origin(key, "", "default", source, value=value)
-
-
-def origins_of(file: CaseFile, document: Mapping[str, Any], notes: Mapping[str, Origin]) -> tuple[Origin, ...]:
-    """Origins of the values of a case, in the order of the tables of a case file.
-
-    Parameters
-    ----------
-    file, document
-        What the case says, validated and as it is written.
-    notes
-        On what it leaves out and has no default of its own.
-    """
-    from walkers.physics.units import ABSENT
-
-    found: dict[str, Origin] = {}
-    for key, raw, value, kind in _leaves(file, document):
-        if raw is not None and not (isinstance(raw, str) and raw.strip().lower() == "auto"):
-            found[key] = Origin(key, text_of(raw), "given", value=value)
-        elif one := notes.get(key):
-            found[key] = replace(one, key=key, text=one.text or text_of(one.value, kind))
-        elif value not in ABSENT:
-            found[key] = Origin(key, text_of(value, kind), "default", value=value)
-    for key, given in file.uncertain.items():
-        ((distribution, (low, high)),) = given.items()
-        # What has no line of its own, such as one of two radii, has one if the case calls it uncertain.
-        raw = value_at(document, parts_of(key))
-        one = found.get(key) or Origin(key, "-" if raw is MISSING else text_of(raw), "given")
-        found[key] = replace(one, range=(low, high), logarithmic=distribution == "loguniform", uncertain=True)
-    return tuple(found.values())
-
-
-def _leaves(table: Any, document: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any, Any, Kind | None]]:
-    """Keys of a table: each with what the document says (None: nothing), its value, and of which kind it is."""
-    from walkers.inputs.schema import fields_of
-    from walkers.physics.units import kind_in
-
-    for name, (attribute, about) in fields_of(type(table)).items():
-        value, raw, key = getattr(table, attribute), value_at(document, parts_of(name)), f"{prefix}{name}"
-        raw = None if raw is MISSING else raw
-        if key in _LEFT_OUT:
-            continue
-        if fields_of(type(value)):
-            yield from _leaves(value, raw or {}, f"{key}.")
-        elif isinstance(value, list) and value and fields_of(type(value[0])):
-            for number, (one, said) in enumerate(zip(value, raw or [], strict=True)):
-                yield from _leaves(one, said, f"{key}[{number}].")
-        else:
-            yield key, raw, value, kind_in([*about.metadata, about.annotation])
-
-
 def text_of(value: Any, kind: Kind | None = None) -> str:
     """A value of a case file as text: lists with commas, tables by their keys; numbers of a kind are in SI units."""
     if isinstance(value, (list, tuple)):
@@ -134,12 +79,10 @@ def text_of(value: Any, kind: Kind | None = None) -> str:
         return ", ".join(
             f"({text})" if isinstance(one, (list, tuple)) else text for one, text in zip(value, texts, strict=True)
         )
-    if kind is not None and not isinstance(value, str):
-        from walkers.physics.units import quantity_text
-
-        return quantity_text(value, kind)
     if isinstance(value, bool):
         return "true" if value else "false"
+    if kind is not None and isinstance(value, (int, float)):
+        return quantity_text(value, kind)
     if isinstance(value, Mapping):
-        return "; ".join(f"{key} {text_of(one)}" for key, one in value.items())
+        return "; ".join(f"{name} {text_of(one)}" for name, one in value.items())
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -5,22 +5,19 @@ Whatever is wrong ends as one `InputError` that names the file, the key, the val
 
 from __future__ import annotations
 
-import stat
-import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.errors import InputError, check_utf8, each, refused, shortened
-from walkers.inputs.library import FILE_NAME, library_of, read_library, suggestion
+from walkers.errors import InputError, check_utf8, refused, shortened, suggestion
+from walkers.inputs.library import FILE_NAME, read_library
+from walkers.inputs.toml import read_toml
 
 if TYPE_CHECKING:
     from walkers.inputs.case import Case
 
 _HERE = Path(__file__).parent
-_MOST_BYTES = 16 << 20
 _COMMANDS = {
     "case": "a case: walkers run {}",
     "sweep": "a sweep: walkers sweep {}",
@@ -60,13 +57,17 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Cas
     Examples
     --------
     >>> case = load_case("fig1b")
-    >>> case.walkers[0].radii, case.drive.frequency
+    >>> case.dimers.radii, case.drive.frequency
     ((0.0003, 0.0002), 80.0)
     >>> load_case("fig1b", {"drive.frequency": "70 Hz", "dimers.radii[1]": "0.25 mm"}).walkers[0].radii
     (0.0003, 0.00025)
     """
     path = find_input(case, "case")
-    return _changed(read_case(path), changes, str(case), path.stem)
+    document = read_case(path)
+    # Not above: that there is no such file is told before all that a case may say is built.
+    from walkers.inputs.case import Case
+
+    return Case.read(document, source=str(case), name=path.stem, changes=changes)
 
 
 def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
@@ -81,29 +82,6 @@ def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
         if own := read_library(beside):
             document["library"] = own
     return document
-
-
-def with_changes(case: Case, changes: Mapping[str, Any] | None = None) -> Case:
-    """A case with changed values, as by `load_case`."""
-    if not changes:
-        return case
-    if not case.as_read:
-        raise refused(case.name, "was changed in Python: expected a case as it was read")
-    return _changed(case.document, changes, case.name, case.name)
-
-
-def _changed(document: Mapping[str, Any], changes: Mapping[str, Any] | None, source: str, name: str) -> Case:
-    """The case of tables with changes, whose keys are checked."""
-    if not changes:
-        return resolve_case(document, source=source, name=name)
-    from walkers.inputs.changes import changed
-    from walkers.inputs.messages import blaming, blaming_changes, check_key
-
-    with blaming_changes(changes):
-        with blaming(source):
-            each(check_key, changes)
-            tables = changed(document, changes)
-        return resolve_case(tables, source=source, name=name)
 
 
 def is_sweep_file(path: Path) -> bool:
@@ -151,52 +129,3 @@ def _kind_of(path: Path) -> str | None:
             of_calibrations = document.keys() & {"parameters", "experiments", "observations"}
             return ("calibration" if of_calibrations else "sweep") if "case" in document else None
     return next((kind for kind in ("case", "sweep", "calibration") if str(path) in shipped(kind)), None)
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file; an `InputError` if it cannot be read, is no TOML, no regular file, or larger than 16 MB."""
-    try:
-        about = path.stat()
-        if not stat.S_ISDIR(about.st_mode) and (not stat.S_ISREG(about.st_mode) or about.st_size > _MOST_BYTES):
-            raise refused(path, f"expected a file of at most {_MOST_BYTES >> 20} MB")
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        found = f"byte {error.object[error.start]:#04x} at offset {error.start}"
-        raise refused(path, f"expected UTF-8 text, found {found}") from error
-    except (ValueError, RecursionError) as error:  # TOML's own errors, integers of 5000 digits, brackets without end
-        raise refused(path, f"not TOML: {error}") from error
-    except OSError as error:
-        raise refused(path, f"cannot be read: {error.strerror}") from error
-
-
-def resolve_case(document: Mapping[str, Any], *, source: str = "<case>", name: str = "case") -> Case:
-    """A case given as the tables of a case file, quantities as strings with units.
-
-    ``source`` is what messages call it; run directories begin with its ``name``. Raises `InputError` if anything in it
-    cannot be used.
-    """
-    # Not above: that there is no such file is told before all that a case may say is built.
-    from walkers.inputs.changes import changed
-    from walkers.inputs.messages import blaming, check_key, validated
-    from walkers.inputs.missing import missing_keys
-    from walkers.inputs.origins import Notes
-    from walkers.inputs.resolving import resolve, supplied
-    from walkers.inputs.schema import CaseFile
-
-    notes = Notes()
-    with blaming(source, document):
-        tables = supplied(document, library_of(document, source), notes)
-        file = validated(CaseFile, tables, source, further=missing_keys(tables))
-        try:
-            case = resolve(file, name, document, notes)
-        except ArithmeticError as error:
-            raise refused(source, f"inconsistent values: {error}") from error
-        for key, given in file.uncertain.items():  # it is a key of the case, which could say both ends
-            try:
-                check_key(key)
-                for end in next(iter(given.values())):
-                    validated(CaseFile, changed(tables, {key: end}), source)
-            except InputError as error:
-                problems = [replace(one, key=f"uncertain.{one.key}") for one in error.problems]
-                raise InputError(source, problems) from error
-    return case

@@ -1,41 +1,36 @@
-"""Resolve a case file: missing values come from the library, from defaults, or from other values.
+"""What a case file leaves out: values of the library, defaults, and values that follow from others.
 
-First what beads, liquid and contacts are made of, then the bodies and the checks that they fit into the boundary and
-beside each other.
+`supplied` fills in a document before it is validated. `STEPS` fill in the validated case: each takes a case and gives
+one that knows more; the order is that of the physics. Checks of the bodies come last.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
-from functools import cache, lru_cache, partial
-from itertools import islice
-from math import atan2, dist, inf, isinf, isnan, pi
-from typing import Any, Literal
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
+from math import atan2, inf
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from walkers.inputs import library
-from walkers.inputs.bodies import ARRANGEMENTS, Mixture, Placed, Standing, Walkers, touching
-from walkers.inputs.boundary import SIZES, Boundary
-from walkers.inputs.case import Case, Run
-from walkers.inputs.changes import MISSING, changed, parts_of, value_at
-from walkers.inputs.errors import unusable
-from walkers.inputs.library import Known, Library, expected_of
-from walkers.inputs.loads import bridge_at_rest, contact_loads, reach
-from walkers.inputs.origins import Notes, Origin, Whence, origins_of
-from walkers.inputs.run_tables import resolve_drive, resolve_run
-from walkers.inputs.schema import MOST_BEADS, CaseFile, MixtureTable
-from walkers.physics.dimer import Dimer
+from walkers.errors import Problem, expected_of, shown, unusable
+from walkers.inputs.bodies import ARRANGEMENTS, MOST_BEADS, Cluster, Walkers, touching
+from walkers.inputs.drive import common_frequency
+from walkers.inputs.keys import MISSING, parts_of, value_at
+from walkers.inputs.library import Known, Library, unmeasured
+from walkers.inputs.loads import bridge_at_rest, contact_loads, dimer_of, reach
+from walkers.inputs.origins import Source
+from walkers.inputs.run import with_run
+from walkers.inputs.standing import OVERLAP, check_bodies
+from walkers.inputs.units import TEMPERATURE, parse_quantity
 from walkers.physics.laws import LAWS
-from walkers.physics.matter import DEFAULT_LAW, Liquid
 from walkers.physics.mixtures import MIXTURES
-from walkers.physics.units import ABSENT, TEMPERATURE, parse_quantity
+
+if TYPE_CHECKING:
+    from walkers.inputs.case import Case
 
 _PACKING = 0.55
 """Packing fraction of a settled wet pile, for the count that fills a height."""
-_OVERLAP = 0.01
-"""Radii by which beads that are given places may overlap with each other and the walls."""
-_WAYS: Mapping[str, Literal["right", "left"]] = {"up": "right", "down": "left"}
-"""What a climber's words mean."""
+_FACING = {"up": "right", "down": "left"}
+"""The words for climbers."""
 _FRICTION = ("contact.friction.bead_bead", "contact.friction.bead_wall", "contact.rolling_friction")
 _OF_SURFACES = (
     *("liquid.viscosity_ratio", "liquid.volume_fraction", "liquid.contact_angle"),
@@ -45,299 +40,298 @@ _VISCOSITIES = ("liquid.kinematic_viscosity", "liquid.dynamic_viscosity")
 _OF_LIQUIDS = ("liquid.surface_tension", "liquid.density", *_VISCOSITIES)
 SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_OF_SURFACES)
 """Keys that a case may leave out because the library has values or defaults."""
+DEFAULT_LAW = "young-laplace"
 
 
-def supplied(document: Mapping[str, Any], known_to: Library, notes: Notes) -> dict[str, Any]:
-    """The tables of a case with what they leave out and the library has of the materials and the liquid they name.
+# --- from the library -------------------------------------------------------------------------------------------------
 
-    Raises `InputError` if they name what the library has not, and do not say all about it themselves.
-    """
+
+class Supplied(NamedTuple):
+    """The tables of a case with what the library gives, the sources of that, and names that it does not know."""
+
+    tables: dict[str, Any]
+    sources: dict[str, Source]
+    problems: list[Problem]
+
+
+def supplied(document: Mapping[str, Any], library: Library) -> Supplied:
+    """The tables of a case with what they leave out and the library has of the materials and the liquid they name."""
     said = {key: value_at(document, parts_of(key)) for key in (*SUPPLIED, "liquid.law")}
     given = {key for key, value in said.items() if value is not MISSING}
-    named = {key: value_at(document, parts_of(key)) for key in ("beads.material", "boundary.material", "liquid.name")}
-    for key, name in named.items():
-        if name is not MISSING and not isinstance(name, str):
-            raise unusable(key, "expected text in quotes")
-    bead, wall, liquid = (None if name is MISSING else str(name) for name in named.values())
-    described = given.issuperset(_FRICTION)
-    for key, name, kind, says_all in (
-        ("beads.material", bead, "materials", described and "beads.density" in given),
-        ("liquid.name", liquid, "liquids", False),
-        ("boundary.material", wall, "materials", described),
-    ):
-        if name is not None and not says_all and not known_to.has(kind, name):
-            message = "not in the library, nor in a library.toml beside the case"
-            raise unusable(key, f"{message}; {expected_of(name, known_to.names(kind))}")
-    known, settings = _known(known_to, bead, wall, liquid, _mixture(document, liquid, notes)), {}
+    keys = ("beads.material", "boundary.material", "liquid.name")
+    named = (value_at(document, parts_of(key)) for key in keys)
+    bead, wall, liquid = (name if isinstance(name, str) else None for name in named)
+    problems = list(_unknown(library, given, bead, wall, liquid))
+    mixture, sources, problem = _mixture(document, liquid)
+    problems += problem
+    values = _values(library, bead, wall, liquid, mixture) if not problem else {}
     # What was calibrated was so with one law of the bridges: with another it is a guess.
     calibrated = liquid if said["liquid.law"] in (MISSING, DEFAULT_LAW) else None
+    tables = {name: value for name, value in document.items() if name != "library"}
+    tables.setdefault("contact", {})
     for key in SUPPLIED:
-        there = isinstance(document.get(key.split(".")[0]), Mapping) or key.startswith("contact")
         instead = key in _VISCOSITIES and not given.isdisjoint(_VISCOSITIES)
-        if there and key in known and not (key in given or instead):
-            settings[key] = known[key].written
-            notes[key] = _origin_of(key, known[key], calibrated)
-    tables = changed({"contact": {}, **document}, settings)
-    tables.pop("library", None)
-    return tables
+        if key in values and not (key in given or instead) and isinstance(tables.get(key.split(".")[0]), Mapping):
+            tables = _with(tables, parts_of(key), values[key].written)
+            sources[key] = _source_of(key, values[key], calibrated)
+    return Supplied(tables, sources, problems)
 
 
-def _mixture(document: Mapping[str, Any], liquid: str | None, notes: Notes) -> tuple[float, float] | None:
-    """Mass fraction and temperature (K) of a liquid whose numbers depend on them; None of any other."""
+def _with(table: Any, parts: Sequence[str | int], value: Any) -> Any:
+    """Nested tables with another value at a place, if there are tables on the way to it."""
+    if not isinstance(table, Mapping):
+        return table
+    name, *rest = parts
+    return {**table, name: _with(table.get(name, {}), rest, value) if rest else value}
+
+
+def _unknown(
+    library: Library, given: set[str], bead: str | None, wall: str | None, liquid: str | None
+) -> list[Problem]:
+    """Names that are not in the library, of things of which the case does not say all itself."""
+    described = given.issuperset(_FRICTION)
+    liquids = {"liquid.surface_tension", "liquid.volume_fraction", "liquid.contact_angle"}
+    of_its_own = given.issuperset(liquids) and not given.isdisjoint(_VISCOSITIES)
+    problems = []
+    for key, name, kind, says_all in (
+        ("beads.material", bead, "materials", described and "beads.density" in given),
+        ("liquid.name", liquid, "liquids", of_its_own),
+        ("boundary.material", wall, "materials", described),
+    ):
+        if name is not None and not says_all and not library.has(kind, name):
+            message = "not in the library, nor in a library.toml beside the case"
+            expected = f"{message}; {expected_of(name, library.names(kind))}"
+            problems.append(Problem(key, shown(name), expected))
+    return problems
+
+
+def _mixture(
+    document: Mapping[str, Any], liquid: str | None
+) -> tuple[tuple[float, float] | None, dict[str, Source], list[Problem]]:
+    """Mass fraction and temperature (K) of a liquid whose numbers depend on them, with sources, or problems."""
     keys = ("liquid.mass_fraction", "liquid.temperature")
     share, temperature = (value_at(document, parts_of(key)) for key in keys)
     if liquid not in MIXTURES:
-        for key, value in zip(keys, (share, temperature), strict=True):
-            if value is not MISSING:
-                raise unusable(key, f'expected none: it is for name = "{next(iter(MIXTURES))}"')
-        return None
+        extra = [key for key, value in zip(keys, (share, temperature), strict=True) if value is not MISSING]
+        message = f'expected none: it is for name = "{next(iter(MIXTURES))}"'
+        return None, {}, [Problem(key, None, message) for key in extra]
     if type(share) not in (int, float) or not 0 <= share <= 1:
         missing = "missing; " if share is MISSING else ""
-        raise unusable(keys[0], f"{missing}expected the mass of the glycerol over that of the mixture, such as 0.87")
-    if temperature is MISSING:
-        temperature = "20 degC"
-        notes[keys[1]] = Origin(keys[1], temperature, "default", value=parse_quantity(temperature, TEMPERATURE))
+        message = f"{missing}expected the mass of the glycerol over that of the mixture, such as 0.87"
+        return None, {}, [Problem(keys[0], None, message)]
+    text = "20 degC" if temperature is MISSING else str(temperature)
+    sources = {keys[1]: Source("default", text=text)} if temperature is MISSING else {}
     try:
-        return float(share), parse_quantity(str(temperature), TEMPERATURE)
+        return (float(share), parse_quantity(text, TEMPERATURE)), sources, []
     except ValueError as error:
-        raise unusable(keys[1], str(error)) from error
+        return None, {}, [Problem(keys[1], None, str(error))]
 
 
 @lru_cache(maxsize=1024)
-def _known(
-    known_to: Library, bead: str | None, wall: str | None, liquid: str | None, mixture: tuple[float, float] | None
+def _values(
+    library: Library, bead: str | None, wall: str | None, liquid: str | None, mixture: tuple[float, float] | None
 ) -> dict[str, Known]:
     """What is usual, and what the library has of materials and a liquid, by the keys of a case."""
-    on_bead, on_wall = known_to.surface_pair(bead, bead), known_to.surface_pair(bead, wall)
-    found = {
-        "beads.density": known_to.material(bead)["density"] if bead and known_to.has("materials", bead) else None,
+    on_bead, on_wall = library.surface_pair(bead, bead), library.surface_pair(bead, wall)
+    of_liquid = library.liquid(liquid, mixture) if liquid and library.has("liquids", liquid) else {}
+    values = {
+        "beads.density": library.material(bead)["density"] if bead and library.has("materials", bead) else None,
         "contact.friction.bead_bead": on_bead.get("friction"),
         "contact.friction.bead_wall": on_wall.get("friction"),
         **{key: on_wall.get(key.split(".")[1]) for key in _OF_SURFACES},
-        **{f"liquid.{key}": known for key, known in (known_to.liquid(liquid, mixture) if liquid else {}).items()},
+        **{f"liquid.{key}": known for key, known in of_liquid.items()},
     }
-    return {**library.unmeasured()} | {key: known for key, known in found.items() if known}
+    return {**unmeasured()} | {key: known for key, known in values.items() if known}
 
 
-@cache
-def _origin_of(key: str, known: Known, liquid: str | None) -> Origin:
+def _source_of(key: str, known: Known, liquid: str | None) -> Source:
     """What was calibrated with other liquids is a guess for this one."""
-    loose, text = library.unmeasured().get(key), str(known.written)
+    loose, text = unmeasured().get(key), str(known.written)
     if loose is None or (known.source and not known.calibrated_with):
         of_sizes = loose is not None and loose.logarithmic
-        return Origin(key, text, known.origin, known.source, known.range, of_sizes, value=known.value)
+        return Source(known.origin, known.source, text, known.range, of_sizes)
     if liquid in known.calibrated_with:
-        whence: Whence = "calibrated" if known.range else "assumed"
-        return Origin(key, text, whence, known.source, known.range, loose.logarithmic, value=known.value)
-    return Origin(key, text, "default", known.source, loose.range, loose.logarithmic, value=known.value)
+        origin = "calibrated" if known.range else "assumed"
+        return Source(origin, known.source, text, known.range, loose.logarithmic)  # type: ignore[arg-type]
+    return Source("default", known.source, text, loose.range, loose.logarithmic)
 
 
-def resolve(file: CaseFile, name: str, document: Mapping[str, Any], notes: Notes) -> Case:
-    """Resolve a validated file, read from a document; ``notes`` are on what it leaves out.
-
-    Raises `InputError` if something is missing that the library does not know, or keys contradict each other.
-    """
-    boundary = file.boundary
-    _check_sizes(boundary)
-    walkers = tuple(_walkers_of(key, table, boundary, notes) for key, table in file.walkers.items())
-    mixture = _mixture_of(file.mixture, boundary) if file.mixture else None
-    placed = Placed(tuple((*bead.at, bead.radius) for bead in file.placed)) if file.placed else None
-    liquid, density = _liquid_of(file.liquid, notes), file.beads.density
-    first = walkers[0].radii if walkers else ()
-    dimer = Dimer((first[0], first[1]), density, liquid.surface_tension) if len(first) == 2 else None
-    case = Case(
-        name=name,
-        title=file.title,
-        walkers=walkers,
-        mixture=mixture,
-        placed=placed,
-        boundary=boundary,
-        drive=resolve_drive(file.drive, boundary, dimer, notes),
-        gravity=file.environment.gravity,
-        material=file.beads.material,
-        density=density,
-        liquid=liquid,
-        contact=file.contact,
-        seed=file.run.seed,
-        run=Run(0.0, 1, 1, 0, False, 1, 1, 1, 1, 0.0, 0.0, 1),  # its step follows from the rest
-    )
-    if liquid.law not in LAWS:
-        _check_law(case)
-    case = replace(case, run=resolve_run(file.run, case, notes))
-    along, across, _ = case.drive_axis
-    uphill = atan2(across, along) + boundary.uphill if boundary.tilt else 0.0
-    case = replace(case, boundary=replace(boundary, uphill=uphill))
-    made = zip(file.walkers, case.walkers, strict=True)
-    case = replace(case, walkers=tuple(_spaced(case, key, one, notes) for key, one in made))
-    _check_bodies(case, file)
-    if boundary.tilt and boundary.uphill == 0.0:
-        notes.default("boundary.uphill", 0.0, "the direction of the drive")
-    # Not in g: the paper's, 9.8 m/s², is not the case's gravity.
-    notes["environment.gravity"] = Origin("", f"{case.gravity:g} m/s^2", "default", value=case.gravity)
-    return case.read_from(document, partial(origins_of, file, document, notes))
+# --- from other values ------------------------------------------------------------------------------------------------
 
 
-def _check_law(case: Case) -> None:
-    """Refuse a user's law that cannot be used for the beads of the case."""
-    try:
-        for radius in case.radii:
-            bridge_at_rest(case, radius, inf)
-    except ValueError as error:
-        raise unusable("liquid.law", str(error)) from error
+def resolve(case: Case) -> Case:
+    """The case with all that its file leaves out; raises `InputError` if its keys contradict each other."""
+    for step in STEPS:
+        case = step(case)
+    return case
 
 
-def _check_sizes(boundary: Boundary) -> None:
-    """Refuse a boundary that has a size of another shape."""
-    for key in {key for sizes in SIZES.values() for key in sizes} - {*SIZES[boundary.shape]}:
-        if getattr(boundary, key) != getattr(Boundary, key):
-            raise unusable(f"boundary.{key}", f"expected none of a {boundary.shape}")
+def _radii(case: Case) -> Case:
+    dimers = case.dimers
+    if dimers is not None and dimers.mean_radius is not None:
+        shares = (1.0 + dimers.sin_delta, 1.0 - dimers.sin_delta)
+        radii = tuple(float(f"{dimers.mean_radius * share:.15g}") for share in shares)
+        case = case.filled("dimers.radii", radii, "from mean_radius and sin_delta")
+    for key, one in case.walkers_by_key.items():
+        if (diameters := getattr(one, "diameters", None)) is not None:
+            case = case.filled(f"{key}.radii", _halves(diameters), "from the diameters")
+    for name in ("small", "large") if case.mixture else ():
+        if (diameters := getattr(case.mixture, f"{name}_diameters")) is not None:
+            case = case.filled(f"mixture.{name}", _halves(diameters), "from the diameters")
+    if any(bead.radius is None for bead in case.placed):
+        beads = (bead if bead.diameter is None else bead.but(radius=bead.diameter / 2.0) for bead in case.placed)
+        case = case.but(placed=tuple(beads))
+    return case
 
 
-def _liquid_of(table: Liquid, notes: Notes) -> Liquid:
-    """The liquid of the bridges and their law; raises `InputError` if its viscosity is missing or said twice."""
-    dynamic, kinematic = table.dynamic_viscosity, table.kinematic_viscosity
-    if not isnan(dynamic) and kinematic is not None:
-        message = "expected either kinematic_viscosity or dynamic_viscosity, not both"
-        raise unusable("liquid.dynamic_viscosity", message)
-    if kinematic is not None:
-        assert table.density is not None
-        dynamic = float(f"{kinematic * table.density:.15g}")
-        notes.derived("liquid.dynamic_viscosity", dynamic, "from kinematic_viscosity and density")
-    of_bridges = float(f"{dynamic * table.viscosity_ratio:.15g}")
-    bare = replace(table, kinematic_viscosity=None, mass_fraction=None, temperature=None)
-    return replace(bare, dynamic_viscosity=of_bridges, viscosity_ratio=1.0)
+def _halves(diameters: Sequence[float]) -> tuple[float, ...]:
+    return tuple(diameter / 2.0 for diameter in diameters)
 
 
-def _walkers_of(key: str, table: Walkers, boundary: Boundary, notes: Notes) -> Walkers:
-    if table.facing in ("up", "down") and (not boundary.tilt or boundary.uphill):
-        message = "on a plane that is tilted along the drive alone walkers face up or down"
-        raise unusable(f"{key}.facing", f'expected "both", "right" or "left": {message}')
-    if table.gap is None:
-        notes.derived(f"{key}.gap", "auto", "where the forces at rest balance")
-    of_others = ("arrangement", "places") if key == "dimers" else ("mean_radius", "sin_delta")
-    for name in of_others:
-        if getattr(table, name) not in ABSENT:
-            raise unusable(f"{key}.{name}".replace("places", "at"), "expected none of " + key.partition("[")[0])
-    walkers = replace(table, facing=_WAYS.get(table.facing, table.facing))
-    if key == "dimers":
-        radii = _radii(table, notes)
-        return replace(walkers, radii=radii, mean_radius=None, sin_delta=None, arrangement="chain")
-    if not 2 <= len(table.radii) <= 100:
-        raise unusable(f"{key}.radii", "expected radii of 2 to 100 beads")
-    if bool(table.arrangement) == bool(table.places):
-        message = f"expected either an arrangement ({', '.join(ARRANGEMENTS)}) or places (at)"
-        raise unusable(f"{key}.arrangement", message)
-    return _arranged(walkers, key) if table.arrangement else _at_places(walkers, key)
+def _viscosity(case: Case) -> Case:
+    liquid = case.liquid
+    if liquid.kinematic_viscosity is not None:
+        if liquid.density is None:
+            raise unusable("liquid.density", "missing; expected the liquid's density beside its kinematic_viscosity")
+        viscosity = float(f"{liquid.kinematic_viscosity * liquid.density:.15g}")
+        case = case.filled("liquid.dynamic_viscosity", viscosity, "from kinematic_viscosity and density")
+    return case
 
 
-def _radii(table: Walkers, notes: Notes) -> tuple[float, ...]:
-    given = {name: getattr(table, name) for name in ("mean_radius", "sin_delta") if getattr(table, name) is not None}
-    if table.radii:
-        if len(table.radii) != 2:
-            raise unusable("dimers.radii", 'expected two radii, such as ["0.3 mm", "0.2 mm"]')
-        if given:
-            message = "expected either the radii or mean_radius and sin_delta, not both"
-            raise unusable(f"dimers.{next(iter(given))}", message)
-        return table.radii
-    assert table.mean_radius is not None
-    assert table.sin_delta is not None
-    first, second = (float(f"{table.mean_radius * share:.15g}") for share in (1 + table.sin_delta, 1 - table.sin_delta))
-    notes.derived("dimers.radii", (first, second), "from mean_radius and sin_delta")
-    return first, second
+def _count(case: Case) -> Case:
+    mixture = case.mixture
+    if mixture is None:
+        return case
+    for name in ("small", "large"):
+        low, high = getattr(mixture, name)
+        if low > high:
+            raise unusable(f"mixture.{name}", "expected the smaller radius first")
+    if max(mixture.small_radii) >= min(mixture.large_radii):
+        raise unusable("mixture.large", "expected radii above those of the small beads")
+    if not case.boundary.closed:
+        raise unusable("boundary.shape", 'expected a container, such as "box": a mixture is poured into it')
+    if mixture.count is None:
+        count = round(_PACKING * case.boundary.cross_section * mixture.fill_height / mixture.mean_volume)
+        if not 1 <= count <= MOST_BEADS:
+            raise unusable("mixture.fill_height", f"that takes {count} beads; expected 1 to {MOST_BEADS}")
+        case = case.filled("mixture.count", count, "from the fill_height")
+    return case
 
 
-def _arranged(walkers: Walkers, key: str) -> Walkers:
-    name = walkers.arrangement
-    known = ARRANGEMENTS.get(name)
-    if known is None:
+def _walkers(case: Case) -> Case:
+    """The walkers, whose arrangements are possible."""
+    for key, one in case.walkers_by_key.items():
+        if one.facing in _FACING:
+            if not case.boundary.tilt or case.boundary.uphill:
+                message = "on a plane that is tilted along the drive alone walkers face up or down"
+                raise unusable(f"{key}.facing", f'expected "both", "right" or "left": {message}')
+            case = case.put(f"{key}.facing", _FACING[one.facing])
+        if isinstance(one, Cluster):
+            _check_places(one, f"{key}.at") if one.at else _check_arrangement(one, key)
+    return case
+
+
+def _check_arrangement(cluster: Cluster, key: str) -> None:
+    name = cluster.arrangement
+    arrangement = ARRANGEMENTS.get(name)
+    if arrangement is None:
         raise unusable(f"{key}.arrangement", expected_of(name, ARRANGEMENTS))
     key = f"{key}.radii"
-    if not known.fewest <= len(walkers.radii) <= known.most:
-        bound = f"at least {known.fewest}" if known.fewest < known.most else str(known.most)
+    if not arrangement.fewest <= len(cluster.radii) <= arrangement.most:
+        least = f"at least {arrangement.fewest}"
+        bound = least if arrangement.fewest < arrangement.most else str(arrangement.most)
         raise unusable(key, f"expected {bound} beads in a {name}")
     try:
-        overlapping = touching(walkers.design, walkers.radii, -_OVERLAP)
+        overlapping = touching(cluster.design, cluster.radii, -OVERLAP)
     except ValueError as error:
         raise unusable(key, str(error)) from error
     if overlapping:
         raise unusable(key, f"beads {overlapping[0][0] + 1} and {overlapping[0][1] + 1} would overlap in a {name}")
-    return walkers
 
 
-def _at_places(walkers: Walkers, key: str) -> Walkers:
-    """A cluster whose beads are given places: they touch, do not overlap, and have a heading."""
-    key, everyone, places = f"{key}.at", set(range(len(walkers.radii))), walkers.places
+def _check_places(cluster: Cluster, key: str) -> None:
+    """Beads that are given places touch, do not overlap, and have a heading."""
+    everyone, places = set(range(len(cluster.radii))), cluster.at
     if len(places) != len(everyone):
         raise unusable(key, f"expected a place for each of the {len(everyone)} beads")
-    walkers = replace(walkers, arrangement="given")
-    if overlapping := touching(places, walkers.radii, -_OVERLAP):
+    if overlapping := touching(places, cluster.radii, -OVERLAP):
         raise unusable(f"{key}[{overlapping[0][1]}]", f"overlaps with {key}[{overlapping[0][0]}]")
-    if not any(walkers.front):
+    if not any(cluster.front):
         raise unusable(key, "expected some beads ahead of others: this walker has no heading")
     joined = {0}
     for _ in everyone:
-        joined |= {bead for pair in walkers.pairs if joined & {*pair} for bead in pair}
+        joined |= {bead for pair in cluster.pairs if joined & {*pair} for bead in pair}
     if alone := everyone - joined:
         raise unusable(f"{key}[{min(alone)}]", "expected beads that touch: this bead is not connected to the first")
-    return walkers
 
 
-def _mixture_of(table: MixtureTable, boundary: Boundary) -> Mixture:
-    """A mixture, its numbers of beads from shares, count or height."""
-    small, large = (_sizes(key, getattr(table, key), table.sizes) for key in ("small", "large"))
-    if max(small) >= min(large):
-        raise unusable("mixture.large", "expected radii above those of the small beads")
-    if (table.count is None) == (table.fill_height is None):
-        raise unusable("mixture.count", "expected either a count or a fill_height")
-    if not boundary.closed:
-        raise unusable("boundary.shape", 'expected a container, such as "box": a mixture is poured into it')
-    volumes = [sum(4.0 / 3.0 * pi * radius**3 for radius in sizes) / len(sizes) for sizes in (small, large)]
-    share = table.small_share
-    if table.mixed_by != "number":  # one density: by mass is by volume
-        by_number = [share / volumes[0], (1.0 - share) / volumes[1]]
-        share = by_number[0] / sum(by_number)
-    count = table.count
-    if count is None:
-        mean = share * volumes[0] + (1.0 - share) * volumes[1]
-        count = round(_PACKING * boundary.cross_section * (table.fill_height or 0.0) / mean)
-        if not 1 <= count <= MOST_BEADS:
-            raise unusable("mixture.fill_height", f"that takes {count} beads; expected 1 to {MOST_BEADS}")
-    few = round(count * share)
-    return Mixture(small, large, (few, count - few))
+def _drive(case: Case) -> Case:
+    boundary = case.boundary
+    several = {f"drive.harmonics[{number}]": one for number, one in enumerate(case.drive.harmonics)}
+    for key, one in (several or {"drive": case.drive}).items():
+        if one.axis is None:
+            case = case.filled(f"{key}.axis", boundary.drive_axis, f"of a {boundary.shape}", "default")
+        if one.gamma0 is not None:
+            if not case.walkers or len(case.walkers[0].radii) != 2:
+                raise unusable(f"{key}.gamma0", "expected peak_acceleration: only a dimer has a Γ0")
+            peak, why = dimer_of(case).peak_acceleration(one.gamma0), "from gamma0, the dimer and the liquid"
+            case = case.filled(f"{key}.peak_acceleration", peak, why)
+    try:
+        common_frequency([one.frequency for one in case.excitation.harmonics])
+    except ValueError as error:
+        raise unusable("drive.harmonics", f"expected frequencies with a common period: {error}") from error
+    if case.drive.frame == "lab" and not case.excitation.is_plain:
+        message = "several harmonics, or one with a phase, are driven in the container's frame"
+        raise unusable("drive.frame", f'expected "container": {message}')
+    return case
 
 
-def _sizes(key: str, bounds: tuple[float, float], number: int) -> tuple[float, ...]:
-    """The middles of equal shares of a range of radii, m."""
-    low, high = bounds
-    if low > high:
-        raise unusable(f"mixture.{key}", "expected the smaller radius first")
-    return tuple(dict.fromkeys(float(f"{low + (high - low) * (k + 0.5) / number:.12g}") for k in range(number)))
+def _law(case: Case) -> Case:
+    """A user's law can be used for the beads of the case."""
+    if case.liquid.law not in LAWS:
+        try:
+            for radius in case.radii:
+                bridge_at_rest(case, radius, inf)
+        except ValueError as error:
+            raise unusable("liquid.law", str(error)) from error
+    return case
 
 
-def _spaced(case: Case, key: str, walkers: Walkers, notes: Notes) -> Walkers:
-    """Settle the spacing of the walkers under a key and refuse starts in which beads overlap."""
-    gap = walkers.gap
-    if gap is not None and gap > 0.0:
-        raise unusable(f"{key}.gap", "expected zero or less: a bridge forms on contact, so beads with a gap have none")
-    _check_held(case, walkers)
-    overlaps = contact_loads(case, walkers).overlaps if gap is None else (-gap,)
-    if max(overlaps) * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):
-        blamed = f"{key}.gap" if gap is not None else "contact.youngs_modulus"
-        raise unusable(blamed, "the beads overlap by more than 2 % of the smallest radius")
-    if isinf(walkers.spacing):
-        spacing = 2.0 * (walkers.length if walkers.meet else reach(case))
-        notes.derived(
-            f"{key}.spacing",
-            spacing,
-            "so that walkers do not touch at the start" if walkers.meet else "so that walkers do not meet",
-        )
-        return replace(walkers, spacing=spacing)
-    # Beads of different walkers may touch, but not overlap, if they are meant to meet.
-    least = (1.0 if walkers.meet else 1.5) * walkers.length
-    if walkers.spacing < least and sum(one.replicates for one in case.walkers) > 1:
-        message = f'neighbouring walkers would touch or overlap; expected at least {1e3 * least:.3g} mm, or "auto"'
-        raise unusable(f"{key}.spacing", message)
-    return walkers
+def _uphill(case: Case) -> Case:
+    """The direction of the steepest way up, from the x axis toward y."""
+    boundary = case.boundary
+    if not boundary.tilt:
+        return case.put("boundary.uphill", 0.0)
+    along, across, _ = case.drive_axis
+    if boundary.uphill == 0.0:
+        case = case.noted("boundary.uphill", "the direction of the drive", "default", "0 deg")
+    return case.put("boundary.uphill", atan2(across, along) + boundary.uphill)
+
+
+def _spacing(case: Case) -> Case:
+    """The spacing of walkers; starts in which beads overlap are refused."""
+    for key, walkers in case.walkers_by_key.items():
+        gap = walkers.gap
+        if gap is not None and gap > 0.0:
+            message = "expected zero or less: a bridge forms on contact, so beads with a gap have none"
+            raise unusable(f"{key}.gap", message)
+        _check_held(case, walkers)
+        overlaps = contact_loads(case, walkers).overlaps if gap is None else (-gap,)
+        if max(overlaps) * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):
+            blamed = f"{key}.gap" if gap is not None else "contact.youngs_modulus"
+            raise unusable(blamed, "the beads overlap by more than 2 % of the smallest radius")
+        if gap is None:
+            case = case.noted(f"{key}.gap", "where the forces at rest balance", text="auto")
+        # Beads of different walkers may touch, but not overlap, if they are meant to meet.
+        least = (1.0 if walkers.meet else 1.5) * walkers.length
+        if walkers.spacing is None:
+            why = "so that walkers do not touch at the start" if walkers.meet else "so that walkers do not meet"
+            spacing = 2.0 * (walkers.length if walkers.meet else reach(case))
+            case = case.filled(f"{key}.spacing", spacing, why)
+        elif walkers.spacing < least and sum(one.replicates for one in case.walkers) > 1:
+            message = f'neighbouring walkers would touch or overlap; expected at least {1e3 * least:.3g} mm, or "auto"'
+            raise unusable(f"{key}.spacing", message)
+    return case
 
 
 def _check_held(case: Case, walkers: Walkers) -> None:
@@ -353,74 +347,11 @@ def _check_held(case: Case, walkers: Walkers) -> None:
             raise unusable(f"liquid.{key}", f"expected {other}: {pushed}")
 
 
-def _check_bodies(case: Case, file: CaseFile) -> None:
-    """Refuse bodies that do not fit into the boundary or beside each other."""
-    boundary, mixture = case.boundary, case.mixture
-    if case.run.ranks > 1 and not boundary.closed:
-        raise unusable("run.ranks", "expected 1: walkers on a plane run slower on several processes")
-    if not case.walkers and mixture is None and "seed" in file.run.model_fields_set:
-        raise unusable("run.seed", "expected none with placed beads: every start would be the same")
-    if case.liquid.conserved and (case.walkers or not boundary.closed):
-        raise unusable("liquid.conserved", "expected false: only loose beads in a container share their liquid")
-    if mixture is not None:
-        _check_pour(mixture, boundary, case.tops_of_others(mixture))
-    if case.placed is not None or case.meets or (case.walkers and not boundary.bare):
-        _check_places(case, [key for key, table in file.walkers.items() for _ in range(table.replicates)])
+def _gravity(case: Case) -> Case:
+    # Not in g: the paper's, 9.8 m/s², is not the case's gravity.
+    return case.noted("environment.gravity", "", "default", f"{case.environment.gravity:g} m/s^2")
 
 
-def _check_pour(mixture: Mixture, boundary: Boundary, floor: float) -> None:
-    largest = max(mixture.large)
-    if boundary.width < 4.0 * largest:
-        raise unusable("boundary.width", "expected at least two of the large beads side by side")
-    if boundary.layer(largest).tight and boundary.width < 8.0 * largest:
-        raise unusable("boundary.width", "expected at least four of the large beads side by side")
-    level = floor + mixture.level(boundary)
-    if level > 2.0 * boundary.height:  # walls and simulation go on to there
-        needed = f"{level / 2.0 * 1e3:.3g} mm"
-        raise unusable("boundary.height", f"too low for {mixture.count} beads; expected {needed} or more")
-
-
-def _check_places(case: Case, keys: list[str]) -> None:
-    """Walkers (each with its table's key) and beads that are placed: between the walls, and not within each other."""
-    import numpy as np
-
-    boundary = case.boundary
-    standing: list[Standing] = []
-    try:
-        standing.extend(one for _, one in islice(case.standing(), len(keys)))
-    except ValueError as error:
-        raise unusable(f"{keys[len(standing)]}.radii", str(error)) from error
-    if boundary.width < 2.0 * (1.0 - _OVERLAP) * max((max(one.radii) for one in case.walkers), default=0.0):
-        raise unusable("boundary.width", "expected more than a bead's diameter")
-    grid = boundary.grid(len(keys), max(one.spacing for one in case.walkers)) if keys else []
-    of_walkers = zip(keys, grid, standing, strict=True)
-    beads = [
-        (key, (x + one.x, y + one.y, one.z), one.radius) for key, (x, y), walker in of_walkers for one in walker.beads
-    ]
-    owner = [number for number, walker in enumerate(standing) for _ in walker.beads]
-    placed = case.placed.beads if case.placed is not None else ()
-    walking = len(beads)
-    beads += [(f"placed[{number}]", (x, y, z), radius) for number, (x, y, z, radius) in enumerate(placed)]
-    clearances = boundary.side_clearance(np.array([bead[1] for bead in beads]))
-    for number, ((key, (_, _, z), radius), clearance) in enumerate(zip(beads, clearances, strict=True)):
-        least = (1.0 - _OVERLAP) * radius
-        beside = clearance < least
-        if number < walking and beside:
-            message = f"the walkers do not fit between the walls of the {boundary.shape}"
-            raise unusable(f"{key}.replicates", message)
-        if number < walking and z + radius > boundary.height:
-            raise unusable("boundary.height", f"too low for the walkers of {key}")
-        if number >= walking and (beside or z < least or z + radius > boundary.height):
-            raise unusable(f"{key}.at", "expected a bead within the boundary")
-    if not (placed or case.meets):
-        return
-    from scipy.spatial import cKDTree
-
-    near = cKDTree([place for _, place, _ in beads]).query_pairs(2.0 * max(radius for *_, radius in beads))
-    strangers = (pair for pair in near if pair[1] >= walking or owner[pair[0]] != owner[pair[1]])
-    for one, other in sorted(strangers, key=lambda pair: pair[::-1]):
-        (key, place, first), (other_key, other_place, second) = beads[one], beads[other]
-        if dist(place, other_place) < first + second - _OVERLAP * min(first, second):
-            if other < walking:
-                raise unusable(f"{other_key}.spacing", "at their start angles, beads of two walkers would overlap")
-            raise unusable(f"{other_key}.at", f"overlaps with {key if one >= walking else f'one of {key}'}")
+STEPS: Sequence[Callable[[Case], Case]] = (
+    *(_radii, _viscosity, _count, _walkers, _drive, _law, with_run, _uphill, _spacing, check_bodies, _gravity),
+)

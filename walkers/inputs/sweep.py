@@ -15,11 +15,13 @@ import hashlib
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from walkers.errors import InputError, Problem, each, refused, shortened, unusable
 from walkers.inputs.axes import (
     MOST_POINTS,
     Axis,
@@ -33,16 +35,16 @@ from walkers.inputs.axes import (
     written,
     zipped,
 )
-from walkers.inputs.case import BOUNDS, Case
-from walkers.inputs.changes import Value, changed, flatten
-from walkers.inputs.errors import InputError, Problem, each, refused, shortened, unusable
+from walkers.inputs.case import Case
+from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
-from walkers.inputs.reading import find_input, read_case, read_toml, resolve_case
-from walkers.inputs.schema import Table
-from walkers.physics.units import Speed, Whole
+from walkers.inputs.reading import find_input, read_case
+from walkers.inputs.table import Table, changed
+from walkers.inputs.toml import read_toml
+from walkers.inputs.units import Speed, Whole
 
 _LONGEST_NAME = 120
-_SAME_RUN = ("title", *(f"run.{bound}" for bound in BOUNDS))
+_SAME_RUN = ("title",)
 """Keys that do not determine a run."""
 
 
@@ -151,10 +153,10 @@ class Sweep:
             text = ", ".join(f"{key} = {value}" for key, value in changes.items())
             where = f"{self.source}: point {number} ({text})" if text else self.source
             with blaming(where):
-                document = changed(self.document, changes)
-            case = resolve_case(document, source=where, name=self.case_name)
+                document = changed(Case, self.document, changes)
+            case = Case.read(document, source=where, name=self.case_name)
             # The base case's title may say what does not hold here.
-            yield case.renamed(case.name, f"{shortened(self.name)}: {shortened(text)}") if text else case
+            yield case.but(title=f"{shortened(self.name)}: {shortened(text)}") if text else case
 
 
 def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) -> Sweep:
@@ -207,9 +209,9 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
             for key in keys:
                 if key in _SAME_RUN:
                     raise unusable(key, f"does not vary: points with another {key} alone are the same run")
-            each(check_key, [key for key in (*settings, *keys) if key != "library"])
-            tables = changed(read_case(base, folder), settings)
-            changed(tables, dict(zip(keys, rows[0], strict=True)))
+            each(partial(check_key, Case), [key for key in (*settings, *keys) if key != "library"])
+            tables = changed(Case, read_case(base, folder), settings)
+            changed(Case, tables, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:
         raise refused(source, "has infinitely nested tables") from error
     descend = file.descend

@@ -13,7 +13,6 @@ import numpy as np
 from walkers.inputs import numerical
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
-from walkers.inputs.text import rendered
 from walkers.paper.maps import paper_drives
 from walkers.paper.published import (
     GRAVITY,
@@ -28,6 +27,7 @@ from walkers.paper.published import (
 from walkers.postprocess.gait import on_axis, steady_walkers
 from walkers.postprocess.tables import read_table
 from walkers.sweeps.table import thresholds
+from walkers.text import rendered
 from walkers.theory.mathieu import largest_stable_v
 from walkers.theory.prediction import motion_of, threshold
 from walkers.theory.quasistatic import FloatArray
@@ -144,7 +144,7 @@ def _value(number: Observation, sources: Sources) -> Value:
         return Value(theory=largest_stable_v())
     if number.quantity == "gamma0":
         case = number.of[0].case()
-        gamma0 = dimer_of(case).gamma0(case.drive.peak_acceleration)
+        gamma0 = dimer_of(case).gamma0(case.excitation.peak_acceleration)
         return Value(gamma0, gamma0, gamma0)
     try:
         if number.key.startswith("fig2_threshold"):

@@ -56,7 +56,7 @@ def fig1b(sources: Sources) -> Figure:
     table = OBSERVATIONS["alignment_asymmetric"].of[0].rows(sources.finished("alignment"))
     trajectory = sources.trajectory(table.sort_values("dimers.angle")["run"].iloc[0])
     case, largest = trajectory.case, float(trajectory.radii.max())
-    cycles = round(_INTERVAL * case.drive.frequency)
+    cycles = round(_INTERVAL * case.excitation.frequency)
     frames = np.arange(_IMAGES) * cycles * case.run.samples_per_cycle
     frames = frames[frames < len(trajectory.time)]
     centre = trajectory.mass_centre[frames, 0] @ np.stack([trajectory.drive_axis, trajectory.across_axis], axis=-1)
@@ -142,7 +142,7 @@ def _threshold(axes: Axes, sources: Sources) -> None:
         look: dict[str, Any] = {"fmt": _MARKERS[float(frequency)], "color": f"C{number}", "ms": 4, "lw": 1.0}
         axes.errorbar(frequency, (low + high) / 2.0, yerr=(high - low) / 2.0, mfc="none", **look)
     case = shipped()
-    predicted = [threshold(driven(case, frequency, [case.drive.peak_acceleration])[0]) for frequency in _MARKERS]
+    predicted = [threshold(driven(case, frequency, [case.excitation.peak_acceleration])[0]) for frequency in _MARKERS]
     axes.plot(list(_MARKERS), predicted, "--", color="0.2", lw=0.9)
     axes.set(ylim=(0.0, 1.3 * float(np.nanmax([*bounds.flat, *predicted]))))
     axes.set(xlim=(55.0, 95.0), xticks=list(_MARKERS))
@@ -178,7 +178,7 @@ def fig3(sources: Sources) -> Figure:
         axes.axvline(float(shown[np.argmax(ended)]), color="0.45", ls="-.", lw=0.8)
     axes.set(xlabel=r"asymmetry $\sin\delta = (R_1 - R_2)/(R_1 + R_2)$", ylabel="velocity (mm/s)")
     axes.set(xlim=(-0.01, 0.41), ylim=(-0.3, None))
-    figure.suptitle(rf"$\Gamma_0$ = {gamma0:g}, {case.drive.frequency:g} Hz, {case.liquid.name}")
+    figure.suptitle(rf"$\Gamma_0$ = {gamma0:g}, {case.excitation.frequency:g} Hz, {case.liquid.name}")
     legend_below(axes)
     return figure
 

@@ -7,8 +7,8 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from walkers.inputs.errors import refused
-from walkers.inputs.extras import require
+from walkers.errors import refused
+from walkers.extras import require
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.comparison import as_dict, as_markdown, compare, count
 from walkers.paper.figures import fig1b, fig2, fig3, fig4, fig_sensitivity

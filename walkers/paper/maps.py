@@ -83,7 +83,7 @@ def climber(*, large_bead_below: bool) -> Alignment:
     """U and V of the shipped climber, shaken and pulled along its wall."""
     case = load_case("climber-dimer")
     weight = case.axial_gravity if large_bead_below else -case.axial_gravity
-    return alignment(dimer_of(case), case.drive.frequency, case.drive.peak_acceleration, weight)
+    return alignment(dimer_of(case), case.excitation.frequency, case.excitation.peak_acceleration, weight)
 
 
 @styled
@@ -203,7 +203,7 @@ def fig_modes(sources: Sources) -> Figure:
     for panel in (kinds, speeds):
         panel.set_xlabel(r"asymmetry $\sin\delta$")
     letter_panels((kinds, speeds))
-    radius, drive = f"mean R = {dimer_of(case).mean_radius * 1e3:g} mm", f"{case.drive.frequency:g} Hz"
+    radius, drive = f"mean R = {dimer_of(case).mean_radius * 1e3:g} mm", f"{case.excitation.frequency:g} Hz"
     figure.suptitle(f"{radius}, {drive}, {case.liquid.name}")
     figure.legend(*kinds.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure

@@ -8,20 +8,19 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from walkers.inputs.caption import liquid_text, radii_text
+from walkers.errors import WalkersError
 from walkers.inputs.case import Case
-from walkers.inputs.drive import Drive, Harmonic
-from walkers.inputs.errors import WalkersError
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
-from walkers.physics.units import ACCELERATION_OF_ONE_G
+from walkers.inputs.units import ACCELERATION_OF_ONE_G
+from walkers.postprocess.caption import liquid_text, radii_text
 from walkers.postprocess.motion import Group, read_motion
 from walkers.sweeps.scheduler import SweepProgress
 from walkers.sweeps.table import load
@@ -140,8 +139,8 @@ def outside_of_the_paper(case: Case) -> str | None:
     strongest = max(point.peak or 0.0 for point in points)
     frequencies = [point.frequency for point in points if point.frequency is not None]
     low, high = min(frequencies), max(frequencies)
-    peak, frequency = case.drive.peak_acceleration / GRAVITY, case.drive.frequency
-    gamma0 = dimer_of(case).gamma0(case.drive.peak_acceleration)
+    peak, frequency = case.excitation.peak_acceleration / GRAVITY, case.excitation.frequency
+    gamma0 = dimer_of(case).gamma0(case.excitation.peak_acceleration)
     found = {
         f"Γ0 = {gamma0:.3g} (measured up to {most:g})": gamma0 > most,
         f"{peak:.3g} g (up to {strongest:g} g)": peak > (1.0 + 1e-9) * strongest,
@@ -161,15 +160,14 @@ def shipped() -> Case:
 
 def driven(case: Case, frequency: float, accelerations: Iterable[float]) -> list[Case]:
     """A case with another frequency (Hz) and peak accelerations (m/s²), for the theory: without a time step."""
-    drives = [Harmonic(case.drive.direction, float(frequency), float(peak)) for peak in accelerations]
-    run = replace(case.run, time_step=0.0)
-    return [replace(case, drive=Drive((one,), case.drive.frame), run=run) for one in drives]
+    drives = (case.drive.but(frequency=float(frequency), peak_acceleration=float(peak)) for peak in accelerations)
+    return [case.but(drive=drive) for drive in drives]
 
 
 def of_radii(case: Case, radii: tuple[float, float], gamma0: float) -> Case:
     """A case with other radii (m), driven at a Γ0."""
-    dimer = replace(case, walkers=(replace(case.walkers[0], radii=radii),))
-    return replace(dimer, drive=case.drive.with_peak(dimer_of(dimer).peak_acceleration(gamma0)))
+    dimer = case.put("dimers.radii", radii)
+    return dimer.put("drive.peak_acceleration", dimer_of(dimer).peak_acceleration(gamma0))
 
 
 def of_asymmetry(case: Case, sin_delta: float, gamma0: float) -> Case:
@@ -180,7 +178,7 @@ def of_asymmetry(case: Case, sin_delta: float, gamma0: float) -> Case:
 
 def described(case: Case) -> str:
     """Radii, drive and liquid of a case in a few words, for titles."""
-    drive = f"{case.drive.frequency:g} Hz, {case.drive.peak_acceleration / GRAVITY:.3g} g"
+    drive = f"{case.excitation.frequency:g} Hz, {case.excitation.peak_acceleration / GRAVITY:.3g} g"
     return f"R = {radii_text(case.walkers[0].radii)} mm, {drive}, {liquid_text(case)}"
 
 

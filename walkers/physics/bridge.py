@@ -30,7 +30,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, film_volume, share_of_bead
-from walkers.physics.matter import Liquid
+from walkers.physics.liquid import BridgeLiquid
 
 FloatArray = npt.NDArray[np.float64]
 _COLUMNS = ("pull", "normal resistance", "sliding resistance", "coupling", "rolling resistance")
@@ -59,11 +59,11 @@ class Surfaces:
     radius: float
     other_radius: float
     volume: float
-    liquid: Liquid
+    liquid: BridgeLiquid
     minimum_separation_ratio: float
 
     @classmethod
-    def of(cls, radius: float, other_radius: float, liquid: Liquid, minimum_separation_ratio: float) -> Surfaces:
+    def of(cls, radius: float, other_radius: float, liquid: BridgeLiquid, minimum_separation_ratio: float) -> Surfaces:
         """Make the surfaces of a bead and another bead or a plane (infinite radius), and the volume of their bridge."""
         if other_radius == inf:
             volume = bridge_volume_at_wall(radius, liquid.volume_fraction)

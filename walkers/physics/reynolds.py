@@ -81,7 +81,7 @@ def curve(surfaces: Surfaces, pull: Callable[[FloatArray], FloatArray], rupture:
 
 def resistances(surfaces: Surfaces, gaps: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """N and S (N s/m), C (N s), Q (N m s) of a bridge at gaps, m, each of shape (n,)."""
-    viscosity, reduced = surfaces.liquid.dynamic_viscosity, surfaces.reduced_radius
+    viscosity, reduced = surfaces.liquid.viscosity, surfaces.reduced_radius
     gaps = np.maximum(gaps, surfaces.closest)
     edge = wetted_gap(surfaces, gaps)
     deep = edge / gaps - 1.0

@@ -18,7 +18,6 @@ from dataclasses import asdict, dataclass
 from math import ceil, inf, pi, sqrt
 
 from walkers.physics.contact import reduced_modulus
-from walkers.physics.matter import Contact, Liquid
 
 AUTO_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.2, "hertz": 0.1, "viscous": 0.4}
 """Largest share of each limit for ``"auto"`` with loose beads. At 0.4 of the viscous limit (2 µs for glycerol), the
@@ -62,25 +61,37 @@ class TimeStepLimits:
 
 
 def time_step_limits(
-    bridged: Bridged, density: float, contact: Contact, liquid: Liquid, peak_velocity: float
+    bridged: Bridged,
+    *,
+    density: float,
+    youngs_modulus: float,
+    poissons_ratio: float,
+    viscosity: float,
+    minimum_separation_ratio: float,
+    peak_velocity: float,
 ) -> TimeStepLimits:
-    """Limits of the time step for beads on a substrate of this peak velocity (m/s); see the module."""
-    modulus = reduced_modulus(contact.youngs_modulus, contact.poissons_ratio)
+    """Limits of the time step for beads on a substrate of this peak velocity; SI units; see the module."""
+
+    def drag(reduced_radius: float) -> float:
+        """Largest normal lubrication resistance of a bridge, N s/m."""
+        return 6.0 * pi * viscosity * reduced_radius / minimum_separation_ratio
+
+    modulus = reduced_modulus(youngs_modulus, poissons_ratio)
     impacts, rates = [], []
     for radius, neighbours in bridged:
         mass = _mass(radius, density)
         impacts.append((mass, radius))
-        rates.append(_drag(radius, liquid, contact) / mass)
+        rates.append(drag(radius) / mass)
         between = 0.0
         for other in neighbours:
             other_mass, reduced = _mass(other, density), radius * other / (radius + other)
             impacts.append((mass * other_mass / (mass + other_mass), reduced))
-            between += _drag(reduced, liquid, contact) * (1.0 / mass + 1.0 / other_mass)
+            between += drag(reduced) * (1.0 / mass + 1.0 / other_mass)
         rates[-1] += between
-    shear_modulus = contact.youngs_modulus / (2.0 * (1.0 + contact.poissons_ratio))
+    shear_modulus = youngs_modulus / (2.0 * (1.0 + poissons_ratio))
     slowest = pi * min(radius for radius, _ in bridged) * sqrt(density / shear_modulus)
     return TimeStepLimits(
-        rayleigh=slowest / (0.1631 * contact.poissons_ratio + 0.8766),
+        rayleigh=slowest / (0.1631 * poissons_ratio + 0.8766),
         hertz=min(2.87 * float((mass**2 / (radius * modulus**2 * peak_velocity)) ** 0.2) for mass, radius in impacts)
         if peak_velocity
         else inf,
@@ -90,11 +101,6 @@ def time_step_limits(
 
 def _mass(radius: float, density: float) -> float:
     return 4.0 / 3.0 * pi * radius**3 * density
-
-
-def _drag(reduced_radius: float, liquid: Liquid, contact: Contact) -> float:
-    """Largest normal lubrication resistance of a bridge, N s/m."""
-    return 6.0 * pi * liquid.dynamic_viscosity * reduced_radius / contact.minimum_separation_ratio
 
 
 def fit_into_cycle(largest_time_step: float, frequency: float, samples_per_cycle: int) -> tuple[float, int]:

@@ -18,13 +18,13 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from walkers.inputs.caption import conditions
+from walkers.errors import refused
 from walkers.inputs.case import Case
-from walkers.inputs.errors import refused
-from walkers.inputs.rounding import SHOWN_UNITS, rounded
-from walkers.inputs.run_tables import limits_of
+from walkers.inputs.run import limits_of
+from walkers.postprocess.caption import conditions
 from walkers.postprocess.drawing import FORMATS, check_formats, save_figure
 from walkers.postprocess.uncertainty import bands_text, lines_of_rest, not_known, rests_on, with_bands
+from walkers.rounding import SHOWN_UNITS, rounded
 from walkers.runner.directory import SEGMENT_NAME, case_of, files_of_segments, segment_directories
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import MANIFEST_NAME, FileChanged, check_unchanged, forget_tables, record_tables
@@ -302,8 +302,8 @@ def _measured(directory: Path) -> tuple[dict[str, Any], dict[str, Columns]]:
         "case": case.name,
         "units": "SI: m, s, m/s, rad",
         "analyses": {one.name: one.version for one in analyses_of(case)},
-        "frequency": case.drive.frequency,
-        "peak_acceleration": case.drive.peak_acceleration,
+        "frequency": case.excitation.frequency,
+        "peak_acceleration": case.excitation.peak_acceleration,
         "drive": conditions(case),
         "goes_uphill": case.goes_uphill,
         "truncated": motion.truncated,

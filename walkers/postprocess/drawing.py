@@ -9,9 +9,9 @@ from pathlib import Path
 from string import ascii_lowercase
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from walkers.inputs.errors import refused
-from walkers.inputs.text import printable
+from walkers.errors import refused
 from walkers.runner.files import beside
+from walkers.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

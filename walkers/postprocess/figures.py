@@ -154,7 +154,7 @@ def gait_panels(group: Group) -> list[Panel]:
     motion = gait(group)
     cycles = (len(group.time) - 1) // samples
     last = slice((cycles - 2) * samples, cycles * samples + 1)
-    phase = group.time[last] * group.case.drive.frequency - (cycles - 2)
+    phase = group.time[last] * group.case.excitation.frequency - (cycles - 2)
     names = ["walker", *(f"bead {bead + 1}" for bead in range(motion.rotation.shape[-1]))]
     values = 1e3 * np.column_stack([motion.velocity[last, 0], motion.rotation[last, 0]])
     means = 1e3 * np.array([walk(group).velocity[0], *averages(group).rotation[0]])
@@ -338,7 +338,7 @@ def _title(case: Case) -> str:
         makes = [" / ".join(f"{radius * 1e3:g}" for radius in make.radii) for make in case.walkers]
         shown = f"R = {'; '.join(makes)} mm"
         if len(case.walkers[0].radii) == 2:
-            gamma0 = f" ($\\Gamma_0$ = {dimer_of(case).gamma0(case.drive.peak_acceleration):.3g})"
+            gamma0 = f" ($\\Gamma_0$ = {dimer_of(case).gamma0(case.excitation.peak_acceleration):.3g})"
     tilted = f", {case.boundary.tilted}" if case.boundary.tilted else ""
     title = "\n".join(wrap(plain_text(case.title or case.name), _LETTERS))
-    return f"{title}\n{shown}{tilted}, {case.drive.described()}{gamma0}"
+    return f"{title}\n{shown}{tilted}, {case.excitation.described()}{gamma0}"

@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from walkers.inputs.errors import WalkersError, refused
-from walkers.inputs.extras import require
-from walkers.physics.units import DURATION, parse_quantity
+from walkers.errors import WalkersError, refused
+from walkers.extras import require
+from walkers.inputs.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_place
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, read_motion
@@ -199,7 +199,7 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
         if not follows:
             largest = min(largest, 1.0 / (_LEAST_SEEN * float(np.median(np.diff(motion.time)))))
         slowdown = max(1.0, round_below(largest))
-    interval, cycle = 1.0 / (options.fps * slowdown), 1.0 / motion.case.drive.frequency
+    interval, cycle = 1.0 / (options.fps * slowdown), 1.0 / motion.case.excitation.frequency
     time = begin + interval * np.arange(int((end - begin) / interval + 1e-9) + 1)
     strobed = interval >= cycle / 2.0
     if strobed:
@@ -226,7 +226,7 @@ def _captions(
     # All pictures may show the same frame.
     decimals = max(0, ceil(-log10(float(np.diff(times.time).max(initial=0.0)) or 1.0) - 1e-9))
     speed = speed_text(times.slowdown) + (", stroboscopic" if times.stroboscopic else "")
-    drive = f"{case.drive.frequency:g} Hz, {case.drive.peak_acceleration:.3g} m/s²"
+    drive = f"{case.excitation.frequency:g} Hz, {case.excitation.peak_acceleration:.3g} m/s²"
     bar = round_below(wide / 5.0 / pixels_per_mm)
     toward, direction = named_direction(scene.motion)
     left, right, level, thick = wide - edge - bar * pixels_per_mm, wide - edge, tall - edge, max(2, edge // 8)
@@ -246,7 +246,7 @@ def _captions(
             for row, text in enumerate(said):
                 draw.text((edge, (2.8 + 1.5 * row) * edge), text, "#333333", small, anchor="lt")
         draw.text((edge, level), drive, "#333333", small, anchor="ls")
-        if case.boundary.tilted and case.gravity:
+        if case.boundary.tilted and case.environment.gravity:
             tip = 5.5 * edge
             draw.line([right, edge, right, tip - edge], "black", thick)
             draw.polygon([right - 0.4 * edge, tip - edge, right + 0.4 * edge, tip - edge, right, tip], "black")

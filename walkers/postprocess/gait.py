@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from walkers.inputs.case import CONSTANT
+from walkers.inputs.run import CONSTANT
 from walkers.postprocess.analysis import read_result
 from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
 from walkers.postprocess.motion import Group, Motion, read_motion

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from walkers.inputs.bodies import Walkers
 from walkers.inputs.case import Case
-from walkers.inputs.drive import Drive
+from walkers.inputs.drive import Excitation
 from walkers.postprocess.dump import BinaryDump, BoolArray, DumpError, FloatArray, IntArray, NoNumberError, local_frames
 from walkers.runner.directory import (
     SEGMENT_NAME,
@@ -403,10 +403,12 @@ def _of_frames(
         column = dump.column(name)
         return data[:, :, column : column + 3]
 
-    shift, speed = prescribed_motion(case.drive, time)
+    shift, speed = prescribed_motion(case.excitation, time)
     if starts and start:  # in the last frame at rest the walls do not move yet
         speed[time == 0.0] = 0.0
-    substrate, substrate_velocity = (shift, speed) if case.drive.frame == "lab" else boundary_motion(case.drive, time)
+    substrate, substrate_velocity = (
+        (shift, speed) if case.drive.frame == "lab" else boundary_motion(case.excitation, time)
+    )
     return Motion(
         case=case.for_cycles(cycles) if case.run.until_steady else case,
         time=time,
@@ -425,14 +427,14 @@ def _of_frames(
     )
 
 
-def prescribed_motion(drive: Drive, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+def prescribed_motion(drive: Excitation, time: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Displacement and velocity of the walls in the frame of the drive, m and m/s, shape (F, 3)."""
     if drive.frame == "lab":
         return boundary_motion(drive, time)
     return np.zeros((len(time), 3)), np.zeros((len(time), 3))
 
 
-def boundary_motion(drive: Drive, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+def boundary_motion(drive: Excitation, time: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Displacement and velocity of the boundary in the laboratory, m and m/s, shape (F, 3); zero before 0 s."""
     displacement, velocity = np.zeros((len(time), 3)), np.zeros((len(time), 3))
     driven = time >= 0.0

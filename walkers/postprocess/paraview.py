@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.errors import refused
-from walkers.inputs.text import rendered
+from walkers.errors import refused
 from walkers.postprocess.analysis import analyses_of
 from walkers.postprocess.drawing import check_every
 from walkers.postprocess.motion import Bridges, Motion, gathered, read_bridges, read_motion
 from walkers.postprocess.scene import Scene, camera_axes, mesh_of, walls_of
 from walkers.runner.files import write_bytes, write_text
+from walkers.text import rendered
 
 if TYPE_CHECKING:
     import pyvista as pv

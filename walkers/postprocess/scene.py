@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from walkers.errors import refused
 from walkers.inputs.boundary import Flat
 from walkers.inputs.case import Case
-from walkers.inputs.errors import refused
 from walkers.postprocess.analyses.piles import Pile, tracks_of
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, boundary_motion
@@ -374,7 +374,7 @@ class Window:
             place = motion.select(slice(number, number + 2)).between(share).position[0]
             time += share * (motion.time[number + 1] - time)
         if self._scene.shaken:
-            shift = 1e3 * boundary_motion(motion.case.drive, np.array([time]))[0][0]
+            shift = 1e3 * boundary_motion(motion.case.excitation, np.array([time]))[0][0]
         turns = self._scene.turns
         self._beads.colour(self._scene.colours(self._scene.pointed_out[number])[self._pale].swapaxes(0, 1))
         self._beads.move(1e3 * place + shift, None if turns is None else turns.at(number, share))

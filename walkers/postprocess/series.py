@@ -197,7 +197,7 @@ def _describe_strips(
         panels[0].set_ylabel(label)
     else:
         panels[-1].set_xlabel(label)
-    if case.boundary.tilted and case.gravity:
+    if case.boundary.tilted and case.environment.gravity:
         place = 1.0 - 0.45 / wide
         figure.text(place, 0.56, case.boundary.pull, ha="center")
         how: dict[str, Any] = {"xycoords": "figure fraction", "arrowprops": {"arrowstyle": "-|>", "lw": 1.5, "fc": "k"}}

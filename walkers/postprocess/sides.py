@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.rounding import with_decimals
+from walkers.rounding import with_decimals
 
 if TYPE_CHECKING:
     import numpy.typing as npt

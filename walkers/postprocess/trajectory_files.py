@@ -11,7 +11,7 @@ from typing import TextIO
 
 import numpy as np
 
-from walkers.inputs.extras import require
+from walkers.extras import require
 from walkers.postprocess.drawing import check_every, check_place
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, read_motion

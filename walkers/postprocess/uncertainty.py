@@ -13,7 +13,7 @@ from typing import Any
 from walkers.inputs.library import unmeasured
 from walkers.inputs.numerical import STIFFER
 from walkers.inputs.origins import Origin
-from walkers.inputs.rounding import SHOWN_UNITS, rounded
+from walkers.rounding import SHOWN_UNITS, rounded
 from walkers.runner.directory import CASE_NAME
 from walkers.runner.files import read_json
 

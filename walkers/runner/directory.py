@@ -146,7 +146,7 @@ def _with_recorded_law(case: Case, directory: Path) -> Case:
     files = [file for file in (tables, source) if file]
     check_unchanged(directory, [file.relative_to(directory).as_posix() for file in files])
     law = RecordedLaw(tables.read_text("utf-8") if tables else "", source.read_bytes() if source else None)
-    return case.read_from(case.document, case.find_origins, law)
+    return case.but(recorded_law=law)
 
 
 def write_case(directory: Path, case: Case) -> None:
@@ -154,7 +154,7 @@ def write_case(directory: Path, case: Case) -> None:
     write_json(directory / CASE_NAME, case.as_dict(), at_once=False)
     if case.liquid.law in LAWS:
         return
-    tables = tables_of(case, [(case.contact, case.liquid)], {(1, radius) for radius in case.radii})
+    tables = tables_of(case, [(case.contact, case.liquid.of_bridges)], {(1, radius) for radius in case.radii})
     write_bytes(directory / BRIDGES_NAME, tables.encode("utf-8"), at_once=False)
     file = None if case.recorded_law else source_of(case.liquid.law)
     if (source := file.read_bytes() if file else getattr(case.recorded_law, "source", None)) is not None:

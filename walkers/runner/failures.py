@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from walkers.inputs.errors import WalkersError
+from walkers.errors import WalkersError
 from walkers.templates.engine import AUDITED_VERSION
 
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from walkers.inputs.rounding import duration_text
+from walkers.rounding import duration_text
 from walkers.runner import failures
 from walkers.runner.binary import Engine, plugin_of, run_script, version_in
 from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, RUN_NAME, Deck

@@ -9,8 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+from walkers.errors import WalkersError
 from walkers.inputs.case import Case
-from walkers.inputs.errors import WalkersError
 from walkers.runner.binary import Engine, plugin_of, read_audit
 from walkers.runner.files import checksum, read_json, write_json
 from walkers.runner.launch import EngineReport, cores_here

@@ -10,22 +10,19 @@ import re
 import shutil
 import time
 from collections.abc import Collection, Mapping
-from dataclasses import fields, replace
-from functools import partial
+from dataclasses import replace
 from math import isclose, isfinite, nan, pi
 from pathlib import Path
 from typing import Any
 
-from walkers.inputs.case import CONSTANT, Case, settling_of
-from walkers.inputs.drive import Harmonic
-from walkers.inputs.errors import refused
-from walkers.inputs.origins import Origin
-from walkers.inputs.readable import readable
-from walkers.inputs.rounding import percent
-from walkers.inputs.schema import ALTERNATIVES, fields_of
-from walkers.physics.matter import Contact
+from walkers.errors import refused
+from walkers.inputs.case import Case
+from walkers.inputs.drive import Sine
+from walkers.inputs.run import CONSTANT
+from walkers.inputs.table import changed as table_changed
 from walkers.postprocess.analysis import tabulate
 from walkers.postprocess.dump import DumpError
+from walkers.rounding import percent
 from walkers.runner.binary import find_engine, plugin_of, run_script
 from walkers.runner.directory import CASE_NAME, DECK_RECORD_NAME, SEGMENT_NAME, finished_run, layout_of, write_deck
 from walkers.runner.failures import EngineFailure, MissingFrames
@@ -52,8 +49,16 @@ _GIVEN = re.compile(r"^variable +(\w+) string ([-+.\de]+)(?: |$)", re.MULTILINE)
 _LINE = re.compile(r"^variable +(\w+) string (\S+)", re.MULTILINE)
 _VARIABLE = re.compile(r"variable (\w+) string")
 _SAME = 1e-9
-_FOLLOW = ("run.time_step", "run.settling_cycles")
-_OF_LIQUID = {"surface_tension": "surface_tension", "viscosity": "dynamic_viscosity"}
+_SETTINGS: Mapping[str, tuple[str, str]] = {
+    "gravity": ("environment.gravity", "m/s^2"),
+    "density": ("beads.density", "kg/m^3"),
+    "youngs_modulus": ("contact.youngs_modulus", "Pa"),
+    "surface_tension": ("liquid.surface_tension", "N/m"),
+    "viscosity": ("liquid.dynamic_viscosity", "Pa*s"),
+    **{name: (f"contact.{name}", "") for name in ("poissons_ratio", "restitution", "rolling_friction")},
+    **{f"friction_{pair}": (f"contact.friction.{pair}", "") for pair in ("bead_bead", "bead_wall")},
+}
+"""For parameters of a deck, the key of a case and its unit."""
 _SCALE = """# Writes tables for another surface tension and viscosity: the deck gives the factors pull and resistance.
 /^[-+.0-9]/ { printf "%s", $1; printf " %.12g", pull * $2; for (i = 3; i <= NF; i++) printf " %.12g", resistance * $i
               printf "\\n"; next }
@@ -147,20 +152,22 @@ def _judged(deck: Deck, folder: Path, log: Path) -> EngineReport:
 
 
 def _as_run(case: Case, written: str, now: str, said: str) -> tuple[Case, Segment, list[str]]:
-    """The case that the engine ran, its segment, and the edits, from the deck as written and now, and the log."""
+    """The case that the engine ran, its segment, and the edits, from the deck as written and now, and the log.
+
+    The engine prints the parameters of the deck: those that were edited are changes of the case.
+    """
     given = {name: float(value) for name, value in _GIVEN.findall(written)}
     words = (_PRINTED.findall(said) or [""])[-1].split()
     printed = {name: _number(name, value) for name, value in zip(words[::2], words[1::2], strict=True)}
     values, case = {**given, **printed}, case.for_cycles(case.run.attempts[0])
     edited = {name: values[name] for name, value in given.items() if values[name] != value}
-    ran = _case_of(case, values, edited)
-    rest = int(values.get("rest_steps", 0))
+    ran = _edited(case, values, edited) if edited or _own_amplitude(case, values) else case
     changes = [f"{name} {value:g}, was {given[name]:g}" for name, value in edited.items()]
     before, after, follow = dict(_LINE.findall(written)), dict(_LINE.findall(now)), _derived(case)
     changed = [name for name in printed if name in follow and name not in given and after.get(name) != before[name]]
     changes += [f"{name} {printed[name]:g}, was {follow[name]:g}" for name in changed]
-    segment = Segment(0, rest + ran.run.steps, rest)
-    return ran, segment, [*changes, *_other_changes(written, now, printed)]
+    rest = int(values.get("rest_steps", 0))
+    return ran, Segment(0, rest + ran.run.steps, rest), [*changes, *_other_changes(written, now, printed)]
 
 
 def _number(name: str, value: str) -> float:
@@ -170,59 +177,70 @@ def _number(name: str, value: str) -> float:
         raise ValueError(f'variable {name}: expected a number, found "{value}"') from error
 
 
-def _case_of(case: Case, values: Mapping[str, float], edited: Mapping[str, float]) -> Case:
+def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float]) -> Case:
     """The case with the values of a deck's parameters, some of which were edited."""
-    ends = suffixes(len(case.drive.harmonics))
-    harmonics = [_harmonic(one, end, values) for one, end in zip(case.drive.harmonics, ends, strict=True)]
-    drive = replace(case.drive, harmonics=tuple(harmonics))
-    steps, cycles = int(values["steps_per_cycle"]), int(values["cycles"])
-    step, parts = values.get("time_step", case.run.time_step), case.run.samples_per_cycle
-    if not isclose(step * steps * drive.frequency, 1.0, rel_tol=_SAME) or steps % parts:
+    several = enumerate(zip(suffixes(len(case.excitation.harmonics)), case.excitation.harmonics, strict=True))
+    harmonics = {number: _harmonic(one, end, values) for number, (end, one) in several}
+    steps, parts = int(values["steps_per_cycle"]), case.run.samples_per_cycle
+    changes: dict[str, Any] = {
+        key: f"{edited[name]!r} {unit}" if unit else edited[name]
+        for name, (key, unit) in _SETTINGS.items()
+        if name in edited
+    }
+    changes |= {"liquid.viscosity_ratio": 1.0} if "viscosity" in edited else {}
+    changes |= {f"{key}.spacing": f"{one.spacing!r} m" for key, one in case.walkers_by_key.items()}
+    changes |= {"run.cycles": int(values["cycles"]), "run.allow_unstable": True}
+    if parts > 1:
+        changes["run.samples_per_cycle"] = parts
+    document = table_changed(Case, case.document, changes)
+    if any(edits for _, edits in harmonics.values()):
+        drive = {**document["drive"], **harmonics[0][0]} if len(harmonics) == 1 else {}
+        drive.pop("gamma0", None)
+        document["drive"] = drive or {"frame": case.drive.frame, "harmonics": [one for one, _ in harmonics.values()]}
+    frequency = values.get("cycle_frequency", values.get("frequency", case.excitation.frequency))
+    step = values.get("time_step", case.run.time_step)
+    if not isclose(step * steps * frequency, 1.0, rel_tol=_SAME) or steps % parts:
         raise ValueError(
-            f"{steps} steps of {step:g} s are not one cycle of {drive.frequency:g} Hz in {parts} equal parts: "
+            f"{steps} steps of {step:g} s are not one cycle of {frequency:g} Hz in {parts} equal parts: "
             f"edit steps_per_cycle (a multiple of {parts}); time_step follows from it and the frequency"
         )
-    if not isclose(start := values.get("peak_velocity", drive.peak_velocity), drive.peak_velocity, rel_tol=_SAME):
+    document["run"] = {**document.get("run", {}), "time_step": f"{step!r} s"}
+    ran = Case.read(document, source=case.name, name=case.name)
+    peak = ran.excitation.peak_velocity
+    if not isclose(start := values.get("peak_velocity", peak), peak, rel_tol=_SAME):
         raise ValueError(
-            f"beads start at peak_velocity {start:g} m/s, but the walls at {drive.peak_velocity:g} m/s: edit "
-            "peak_acceleration or frequency, from which amplitude and peak_velocity follow"
+            f"beads start at peak_velocity {start:g} m/s, but the walls at {peak:g} m/s: edit peak_acceleration or "
+            "frequency, from which amplitude and peak_velocity follow"
         )
-    run = replace(case.run, time_step=step, steps_per_cycle=steps)
-    if cycles != run.cycles:
-        settling = settling_of(cycles) if case.walkers else 0
-        run = replace(run, cycles=cycles, cycles_per_segment=cycles, settling_cycles=settling)
-    contact = {one.name: values[one.name] for one in fields(Contact) if one.name in values}
-    liquid: dict[str, Any] = {key: edited[name] for name, key in _OF_LIQUID.items() if name in edited}
-    ran = replace(
-        case,
-        drive=drive,
-        run=run,
-        gravity=values.get("gravity", case.gravity),
-        density=values.get("density", case.density),
-        material=None if "density" in edited else case.material,
-        contact=replace(case.contact, **contact),
-        liquid=replace(case.liquid, name=None, **liquid) if liquid else case.liquid,
-    )
-    # The origins of values remain valid for an unchanged case.
-    return case if ran == case else ran.read_from({}, partial(_origins, case, ran))
+    return ran
 
 
 def _derived(case: Case) -> dict[str, float]:
     """Parameters of a deck that follow from others."""
-    ends, harmonics = suffixes(len(case.drive.harmonics)), case.drive.harmonics
+    ends, harmonics = suffixes(len(case.excitation.harmonics)), case.excitation.harmonics
     amplitudes = {f"amplitude{end}": one.amplitude for end, one in zip(ends, harmonics, strict=True)}
-    return {**amplitudes, "peak_velocity": case.drive.peak_velocity, "time_step": case.run.time_step}
+    return {**amplitudes, "peak_velocity": case.excitation.peak_velocity, "time_step": case.run.time_step}
 
 
-def _harmonic(one: Harmonic, end: str, values: Mapping[str, float]) -> Harmonic:
-    """A harmonic from its parameters; an amplitude that contradicts the acceleration was edited and replaces it."""
+def _own_amplitude(case: Case, values: Mapping[str, float]) -> bool:
+    """Whether a parameter that follows from others was edited."""
+    return any(not isclose(values.get(name, one), one, rel_tol=_SAME) for name, one in _derived(case).items())
+
+
+def _harmonic(one: Sine, end: str, values: Mapping[str, float]) -> tuple[dict[str, Any], bool]:
+    """A harmonic as a case file has it, and whether it was edited.
+
+    An amplitude that contradicts the acceleration was edited and replaces it.
+    """
     frequency = values.get(f"frequency{end}", one.frequency)
     peak = values.get(f"peak_acceleration{end}", one.peak_acceleration)
     implied = values.get(f"amplitude{end}", nan) * (2.0 * pi * frequency) ** 2
     if isfinite(implied) and not isclose(implied, peak, rel_tol=_SAME):
         peak = implied
     phase = values.get(f"phase{end}", one.phase)
-    return replace(one, frequency=frequency, peak_acceleration=peak, phase=phase)
+    table = {"axis": list(one.direction), "frequency": f"{frequency!r} Hz", "peak_acceleration": f"{peak!r} m/s^2"}
+    table |= {"phase": f"{phase!r} rad"} if phase else {}
+    return table, (frequency, peak, phase) != (one.frequency, one.peak_acceleration, one.phase)
 
 
 def _other_changes(written: str, now: str, given: Collection[str]) -> list[str]:
@@ -238,44 +256,6 @@ def _other_changes(written: str, now: str, given: Collection[str]) -> list[str]:
     )
     others = [line for line in after if line not in before] or [line for line in before if line not in after]
     return [f"{len(others)} other line(s), which are not part of the case, first: {others[0]}"] if others else []
-
-
-def _origins(case: Case, ran: Case) -> tuple[Origin, ...]:
-    """Origins of the values of an edited deck, which ran: what differs from the case of the deck is given now."""
-    before, known = _values(case), {one.key for one in case.origins}
-    now = {key: value for key, value in _values(ran).items() if value != before[key]}
-    gone = {
-        f"{key.rpartition('.')[0]}.{other.rpartition('.')[2]}"
-        for key in now
-        for other in ALTERNATIVES.get(re.sub(r"harmonics\[\d+\]\.", "", key), ())
-    }
-    if any(key.startswith("drive.harmonics") for key in now) and "drive.frequency" in known:  # those of a waveform
-        now |= {key: value for key, value in _values(ran).items() if key.startswith("drive.harmonics")}
-        gone |= {f"drive.{name}" for name in ("frequency", "peak_acceleration", "phase", "waveform")}
-    if "liquid.dynamic_viscosity" in now:  # of the bridges
-        now["liquid.viscosity_ratio"] = 1.0
-    if ran.drive.frequency != case.drive.frequency and "run.duration" in known:
-        now["run.cycles"], gone = ran.run.cycles, gone | {"run.duration"}
-    found = {one.key: one for one in case.origins if one.key not in gone}
-    for key, value in now.items():
-        found[key] = Origin(key, readable(key, value), "derived" if key in _FOLLOW else "given", value=value)
-    return tuple(found.values())
-
-
-def _values(case: Case) -> dict[str, Any]:
-    """The values of a case that parameters of a deck determine, by their keys in a case file."""
-    harmonics, several = case.drive.harmonics, len(case.drive.harmonics) > 1
-    return {
-        **{
-            f"drive.{f'harmonics[{number}].' if several else ''}{name}": getattr(one, name)
-            for number, one in enumerate(harmonics)
-            for name in ("frequency", "peak_acceleration", "phase")
-        },
-        **{f"contact.{key}": getattr(case.contact, name) for key, (name, _) in fields_of(Contact).items()},
-        **{f"liquid.{key}": getattr(case.liquid, key) for key in _OF_LIQUID.values()},
-        **{key: getattr(case.run, key.partition(".")[2]) for key in ("run.cycles", *_FOLLOW)},
-        **{"environment.gravity": case.gravity, "beads.density": case.density},
-    }
 
 
 def _write(

@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.changes import dotted
-from walkers.inputs.errors import refused
-from walkers.inputs.rounding import percent
+from walkers.errors import refused
+from walkers.inputs.keys import dotted
 from walkers.postprocess.analyses.piles import Pile
+from walkers.rounding import percent
 from walkers.runner.directory import CASE_NAME, FinishedRun, finished_places, finished_run
 from walkers.sweeps.table import RECORD_NAME, read_record, result_in, states, value_text
 

@@ -8,13 +8,13 @@ from math import hypot, isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.errors import refused
-from walkers.inputs.readable import differing, flattened, readable, readable_unit
-from walkers.inputs.rounding import percent, rounded
+from walkers.errors import refused
 from walkers.postprocess.sides import STEADY_SPEED, alike, fell, sides, sides_apart, ways
 from walkers.postprocess.uncertainty import band_of, band_text, has_error, not_known, with_bands
+from walkers.rounding import percent, rounded
 from walkers.runner.directory import case_of
 from walkers.sweeps.folder import aligned
+from walkers.sweeps.readable import differing, flattened, readable, readable_unit
 from walkers.sweeps.table import (
     ERRORS,
     default_column,
@@ -120,7 +120,7 @@ def compare_runs(first: Side, second: Side) -> Comparison:
 
 def _different(cases: Sequence[Case], names: Sequence[str]) -> tuple[dict[str, list[Any]], str]:
     """The given values by which two cases differ, without derived ones, in SI units, and as text."""
-    flat = [flattened(one.as_dict()) for one in cases]
+    flat = [flattened(one) for one in cases]
     parameters = {key: [one.get(key) for one in flat] for key in differing(flat)}
     rows = [[key, *(readable(key, value) for value in values)] for key, values in parameters.items()]
     return parameters, aligned([["parameter", *names], *rows]) if rows else ""

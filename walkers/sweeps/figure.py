@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.errors import refused
+from walkers.errors import refused
 from walkers.inputs.library import unmeasured
-from walkers.inputs.readable import readable_unit
 from walkers.postprocess.drawing import (
     SCATTER,
     errors_seen,
@@ -22,6 +21,7 @@ from walkers.postprocess.drawing import (
     plain_text,
     styled,
 )
+from walkers.sweeps.readable import readable_unit
 from walkers.sweeps.table import ERRORS, find_name, value_text, varied_columns, with_unit
 
 if TYPE_CHECKING:

@@ -20,12 +20,12 @@ from pathlib import Path
 from stat import S_ISDIR
 from typing import Any, Literal
 
-from walkers.inputs.errors import InputError, Problem, refused
-from walkers.inputs.readable import agrees, check_wanted, differing, flattened, has_key, kind_of, readable, short_keys
-from walkers.inputs.rounding import counted, duration_text, rounded
-from walkers.physics.units import Kind, parse_quantity
+from walkers.errors import InputError, Problem, refused
+from walkers.inputs.case import Case
+from walkers.inputs.units import Kind, parse_quantity
 from walkers.postprocess.sides import REST, came_apart, of_tray, sides_apart, uphill_velocities
 from walkers.postprocess.uncertainty import SPREAD, SPREAD_NAME
+from walkers.rounding import counted, duration_text, rounded
 from walkers.runner.directory import (
     CASE_NAME,
     REPLACED,
@@ -39,6 +39,17 @@ from walkers.runner.directory import (
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.sweeps.making import progress_at
+from walkers.sweeps.readable import (
+    FlatCase,
+    agrees,
+    check_wanted,
+    differing,
+    flattened,
+    has_key,
+    kind_of,
+    readable,
+    short_keys,
+)
 from walkers.sweeps.table import (
     PARSL,
     RECORD_NAME,
@@ -66,7 +77,7 @@ class Entry:
 
     The status is finished, running, failed, or interrupted (a run can be continued, or points of a sweep are missing).
     ``age`` (s) counts from the end of the run or from the last change, ``size`` (bytes) is that of the files, for a
-    sweep of its runs. ``parameters`` are those of `walkers.inputs.readable.flattened`, for a sweep the number of values
+    sweep of its runs. ``parameters`` are those of `walkers.sweeps.readable.flattened`, for a sweep the number of values
     of each varied key. A run has a velocity (m/s, mean over the walkers; if ``sides`` has velocities of walkers on a
     slope, the first of them; ``words`` say what walkers on a tray do, or that they came apart) or a number of climbs; a
     sweep has numbers of points by status.
@@ -78,7 +89,7 @@ class Entry:
     directory: Path
     age: float = 0.0
     size: int = 0
-    parameters: Mapping[str, Any] = field(default_factory=dict)
+    parameters: FlatCase = field(default_factory=FlatCase)
     reason: str | None = None
     message: str | None = None
     velocity: float | None = None
@@ -124,11 +135,11 @@ def _run(path: Path, now: float) -> Entry | None:
     finished = name == path.name and (path / MANIFEST_NAME).is_file()
     if not (finished or is_run_name(name)):  # a user's folder
         return None
-    parameters: Mapping[str, Any] = {}
+    parameters = FlatCase()
     case_name = name.rpartition("-")[0]
     try:
-        case = read_json(path / CASE_NAME)
-        parameters, case_name = flattened(case), str(case["name"])
+        case = Case.from_dict(read_json(path / CASE_NAME))
+        parameters, case_name = flattened(case), case.name
     except (OSError, ValueError, KeyError, TypeError):
         if not is_run_name(name) or not (finished or (name != path.name and holds_unfinished(path))):
             return None
@@ -187,7 +198,7 @@ def _sweep(path: Path, runs: Sequence[Entry], now: float) -> Entry | None:
         directory=path,
         age=_age(path / RECORD_NAME, now),
         size=sum(run.size for run in runs if run.name in named),
-        parameters={key: len({str(row[at]) for row in record.values}) for at, key in enumerate(record.units)},
+        parameters=FlatCase({key: len({str(row[at]) for row in record.values}) for at, key in enumerate(record.units)}),
         points=points,
         runs=record.runs,
     )
@@ -224,7 +235,7 @@ def select(
         if runs and not any(has_key(run.parameters, key) for run in runs):
             known = ", ".join(dict.fromkeys(one for run in runs for one in run.parameters))
             raise InputError("--where", [Problem(key, None, f"no run has such a key; they have {known}")])
-        alike = {key: 0.0} if kind_of(key) and "/" not in value else {}  # if there are no runs to compare with
+        alike = FlatCase({key: 0.0}) if kind_of(key) and "/" not in value else FlatCase()  # if there are no runs to compare with
         for parameters in [run.parameters for run in runs] or [alike]:
             try:
                 check_wanted(parameters, key, value)
@@ -251,7 +262,7 @@ def ordered(entries: Sequence[Entry], order: Order, *, reverse: bool = False) ->
 
 
 def _varied(runs: Sequence[Entry]) -> Iterator[tuple[str, list[Entry], list[str]]]:
-    """The runs of each case, and the keys by which they differ, see `walkers.inputs.readable.differing`."""
+    """The runs of each case, and the keys by which they differ, see `walkers.sweeps.readable.differing`."""
     for case in dict.fromkeys(run.case for run in runs):
         of_case = [run for run in runs if run.case == case]
         yield case, of_case, differing([run.parameters for run in of_case if run.parameters])

@@ -20,8 +20,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from walkers.inputs.case import Case, Run
-from walkers.inputs.errors import Stopped, WalkersError
+from walkers.errors import Stopped, WalkersError
+from walkers.inputs.case import Case
+from walkers.inputs.run import Run
 from walkers.postprocess.analysis import tabulate
 from walkers.runner.binary import Engine, is_new, model_sha256, read_audit
 from walkers.runner.directory import (

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkers.inputs.extras import require
-from walkers.inputs.readable import readable_unit
-from walkers.inputs.rounding import rounded
+from walkers.extras import require
 from walkers.postprocess.drawing import errors_seen
 from walkers.postprocess.report.page import (
     COLOURS,
@@ -28,7 +26,9 @@ from walkers.postprocess.report.page import (
 )
 from walkers.postprocess.report.run import RunReport
 from walkers.postprocess.uncertainty import not_known
+from walkers.rounding import rounded
 from walkers.sweeps.figure import drawn_column, factors_of, joined, readable_key
+from walkers.sweeps.readable import readable_unit
 from walkers.sweeps.table import SIDES, load, main_columns, result_in, sides_differ, varied_columns, with_unit
 
 if TYPE_CHECKING:

@@ -31,15 +31,15 @@ from platform import node
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
+from walkers.errors import InputError, Stopped, WalkersError, check_utf8, refused
 from walkers.inputs.case import Case
-from walkers.inputs.errors import InputError, Stopped, WalkersError, check_utf8, refused
-from walkers.inputs.rounding import counted, duration_text
 from walkers.inputs.sweep import Sweep
 from walkers.postprocess.analysis import current_result
+from walkers.rounding import counted, duration_text
 from walkers.runner.binary import Engine, find_engine
 from walkers.runner.directory import is_locked, run_place, unfinished
 from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, OutputGone, ProgramDiffers
-from walkers.runner.summary import PROGRAM_SECONDS, pairs_of_beads, predicted_overhead, predicted_seconds
+from walkers.show import PROGRAM_SECONDS, pairs_of_beads, predicted_overhead, predicted_seconds
 from walkers.sweeps.making import check_audit, make_runs
 from walkers.sweeps.site import Site, check_path, pilots
 from walkers.sweeps.table import (

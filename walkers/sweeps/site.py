@@ -22,14 +22,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
-from walkers.inputs.changes import value_at
-from walkers.inputs.errors import InputError, Problem, refused
-from walkers.inputs.extras import require
-from walkers.inputs.library import expected_of
+from walkers.errors import InputError, Problem, expected_of, refused
+from walkers.extras import require
+from walkers.inputs.keys import value_at
 from walkers.inputs.messages import quoted, validated
-from walkers.inputs.reading import read_toml
-from walkers.inputs.text import printable
-from walkers.physics.units import Whole
+from walkers.inputs.toml import read_toml
+from walkers.inputs.units import Whole
+from walkers.text import printable
 
 if TYPE_CHECKING:
     from parsl.config import Config

@@ -8,22 +8,22 @@ from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from walkers.errors import refused, unusable
 from walkers.inputs.axes import Range, ranges_of, sampled, unit_cube, unit_of, written
 from walkers.inputs.case import Case
-from walkers.inputs.errors import refused, unusable
 from walkers.inputs.library import unmeasured
 from walkers.inputs.messages import blaming
 from walkers.inputs.origins import Origin
-from walkers.inputs.readable import kind_of
-from walkers.inputs.rounding import SHOWN_UNITS, rounded
 from walkers.inputs.sweep import Sweep, settings_in
-from walkers.physics.units import parse_quantity
+from walkers.inputs.units import parse_quantity
 from walkers.postprocess.analysis import analyses, analyses_of
 from walkers.postprocess.sides import REST, SEPARATED
 from walkers.postprocess.uncertainty import BANDS_ON_SLOPES, LEAST_PER_VALUE, SPREAD_NAME, spread_of
+from walkers.rounding import SHOWN_UNITS, rounded
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.runner.files import write_json
+from walkers.sweeps.readable import kind_of
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
 from walkers.sweeps.table import load, main_columns
 
@@ -110,8 +110,6 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
     """
     import numpy as np
 
-    if not case.as_read:
-        raise refused(case.name, "was changed after it was read; expected a case from load_case(name, changes)")
     varied = [one for one in case.origins if one.range is not None]
     if not varied:
         message = "no value is uncertain: give ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"

@@ -22,19 +22,18 @@ from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from walkers.errors import InputError, Problem, WalkersError, refused, suggestion
 from walkers.inputs.axes import is_axis, plain
 from walkers.inputs.case import Case
-from walkers.inputs.changes import flatten
-from walkers.inputs.errors import InputError, Problem, WalkersError, refused
-from walkers.inputs.library import suggestion
-from walkers.inputs.readable import short_keys
-from walkers.inputs.rounding import DIGITS, SHOWN_UNITS, rounded
+from walkers.inputs.keys import flatten
 from walkers.postprocess.analysis import RESULT_NAME, Described, analyses, analyses_in, analyses_of, current_result
 from walkers.postprocess.sides import differ
+from walkers.rounding import DIGITS, SHOWN_UNITS, rounded
 from walkers.runner.binary import Engine
 from walkers.runner.directory import FAILURE_NAME, finished_run, is_locked, run_place, unfinished
 from walkers.runner.files import json_bytes, read_json, write_bytes, write_json
 from walkers.runner.manifest import check_unchanged
+from walkers.sweeps.readable import short_keys
 
 if TYPE_CHECKING:
     import pandas as pd

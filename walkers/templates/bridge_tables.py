@@ -17,7 +17,7 @@ from math import inf, log2
 import numpy as np
 
 from walkers.physics.bridge import BridgeLaw, Curve, FloatArray, Forces, Surfaces, UnusableLawError, columns_at
-from walkers.physics.laws import law_of
+from walkers.physics.laws import by_name
 from walkers.templates.scene import Surface
 
 TOLERANCE = 1e-6
@@ -136,7 +136,7 @@ def bridge_tables(
                         numbers = " ".join(map(repr, (meeting.volume, *chain(*meeting.films))))
                         parts.append(f"liquid {numbers}\n")
                     tolerance = _COARSE if liquid.conserved else TOLERANCE
-                    parts.append(tabulated(law or law_of(liquid), meeting, tolerance).text())
+                    parts.append(tabulated(law or by_name(liquid.law), meeting, tolerance).text())
     return "".join(parts)
 
 

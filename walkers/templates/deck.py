@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from functools import partial
 from math import ceil, inf, pi, prod, sqrt
 
-from walkers.inputs.case import Case
+from walkers.errors import InputError, Problem
+from walkers.inputs.case import Case, Contact
 from walkers.inputs.drive import Vector
-from walkers.inputs.errors import InputError, Problem
 from walkers.inputs.loads import bridge_at_rest, hop_height, reach
-from walkers.inputs.run_tables import limits_of
-from walkers.inputs.text import rendered
-from walkers.physics.matter import Contact
+from walkers.inputs.run import Run, limits_of
 from walkers.templates.layout import (
     BEAD_COLUMNS,
     FILM_COLUMN,
@@ -39,6 +37,7 @@ from walkers.templates.parameters import (
     suffixes,
 )
 from walkers.templates.scene import Scene, Surface, place, surface_of
+from walkers.text import rendered
 
 DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"
@@ -69,6 +68,10 @@ _MOST_BINS = 3e7
 Sorting 60 beads into 1.5e9 bins made a run 50 times slower; above 2^31 the engine refuses.
 """
 _LEAST_NEIGHBOURS = 100
+_SILENCE = 600.0  # s; piles of 200 beads write some thirty lines a second, those of 20,000 one in four seconds
+_SLOWEST_STEP = 4e-5  # s a bead: thirty times what it takes with two beads alone, a hundred times that in a pile
+_LOG_BYTES = 64e6  # walkers write some 50 kB, a segment of a pile as much …
+_LOG_BYTES_PER_CYCLE = 1e4  # … and a cycle some 500 bytes
 _SKIN = 2e-4
 """m; for piles. From 0.1 to 0.3 mm, the time per step changes by a few per cent."""
 
@@ -251,13 +254,13 @@ def compose(plan: Plan) -> Deck:
         in_cycles=partial(in_cycles, steps_per_cycle=case.run.steps_per_cycle),
         run_name=RUN_NAME,
         types=len(surfaces) + 1,
-        ends_of_harmonics=suffixes(len(case.drive.harmonics)),
+        ends_of_harmonics=suffixes(len(case.excitation.harmonics)),
         moduli=" ".join(["${youngs_modulus}"] * len(moduli) if "youngs_modulus" in named else map(number, moduli)),
         stiff=max(moduli) > _STIFFEST,
-        friction=_coefficients(contacts, named, "friction_bead_bead", "friction_bead_wall"),
+        friction=_coefficients(contacts, named, "friction.bead_bead", "friction.bead_wall"),
         rolling_friction=_coefficients(contacts, named, "rolling_friction"),
         restitution=_coefficients(contacts, named, "restitution"),
-        down=[component / case.gravity for component in case.gravity_vector] if case.gravity else [],
+        down=[component / case.environment.gravity for component in case.gravity_vector] if case.environment.gravity else [],
         plan=plan,
         shaken=plan.drive_from is not None,
         several=several,
@@ -276,7 +279,7 @@ def compose(plan: Plan) -> Deck:
     files[BRIDGES_NAME] = tables_of(case, surfaces, {(bead.surface, bead.radius) for bead in scene.beads})
     fastest = plan.fastest or fastest_of(case, scene)
     beyond = bool(limits_of(case).exceeded_by(case.run.time_step))
-    bounds = (case.run.longest_silence(len(scene.beads)), case.run.most_log)
+    bounds = (longest_silence(case.run, len(scene.beads)), max(_LOG_BYTES, case.run.cycles * _LOG_BYTES_PER_CYCLE))
     return Deck(text, files, layout, (scene.lower, scene.upper), fastest, *bounds, beyond)
 
 
@@ -303,14 +306,14 @@ def _parameters(plan: Plan, surfaces: Sequence[Surface]) -> tuple[list[Parameter
     """The named parameters of a deck, and the values that follow from them."""
     case, recording, begin = plan.case, plan.recording, plan.drive_from
     several = len(plan.scene.loadings) > 1
-    drive, of_it = of_drive(case.drive, amplitudes=begin is not None and not several)
+    drive, of_it = of_drive(case.excitation, amplitudes=begin is not None and not several)
     stable = min(limits_of(case).as_dict().values())
     time, of_that = of_time(case, None if recording.begin else begin, recording.steps, stable)
     given = [*drive, *time]
-    if case.gravity > 0.0 and not several:
-        given.append(Parameter("gravity", number(case.gravity), "m/s^2"))
+    if case.environment.gravity > 0.0 and not several:
+        given.append(Parameter("gravity", number(case.environment.gravity), "m/s^2"))
     if not plan.restart_from:
-        given.append(Parameter("density", number(case.density), "kg/m^3", "of the beads"))
+        given.append(Parameter("density", number(case.beads.density), "kg/m^3", "of the beads"))
     given += of_contacts(case, [contact for contact, _ in surfaces])
     if len(surfaces) == 1:
         given += of_liquid(surfaces[0], min(bead.radius for bead in plan.scene.beads))
@@ -330,7 +333,14 @@ def _coefficients(contacts: Sequence[Contact], named: Collection[str], of_beads:
     Beads of different surfaces never meet.
     """
     wall, names = len(contacts), (of_beads, of_walls or of_beads)
-    values = [[f"${{{name}}}" if name in named else number(getattr(one, name)) for name in names] for one in contacts]
+    parameters = [name.replace(".", "_") for name in names]
+    values = [
+        [
+            f"${{{one}}}" if one in named else number(of.value_of(name))
+            for one, name in zip(parameters, names, strict=True)
+        ]
+        for of in contacts
+    ]
     return [
         values[min(one, other, wall - 1)][int(max(one, other) == wall)]
         for one in range(wall + 1)
@@ -341,12 +351,18 @@ def _coefficients(contacts: Sequence[Contact], named: Collection[str], of_beads:
 def fastest_of(case: Case, scene: Scene) -> float:
     """Ten times the boundary's peak velocity (20 in a pile), plus the speeds of the deepest fall and a bridge, m/s."""
     sizes = sorted(bead.radius for bead in scene.beads)
-    mass = 4.0 / 3.0 * pi * sizes[0] ** 3 * case.density
+    mass = 4.0 / 3.0 * pi * sizes[0] ** 3 * case.beads.density
     bridge = bridge_at_rest(case, sizes[-1], inf)
     work = abs(bridge.pull) * bridge.rupture  # among loose beads, a bridge may push
     deep = hop_height(case) if case.boundary.tilt == 0.0 else reach(case)
-    fall = sqrt(2.0 * case.gravity * (max(scene.upper[2], deep) if case.loose else deep))
-    return (20.0 if case.loose else 10.0) * case.drive.peak_velocity + fall + sqrt(2.0 * work / mass)
+    fall = sqrt(2.0 * case.environment.gravity * (max(scene.upper[2], deep) if case.loose else deep))
+    return (20.0 if case.loose else 10.0) * case.excitation.peak_velocity + fall + sqrt(2.0 * work / mass)
+
+
+def longest_silence(run: Run, beads: int) -> float:
+    """Longest time, s, for which an engine with a number of beads may write nothing to log and dump."""
+    # It writes once a sample, and several times a cycle.
+    return max(_SILENCE, min(run.steps_per_sample, run.steps_per_cycle) * beads * _SLOWEST_STEP)
 
 
 def _layout(plan: Plan) -> Layout:

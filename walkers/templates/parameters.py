@@ -11,11 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import ceil, inf
 
-from walkers.inputs.case import Case
-from walkers.inputs.drive import Drive, Vector
+from walkers.inputs.case import Case, Contact
+from walkers.inputs.drive import Excitation, Vector
 from walkers.inputs.numerical import INFLUENCE, STIFFER, numerical_error
-from walkers.physics.laws import LAWS, law_of
-from walkers.physics.matter import Contact
+from walkers.physics.laws import LAWS, by_name
 from walkers.templates.scene import Surface
 
 STATUS_LINES_PER_CYCLE = 4
@@ -66,7 +65,7 @@ def along(name: str, direction: Vector) -> str:
     return " ".join(parts.get(part, f"$(v_{name}*({number(part)}))") for part in direction)
 
 
-def of_drive(drive: Drive, *, amplitudes: bool) -> tuple[list[Parameter], list[Parameter]]:
+def of_drive(drive: Excitation, *, amplitudes: bool) -> tuple[list[Parameter], list[Parameter]]:
     """Given and derived parameters of a drive; without ``amplitudes`` only its times."""
     given, derived = [], []
     for end, one in zip(suffixes(len(drive.harmonics)), drive.harmonics, strict=True):
@@ -99,10 +98,10 @@ def of_time(case: Case, drive_from: int | None, steps: int, stable: float) -> tu
         Time step below which the integration is stable, s.
     """
     run = case.run
-    frequency = "frequency" if len(case.drive.harmonics) == 1 else "cycle_frequency"
+    frequency = "frequency" if len(case.excitation.harmonics) == 1 else "cycle_frequency"
     words = f"a multiple of {run.samples_per_cycle} for which the time step is below {stable:.3g} s"
     given = [Parameter("steps_per_cycle", str(run.steps_per_cycle), note=words)]
-    exact = 1.0 / (case.drive.frequency * run.steps_per_cycle) == run.time_step
+    exact = 1.0 / (case.excitation.frequency * run.steps_per_cycle) == run.time_step
     formula = f"$(1.0/(v_{frequency}*v_steps_per_cycle))"
     derived = [Parameter("time_step", formula if exact else number(run.time_step), "s")]
     if drive_from:
@@ -125,9 +124,9 @@ def of_contacts(case: Case, contacts: Sequence[Contact]) -> list[Parameter]:
     found = found if {one.youngs_modulus for one in (*contacts, case.contact)} == {first.youngs_modulus} else []
     found.append(Parameter("poissons_ratio", number(case.contact.poissons_ratio)))
     if len(contacts) == 1:
-        names = ["restitution", "friction_bead_bead", "friction_bead_wall"]
+        names = ["restitution", "friction.bead_bead", "friction.bead_wall"]
         names += ["rolling_friction"] if case.contact.rolling_friction > 0.0 else []
-        found += [Parameter(name, number(getattr(first, name))) for name in names]
+        found += [Parameter(name.replace(".", "_"), number(first.value_of(name))) for name in names]
     return found
 
 
@@ -141,18 +140,16 @@ def of_liquid(surface: Surface, radius: float) -> list[Parameter]:
     from walkers.physics.bridge import Surfaces
 
     contact, liquid = surface
-    if liquid.law not in LAWS or not (liquid.surface_tension > 0.0 and liquid.dynamic_viscosity > 0.0):
+    if liquid.law not in LAWS or not (liquid.surface_tension > 0.0 and liquid.viscosity > 0.0):
         return []
-    doubled = replace(
-        liquid, surface_tension=2.0 * liquid.surface_tension, dynamic_viscosity=2.0 * liquid.dynamic_viscosity
-    )
+    doubled = replace(liquid, surface_tension=2.0 * liquid.surface_tension, viscosity=2.0 * liquid.viscosity)
     once, twice = (
-        law_of(one)(Surfaces.of(radius, inf, one, contact.minimum_separation_ratio)) for one in (liquid, doubled)
+        by_name(one.law)(Surfaces.of(radius, inf, one, contact.minimum_separation_ratio)) for one in (liquid, doubled)
     )
     gaps = once.rupture * np.array([0.0, 0.01, 0.3, 0.9])
     if not np.allclose(twice.forces(gaps).columns(), 2.0 * once.forces(gaps).columns(), rtol=1e-9, atol=0.0):
         return []
     return [
         Parameter("surface_tension", number(liquid.surface_tension), "N/m"),
-        Parameter("viscosity", number(liquid.dynamic_viscosity), "Pa s", "of the bridges"),
+        Parameter("viscosity", number(liquid.viscosity), "Pa s", "of the bridges"),
     ]

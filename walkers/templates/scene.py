@@ -9,17 +9,18 @@ all.
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 from walkers.inputs.boundary import Wall
-from walkers.inputs.case import Case
+from walkers.inputs.case import Case, Contact
 from walkers.inputs.drive import Vector
 from walkers.inputs.loads import hop_height, reach
-from walkers.physics.matter import Contact, Liquid
+from walkers.inputs.standing import standing
+from walkers.physics.liquid import BridgeLiquid
 from walkers.templates.layout import PlacedWalker
 
-Surface = tuple[Contact, Liquid]
+Surface = tuple[Contact, BridgeLiquid]
 """Contact parameters of beads: an atom type of a deck."""
 
 
@@ -62,12 +63,12 @@ class Scene:
 
 def surface_of(case: Case) -> Surface:
     """Contact parameters of the beads of a case."""
-    return case.contact, replace(case.liquid, name=None, density=None)
+    return case.contact, case.liquid.of_bridges
 
 
 def loading_of(case: Case) -> Loading:
     """Loads on the beads of a case."""
-    amplitudes = [(one.peak_acceleration, one.direction) for one in case.drive.harmonics]
+    amplitudes = [(one.peak_acceleration, one.direction) for one in case.excitation.harmonics]
     inertia = tuple((a * x, a * y, a * z) for a, (x, y, z) in amplitudes)
     return Loading(case.gravity_vector, inertia)
 
@@ -82,18 +83,14 @@ def sharing_key(case: Case) -> Hashable:
         return case
     # Walkers with a spacing below their own reach would meet other neighbours in a shared deck.
     crowded = case if min(one.spacing for one in case.walkers) < 2.0 * reach(case) else None
-    contact = replace(
-        case.contact,
-        friction_bead_bead=0.0,
-        friction_bead_wall=0.0,
-        restitution=0.0,
-        # The model of rolling friction is in the deck or not.
-        rolling_friction=float(case.contact.rolling_friction > 0.0),
-    )
-    boundary = replace(case.boundary, material="", tilt=0.0, uphill=0.0)
-    times: Hashable = tuple((one.frequency, one.phase) for one in case.drive.harmonics)
-    driven = (case.drive, loading_of(case)) if case.drive.frame == "lab" else times
-    return (boundary, contact, driven, case.run, case.density, crowded)
+    # The model of rolling friction is in the deck or not.
+    rolling = float(case.contact.rolling_friction > 0.0)
+    contact = case.contact.but(friction=None, restitution=0.0, rolling_friction=rolling)
+    boundary = case.boundary.but(material="", tilt=0.0, uphill=0.0)
+    times: Hashable = tuple((one.frequency, one.phase) for one in case.excitation.harmonics)
+    driven = (case.excitation, loading_of(case)) if case.drive.frame == "lab" else times
+    run = tuple(case.run.but(seed=0).determinants().items())
+    return (boundary, contact, driven, run, case.beads.density, crowded)
 
 
 @lru_cache(maxsize=4)  # the segments of a run begin with the same scene
@@ -112,14 +109,14 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
         raise ValueError("these cases cannot share a deck")
     surfaces = tuple(dict.fromkeys(surface_of(case) for case in cases))
     loadings = tuple(dict.fromkeys(loading_of(case) for case in cases))
-    standing = [(case, make, one) for case in cases for make, one in case.standing()]
-    walking = sum(one.walks for _, _, one in standing)
+    bodies = [(case, make, one) for case in cases for make, one in standing(case)]
+    walking = sum(one.walks for _, _, one in bodies)
     spacing = max((walkers.spacing for case in cases for walkers in case.walkers), default=0.0)
     boundary = cases[0].boundary
     grid = boundary.grid(walking, spacing) if walking else []
     walkers: list[PlacedWalker] = []
     beads: list[Bead] = []
-    for case, make, one in standing:
+    for case, make, one in bodies:
         x, y = origin = grid[len(walkers)] if one.walks else (0.0, 0.0)
         surface, loading = 1 + surfaces.index(surface_of(case)), loadings.index(loading_of(case))
         ids = tuple(range(1 + len(beads), 1 + len(beads) + len(one.beads)))
@@ -135,13 +132,13 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
 def _room(cases: Sequence[Case], grid: Sequence[tuple[float, float]], spacing: float) -> tuple[Vector, Vector]:
     far = max(spacing / 2.0, *(reach(case) for case in cases))
     largest = max(max(case.radii) for case in cases)
-    amplitude = max(case.drive.amplitude for case in cases)
-    placed = [bead for case in cases if case.placed is not None for bead in case.placed.beads]
+    amplitude = max(case.excitation.amplitude for case in cases)
+    placed = [bead.at for case in cases for bead in case.placed]
     return cases[0].boundary.room(
-        half_x=max([x for x, _ in grid] + [abs(x) for x, *_ in placed], default=0.0) + far,
-        half_y=max([y for _, y in grid] + [abs(y) for _, y, *_ in placed], default=0.0) + far,
+        half_x=max([x for x, _ in grid] + [abs(x) for x, _, _ in placed], default=0.0) + far,
+        half_y=max([y for _, y in grid] + [abs(y) for _, y, _ in placed], default=0.0) + far,
         height=10.0 * largest
-        + max([z for _, _, z, _ in placed], default=0.0)
+        + max([z for _, _, z in placed], default=0.0)
         + max(hop_height(case) for case in cases)
         + 2.0 * amplitude,
         margin=4.0 * largest + 2.0 * amplitude,

@@ -173,7 +173,7 @@ def turning_rate(case: Case) -> float | None:
     by μ F R/|ω|, with the engine's model of constant torque; it is left out of the axial motion.
     """
     dimer, walker, friction = dimer_of(case), Walker.of_case(case), Friction.of_cases(case)
-    frequency, peak, steady = case.drive.frequency, case.drive.peak_acceleration, case.axial_gravity
+    frequency, peak, steady = case.excitation.frequency, case.excitation.peak_acceleration, case.axial_gravity
     motion = walk(walker, friction, frequency, peak, steady_acceleration=steady, steps_per_cycle=_STEPS)
     if not (motion.periodic[0] and motion.solved[0]):
         return None

@@ -21,8 +21,8 @@ from math import inf
 import numpy as np
 import numpy.typing as npt
 
+from walkers.extras import require
 from walkers.inputs.case import Case
-from walkers.inputs.extras import require
 from walkers.inputs.loads import contact_loads, dimer_of, resistances_at_rest
 from walkers.physics.dimer import Dimer
 from walkers.theory.quasistatic import (
@@ -61,7 +61,7 @@ class Friction:
     def of_cases(cls, *cases: Case) -> Friction:
         """Coulomb's law with each case's coefficients."""
         found = [case.contact for case in cases]
-        return cls.coulomb([one.friction_bead_wall for one in found], [one.friction_bead_bead for one in found])
+        return cls.coulomb([one.friction.bead_wall for one in found], [one.friction.bead_bead for one in found])
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
-from walkers.inputs.rounding import with_decimals
+from walkers.rounding import with_decimals
 from walkers.theory.mathieu import Alignment, alignment, largest_stable_v, time_to_turn, turning_rate
 from walkers.theory.motion import Friction, Motion, Walker, walk
 from walkers.theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, FloatArray, detachment, mean_velocity
@@ -39,8 +39,8 @@ def motion_of(*cases: Case, viscous: bool = True) -> Motion:
     return walk(
         Walker.joined([Walker.of_case(case, viscous=viscous) for case in cases]),
         Friction.of_cases(*cases),
-        [case.drive.frequency for case in cases],
-        [case.drive.peak_acceleration for case in cases],
+        [case.excitation.frequency for case in cases],
+        [case.excitation.peak_acceleration for case in cases],
         steady_acceleration=[case.axial_gravity for case in cases],
     )
 
@@ -52,7 +52,7 @@ def check_applies(*cases: Case) -> None:
             raise ValueError("bodies: expected dimers; the theory is for dimers only")
         if not case.boundary.bare:
             raise ValueError("boundary.shape: the theory is for planes")
-        if not case.drive.is_plain or case.drive.direction[2] != 0.0:
+        if not case.excitation.is_plain or case.excitation.direction[2] != 0.0:
             raise ValueError("drive: the theory is for a single harmonic along the plane, without a phase")
         if hypot(*case.gravity_vector[:2]) > abs(case.axial_gravity) + 1e-9:
             raise ValueError("boundary.uphill: the theory is for planes tilted along the drive")
@@ -73,7 +73,7 @@ def threshold(case: Case, *, viscous: bool = True) -> float:
         trials = np.linspace(low, high, _TRIALS)
         accelerations = np.array([dimer.peak_acceleration(float(gamma)) for gamma in trials])
         pull = case.axial_gravity
-        motion = walk(walker, friction, case.drive.frequency, accelerations, steady_acceleration=pull)
+        motion = walk(walker, friction, case.excitation.frequency, accelerations, steady_acceleration=pull)
         moves = np.abs(motion.velocity) > MOVING
         if not moves.any():
             return float("nan")
@@ -88,7 +88,7 @@ def predict(case: Case) -> dict[str, Any]:
     Errors as for `check_applies`.
     """
     dimer = dimer_of(case)
-    gamma0 = dimer.gamma0(case.drive.peak_acceleration)
+    gamma0 = dimer.gamma0(case.excitation.peak_acceleration)
     end = detachment(dimer.sin_delta)
     linear, reason = nan, why_not_the_paper(case)
     if reason is None:
@@ -111,7 +111,7 @@ def predict(case: Case) -> dict[str, Any]:
 
 def why_not_the_paper(case: Case) -> str | None:
     """Reason why the fit of the paper does not apply to a case; None if it applies."""
-    same = case.material == _BEADS and case.boundary.material in _BOUNDARIES and case.liquid.name in _LIQUIDS
+    same = case.beads.material == _BEADS and case.boundary.material in _BOUNDARIES and case.liquid.name in _LIQUIDS
     if same and case.axial_gravity == 0.0:
         return None
     return f"the fit is to {_BEADS} on level {' or '.join(_BOUNDARIES)} in {' or '.join(_LIQUIDS)}"
@@ -146,7 +146,7 @@ def _number(value: float) -> float | None:
 def pendulum_of(case: Case) -> Alignment:
     """The Mathieu equation of a case's dimer, damped by its bridges."""
     rolling = float(Walker.of_case(case).resistances[2, :2].sum())
-    drive = (case.drive.frequency, case.drive.peak_acceleration)
+    drive = (case.excitation.frequency, case.excitation.peak_acceleration)
     return alignment(dimer_of(case), *drive, -case.axial_gravity, rolling)
 
 
@@ -284,7 +284,7 @@ def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, Floa
         if why := why_not_the_paper(case):
             reasons[f"{PAPER}: {why}"] += 1
         else:
-            paper[place] = mean_velocity(dimer.gamma0(case.drive.peak_acceleration), dimer.sin_delta)
+            paper[place] = mean_velocity(dimer.gamma0(case.excitation.peak_acceleration), dimer.sin_delta)
     found = {MODEL: model, PAPER: paper}
     return {name: one for name, one in found.items() if np.isfinite(one).any()}, dict(reasons)
 

@@ -17,8 +17,6 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING
 
-from walkers.physics.matter import Liquid
-
 if TYPE_CHECKING:  # numpy is not needed to find a law by name
     from walkers.physics.bridge import BridgeLaw
 
@@ -75,11 +73,6 @@ def source_sha256(name: str) -> str | None:
         return hashlib.sha256(file.read_bytes()).hexdigest()
     except OSError as error:
         raise ValueError(f"bridge law {name!r}: {file} cannot be read: {error.strerror}") from error
-
-
-def law_of(liquid: Liquid) -> BridgeLaw:
-    """The law of a liquid's bridges (`by_name`)."""
-    return by_name(liquid.law)
 
 
 @lru_cache(maxsize=64)

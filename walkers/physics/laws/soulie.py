@@ -54,7 +54,7 @@ def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, 
 def law(surfaces: Surfaces) -> Curve:
     """Pull and resistances of decks for the stock engine."""
     liquid, reduced, shape = surfaces.liquid, surfaces.reduced_radius, (surfaces.radius, surfaces.other_radius)
-    stokes = 6.0 * pi * liquid.dynamic_viscosity * reduced
+    stokes = 6.0 * pi * liquid.viscosity * reduced
 
     def forces(gaps: FloatArray) -> Forces:
         near, none = np.maximum(surfaces.minimum_separation_ratio, gaps / reduced), np.zeros_like(gaps)

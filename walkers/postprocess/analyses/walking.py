@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
-from walkers.inputs.caption import radii_text
-from walkers.inputs.case import CONSTANT, Case
+from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.numerical import STIFFER, numerical_error
-from walkers.inputs.rounding import percent, with_decimals
+from walkers.inputs.run import CONSTANT
 from walkers.postprocess.analysis import Analysis, Described, Measured, Quantity
+from walkers.postprocess.caption import radii_text
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.gait import (
     POSTURES,
@@ -63,6 +63,7 @@ from walkers.postprocess.uncertainty import (
     not_known,
     wrapped,
 )
+from walkers.rounding import percent, with_decimals
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -209,7 +210,7 @@ class Walking(Analysis):
             return known
         dimer = dimer_of(case)
         known |= {"sin_delta": dimer.sin_delta, "mass_asymmetry": dimer.mass_asymmetry}
-        return {"gamma0": dimer.gamma0(case.drive.peak_acceleration), **known}
+        return {"gamma0": dimer.gamma0(case.excitation.peak_acceleration), **known}
 
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
         """Quantities of all walkers: velocities, contacts, makes, postures; sweeps have the contacts of dimers."""
@@ -356,7 +357,7 @@ def _trajectory(group: Group, motion: Gait) -> Trajectory:
     return Trajectory(
         np.repeat([walker.walker for walker in group.walkers], len(group.time)),
         time,
-        time * group.case.drive.frequency,
+        time * group.case.excitation.frequency,
         *along(group.mass_centre).T,
         *map(along, (group.orientation, motion.velocity, motion.rotation, motion.sliding, motion.gap)),
     )
@@ -460,7 +461,7 @@ def _summary(walkers: Columns, case: Case) -> dict[str, Any]:
 
 def _depends_on_start(walkers: Columns, facing: IntArray, case: Case) -> bool:
     """Whether steady walkers of one make differ; both directions are one if boundary and drive are symmetric."""
-    drive = case.drive.harmonics
+    drive = case.excitation.harmonics
     symmetric = not case.boundary.tilt and len(drive) == 1 and abs(drive[0].direction[2]) in (0.0, 1.0)
     kept = walkers["steady"] & np.isnan(walkers["turned_at"]) & (walkers["separated_fraction"] < SEPARATED)
     kind = 2 * walkers["make"] + (0 if symmetric else facing > 0)

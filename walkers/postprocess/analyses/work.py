@@ -21,7 +21,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from walkers.inputs.case import Case
-from walkers.physics.units import ACCELERATION_OF_ONE_G
+from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.analyses.walking import spread
 from walkers.postprocess.analysis import Analysis, Quantity
 from walkers.postprocess.dump import FloatArray, IntArray
@@ -82,14 +82,14 @@ class Working(Analysis):
 
 def _mass(group: Group) -> float:
     """Mass of a walker, kg."""
-    return float(4.0 / 3.0 * pi * np.sum(group.radii**3) * group.case.density)
+    return float(4.0 / 3.0 * pi * np.sum(group.radii**3) * group.case.beads.density)
 
 
 def _lifted(group: Group) -> FloatArray:
     """Work to lift each walker by its path in a cycle, J, shape (W,); NaN for walkers that hardly walk."""
     speed = np.abs(walk(group).velocity)
     speed[speed < STEADY_SPEED] = np.nan
-    return _mass(group) * ACCELERATION_OF_ONE_G * speed / group.case.drive.frequency
+    return _mass(group) * ACCELERATION_OF_ONE_G * speed / group.case.excitation.frequency
 
 
 def work_of(group: Group) -> FloatArray:
@@ -100,7 +100,7 @@ def work_of(group: Group) -> FloatArray:
     work = np.zeros(ways[0].shape[:2])
     for part, (one, next_one) in enumerate(pairwise(ways)):
         time = begin + (part + 0.5) / _PARTS * interval
-        for harmonic in group.case.drive.harmonics:
+        for harmonic in group.case.excitation.harmonics:
             phase = harmonic.angular_frequency * time + harmonic.phase
             pull = harmonic.peak_acceleration * np.sin(phase)
             work += pull[:, None] * ((next_one - one) @ np.array(harmonic.direction))

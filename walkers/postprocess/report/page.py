@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkers.inputs.errors import refused
-from walkers.inputs.text import environment
+from walkers.errors import refused
 from walkers.postprocess.drawing import check_place
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.figures import Panel
 from walkers.runner.files import write_text
 from walkers.runner.provenance import PROJECT, software
+from walkers.text import environment
 
 if TYPE_CHECKING:
     from bokeh.models import Model

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkers.inputs.extras import require
+from walkers.extras import require
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, gathered, read_motion
 from walkers.postprocess.scene import (
@@ -90,7 +90,7 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
         back[:, :3, 3] = np.round(-path / _GRID) * _GRID
         for part in boundary:
             part.model_matrix = _series(shown, back)
-    if motion.case.boundary.tilted and motion.case.gravity:
+    if motion.case.boundary.tilted and motion.case.environment.gravity:
         boundary.append(_gravity(scene))
         captions.append(f"{motion.case.boundary.tilted.capitalize()}; the arrow shows the direction of gravity.")
     for part in [*boundary, *beads]:

@@ -6,10 +6,9 @@ import base64
 from pathlib import Path
 from typing import Any
 
-from walkers.inputs.caption import caption
+from walkers.extras import require
 from walkers.inputs.case import Case
-from walkers.inputs.changes import dotted
-from walkers.inputs.extras import require
+from walkers.inputs.keys import dotted
 from walkers.inputs.origins import Origin, text_of
 from walkers.postprocess.analysis import (
     Measured,
@@ -20,6 +19,7 @@ from walkers.postprocess.analysis import (
     uncertainty_of,
     warnings_of,
 )
+from walkers.postprocess.caption import caption
 from walkers.postprocess.report.page import NAME, check_report, drawn, fill, packed_plots, write_page
 from walkers.postprocess.report.player import MOST_PLACES, player_of
 from walkers.postprocess.uncertainty import rests_on, with_bands

@@ -7,12 +7,13 @@ from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 
-from walkers.inputs.errors import refused
-from walkers.inputs.library import HALF, Known, Library, read_library, suggestion, unmeasured
-from walkers.inputs.reading import read_toml, shipped
+from walkers.errors import refused, suggestion
+from walkers.inputs.library import HALF, Known, Library, read_library, unmeasured
+from walkers.inputs.reading import shipped
+from walkers.inputs.toml import read_toml
+from walkers.inputs.units import TEMPERATURE, quantity_text
 from walkers.physics.laws import LAWS
 from walkers.physics.mixtures import MIXTURES
-from walkers.physics.units import TEMPERATURE, quantity_text
 
 _COLUMNS: Mapping[str, tuple[str, ...]] = {
     "materials": ("density", "youngs_modulus", "poissons_ratio"),

@@ -8,10 +8,13 @@ from functools import cache
 from math import isclose, pi
 from typing import Any
 
-from walkers.inputs.case import BOUNDS
-from walkers.inputs.changes import dotted
-from walkers.physics import units
-from walkers.physics.units import Kind
+from pydantic_core import to_jsonable_python
+
+from walkers.inputs import units
+from walkers.inputs.case import Case
+from walkers.inputs.messages import keys_of
+from walkers.inputs.table import keys_in
+from walkers.inputs.units import Kind
 
 READABLE_UNITS: Mapping[str, tuple[str, float]] = {
     "m": ("mm", 1e-3),
@@ -25,29 +28,20 @@ READABLE_UNITS: Mapping[str, tuple[str, float]] = {
     "J": ("nJ", 1e-9),
 }
 """For SI units the unit in which the field states such quantities, and what it is in the SI unit."""
-_NOT_COMPARED = ("name", "title", "document", "origins", *(f"run.{bound}" for bound in BOUNDS))
-"""What does not determine a run, or only says when it is ended."""
 
 
 class FlatCase(dict[str, Any]):
-    """The values of a case by dotted key, SI units; ``given`` has the keys that the case itself says, if it was read.
+    """The values of a case by dotted key, SI units; ``given`` has the keys that the case itself says."""
 
-    The values of a case that was changed after it was read have the keys of `walkers.inputs.case.Case`.
-    """
-
-    given: frozenset[str] | None = None
+    given: frozenset[str] = frozenset()
 
 
-def flattened(case: Mapping[str, Any]) -> FlatCase:
-    """The values of a case, as `walkers.inputs.case.Case.as_dict` or a run directory's ``case.json`` has it."""
-    recorded = [one for one in case.get("origins", ()) if one["value"] is not None and one["key"] not in _NOT_COMPARED]
-    if not recorded:
-        values = {key: value for key, value in case.items() if key not in _NOT_COMPARED}
-        return FlatCase((key, value) for key, value in dotted(values) if key not in _NOT_COMPARED)
-    flat = FlatCase((one["key"], one["value"]) for one in recorded)
-    if placed := case.get("placed"):  # which have no origins, because there may be hundreds
-        flat["placed"] = placed["beads"]
-    flat.given = frozenset(["placed", *(one["key"] for one in recorded if one["origin"] == "given")])
+def flattened(case: Case) -> FlatCase:
+    """The values of a case as plain JSON types, by the keys of a case file."""
+    flat = FlatCase((one.key, to_jsonable_python(one.value)) for one in case.origins if one.value is not None)
+    if case.placed:  # which have no origins, because there may be hundreds
+        flat["placed"] = [[*bead.at, bead.radius] for bead in case.placed]
+    flat.given = frozenset(["placed", *(one.key for one in case.origins if one.origin == "given")])
     return flat
 
 
@@ -77,11 +71,8 @@ def kind_of(key: str) -> Kind | None:
 @cache
 def _kinds() -> Mapping[str, Kind]:
     """What the numbers of a case are, by the last part of their keys; the others are pure numbers."""
-    from walkers.inputs.messages import keys_of
-    from walkers.inputs.schema import CaseFile, fields_of
-
-    tables = filter(None, keys_of(CaseFile).values())
-    fields = [(name, field) for table in tables for name, (_, field) in fields_of(table).items()]
+    tables = filter(None, keys_of(Case).values())
+    fields = [(name, field) for table in tables for name, field in keys_in(table).items()]
     kinds = {name: units.kind_in([*field.metadata, field.annotation]) for name, field in fields}
     return {name: kind for name, kind in kinds.items() if kind is not None}
 
@@ -94,7 +85,7 @@ def _number(value: Any, size: float) -> str:
     return f"{value / size:.6g}"
 
 
-def differing(cases: Sequence[Mapping[str, Any]]) -> list[str]:
+def differing(cases: Sequence[FlatCase]) -> list[str]:
     """The keys whose values differ among flattened cases, in the cases' order, without those that follow from others.
 
     What none of the cases gives itself (a time step that ``"auto"`` chose, the numbers of a liquid that the library
@@ -102,8 +93,7 @@ def differing(cases: Sequence[Mapping[str, Any]]) -> list[str]:
     """
     keys = dict.fromkeys(key for case in cases for key in case)
     varied = [key for key in keys if len({_comparable(case.get(key)) for case in cases}) > 1]
-    given = [case.given if isinstance(case, FlatCase) else None for case in cases]
-    return [key for key in varied if any(said is None or key in said for said in given)] or varied
+    return [key for key in varied if any(key in case.given for case in cases)] or varied
 
 
 def short_keys(keys: Sequence[str], others: Iterable[str] = ("name",)) -> list[str]:

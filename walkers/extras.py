@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from walkers.inputs.errors import InputError, Problem
+from walkers.errors import InputError, Problem
 
 EXTRAS = {
     "archive": ("an archive", ("rocrate", "tomli-w")),

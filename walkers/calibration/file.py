@@ -28,13 +28,13 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from walkers.inputs.changes import Value, flatten
-from walkers.inputs.errors import InputError, Problem
-from walkers.inputs.library import suggestion
+from walkers.errors import InputError, Problem, suggestion
+from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import validated
-from walkers.inputs.reading import find_input, read_toml
-from walkers.inputs.schema import Table
-from walkers.physics.units import ANGLE, SPEED, WRITTEN, Kind, Number, Whole, parse_quantity
+from walkers.inputs.reading import find_input
+from walkers.inputs.table import Table
+from walkers.inputs.toml import read_toml
+from walkers.inputs.units import ANGLE, SPEED, WRITTEN, Kind, Number, Whole, parse_quantity
 
 _MOST = 10_000
 Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_3"]

@@ -6,14 +6,15 @@ Radians are not pure numbers, so that "500 rad/s" is not read as 500 Hz.
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
-from math import inf, nan, pi
+from math import pi
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
-from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, ValidationInfo, WrapValidator
+from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema
 from pydantic_core.core_schema import with_info_before_validator_function
 
@@ -38,7 +39,6 @@ _USUAL: Mapping[str, tuple[str, float]] = {
     **{"N/m": ("N/m", 1.0), "mN/m": ("N/m", 1e-3)},
     **{"m^2/s": ("m^2/s", 1.0), "m²/s": ("m^2/s", 1.0), "mm^2/s": ("m^2/s", 1e-6), "mm²/s": ("m^2/s", 1e-6)},
     **{"Pa*s": ("Pa*s", 1.0), "mPa*s": ("Pa*s", 1e-3)},
-    **{"kB": ("byte", 1e3), "MB": ("byte", 1e6), "GB": ("byte", 1e9)},
     **{"Pa": ("Pa", 1.0), "kPa": ("Pa", 1e3), "MPa": ("Pa", 1e6), "GPa": ("Pa", 1e9)},
 }
 """Usual units in SI units, as in pint; cases with only these units do not import pint."""
@@ -70,6 +70,10 @@ class Kind:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return with_info_before_validator_function(self._read, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """A text with a unit, for editors that check case files."""
+        return {"type": "string", "description": self.expectation, "examples": [self.example]}
 
     def _read(self, value: object, info: ValidationInfo) -> object:
         if not isinstance(value, str):
@@ -137,10 +141,8 @@ def _by_pint(symbol: str, kind: Kind) -> float:
         root = str(units.Quantity(1.0, unit).to_root_units().units)
     except Exception as error:  # pint's parser raises a dozen types, the tokenizer's errors among them
         raise ValueError(kind.expectation) from error
-    # Pint treats radians and bits as pure numbers.
+    # Pint treats radians as pure numbers.
     if kind.unit == ANGLE.unit and str(unit) not in _ANGLE_UNITS:
-        raise ValueError(kind.expectation)
-    if kind.unit == FILE_SIZE.unit and root != "bit":
         raise ValueError(kind.expectation)
     if kind.unit == FREQUENCY.unit and "radian" in root:
         raise ValueError(kind.expectation + " (cycles per second, not an angular frequency)")
@@ -169,6 +171,15 @@ def kind_in(annotations: Iterable[Any]) -> Kind | None:
     return None
 
 
+def shown_in_file(value: Any) -> str:
+    """A value as a TOML file has it: text in quotes, tables in braces."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{name} = {shown_in_file(one)}" for name, one in value.items()) + " }"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(shown_in_file, value))}]"
+    return json.dumps(value, ensure_ascii=False)
+
+
 POSITIVE, NOT_NEGATIVE = "more than zero", "zero or more"
 WRITTEN = "written"
 """Context for the validation of user input, which refuses quantities without units."""
@@ -186,10 +197,10 @@ KINEMATIC_VISCOSITY = Kind("kinematic viscosity", "m^2/s", "5 mm^2/s", 10.0, sig
 DYNAMIC_VISCOSITY = Kind("dynamic viscosity", "Pa*s", "4.6 mPa*s", 1e4, sign=NOT_NEGATIVE)
 MODULUS = Kind("modulus", "Pa", "50 MPa", 1e13, 1e3, POSITIVE)
 TEMPERATURE = Kind("temperature", "K", "20 degC", 373.15, 273.15)
-FILE_SIZE = Kind("file size", "byte", "64 MB", 1e15, 1.0, POSITIVE)
 
 Length = Annotated[float, LENGTH]
 Radius = Annotated[float, replace(LENGTH, largest=0.02, smallest=1e-6)]
+Diameter = Annotated[float, replace(LENGTH, largest=0.04, smallest=2e-6)]
 SignedLength = Annotated[float, replace(LENGTH, sign="")]
 Frequency = Annotated[float, FREQUENCY]
 Acceleration = Annotated[float, ACCELERATION]
@@ -205,7 +216,6 @@ SurfaceTension = Annotated[float, SURFACE_TENSION]
 KinematicViscosity = Annotated[float, KINEMATIC_VISCOSITY]
 DynamicViscosity = Annotated[float, DYNAMIC_VISCOSITY]
 Temperature = Annotated[float, TEMPERATURE]
-FileSize = Annotated[float, FILE_SIZE]
 
 
 def _is_auto(value: object) -> bool:
@@ -213,11 +223,7 @@ def _is_auto(value: object) -> bool:
 
 
 AUTO = BeforeValidator(lambda value: None if _is_auto(value) else value)
-"""Reads "auto" as None …"""
-AUTO_FAR = WrapValidator(lambda value, read: inf if _is_auto(value) else read(value))
-"""… and as infinity."""
-ABSENT: Sequence[Any] = (None, "", [], (), inf, pi, nan)
-"""Defaults that represent missing values."""
+"""Reads "auto" as None."""
 Whole = Annotated[int, Field(strict=True)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 """TOML's integers and floats only: neither "0.3" nor true is a coefficient."""

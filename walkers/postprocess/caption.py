@@ -29,7 +29,7 @@ def conditions(case: Case) -> str:
 
     Pictures have the drive axis to the right: what faces right goes up where that is the steepest way up.
     """
-    parts = [case.drive.described()]
+    parts = [case.excitation.described()]
     if case.boundary.tilted:
         up = "right is up" if case.goes_uphill else f"up is at {degrees(case.boundary.uphill):.4g}° from x toward y"
         parts += [case.boundary.tilted, up]

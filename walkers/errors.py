@@ -6,6 +6,7 @@ an engine runs derives from `WalkersError` too and is listed in `walkers.runner.
 
 from __future__ import annotations
 
+import difflib
 import json
 import os
 from collections.abc import Callable, Iterable, Sequence
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from walkers.inputs.text import printable
+from walkers.text import printable
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -107,3 +108,17 @@ def check_utf8(word: str | Path) -> None:
     except UnicodeEncodeError as error:
         odd = os.fsencode(str(word)).decode("utf-8", "backslashreplace")
         raise refused(odd, "expected UTF-8 text") from error
+
+
+def expected_of(word: str, names: Iterable[str]) -> str:
+    """``expected one of …``, with a suggestion if a name is similar."""
+    names = list(names)
+    return f"expected one of {', '.join(names)}{suggestion(word, names)}"
+
+
+def suggestion(word: str, names: Iterable[str]) -> str:
+    """``; did you mean "…"?`` if a name is similar, otherwise empty."""
+    names = list(names)
+    begun = [name for name in names if len(word) > 2 and name.startswith(word)]
+    close = begun or difflib.get_close_matches(word, names, n=1, cutoff=0.6)
+    return f'; did you mean "{close[0]}"?' if close else ""

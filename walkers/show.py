@@ -7,21 +7,22 @@ The cost is predicted from measurements of CPU time on one core of a 2020s x86 s
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import asdict
 from math import ceil, inf, isfinite, pi
 from typing import Any
 
 from walkers.inputs.bodies import Walkers
-from walkers.inputs.case import CONSTANT, Case
+from walkers.inputs.case import Case
 from walkers.inputs.library import Known, library_of
 from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.numerical import numerical_error
-from walkers.inputs.rounding import percent
-from walkers.inputs.run_tables import limits_of
-from walkers.inputs.text import printable
+from walkers.inputs.run import CONSTANT, limits_of
+from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.physics.capillary import capillary_force_limit_at_wall
 from walkers.physics.time_step import auto_fractions
-from walkers.physics.units import ACCELERATION_OF_ONE_G
+from walkers.rounding import percent
 from walkers.templates.deck import RESTING_SEGMENTS, settling_steps
+from walkers.text import printable
 
 START_UP_SECONDS = 0.04
 _STEP_MICROSECONDS = 0.9
@@ -71,7 +72,9 @@ def predicted_overhead(cases: Iterable[Case]) -> float:
     from walkers.physics.laws.young_laplace import unsolved
 
     cases = list(cases)
-    kinds = {(one.liquid, one.contact.minimum_separation_ratio, tuple(sorted(set(one.radii)))) for one in cases}
+    kinds = {
+        (one.liquid.of_bridges, one.contact.minimum_separation_ratio, tuple(sorted(set(one.radii)))) for one in cases
+    }
     bridges = [
         bridge
         for liquid, ratio, radii in kinds
@@ -119,7 +122,7 @@ def _volume(case: Case) -> float:
 
 def _youngs_modulus(case: Case) -> Known | None:
     """Young's modulus of the material of the beads, if the library has it."""
-    known_to, name = library_of(case.document), case.material
+    known_to, name = library_of(case.document), case.beads.material
     return known_to.material(name).get("youngs_modulus") if name and known_to.has("materials", name) else None
 
 
@@ -138,12 +141,12 @@ def summarise(case: Case) -> dict[str, Any]:
     volume = _volume(case)
     known = _youngs_modulus(case)
     summary: dict[str, Any] = {
-        "case": case.as_dict(),
+        "case": {**case.as_dict(), "origins": [asdict(one) for one in case.origins]},
         "drive": {name: getattr(drive, name) for name in ("peak_acceleration", "amplitude", "peak_velocity")},
         "beads": {
             "small": case.count - case.large,
             "large": case.large,
-            "mass": volume * case.density,
+            "mass": volume * case.beads.density,
             "volume": volume,
             "liquid": volume * case.liquid.volume_fraction,
             "stiffness_ratio": case.contact.youngs_modulus / known.value if known else None,
@@ -219,7 +222,7 @@ def describe(summary: dict[str, Any]) -> str:
             lines.append("           bead 1 is the smaller bead")
     lines.append(
         f"drive      a0 = {drive['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g "
-        f"(g = {ACCELERATION_OF_ONE_G:g} m/s², as in the paper; gravity is {summary['case']['gravity']:g} m/s²), "
+        f"(g = {ACCELERATION_OF_ONE_G:g} m/s², as in the paper; gravity is {summary['case']['environment']['gravity']:g} m/s²), "
         f"amplitude {drive['amplitude'] * 1e3:.4g} mm, peak velocity {drive['peak_velocity'] * 1e3:.4g} mm/s"
     )
     if summary["contacts"]:

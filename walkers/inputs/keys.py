@@ -1,18 +1,17 @@
-"""Dotted keys, such as ``drive.harmonics[1].phase``, and values that replace those of a case file.
+"""Dotted keys, such as ``drive.harmonics[1].phase``, and values given by them.
 
 They come from the command line (``drive.frequency=70Hz``), a mapping in Python, or a sweep's points.
 """
 
 from __future__ import annotations
 
-import copy
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-from walkers.inputs.errors import InputError, Problem, unusable
+from walkers.errors import InputError, Problem, unusable
 
 Value = Any
 """A TOML value: text with a unit, a number, or a list of such."""
@@ -103,43 +102,3 @@ def _value(text: str) -> Value:
     if text.startswith("[") and text.endswith("]") and "[" not in text[1:]:
         return [_value(part.strip()) for part in text[1:-1].split(",")]
     return text
-
-
-def changed(document: Mapping[str, Any], changes: Mapping[str, Value]) -> dict[str, Any]:
-    """A case's tables with dotted keys (``dimers.radii[0]`` for one of a list) given other values.
-
-    What a new value stands for in other words (`walkers.inputs.schema.ALTERNATIVES`) goes, unless it changes too.
-
-    Raises
-    ------
-    InputError
-        If there is no such place in a list.
-    """
-    from walkers.inputs.schema import ALTERNATIVES
-
-    tables = copy.deepcopy(dict(document))
-    for key, value in changes.items():
-        *table, name = parts_of(key)
-        others = [other.rpartition(".")[2] for other in ALTERNATIVES.get(f"{key.split('.')[0]}.{name}", ())]
-        _put(tables, key, value, [other for other in others if joined([*table, other]) not in changes])
-    return tables
-
-
-def _put(tables: dict[str, Any], key: str, value: Value, without: Sequence[str]) -> None:
-    """Give the place of a dotted key another value; other keys there go."""
-    place: Any = tables
-    parts = parts_of(key)
-    for number, part in enumerate(parts):
-        if isinstance(part, int):
-            if not isinstance(place, list) or part >= len(place):
-                raise unusable(key, f"the base case has no {joined(parts[:number])} of that length", value)
-        elif isinstance(place, list):
-            here = joined(parts[:number])
-            raise unusable(key, f"{here} is a list: say which one, such as {here}[0]", value)
-        elif not isinstance(place, dict):  # the base case is wrong there, which its own check tells
-            return
-        if number + 1 < len(parts):
-            place = place[part] if isinstance(part, int) else place.setdefault(part, {})
-    for other in without:
-        place.pop(other, None)
-    place[parts[-1]] = value

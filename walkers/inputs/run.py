@@ -1,0 +1,293 @@
+"""Length, time step and sampling of a run: the table ``[run]``, and what follows from it and the rest of a case."""
+
+from __future__ import annotations
+
+from math import ceil, inf
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+from pydantic import Field
+
+from walkers.errors import unusable
+from walkers.inputs import units
+from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Flag, Table, key
+from walkers.inputs.units import AUTO, Duration, Number, Whole
+from walkers.physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
+from walkers.rounding import percent
+
+if TYPE_CHECKING:
+    from walkers.inputs.case import Case
+
+MOST_STEPS = 2**31 - 1
+FIRST_ATTEMPTS = (12, 24)
+"""Cycles after which velocities are checked. After 36 hardly any are constant that were not after 24."""
+CONSTANT = 0.002
+"""Share within which the velocities of the halves of a walker's cycles agree where a run ends early: they are constant.
+
+A walker is called steady at a looser criterion, that of `walkers.postprocess.gait.walk`.
+"""
+_SEGMENT_SECONDS = 0.5
+_MOST_CYCLES = 60
+_SAMPLES = 20
+_NEARLY_SYMMETRIC = 0.08
+"""sin δ of dimers below which speeds of steady walkers still creep …"""
+_ASLANT = 0.1
+"""… and start angle (rad) from which walkers turn for longer than a few cycles: both run in full."""
+_LONGEST_SETTLING = 0.5
+_SETTLED_BELOW = 5e-3
+_FRAMES_PER_SECOND = 60.0
+_Cycles = Annotated[Whole, Field(ge=2, le=1_000_000)]
+_Samples = Annotated[Whole, Field(ge=1, le=1000)]
+
+
+def settling_of(cycles: int) -> int:
+    """Default number of settling cycles of walkers: a third of the cycles, at most 20."""
+    return min(20, cycles // 3)
+
+
+class Run(Table):
+    """``[run]``: the time step, the length of the run and what is recorded.
+
+    The length is given by ``cycles`` or as a ``duration``, the sampling by ``samples_per_cycle`` or
+    ``frames_per_second``. Left out, or ``cycles = "auto"``, walkers run until their velocities are constant, for 60
+    cycles (``most_cycles``) of 20 samples at most, a third of them, at most 20, to settle; loose beads have a duration,
+    are recorded 60 times a second, and rest before the drive (``settled_below``, ``longest_settling``; 0 of walkers,
+    which stand from the first).
+
+    A cycle is a whole multiple of the sampling interval: beads are recorded ``samples_per_cycle`` times a cycle, or
+    once in ``cycles_per_sample`` (one of the two is 1), bridges with one of ``samples_per_bridge_sample`` samples. If
+    there are several segments, each has a restart file at its end. If ``until_steady``, fewer cycles do if velocities
+    are constant after them (`walkers.postprocess.gait.are_constant`).
+    """
+
+    choices: ClassVar = (
+        Choice((("cycles",), ("duration",), ("most_cycles",)), required=False),
+        Choice((("samples_per_cycle",), ("frames_per_second",)), required=False),
+    )
+    time_step: Annotated[Filled[units.Time], AUTO] = key("§", None)
+    allow_unstable: Annotated[Flag, SAME_RUN] = key("§", False)
+    cycles: Annotated[Filled[_Cycles], AUTO] = key("§", None, 60)
+    most_cycles: Annotated[Filled[_Cycles], SAME_RUN] = key("§", None, 60)
+    duration: Annotated[Filled[Duration], SAME_RUN] = key("§", None)
+    settling_cycles: Filled[Annotated[Whole, Field(ge=0, le=1_000_000)]] = key("§", None, 20)
+    samples_per_cycle: Filled[_Samples] = key("§", None, 20)
+    bridge_samples_per_cycle: Annotated[Filled[_Samples], SAME_RUN] = key("§", None, 1)
+    frames_per_second: Annotated[Filled[Annotated[Number, Field(gt=0, le=1e6)]], SAME_RUN] = key("§", None, 60)
+    segment: Annotated[Filled[Duration], SAME_RUN] = key("§", None)
+    settled_below: Filled[units.Speed] = key("§", None)
+    longest_settling: Filled[units.NonNegativeDuration] = key("§", None)
+    ranks: Annotated[Whole, Field(ge=1, le=64)] = key("§", 1)
+    seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)] = key("§", 1)
+    steps_per_cycle: Derived[int] = 0
+    until_steady: Derived[bool] = False
+    cycles_per_sample: Derived[int] = 1
+    samples_per_bridge_sample: Derived[int] = 1
+    cycles_per_segment: Derived[int] = 1
+
+    @property
+    def period(self) -> float:
+        """Period of a cycle, s."""
+        return self.time_step * self.steps_per_cycle
+
+    @property
+    def steps(self) -> int:
+        """Steps of the whole drive."""
+        return self.steps_per_cycle * self.cycles
+
+    @property
+    def steps_per_sample(self) -> int:
+        """Steps between samples."""
+        return self.steps_per_cycle * self.cycles_per_sample // self.samples_per_cycle
+
+    @property
+    def settled_strobes(self) -> int:
+        """Number of stroboscopic samples before velocities are measured."""
+        return -(-self.settling_cycles // self.cycles_per_sample)
+
+    @property
+    def attempts(self) -> tuple[int, ...]:
+        """Cycles for which the run is made, and made again from its begin if its walkers are not steady after them."""
+        fewer = FIRST_ATTEMPTS if self.until_steady else ()
+        return (*(cycles for cycles in fewer if cycles < self.cycles), self.cycles)
+
+    @property
+    def continuation(self) -> str:
+        """What `walkers run` does after the cycles tried first; empty for a fixed number of cycles."""
+        further = (
+            f"walkers run continues to {self.cycles} if the velocities are not constant within {percent(CONSTANT)}"
+        )
+        return f"{further}: then set cycles to {self.cycles}" if len(self.attempts) > 1 else ""
+
+    def steps_until(self, cycles: int) -> int:
+        """Steps of the attempts up to the one for so many cycles."""
+        return self.steps_per_cycle * sum(one for one in self.attempts if one <= cycles)
+
+    def for_cycles(self, cycles: int) -> Run:
+        """The same run with a fixed number of cycles in one segment."""
+        if not self.until_steady:
+            return self
+        settling = settling_of(cycles)
+        return self.but(cycles=cycles, settling_cycles=settling, until_steady=False, cycles_per_segment=cycles)
+
+    @property
+    def rests(self) -> bool:
+        """Whether the beads rest before the drive."""
+        return bool(self.longest_settling)
+
+    @property
+    def in_one(self) -> bool:
+        """Whether the run has a single segment."""
+        return not self.rests and self.cycles_per_segment >= self.cycles
+
+
+def limits_of(case: Case) -> TimeStepLimits:
+    """Limits of the time step for the bodies of a case."""
+    contact = case.contact
+    return time_step_limits(
+        [entry for body in case.bodies for entry in body.bridged],
+        density=case.beads.density,
+        youngs_modulus=contact.youngs_modulus,
+        poissons_ratio=contact.poissons_ratio,
+        viscosity=case.liquid.of_bridges.viscosity,
+        minimum_separation_ratio=contact.minimum_separation_ratio,
+        peak_velocity=case.excitation.peak_velocity,
+    )
+
+
+def with_run(case: Case) -> Case:
+    """The case with the time step, the length and the sampling of its run.
+
+    Raises `InputError` if they contradict each other, or the time step is beyond its limits.
+    """
+    table, frequency, loose = case.run, case.excitation.frequency, case.loose
+    samples, cycles_per_sample, samples_per_bridge_sample = _sampling(case)
+    largest, reason = _largest_time_step(case)
+    time_step, steps = fit_into_cycle(largest, frequency, samples)
+    cycles, until_steady = _cycles(case, cycles_per_sample), _until_steady(case, cycles_per_sample)
+    settling = table.settling_cycles
+    if settling is None:
+        settling = settling_of(cycles) if case.walkers else 0
+    rest = table.longest_settling
+    if rest is None:
+        rest = _LONGEST_SETTLING if loose else 0.0
+    _check_length(case, cycles, settling, cycles_per_sample)
+    most = MOST_STEPS // steps - (ceil((rest + 1.0) * frequency) if rest else 0)
+    if cycles > most:
+        name, message = ("cycles", f"expected at most {most}") if table.duration is None else ("duration", "too long")
+        raise unusable(f"run.{name}", f"{message}: the engine counts steps up to 2^31")
+    segment = table.segment if table.segment is not None else _SEGMENT_SECONDS if loose else inf
+    # Segments end with a sample, so that each begins where the last one ended.
+    samples_of_segment = max(1, round(min(segment * frequency, cycles) / cycles_per_sample))
+    run = table.but(
+        time_step=time_step,
+        steps_per_cycle=steps,
+        cycles=cycles,
+        settling_cycles=settling,
+        until_steady=until_steady,
+        samples_per_cycle=samples,
+        cycles_per_sample=cycles_per_sample,
+        samples_per_bridge_sample=samples_per_bridge_sample,
+        cycles_per_segment=min(samples_of_segment * cycles_per_sample, cycles),
+        settled_below=(table.settled_below or _SETTLED_BELOW) if rest else None,
+        longest_settling=rest or None,
+    )
+    return _explained(case.but(run=run), table, reason)
+
+
+def _explained(case: Case, table: Run, reason: str) -> Case:
+    """The case with the origins of the values of its run; ``table`` is the run as it was given."""
+    run = case.run
+    often = run.samples_per_cycle if run.cycles_per_sample == 1 else f"1 in {run.cycles_per_sample} cycles"
+    cycles = f"until constant within {percent(CONSTANT)}, at most {run.cycles}" if run.until_steady else ""
+    checked = "checked after 12 and 24 cycles" if run.until_steady else "not checked earlier"
+    whence = "from the duration" if table.duration else checked
+    if run.cycles_per_sample > 1:
+        whence += f", rounded up to a multiple of {run.cycles_per_sample} cycles (one sample)"
+    settling = ", ".join(f"{settling_of(cycles)} of {cycles}" for cycles in run.attempts) if run.until_steady else ""
+    sampled = "from frames_per_second" if case.loose or table.frames_per_second else ""
+    case = case.noted("run.samples_per_cycle", sampled, "derived" if sampled else "default", text=str(often))
+    if case.loose:
+        length = units.quantity_text(run.cycles_per_segment / case.excitation.frequency, units.DURATION)
+        case = case.noted("run.segment", "about 0.5 s", text=length)
+    if run.rests:
+        case = case.noted("run.longest_settling", "of loose beads" if case.loose else "", "default")
+        case = case.noted("run.settled_below", "", "default")
+    case = case.noted("run.time_step", f"auto: {reason}, a whole number of steps per cycle")
+    case = case.noted("run.cycles", whence, text=cycles)
+    if case.walkers:
+        return case.noted("run.settling_cycles", "a third of the cycles, at most 20", text=settling)
+    return case.noted("run.settling_cycles", "of loose beads", "default")
+
+
+def _check_length(case: Case, cycles: int, settling: int, cycles_per_sample: int) -> None:
+    """At least two cycles are measured, and one frame of walkers."""
+    if cycles < 2:
+        name = "run.duration" if case.run.duration is not None else "run.cycles"
+        raise unusable(name, f"expected at least two cycles of the drive, {2.0 / case.excitation.frequency:.4g} s")
+    if cycles - settling < 2:
+        raise unusable("run.settling_cycles", f"expected at most cycles - 2 = {cycles - 2}")
+    if case.walkers and cycles // cycles_per_sample <= -(-settling // cycles_per_sample):
+        message = f"expected more: one frame in {cycles_per_sample} cycles leaves none after {settling} settling cycles"
+        raise unusable("run.frames_per_second", message)
+
+
+def _largest_time_step(case: Case) -> tuple[float, str]:
+    """The largest step, s, and its reason: given (within the limits unless the case insists), or ``"auto"``."""
+    limits, given = limits_of(case), case.run.time_step
+    if given is None:
+        return limits.recommended(loose=case.loose)
+    if (exceeded := limits.exceeded_by(given)) and not case.run.allow_unstable:
+        allowed = f"{min(limits.as_dict().values()) * 1e6:.3g} us"
+        message = f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed}, "
+        raise unusable("run.time_step", f'{message}"auto", or allow_unstable = true')
+    return given, "given"
+
+
+def _sampling(case: Case) -> tuple[int, int, int]:
+    """Samples a cycle and cycles a sample, one of which is 1, and samples a sample of bridges."""
+    table = case.run
+    samples, cycles_per_sample = table.samples_per_cycle or _SAMPLES, 1
+    if table.samples_per_cycle is None and (table.frames_per_second is not None or case.loose):
+        wanted = case.excitation.frequency / (table.frames_per_second or _FRAMES_PER_SECOND)
+        samples, cycles_per_sample = (round(1.0 / wanted), 1) if wanted < 1.0 else (1, round(wanted))
+    name, bridges = "run.bridge_samples_per_cycle", table.bridge_samples_per_cycle
+    if bridges is None:
+        return samples, cycles_per_sample, 1 if case.loose else samples
+    if case.loose:
+        raise unusable(name, "expected none: bridges of loose beads are in every frame")
+    if samples % bridges:
+        raise unusable(name, f"expected a divisor of samples_per_cycle = {samples}")
+    return samples, cycles_per_sample, samples // bridges
+
+
+def _cycles(case: Case, cycles_per_sample: int) -> int:
+    """Cycles of a run, whole samples of them."""
+    cycles: float = case.run.cycles or case.run.most_cycles or _MOST_CYCLES
+    if case.run.duration is not None:
+        cycles = case.run.duration * case.excitation.frequency * (1.0 - 1e-12)
+    return ceil(cycles / cycles_per_sample) * cycles_per_sample
+
+
+def _until_steady(case: Case, cycles_per_sample: int) -> bool:
+    """Whether a run may end when its velocities are constant; not if the case gives its length or segments.
+
+    Raises `InputError` if a case asks for both.
+    """
+    table = case.run
+    asked = ["cycles"] if "cycles" in table.model_fields_set and table.cycles is None else []
+    asked += ["most_cycles"] if table.most_cycles is not None else []
+    given = [name for name in ("cycles", "duration", "settling_cycles", "segment") if getattr(table, name) is not None]
+    if given and asked:
+        raise unusable(
+            f"run.{given[0]}", f"expected none: with run.{asked[0]}, walkers run until their velocity is constant"
+        )
+    if asked and not case.apart:
+        raise unusable(f"run.{asked[0]}", "expected run.duration: a run until steady needs independent walkers")
+    if not case.apart or given or table.ranks != 1 or cycles_per_sample != 1:
+        return False
+    # A few cycles suffice for asymmetric dimers that start near the axis.
+    return all(
+        len(walkers.radii) == 2
+        and abs(walkers.radii[0] - walkers.radii[1]) / sum(walkers.radii) >= _NEARLY_SYMMETRIC
+        and abs(walkers.angle) + walkers.angle_spread < _ASLANT
+        for walkers in case.walkers
+    )

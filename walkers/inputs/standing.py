@@ -1,0 +1,240 @@
+"""Where the beads of a case start, and whether they fit into the boundary and beside each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import islice
+from math import atan2, cos, dist, inf, pi, sin
+from typing import TYPE_CHECKING
+
+from walkers.errors import unusable
+from walkers.inputs.bodies import Body, Mixture, PlacedBeads, Walkers
+from walkers.inputs.boundary import LOOSE, Boundary
+from walkers.inputs.loads import contact_loads
+
+if TYPE_CHECKING:
+    from walkers.inputs.case import Case
+
+OVERLAP = 0.01
+"""Radii by which beads that are given places may overlap with each other and the walls."""
+
+
+@dataclass(frozen=True)
+class StandingBead:
+    """Centre (m) and radius (m) of a bead at the start."""
+
+    x: float
+    y: float
+    z: float
+    radius: float
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Beads that start together; positions relative to the walker's place (chosen by the deck) or to the boundary.
+
+    ``facing`` is +1 along the drive axis or −1, and ``angle`` that to it (rad); 0 and 0 of what is no walker.
+    """
+
+    beads: tuple[StandingBead, ...]
+    facing: int = 0
+    angle: float = 0.0
+    walks: bool = False
+
+
+def standing(case: Case) -> Iterator[tuple[int, Standing]]:
+    """What stands at the start, each with the number of its body; walkers come first and are numbered through.
+
+    Raises `ValueError` if the beads of a walker cannot stand so.
+    """
+    first = 0
+    for number, body in enumerate(case.bodies):
+        if isinstance(body, Walkers):
+            for one in _walkers(case, body, first):
+                yield number, one
+            first += body.replicates
+        elif isinstance(body, Mixture):
+            yield number, _poured(case, body)
+        else:
+            yield number, Standing(tuple(StandingBead(*bead.at, bead.radius) for bead in body.beads))
+
+
+def _walkers(case: Case, walkers: Walkers, first: int) -> Iterator[Standing]:
+    """Each walker around the contact of its first two beads; ``first``: index of the first walker.
+
+    Its angle and contacts are drawn from a stream of its own, whoever shares the deck.
+    """
+    x, y, _ = case.drive_axis
+    resting = contact_loads(case, walkers).overlaps
+    for number in range(first, first + walkers.replicates):
+        facing = {"right": 1, "left": -1}.get(walkers.facing, 1 if number % 2 == 0 else -1)
+        turn, press = _draws(case.run.seed, number)
+        angle, factor = walkers.angle + walkers.angle_spread * turn, 1.0 + walkers.gap_spread * press
+        overlaps = [(overlap if walkers.gap is None else -walkers.gap) * factor for overlap in resting]
+        heading = atan2(y, x) + angle + (0.0 if facing > 0 else pi)
+        of_beads = overlaps[: len(walkers.radii)]  # the first are those with the floor
+        heights = [
+            case.boundary.rest_height(radius - overlap) for radius, overlap in zip(walkers.radii, of_beads, strict=True)
+        ]
+        beads = [
+            StandingBead(
+                along * cos(heading) - aside * sin(heading), along * sin(heading) + aside * cos(heading), *rest
+            )
+            for (along, aside), *rest in zip(walkers.places(heights, overlaps), heights, walkers.radii, strict=True)
+        ]
+        yield Standing(tuple(beads), facing, angle, walks=True)
+
+
+@lru_cache(maxsize=4096)
+def _draws(seed: int, number: int) -> tuple[float, float]:
+    from numpy.random import default_rng
+
+    turn, press = default_rng([seed, number]).uniform(-1.0, 1.0, size=2)
+    return float(turn), float(press)
+
+
+def _poured(case: Case, mixture: Mixture) -> Standing:
+    """Beads on a loose lattice with random order and displacements (seed of the case); they fall and settle."""
+    from numpy.random import default_rng
+
+    largest, draw = max(mixture.radii), default_rng(case.run.seed)
+    layer = case.boundary.layer(largest)
+    floor = tops_of_others(case, mixture)
+    beads = []
+    for number, radius in enumerate(float(one) for one in draw.permutation(mixture.all_radii)):
+        level, place = divmod(number, len(layer.places))
+        x, y = layer.places[place]
+        shift = draw.uniform(-1.0, 1.0, 2) * 0.9 * layer.play(radius, largest)
+        height = (level + 0.5) * 2.0 * LOOSE * largest
+        beads.append(StandingBead(x + float(shift[0]), y + float(shift[1]), floor + height, radius))
+    return Standing(tuple(beads))
+
+
+def tops_of_others(case: Case, body: Body) -> float:
+    """Largest height of the other bodies at the start, m."""
+    walkers = [2.0 * max(one.radii) for one in case.walkers if one is not body]
+    placed = () if isinstance(body, PlacedBeads) else case.placed
+    return max([*walkers, *(bead.at[2] + bead.radius for bead in placed)], default=0.0)
+
+
+def check_bodies(case: Case) -> Case:
+    """Refuse bodies that do not fit into the boundary or beside each other."""
+    boundary, mixture = case.boundary, case.mixture
+    if case.run.ranks > 1 and not boundary.closed:
+        raise unusable("run.ranks", "expected 1: walkers on a plane run slower on several processes")
+    if not case.walkers and mixture is None and "seed" in case.document.get("run", {}):
+        raise unusable("run.seed", "expected none with placed beads: every start would be the same")
+    if case.liquid.conserved and (case.walkers or not boundary.closed):
+        raise unusable("liquid.conserved", "expected false: only loose beads in a container share their liquid")
+    if mixture is not None:
+        _check_pour(mixture, boundary, tops_of_others(case, mixture))
+    if case.placed or case.meets or (case.walkers and not boundary.bare):
+        _check_places(case)
+    return case
+
+
+def _check_pour(mixture: Mixture, boundary: Boundary, floor: float) -> None:
+    largest = max(mixture.large_radii)
+    if boundary.width < 4.0 * largest:
+        raise unusable("boundary.width", "expected at least two of the large beads side by side")
+    layer = boundary.layer(largest)
+    if layer.tight and boundary.width < 8.0 * largest:
+        raise unusable("boundary.width", "expected at least four of the large beads side by side")
+    layers = -(-mixture.count // len(layer.places)) if layer.places else inf
+    level = floor + layers * 2.0 * LOOSE * max(mixture.radii)
+    if level > 2.0 * boundary.height:  # walls and simulation go on to there
+        needed = f"{level / 2.0 * 1e3:.3g} mm"
+        raise unusable("boundary.height", f"too low for {mixture.count} beads; expected {needed} or more")
+
+
+@dataclass(frozen=True)
+class _Held:
+    """A bead at its start, the key that is to blame for it, and the number of its walker, -1 of a placed bead."""
+
+    key: str
+    place: tuple[float, float, float]
+    radius: float
+    walker: int = -1
+
+
+def _check_places(case: Case) -> None:
+    """Walkers and beads that are placed: between the walls, and not within each other."""
+    beads = [*_standing_walkers(case), *_placed(case)]
+    _check_walls(case, beads)
+    if case.placed or case.meets:
+        _check_overlaps(beads)
+
+
+def _placed(case: Case) -> Iterator[_Held]:
+    for number, bead in enumerate(case.placed):
+        yield _Held(f"placed[{number}]", bead.at, bead.radius)
+
+
+def _standing_walkers(case: Case) -> list[_Held]:
+    keys = [key for key, one in case.walkers_by_key.items() for _ in range(one.replicates)]
+    walkers: list[Standing] = []
+    try:
+        walkers.extend(one for _, one in islice(standing(case), len(keys)))
+    except ValueError as error:
+        raise unusable(f"{keys[len(walkers)]}.radii", str(error)) from error
+    grid = case.boundary.grid(len(keys), max(one.spacing for one in case.walkers)) if keys else []
+    return [
+        _Held(key, (x + bead.x, y + bead.y, bead.z), bead.radius, number)
+        for number, (key, (x, y), walker) in enumerate(zip(keys, grid, walkers, strict=True))
+        for bead in walker.beads
+    ]
+
+
+def _check_walls(case: Case, beads: list[_Held]) -> None:
+    import numpy as np
+
+    boundary, top = case.boundary, case.boundary.height or inf
+    largest = max((max(one.radii) for one in case.walkers), default=0.0)
+    if boundary.width is not None and boundary.width < 2.0 * (1.0 - OVERLAP) * largest:
+        raise unusable("boundary.width", f"expected more than a bead's diameter, {2e3 * largest:.4g} mm")
+    clearances = boundary.side_clearance(np.array([bead.place for bead in beads]))
+    beside = [clear < (1.0 - OVERLAP) * bead.radius for bead, clear in zip(beads, clearances, strict=True)]
+    for bead, out in zip(beads, beside, strict=True):
+        too_high = bead.place[2] + bead.radius > top
+        if bead.walker >= 0 and out:
+            most = _most_walkers(case)
+            message = f"the walkers do not fit between the walls of the {boundary.shape}; expected {most}"
+            raise unusable(f"{bead.key}.replicates", message)
+        if bead.walker >= 0 and too_high:
+            least = f"{1e3 * (bead.place[2] + bead.radius):.4g} mm"
+            raise unusable("boundary.height", f"too low for the walkers of {bead.key}; expected at least {least}")
+        if bead.walker < 0 and (out or too_high or bead.place[2] < (1.0 - OVERLAP) * bead.radius):
+            raise unusable(f"{bead.key}.at", "expected a bead within the boundary")
+
+
+def _most_walkers(case: Case) -> str:
+    """How many walkers would fit, of a case with some outside."""
+    import numpy as np
+
+    many = sum(one.replicates for one in case.walkers)
+    spacing, radius = max(one.spacing for one in case.walkers), max(max(one.radii) for one in case.walkers)
+    half = max(one.length for one in case.walkers) / 2.0
+    for fewer in range(many - 1, 0, -1):
+        places = np.array([(x, y, radius) for x, y in case.boundary.grid(fewer, spacing)])
+        if (case.boundary.side_clearance(places) >= half).all():
+            return f"at most {fewer} at this spacing"
+    return "a wider boundary"
+
+
+def _check_overlaps(beads: list[_Held]) -> None:
+    from scipy.spatial import cKDTree
+
+    near = cKDTree([bead.place for bead in beads]).query_pairs(2.0 * max(bead.radius for bead in beads))
+    strangers = (pair for pair in near if beads[pair[0]].walker != beads[pair[1]].walker or beads[pair[0]].walker < 0)
+    for one, other in sorted(strangers, key=lambda pair: pair[::-1]):
+        first, second = beads[one], beads[other]
+        apart, touching = dist(first.place, second.place), first.radius + second.radius
+        if apart < touching - OVERLAP * min(first.radius, second.radius):
+            by = f"{1e3 * (touching - apart):.3g} mm; they touch at a distance of {1e3 * touching:.4g} mm"
+            if second.walker >= 0:
+                message = f"at their start angles, beads of two walkers would overlap by {by}"
+                raise unusable(f"{second.key}.spacing", message)
+            whom = first.key if first.walker < 0 else f"one of {first.key}"
+            raise unusable(f"{second.key}.at", f"overlaps with {whom} by {by}")

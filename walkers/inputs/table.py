@@ -1,0 +1,258 @@
+"""Tables of files as frozen models: a file's keys are the fields, values are in SI units.
+
+A table says what excludes what (`Table.choices`), gives its values by dotted keys (`Table.leaves`), and makes copies
+with other values (`Table.but`, `Table.put`).
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, ValidationInfo
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticCustomError, PydanticUndefined
+
+from walkers.errors import Problem, unusable
+from walkers.inputs.keys import joined, parts_of
+from walkers.inputs.units import WRITTEN
+
+T = TypeVar("T")
+SAME_RUN = "same run"
+"""Annotation of a key: another value does not make another run, by itself."""
+Flag = StrictBool
+
+
+def _only_derived(value: object, info: ValidationInfo) -> object:
+    if info.context == WRITTEN:
+        raise PydanticCustomError("extra_forbidden", "no file has this key")
+    return value
+
+
+_DERIVED = BeforeValidator(_only_derived)
+if TYPE_CHECKING:
+    Filled = Annotated[T, "filled"]
+    """A key that a file may leave out: None until it is filled in."""
+    Derived = Annotated[T, "derived"]
+    """A field that follows from others, which no file has."""
+else:
+
+    class Filled:
+        """A key that a file may leave out: None until it is filled in."""
+
+        def __class_getitem__(cls, kind: Any) -> Any:
+            return kind | None
+
+    class Derived:
+        """A field that follows from others, which no file has."""
+
+        def __class_getitem__(cls, kind: Any) -> Any:
+            return Annotated[kind, _DERIVED]
+
+
+def key(meaning: str, default: Any = PydanticUndefined, example: Any = None, **bounds: Any) -> Any:
+    """A key of a table: its meaning, default (required without one), an example as a file has it, and bounds."""
+    return Field(default, description=meaning, examples=None if example is None else [example], **bounds)
+
+
+class Choice(NamedTuple):
+    """Keys of a table that say the same in other words: exactly one of the ways, or at most one."""
+
+    ways: tuple[tuple[str, ...], ...]
+    required: bool = True
+
+    @property
+    def text(self) -> str:
+        """The ways, such as ``radii or mean_radius and sin_delta``."""
+        return " or ".join(" and ".join(way) for way in self.ways)
+
+
+class Table(BaseModel):
+    """A table of a file. Its fields are the keys; values are in SI units; unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, ignored_types=(cached_property,))
+    choices: ClassVar[tuple[Choice, ...]] = ()
+
+    @cached_property
+    def _values(self) -> tuple[Any, ...]:
+        return tuple(getattr(self, name) for name in type(self).model_fields)
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash(self._values)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and self._values == other._values
+
+    def but(self, **values: Any) -> Self:
+        """The same table with other values, which are not validated.
+
+        `model_copy` would keep the cached properties of the former values.
+        """
+        kept = {name: getattr(self, name) for name in type(self).model_fields}
+        return type(self).model_construct({*self.model_fields_set, *values}, **{**kept, **values})  # type: ignore[return-value]
+
+    def put(self, name: str, value: Any) -> Self:
+        """The same tables with another value at a dotted key, which is not validated."""
+        first, *rest = parts_of(name)
+        if not rest:
+            return self.but(**{str(first): value})
+        below = getattr(self, str(first))
+        if isinstance(below, tuple):
+            number, *inner = rest
+            new = below[int(number)].put(joined(inner), value) if inner else value
+            return self.but(**{str(first): (*below[: int(number)], new, *below[int(number) + 1 :])})
+        return self.but(**{str(first): below.put(joined(rest), value)})
+
+    def value_of(self, name: str) -> Any:
+        """The value of a dotted key; None if there is no such place."""
+        value: Any = self
+        for part in parts_of(name):
+            if isinstance(part, int):
+                value = value[part] if isinstance(value, tuple) and part < len(value) else None
+            else:
+                value = getattr(value, field_name(type(value), part)) if isinstance(value, Table) else None
+        return value
+
+    def leaves(self, prefix: str = "") -> Iterator[tuple[str, Any, FieldInfo]]:
+        """Values of all keys, tables in tables by dotted keys, each with its field; without derived fields."""
+        for name, field in keys_in(type(self)).items():
+            value, place = getattr(self, field_name(type(self), name)), f"{prefix}{name}"
+            if isinstance(value, Table):
+                yield from value.leaves(f"{place}.")
+            elif isinstance(value, tuple) and value and isinstance(value[0], Table):
+                for number, one in enumerate(value):
+                    yield from one.leaves(f"{place}[{number}].")
+            else:
+                yield place, value, field
+
+    def determinants(self) -> dict[str, Any]:
+        """The values that make another run if they differ; absent ones are left out, so that new keys rename no runs."""
+        kept = {}
+        for name, field in type(self).model_fields.items():
+            if SAME_RUN in field.metadata or (value := getattr(self, name)) in (None, ()):
+                continue
+            several = isinstance(value, tuple) and isinstance(value[0], Table)
+            kept[name] = [one.determinants() for one in value] if several else value
+            if isinstance(value, Table):
+                kept[name] = value.determinants()
+        return kept
+
+    @classmethod
+    def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
+        """What a table that is given at a place says in no way, or in two."""
+        for choice in cls.choices:
+            said = [way for way in choice.ways if any(name in given and not _is_auto(given[name]) for name in way)]
+            if len(said) > 1:
+                name = next(name for name in said[1] if name in given)
+                yield Problem(joined([*parts_of(place), name]), None, f"expected either {choice.text}")
+            elif said or choice.required:
+                way = said[0] if said else choice.ways[0]
+                others = [other for other in choice.ways if other is not way] if not said else []
+                instead = "".join(f", or {' and '.join(other)}" for other in others)
+                for name in way:
+                    if name not in given:
+                        example = example_of(cls.model_fields[name])
+                        yield Problem(joined([*parts_of(place), name]), None, f"missing; expected {example}{instead}")
+
+
+def _is_auto(value: object) -> bool:
+    return isinstance(value, str) and value.strip().lower() == "auto"
+
+
+def keys_in(model: type[BaseModel]) -> dict[str, FieldInfo]:
+    """The keys of a table, as a file has them, with their fields."""
+    fields = model.model_fields.items()
+    return {field.alias or name: field for name, field in fields if _DERIVED not in field.metadata}
+
+
+def field_name(model: type[BaseModel], name: str) -> str:
+    """The field of a key of a table."""
+    return name if name in model.model_fields else next(one for one, f in model.model_fields.items() if f.alias == name)
+
+
+def table_in(annotation: Any) -> type[Table] | None:
+    """The table that a field holds, alone or in a tuple."""
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        return annotation
+    return next((table for one in get_args(annotation) if (table := table_in(one))), None)
+
+
+def example_of(field: FieldInfo) -> str:
+    """An example of what a key takes: ``such as "80 Hz"``."""
+    from walkers.inputs.units import kind_in, shown_in_file
+
+    if field.examples:
+        return f"such as {shown_in_file(field.examples[0])}"
+    kind = kind_in([*field.metadata, field.annotation])
+    return f'such as "{kind.example}"' if kind else "a value"
+
+
+def contradictions(model: type[Table], document: Any, place: str = "") -> Iterator[Problem]:
+    """What the tables of a document say in no way, or in two (`Table.problems`)."""
+    if not isinstance(document, Mapping):
+        return
+    yield from model.problems(document, place)
+    for name, field in keys_in(model).items():
+        below, inner = document.get(name), table_in(field.annotation)
+        if inner is None or below is None:
+            continue
+        for number, one in enumerate(below) if isinstance(below, list) else [(None, below)]:
+            yield from contradictions(
+                inner, one, joined([*parts_of(place), name, *([] if number is None else [number])])
+            )
+
+
+def alternatives(model: type[Table], name: str) -> set[str]:
+    """Dotted keys that say in other words what a key says."""
+    *path, last = [part for part in parts_of(name) if isinstance(part, str)]
+    for part in path:
+        model = table_in(keys_in(model)[part].annotation) or model
+    ways = [way for choice in model.choices if any(last in way for way in choice.ways) for way in choice.ways]
+    return {joined([*parts_of(name)[:-1], other]) for way in ways if last not in way for other in way}
+
+
+def changed(model: type[Table], document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """A document with other values at dotted keys (``dimers.radii[0]`` for one of a list).
+
+    What a new value says in other words (`Table.choices`) goes, unless it changes too.
+
+    Raises
+    ------
+    InputError
+        If there is no such place in a list.
+    """
+    tables = copy.deepcopy(dict(document))
+    for name, value in changes.items():
+        _put(model, tables, name, value, changes)
+    return tables
+
+
+def _put(model: type[Table] | None, tables: dict[str, Any], name: str, value: Any, changes: Mapping[str, Any]) -> None:
+    place: Any = tables
+    parts = parts_of(name)
+    for number, part in enumerate(parts):
+        above = parts[:number]
+        if isinstance(part, int):
+            if not isinstance(place, list) or part >= len(place):
+                raise unusable(name, f"the base case has no {joined(above)} of that length", value)
+        elif isinstance(place, list):
+            raise unusable(name, f"{joined(above)} is a list: say which one, such as {joined(above)}[0]", value)
+        elif not isinstance(place, dict):  # the base case is wrong there, which its own check tells
+            return
+        if number + 1 < len(parts):
+            place = place[part] if isinstance(part, int) else place.setdefault(part, {})
+            field = keys_in(model).get(part) if model and isinstance(part, str) else None
+            model = table_in(field.annotation) if field else model if isinstance(part, int) else None
+    last = parts[-1]
+    for ways, _ in model.choices if model else ():
+        if any(last in way for way in ways):
+            for other in {one for way in ways if last not in way for one in way}:
+                if joined([*parts[:-1], other]) not in changes:
+                    place.pop(other, None)
+    place[last] = value
