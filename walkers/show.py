@@ -204,7 +204,7 @@ def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
 def describe(summary: dict[str, Any]) -> str:
     """The summary as text."""
     beads, drive, dimer = summary["beads"], summary["drive"], summary.get("dimer")
-    ratio = beads["stiffness_ratio"]
+    ratio, gravity = beads["stiffness_ratio"], summary["case"]["environment"]["gravity"]
     factor = _two_digits(1.0 / ratio) if ratio and ratio < 1 else ""
     softened = f"; Young's modulus of the beads reduced by a factor of {factor}" if factor else ""
     lines = [
@@ -222,7 +222,7 @@ def describe(summary: dict[str, Any]) -> str:
             lines.append("           bead 1 is the smaller bead")
     lines.append(
         f"drive      a0 = {drive['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g "
-        f"(g = {ACCELERATION_OF_ONE_G:g} m/s², as in the paper; gravity is {summary['case']['environment']['gravity']:g} m/s²), "
+        f"(g = {ACCELERATION_OF_ONE_G:g} m/s², as in the paper; gravity is {gravity:g} m/s²), "
         f"amplitude {drive['amplitude'] * 1e3:.4g} mm, peak velocity {drive['peak_velocity'] * 1e3:.4g} mm/s"
     )
     if summary["contacts"]:

@@ -174,14 +174,33 @@ class Walkers(Table):
         @property
         def at(self) -> tuple[tuple[float, float], ...]: ...  # noqa: D102
 
-    replicates: Annotated[Whole, Field(ge=1, le=1000)] = key("§", 6)
-    facing: Literal["both", "right", "left", "up", "down"] = key("§", "both")
-    angle: units.Angle = key("§", 0.0)
-    angle_spread: units.NonNegativeAngle = key("§", pi / 180.0)
-    gap: Annotated[Filled[SignedLength], units.AUTO] = key("§", None)
-    gap_spread: Annotated[Number, Field(ge=0, lt=1)] = key("§", 0.2)
-    spacing: Annotated[Filled[Length], units.AUTO] = key("§", None)
-    meet: Flag = key("§", False)
+    replicates: Annotated[Whole, Field(ge=1, le=1000)] = key(
+        "Number of walkers. They stand far apart, and each starts with a small random perturbation.", 6
+    )
+    facing: Literal["both", "right", "left", "up", "down"] = key(
+        "Direction of the walkers along the drive axis: `right` or `up`, `left` or `down`, or alternately `both`.",
+        "both",
+    )
+    angle: units.Angle = key("Angle at the start between the whole walker and that direction.", 0.0)
+    angle_spread: units.NonNegativeAngle = key(
+        "Range of the random angle at the start: `angle` ± this value.", pi / 180.0
+    )
+    gap: Annotated[Filled[SignedLength], units.AUTO] = key(
+        "Gap at all contacts at the start, negative for overlap. `auto`: the overlap at which the elastic "
+        "repulsion balances the capillary force.",
+        None,
+    )
+    gap_spread: Annotated[Number, Field(ge=0, lt=1)] = key(
+        "Range of the random factor that multiplies the overlap of each walker: 1 ± this value.", 0.2
+    )
+    spacing: Annotated[Filled[Length], units.AUTO] = key(
+        "Distance between the walkers. `auto`: large enough that walkers do not meet, or, with `meet`, do not"
+        " touch at the start.",
+        None,
+    )
+    meet: Flag = key(
+        "Whether the walkers may meet. If false, the walkers are replicates, and a meeting gives a warning.", False
+    )
 
     @property
     def all_radii(self) -> list[float]:
@@ -275,10 +294,16 @@ class Dimers(Walkers):
     choices: ClassVar = (Choice((("radii",), ("diameters",), ("mean_radius", "sin_delta"))),)
     arrangement: ClassVar[str] = "chain"
     at: ClassVar[tuple[_Place, ...]] = ()
-    radii: Filled[tuple[Radius, Radius]] = key("§", None, ["0.3 mm", "0.2 mm"])
-    diameters: Annotated[Filled[tuple[Diameter, Diameter]], SAME_RUN] = key("§", None, ["0.6 mm", "0.4 mm"])
-    mean_radius: Annotated[Filled[Radius], SAME_RUN] = key("§", None, "0.25 mm")
-    sin_delta: Annotated[Filled[Annotated[Number, Field(gt=-0.9, lt=0.9)]], SAME_RUN] = key("§", None, 0.2)
+    radii: Filled[tuple[Radius, Radius]] = key("Radii of the beads. The first bead leads.", None, ["0.3 mm", "0.2 mm"])
+    diameters: Annotated[Filled[tuple[Diameter, Diameter]], SAME_RUN] = key(
+        "Diameters of the beads, instead of `radii`.", None, ["0.6 mm", "0.4 mm"]
+    )
+    mean_radius: Annotated[Filled[Radius], SAME_RUN] = key(
+        "Mean radius of a dimer, together with `sin_delta` instead of `radii`.", None, "0.25 mm"
+    )
+    sin_delta: Annotated[Filled[Annotated[Number, Field(gt=-0.9, lt=0.9)]], SAME_RUN] = key(
+        "Asymmetry of a dimer, sin δ = (R1 − R2)/(R1 + R2).", None, 0.2
+    )
 
 
 class Cluster(Walkers):
@@ -289,13 +314,22 @@ class Cluster(Walkers):
 
     choices: ClassVar = (Choice((("radii",), ("diameters",))), Choice((("arrangement",), ("at",))))
     radii: Filled[Annotated[tuple[Radius, ...], Field(min_length=2, max_length=100)]] = key(
-        "§", None, ["0.3 mm", "0.2 mm", "0.2 mm"]
+        "Radii of the beads. The first bead leads.", None, ["0.3 mm", "0.2 mm", "0.2 mm"]
     )
     diameters: Annotated[Filled[Annotated[tuple[Diameter, ...], Field(min_length=2, max_length=100)]], SAME_RUN] = key(
-        "§", None, ["0.6 mm", "0.4 mm", "0.4 mm"]
+        "Diameters of the beads, instead of `radii`.", None, ["0.6 mm", "0.4 mm", "0.4 mm"]
     )
-    arrangement: str = key("§", "", "fan")
-    at: Annotated[tuple[_Place, ...], Field(max_length=100)] = key("§", (), [["0.2 mm", "0 mm"], ["-0.3 mm", "0 mm"]])
+    arrangement: str = key(
+        "Arrangement of the beads of a cluster: `chain`, `fan`, `diamond`, `ring` or `raft`. See "
+        "[](../cases.md#bodies).",
+        "",
+        "fan",
+    )
+    at: Annotated[tuple[_Place, ...], Field(max_length=100)] = key(
+        "Positions of the beads of a cluster (distance ahead, distance to the left), instead of an arrangement.",
+        (),
+        [["0.2 mm", "0 mm"], ["-0.3 mm", "0 mm"]],
+    )
 
 
 def _beside(one: float, other: float) -> list[tuple[float, list[float]]]:
@@ -318,15 +352,21 @@ class Mixture(Table):
         Choice((("large",), ("large_diameters",))),
         Choice((("count",), ("fill_height",))),
     )
-    small: Filled[_Range] = key("§", None, ["0.3 mm", "0.315 mm"])
-    large: Filled[_Range] = key("§", None, ["0.5 mm", "0.59 mm"])
-    small_diameters: Annotated[Filled[_RangeOfDiameters], SAME_RUN] = key("§", None, ["0.6 mm", "0.63 mm"])
-    large_diameters: Annotated[Filled[_RangeOfDiameters], SAME_RUN] = key("§", None, ["1 mm", "1.18 mm"])
-    small_share: Annotated[Number, Field(ge=0, le=1)] = key("§", 0.5)
-    mixed_by: Literal["mass", "volume", "number"] = key("§", "mass")
-    sizes: Annotated[Whole, Field(ge=1, le=20)] = key("§", 4)
-    count: Filled[Annotated[Whole, Field(ge=1, le=MOST_BEADS)]] = key("§", None, 200)
-    fill_height: Annotated[Filled[Length], SAME_RUN] = key("§", None, "3 mm")
+    small: Filled[_Range] = key("Range of radii of the small beads.", None, ["0.3 mm", "0.315 mm"])
+    large: Filled[_Range] = key("Range of radii of the large beads.", None, ["0.5 mm", "0.59 mm"])
+    small_diameters: Annotated[Filled[_RangeOfDiameters], SAME_RUN] = key(
+        "Range of diameters of the small beads, instead of `small`.", None, ["0.6 mm", "0.63 mm"]
+    )
+    large_diameters: Annotated[Filled[_RangeOfDiameters], SAME_RUN] = key(
+        "Range of diameters of the large beads, instead of `large`.", None, ["1 mm", "1.18 mm"]
+    )
+    small_share: Annotated[Number, Field(ge=0, le=1)] = key("Share of the small beads.", 0.5)
+    mixed_by: Literal["mass", "volume", "number"] = key("Quantity that `small_share` refers to.", "mass")
+    sizes: Annotated[Whole, Field(ge=1, le=20)] = key("Number of different radii in each range.", 4)
+    count: Filled[Annotated[Whole, Field(ge=1, le=MOST_BEADS)]] = key("Number of beads.", None, 200)
+    fill_height: Annotated[Filled[Length], SAME_RUN] = key(
+        "Height of the bed, instead of a number of beads.", None, "3 mm"
+    )
 
     @cached_property
     def small_radii(self) -> tuple[float, ...]:
@@ -394,9 +434,12 @@ class PlacedBead(Table):
     """One of ``[[placed]]``: a bead and where it begins, from the middle of the floor."""
 
     choices: ClassVar = (Choice((("radius",), ("diameter",))),)
-    radius: Filled[Radius] = key("§", None, "0.3 mm")
-    diameter: Annotated[Filled[Diameter], SAME_RUN] = key("§", None, "0.6 mm")
-    at: tuple[SignedLength, SignedLength, SignedLength] = key("§", example=["5 mm", "-3 mm", "0.3 mm"])
+    radius: Filled[Radius] = key("Radius of the bead.", None, "0.3 mm")
+    diameter: Annotated[Filled[Diameter], SAME_RUN] = key("Diameter of the bead, instead of `radius`.", None, "0.6 mm")
+    at: tuple[SignedLength, SignedLength, SignedLength] = key(
+        "Position of the bead's centre at the start: x, y, z from the middle of the floor.",
+        example=["5 mm", "-3 mm", "0.3 mm"],
+    )
 
 
 @dataclass(frozen=True)

@@ -111,17 +111,19 @@ class Boundary(Table):
 
     shape: Shape = key("Shape of the boundary. See [](../cases.md#boundaries).", "plane")
     material: Annotated[str, SAME_RUN] = key(
-        "Material of the boundary, from the library. Any other name is possible if the case gives all friction "
-        "coefficients.",
+        "Material of the boundary, from the library. Any other name is possible if the case gives all "
+        "friction coefficients.",
         example="chromium-coated glass",
     )
     opening: Filled[Annotated[float, replace(units.ANGLE, smallest=0.5, largest=3.1, sign=units.POSITIVE)]] = key(
-        "Angle between the walls of a groove.", None, "120 deg"
+        "Angle between the two walls of a groove.", None, "120 deg"
     )
-    width: Filled[units.Length] = key("Width of a channel, inner side of a box, or diameter.", None, "5.3 mm")
-    height: Filled[units.Length] = key("Height of a container.", None, "5.3 mm")
-    tilt: Annotated[float, replace(units.ANGLE, largest=1.5708, sign=_SLOPE)] = key("Tilt of the boundary.", 0.0)
-    uphill: units.Angle = key("Direction of the steepest way up, from that of the drive.", 0.0)
+    width: Filled[units.Length] = key("Width of a channel; inner side or diameter of a container.", None, "5.3 mm")
+    height: Filled[units.Length] = key("Height of a container. Beads are lost above twice this height.", None, "5.3 mm")
+    tilt: Annotated[float, replace(units.ANGLE, largest=1.5708, sign=_SLOPE)] = key(
+        'Tilt of the floor: 0° is level, 90° is a wall. `uphill = "180 deg"` turns the slope.', 0.0
+    )
+    uphill: units.Angle = key("Direction of the steepest ascent, measured within the floor from the drive axis.", 0.0)
 
     @classmethod
     def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:

@@ -1,7 +1,7 @@
 """A case: bodies on a boundary under a drive, with a liquid and contacts; a file's keys are its fields.
 
 Values are numbers in SI units. What the file leaves out comes from the library, from defaults or from other values
-(`walkers.inputs.resolving`), and ``sources`` says from where. The deck is rendered from it, a run directory stores it as
+(`walkers.inputs.resolving`), and ``sources`` says from where. A deck is rendered from it, a run directory stores it as
 ``case.json``, and the hash in a run's name is made of it.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
+from html import escape
 from math import cos, hypot, inf, sin
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -43,8 +44,13 @@ DEFAULT_LAW = "young-laplace"
 class Beads(Table):
     """``[beads]``: what all beads are made of."""
 
-    material: Annotated[str | None, SAME_RUN] = key("§", None, "ruby")
-    density: units.Density = key("§")
+    material: Annotated[str | None, SAME_RUN] = key(
+        "Material of all beads, from the library. It gives the density and, with the boundary's material, the"
+        " friction.",
+        None,
+        "ruby",
+    )
+    density: units.Density = key("Density of the beads.")
 
 
 class Liquid(Table):
@@ -58,18 +64,36 @@ class Liquid(Table):
     """
 
     choices: ClassVar = (Choice((("dynamic_viscosity",), ("kinematic_viscosity",))),)
-    name: Annotated[str | None, SAME_RUN] = key("§", None, "Si AK5")
-    mass_fraction: Annotated[Filled[Annotated[Number, Field(ge=0, le=1)]], SAME_RUN] = key("§", None, 0.87)
-    temperature: Annotated[Filled[units.Temperature], SAME_RUN] = key("§", None)
-    surface_tension: units.SurfaceTension = key("§")
-    density: Annotated[Filled[units.Density], SAME_RUN] = key("§", None)
-    kinematic_viscosity: Annotated[Filled[units.KinematicViscosity], SAME_RUN] = key("§", None)
-    dynamic_viscosity: Filled[units.DynamicViscosity] = key("§", None)
-    volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)] = key("§", example=0.01)
-    viscosity_ratio: Annotated[Number, Field(ge=0, le=1e4)] = key("§", 1.0)
-    contact_angle: units.UpToRightAngle = key("§")
-    conserved: Flag = key("§", False)
-    law: str = key("§", DEFAULT_LAW)
+    name: Annotated[str | None, SAME_RUN] = key(
+        "Liquid from the library. The other keys override its values.", None, "Si AK5"
+    )
+    mass_fraction: Annotated[Filled[Annotated[Number, Field(ge=0, le=1)]], SAME_RUN] = key(
+        "Mass fraction of glycerol in the liquid `water-glycerol`.", None, 0.87
+    )
+    temperature: Annotated[Filled[units.Temperature], SAME_RUN] = key(
+        "Temperature of the liquid `water-glycerol`. Default: 20 °C.", None
+    )
+    surface_tension: units.SurfaceTension = key("Surface tension.")
+    density: Annotated[Filled[units.Density], SAME_RUN] = key("Density of the liquid.", None)
+    kinematic_viscosity: Annotated[Filled[units.KinematicViscosity], SAME_RUN] = key("Kinematic viscosity.", None)
+    dynamic_viscosity: Filled[units.DynamicViscosity] = key("Dynamic viscosity, instead of the kinematic one.", None)
+    volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)] = key(
+        "Volume of liquid on a bead divided by the volume of the bead.", example=0.01
+    )
+    viscosity_ratio: Annotated[Number, Field(ge=0, le=1e4)] = key(
+        "Viscosity of the bridges divided by the viscosity of the liquid. It scales the drag of the bridges.", 1.0
+    )
+    contact_angle: units.UpToRightAngle = key(
+        "Contact angle at every bridge, between beads and at the boundary. A case whose bridges push the "
+        "beads of a walker apart at rest is refused."
+    )
+    conserved: Flag = key(
+        "Whether a bridge takes its volume from the films of its beads and gives it back when it breaks, so "
+        "that bridges share the liquid; otherwise the volume of a bridge does not depend on other bridges. "
+        "For piles.",
+        False,
+    )
+    law: str = key("Law of the bridges. See [](../../how-to/bridge-law.md).", DEFAULT_LAW)
 
     @cached_property
     def of_bridges(self) -> BridgeLiquid:
@@ -87,8 +111,8 @@ class Liquid(Table):
 class Friction(Table):
     """``[contact.friction]``: Coulomb coefficients."""
 
-    bead_bead: Coefficient = key("§", example=0.25)
-    bead_wall: Coefficient = key("§", example=0.25)
+    bead_bead: Coefficient = key("Coulomb coefficient between two beads.", example=0.25)
+    bead_wall: Coefficient = key("Coulomb coefficient between a bead and the boundary.", example=0.25)
 
 
 class Contact(Table):
@@ -98,17 +122,27 @@ class Contact(Table):
     """
 
     friction: Friction = key("")
-    rolling_friction: Coefficient = key("§", example=0.01)
-    restitution: Annotated[Number, Field(gt=0.05, le=1)] = key("§", example=0.5)
-    youngs_modulus: Annotated[float, replace(units.MODULUS, smallest=5e6, largest=1e9)] = key("§", 5e7)
-    poissons_ratio: Annotated[Number, Field(ge=0, lt=0.5)] = key("§", 0.3)
-    minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)] = key("§", example=0.05)
+    rolling_friction: Coefficient = key(
+        "Coefficient of rolling friction (constant-directional-torque model); 0 switches it off.", example=0.01
+    )
+    restitution: Annotated[Number, Field(gt=0.05, le=1)] = key(
+        "Coefficient of restitution of the dry contact.", example=0.5
+    )
+    youngs_modulus: Annotated[float, replace(units.MODULUS, smallest=5e6, largest=1e9)] = key(
+        "Young's modulus of the beads and the boundary. It is lower than the real one, so that the time step "
+        "can be longer.",
+        5e7,
+    )
+    poissons_ratio: Annotated[Number, Field(ge=0, lt=0.5)] = key("Poisson's ratio.", 0.3)
+    minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)] = key(
+        "Gap, divided by the reduced radius, below which the drag of the bridges stops growing.", example=0.05
+    )
 
 
 class Environment(Table):
     """``[environment]``."""
 
-    gravity: units.Acceleration = key("§", 9.81)
+    gravity: units.Acceleration = key("Acceleration of gravity.", 9.81)
 
 
 def _ranges(value: object) -> object:
@@ -144,7 +178,7 @@ class Case(Table):
     recorded it.
     """
 
-    title: Annotated[str, SAME_RUN] = key("§", "")
+    title: Annotated[str, SAME_RUN] = key("Title of figures and reports. It does not change the results.", "")
     beads: Beads = key("")
     dimers: Dimers | None = key("", None)
     clusters: Annotated[tuple[Cluster, ...], Field(max_length=100)] = key("", ())
@@ -156,10 +190,14 @@ class Case(Table):
     contact: Contact = key("")
     run: Run = key("", Run())
     environment: Environment = key("", Environment())
-    uncertain: Annotated[Ranges, SAME_RUN] = key("§", {})
+    uncertain: Annotated[Ranges, SAME_RUN] = key(
+        "Ranges of values that are guesses, by dotted key: `[low, high]`, or `{ loguniform = [low, high] }`. "
+        "See [](../../how-to/own-beads.md).",
+        {},
+    )
     name: Annotated[Derived[str], SAME_RUN] = "case"
-    document: Annotated[Derived[dict[str, Any]], SAME_RUN] = {}
-    sources: Annotated[Derived[dict[str, Source]], SAME_RUN] = {}
+    document: Annotated[Derived[dict[str, Any]], SAME_RUN] = Field({})
+    sources: Annotated[Derived[dict[str, Source]], SAME_RUN] = Field({})
     recorded_law: Annotated[Derived[Any], SAME_RUN, Field(exclude=True)] = None
 
     @classmethod
@@ -289,7 +327,7 @@ class Case(Table):
             if name in ("title", "uncertain") or name.startswith("placed["):  # no value, or hundreds
                 continue
             raw, kind = value_at(self.document, parts_of(name)), kind_in([*field.metadata, field.annotation])
-            if raw is not MISSING and not (isinstance(raw, str) and raw.strip().lower() == "auto"):
+            if raw is not MISSING and not (units.is_auto(raw)):
                 origins[name] = Origin(name, text_of(raw), "given", value=value)
             elif source := self.sources.get(name):
                 text = source.text or text_of(value, kind)
@@ -305,6 +343,16 @@ class Case(Table):
             logarithmic = distribution == "loguniform"
             origins[name] = replace(one, range=(low, high), logarithmic=logarithmic, uncertain=True)
         return tuple(origins.values())
+
+    def __repr__(self) -> str:
+        given = ", ".join(f"{one.key} = {one.text}" for one in self.origins if one.origin == "given")
+        return f"<Case {self.name}: {given}>"
+
+    def _repr_html_(self) -> str:
+        """All values with their origins, for notebooks."""
+        cells = ([one.key, one.text, one.word, one.source] for one in self.origins)
+        rows = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in cells)
+        return f"<table><caption>{escape(self.title or self.name)}</caption>{rows}</table>"
 
     # --- questions ------------------------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from functools import cached_property
 from math import degrees, gcd, hypot, isclose, isfinite, lcm, pi
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from walkers.inputs import units
 from walkers.inputs.table import SAME_RUN, Choice, Filled, Table, key
@@ -45,21 +45,26 @@ def _axis(value: object) -> object:
     raise ValueError("expected 'x', 'y' or 'z', or a direction such as [1, 0, 1]")
 
 
+_AXIS = {"anyOf": [{"enum": list(AXES)}, {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}]}
+
+
 class Harmonic(Table):
     """One of ``[[drive.harmonics]]``; exactly one of ``peak_acceleration`` and ``gamma0``."""
 
     choices: ClassVar[tuple[Choice, ...]] = (Choice((("peak_acceleration",), ("gamma0",))),)
-    axis: Annotated[Any, BeforeValidator(_axis)] = key(
-        "Direction of the drive: `x`, `y`, `z`, or components such as `[1, 0, 1]`. Default: `x` on planes, `z` in "
-        "containers.",
+    axis: Annotated[Any, BeforeValidator(_axis), WithJsonSchema(_AXIS)] = key(
+        "Direction of the shaking. Default: `x`; in containers `z`.",
         None,
     )
-    frequency: units.Frequency = key("Frequency of the drive.")
-    peak_acceleration: Filled[units.Acceleration] = key("Peak acceleration.", None)
+    frequency: units.Frequency = key("Frequency in cycles per second.")
+    peak_acceleration: Filled[units.Acceleration] = key("Peak acceleration of the boundary; `g` is 9.8 m/s².", None)
     gamma0: Annotated[Filled[Coefficient], SAME_RUN] = key(
-        "Peak acceleration as Γ0 = a0 M/(4πγR̄) of the dimer, instead of `peak_acceleration`.", None, 0.5
+        "Dimensionless peak force Γ0 = a0 M/(4πγR̄), instead of the peak acceleration. M is the mass of both "
+        "beads, R̄ their mean radius.",
+        None,
+        0.5,
     )
-    phase: Angle = key("Phase φ of the displacement sin(2π f t + φ).", 0.0)
+    phase: Angle = key("Phase of the sine.", 0.0)
 
     @property
     def sine(self) -> Sine:
@@ -79,9 +84,14 @@ class Drive(Harmonic):
         Choice((("peak_acceleration",), ("gamma0",), ("harmonics",))),
         Choice((("frequency",), ("harmonics",))),
     )
-    frequency: Filled[units.Frequency] = key("Frequency of the drive.", None)
-    waveform: Literal["sine", "triangle", "sawtooth"] = key("Waveform of the acceleration.", "sine")
-    frame: Frame = key("Frame in which the equations are solved; the laboratory's is for checks.", "container")
+    frequency: Filled[units.Frequency] = key("Frequency in cycles per second.", None)
+    waveform: Literal["sine", "triangle", "sawtooth"] = key(
+        "Waveform of the acceleration. `triangle` and `sawtooth` contain harmonics up to the 9th.", "sine"
+    )
+    frame: Frame = key(
+        "`container`: the beads feel the inertial force. `lab`: the boundary moves. Velocities agree within 10⁻⁶.",
+        "container",
+    )
     harmonics: Annotated[tuple[Harmonic, ...], Field(max_length=24)] = key("Several harmonics.", ())
 
     @cached_property

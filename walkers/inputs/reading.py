@@ -34,20 +34,20 @@ def shipped(kind: str) -> dict[str, Path]:
     return {path.stem: path for path in sorted((_HERE / f"{kind}s").glob("*.toml"))}
 
 
-def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Case:
+def load_case(case: str | Path | Mapping[str, Any], changes: Mapping[str, Any] | None = None) -> Case:
     """Read and resolve a case.
 
     Parameters
     ----------
     case
-        A TOML file, or the name of a shipped case such as ``fig1b``.
+        A TOML file, the name of a shipped case such as ``fig1b``, or the tables of a case file.
     changes
         Values that replace those of the file, by dotted keys, written as in a case file.
 
     Returns
     -------
     Case
-        Named after the file.
+        Named after the file; ``case`` if there is none.
 
     Raises
     ------
@@ -62,12 +62,13 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Cas
     >>> load_case("fig1b", {"drive.frequency": "70 Hz", "dimers.radii[1]": "0.25 mm"}).walkers[0].radii
     (0.0003, 0.00025)
     """
-    path = find_input(case, "case")
-    document = read_case(path)
+    path = Path("case.toml") if isinstance(case, Mapping) else find_input(case, "case")
+    document = case if isinstance(case, Mapping) else read_case(path)
     # Not above: that there is no such file is told before all that a case may say is built.
     from walkers.inputs.case import Case
 
-    return Case.read(document, source=str(case), name=path.stem, changes=changes)
+    source = "<case>" if isinstance(case, Mapping) else str(case)
+    return Case.read(document, source=source, name=path.stem, changes=changes)
 
 
 def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:

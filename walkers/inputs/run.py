@@ -63,20 +63,47 @@ class Run(Table):
         Choice((("cycles",), ("duration",), ("most_cycles",)), required=False),
         Choice((("samples_per_cycle",), ("frames_per_second",)), required=False),
     )
-    time_step: Annotated[Filled[units.Time], AUTO] = key("§", None)
-    allow_unstable: Annotated[Flag, SAME_RUN] = key("§", False)
-    cycles: Annotated[Filled[_Cycles], AUTO] = key("§", None, 60)
-    most_cycles: Annotated[Filled[_Cycles], SAME_RUN] = key("§", None, 60)
-    duration: Annotated[Filled[Duration], SAME_RUN] = key("§", None)
-    settling_cycles: Filled[Annotated[Whole, Field(ge=0, le=1_000_000)]] = key("§", None, 20)
-    samples_per_cycle: Filled[_Samples] = key("§", None, 20)
-    bridge_samples_per_cycle: Annotated[Filled[_Samples], SAME_RUN] = key("§", None, 1)
-    frames_per_second: Annotated[Filled[Annotated[Number, Field(gt=0, le=1e6)]], SAME_RUN] = key("§", None, 60)
-    segment: Annotated[Filled[Duration], SAME_RUN] = key("§", None)
-    settled_below: Filled[units.Speed] = key("§", None)
-    longest_settling: Filled[units.NonNegativeDuration] = key("§", None)
-    ranks: Annotated[Whole, Field(ge=1, le=64)] = key("§", 1)
-    seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)] = key("§", 1)
+    time_step: Annotated[Filled[units.Time], AUTO] = key(
+        "Time step, or its upper limit; the program shortens it so that a cycle contains a whole number of samples.",
+        None,
+    )
+    allow_unstable: Annotated[Flag, SAME_RUN] = key("Accept a time step beyond a stability limit.", False)
+    cycles: Annotated[Filled[_Cycles], AUTO] = key(
+        "Number of drive cycles. `auto`: until the walkers are steady. See [](../cases.md#length-of-a-run).", None, 60
+    )
+    most_cycles: Annotated[Filled[_Cycles], SAME_RUN] = key('Upper limit for `cycles = "auto"`. Default: 60.', None, 60)
+    duration: Annotated[Filled[Duration], SAME_RUN] = key(
+        "Duration of the drive, instead of a number of cycles. Mixtures and placed beads need it.", None
+    )
+    settling_cycles: Filled[Annotated[Whole, Field(ge=0, le=1_000_000)]] = key(
+        "Cycles at the start that are excluded from means and velocities. Default: a third of the cycles, at most 20.",
+        None,
+        20,
+    )
+    samples_per_cycle: Filled[_Samples] = key("Samples of the beads per cycle. Default: 20.", None, 20)
+    bridge_samples_per_cycle: Annotated[Filled[_Samples], SAME_RUN] = key(
+        "Samples of the bridges per cycle, a divisor of `samples_per_cycle`. Default: 1; all samples for loose beads.",
+        None,
+        1,
+    )
+    frames_per_second: Annotated[Filled[Annotated[Number, Field(gt=0, le=1e6)]], SAME_RUN] = key(
+        "Samples per second, instead of per cycle. Default for loose beads: 60.", None, 60
+    )
+    segment: Annotated[Filled[Duration], SAME_RUN] = key(
+        "Length of a segment. A run of several segments can continue after an interruption. Default for loose"
+        " beads: 0.5 s.",
+        None,
+    )
+    settled_below: Filled[units.Speed] = key(
+        "Root mean square velocity at which a pile counts as settled. Default for loose beads: 5 mm/s.", None
+    )
+    longest_settling: Filled[units.NonNegativeDuration] = key(
+        "Longest time for settling before the drive starts. Default for loose beads: 0.5 s.", None
+    )
+    ranks: Annotated[Whole, Field(ge=1, le=64)] = key(
+        "Number of MPI processes. More than one helps large piles only.", 1
+    )
+    seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)] = key("Seed of the random perturbations and of poured beads.", 1)
     steps_per_cycle: Derived[int] = 0
     until_steady: Derived[bool] = False
     cycles_per_sample: Derived[int] = 1

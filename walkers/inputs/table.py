@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, Ty
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, ValidationInfo
 from pydantic.fields import FieldInfo
+from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError, PydanticUndefined
 
 from walkers.errors import Problem, unusable
 from walkers.inputs.keys import joined, parts_of
-from walkers.inputs.units import WRITTEN
+from walkers.inputs.units import WRITTEN, is_auto, kind_in, shown_in_file
 
 T = TypeVar("T")
 SAME_RUN = "same run"
@@ -49,7 +50,7 @@ else:
         """A field that follows from others, which no file has."""
 
         def __class_getitem__(cls, kind: Any) -> Any:
-            return Annotated[kind, _DERIVED]
+            return Annotated[kind, _DERIVED, SkipJsonSchema()]
 
 
 def key(meaning: str, default: Any = PydanticUndefined, example: Any = None, **bounds: Any) -> Any:
@@ -132,7 +133,7 @@ class Table(BaseModel):
                 yield place, value, field
 
     def determinants(self) -> dict[str, Any]:
-        """The values that make another run if they differ; absent ones are left out, so that new keys rename no runs."""
+        """The values that make another run if they differ; absent ones are left out: new keys rename no runs."""
         kept = {}
         for name, field in type(self).model_fields.items():
             if SAME_RUN in field.metadata or (value := getattr(self, name)) in (None, ()):
@@ -147,7 +148,7 @@ class Table(BaseModel):
     def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
         """What a table that is given at a place says in no way, or in two."""
         for choice in cls.choices:
-            said = [way for way in choice.ways if any(name in given and not _is_auto(given[name]) for name in way)]
+            said = [way for way in choice.ways if any(name in given and not is_auto(given[name]) for name in way)]
             if len(said) > 1:
                 name = next(name for name in said[1] if name in given)
                 yield Problem(joined([*parts_of(place), name]), None, f"expected either {choice.text}")
@@ -159,10 +160,6 @@ class Table(BaseModel):
                     if name not in given:
                         example = example_of(cls.model_fields[name])
                         yield Problem(joined([*parts_of(place), name]), None, f"missing; expected {example}{instead}")
-
-
-def _is_auto(value: object) -> bool:
-    return isinstance(value, str) and value.strip().lower() == "auto"
 
 
 def keys_in(model: type[BaseModel]) -> dict[str, FieldInfo]:
@@ -185,8 +182,6 @@ def table_in(annotation: Any) -> type[Table] | None:
 
 def example_of(field: FieldInfo) -> str:
     """An example of what a key takes: ``such as "80 Hz"``."""
-    from walkers.inputs.units import kind_in, shown_in_file
-
     if field.examples:
         return f"such as {shown_in_file(field.examples[0])}"
     kind = kind_in([*field.metadata, field.annotation])

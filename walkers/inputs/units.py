@@ -14,9 +14,9 @@ from functools import cache, lru_cache
 from math import pi
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
-from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema
-from pydantic_core.core_schema import with_info_before_validator_function
+from pydantic_core.core_schema import no_info_before_validator_function, with_info_before_validator_function
 
 if TYPE_CHECKING:
     from pint import UnitRegistry
@@ -26,6 +26,8 @@ ACCELERATION_OF_ONE_G = 9.8
 
 # pint's own expression parser reads "0,3 mm" as 0 mm and "0.3 mm; 2" as 0.6 mm: only its unit parser is used.
 _NUMBER_AND_UNIT = re.compile(r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s%,;][^%,;]*)")
+_PATTERN = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[^\d\s%,;]"
+"""The begin of a quantity, for editors."""
 _GRAM_SYMBOL = re.compile(r"(?<![A-Za-z_])g(?![A-Za-z_0-9])")
 _ANGLE_UNITS = frozenset({"degree", "radian", "milliradian", "arcminute", "arcsecond"})
 _USUAL: Mapping[str, tuple[str, float]] = {
@@ -73,7 +75,7 @@ class Kind:
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """A text with a unit, for editors that check case files."""
-        return {"type": "string", "description": self.expectation, "examples": [self.example]}
+        return {"type": "string", "pattern": _PATTERN, "description": self.expectation, "examples": [self.example]}
 
     def _read(self, value: object, info: ValidationInfo) -> object:
         if not isinstance(value, str):
@@ -218,12 +220,22 @@ DynamicViscosity = Annotated[float, DYNAMIC_VISCOSITY]
 Temperature = Annotated[float, TEMPERATURE]
 
 
-def _is_auto(value: object) -> bool:
+def is_auto(value: object) -> bool:
+    """Whether a value is the word "auto"."""
     return isinstance(value, str) and value.strip().lower() == "auto"
 
 
-AUTO = BeforeValidator(lambda value: None if _is_auto(value) else value)
-"""Reads "auto" as None."""
+class _Auto:
+    """Reads "auto" as None."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return no_info_before_validator_function(lambda value: None if is_auto(value) else value, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        return {"anyOf": [handler(schema), {"const": "auto"}]}
+
+
+AUTO = _Auto()
 Whole = Annotated[int, Field(strict=True)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 """TOML's integers and floats only: neither "0.3" nor true is a coefficient."""

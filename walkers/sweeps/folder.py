@@ -235,7 +235,9 @@ def select(
         if runs and not any(has_key(run.parameters, key) for run in runs):
             known = ", ".join(dict.fromkeys(one for run in runs for one in run.parameters))
             raise InputError("--where", [Problem(key, None, f"no run has such a key; they have {known}")])
-        alike = FlatCase({key: 0.0}) if kind_of(key) and "/" not in value else FlatCase()  # if there are no runs to compare with
+        alike = (
+            FlatCase({key: 0.0}) if kind_of(key) and "/" not in value else FlatCase()
+        )  # if there are no runs to compare with
         for parameters in [run.parameters for run in runs] or [alike]:
             try:
                 check_wanted(parameters, key, value)

@@ -220,7 +220,7 @@ def compose(plan: Plan) -> Deck:
         If the law of the bridges cannot be tabulated.
     """
     case, scene = plan.case, plan.scene
-    layout = _layout(plan)
+    layout, gravity = _layout(plan), case.environment.gravity
     surfaces = scene.surfaces or (surface_of(case),)
     several = len(scene.loadings) > 1
     contacts = [contact for contact, _ in surfaces]
@@ -260,7 +260,7 @@ def compose(plan: Plan) -> Deck:
         friction=_coefficients(contacts, named, "friction.bead_bead", "friction.bead_wall"),
         rolling_friction=_coefficients(contacts, named, "rolling_friction"),
         restitution=_coefficients(contacts, named, "restitution"),
-        down=[component / case.environment.gravity for component in case.gravity_vector] if case.environment.gravity else [],
+        down=[component / gravity for component in case.gravity_vector] if gravity else [],
         plan=plan,
         shaken=plan.drive_from is not None,
         several=several,

@@ -1,0 +1,40 @@
+"""JSON schema of a case file, with which editors complete and check it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core.core_schema import NullableSchema, WithDefaultSchema
+
+from walkers.inputs.case import Case
+
+
+class _Generator(GenerateJsonSchema):
+    """Without null, which TOML lacks, without defaults, which are in SI units, and without titles."""
+
+    def field_title_should_be_set(self, schema: Any) -> bool:  # noqa: ARG002
+        return False
+
+    def nullable_schema(self, schema: NullableSchema) -> JsonSchemaValue:
+        return self.generate_inner(schema["schema"])
+
+    def default_schema(self, schema: WithDefaultSchema) -> JsonSchemaValue:
+        return self.generate_inner(schema["schema"])
+
+
+def case_schema() -> dict[str, Any]:
+    """The schema of a case file (JSON Schema 2020-12): keys, meanings, types, bounds and examples.
+
+    It does not say what excludes what (`walkers.inputs.table.Choice`), nor what the library knows.
+    """
+    schema = Case.model_json_schema(schema_generator=_Generator)
+    schema["properties"]["library"] = {"type": "object", "description": "Materials and liquids of the case itself."}
+    for table in ("Beads", "Liquid", "Contact", "Friction"):  # the library may give what they lack
+        schema["$defs"][table].pop("required", None)
+    return {
+        **schema,
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Case file of granular-walkers",
+        "required": ["beads", "boundary", "drive", "liquid"],
+    }
