@@ -57,8 +57,10 @@ DEPTH = hertz_overlap(4.0 / 3.0 * np.pi * RADIUS**3 * 4000.0 * 9.81, RADIUS, red
 def matter(step: float = 1e-6, gravity: str = "0 m/s^2", tilt: str = "0 deg", **contact: float) -> Case:
     """Elastic beads without friction, but for some changes."""
     case = bench_case(environment={"gravity": gravity}, boundary={"tilt": tilt}, liquid={"law": "young-laplace"})
-    contacts = replace(case.contact, youngs_modulus=5e7, poissons_ratio=0.3, **contact)
-    return replace(case, contact=contacts, run=replace(case.run, time_step=step, steps_per_cycle=0))
+    case = case.put("contact.youngs_modulus", 5e7).put("contact.poissons_ratio", 0.3)
+    for name, value in contact.items():
+        case = case.put(f"contact.{name.replace('friction_bead', 'friction.bead')}", value)
+    return case.put("run.time_step", step).put("run.steps_per_cycle", 0)
 
 
 def one_bead(
@@ -125,9 +127,11 @@ def test_a_bead_rolls_to_rest_and_swings_in_a_cylinder() -> None:
 def test_bridges_are_the_law_between_its_knots() -> None:
     """Pull and resistances, at gaps that are none of the splines', to 1e-8."""
     case = matter()
-    case = replace(case, liquid=replace(case.liquid, dynamic_viscosity=0.01))
+    case = case.put("liquid.dynamic_viscosity", 0.01)
     bridges = one_bead(case, (0.0, 0.0, RADIUS), without=()).constants.bridges
-    curve = by_name(case.liquid.law)(Surfaces.of(RADIUS, inf, case.liquid, case.contact.minimum_separation_ratio))
+    curve = by_name(case.liquid.law)(
+        Surfaces.of(RADIUS, inf, case.liquid.of_bridges, case.contact.minimum_separation_ratio)
+    )
     for gap in np.linspace(0.0, 0.999 * curve.rupture, 777):
         expected = curve.forces(np.array([gap])).columns()[0]
         assert kernels.bridge_forces(bridges, bridges.between[0, -1], gap) == pytest.approx(expected, rel=1e-8)
@@ -179,11 +183,10 @@ def test_other_kinds_of_cases_agree(name: str, tmp_path: Path) -> None:
     To 0.1 nm without rolling friction, which amplifies rounding.
     """
     case = shortened(full_cases()[name], 3)
-    assert case.as_read
     found = compare([run(case, tmp_path).motion])
     assert found.chapter().failures == []
     assert found.starts[0].apart.max() < 1e-5
-    free = replace(case, contact=replace(case.contact, rolling_friction=0.0))
+    free = case.put("contact.rolling_friction", 0.0)
     assert compare([run(free, tmp_path).motion]).starts[0].apart.max() < 1e-10
 
 
@@ -214,7 +217,7 @@ def test_piles_agree_until_they_are_chaotic(in_folder: Path) -> None:
     done = call("check", "pile.toml", "--cycles", "9", "--seeds", "2", "--json", check=True)
     (told,) = json.loads(done.stdout)["checks"]
     *means, first, second = [line["what"] for line in told["lines"]]
-    seed = load_case("pile-ci").seed
+    seed = load_case("pile-ci").run.seed
     assert (first.startswith(f"start {seed}, same"), second.startswith(f"start {seed + 1}, same")) == (True, True)
     assert [what.split(" (")[0] for what in means][::2] == ["height of the beads", "touching pairs per bead"]
 
@@ -319,7 +322,7 @@ def test_commands_that_are_refused(bench: Bench, command: str) -> None:
 def test_a_dry_contact_with_a_wall_begins_without_friction(bench: Bench) -> None:
     """Sheared, lifted and put down again, where films are empty: the spring of the first contact has ended."""
     case = bench_case(liquid={"law": "willett"}, contact={"friction": {"bead_bead": 0.3, "bead_wall": 0.3}})
-    case = replace(case, liquid=replace(case.liquid, conserved=True))
+    case = case.put("liquid.conserved", True)
     deck = compose(prescribed(case, standing([over(FLOOR, -1e-6, RADIUS, spin=STILL)]), 60))
     empty = deck.text.replace("scalar yes yes no 1.0", "scalar yes yes no 0.0")
     assert empty != deck.text
@@ -351,7 +354,7 @@ def test_liquid_is_conserved(bench: Bench, ranks: int) -> None:
     """Beads that fly through each other along a floor: their films are those that the rule of the bridges gives."""
     steps, dt, draw = 4000, 1e-6, np.random.default_rng(3)
     case = bench_case(liquid={"volume_fraction": 0.02, "law": "willett"})  # whose tables take no time
-    case = replace(case, liquid=replace(case.liquid, conserved=True))
+    case = case.put("liquid.conserved", True)
     sizes = draw.choice([2e-4, 2.5e-4, 3e-4], 16)
     start = np.column_stack([draw.uniform(-8e-4, 8e-4, (16, 2)), sizes + draw.uniform(-3e-5, 8e-5, 16)])
     velocity = np.column_stack([draw.uniform(-0.3, 0.3, (16, 2)), draw.uniform(-0.03, 0.03, 16)])

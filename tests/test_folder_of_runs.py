@@ -156,7 +156,7 @@ def test_list_reads_neither_dumps_nor_tables(out: Path) -> None:
 def test_what_a_case_gives_is_a_difference_and_what_follows_is_none(
     first: dict[str, Any], second: dict[str, Any], differ: set[str]
 ) -> None:
-    cases = [flattened(walkers.load_case("fig1b", one).as_dict()) for one in (first, second)]
+    cases = [flattened(walkers.load_case("fig1b", one)) for one in (first, second)]
     assert set(differing(cases)) == differ
 
 

@@ -88,14 +88,8 @@ def _tags(page: str) -> list[tuple[str, tuple[str, ...]]]:
 
 def _with_texts(case: Case, text: str) -> Case:
     """The case as somebody could hand it over: each text of it another."""
-    return replace(
-        case,
-        name=text,
-        title=text,
-        material=text,
-        liquid=replace(case.liquid, name=text),
-        boundary=replace(case.boundary, material=text),
-    )
+    named = case.put("beads.material", text).put("liquid.name", text).put("boundary.material", text)
+    return named.but(name=text, title=text)
 
 
 @pytest.fixture
@@ -127,7 +121,7 @@ def test_a_title_is_no_line_of_a_deck(name: str) -> None:
 def test_a_title_is_no_line_of_a_script_for_paraview(name: str, run_directory: Callable[..., Path]) -> None:
     motion, folder = read_motion(run_directory(run=SHORT)).driven, Path(f"/{HOSTILE[name]}")
     plain, odd = (
-        _script(replace(motion, case=replace(motion.case, title=title)), "walker", folder)
+        _script(replace(motion, case=motion.case.but(title=title)), "walker", folder)
         for title in ("plain", HOSTILE[name])
     )
     assert ast.dump(ast.parse(odd)) == ast.dump(ast.parse(plain))
@@ -197,7 +191,7 @@ def test_a_calibrations_title_is_no_line_of_its_report(name: str) -> None:
 @EACH
 def test_a_summary_of_a_case_has_no_line_of_its_title(name: str) -> None:
     case = make_case(run=SHORT)
-    plain, odd = (describe(summarise(replace(case, title=title))) for title in ("plain", HOSTILE[name]))
+    plain, odd = (describe(summarise(case.but(title=title))) for title in ("plain", HOSTILE[name]))
     assert len(odd.splitlines()) == len(plain.splitlines())
     assert all(line.isprintable() for line in odd.split("\n"))
 
@@ -268,7 +262,7 @@ def test_a_folder_that_is_no_utf8_is_refused_before_anything_is_done(case_file: 
     tries: list[Callable[[], object]] = [
         lambda: run_case("base.toml", folder),
         lambda: load_case(f"{NO_UTF8}.toml"),
-        lambda: run_case(load_case("base.toml").renamed(NO_UTF8), in_folder),
+        lambda: run_case(load_case("base.toml").but(name=NO_UTF8), in_folder),
     ]
     for attempt in tries:
         with pytest.raises(InputError, match=r"x\\xff.*: expected UTF-8 text"):

@@ -297,8 +297,7 @@ def test_a_scale_bar_is_as_long_as_beads_say(motion: Motion) -> None:
 
 def test_up_in_the_picture_is_up_against_gravity(motion: Motion) -> None:
     for degrees in (0.0, 10.0, 90.0):
-        boundary = replace(motion.case.boundary, tilt=np.radians(degrees))
-        tilted = replace(motion, case=replace(motion.case, boundary=boundary))
+        tilted = replace(motion, case=motion.case.put("boundary.tilt", np.radians(degrees)))
         right, up, toward = axes = camera_axes(tilted)
         np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
         gravity = np.array(tilted.case.gravity_vector)
@@ -309,11 +308,11 @@ def test_up_in_the_picture_is_up_against_gravity(motion: Motion) -> None:
 
 @pytest.mark.parametrize(("meet", "seen"), [(True, [-2.0, -2.0]), (False, [-2.0, 0.0])])
 def test_a_closed_tray_is_seen_from_above(meet: bool, seen: list[float], motion: Motion) -> None:
-    boundary = replace(motion.case.boundary, shape="box", width=4e-3, height=3e-3)
-    walkers = tuple(replace(one, meet=meet) for one in motion.case.walkers)
+    boundary = motion.case.boundary.but(shape="box", width=4e-3, height=3e-3)
+    case = motion.case.but(boundary=boundary).put("dimers.meet", meet)
     one = motion.of_walkers(motion.walkers[:1])
     inside = one.position - np.array([*one.walkers[0].origin, 0.0])
-    tray = replace(one, position=inside, case=replace(one.case, boundary=boundary, walkers=walkers))
+    tray = replace(one, position=inside, case=case)
     axes = camera_axes(tray)
     assert axes[2, 2] == float(meet)
     np.testing.assert_allclose(Scene.around(tray, axes, shaken=False).low[:2], seen, atol=1e-2)
@@ -341,7 +340,7 @@ def test_the_camera_follows_a_walker_that_walks_far(lengths: float, follows: boo
 @pytest.mark.parametrize(("tilt", "name"), [(0.0, "along the drive axis"), (20.0, "uphill")])
 def test_displacements_have_a_sign_and_a_direction(tilt: float, name: str, motion: Motion) -> None:
     one = motion.of_walkers(motion.walkers[:1])
-    case = replace(one.case, boundary=replace(one.case.boundary, tilt=np.radians(tilt)))
+    case = one.case.put("boundary.tilt", np.radians(tilt))
     way = -40.0 * case.walkers[0].length * one.time / one.time[-1]
     far = replace(one, case=case, position=one.position + way[:, None, None] * np.array(case.drive_axis))
     toward, direction = named_direction(far)
@@ -392,7 +391,7 @@ def test_walls_are_whole_wherever_the_beads_are(motion: Motion, boundary: Bounda
     """Beads high above the floor of a container, or far from the middle of what has no end; seams are at the ends."""
     away = [0.0, 0.0, 2e-3] if boundary.closed else [5e-2, 0.0, 0.0]
     beads = motion.position - motion.position.mean(axis=(0, 1)) + away
-    moved = replace(motion, position=0.1 * (beads - away) + away, case=replace(motion.case, boundary=boundary))
+    moved = replace(motion, position=0.1 * (beads - away) + away, case=motion.case.but(boundary=boundary))
     walls = mesh_of(walls_of(moved)).clean(tolerance=1e-9, absolute=True)
     assert (walls.n_cells, walls.bounds[4]) == (faces, pytest.approx(0.0, abs=1e-12))
     assert walls.n_open_edges == edges

@@ -245,7 +245,7 @@ def test_both_frames_shake_alike(tmp_path: Path) -> None:
     """Until chaotic trajectories part; in the laboratory the container's motion is taken off at any phase."""
     run = {"duration": "0.03 s", "frames_per_second": 680.0, **QUICK}
     cases = [small(drive={"frame": frame}, run=run) for frame in ("container", "lab")]
-    amplitude = cases[1].drive.amplitude
+    amplitude = cases[1].excitation.amplitude
     motions = [walkers.run(case, tmp_path).motion for case in cases]
     here, there = ([array[motion.first_driven :] for array in (motion.position, motion.velocity)] for motion in motions)
     assert cases[1].run.samples_per_cycle == 4
@@ -493,7 +493,7 @@ def test_of_runs_that_begin_alike_the_longest_counts(tmp_path: Path, monkeypatch
     runs = [("a-1", 1, 40, 7), ("b-2", 1, 80, 7), ("c-3", 2, 40, 7), ("d-4", 2, 20, 7), ("e-5", 1, 80, 6)]
     for name, seed, cycles, version in runs:
         (tmp_path / name).mkdir()
-        told = {"seed": seed, "run": {"cycles": cycles, "cycles_per_segment": min(cycles, 30)}, "gravity": 9.81}
+        told = {"run": {"seed": seed, "cycles": cycles, "cycles_per_segment": min(cycles, 30)}}
         (tmp_path / name / "manifest.json").write_text("{}")
         case = SimpleNamespace(determinants=lambda told=told: told)
         manifest = {"deck_version": version, "engine": {"sha256": "0" * 64}}

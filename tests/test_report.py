@@ -193,7 +193,7 @@ def test_the_player_shows_the_motion(walked_run: Path) -> None:
     rotation = read_table(walked_run, "walkers").iloc[0]
     for bead, key in enumerate(("rotation_1", "rotation_2")):
         assert np.mean(rolled[bead]) == pytest.approx(rotation[key], rel=0.01, abs=2e-6)
-    weightless = replace(motion, case=replace(motion.case, gravity=0.0))  # is seen as the floor lies
+    weightless = replace(motion, case=motion.case.put("environment.gravity", 0.0))  # is seen as the floor lies
     assert cameras_of(weightless) == cameras_of(motion)
     np.testing.assert_allclose(camera_axes(weightless), camera_axes(motion))
 
@@ -242,10 +242,10 @@ def test_words_and_numbers() -> None:
     assert {unit: (one.text, one.unit) for unit, one in shown.items() if one} == told
     case = make_case()
     assert "glass, Si AK5; 80 Hz" in caption(case)
-    assert "liquid of 19.2 mN/m; 80 Hz" in caption(replace(case, liquid=replace(case.liquid, name=None)))
-    tilted = replace(case, boundary=replace(case.boundary, tilt=pi / 3.0))
+    assert "liquid of 19.2 mN/m; 80 Hz" in caption(case.put("liquid.name", None))
+    tilted = case.put("boundary.tilt", pi / 3.0)
     assert caption(tilted).endswith("plane tilted by 60°, right is up")
-    aside = replace(tilted, boundary=replace(tilted.boundary, uphill=pi / 2.0))
+    aside = tilted.put("boundary.uphill", pi / 2.0)
     assert caption(aside).endswith("plane tilted by 60°, up is at 90° from x toward y")
 
 

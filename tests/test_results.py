@@ -195,7 +195,7 @@ def test_panels_have_one_named_direction(run_directory: Callable[..., Path]) -> 
     _, turned, _ = walk_panels([group])
     assert turned.lines[0].y[0] == pytest.approx(-30.0)
     assert "from\nleft" in turned.y
-    tray = replace(group.case, walkers=tuple(replace(one, meet=True, facing=-1) for one in group.case.walkers))
+    tray = group.case.put("dimers.meet", True).put("dimers.facing", "left")
     left = [replace(one, facing=-1) for one in group.walkers]
     (walked, turned, _) = walk_panels([replace(group, motion=replace(group.motion, case=tray), walkers=left)])
     assert turned.lines[0].y[0] == pytest.approx(150.0)
@@ -266,8 +266,7 @@ def test_mean_spins_are_those_of_all_steps_between_two_samples(groups: dict[int,
 def test_with_few_samples_a_cycle_gaps_are_looked_at_there_alone(groups: dict[int, Group]) -> None:
     """A cubic over a quarter of a cycle or more is no way of a bead that hops."""
     few = groups[20]
-    run = replace(few.case.run, samples_per_cycle=4)
-    motion = replace(few.motion, case=replace(few.case, run=run))
+    motion = replace(few.motion, case=few.case.put("run.samples_per_cycle", 4))
     names = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "mean_spin")
     motion = replace(motion, **{name: getattr(motion, name)[::5] for name in names}, frames=motion.frames[::5])
     thinned = Group(motion, few.make, few.walkers)

@@ -86,7 +86,7 @@ def test_the_name_depends_on_what_determines_the_run() -> None:
     assert name(title="another title") == name()
     other = replace(find_engine(), sha256="0" * 64)
     assert run_name(make_case(), other) != name()
-    long = run_name(make_case().renamed("a b/" * 100), other)
+    long = run_name(make_case().but(name="a b/" * 100), other)
     assert len(long) < 100
     assert "/" not in long
 
@@ -314,7 +314,7 @@ def test_an_engine_that_outlives_its_launcher_keeps_others_away(
     assert program.poll() is None
     program.kill()
     program.wait()
-    case = make_case(run=LONG).renamed("test")
+    case = make_case(run=LONG)
     try:
         with pytest.raises(RunBusy):
             run_case(case, in_folder / "runs", engine=engine)

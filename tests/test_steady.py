@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,6 @@ from tests.conftest import document
 from walkers import run as run_case
 from walkers.errors import InputError, Stopped
 from walkers.inputs.case import Case
-from walkers.inputs.drive import AXES
 from walkers.inputs.reading import load_case
 from walkers.postprocess.gait import are_constant, walk
 from walkers.postprocess.motion import read_motion
@@ -47,13 +45,13 @@ def _shipped(angle: float = 0.0, **drive: Any) -> Case:
 def _turning() -> Case:
     """A walker that still turns to the axis after 12 cycles, and less and less after 24: little drags it."""
     case = _shipped(4.0, peak_acceleration="8 g")
-    return replace(case, liquid=replace(case.liquid, dynamic_viscosity=4.6e-3))
+    return case.put("liquid.dynamic_viscosity", 4.6e-3)
 
 
 def test_a_steady_walker_ends_early_at_the_speed_of_a_long_run(runs_folder: Path) -> None:
     short = run_case(load_case("fig1b"), runs_folder)
     case = load_case("fig1b")
-    full = replace(case, run=replace(case.run, until_steady=False, cycles_per_segment=case.run.cycles))
+    full = case.but(run=case.run.but(until_steady=False, cycles_per_segment=case.run.cycles))
     long = run_case(full, runs_folder)
     assert (short.result["cycles"], short.result["settling_cycles"], short.result["ended_early"]) == (12, 4, True)
     assert (long.result["cycles"], long.result["settling_cycles"], long.result["ended_early"]) == (60, 20, False)
@@ -125,17 +123,17 @@ def test_a_length_said_twice_is_refused(key: str, run: dict[str, Any], expected:
 def _companions() -> list[Case]:
     """Walkers that feel other forces each, one of which goes on when the others are done."""
     case = _shipped()
-    drive = case.drive
-    return [
-        case.renamed("one"),
-        _turning().renamed("turning"),
-        replace(case, drive=drive.with_peak(0.5 * drive.peak_acceleration)).renamed("weak"),
-        replace(case, drive=replace(drive, harmonics=(replace(drive.largest, direction=AXES["y"]),))).renamed("across"),
-        replace(case, boundary=replace(case.boundary, tilt=0.3)).renamed("uphill"),
-        replace(case, gravity=5.0).renamed("light"),
-        replace(case, contact=replace(case.contact, friction_bead_wall=0.2)).renamed("rough"),
-        replace(case, liquid=replace(case.liquid, dynamic_viscosity=2e-3)).renamed("thin"),
-    ]
+    changes = {
+        "one": ("title", ""),
+        "weak": ("drive.peak_acceleration", 0.5 * case.excitation.peak_acceleration),
+        "across": ("drive.axis", "y"),
+        "uphill": ("boundary.tilt", 0.3),
+        "light": ("environment.gravity", 5.0),
+        "rough": ("contact.friction.bead_wall", 0.2),
+        "thin": ("liquid.dynamic_viscosity", 2e-3),
+    }
+    others = [case.put(*change).but(name=name) for name, change in changes.items()]
+    return [others[0], _turning().but(name="turning"), *others[1:]]
 
 
 def test_company_does_not_matter_whatever_forces_it_feels(tmp_path: Path) -> None:

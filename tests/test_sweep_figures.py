@@ -1,7 +1,6 @@
 """Figures of sweeps: what goes where, what is drawn, what is left out and said."""
 
 import shutil
-from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -253,8 +252,7 @@ def test_theory_is_a_curve_along_what_follows_from_a_key(looked_through: Path, x
         (run, *_) = rows["run"]
         near = case_of(Path(run))
         assert values[middle] == pytest.approx(
-            1e3
-            * predict(replace(near, drive=near.drive.with_peak(_peak(near, x, along[middle]))))["viscous"]["velocity"]
+            1e3 * predict(near.put("drive.peak_acceleration", _peak(near, x, along[middle])))["viscous"]["velocity"]
         )
 
 

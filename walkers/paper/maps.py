@@ -127,7 +127,7 @@ def fig_alignment(sources: Sources) -> Figure:
 
 def _draw_beginning(axes: Axes, trajectory: Group, colour: tuple[float, ...]) -> None:
     """Each walker with the solution for the same start."""
-    drive, few = trajectory.case.drive, trajectory.time <= _SMALL
+    drive, few = trajectory.case.excitation, trajectory.time <= _SMALL
     time = trajectory.time[few]
     for number, walker in enumerate(trajectory.walkers):
         psi = trajectory.orientation[few, number]

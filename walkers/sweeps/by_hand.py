@@ -11,13 +11,13 @@ import shutil
 import time
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from math import isclose, isfinite, nan, pi
+from math import isclose, isfinite, nan
 from pathlib import Path
 from typing import Any
 
 from walkers.errors import refused
 from walkers.inputs.case import Case
-from walkers.inputs.drive import Sine
+from walkers.inputs.drive import AXES, Excitation, Sine
 from walkers.inputs.run import CONSTANT
 from walkers.inputs.table import changed as table_changed
 from walkers.postprocess.analysis import tabulate
@@ -119,7 +119,7 @@ def take_in(folder: Path) -> None:
             raise refused(folder, f"the deck was not run ({expected}); do: cd {folder} && sh {RUN_NAME}")
         log = max(logs, key=lambda path: path.stat().st_mtime_ns)
         said = log.read_text(encoding="utf-8", errors="replace")
-        ran, segment, changes = _as_run(case, written, now, said)
+        ran, segment, changes = _as_run(case, written, now, said, f"{folder}: the edited deck")
         deck = render_deck(ran, segment)
         notes = ["run by hand", *([f"the deck was edited: {'; '.join(changes)}"] if changes else [])]
         if (folder / DECK_NAME).stat().st_mtime_ns > log.stat().st_mtime_ns:
@@ -151,22 +151,19 @@ def _judged(deck: Deck, folder: Path, log: Path) -> EngineReport:
     return replace(report, wall_seconds=report.loop_seconds)
 
 
-def _as_run(case: Case, written: str, now: str, said: str) -> tuple[Case, Segment, list[str]]:
-    """The case that the engine ran, its segment, and the edits, from the deck as written and now, and the log.
-
-    The engine prints the parameters of the deck: those that were edited are changes of the case.
-    """
+def _as_run(case: Case, written: str, now: str, said: str, source: str) -> tuple[Case, Segment, list[str]]:
+    """The case that the engine ran, its segment, and the edits, from the deck as written and now, and the log."""
     given = {name: float(value) for name, value in _GIVEN.findall(written)}
     words = (_PRINTED.findall(said) or [""])[-1].split()
     printed = {name: _number(name, value) for name, value in zip(words[::2], words[1::2], strict=True)}
     values, case = {**given, **printed}, case.for_cycles(case.run.attempts[0])
     edited = {name: values[name] for name, value in given.items() if values[name] != value}
-    ran = _edited(case, values, edited) if edited or _own_amplitude(case, values) else case
     changes = [f"{name} {value:g}, was {given[name]:g}" for name, value in edited.items()]
     before, after, follow = dict(_LINE.findall(written)), dict(_LINE.findall(now)), _derived(case)
     changed = [name for name in printed if name in follow and name not in given and after.get(name) != before[name]]
     changes += [f"{name} {printed[name]:g}, was {follow[name]:g}" for name in changed]
-    rest = int(values.get("rest_steps", 0))
+    differ = edited or not all(isclose(values.get(name, one), one, rel_tol=_SAME) for name, one in follow.items())
+    ran, rest = _edited(case, values, edited, source) if differ else case, int(values.get("rest_steps", 0))
     return ran, Segment(0, rest + ran.run.steps, rest), [*changes, *_other_changes(written, now, printed)]
 
 
@@ -177,70 +174,70 @@ def _number(name: str, value: str) -> float:
         raise ValueError(f'variable {name}: expected a number, found "{value}"') from error
 
 
-def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float]) -> Case:
-    """The case with the values of a deck's parameters, some of which were edited."""
-    several = enumerate(zip(suffixes(len(case.excitation.harmonics)), case.excitation.harmonics, strict=True))
-    harmonics = {number: _harmonic(one, end, values) for number, (end, one) in several}
-    steps, parts = int(values["steps_per_cycle"]), case.run.samples_per_cycle
-    changes: dict[str, Any] = {
-        key: f"{edited[name]!r} {unit}" if unit else edited[name]
-        for name, (key, unit) in _SETTINGS.items()
-        if name in edited
-    }
-    changes |= {"liquid.viscosity_ratio": 1.0} if "viscosity" in edited else {}
-    changes |= {f"{key}.spacing": f"{one.spacing!r} m" for key, one in case.walkers_by_key.items()}
-    changes |= {"run.cycles": int(values["cycles"]), "run.allow_unstable": True}
-    if parts > 1:
-        changes["run.samples_per_cycle"] = parts
-    document = table_changed(Case, case.document, changes)
-    if any(edits for _, edits in harmonics.values()):
-        drive = {**document["drive"], **harmonics[0][0]} if len(harmonics) == 1 else {}
-        drive.pop("gamma0", None)
-        document["drive"] = drive or {"frame": case.drive.frame, "harmonics": [one for one, _ in harmonics.values()]}
-    frequency = values.get("cycle_frequency", values.get("frequency", case.excitation.frequency))
-    step = values.get("time_step", case.run.time_step)
+def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float], source: str) -> Case:
+    """The case with the values of a deck's parameters, some of which were edited: changes of its tables."""
+    sines = tuple(_sine(one, end, values) for end, one in _by_suffix(case.excitation))
+    drive, run = Excitation(sines, case.drive.frame), case.run
+    steps, cycles, step = int(values["steps_per_cycle"]), int(values["cycles"]), values.get("time_step", run.time_step)
+    parts, frequency = run.samples_per_cycle, drive.frequency
     if not isclose(step * steps * frequency, 1.0, rel_tol=_SAME) or steps % parts:
         raise ValueError(
             f"{steps} steps of {step:g} s are not one cycle of {frequency:g} Hz in {parts} equal parts: "
             f"edit steps_per_cycle (a multiple of {parts}); time_step follows from it and the frequency"
         )
-    document["run"] = {**document.get("run", {}), "time_step": f"{step!r} s"}
-    ran = Case.read(document, source=case.name, name=case.name)
-    peak = ran.excitation.peak_velocity
-    if not isclose(start := values.get("peak_velocity", peak), peak, rel_tol=_SAME):
+    if not isclose(start := values.get("peak_velocity", drive.peak_velocity), drive.peak_velocity, rel_tol=_SAME):
         raise ValueError(
-            f"beads start at peak_velocity {start:g} m/s, but the walls at {peak:g} m/s: edit peak_acceleration or "
-            "frequency, from which amplitude and peak_velocity follow"
+            f"beads start at peak_velocity {start:g} m/s, but the walls at {drive.peak_velocity:g} m/s: edit "
+            "peak_acceleration or frequency, from which amplitude and peak_velocity follow"
         )
-    return ran
+    document = {name: table for name, table in case.document.items() if name != "uncertain"}
+    table, other = document.get("run", {}), frequency != case.excitation.frequency
+    changes: dict[str, Any] = {key: edited[name] for name, (key, unit) in _SETTINGS.items() if name in edited}
+    changes |= {key: f"{changes[key]!r} {unit}" for key, unit in _SETTINGS.values() if unit and key in changes}
+    changes |= {"liquid.viscosity_ratio": 1.0} if "viscosity" in edited else {}
+    if {"steps_per_cycle", "time_step"} & edited.keys() or "time_step" in table:
+        changes |= {"run.time_step": f"{step!r} s", "run.allow_unstable": True}
+    if cycles != run.cycles or (other and "duration" in table):
+        changes["run.cycles"] = cycles
+        document["run"] = {name: value for name, value in table.items() if name != "settling_cycles"}
+    if other and (case.loose or "frames_per_second" in table):
+        often = {"samples_per_cycle": parts} if parts > 1 else {"frames_per_second": frequency / run.cycles_per_sample}
+        changes |= {f"run.{name}": value for name, value in often.items()}
+    # A deck has no Γ0, but the acceleration for the density and the surface tension that it was made for.
+    by_gamma0 = any(one.gamma0 is not None for one in (case.drive, *case.drive.harmonics))
+    if drive != case.excitation or (by_gamma0 and {"density", "surface_tension"} & edited.keys()):
+        tables = [_table(one) for one in sines]
+        document["drive"] = {"frame": drive.frame, **(tables[0] if len(tables) == 1 else {"harmonics": tables})}
+    ran = Case.read(table_changed(Case, document, changes), source=source, name=case.name).for_cycles(cycles)
+    for key, walkers in case.walkers_by_key.items():
+        ran = ran.put(f"{key}.spacing", walkers.spacing)
+    return ran.but(run=ran.run.but(time_step=step, steps_per_cycle=steps, cycles=cycles))
+
+
+def _by_suffix(drive: Excitation) -> list[tuple[str, Sine]]:
+    return list(zip(suffixes(len(drive.harmonics)), drive.harmonics, strict=True))
 
 
 def _derived(case: Case) -> dict[str, float]:
     """Parameters of a deck that follow from others."""
-    ends, harmonics = suffixes(len(case.excitation.harmonics)), case.excitation.harmonics
-    amplitudes = {f"amplitude{end}": one.amplitude for end, one in zip(ends, harmonics, strict=True)}
+    amplitudes = {f"amplitude{end}": one.amplitude for end, one in _by_suffix(case.excitation)}
     return {**amplitudes, "peak_velocity": case.excitation.peak_velocity, "time_step": case.run.time_step}
 
 
-def _own_amplitude(case: Case, values: Mapping[str, float]) -> bool:
-    """Whether a parameter that follows from others was edited."""
-    return any(not isclose(values.get(name, one), one, rel_tol=_SAME) for name, one in _derived(case).items())
+def _sine(one: Sine, end: str, values: Mapping[str, float]) -> Sine:
+    """A sine from its parameters; an amplitude that contradicts the acceleration was edited and replaces it."""
+    names = ("frequency", "peak_acceleration", "phase")
+    one = replace(one, **{name: values.get(f"{name}{end}", getattr(one, name)) for name in names})
+    implied = values.get(f"amplitude{end}", nan) * one.angular_frequency**2
+    same = not isfinite(implied) or isclose(implied, one.peak_acceleration, rel_tol=_SAME)
+    return one if same else replace(one, peak_acceleration=implied)
 
 
-def _harmonic(one: Sine, end: str, values: Mapping[str, float]) -> tuple[dict[str, Any], bool]:
-    """A harmonic as a case file has it, and whether it was edited.
-
-    An amplitude that contradicts the acceleration was edited and replaces it.
-    """
-    frequency = values.get(f"frequency{end}", one.frequency)
-    peak = values.get(f"peak_acceleration{end}", one.peak_acceleration)
-    implied = values.get(f"amplitude{end}", nan) * (2.0 * pi * frequency) ** 2
-    if isfinite(implied) and not isclose(implied, peak, rel_tol=_SAME):
-        peak = implied
-    phase = values.get(f"phase{end}", one.phase)
-    table = {"axis": list(one.direction), "frequency": f"{frequency!r} Hz", "peak_acceleration": f"{peak!r} m/s^2"}
-    table |= {"phase": f"{phase!r} rad"} if phase else {}
-    return table, (frequency, peak, phase) != (one.frequency, one.peak_acceleration, one.phase)
+def _table(one: Sine) -> dict[str, Any]:
+    """A sine as a case file has it."""
+    axis = next((name for name, direction in AXES.items() if direction == one.direction), [*one.direction])
+    units = {"frequency": "Hz", "peak_acceleration": "m/s^2", "phase": "rad"}
+    return {"axis": axis, **{name: f"{getattr(one, name)!r} {unit}" for name, unit in units.items()}}
 
 
 def _other_changes(written: str, now: str, given: Collection[str]) -> list[str]:

@@ -29,7 +29,7 @@ from walkers.sweeps.table import RECORD_NAME, read_record, result_in, states, va
 FloatArray = npt.NDArray[np.float64]
 
 _CONFIDENCE = 0.95
-_NO_CONDITION = ("name", "title", "seed", "run.seed", "run.cycles", "run.duration", "run.cycles_per_segment")
+_NO_CONDITION = ("name", "title", "run.seed", "run.cycles", "run.duration", "run.cycles_per_segment")
 """Keys of a case that do not define a condition: names, seeds and lengths (a segment is as long as a short run)."""
 _DRAWS = 10_000
 _PARTS: Mapping[str, Callable[[Mapping[str, Any]], bool]] = {
@@ -121,7 +121,7 @@ def _groups(directory: Path) -> list[tuple[dict[str, str], list[Path]]]:
         own, exact = {key: value_text(case.get(key)) for key in differ}, str([case.get(key) for key in differ])
         made_by = {key: own[key] for key in ("deck version", "engine") if key in own}
         _, starts = groups.setdefault(exact, ((varied[path] | made_by) if varied[path] else own, {}))
-        starts.setdefault(case.get("seed"), path)
+        starts.setdefault(case.get("run.seed"), path)
     order = {path: number for number, path in enumerate(varied)}
     sets = [(values, sorted(starts.values(), key=order.__getitem__)) for values, starts in groups.values()]
     return sorted(sets, key=lambda one: order[one[1][0]])

@@ -161,7 +161,7 @@ def alignment_of(case: Case) -> dict[str, Any]:
         growth rate with sliding contacts and spinning beads, 1/s (negative: decay; at 1° if there is rolling friction),
         None if the axial motion is not periodic; whether the dimer ``stands``; ``turns_over_after``, s from 1° to 90°.
     """
-    drive = case.drive
+    drive = case.excitation
     mathieu = pendulum_of(case)
     rate = turning_rate(case) if drive.peak_acceleration > 0.0 else None
     return {
