@@ -3,7 +3,9 @@
 import re
 import subprocess
 from collections.abc import Callable
+from math import pi
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,6 +14,7 @@ from walkers import load
 from walkers import run as run_case
 from walkers.errors import InputError
 from walkers.inputs.case import Case
+from walkers.inputs.drive import WAVEFORMS
 from walkers.sweeps.by_hand import take_in, write_folder
 from walkers.sweeps.readable import differing, flattened
 
@@ -57,17 +60,17 @@ def test_a_deck_run_by_hand_is_read_and_says_so(folder: Path, run_directory: Cal
 
 
 EDITED = {
-    "acceleration": ({"peak_acceleration": "29.4"}, {"drive": {"peak_acceleration": "29.4 m/s^2"}}),
-    "amplitude": ({"amplitude": "1.1636e-4"}, {"drive": {"peak_acceleration": "29.4 m/s^2"}}),
+    "acceleration": ({"peak_acceleration": "29.4"}, {"drive.peak_acceleration": "29.4 m/s^2"}),
+    "amplitude": ({"amplitude": "1.1636e-4"}, {"drive.peak_acceleration": "29.4 m/s^2"}),
     "friction": (
         {"friction_bead_wall": "0.2", "restitution": "0.5"},
-        {"contact": {"friction": {"bead_bead": 0.1, "bead_wall": 0.2}, "restitution": 0.5}},
+        {"contact.friction.bead_wall": 0.2, "contact.restitution": 0.5},
     ),
-    "viscosity": ({"viscosity": "0.0092"}, {"liquid": {"viscosity_ratio": 2.0}}),
-    "tension": ({"surface_tension": "0.03"}, {"liquid": {"surface_tension": "30 mN/m"}}),
-    "density": ({"density": "4200.0"}, {"beads": {"density": "4.2 g/cm^3"}}),
-    "length": ({"cycles": "9"}, {"run": {**SHORT, "cycles": 9, "settling_cycles": 3}}),
-    "frequency": ({"frequency": "70.0"}, {"drive": {"frequency": "70 Hz"}}),
+    "viscosity": ({"viscosity": "0.0092"}, {"liquid.dynamic_viscosity": "9.2 mPa*s"}),
+    "tension": ({"surface_tension": "0.03"}, {"liquid.surface_tension": "30 mN/m"}),
+    "density": ({"density": "4200.0"}, {"beads.density": "4.2 g/cm^3"}),
+    "length": ({"cycles": "9"}, {"run.cycles": 9, "run.settling_cycles": 3}),
+    "frequency": ({"frequency": "70.0"}, {"drive.frequency": "70 Hz"}),
 }
 
 
@@ -76,25 +79,156 @@ def test_an_edited_parameter_is_another_case(name: str, folder: Path, run_direct
     edits, changes = EDITED[name]
     _edit(folder, **edits)
     _run(folder)
-    found, same = load(folder), load(run_directory(**{"run": SHORT, **changes}))
+    found, same = load(folder), load(run_directory(make_case(run=SHORT).changed(changes)))
     # Where the walker stands at first and its time step are those of the case as it was.
     assert found.result["velocity"]["mean"] == pytest.approx(same.result["velocity"]["mean"], rel=5e-3)
-    assert found.case.excitation.peak_acceleration == pytest.approx(same.case.excitation.peak_acceleration, rel=1e-3)
-    assert found.case.contact == same.case.contact
-    # What has another number is no longer what the library calls so.
-    assert found.case.liquid.name == (None if "liquid" in changes else "Si AK5")
-    assert found.case.beads.material == (None if "beads" in changes else "ruby")
     assert found.case.run.period == pytest.approx(same.case.run.period)
     told, *constant = found.result["by_hand"][1:]
     assert told.startswith("the deck was edited: ")
     assert all("are not constant within 0.2 %" in one for one in constant)  # in so few cycles
     assert all(re.search(rf"{parameter} \S+, was [\d.e-]+", told) for parameter in edits)
     assert "other line" not in told
-    # What commands show and compare.
-    values = flattened(found.case.as_dict())
-    assert values["drive.peak_acceleration"] == found.case.excitation.peak_acceleration
-    assert values["run.time_step"] == found.case.run.time_step
-    assert differing([flattened(make_case(run=SHORT).as_dict()), values])
+    # What commands show and compare: the edits, which are given, and nothing else.
+    before, after = flattened(make_case(run=SHORT)), flattened(found.case)
+    of_edits = {*differing([before, flattened(same.case)])} - {"run.settling_cycles"}
+    assert {*differing([before, after])} - {"run.settling_cycles"} == of_edits
+    assert {key: after.get(key) for key in of_edits} == pytest.approx(
+        {key: flattened(same.case).get(key) for key in of_edits}, rel=1e-4
+    )
+
+
+TONES = [
+    {"frequency": "80 Hz", "peak_acceleration": "2 g"},
+    {"axis": "y", "frequency": "160 Hz", "peak_acceleration": "1 g", "phase": "90 deg"},
+]
+TRIANGLE = [
+    {
+        "frequency": f"{80 * times} Hz",
+        "peak_acceleration": f"{39.2 * abs(part)} m/s^2",
+        "phase": f"{pi * (part < 0)} rad",
+    }
+    for times, part in WAVEFORMS["triangle"]
+]
+LIQUID = {"volume_fraction": 0.01, "contact_angle": "0 deg", "surface_tension": "20 mN/m", "density": "1 g/cm^3"}
+BY_GAMMA0 = {"frequency": "80 Hz", "gamma0": 0.4}
+BOX = {"material": "glass", "shape": "box", "width": "2 mm", "height": "4 mm"}
+QUICK = {"frames_per_second": 80, "longest_settling": "0.01 s", "settled_below": "1 m/s"}
+OTHERS: dict[str, tuple[dict[str, Any], dict[str, str], dict[str, Any]]] = {
+    "a waveform": (
+        {"drive": {"frequency": "80 Hz", "peak_acceleration": "4 g", "waveform": "triangle"}},
+        {"gravity": "9.0"},
+        {"environment": {"gravity": "9 m/s^2"}},
+    ),
+    "sines of a waveform": (
+        {"drive": {"frequency": "80 Hz", "peak_acceleration": "4 g", "waveform": "triangle"}},
+        {"peak_acceleration_1": "30.0", "phase_2": "0.5"},
+        {
+            "drive": {
+                "harmonics": [
+                    {**TRIANGLE[0], "peak_acceleration": "30 m/s^2"},
+                    {**TRIANGLE[1], "phase": "0.5 rad"},
+                    *TRIANGLE[2:],
+                ]
+            }
+        },
+    ),
+    "two tones": (
+        {"drive": {"harmonics": TONES}},
+        {"frequency_2": "240.0"},
+        {"drive": {"harmonics": [TONES[0], {**TONES[1], "frequency": "240 Hz"}]}},
+    ),
+    "two tones and their cycle": (
+        {"drive": {"harmonics": TONES}},
+        {"frequency_1": "60.0", "frequency_2": "120.0", "cycle_frequency": "60.0"},
+        {"drive": {"harmonics": [{**TONES[0], "frequency": "60 Hz"}, {**TONES[1], "frequency": "120 Hz"}]}},
+    ),
+    "the acceleration of a Γ0": (
+        {"drive": BY_GAMMA0},
+        {"peak_acceleration": "20.0"},
+        {
+            "drive": {"frequency": "80 Hz", "peak_acceleration": "20 m/s^2"},
+        },
+    ),
+    "Γ0 with other friction": (
+        {"drive": BY_GAMMA0},
+        {"restitution": "0.5"},
+        {
+            "contact": {**document()["contact"], "restitution": 0.5},
+        },
+    ),
+    "Γ0 with another density": (
+        {"drive": BY_GAMMA0},
+        {"density": "4200.0"},
+        {
+            "beads": {"density": "4.2 g/cm^3", "material": "ruby"},
+            "drive": {
+                "frequency": "80 Hz",
+                "peak_acceleration": f"{make_case().changed({'drive.gamma0': 0.4}).drive.peak_acceleration!r} m/s^2",
+            },
+        },
+    ),
+    "a kinematic viscosity": (
+        {"liquid": {**LIQUID, "kinematic_viscosity": "5 mm^2/s", "viscosity_ratio": 2.0}},
+        {"viscosity": "0.004"},
+        {"liquid": {**LIQUID, "dynamic_viscosity": "4 mPa*s"}},
+    ),
+    "a groove": (
+        {"boundary": {"material": "glass", "shape": "groove", "opening": "120 deg"}},
+        {"cycles": "3", "friction_bead_wall": "0.2"},
+        {
+            "contact": {**document()["contact"], "friction": {"bead_bead": 0.1, "bead_wall": 0.2}},
+            "run": {"samples_per_cycle": 10, "cycles": 3},
+        },
+    ),
+    "a time step beyond the limits": (
+        {"run": {**SHORT, "time_step": "2 us"}},
+        {"steps_per_cycle": "2000"},
+        {"run": {**SHORT, "time_step": "6.25 us", "allow_unstable": True}},
+    ),
+    "loose beads": (
+        {
+            "placed": [{"at": ["0.3 mm", "0 mm", "0.3 mm"], "radius": "0.3 mm"}],
+            "boundary": BOX,
+            "run": {**QUICK, "duration": "0.05 s"},
+        },
+        {"frequency": "150.0"},
+        {
+            "drive": {"frequency": "150 Hz", "peak_acceleration": "4 g"},
+            "run": {**QUICK, "cycles": 4, "frames_per_second": 150},
+        },
+    ),
+    "an uncertain value": (
+        {"uncertain": {"contact.restitution": [0.2, 0.4]}},
+        {"restitution": "0.5"},
+        {"contact": {**document()["contact"], "restitution": 0.5}, "uncertain": {}},
+    ),
+}
+
+
+def _numbers(case: Case) -> list[float]:
+    """What parameters of a deck determine."""
+    liquid, contact, run, sines = case.liquid.of_bridges, case.contact, case.run, case.excitation.harmonics
+    numbers = [number for one in sines for number in (*one.direction, one.frequency, one.peak_acceleration, one.phase)]
+    numbers += [case.beads.density, case.environment.gravity, liquid.surface_tension, liquid.viscosity, run.period]
+    numbers += [contact.friction.bead_bead, contact.friction.bead_wall, contact.restitution, contact.youngs_modulus]
+    return [*numbers, run.cycles, run.settling_cycles, run.samples_per_cycle, run.cycles_per_sample]
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_an_edited_deck_of_any_case_is_changes_of_its_tables(name: str, tmp_path: Path) -> None:
+    tables, edits, changes = OTHERS[name]
+    before = {key: table for key, table in document(run=SHORT).items() if key != "dimers" or "placed" not in tables}
+    case, expected = (Case.read({**before, **tables, **more}, name="test") for more in ({}, changes))
+    folder = write_folder(case, tmp_path / "hand").parent
+    _edit(folder, **edits)
+    _run(folder)
+    found = load(folder).case
+    assert _numbers(found) == pytest.approx(_numbers(expected), rel=1e-9)
+    assert found.drive.waveform == expected.drive.waveform
+    assert found.run.steps_per_cycle == int(edits.get("steps_per_cycle", case.run.steps_per_cycle))
+    assert [one.spacing for one in found.walkers] == [one.spacing for one in case.walkers]
+    # Its tables are those of a case file.
+    assert _numbers(found.changed({"run.seed": 2})) == pytest.approx(_numbers(expected), rel=1e-9)
 
 
 def test_a_deck_that_is_edited_and_run_again_is_read_again(folder: Path) -> None:
@@ -111,7 +245,7 @@ def test_a_deck_that_is_edited_and_run_again_is_read_again(folder: Path) -> None
     assert " finished: edited and run by hand " in call("list", "--out", str(folder.parent)).stdout
     _edit(folder, restitution="0.5")
     assert "walker.lig is newer than" in load(folder).result["by_hand"][-1]
-    with pytest.raises(InputError, match="hand: its deck was edited and run by hand: --set is for cases"):
+    with pytest.raises(InputError, match=r"no finished run in .*--set 'drive.frequency=70 Hz'"):
         load(folder, changes={"drive.frequency": "70 Hz"})
 
 
@@ -158,12 +292,37 @@ def test_a_run_by_hand_whose_log_was_emptied_or_cut_is_refused(folder: Path) -> 
         assert not (folder / "manifest.json").exists()
 
 
-def test_an_amplitude_with_which_beads_would_start_unlike_the_walls_is_refused(tmp_path: Path) -> None:
-    folder = write_folder(make_case(run=SHORT, drive={"frame": "lab"}), tmp_path / "hand").parent
-    _edit(folder, amplitude="1.2e-4")
+REFUSED: dict[str, tuple[dict[str, Any], dict[str, str], str]] = {
+    "an amplitude with which beads would start unlike the walls": (
+        {"drive": {"frame": "lab"}},
+        {"amplitude": "1.2e-4"},
+        r"but the walls at .*: edit peak_acceleration or frequency",
+    ),
+    "tones whose cycle is another": (
+        {"drive": {"harmonics": TONES}},
+        {"frequency_1": "60.0", "frequency_2": "120.0"},
+        "cannot be read .*not one cycle of 60 Hz",
+    ),
+    "a value that no case has": (
+        {},
+        {"youngs_modulus": "2e6"},
+        r'hand: the edited deck: contact\.youngs_modulus = "2000000\.0 Pa": expected ',
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_edits_that_make_no_case_are_refused(name: str, tmp_path: Path) -> None:
+    changes, edits, told = REFUSED[name]
+    tables = document(run=SHORT, **changes)
+    if "harmonics" in tables["drive"]:
+        tables["drive"] = changes["drive"]
+    folder = write_folder(Case.read(tables, name="test"), tmp_path / "hand").parent
+    _edit(folder, **edits)
     _run(folder)
-    with pytest.raises(InputError, match=r"but the walls at .*: edit peak_acceleration or frequency"):
+    with pytest.raises(InputError, match=told) as caught:
         load(folder)
+    assert len(str(caught.value).splitlines()) == 1
 
 
 LENGTHS = {

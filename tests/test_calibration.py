@@ -493,7 +493,7 @@ _BOTH = {"observations": ["slow", "fast"], "share": 0.5}
     [
         ("parameters/drag/range", [3.0, 1.0], r"parameters\.drag\.range"),
         ("parameters/drag/range", [0.0, 1.0], r"parameters\.drag\.range"),  # it is logarithmic
-        ("parameters/drag/range", [1.0, 2.0, 3.0], r"parameters\.drag\.range.*two numbers"),
+        ("parameters/drag/range", [1.0, 2.0, 3.0], r"drag\.range.*has 3 values; expected .*2, such as \[0\.05, 0\.5\]"),
         ("parameters/drag/rang", [0.0, 1.0], r"parameters\.drag\.rang.*range"),
         ("parameters/drag/keys", ["contact.friction.bead_wall"], r"set by friction already"),
         ("parameters/drag/experiments", [], r"parameters\.drag\.experiments"),

@@ -55,7 +55,7 @@ class ParameterTable(Table):
 
     keys: Names
     log: bool = False
-    range: tuple[Number, Number]
+    range: tuple[Number, Number] = Field(examples=[[0.05, 0.5]])
     unit: str = ""
     experiments: Names | None = None
     symbol: str = ""
