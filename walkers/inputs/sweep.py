@@ -16,6 +16,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from html import escape
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -42,8 +43,10 @@ from walkers.inputs.reading import find_input, read_case
 from walkers.inputs.table import Table, changed
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import Speed, Whole
+from walkers.rounding import counted
 
 _LONGEST_NAME = 120
+_SHOWN = 20
 _SAME_RUN = ("title",)
 """Keys that do not determine a run."""
 
@@ -115,7 +118,7 @@ class Descent:
         return abs(velocity) < self.until_below
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Sweep:
     """A base case and its variations.
 
@@ -146,6 +149,16 @@ class Sweep:
     descent: Descent | None
     file: Mapping[str, Any] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        varied = ", ".join(self.keys) or "nothing"
+        return f"<Sweep {self.name} of {self.case_name}: {counted(len(self.rows), 'point')}, varies {varied}>"
+
+    def _repr_html_(self) -> str:
+        """The points, for notebooks: at most the first `_SHOWN`."""
+        rows = [self.keys, *([str(value) for value in row] for row in self.rows[:_SHOWN])]
+        cells = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
+        return f"<table><caption>{escape(repr(self))}</caption>{cells}</table>"
+
     def cases(self) -> Iterator[Case]:
         """The case of each point, resolved; raises `InputError` if a point cannot be used; it says which."""
         for number, row in enumerate(self.rows):
@@ -159,25 +172,26 @@ class Sweep:
             yield case.but(title=f"{shortened(self.name)}: {shortened(text)}") if text else case
 
 
-def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) -> Sweep:
-    """Read a sweep file, or a shipped sweep such as ``fig2``, and expand it.
+def load_sweep(sweep: str | Path | Mapping[str, Any], changes: Mapping[str, Value] | None = None) -> Sweep:
+    """Read a sweep file, a shipped sweep such as ``fig2``, or the tables of a sweep file, and expand it.
 
     ``changes`` are put beside its ``[set]``, by dotted keys; its name tells of them. Raises `InputError` if there
     is no such file or anything in it cannot be used; its points are checked by `Sweep.cases`.
     """
-    path = find_input(sweep, "sweep")
-    document, name = read_toml(path), path.stem
+    path = Path("sweep.toml") if isinstance(sweep, Mapping) else find_input(sweep, "sweep")
+    document, name = dict(sweep) if isinstance(sweep, Mapping) else read_toml(path), path.stem
+    source = "<sweep>" if isinstance(sweep, Mapping) else str(sweep)
     if changes:
-        with blaming(str(sweep)):
+        with blaming(source):
             if not isinstance(document.get("set", {}), Mapping):
                 raise unusable("set", "expected a table of keys")
             document = {**document, "set": {**settings_in(document.get("set", {})), **changes}}
         name = _name_with(name, changes)
     with blaming_changes(changes or {}):
-        made = expand(document, source=str(sweep), name=name, folder=path.parent)
+        made = expand(document, source=source, name=name, folder=path.parent)
         text = "varies in this sweep and cannot be set"
         if problems := [Problem(key, f'"{value}"', text) for key, value in (changes or {}).items() if key in made.keys]:
-            raise InputError(str(sweep), problems)
+            raise InputError(source, problems)
     return made
 
 
