@@ -31,14 +31,12 @@ from walkers.inputs.run import Run
 from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Flag, Table, changed, contradictions, key
 from walkers.inputs.units import Coefficient, Number, kind_in
 from walkers.physics.laws import by_name
-from walkers.physics.liquid import BridgeLiquid
+from walkers.physics.liquid import DEFAULT_LAW, BridgeLiquid
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from walkers.physics.bridge import BridgeLaw
-
-DEFAULT_LAW = "young-laplace"
 
 
 class Beads(Table):

@@ -22,6 +22,7 @@ from walkers.inputs.run import with_run
 from walkers.inputs.standing import OVERLAP, check_bodies
 from walkers.inputs.units import TEMPERATURE, parse_quantity
 from walkers.physics.laws import LAWS
+from walkers.physics.liquid import DEFAULT_LAW
 from walkers.physics.mixtures import MIXTURES
 
 if TYPE_CHECKING:
@@ -40,7 +41,6 @@ _VISCOSITIES = ("liquid.kinematic_viscosity", "liquid.dynamic_viscosity")
 _OF_LIQUIDS = ("liquid.surface_tension", "liquid.density", *_VISCOSITIES)
 SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_OF_SURFACES)
 """Keys that a case may leave out because the library has values or defaults."""
-DEFAULT_LAW = "young-laplace"
 
 
 # --- from the library -------------------------------------------------------------------------------------------------
