@@ -284,7 +284,8 @@ class Walkers:
         """
         standing, (x, y, _) = [], case.drive_axis
         for number in range(first, first + self.replicates):
-            facing = {"right": 1, "left": -1}.get(self.facing, 1 if number % 2 == 0 else -1)
+            row = number // case.shifted_rows if case.shifted_rows else 0
+            facing = {"right": 1, "left": -1}.get(self.facing, 1 if (number + row) % 2 == 0 else -1)
             turn, press = _draws(case.seed, number)
             angle, factor = self.angle + self.angle_spread * turn, 1.0 + self.gap_spread * press
             resting = contact_loads(case, self).overlaps

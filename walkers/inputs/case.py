@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
-from math import cos, hypot, inf, isclose, sin
+from math import cos, hypot, inf, isclose, pi, sin
 from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter, ValidationError
@@ -307,6 +307,17 @@ class Case:
         """Whether walkers may meet."""
         return any(walkers.meet for walkers in self.walkers)
 
+    @cached_property
+    def shifted_rows(self) -> int:
+        """Length of rows of which every second one begins with a walker that faces left; 0 if none does.
+
+        On a grid with rows of even length, walkers that face right and left in turn would stand in columns that all
+        face the same way, and not meet. If they start in any direction, it makes no difference.
+        """
+        columns = self.boundary.columns(count := sum(one.replicates for one in self.walkers))
+        in_turn = any(one.facing == "both" and not isclose(one.angle_spread, pi) for one in self.walkers)
+        return columns if self.meets and in_turn and columns % 2 == 0 and columns < count else 0
+
     @property
     def drive_axis(self) -> Vector:
         """Reference direction of orientations: the drive in the plane of the floor, or x if it has none there."""
@@ -345,7 +356,7 @@ class Case:
         if not self.liquid.conserved:  # cases of before this key keep their names
             without["liquid"] = {*without["liquid"], "conserved"}
         values: dict[str, Any] = _adapter().dump_python(self, mode="json", exclude=without)
-        return values
+        return {**values, "shifted_rows": self.shifted_rows} if self.shifted_rows else values
 
     def as_dict(self) -> dict[str, Any]:
         """The whole case as plain JSON types, SI units, with the tables it was read from and its values' origins."""
