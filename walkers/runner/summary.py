@@ -15,12 +15,13 @@ from walkers.inputs.case import CONSTANT, Case
 from walkers.inputs.library import Known, library_of
 from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.numerical import numerical_error
-from walkers.inputs.rounding import percent
+from walkers.inputs.rounding import counted, percent
 from walkers.inputs.run_tables import limits_of
 from walkers.inputs.text import printable
 from walkers.physics.capillary import capillary_force_limit_at_wall
 from walkers.physics.time_step import auto_fractions
 from walkers.physics.units import ACCELERATION_OF_ONE_G
+from walkers.runner.launch import cores_here
 from walkers.templates.deck import RESTING_SEGMENTS, settling_steps
 
 START_UP_SECONDS = 0.04
@@ -89,13 +90,16 @@ def pairs_of_beads(case: Case) -> int:
 
 
 def notes(case: Case) -> list[str]:
-    """Notes on a case before it is run: a long time step; of a pile, beads of one size and low walls."""
+    """Notes on a case before it is run: a long time step, few cores; of a pile, beads of one size and low walls."""
     largest, reason = limits_of(case).recommended(loose=case.loose)
     times, lines = case.run.time_step / largest, []
     if times < 1e-2:
         lines = [f"the time step is {_two_digits(1.0 / times)} times smaller than needed ({reason})"]
     elif times > 1.01 and numerical_error(case) is None:
         lines = [f"the time step is {times:.2g} times the largest of auto ({reason})"]
+    if case.run.ranks > (cores := cores_here()):
+        share = f"{case.run.ranks} MPI processes (run.ranks) share {counted(cores, 'core')} of this machine"
+        lines.append(f"{share}: the run takes many times longer than predicted")
     if not (case.loose and case.boundary.closed and case.mixture):
         return lines
     numbers = {"large": case.large, "small": case.count - case.large}
