@@ -19,7 +19,7 @@ import threading
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
@@ -45,7 +45,10 @@ from walkers.sweeps.site import Site, check_path, pilots
 from walkers.sweeps.table import (
     PARSL,
     RECORD_NAME,
+    DamagedRunError,
+    PointState,
     SweepRecord,
+    checked_states,
     describe_sweep,
     read_record,
     states,
@@ -284,15 +287,20 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     if options.site is not None:
         check_path(record.directory)
     found = states(record)
-    final = [
-        Failure(point, run, state.reason or "", state.message or "", str(state.directory))
-        for point, (run, state) in enumerate(zip(record.runs, found, strict=True))
-        if state.status == "failed" and state.reason in options.final
-    ]
+    final = _failures(record, found, options.final)
     settled = {point for point, state in enumerate(found) if state.status in ("finished", "not needed")}
     settled |= {failure.point for failure in final}
     decks = _missing_decks(cases, range(len(cases)), options, settled.__contains__)
     return SweepPlan(record, cases, binary, decks, [state.status for state in found], options, final)
+
+
+def _failures(record: SweepRecord, found: Sequence[PointState], reasons: Collection[str]) -> list[Failure]:
+    """The points with such failures."""
+    return [
+        Failure(point, run, state.reason or "", state.message or "", str(state.directory))
+        for point, (run, state) in enumerate(zip(record.runs, found, strict=True))
+        if state.reason in reasons
+    ]
 
 
 def run_sweep(
@@ -340,7 +348,7 @@ def run_sweep(
             warnings.warn(f"{record.directory}: {text}", SweepReplacedWarning, stacklevel=2)
     write_record(record)
     if not plan.decks:
-        return record, plan.final
+        return record, [*plan.final, *_damaged(record)]
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     with suppress(ValueError, OSError):  # each point of a running deck keeps a lock file open
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
@@ -350,7 +358,11 @@ def run_sweep(
         raise OutputGone(record.directory)
     if list(read_record(record.directory).runs) != list(record.runs):
         raise SweepStopped(f"{record.directory} was replaced by another sweep of the same name; the runs are kept")
-    return record, failures
+    return record, [*failures, *_damaged(record)]
+
+
+def _damaged(record: SweepRecord) -> list[Failure]:
+    return _failures(record, checked_states(record), [DamagedRunError.__name__])
 
 
 # --- workers ----------------------------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import nan
 from pathlib import Path
@@ -222,6 +222,8 @@ class PointState:
     reason: str | None = None
     message: str | None = None
     lost: int = 0
+    result: Mapping[str, Any] = field(default_factory=dict)
+    """Of a finished run; only from `checked_states`."""
 
 
 def states(record: SweepRecord) -> list[PointState]:
@@ -238,6 +240,20 @@ def states(record: SweepRecord) -> list[PointState]:
             elif found[number].status == "finished":
                 stopped = record.descent.at_rest(velocity_of(places[number]))
     return found
+
+
+def checked_states(record: SweepRecord) -> list[PointState]:
+    """State of each point as from `states`, with its result; finished runs that are damaged have failed."""
+    return list(map(_checked, states(record)))
+
+
+def _checked(state: PointState) -> PointState:
+    if state.status != "finished" or state.directory is None:
+        return state
+    try:
+        return replace(state, result=result_in(state.directory))
+    except DamagedRunError as error:
+        return PointState("failed", state.directory, type(error).__name__, str(error))
 
 
 def worst_status(points: Iterable[str]) -> str:
@@ -322,7 +338,7 @@ def load(directory: str | Path) -> pd.DataFrame:
     described = {"point": ("", "number of the point"), **varied, **found, **STATE}
     rows = [
         dict.fromkeys(found, nan) | _row(record, number, state)
-        for number, state in enumerate(states(record))
+        for number, state in enumerate(checked_states(record))
         if state.status != "not needed"
     ]
     frame = _with_units(pd.DataFrame(rows, columns=list(described)), described)
@@ -343,12 +359,7 @@ def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
     row |= record.derived[number]
     row |= {"status": state.status, "lost": state.lost, "reason": state.reason or ""}
     row["run"] = os.path.relpath(state.directory) if state.directory else ""
-    if state.status != "finished" or state.directory is None:
-        return row
-    try:
-        return row | row_of(result_in(state.directory))
-    except DamagedRunError:
-        return row | {"status": "failed", "reason": DamagedRunError.__name__}
+    return row | row_of(state.result) if state.result else row
 
 
 def varied_columns(frame: pd.DataFrame) -> list[str]:
@@ -497,7 +508,7 @@ def thresholds(directory: str | Path) -> pd.DataFrame:
 
 def describe_status(record: SweepRecord) -> str:
     """Numbers of points by status, failures with their messages, and the thresholds of descents."""
-    found = states(record)
+    found = checked_states(record)
     count = Counter(state.status for state in found)
     text = ", ".join(f"{count[status]} {status}" for status in _STATUSES if count[status])
     lines = [f"{record.name}: {len(found)} points, {text or 'none'}"]
