@@ -11,13 +11,14 @@ from pathlib import Path
 import pytest
 
 import walkers
-from tests.conftest import REFERENCE, call, document, make_case, origins, to_toml
+from tests.conftest import REFERENCE, SHORT, call, document, make_case, origins, to_toml
 from walkers.inputs import library
 from walkers.inputs.case import Case
 from walkers.inputs.changes import changed, settings_of
 from walkers.inputs.errors import InputError
 from walkers.inputs.origins import Origin
-from walkers.inputs.reading import load_case, resolve_case, shipped
+from walkers.inputs.readable import flattened
+from walkers.inputs.reading import load_case, resolve_case, shipped, with_changes
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.gait import SEPARATED
 from walkers.postprocess.uncertainty import SPREAD_NAME, band_of, band_text, lines_of_rest, rests_on
@@ -233,13 +234,27 @@ def test_names_and_what_no_law_asks_for_do_not_determine_a_run() -> None:
         beads={"material": "rubies", "density": "4.0 g/cm^3"},
         boundary={"material": "chromium"},
         liquid={"surface_tension": "19.2 mN/m", "dynamic_viscosity": "4.6 mPa*s"},
-        run={"settled_below": "1 mm/s", "silence": "20 s"},
+        run={"settled_below": "1 mm/s"},
     )
     del tables["liquid"]["name"]
     named = resolve_case(tables)
     assert named != case
     assert named.determinants() == case.determinants()
     assert make_case(run={"seed": 2}).determinants() != make_case().determinants()
+
+
+def test_a_case_of_before_loads_without_the_keys_that_have_ended() -> None:
+    """A run's ``case.json`` has the values, and perhaps the keys of its file; the run keeps its name."""
+    case = make_case(run=SHORT)
+    before = json.loads(json.dumps(case.as_dict()))
+    before["run"] |= {"silence": None, "log_limit": 2e6}
+    before["document"]["run"] |= {"log_limit": "2 MB"}
+    before["origins"].append({**before["origins"][0], "key": "run.silence"})
+    again = Case.from_dict(before)
+    assert (again, again.determinants()) == (case, case.determinants())
+    assert [one.key for one in again.origins] == [one.key for one in case.origins]
+    assert with_changes(again, {"run.cycles": 7}).run.cycles == 7
+    assert "run.silence" not in flattened(before)
 
 
 def test_a_result_says_what_it_rests_on(run_directory: Callable[..., Path], tmp_path: Path) -> None:

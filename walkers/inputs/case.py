@@ -25,14 +25,10 @@ from walkers.physics.matter import Contact, Liquid
 if TYPE_CHECKING:
     from walkers.physics.bridge import BridgeLaw
 
-_SILENCE = 600.0  # s; piles of 200 beads write some thirty lines a second, those of 20,000 one in four seconds
-_SLOWEST_STEP = 4e-5  # s a bead: thirty times what it takes with two beads alone, a hundred times that in a pile
-_LOG_BYTES = 64e6  # walkers write some 50 kB, a segment of a pile as much …
-_LOG_BYTES_PER_CYCLE = 1e4  # … and a cycle some 500 bytes
 FIRST_ATTEMPTS = (12, 24)
 """Cycles after which it is asked whether velocities are constant. After 36 hardly any are that were not after 24."""
-BOUNDS = ("silence", "log_limit")
-"""Fields of `Run` that limit the engine and do not change the result."""
+ENDED = ("run.silence", "run.log_limit")
+"""Keys of cases of earlier versions; they limited the engine."""
 
 _SOURCES = ("document", "find_origins", "recorded_law")
 
@@ -75,10 +71,6 @@ class Run:
     longest_settling: float
     ranks: int
     """MPI processes."""
-    silence: float | None = None
-    """s for which an engine may write nothing before it is ended; None: as `longest_silence` says."""
-    log_limit: float | None = None
-    """Bytes of a log beyond which an engine is ended; None: as `most_log` says."""
 
     @property
     def period(self) -> float:
@@ -124,18 +116,6 @@ class Run:
             return self
         settling = settling_of(cycles)
         return replace(self, cycles=cycles, settling_cycles=settling, until_steady=False, cycles_per_segment=cycles)
-
-    def longest_silence(self, beads: int) -> float:
-        """Longest time, s, for which an engine with a number of beads may write nothing to log and dump."""
-        if self.silence is not None:
-            return self.silence
-        # It writes once a sample, and several times a cycle.
-        return max(_SILENCE, min(self.steps_per_sample, self.steps_per_cycle) * beads * _SLOWEST_STEP)
-
-    @property
-    def most_log(self) -> float:
-        """Largest size of the engine's log, bytes."""
-        return self.log_limit or max(_LOG_BYTES, self.cycles * _LOG_BYTES_PER_CYCLE)
 
     @property
     def rests(self) -> bool:
@@ -348,9 +328,9 @@ class Case:
         return -sum(one * along for one, along in zip(self.gravity_vector, self.drive_axis, strict=True))
 
     def determinants(self) -> dict[str, Any]:
-        """All values that determine the results, as plain JSON types: without names and limits of the engine."""
-        no_names: dict[str, Any] = {**dict.fromkeys(("name", "title", "material", *_SOURCES), True), "run": set(BOUNDS)}
-        without = {**no_names, "boundary": {"material"}, "liquid": {"name"}}
+        """All values that determine the results, as plain JSON types: without names."""
+        no_names = dict.fromkeys(("name", "title", "material", *_SOURCES), True)
+        without: dict[str, Any] = {**no_names, "boundary": {"material"}, "liquid": {"name"}}
         if self.liquid.law in LAWS:  # none of which asks for the density; one of a user's own may
             without["liquid"] = {"name", "density"}
         if not self.liquid.conserved:  # cases of before this key keep their names
@@ -370,7 +350,9 @@ class Case:
             case = _adapter().validate_python(values, by_alias=False, by_name=True)
             about = values.get("document", {}), values.get("origins", ())
             document, origins = _origins_adapter().validate_python(about)
-            return case.read_from(document, partial(tuple, origins))
+            if isinstance(run := document.get("run"), dict):
+                document["run"] = {key: value for key, value in run.items() if f"run.{key}" not in ENDED}
+            return case.read_from(document, partial(tuple, [one for one in origins if one.key not in ENDED]))
         except ValidationError as error:
             first = error.errors()[0]
             raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error

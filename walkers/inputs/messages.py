@@ -12,6 +12,7 @@ from typing import Any, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from walkers.inputs.case import ENDED
 from walkers.inputs.changes import MISSING, joined, parts_of, value_at
 from walkers.inputs.errors import InputError, Problem, shown, unusable
 from walkers.inputs.library import suggestion
@@ -179,6 +180,8 @@ def check_key(key: str) -> None:
 
 def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
     *tables, word = location
+    if ".".join(location) in ENDED:
+        return "expected none: this key has ended; the program limits the engine itself"
     known, place = keys_of(file), ""
     for part in tables:
         below = f"{place}.{part}".lstrip(".")

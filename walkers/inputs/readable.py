@@ -8,7 +8,7 @@ from functools import cache
 from math import isclose, pi
 from typing import Any
 
-from walkers.inputs.case import BOUNDS
+from walkers.inputs.case import ENDED
 from walkers.inputs.changes import dotted
 from walkers.physics import units
 from walkers.physics.units import Kind
@@ -25,8 +25,8 @@ READABLE_UNITS: Mapping[str, tuple[str, float]] = {
     "J": ("nJ", 1e-9),
 }
 """For SI units the unit in which the field states such quantities, and what it is in the SI unit."""
-_NOT_COMPARED = ("name", "title", "document", "origins", *(f"run.{bound}" for bound in BOUNDS))
-"""What does not determine a run, or only says when it is ended."""
+_NOT_COMPARED = ("name", "title", "document", "origins", *ENDED)
+"""What does not determine a run."""
 
 
 class FlatCase(dict[str, Any]):

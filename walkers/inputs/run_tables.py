@@ -117,8 +117,6 @@ def resolve_run(table: RunTable, case: Case, notes: Notes) -> Run:
         settled_below=(table.settled_below or _SETTLED_BELOW) if rest else 0.0,
         longest_settling=rest,
         ranks=table.ranks,
-        silence=table.silence,
-        log_limit=table.log_limit,
     )
     _note_run(run, table, case, notes, reason)
     return run
@@ -132,7 +130,6 @@ def _note_run(run: Run, table: RunTable, case: Case, notes: Notes, reason: str) 
     if run.cycles_per_sample > 1:
         whence += f", rounded up to a multiple of {run.cycles_per_sample} cycles (one sample)"
     settling = ", ".join(f"{settling_of(cycles)} of {cycles}" for cycles in run.attempts) if run.until_steady else ""
-    silence = run.longest_silence(case.count)
     notes.default("run.samples_per_cycle", often)
     if case.loose:
         notes.derived("run.samples_per_cycle", often, "from frames_per_second")
@@ -146,8 +143,6 @@ def _note_run(run: Run, table: RunTable, case: Case, notes: Notes, reason: str) 
     if case.walkers:
         third = "a third of the cycles, at most 20"
         notes["run.settling_cycles"] = Origin("", settling, "derived", third, value=run.settling_cycles)
-    notes.derived("run.silence", silence, "the engine is stopped if it writes nothing for this long")
-    notes.derived("run.log_limit", run.most_log, "the engine is stopped if its log is larger")
 
 
 def _check_length(table: RunTable, case: Case, cycles: int, settling: int, cycles_per_sample: int) -> None:

@@ -173,8 +173,7 @@ class RunTable(Table):
     The length is given by ``cycles`` or as a ``duration``, the sampling by ``samples_per_cycle`` or
     ``frames_per_second``. Left out, or ``cycles = "auto"``, walkers run until their velocities are constant, for 60
     cycles (``most_cycles``) of 20 samples at most, a third of them, at most 20, to settle; loose beads have a duration,
-    are recorded 60 times a second, and rest before the drive (``settled_below``, ``longest_settling``). An engine that
-    says nothing for ``silence``, or more than ``log_limit``, is ended: no numbers depend on these two.
+    are recorded 60 times a second, and rest before the drive (``settled_below``, ``longest_settling``).
     """
 
     time_step: Annotated[units.Time | None, AUTO] = None
@@ -191,8 +190,6 @@ class RunTable(Table):
     longest_settling: units.NonNegativeDuration | None = None
     ranks: Annotated[Whole, Field(ge=1, le=64)] = 1
     seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)] = 1
-    silence: Annotated[Duration | None, AUTO] = None
-    log_limit: Annotated[units.FileSize | None, AUTO] = None
 
 
 class EnvironmentTable(Table):

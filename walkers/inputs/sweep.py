@@ -33,7 +33,7 @@ from walkers.inputs.axes import (
     written,
     zipped,
 )
-from walkers.inputs.case import BOUNDS, Case
+from walkers.inputs.case import Case
 from walkers.inputs.changes import Value, changed, flatten
 from walkers.inputs.errors import InputError, Problem, each, refused, shortened, unusable
 from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
@@ -42,8 +42,6 @@ from walkers.inputs.schema import Table
 from walkers.physics.units import Speed, Whole
 
 _LONGEST_NAME = 120
-_SAME_RUN = ("title", *(f"run.{bound}" for bound in BOUNDS))
-"""Keys that do not determine a run."""
 
 
 class SampleTable(Table):
@@ -205,8 +203,8 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
                 unit_of(axis.keys[at], [row[at] for row in axis.rows]) for axis in axes for at in range(len(axis.keys))
             ]
             for key in keys:
-                if key in _SAME_RUN:
-                    raise unusable(key, f"does not vary: points with another {key} alone are the same run")
+                if key == "title":
+                    raise unusable(key, "does not vary: points with another title alone are the same run")
             each(check_key, [key for key in (*settings, *keys) if key != "library"])
             tables = changed(read_case(base, folder), settings)
             changed(tables, dict(zip(keys, rows[0], strict=True)))

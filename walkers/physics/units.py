@@ -38,7 +38,6 @@ _USUAL: Mapping[str, tuple[str, float]] = {
     **{"N/m": ("N/m", 1.0), "mN/m": ("N/m", 1e-3)},
     **{"m^2/s": ("m^2/s", 1.0), "m²/s": ("m^2/s", 1.0), "mm^2/s": ("m^2/s", 1e-6), "mm²/s": ("m^2/s", 1e-6)},
     **{"Pa*s": ("Pa*s", 1.0), "mPa*s": ("Pa*s", 1e-3)},
-    **{"kB": ("byte", 1e3), "MB": ("byte", 1e6), "GB": ("byte", 1e9)},
     **{"Pa": ("Pa", 1.0), "kPa": ("Pa", 1e3), "MPa": ("Pa", 1e6), "GPa": ("Pa", 1e9)},
 }
 """Usual units in SI units, as in pint; cases with only these units do not import pint."""
@@ -137,10 +136,8 @@ def _by_pint(symbol: str, kind: Kind) -> float:
         root = str(units.Quantity(1.0, unit).to_root_units().units)
     except Exception as error:  # pint's parser raises a dozen types, the tokenizer's errors among them
         raise ValueError(kind.expectation) from error
-    # Pint treats radians and bits as pure numbers.
+    # Pint treats radians as pure numbers.
     if kind.unit == ANGLE.unit and str(unit) not in _ANGLE_UNITS:
-        raise ValueError(kind.expectation)
-    if kind.unit == FILE_SIZE.unit and root != "bit":
         raise ValueError(kind.expectation)
     if kind.unit == FREQUENCY.unit and "radian" in root:
         raise ValueError(kind.expectation + " (cycles per second, not an angular frequency)")
@@ -186,7 +183,6 @@ KINEMATIC_VISCOSITY = Kind("kinematic viscosity", "m^2/s", "5 mm^2/s", 10.0, sig
 DYNAMIC_VISCOSITY = Kind("dynamic viscosity", "Pa*s", "4.6 mPa*s", 1e4, sign=NOT_NEGATIVE)
 MODULUS = Kind("modulus", "Pa", "50 MPa", 1e13, 1e3, POSITIVE)
 TEMPERATURE = Kind("temperature", "K", "20 degC", 373.15, 273.15)
-FILE_SIZE = Kind("file size", "byte", "64 MB", 1e15, 1.0, POSITIVE)
 
 Length = Annotated[float, LENGTH]
 Radius = Annotated[float, replace(LENGTH, largest=0.02, smallest=1e-6)]
@@ -205,7 +201,6 @@ SurfaceTension = Annotated[float, SURFACE_TENSION]
 KinematicViscosity = Annotated[float, KINEMATIC_VISCOSITY]
 DynamicViscosity = Annotated[float, DYNAMIC_VISCOSITY]
 Temperature = Annotated[float, TEMPERATURE]
-FileSize = Annotated[float, FILE_SIZE]
 
 
 def _is_auto(value: object) -> bool:

@@ -61,6 +61,10 @@ SETTLING_SECONDS = 0.05
 """Length of the segments in which beads come to rest; at the end of each we check whether they have."""
 RESTING_SEGMENTS = 3
 """Largest number of such segments that piles needed."""
+_SILENCE = 600.0  # s; piles of 200 beads write some thirty lines a second, those of 20,000 one in four seconds
+_SLOWEST_STEP = 4e-5  # s a bead: thirty times what it takes with two beads alone, a hundred times that in a pile
+_LOG_BYTES = 64e6  # walkers write some 50 kB, a segment of a pile as much …
+_LOG_BYTES_PER_CYCLE = 1e4  # … and a cycle some 500 bytes
 _STIFFEST = 1e9
 """Pa; no case has stiffer contacts, but a check may."""
 _MOST_BINS = 3e7
@@ -276,7 +280,9 @@ def compose(plan: Plan) -> Deck:
     files[BRIDGES_NAME] = tables_of(case, surfaces, {(bead.surface, bead.radius) for bead in scene.beads})
     fastest = plan.fastest or fastest_of(case, scene)
     beyond = bool(limits_of(case).exceeded_by(case.run.time_step))
-    bounds = (case.run.longest_silence(len(scene.beads)), case.run.most_log)
+    # The engine writes once a sample, and several times a cycle.
+    slowest = min(case.run.steps_per_sample, case.run.steps_per_cycle) * len(scene.beads) * _SLOWEST_STEP
+    bounds = (max(_SILENCE, slowest), max(_LOG_BYTES, case.run.cycles * _LOG_BYTES_PER_CYCLE))
     return Deck(text, files, layout, (scene.lower, scene.upper), fastest, *bounds, beyond)
 
 
