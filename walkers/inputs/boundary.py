@@ -198,13 +198,9 @@ class Boundary:
                 found = found.clip(max=wall.distances(places))
         return found
 
-    def columns(self, number: int) -> int:
-        """Number of walkers side by side in a grid of walkers, seen along x."""
-        return 1 if self.shape in ("channel", "groove") else ceil(sqrt(number))
-
     def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
         """Places about the origin for walkers that stand ``spacing`` (m) apart: a square grid, or a row along x."""
-        columns = self.columns(number)
+        columns = 1 if self.shape in ("channel", "groove") else ceil(sqrt(number))
         rows = ceil(number / columns)
         cells = (divmod(place, columns) for place in range(number))
         return [((row - (rows - 1) / 2.0) * spacing, (column - (columns - 1) / 2.0) * spacing) for row, column in cells]

@@ -289,14 +289,12 @@ class Case:
 
     @cached_property
     def shifted_rows(self) -> int:
-        """Length of rows of which every second one begins with a walker that faces left; 0 if none does.
-
-        On a grid with rows of even length, walkers that face right and left in turn would stand in columns that all
-        face the same way, and not meet. If they start in any direction, it makes no difference.
-        """
-        columns = self.boundary.columns(count := sum(one.replicates for one in self.walkers))
-        in_turn = any(one.facing == "both" and not isclose(one.angle_spread, pi) for one in self.walkers)
-        return columns if self.meets and in_turn and columns % 2 == 0 and columns < count else 0
+        """Even length of rows of which every second one begins facing left, so that neighbours meet; 0 if none does."""
+        if not (self.meets and any(one.facing == "both" and not isclose(one.angle_spread, pi) for one in self.walkers)):
+            return 0
+        rows = [x for x, _ in self.boundary.grid(sum(one.replicates for one in self.walkers), 1.0)]
+        length = rows.count(rows[0])
+        return length if length % 2 == 0 and length < len(rows) else 0
 
     @property
     def drive_axis(self) -> Vector:

@@ -214,7 +214,7 @@ def read_record(directory: str | Path) -> SweepRecord:
 class PointState:
     """State of a point: finished, failed, running, missing, or not needed (below the end of a descent).
 
-    ``directory`` is that of the finished or failed run; the other fields describe a failure.
+    ``directory`` is that of the finished or failed run, ``result`` is from `checked_states`; others describe a failure.
     """
 
     status: str
@@ -223,7 +223,6 @@ class PointState:
     message: str | None = None
     lost: int = 0
     result: Mapping[str, Any] = field(default_factory=dict)
-    """Of a finished run; only from `checked_states`."""
 
 
 def states(record: SweepRecord) -> list[PointState]:
@@ -244,16 +243,14 @@ def states(record: SweepRecord) -> list[PointState]:
 
 def checked_states(record: SweepRecord) -> list[PointState]:
     """State of each point as from `states`, with its result; finished runs that are damaged have failed."""
-    return list(map(_checked, states(record)))
-
-
-def _checked(state: PointState) -> PointState:
-    if state.status != "finished" or state.directory is None:
-        return state
-    try:
-        return replace(state, result=result_in(state.directory))
-    except DamagedRunError as error:
-        return PointState("failed", state.directory, type(error).__name__, str(error))
+    found = states(record)
+    for number, state in enumerate(found):
+        if state.status == "finished" and state.directory is not None:
+            try:
+                found[number] = replace(state, result=result_in(state.directory))
+            except DamagedRunError as error:
+                found[number] = PointState("failed", state.directory, type(error).__name__, str(error))
+    return found
 
 
 def worst_status(points: Iterable[str]) -> str:
