@@ -84,6 +84,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"run": {"cycles": 999_999}}, f"run.cycles = 999999: expected at most {(2**31 - 1) // 3200}: "),
     ({"run": {"cycles": 20, "frames_per_second": 4.0}}, "run.frames_per_second"),
     ({"run": {"ranks": 2}}, "run.ranks = 2"),
+    ({"run": {"silence": "20 s"}}, 'run.silence = "20 s": expected none: this key has ended'),
     # Bodies and boundaries
     ({"dimers": {"radii": None, "mean_radius": "0.2 mm"}}, "dimers.sin_delta: missing"),
     ({"dimers": {"sin_delta": 0.2}}, "dimers.sin_delta = 0.2: expected either the radii or"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations
-from math import cos, pi, radians, sin
+from math import cos, dist, pi, radians, sin
 from pathlib import Path
 from typing import Any
 
@@ -169,6 +169,30 @@ def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
     # Contact 3 is bead on bead of a dimer, and bead 3 on the floor of a trimer: they are not averaged.
     assert done.result["sliding"] == makes[0]["sliding"]
     assert len(makes[1]["sliding"]) == 6
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 6, 9, 12, 16])
+def test_neighbours_on_a_tray_face_opposite_ways(count: int) -> None:
+    """Along the rows and across them; so they do in a square of odd rows by their numbers alone."""
+    case = of_tables(dimers=dimers(count, meet=True))
+    _, tray = place((case,))
+    least = 1.1 * case.walkers[0].spacing
+    near = [(one, other) for one, other in combinations(tray, 2) if dist(one.origin, other.origin) < least]
+    assert len(near) >= count - 1
+    assert all(one.facing == -other.facing for one, other in near)
+
+
+def test_a_tray_has_another_name_where_its_walkers_face_other_ways() -> None:
+    """They do in even rows, unless they face any way, or are told one; walkers that do not meet keep their names."""
+    turned = {"angle_spread": "180 deg"}
+    for count, start, moved in [(16, {}, True), (9, {}, False), (16, turned, False), (16, {"facing": "right"}, False)]:
+        assert ("shifted_rows" in of_tables(dimers=dimers(count, meet=True, **start)).determinants()) == moved
+    assert "shifted_rows" not in of_tables(dimers=dimers(16)).determinants()
+
+
+def test_walkers_on_a_tray_of_even_rows_meet(tmp_path: Path) -> None:
+    close = dimers(4, spacing="1.6 mm", meet=True)
+    assert walkers.run(of_tables(dimers=close, run={"cycles": 60, "settling_cycles": 18}), tmp_path).result["merged"]
 
 
 def test_walkers_on_a_tray_meet_and_stick(tmp_path: Path) -> None:

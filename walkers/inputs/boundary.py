@@ -214,9 +214,7 @@ class Boundary(Table):
 
     def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
         """Places about the origin for walkers that stand ``spacing`` (m) apart: a square grid, or a row along x."""
-        if self.shape in ("channel", "groove"):
-            return [((place - (number - 1) / 2.0) * spacing, 0.0) for place in range(number)]
-        columns = ceil(sqrt(number))
+        columns = 1 if self.shape in ("channel", "groove") else ceil(sqrt(number))
         rows = ceil(number / columns)
         cells = (divmod(place, columns) for place in range(number))
         return [((row - (rows - 1) / 2.0) * spacing, (column - (columns - 1) / 2.0) * spacing) for row, column in cells]

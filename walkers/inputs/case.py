@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from html import escape
-from math import cos, hypot, inf, sin
+from math import cos, hypot, inf, isclose, pi, sin
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import BeforeValidator, Field, ValidationError
@@ -288,6 +288,8 @@ class Case(Table):
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Case:
         """A case from `as_dict` (a run directory's ``case.json``); raises `ValueError` if it is none."""
+        if "walkers" in values:
+            raise ValueError("is of an earlier version of this program: run the case again")
         try:
             return cls.model_validate(values)
         except ValidationError as error:
@@ -436,6 +438,15 @@ class Case(Table):
     def meets(self) -> bool:
         """Whether walkers may meet."""
         return any(walkers.meet for walkers in self.walkers)
+
+    @cached_property
+    def shifted_rows(self) -> int:
+        """Even length of rows of which every second one begins facing left, so that neighbours meet; 0 if none does."""
+        if not (self.meets and any(one.facing == "both" and not isclose(one.angle_spread, pi) for one in self.walkers)):
+            return 0
+        rows = [x for x, _ in self.boundary.grid(sum(one.replicates for one in self.walkers), 1.0)]
+        length = rows.count(rows[0])
+        return length if length % 2 == 0 and length < len(rows) else 0
 
     @property
     def drive_axis(self) -> Vector:

@@ -38,6 +38,8 @@ _SENTENCES = {
     **dict.fromkeys(("model_type", "dict_type", "model_attributes_type"), "expected a table [{key}]"),
 }
 """By the type of an error of pydantic, with the values of its context."""
+_ENDED = ("run.silence", "run.log_limit")
+"""Keys of cases of earlier versions."""
 _GIVEN_ELSEWHERE = {"beads": "a material", "liquid": "a liquid", "contact": "surfaces"}
 """What the library knows that gives keys of these tables."""
 
@@ -189,6 +191,8 @@ def check_key(model: type[Table], key: str) -> None:
 
 def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
     *tables, word = location
+    if ".".join(location) in _ENDED:
+        return "expected none: this key has ended; the program limits the engine itself"
     known, place = keys_of(file), ""
     for part in tables:
         below = f"{place}.{part}".lstrip(".")

@@ -69,7 +69,8 @@ def _walkers(case: Case, walkers: Walkers, first: int) -> Iterator[Standing]:
     x, y, _ = case.drive_axis
     resting = contact_loads(case, walkers).overlaps
     for number in range(first, first + walkers.replicates):
-        facing = {"right": 1, "left": -1}.get(walkers.facing, 1 if number % 2 == 0 else -1)
+        row = number // case.shifted_rows if case.shifted_rows else 0
+        facing = {"right": 1, "left": -1}.get(walkers.facing, 1 if (number + row) % 2 == 0 else -1)
         turn, press = _draws(case.run.seed, number)
         angle, factor = walkers.angle + walkers.angle_spread * turn, 1.0 + walkers.gap_spread * press
         overlaps = [(overlap if walkers.gap is None else -walkers.gap) * factor for overlap in resting]

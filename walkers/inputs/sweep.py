@@ -47,8 +47,6 @@ from walkers.rounding import counted
 
 _LONGEST_NAME = 120
 _SHOWN = 20
-_SAME_RUN = ("title",)
-"""Keys that do not determine a run."""
 
 
 class SampleTable(Table):
@@ -221,8 +219,8 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
                 unit_of(axis.keys[at], [row[at] for row in axis.rows]) for axis in axes for at in range(len(axis.keys))
             ]
             for key in keys:
-                if key in _SAME_RUN:
-                    raise unusable(key, f"does not vary: points with another {key} alone are the same run")
+                if key == "title":
+                    raise unusable(key, "does not vary: points with another title alone are the same run")
             each(partial(check_key, Case), [key for key in (*settings, *keys) if key != "library"])
             tables = changed(Case, read_case(base, folder), settings)
             changed(Case, tables, dict(zip(keys, rows[0], strict=True)))
