@@ -329,7 +329,7 @@ class Case(Table):
             raw, kind = value_at(self.document, parts_of(name)), kind_in([*field.metadata, field.annotation])
             if raw is not MISSING and not (units.is_auto(raw)):
                 origins[name] = Origin(name, text_of(raw), "given", value=value)
-            elif source := self.sources.get(name):
+            elif (source := self.sources.get(name)) and (source.text or value is not None):
                 text = source.text or text_of(value, kind)
                 about = (source.origin, source.why, source.range, source.logarithmic)
                 origins[name] = Origin(name, text, *about, value=value)
