@@ -169,6 +169,15 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"axis": {}}, 'unknown key; a sweep takes .*did you mean "axes"'),
     ({"case": "fig1c"}, 'case = "fig1c": no such file, run or sweep, nor a shipped case .*did you mean "fig1b"'),
     ({"set": {"drive.frequncy": "60 Hz"}}, "drive.frequncy: unknown key"),
+    ({"case": "."}, r'case = "\.": expected a case file, or the name of a shipped case'),
+    ({"case": "./"}, r'case = "\./": expected a case file, or the name of a shipped case'),
+    ({"set": {"dimers.radii[-1]": {}}}, r"dimers\.radii\[-1\]: unknown key"),
+    ({"set": {"dimers": {}}}, "dimers: is a table of a case"),
+    ({"axes": {"run.seed": {}}}, r"run\.seed = {}: expected a list of values"),
+    *(({"axes": axes}, f"{key}: expected one of {key} and {other}, which replace each other") for axes, key, other in (
+        ({"drive.peak_acceleration": ["1 g"], "drive.gamma0": [0.5]}, "drive.peak_acceleration", "drive.gamma0"),
+        ({"dimers.sin_delta": [0.1], "dimers.radii": [["3 mm", "2 mm"]]}, "dimers.sin_delta", "dimers.radii"),
+    )),
     # What would make the same point twice
     ({"axes": {"drive.frequency": ["80 Hz", "80.0 Hz"]}}, r'"80\.0 Hz": expected different'),
     ({"axes": {"drive.frequency": {"linspace": ["80 Hz", "80 Hz", 3]}}}, "expected different values"),
@@ -182,6 +191,15 @@ BAD: list[tuple[dict[str, Any], str]] = [
 def test_a_sweep_that_makes_no_sense(make: Make, tables: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=f"test.toml: .*{message}"):
         make(**tables)
+
+
+@pytest.mark.parametrize("case", ["other", "other.toml", "./other"])
+def test_the_base_case_beside_a_sweep_comes_before_that_of_the_working_directory(case: str, in_folder: Path) -> None:
+    (in_folder / "below").mkdir()
+    for place, acceleration in (("other.toml", "2 g"), ("below/other.toml", "3 g")):
+        (in_folder / place).write_text(to_toml(document(drive={"peak_acceleration": acceleration})))
+    (in_folder / "below" / "sweep.toml").write_text(f'case = "{case}"\naxes.run.seed = [1]\n')
+    assert [point.drive.peak_acceleration for point in load_sweep("below/sweep.toml").cases()] == [pytest.approx(29.4)]
 
 
 def test_a_point_that_makes_no_sense_is_named(make: Make) -> None:

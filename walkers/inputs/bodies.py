@@ -202,7 +202,7 @@ class Walkers:
     gap: Annotated[units.SignedLength | None, units.AUTO] = None
     gap_spread: Annotated[units.Number, Field(ge=0, lt=1)] = 0.2
     spacing: Annotated[units.Length, units.AUTO_FAR] = inf
-    meet: bool = False
+    meet: units.Flag = False
     radii: tuple[units.Radius, ...] = ()
     mean_radius: Annotated[units.Radius | None, Field(exclude=True)] = None
     sin_delta: Annotated[units.Number | None, Field(gt=-0.9, lt=0.9, exclude=True)] = None
@@ -290,10 +290,8 @@ class Walkers:
             resting = contact_loads(case, self).overlaps
             overlaps = [(overlap if self.gap is None else -self.gap) * factor for overlap in resting]
             heading = atan2(y, x) + angle + (0.0 if facing > 0 else pi)
-            heights = [
-                case.boundary.rest_height(radius - overlap)
-                for radius, overlap in zip(self.radii, overlaps, strict=False)
-            ]
+            on_floor = zip(self.radii, overlaps[: len(self.radii)], strict=True)
+            heights = [case.boundary.rest_height(radius - overlap) for radius, overlap in on_floor]
             beads = [
                 StandingBead(
                     along * cos(heading) - aside * sin(heading), along * sin(heading) + aside * cos(heading), *rest

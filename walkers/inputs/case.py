@@ -309,7 +309,10 @@ class Case:
 
     @property
     def drive_axis(self) -> Vector:
-        """Reference direction of orientations: the drive in the plane of the floor, or x if it has none there."""
+        """Reference direction of orientations and of facing: the largest harmonic, the first of equal ones.
+
+        It is taken in the plane of the floor; x if it has no component there.
+        """
         x, y, _ = self.drive.direction
         length = hypot(x, y)
         return (x / length, y / length, 0.0) if length else AXES["x"]
@@ -337,7 +340,11 @@ class Case:
         return -sum(one * along for one, along in zip(self.gravity_vector, self.drive_axis, strict=True))
 
     def determinants(self) -> dict[str, Any]:
-        """All values that determine the results, as plain JSON types: without names and limits of the engine."""
+        """All values that determine the results, as plain JSON types: without names and limits of the engine.
+
+        Their text, with sorted keys, is hashed for the names of runs and for `walkers.inputs.numerical`: a field with
+        another name renames all runs.
+        """
         no_names: dict[str, Any] = {**dict.fromkeys(("name", "title", "material", *_SOURCES), True), "run": set(BOUNDS)}
         without = {**no_names, "boundary": {"material"}, "liquid": {"name"}}
         if self.liquid.law in LAWS:  # none of which asks for the density; one of a user's own may

@@ -91,8 +91,9 @@ def describe(found: Sequence[Entry]) -> str:
 
 
 def _cell(numbers: Mapping[str, Known], column: str) -> str:
-    """A number with its range; the known one of the two viscosities."""
-    known = next((one for key, one in numbers.items() if f"_{key}".endswith(f"_{column}")), None)
+    """A number with its range; of ``viscosity`` whichever of the two there is."""
+    keys = ("kinematic_viscosity", "dynamic_viscosity") if column == "viscosity" else (column,)
+    known = next((numbers[key] for key in keys if key in numbers), None)
     if known is None:
         return "-"
     ends = f" ({known.range[0]} to {known.range[1]})" if known.range else ""

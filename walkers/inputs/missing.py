@@ -20,6 +20,7 @@ _EXPECTED = {
     "width": 'such as "5.3 mm"',
     "height": 'such as "5.3 mm"',
     "dynamic_viscosity": "a liquid of the library by name, or this number",
+    "kinematic_viscosity": "a liquid of the library by name, or a viscosity, kinematic or dynamic",
     "density": "the liquid's density beside its kinematic_viscosity",
     "frequency": 'such as "80 Hz"',
     "peak_acceleration": 'it (such as "4 g") or gamma0',

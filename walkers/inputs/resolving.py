@@ -43,6 +43,8 @@ _OF_SURFACES = (
 )
 _VISCOSITIES = ("liquid.kinematic_viscosity", "liquid.dynamic_viscosity")
 _OF_LIQUIDS = ("liquid.surface_tension", "liquid.density", *_VISCOSITIES)
+_LIQUIDS = ((_OF_LIQUIDS[0], _VISCOSITIES[1]), _OF_LIQUIDS[:3])
+"""What a liquid of its own says: its surface tension, and its dynamic viscosity or density and kinematic viscosity."""
 SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_OF_SURFACES)
 """Keys that a case may leave out because the library has values or defaults."""
 
@@ -62,7 +64,7 @@ def supplied(document: Mapping[str, Any], known_to: Library, notes: Notes) -> di
     described = given.issuperset(_FRICTION)
     for key, name, kind, says_all in (
         ("beads.material", bead, "materials", described and "beads.density" in given),
-        ("liquid.name", liquid, "liquids", False),
+        ("liquid.name", liquid, "liquids", any(given.issuperset(of_one) for of_one in _LIQUIDS)),
         ("boundary.material", wall, "materials", described),
     ):
         if name is not None and not says_all and not known_to.has(kind, name):
@@ -109,12 +111,13 @@ def _known(
 ) -> dict[str, Known]:
     """What is usual, and what the library has of materials and a liquid, by the keys of a case."""
     on_bead, on_wall = known_to.surface_pair(bead, bead), known_to.surface_pair(bead, wall)
+    of_liquid = known_to.liquid(liquid, mixture) if liquid and known_to.has("liquids", liquid) else {}
     found = {
         "beads.density": known_to.material(bead)["density"] if bead and known_to.has("materials", bead) else None,
         "contact.friction.bead_bead": on_bead.get("friction"),
         "contact.friction.bead_wall": on_wall.get("friction"),
         **{key: on_wall.get(key.split(".")[1]) for key in _OF_SURFACES},
-        **{f"liquid.{key}": known for key, known in (known_to.liquid(liquid, mixture) if liquid else {}).items()},
+        **{f"liquid.{key}": known for key, known in of_liquid.items()},
     }
     return {**library.unmeasured()} | {key: known for key, known in found.items() if known}
 
@@ -322,8 +325,10 @@ def _spaced(case: Case, key: str, walkers: Walkers, notes: Notes) -> Walkers:
     _check_held(case, walkers)
     overlaps = contact_loads(case, walkers).overlaps if gap is None else (-gap,)
     if max(overlaps) * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):
-        blamed = f"{key}.gap" if gap is not None else "contact.youngs_modulus"
-        raise unusable(blamed, "the beads overlap by more than 2 % of the smallest radius")
+        blamed, other = "contact.youngs_modulus", "a larger modulus, or a gap"
+        if gap is not None:
+            blamed, other = f"{key}.gap", f"{-0.02e6 * min(walkers.radii) / (1.0 + walkers.gap_spread):.3g} um or more"
+        raise unusable(blamed, f"the beads overlap by more than 2 % of the smallest radius: expected {other}")
     if isinf(walkers.spacing):
         spacing = 2.0 * (walkers.length if walkers.meet else reach(case))
         notes.derived(
@@ -406,10 +411,11 @@ def _check_places(case: Case, keys: list[str]) -> None:
         least = (1.0 - _OVERLAP) * radius
         beside = clearance < least
         if number < walking and beside:
-            message = f"the walkers do not fit between the walls of the {boundary.shape}"
-            raise unusable(f"{key}.replicates", message)
+            message = f"the walkers do not fit between the walls of the {boundary.shape}: expected fewer or smaller"
+            raise unusable(f"{key}.replicates", f"{message} walkers")
         if number < walking and z + radius > boundary.height:
-            raise unusable("boundary.height", f"too low for the walkers of {key}")
+            message = f"too low for the walkers of {key}; expected {1e3 * (z + radius):.4g} mm or more"
+            raise unusable("boundary.height", message)
         if number >= walking and (beside or z < least or z + radius > boundary.height):
             raise unusable(f"{key}.at", "expected a bead within the boundary")
     if not (placed or case.meets):
@@ -420,7 +426,9 @@ def _check_places(case: Case, keys: list[str]) -> None:
     strangers = (pair for pair in near if pair[1] >= walking or owner[pair[0]] != owner[pair[1]])
     for one, other in sorted(strangers, key=lambda pair: pair[::-1]):
         (key, place, first), (other_key, other_place, second) = beads[one], beads[other]
-        if dist(place, other_place) < first + second - _OVERLAP * min(first, second):
+        least = first + second - _OVERLAP * min(first, second)
+        if dist(place, other_place) < least:
             if other < walking:
                 raise unusable(f"{other_key}.spacing", "at their start angles, beads of two walkers would overlap")
-            raise unusable(f"{other_key}.at", f"overlaps with {key if one >= walking else f'one of {key}'}")
+            message = f"overlaps with {key if one >= walking else f'one of {key}'}; expected their centres at least"
+            raise unusable(f"{other_key}.at", f"{message} {1e3 * least:.4g} mm apart")

@@ -88,7 +88,11 @@ ALTERNATIVES: Mapping[str, tuple[str, ...]] = {
     for way in ways
     for key in way
 }
-"""Keys that say the same in other words: a change of one puts the others out of force."""
+"""Keys that say the same in other words: a change of one puts the others out of force.
+
+Keys of lists, such as ``drive.harmonics[0].gamma0``, have the alternatives of their first and last part: a table within
+a table must not give that name others.
+"""
 
 MOST_BEADS = 20_000
 Axis = Annotated[Any, BeforeValidator(_axis)]
@@ -178,7 +182,7 @@ class RunTable(Table):
     """
 
     time_step: Annotated[units.Time | None, AUTO] = None
-    allow_unstable: bool = False
+    allow_unstable: units.Flag = False
     cycles: Annotated[Annotated[Whole, Field(ge=2, le=1_000_000)] | None, AUTO] = None
     most_cycles: Annotated[Whole, Field(ge=2, le=1_000_000)] | None = None
     duration: Duration | None = None
