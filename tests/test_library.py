@@ -169,11 +169,15 @@ def test_a_library_elsewhere_is_named(own: Path) -> None:
         ),
         (
             '[materials."a\\u001b[31m"]\ndensity = { value = "2 g/cm^3", source = "x" }',
-            "expected printable text on one line",
+            "materials.a\\x1b[31m: expected printable text on one line",
+        ),
+        (
+            '[materials.a]\ndensity = { value = "2 g/cm^3", source = "" }',
+            'materials.a.density.source = "": expected printable text on one line',
         ),
         (
             '[materials.a]\ndensity = { value = "2 g/cm^3", source = "x\\u001b[31m" }',
-            "expected printable text on one line",
+            'materials.a.density.source = "x\\u001b[31m": expected printable text on one line',
         ),
     ],
 )

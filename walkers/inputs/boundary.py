@@ -170,9 +170,8 @@ class Boundary:
     def damping(self, radius: float) -> float:
         """Damping of a bead of a radius (m) by the walls that it touches at once, over that by one of them.
 
-        It is the largest eigenvalue of the sum of n nᵀ over their normals n. The floor and a side wall damp different
-        directions. Not counted are two neighbouring sides of an octagon (1.7): the step of loose beads allows for more
-        (`walkers.inputs.bodies.Mixture.bridged`).
+        It is the largest eigenvalue of the sum of n nᵀ over their normals n. Neighbouring sides of an octagon (1.7) do
+        not count: the step of loose beads allows for more neighbours (`walkers.inputs.bodies.Mixture.bridged`).
         """
         if self.shape == "groove":
             return 1.0 + abs(cos(self.opening))

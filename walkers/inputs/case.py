@@ -109,10 +109,8 @@ class Run:
     @property
     def continuation(self) -> str:
         """What `walkers run` does after the cycles tried first; empty for a fixed number of cycles."""
-        further = (
-            f"walkers run continues to {self.cycles} if the velocities are not constant within {percent(CONSTANT)}"
-        )
-        return f"{further}: then set cycles to {self.cycles}" if len(self.attempts) > 1 else ""
+        until = f"continues to {self.cycles} if the velocities are not constant within {percent(CONSTANT)}"
+        return f"walkers run {until}: then set cycles to {self.cycles}" if len(self.attempts) > 1 else ""
 
     def steps_until(self, cycles: int) -> int:
         """Steps of the attempts up to the one for so many cycles."""
@@ -309,10 +307,7 @@ class Case:
 
     @property
     def drive_axis(self) -> Vector:
-        """Reference direction of orientations and of facing: the largest harmonic, the first of equal ones.
-
-        It is taken in the plane of the floor; x if it has no component there.
-        """
+        """Direction of the largest harmonic (the first of equal ones) in the plane of the floor; x if it has none."""
         x, y, _ = self.drive.direction
         length = hypot(x, y)
         return (x / length, y / length, 0.0) if length else AXES["x"]
@@ -342,8 +337,7 @@ class Case:
     def determinants(self) -> dict[str, Any]:
         """All values that determine the results, as plain JSON types: without names and limits of the engine.
 
-        Their text, with sorted keys, is hashed for the names of runs and for `walkers.inputs.numerical`: a field with
-        another name renames all runs.
+        They are hashed with their keys: a renamed field renames all runs, and loses the measured numerical errors.
         """
         no_names: dict[str, Any] = {**dict.fromkeys(("name", "title", "material", *_SOURCES), True), "run": set(BOUNDS)}
         without = {**no_names, "boundary": {"material"}, "liquid": {"name"}}

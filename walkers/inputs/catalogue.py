@@ -121,7 +121,5 @@ def describe_one(found: Sequence[Entry], name: str) -> str:
             for key, known in one.numbers.items()
         ]
     if wanted[0].kind == "materials":
-        lines.append(
-            f"The friction of {wanted[0].name} on other wet surfaces has not been measured; see walkers library."
-        )
+        lines.append(f"The friction of {wanted[0].name} on other wet surfaces is not measured; see walkers library.")
     return "\n".join(filter(None, lines))

@@ -55,7 +55,7 @@ def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool] = lambda _:
         if isinstance(value, Mapping) and value and not is_leaf(value):
             below = {f"{name}.{key}": one for key, one in flatten(value, is_leaf).items()}
         if twice := flat.keys() & below.keys():
-            raise unusable(twice.pop(), "is given twice")
+            raise unusable(twice.pop(), "is given twice; expected one value")
         flat |= below
     return flat
 
@@ -91,7 +91,7 @@ def settings_of(words: Iterable[str]) -> dict[str, Value]:
         if not (key and separator and text):
             raise InputError("--set", [Problem(word, None, "expected key=value, such as drive.frequency=70Hz")])
         if key in settings:
-            raise InputError("--set", [Problem(key, text, "is given twice")])
+            raise InputError("--set", [Problem(key, text, "is given twice; expected one value")])
         settings[key] = _value(text)
     return settings
 
@@ -132,7 +132,10 @@ def _put(tables: dict[str, Any], key: str, value: Value, without: Sequence[str])
     for number, part in enumerate(parts):
         if isinstance(part, int):
             if not isinstance(place, list) or part >= len(place):
-                raise unusable(key, f"the base case has no {joined(parts[:number])} of that length", value)
+                places = f"a place below [{len(place)}]" if isinstance(place, list) and place else "no place"
+                raise unusable(
+                    key, f"the base case has no {joined(parts[:number])} of that length; expected {places}", value
+                )
         elif isinstance(place, list):
             here = joined(parts[:number])
             raise unusable(key, f"{here} is a list: say which one, such as {here}[0]", value)

@@ -153,21 +153,18 @@ def check_library(tables: object, source: str) -> None:
         raise refused(source, "expected the tables of a library: materials, liquids, surface_pairs")
     validated(LibraryFile, tables, source, "a library")
     shipped, text = _contents(), "is in the library of the program; expected "
-    problems = [
-        Problem(f"{kind}.{name}", None, f"{text}another name")
-        for kind in ("materials", "liquids")
-        for name in tables.get(kind, ())
-        if name in shipped[kind]
-    ]
+    kinds = ("materials", "liquids")
+    again = [f"{kind}.{name}" for kind in kinds for name in tables.get(kind, ()) if name in shipped[kind]]
+    problems = [Problem(key, None, f"{text}another name") for key in again]
     known, pairs = Library(tables).names("materials"), [sorted(one["materials"]) for one in shipped["surface_pairs"]]
     given = list(pairs)
     for number, materials in enumerate(one["materials"] for one in tables.get("surface_pairs", ())):
         key, pair = f"surface_pairs[{number}]", sorted(materials)
         if pair in given:
-            why = f"{text}its numbers in the case instead" if pair in pairs else "is given twice"
+            why = f"{text}its numbers in the case instead" if pair in pairs else "is given twice; expected one table"
             problems.append(Problem(key, " on ".join(materials), why))
         given.append(pair)
-        for name in {*materials}.difference(known):
+        for name in sorted({*materials}.difference(known)):
             why = f"not in the library; {expected_of(name, known)}"
             problems.append(Problem(f"{key}.materials", shown(name), why))
     if problems:

@@ -14,12 +14,12 @@ Q = TypeVar("Q")
 
 
 def _printable(text: str) -> str:
-    if not text.isprintable():
+    if not text or not text.isprintable():
         raise ValueError("expected printable text on one line")
     return text
 
 
-Text = Annotated[str, Field(min_length=1), AfterValidator(_printable)]
+Text = Annotated[str, AfterValidator(_printable)]
 """A name or a source, which commands and reports print as it is."""
 
 

@@ -90,10 +90,7 @@ def _kinds() -> Mapping[str, Kind]:
 
 
 def range_about(one: Origin) -> dict[str, list[Any]]:
-    """The range of a value for the sampler of a sweep; the value of the case is the median.
-
-    Raises `InputError` if the value lies beyond its range.
-    """
+    """The range of a value for a sampler, its median the value of the case; `InputError` if that is beyond it."""
     name, (low, high) = "loguniform" if one.logarithmic else "uniform", one.range or (None, None)
     ends = ranges_of({one.key: {name: [low, high]}})[one.key]
     kind = kind_of(one.key)

@@ -211,9 +211,8 @@ def _until_steady(table: RunTable, case: Case, cycles_per_sample: int) -> bool:
     asked += ["most_cycles"] if table.most_cycles is not None else []
     given = [key for key in ("cycles", "duration", "settling_cycles", "segment") if getattr(table, key) is not None]
     if given and asked:
-        raise unusable(
-            f"run.{given[0]}", f"expected none: with run.{asked[0]}, walkers run until their velocity is constant"
-        )
+        why = f"with run.{asked[0]}, walkers run until their velocity is constant"
+        raise unusable(f"run.{given[0]}", f"expected none: {why}")
     if asked and not case.apart:
         raise unusable(f"run.{asked[0]}", "expected run.duration: a run until steady needs independent walkers")
     if not case.apart or given or table.ranks != 1 or cycles_per_sample != 1:

@@ -22,17 +22,7 @@ from walkers.inputs.changes import flatten
 from walkers.inputs.errors import InputError, unusable
 from walkers.physics import units
 from walkers.physics.matter import Contact, Liquid
-from walkers.physics.units import (
-    AUTO,
-    Angle,
-    Coefficient,
-    Duration,
-    Length,
-    Number,
-    Radius,
-    SignedLength,
-    Whole,
-)
+from walkers.physics.units import AUTO, Angle, Coefficient, Duration, Length, Number, Radius, SignedLength, Whole
 
 
 def _axis(value: object) -> object:
@@ -88,11 +78,7 @@ ALTERNATIVES: Mapping[str, tuple[str, ...]] = {
     for way in ways
     for key in way
 }
-"""Keys that say the same in other words: a change of one puts the others out of force.
-
-Keys of lists, such as ``drive.harmonics[0].gamma0``, have the alternatives of their first and last part: a table within
-a table must not give that name others.
-"""
+"""Keys that replace each other, by first and last part: no table within a table may give such a name others."""
 
 MOST_BEADS = 20_000
 Axis = Annotated[Any, BeforeValidator(_axis)]

@@ -206,7 +206,7 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
             ]
             for key in keys:
                 if key in _SAME_RUN:
-                    raise unusable(key, f"does not vary: points with another {key} alone are the same run")
+                    raise unusable(key, f"expected another key, for {key} does not determine a run")
                 for other in {*ALTERNATIVES.get(key, ())} & {*keys}:
                     raise unusable(key, f"expected one of {key} and {other}, which replace each other")
             each(check_key, [key for key in (*settings, *keys) if key != "library"])
@@ -243,8 +243,7 @@ def _base(case: str, source: str, folder: Path) -> Path:
         base = next(beside, None) or find_input(case or "no name", "case")
         if base.is_dir():
             raise refused(base, "expected a case file, or the name of a shipped case")
-    except OSError as error:
-        raise InputError(source, [Problem("case", f'"{case[:40]}…"', f"cannot be read: {error.strerror}")]) from error
-    except InputError as error:
-        raise InputError(source, [Problem("case", f'"{case}"', error.problems[0].expected)]) from error
+    except (OSError, InputError) as error:
+        why = error.problems[0].expected if isinstance(error, InputError) else f"cannot be read: {error.strerror}"
+        raise InputError(source, [Problem("case", f'"{case}"', why)]) from error
     return base

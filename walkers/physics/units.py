@@ -219,7 +219,6 @@ AUTO_FAR = WrapValidator(lambda value, read: inf if _is_auto(value) else read(va
 ABSENT: Sequence[Any] = (None, "", [], (), inf, pi, nan)
 """Defaults that represent missing values. No key with such a default takes it as a value (an opening is below pi)."""
 Flag = Annotated[bool, Field(strict=True)]
-"""true or false, neither "yes" nor 1."""
 Whole = Annotated[int, Field(strict=True)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 """TOML's integers and floats only: neither "0.3" nor true is a coefficient."""
