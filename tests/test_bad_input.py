@@ -83,6 +83,8 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"liquid": {"contact_angle": "84 deg"}, "dimers": {"gap": "-1 nm"}}, 'liquid.contact_angle = "84 deg": exp'),
     ({"liquid": {"contact_angle": "90 deg"}, "environment": {"gravity": "0 g"}}, "bead 1 and the boundary apart"),
     ({"run": {"time_step": "20 us"}}, 'run.time_step = "20 us": beyond the rayleigh'),
+    ({"run": {"time_step": "3 us"}, "liquid": {"name": "glycerol 87 %"},
+      "boundary": {"shape": "groove", "opening": "60 deg"}}, "beyond the viscous limit; expected less than 2.59 us"),
     ({"run": {"cycles": 10, "settling_cycles": 10}}, "run.settling_cycles = 10: expected at most"),
     ({"run": {"bridge_samples_per_cycle": 3}}, "run.bridge_samples_per_cycle = 3: expected a divisor"),
     ({"run": {"cycles": 999_999}}, f"run.cycles = 999999: expected at most {(2**31 - 1) // 3200}: "),

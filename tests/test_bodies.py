@@ -270,6 +270,17 @@ def test_a_bead_rests_on_both_walls_of_a_groove() -> None:
     assert [np.dot(wall.normal, (0.0, 0.0, height)) for wall in groove.walls] == pytest.approx([3e-4, 3e-4])
 
 
+@pytest.mark.parametrize("first", ["x", "y"])
+def test_walkers_face_along_the_first_of_equal_harmonics(first: str) -> None:
+    axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+    tones = [{"axis": axis, "frequency": "80 Hz", "peak_acceleration": "2 g"} for axis in dict.fromkeys((first, *axes))]
+    case = resolve_case({**document(), "drive": {"harmonics": tones}})
+    assert case.drive_axis == axes[first]
+    ((_, standing),) = case.standing()
+    large, small = standing.beads
+    assert np.sign(np.round([large.x - small.x, large.y - small.y], 9)).tolist() == list(axes[first][:2])
+
+
 @pytest.mark.parametrize(
     ("boundary", "walls"),
     [

@@ -9,7 +9,8 @@ third, velocities are wrong without any warning (a glycerol climber: 10.9 mm/s a
                 (the bead's own at a wall, the reduced mass between beads); two walls at an angle φ count as 1 + |cos φ|
 
 The sum takes the bridges to other beads as parallel, which is safe for clusters: the shipped climber, at 0.86 of its
-limit, has the velocity (within 0.02 %) and the kinetic energy (0.05 %) of a quarter of that step.
+limit, has the velocity (within 0.02 %) and the kinetic energy (0.05 %) of a quarter of that step. In a groove of 60° a
+dimer takes 23 times the work of shorter steps at 1.3 of its limit, and theirs within 3 % at 0.87.
 
 Speeds of the AK5 walker agree within 0.5 % from 1 to 10 µs, the latter being its Rayleigh time.
 """
