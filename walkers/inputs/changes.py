@@ -132,10 +132,9 @@ def _put(tables: dict[str, Any], key: str, value: Value, without: Sequence[str])
     for number, part in enumerate(parts):
         if isinstance(part, int):
             if not isinstance(place, list) or part >= len(place):
-                places = f"a place below [{len(place)}]" if isinstance(place, list) and place else "no place"
-                raise unusable(
-                    key, f"the base case has no {joined(parts[:number])} of that length; expected {places}", value
-                )
+                other = f"a place below [{len(place)}]" if isinstance(place, list) else "the whole list"
+                message = f"the base case has no {joined(parts[:number])} of that length; expected {other}"
+                raise unusable(key, message, value)
         elif isinstance(place, list):
             here = joined(parts[:number])
             raise unusable(key, f"{here} is a list: say which one, such as {here}[0]", value)

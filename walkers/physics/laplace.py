@@ -310,7 +310,11 @@ def _turning_point(
 
 
 def force_curve(
-    radius_1: float, radius_2: float, volume: float, contact_angle: float | tuple[float, float], gaps: npt.ArrayLike
+    radius_1: float,
+    radius_2: float,
+    volume: float,
+    contact_angle: float | tuple[float, float],
+    gaps: npt.ArrayLike,
 ) -> ForceCurve:
     """Pull of a bridge of constant volume at gaps.
 
