@@ -19,7 +19,7 @@ from walkers.inputs.errors import InputError
 from walkers.inputs.origins import Origin
 from walkers.inputs.readable import flattened
 from walkers.inputs.reading import load_case, resolve_case, shipped, with_changes
-from walkers.inputs.sweep import load_sweep
+from walkers.inputs.sweep import expand, load_sweep
 from walkers.postprocess.gait import SEPARATED
 from walkers.postprocess.uncertainty import SPREAD_NAME, band_of, band_text, lines_of_rest, rests_on
 from walkers.runner.files import read_json
@@ -196,6 +196,30 @@ def test_what_is_called_uncertain_keeps_where_it_comes_from(tmp_path: Path) -> N
         lines_of_rest(rests_on(case.origins))
     )
     assert {*ranges, "dimers.radii[1]"} < set(spread_sweep(case, 2).keys)
+
+
+@pytest.mark.parametrize("key", ["contact.restitution", "liquid.contact_angle", "dimers.radii[1]"])
+def test_the_range_of_an_uncertain_value_holds_it(key: str, in_folder: Path) -> None:
+    low, high, within = {
+        "contact.restitution": (0.4, 0.8, "0.5"),
+        "liquid.contact_angle": ("5 deg", "12 deg", "10 deg"),
+        "dimers.radii[1]": ("0.21 mm", "0.25 mm", "220 um"),
+    }[key]
+    (in_folder / "mine.toml").write_text(to_toml(document(uncertain={key: [low, high]})))
+    for command in ("show", "run"):
+        done = call(command, "mine.toml")
+        assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+        assert f"mine.toml: uncertain.{key} = [" in done.stderr
+        assert "]: expected a range that holds the case's own value, " in done.stderr
+    assert not (in_folder / "runs").exists()
+    call("show", "mine.toml", "--set", f"{key}={within}", check=True)
+
+
+def test_a_sweep_may_leave_the_range_of_an_uncertain_value(in_folder: Path) -> None:
+    (in_folder / "mine.toml").write_text(to_toml(document(uncertain={"contact.restitution": [0.2, 0.4]})))
+    tables = {"case": "mine.toml", "axes": {"contact.restitution": [0.3, 0.9]}}
+    points = expand(tables, source="wide", name="wide", folder=in_folder).cases()
+    assert [case.contact.restitution for case in points] == [0.3, 0.9]
 
 
 def test_settings_are_read_as_a_file_would() -> None:

@@ -33,7 +33,7 @@ _LEAST_LEVER = 0.1
 """Of a cluster's extent: large and small beads whose centroids are nearer than that give no heading."""
 _TOUCHING = 0.02
 """Radii by which beads that are given places may be apart and still touch."""
-_TOO_SMALL = "a bead is too small to touch two beads that touch each other"
+_TOO_SMALL = "a bead is too small to touch two beads that touch each other; expected a larger one"
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def _fan(radii: Sequence[float], apart: Apart) -> Places:
             raise ValueError(_TOO_SMALL)
         turns.append(turns[-1] + acos(cosine))
     if turns[-1] + turns[-1] / max(len(turns) - 1, 1) > 2.0 * pi * (1.0 + 1e-9):
-        raise ValueError("too many beads to fit around the first one")
+        raise ValueError("too many beads to fit around the first one; expected fewer")
     front = apart(0, 1) * radii[0] / (radii[0] + radii[1])
     behind = [(apart(0, bead), pi - turns[-1] / 2.0 + turn) for bead, turn in enumerate(turns, 1)]
     return [(front, 0.0), *((front + away * cos(turn), away * sin(turn)) for away, turn in behind)]
@@ -110,7 +110,7 @@ def _ring(radii: Sequence[float], apart: Apart) -> Places:
         return [2.0 * asin(min(chord / (2.0 * radius), 1.0)) for chord in chords]
 
     if sum(turns(low)) < 2.0 * pi:
-        raise ValueError("these beads do not form a closed ring")
+        raise ValueError("these beads do not form a closed ring; expected more beads, or more similar radii")
     for _ in range(200):
         middle = (low + high) / 2.0
         low, high = (middle, high) if sum(turns(middle)) > 2.0 * pi else (low, middle)
@@ -202,7 +202,7 @@ class Walkers:
     gap: Annotated[units.SignedLength | None, units.AUTO] = None
     gap_spread: Annotated[units.Number, Field(ge=0, lt=1)] = 0.2
     spacing: Annotated[units.Length, units.AUTO_FAR] = inf
-    meet: bool = False
+    meet: units.Flag = False
     radii: tuple[units.Radius, ...] = ()
     mean_radius: Annotated[units.Radius | None, Field(exclude=True)] = None
     sin_delta: Annotated[units.Number | None, Field(gt=-0.9, lt=0.9, exclude=True)] = None
@@ -272,9 +272,8 @@ class Walkers:
             return self.front
         many = (sum(large), len(large) - sum(large))
         weights = tuple(1.0 / many[0] if is_large else -1.0 / many[1] for is_large in large)
-        lever = [
-            sum(weight * x for weight, x in zip(weights, axis, strict=True)) for axis in zip(*self.design, strict=True)
-        ]
+        axes = zip(*self.design, strict=True)
+        lever = [sum(weight * x for weight, x in zip(weights, axis, strict=True)) for axis in axes]
         return weights if hypot(*lever) > _LEAST_LEVER * self.length else self.front
 
     def stand(self, case: Case, first: int) -> list[Standing]:
@@ -291,17 +290,14 @@ class Walkers:
             resting = contact_loads(case, self).overlaps
             overlaps = [(overlap if self.gap is None else -self.gap) * factor for overlap in resting]
             heading = atan2(y, x) + angle + (0.0 if facing > 0 else pi)
-            heights = [
-                case.boundary.rest_height(radius - overlap)
-                for radius, overlap in zip(self.radii, overlaps, strict=False)
-            ]
-            beads = [
-                StandingBead(
-                    along * cos(heading) - aside * sin(heading), along * sin(heading) + aside * cos(heading), *rest
-                )
+            on_floor = zip(self.radii, overlaps[: len(self.radii)], strict=True)
+            heights = [case.boundary.rest_height(radius - overlap) for radius, overlap in on_floor]
+            ahead, left = cos(heading), sin(heading)
+            beads = tuple(
+                StandingBead(along * ahead - aside * left, along * left + aside * ahead, *rest)
                 for (along, aside), *rest in zip(self._places(heights, overlaps), heights, self.radii, strict=True)
-            ]
-            standing.append(Standing(tuple(beads), facing, angle, walks=True))
+            )
+            standing.append(Standing(beads, facing, angle, walks=True))
         return standing
 
     def _places(self, heights: Sequence[float], overlaps: Sequence[float]) -> Places:
@@ -313,7 +309,8 @@ class Walkers:
         def apart(one: int, other: int) -> float:
             between = self.radii[one] + self.radii[other] - known[min(one, other), max(one, other)]
             if between < abs(heights[one] - heights[other]):
-                raise ValueError("the radii differ too much: the beads do not touch when they rest on the boundary")
+                message = "the radii differ too much: the beads do not touch when they rest on the boundary"
+                raise ValueError(f"{message}; expected more similar radii")
             return sqrt(between**2 - (heights[one] - heights[other]) ** 2)
 
         return ARRANGEMENTS[self.arrangement].places(self.radii, apart)

@@ -101,10 +101,8 @@ class Run:
     @property
     def continuation(self) -> str:
         """What `walkers run` does after the cycles tried first; empty for a fixed number of cycles."""
-        further = (
-            f"walkers run continues to {self.cycles} if the velocities are not constant within {percent(CONSTANT)}"
-        )
-        return f"{further}: then set cycles to {self.cycles}" if len(self.attempts) > 1 else ""
+        until = f"continues to {self.cycles} if the velocities are not constant within {percent(CONSTANT)}"
+        return f"walkers run {until}: then set cycles to {self.cycles}" if len(self.attempts) > 1 else ""
 
     def steps_until(self, cycles: int) -> int:
         """Steps of the attempts up to the one for so many cycles."""
@@ -298,7 +296,7 @@ class Case:
 
     @property
     def drive_axis(self) -> Vector:
-        """Reference direction of orientations: the drive in the plane of the floor, or x if it has none there."""
+        """Direction of the largest harmonic (the first of equal ones) in the plane of the floor; x if it has none."""
         x, y, _ = self.drive.direction
         length = hypot(x, y)
         return (x / length, y / length, 0.0) if length else AXES["x"]
@@ -326,7 +324,10 @@ class Case:
         return -sum(one * along for one, along in zip(self.gravity_vector, self.drive_axis, strict=True))
 
     def determinants(self) -> dict[str, Any]:
-        """All values that determine the results, as plain JSON types: without names."""
+        """All values that determine the results, as plain JSON types: without names.
+
+        They are hashed with their keys: a renamed field renames all runs, and loses the measured numerical errors.
+        """
         no_names = dict.fromkeys(("name", "title", "material", *_SOURCES), True)
         without: dict[str, Any] = {**no_names, "boundary": {"material"}, "liquid": {"name"}}
         if self.liquid.law in LAWS:  # none of which asks for the density; one of a user's own may

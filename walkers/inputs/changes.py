@@ -9,6 +9,7 @@ import copy
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import lru_cache
 from typing import Any
 
@@ -51,10 +52,10 @@ def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool] = lambda _:
     flat: dict[str, Any] = {}
     for name, value in table.items():
         below = {name: value}
-        if isinstance(value, Mapping) and not is_leaf(value):
+        if isinstance(value, Mapping) and value and not is_leaf(value):
             below = {f"{name}.{key}": one for key, one in flatten(value, is_leaf).items()}
         if twice := flat.keys() & below.keys():
-            raise unusable(twice.pop(), "is given twice")
+            raise unusable(twice.pop(), "is given twice; expected one value")
         flat |= below
     return flat
 
@@ -90,16 +91,15 @@ def settings_of(words: Iterable[str]) -> dict[str, Value]:
         if not (key and separator and text):
             raise InputError("--set", [Problem(word, None, "expected key=value, such as drive.frequency=70Hz")])
         if key in settings:
-            raise InputError("--set", [Problem(key, text, "is given twice")])
+            raise InputError("--set", [Problem(key, text, "is given twice; expected one value")])
         settings[key] = _value(text)
     return settings
 
 
 def _value(text: str) -> Value:
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except (tomllib.TOMLDecodeError, KeyError):
-        pass
+    with suppress(ValueError):  # no TOML, or further keys on further lines
+        (value,) = tomllib.loads(f"value = {text}").values()
+        return value
     if text.startswith("[") and text.endswith("]") and "[" not in text[1:]:
         return [_value(part.strip()) for part in text[1:-1].split(",")]
     return text
@@ -132,7 +132,9 @@ def _put(tables: dict[str, Any], key: str, value: Value, without: Sequence[str])
     for number, part in enumerate(parts):
         if isinstance(part, int):
             if not isinstance(place, list) or part >= len(place):
-                raise unusable(key, f"the base case has no {joined(parts[:number])} of that length", value)
+                other = f"a place below [{len(place)}]" if isinstance(place, list) else "the whole list"
+                message = f"the base case has no {joined(parts[:number])} of that length; expected {other}"
+                raise unusable(key, message, value)
         elif isinstance(place, list):
             here = joined(parts[:number])
             raise unusable(key, f"{here} is a list: say which one, such as {here}[0]", value)

@@ -89,10 +89,8 @@ def blaming_changes(changes: Mapping[str, Any]) -> Iterator[None]:
         ours = [any(of and of[: len(one)] == one[: len(of)] for one in given) for of in parts]
         if not any(ours):
             raise
-        told = [
-            replace(one, key=f"--set {one.key}") if of else one for one, of in zip(error.problems, ours, strict=True)
-        ]
-        raise InputError(error.source, told) from error
+        blamed = zip(error.problems, ours, strict=True)
+        raise InputError(error.source, [replace(one, key="--set " * of + one.key) for one, of in blamed]) from error
 
 
 def validated(
@@ -114,7 +112,8 @@ def validated(
 
 
 def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[BaseModel], whole: str) -> Problem:
-    location, kind, context = details["loc"], details["type"], details.get("ctx", {})
+    kind, context = details["type"], details.get("ctx", {})
+    location = [part for part in details["loc"] if part != "[key]"]  # of a name of the user's
     message = details["msg"]
     for pydantics, ours in _WORDS.items():
         message = message.replace(pydantics, ours)
@@ -122,11 +121,8 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
     key = joined(location[:-1] if short_list else location)
     example = _EXAMPLES.get(re.sub(r"\[\d+\]", "", key)) or _EXAMPLES.get(f"*.{location[-1]}")
     if kind == "missing":
-        message = (
-            f"too short; expected {example or 'two numbers'}"
-            if short_list
-            else f"missing; expected {example or 'a value'}"
-        )
+        fault, other = ("too short", "two numbers") if short_list else ("missing", "a value")
+        message = f"{fault}; expected {example or other}"
     elif kind == "too_long":
         most = context["max_length"]
         message = f"too long; expected {example or ('two numbers' if most == 2 else f'at most {most} entries')}"
@@ -171,7 +167,7 @@ def check_key(key: str) -> None:
     """Refuse a key that no case has; raises `InputError` if it is one."""
     parts, known = re.sub(r"\[\d+\]", "", key).split("."), keys_of(CaseFile)
     if "" in parts:
-        raise unusable(key, "is not a key of a case")
+        raise unusable(key, "is not a key of a case; expected one such as drive.frequency")
     if ".".join(parts) not in known:
         raise unusable(key, _unknown_key(parts, CaseFile, "a case"))
     if known[".".join(parts)]:

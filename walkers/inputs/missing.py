@@ -20,6 +20,7 @@ _EXPECTED = {
     "width": 'such as "5.3 mm"',
     "height": 'such as "5.3 mm"',
     "dynamic_viscosity": "a liquid of the library by name, or this number",
+    "kinematic_viscosity": "a liquid of the library by name, or a viscosity, kinematic or dynamic",
     "density": "the liquid's density beside its kinematic_viscosity",
     "frequency": 'such as "80 Hz"',
     "peak_acceleration": 'it (such as "4 g") or gamma0',
@@ -31,8 +32,7 @@ def missing_keys(tables: Mapping[str, Any]) -> list[Problem]:
     """The keys that are missing of the tables of a case, which are checked by their models as well."""
     problems = [Problem(key, None, f"missing; expected {_EXPECTED[key.rpartition('.')[2]]}") for key in _keys(tables)]
     if not any(body in tables for body in _BODIES):
-        message = f"missing; expected bodies: {', '.join(f'[[{one}]]' for one in _BODIES)}"
-        message = message.replace("[[dimers]]", "[dimers]").replace("[[mixture]], ", "[mixture] or ")
+        message = "missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]"
         problems.insert(0, Problem("dimers", None, message))
     return problems
 
@@ -62,7 +62,7 @@ def _list(value: Any) -> list[Any]:
 
 
 def _lacking(name: str, table: Any, ways: tuple[tuple[str, ...], ...]) -> Iterator[str]:
-    """What a table lacks, which says something in one of several ways: of that of which it has most."""
+    """Missing keys of a table that may use one of several sets of keys: those of the set of which it has a key."""
     if isinstance(table, Mapping):
         way = max(ways, key=lambda keys: (sum(key in table for key in keys) > 0, -len(keys)))
         yield from (f"{name}.{key}" for key in way if key not in table)

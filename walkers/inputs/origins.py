@@ -130,10 +130,8 @@ def _leaves(table: Any, document: Mapping[str, Any], prefix: str = "") -> Iterat
 def text_of(value: Any, kind: Kind | None = None) -> str:
     """A value of a case file as text: lists with commas, tables by their keys; numbers of a kind are in SI units."""
     if isinstance(value, (list, tuple)):
-        texts = [text_of(one, kind) for one in value]
-        return ", ".join(
-            f"({text})" if isinstance(one, (list, tuple)) else text for one, text in zip(value, texts, strict=True)
-        )
+        forms = ["({})" if isinstance(one, (list, tuple)) else "{}" for one in value]
+        return ", ".join(forms).format(*(text_of(one, kind) for one in value))
     if kind is not None and not isinstance(value, str):
         from walkers.physics.units import quantity_text
 

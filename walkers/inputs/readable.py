@@ -8,8 +8,11 @@ from functools import cache
 from math import isclose, pi
 from typing import Any
 
+from walkers.inputs.axes import ranges_of, written
 from walkers.inputs.case import ENDED
 from walkers.inputs.changes import dotted
+from walkers.inputs.errors import unusable
+from walkers.inputs.origins import Origin
 from walkers.physics import units
 from walkers.physics.units import Kind
 
@@ -84,6 +87,22 @@ def _kinds() -> Mapping[str, Kind]:
     fields = [(name, field) for table in tables for name, (_, field) in fields_of(table).items()]
     kinds = {name: units.kind_in([*field.metadata, field.annotation]) for name, field in fields}
     return {name: kind for name, kind in kinds.items() if kind is not None}
+
+
+def range_about(one: Origin) -> dict[str, list[Any]]:
+    """The range of a value for a sampler, its median the value of the case; `InputError` if that is beyond it."""
+    name, (low, high) = "loguniform" if one.logarithmic else "uniform", one.range or (None, None)
+    ends = ranges_of({one.key: {name: [low, high]}})[one.key]
+    kind = kind_of(one.key)
+    try:
+        unit = units.parse_quantity(f"1 {ends.unit}", kind) if kind and ends.unit else 1.0
+        value = (units.parse_quantity(one.text, kind) if kind and ends.unit else float(one.text)) / unit
+    except ValueError:  # a value that the program computes, such as a time step
+        return {name: [low, high]}
+    if not ends.low * (1.0 - 1e-9) <= value <= ends.high * (1.0 + 1e-9):
+        message = f"expected a range that holds the case's own value, {one.text}"
+        raise unusable(f"uncertain.{one.key}", message, [low, high])
+    return {name: [low, written(min(max(value, ends.low), ends.high), ends.unit), high]}
 
 
 def _number(value: Any, size: float) -> str:

@@ -94,16 +94,18 @@ def with_changes(case: Case, changes: Mapping[str, Any] | None = None) -> Case:
 
 def _changed(document: Mapping[str, Any], changes: Mapping[str, Any] | None, source: str, name: str) -> Case:
     """The case of tables with changes, whose keys are checked."""
-    if not changes:
-        return resolve_case(document, source=source, name=name)
     from walkers.inputs.changes import changed
     from walkers.inputs.messages import blaming, blaming_changes, check_key
+    from walkers.inputs.readable import range_about
 
-    with blaming_changes(changes):
+    with blaming_changes(changes or {}):
         with blaming(source):
-            each(check_key, changes)
-            tables = changed(document, changes)
-        return resolve_case(tables, source=source, name=name)
+            each(check_key, changes or {})
+            tables = changed(document, changes or {})
+        case = resolve_case(tables, source=source, name=name)
+    with blaming(source):
+        each(range_about, [one for one in case.origins if one.uncertain] if tables.get("uncertain") else [])
+    return case
 
 
 def is_sweep_file(path: Path) -> bool:

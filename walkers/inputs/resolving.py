@@ -43,6 +43,8 @@ _OF_SURFACES = (
 )
 _VISCOSITIES = ("liquid.kinematic_viscosity", "liquid.dynamic_viscosity")
 _OF_LIQUIDS = ("liquid.surface_tension", "liquid.density", *_VISCOSITIES)
+_LIQUIDS = ((_OF_LIQUIDS[0], _VISCOSITIES[1]), _OF_LIQUIDS[:3])
+"""What a liquid of its own says: its surface tension, and its dynamic viscosity or density and kinematic viscosity."""
 SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_OF_SURFACES)
 """Keys that a case may leave out because the library has values or defaults."""
 
@@ -62,7 +64,7 @@ def supplied(document: Mapping[str, Any], known_to: Library, notes: Notes) -> di
     described = given.issuperset(_FRICTION)
     for key, name, kind, says_all in (
         ("beads.material", bead, "materials", described and "beads.density" in given),
-        ("liquid.name", liquid, "liquids", False),
+        ("liquid.name", liquid, "liquids", any(given.issuperset(of_one) for of_one in _LIQUIDS)),
         ("boundary.material", wall, "materials", described),
     ):
         if name is not None and not says_all and not known_to.has(kind, name):
@@ -109,12 +111,13 @@ def _known(
 ) -> dict[str, Known]:
     """What is usual, and what the library has of materials and a liquid, by the keys of a case."""
     on_bead, on_wall = known_to.surface_pair(bead, bead), known_to.surface_pair(bead, wall)
+    of_liquid = known_to.liquid(liquid, mixture) if liquid and known_to.has("liquids", liquid) else {}
     found = {
         "beads.density": known_to.material(bead)["density"] if bead and known_to.has("materials", bead) else None,
         "contact.friction.bead_bead": on_bead.get("friction"),
         "contact.friction.bead_wall": on_wall.get("friction"),
         **{key: on_wall.get(key.split(".")[1]) for key in _OF_SURFACES},
-        **{f"liquid.{key}": known for key, known in (known_to.liquid(liquid, mixture) if liquid else {}).items()},
+        **{f"liquid.{key}": known for key, known in of_liquid.items()},
     }
     return {**library.unmeasured()} | {key: known for key, known in found.items() if known}
 
@@ -197,8 +200,7 @@ def _liquid_of(table: Liquid, notes: Notes) -> Liquid:
     """The liquid of the bridges and their law; raises `InputError` if its viscosity is missing or said twice."""
     dynamic, kinematic = table.dynamic_viscosity, table.kinematic_viscosity
     if not isnan(dynamic) and kinematic is not None:
-        message = "expected either kinematic_viscosity or dynamic_viscosity, not both"
-        raise unusable("liquid.dynamic_viscosity", message)
+        raise unusable("liquid.dynamic_viscosity", "expected either kinematic_viscosity or dynamic_viscosity, not both")
     if kinematic is not None:
         assert table.density is not None
         dynamic = float(f"{kinematic * table.density:.15g}")
@@ -260,7 +262,8 @@ def _arranged(walkers: Walkers, key: str) -> Walkers:
     except ValueError as error:
         raise unusable(key, str(error)) from error
     if overlapping:
-        raise unusable(key, f"beads {overlapping[0][0] + 1} and {overlapping[0][1] + 1} would overlap in a {name}")
+        one, other = (bead + 1 for bead in overlapping[0])
+        raise unusable(key, f"beads {one} and {other} would overlap in a {name}; expected similar radii")
     return walkers
 
 
@@ -271,7 +274,8 @@ def _at_places(walkers: Walkers, key: str) -> Walkers:
         raise unusable(key, f"expected a place for each of the {len(everyone)} beads")
     walkers = replace(walkers, arrangement="given")
     if overlapping := touching(places, walkers.radii, -_OVERLAP):
-        raise unusable(f"{key}[{overlapping[0][1]}]", f"overlaps with {key}[{overlapping[0][0]}]")
+        one, other = overlapping[0]
+        raise unusable(f"{key}[{other}]", f"overlaps with {key}[{one}]; expected beads that touch")
     if not any(walkers.front):
         raise unusable(key, "expected some beads ahead of others: this walker has no heading")
     joined = {0}
@@ -322,15 +326,14 @@ def _spaced(case: Case, key: str, walkers: Walkers, notes: Notes) -> Walkers:
     _check_held(case, walkers)
     overlaps = contact_loads(case, walkers).overlaps if gap is None else (-gap,)
     if max(overlaps) * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):
-        blamed = f"{key}.gap" if gap is not None else "contact.youngs_modulus"
-        raise unusable(blamed, "the beads overlap by more than 2 % of the smallest radius")
+        blamed, other = "contact.youngs_modulus", f"a larger modulus, or {key}.gap"
+        if gap is not None:
+            blamed, other = f"{key}.gap", f"{-0.02e6 * min(walkers.radii) / (1.0 + walkers.gap_spread):.3g} um or more"
+        raise unusable(blamed, f"the beads overlap by more than 2 % of the smallest radius: expected {other}")
     if isinf(walkers.spacing):
         spacing = 2.0 * (walkers.length if walkers.meet else reach(case))
-        notes.derived(
-            f"{key}.spacing",
-            spacing,
-            "so that walkers do not touch at the start" if walkers.meet else "so that walkers do not meet",
-        )
+        avoided = "touch at the start" if walkers.meet else "meet"
+        notes.derived(f"{key}.spacing", spacing, f"so that walkers do not {avoided}")
         return replace(walkers, spacing=spacing)
     # Beads of different walkers may touch, but not overlap, if they are meant to meet.
     least = (1.0 if walkers.meet else 1.5) * walkers.length
@@ -394,9 +397,8 @@ def _check_places(case: Case, keys: list[str]) -> None:
         raise unusable("boundary.width", "expected more than a bead's diameter")
     grid = boundary.grid(len(keys), max(one.spacing for one in case.walkers)) if keys else []
     of_walkers = zip(keys, grid, standing, strict=True)
-    beads = [
-        (key, (x + one.x, y + one.y, one.z), one.radius) for key, (x, y), walker in of_walkers for one in walker.beads
-    ]
+    stood = [(key, x, y, one) for key, (x, y), walker in of_walkers for one in walker.beads]
+    beads = [(key, (x + one.x, y + one.y, one.z), one.radius) for key, x, y, one in stood]
     owner = [number for number, walker in enumerate(standing) for _ in walker.beads]
     placed = case.placed.beads if case.placed is not None else ()
     walking = len(beads)
@@ -406,10 +408,11 @@ def _check_places(case: Case, keys: list[str]) -> None:
         least = (1.0 - _OVERLAP) * radius
         beside = clearance < least
         if number < walking and beside:
-            message = f"the walkers do not fit between the walls of the {boundary.shape}"
-            raise unusable(f"{key}.replicates", message)
+            message = f"the walkers do not fit between the walls of the {boundary.shape}: expected fewer or smaller"
+            raise unusable(f"{key}.replicates", f"{message} walkers")
         if number < walking and z + radius > boundary.height:
-            raise unusable("boundary.height", f"too low for the walkers of {key}")
+            message = f"too low for the walkers of {key}; expected {1e3 * (z + radius):.4g} mm or more"
+            raise unusable("boundary.height", message)
         if number >= walking and (beside or z < least or z + radius > boundary.height):
             raise unusable(f"{key}.at", "expected a bead within the boundary")
     if not (placed or case.meets):
@@ -420,7 +423,9 @@ def _check_places(case: Case, keys: list[str]) -> None:
     strangers = (pair for pair in near if pair[1] >= walking or owner[pair[0]] != owner[pair[1]])
     for one, other in sorted(strangers, key=lambda pair: pair[::-1]):
         (key, place, first), (other_key, other_place, second) = beads[one], beads[other]
-        if dist(place, other_place) < first + second - _OVERLAP * min(first, second):
+        least = first + second - _OVERLAP * min(first, second)
+        if dist(place, other_place) < least:
             if other < walking:
-                raise unusable(f"{other_key}.spacing", "at their start angles, beads of two walkers would overlap")
-            raise unusable(f"{other_key}.at", f"overlaps with {key if one >= walking else f'one of {key}'}")
+                raise unusable(f"{other_key}.spacing", "beads of two walkers would overlap at the start; expected more")
+            message = f"overlaps with {key if one >= walking else f'one of {key}'}; expected their centres at least"
+            raise unusable(f"{other_key}.at", f"{message} {1e3 * least:.4g} mm apart")

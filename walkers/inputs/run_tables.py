@@ -76,7 +76,7 @@ def _harmonic(table: HarmonicTable, key: str, boundary: Boundary, dimer: Dimer |
 
 def limits_of(case: Case) -> TimeStepLimits:
     """Limits of the time step for the bodies of a case."""
-    bridged = [entry for body in case.bodies for entry in body.bridged]
+    bridged = [(*entry, case.boundary.damping(entry[0])) for body in case.bodies for entry in body.bridged]
     return time_step_limits(bridged, case.density, case.contact, case.liquid, case.drive.peak_velocity)
 
 
@@ -99,8 +99,8 @@ def resolve_run(table: RunTable, case: Case, notes: Notes) -> Run:
     _check_length(table, case, cycles, settling, cycles_per_sample)
     most = MOST_STEPS // steps - (ceil((rest + 1.0) * frequency) if rest else 0)
     if cycles > most:
-        key, message = ("cycles", f"expected at most {most}") if table.duration is None else ("duration", "too long")
-        raise unusable(f"run.{key}", f"{message}: the engine counts steps up to 2^31")
+        key, longest = ("cycles", f"{most}") if table.duration is None else ("duration", f"{most // frequency:g} s")
+        raise unusable(f"run.{key}", f"expected at most {longest}: the engine counts steps up to 2^31")
     segment = table.segment if table.segment is not None else _SEGMENT_SECONDS if loose else inf
     # Segments end with a sample, so that each begins where the last one ended.
     samples_of_segment = max(1, round(min(segment * frequency, cycles) / cycles_per_sample))
@@ -206,9 +206,8 @@ def _until_steady(table: RunTable, case: Case, cycles_per_sample: int) -> bool:
     asked += ["most_cycles"] if table.most_cycles is not None else []
     given = [key for key in ("cycles", "duration", "settling_cycles", "segment") if getattr(table, key) is not None]
     if given and asked:
-        raise unusable(
-            f"run.{given[0]}", f"expected none: with run.{asked[0]}, walkers run until their velocity is constant"
-        )
+        why = f"with run.{asked[0]}, walkers run until their velocity is constant"
+        raise unusable(f"run.{given[0]}", f"expected none: {why}")
     if asked and not case.apart:
         raise unusable(f"run.{asked[0]}", "expected run.duration: a run until steady needs independent walkers")
     if not case.apart or given or table.ranks != 1 or cycles_per_sample != 1:

@@ -22,17 +22,7 @@ from walkers.inputs.changes import flatten
 from walkers.inputs.errors import InputError, unusable
 from walkers.physics import units
 from walkers.physics.matter import Contact, Liquid
-from walkers.physics.units import (
-    AUTO,
-    Angle,
-    Coefficient,
-    Duration,
-    Length,
-    Number,
-    Radius,
-    SignedLength,
-    Whole,
-)
+from walkers.physics.units import AUTO, Angle, Coefficient, Duration, Length, Number, Radius, SignedLength, Whole
 
 
 def _axis(value: object) -> object:
@@ -88,7 +78,7 @@ ALTERNATIVES: Mapping[str, tuple[str, ...]] = {
     for way in ways
     for key in way
 }
-"""Keys that say the same in other words: a change of one puts the others out of force."""
+"""Keys that replace each other, by first and last part: no table within a table may give such a name others."""
 
 MOST_BEADS = 20_000
 Axis = Annotated[Any, BeforeValidator(_axis)]
@@ -177,7 +167,7 @@ class RunTable(Table):
     """
 
     time_step: Annotated[units.Time | None, AUTO] = None
-    allow_unstable: bool = False
+    allow_unstable: units.Flag = False
     cycles: Annotated[Annotated[Whole, Field(ge=2, le=1_000_000)] | None, AUTO] = None
     most_cycles: Annotated[Whole, Field(ge=2, le=1_000_000)] | None = None
     duration: Duration | None = None

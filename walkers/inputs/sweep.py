@@ -37,8 +37,8 @@ from walkers.inputs.case import Case
 from walkers.inputs.changes import Value, changed, flatten
 from walkers.inputs.errors import InputError, Problem, each, refused, shortened, unusable
 from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
-from walkers.inputs.reading import find_input, read_case, read_toml, resolve_case
-from walkers.inputs.schema import Table
+from walkers.inputs.reading import find_input, read_case, read_toml, resolve_case, shipped
+from walkers.inputs.schema import ALTERNATIVES, Table
 from walkers.physics.units import Speed, Whole
 
 _LONGEST_NAME = 120
@@ -204,7 +204,9 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
             ]
             for key in keys:
                 if key == "title":
-                    raise unusable(key, "does not vary: points with another title alone are the same run")
+                    raise unusable(key, f"expected another key, for {key} does not determine a run")
+                for other in {*ALTERNATIVES.get(key, ())} & {*keys}:
+                    raise unusable(key, f"expected one of {key} and {other}, which replace each other")
             each(check_key, [key for key in (*settings, *keys) if key != "library"])
             tables = changed(read_case(base, folder), settings)
             changed(tables, dict(zip(keys, rows[0], strict=True)))
@@ -232,10 +234,14 @@ def settings_in(tables: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _base(case: str, source: str, folder: Path) -> Path:
+    """The file of the base case: beside the sweep, with or without ``.toml``, or as a command finds it."""
+    names = [case] if case in shipped("case") else [case, f"{case}.toml"]
     try:
-        beside = folder / case
-        return beside if case and beside.is_file() else find_input(case or "no name", "case")
-    except OSError as error:
-        raise InputError(source, [Problem("case", f'"{case[:40]}…"', f"cannot be read: {error.strerror}")]) from error
-    except InputError as error:
-        raise InputError(source, [Problem("case", f'"{case}"', error.problems[0].expected)]) from error
+        beside = (folder / name for name in names if case and (folder / name).is_file())
+        base = next(beside, None) or find_input(case or "no name", "case")
+        if base.is_dir():
+            raise refused(base, "expected a case file, or the name of a shipped case")
+    except (OSError, InputError) as error:
+        why = error.problems[0].expected if isinstance(error, InputError) else f"cannot be read: {error.strerror}"
+        raise InputError(source, [Problem("case", f'"{case}"', why)]) from error
+    return base

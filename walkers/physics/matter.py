@@ -36,7 +36,7 @@ class Liquid:
     volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)]
     viscosity_ratio: Annotated[Number, Field(ge=0, le=1e4, exclude=True)] = 1.0
     contact_angle: units.UpToRightAngle
-    conserved: bool = False
+    conserved: units.Flag = False
     law: str = DEFAULT_LAW
 
 

@@ -8,16 +8,15 @@ from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.inputs.axes import Range, ranges_of, sampled, unit_cube, unit_of, written
+from walkers.inputs.axes import ranges_of, sampled, unit_cube, unit_of
 from walkers.inputs.case import Case
-from walkers.inputs.errors import refused, unusable
+from walkers.inputs.errors import refused
 from walkers.inputs.library import unmeasured
 from walkers.inputs.messages import blaming
 from walkers.inputs.origins import Origin
-from walkers.inputs.readable import kind_of
+from walkers.inputs.readable import range_about
 from walkers.inputs.rounding import SHOWN_UNITS, rounded
 from walkers.inputs.sweep import Sweep, settings_in
-from walkers.physics.units import parse_quantity
 from walkers.postprocess.analysis import analyses, analyses_of
 from walkers.postprocess.sides import REST, SEPARATED
 from walkers.postprocess.uncertainty import BANDS_ON_SLOPES, LEAST_PER_VALUE, SPREAD_NAME, spread_of
@@ -80,25 +79,9 @@ class Spread:
         return contents
 
 
-def _range_of(one: Origin) -> dict[str, list[Any]]:
-    """The range of a value for the sampler of a sweep; the value of the case is the median."""
-    name, (low, high) = "loguniform" if one.logarithmic else "uniform", one.range or (None, None)
-    ends: Range = ranges_of({one.key: {name: [low, high]}})[one.key]
-    kind = kind_of(one.key)
-    try:
-        unit = parse_quantity(f"1 {ends.unit}", kind) if kind and ends.unit else 1.0
-        own = (parse_quantity(one.text, kind) if kind and ends.unit else float(one.text)) / unit
-    except ValueError:  # a value that the program computes, such as a time step
-        return {name: [low, high]}
-    if not ends.low * (1.0 - 1e-9) <= own <= ends.high * (1.0 + 1e-9):
-        message = f"expected a range that holds the case's own value, {one.text}"
-        raise unusable(f"uncertain.{one.key}", message, [low, high])
-    return {name: [low, written(min(max(own, ends.low), ends.high), ends.unit), high]}
-
-
 def _half(one: Origin) -> str:
     """A note that half of the draws are equal, if the median is an end of the range."""
-    drawn = ranges_of({one.key: _range_of(one)})[one.key]
+    drawn = ranges_of({one.key: range_about(one)})[one.key]
     return f"; half of the draws at {one.text}" if drawn.median in (drawn.low, drawn.high) else ""
 
 
@@ -117,7 +100,7 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
         message = "no value is uncertain: give ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
         raise refused(case.name, message)
     with blaming(case.name, case.document):
-        ranges = {one.key: _range_of(one) for one in varied}
+        ranges = {one.key: range_about(one) for one in varied}
 
     def likeness(seed: int) -> float:
         cube = unit_cube("sobol", len(varied), points, seed)

@@ -146,9 +146,8 @@ def of_liquid(surface: Surface, radius: float) -> list[Parameter]:
     doubled = replace(
         liquid, surface_tension=2.0 * liquid.surface_tension, dynamic_viscosity=2.0 * liquid.dynamic_viscosity
     )
-    once, twice = (
-        law_of(one)(Surfaces.of(radius, inf, one, contact.minimum_separation_ratio)) for one in (liquid, doubled)
-    )
+    separation = contact.minimum_separation_ratio
+    once, twice = (law_of(one)(Surfaces.of(radius, inf, one, separation)) for one in (liquid, doubled))
     gaps = once.rupture * np.array([0.0, 0.01, 0.3, 0.9])
     if not np.allclose(twice.forces(gaps).columns(), 2.0 * once.forces(gaps).columns(), rtol=1e-9, atol=0.0):
         return []
