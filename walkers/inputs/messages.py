@@ -97,7 +97,8 @@ def validated(
 
 
 def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[BaseModel], whole: str) -> Problem:
-    location, kind, context = details["loc"], details["type"], details.get("ctx", {})
+    kind, context = details["type"], details.get("ctx", {})
+    location = tuple(part for part in details["loc"] if part != "[key]")  # of a name of the user's
     of_list = kind == "missing" and isinstance(location[-1], int)
     parts: tuple[str | int, ...] = location[:-1] if of_list else location
     key, field = joined(parts), _field_at(file, parts)
@@ -182,7 +183,7 @@ def check_key(model: type[Table], key: str) -> None:
     """Refuse a key that no case has; raises `InputError` if it is one."""
     parts, known = re.sub(r"\[\d+\]", "", key).split("."), keys_of(model)
     if "" in parts:
-        raise unusable(key, "is not a key of a case")
+        raise unusable(key, "is not a key of a case; expected one such as drive.frequency")
     if ".".join(parts) not in known:
         raise unusable(key, _unknown_key(parts, model, "a case"))
     if known[".".join(parts)]:

@@ -10,7 +10,7 @@ from pydantic import Field
 from walkers.errors import unusable
 from walkers.inputs import units
 from walkers.inputs.origins import Source
-from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Flag, Table, key
+from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Table, key
 from walkers.inputs.units import AUTO, Duration, Number, Whole
 from walkers.physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
 from walkers.rounding import percent
@@ -68,7 +68,7 @@ class Run(Table):
         "Time step, or its upper limit; the program shortens it so that a cycle contains a whole number of samples.",
         None,
     )
-    allow_unstable: Annotated[Flag, SAME_RUN] = key("Accept a time step beyond a stability limit.", False)
+    allow_unstable: Annotated[units.Flag, SAME_RUN] = key("Accept a time step beyond a stability limit.", False)
     cycles: Annotated[Filled[_Cycles], AUTO] = key(
         "Number of drive cycles. `auto`: until the walkers are steady. See [](../cases.md#length-of-a-run).", None, 60
     )
@@ -171,7 +171,7 @@ def limits_of(case: Case) -> TimeStepLimits:
     """Limits of the time step for the bodies of a case."""
     contact = case.contact
     return time_step_limits(
-        [entry for body in case.bodies for entry in body.bridged],
+        [(*entry, case.boundary.damping(entry[0])) for body in case.bodies for entry in body.bridged],
         density=case.beads.density,
         youngs_modulus=contact.youngs_modulus,
         poissons_ratio=contact.poissons_ratio,
@@ -200,8 +200,8 @@ def with_run(case: Case) -> Case:
     _check_length(case, cycles, settling, cycles_per_sample)
     most = MOST_STEPS // steps - (ceil((rest + 1.0) * frequency) if rest else 0)
     if cycles > most:
-        name, message = ("cycles", f"expected at most {most}") if table.duration is None else ("duration", "too long")
-        raise unusable(f"run.{name}", f"{message}: the engine counts steps up to 2^31")
+        name, longest = ("cycles", f"{most}") if table.duration is None else ("duration", f"{most // frequency:g} s")
+        raise unusable(f"run.{name}", f"expected at most {longest}: the engine counts steps up to 2^31")
     segment = table.segment if table.segment is not None else _SEGMENT_SECONDS if loose else inf
     # Segments end with a sample, so that each begins where the last one ended.
     samples_of_segment = max(1, round(min(segment * frequency, cycles) / cycles_per_sample))

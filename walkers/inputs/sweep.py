@@ -39,8 +39,8 @@ from walkers.inputs.axes import (
 from walkers.inputs.case import Case
 from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
-from walkers.inputs.reading import find_input, read_case
-from walkers.inputs.table import Table, changed
+from walkers.inputs.reading import find_input, read_case, shipped
+from walkers.inputs.table import Table, alternatives, changed
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import Speed, Whole
 from walkers.rounding import counted
@@ -220,8 +220,11 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
             ]
             for key in keys:
                 if key == "title":
-                    raise unusable(key, "does not vary: points with another title alone are the same run")
+                    raise unusable(key, f"expected another key, for {key} does not determine a run")
             each(partial(check_key, Case), [key for key in (*settings, *keys) if key != "library"])
+            for key in keys:
+                for other in alternatives(Case, key) & {*keys}:
+                    raise unusable(key, f"expected one of {key} and {other}, which replace each other")
             tables = changed(Case, read_case(base, folder), settings)
             changed(Case, tables, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:
@@ -248,10 +251,14 @@ def settings_in(tables: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _base(case: str, source: str, folder: Path) -> Path:
+    """The file of the base case: beside the sweep, with or without ``.toml``, or as a command finds it."""
+    names = [case] if case in shipped("case") else [case, f"{case}.toml"]
     try:
-        beside = folder / case
-        return beside if case and beside.is_file() else find_input(case or "no name", "case")
-    except OSError as error:
-        raise InputError(source, [Problem("case", f'"{case[:40]}…"', f"cannot be read: {error.strerror}")]) from error
-    except InputError as error:
-        raise InputError(source, [Problem("case", f'"{case}"', error.problems[0].expected)]) from error
+        beside = (folder / name for name in names if case and (folder / name).is_file())
+        base = next(beside, None) or find_input(case or "no name", "case")
+        if base.is_dir():
+            raise refused(base, "expected a case file, or the name of a shipped case")
+    except (OSError, InputError) as error:
+        why = error.problems[0].expected if isinstance(error, InputError) else f"cannot be read: {error.strerror}"
+        raise InputError(source, [Problem("case", f'"{case}"', why)]) from error
+    return base

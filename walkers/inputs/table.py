@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, ValidationInfo
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError, PydanticUndefined
@@ -23,7 +23,6 @@ from walkers.inputs.units import WRITTEN, is_auto, kind_in, shown_in_file
 T = TypeVar("T")
 SAME_RUN = "same run"
 """Annotation of a key: another value does not make another run, by itself."""
-Flag = StrictBool
 
 
 def _only_derived(value: object, info: ValidationInfo) -> object:
@@ -239,7 +238,9 @@ def _put(model: type[Table] | None, tables: dict[str, Any], name: str, value: An
         above = parts[:number]
         if isinstance(part, int):
             if not isinstance(place, list) or part >= len(place):
-                raise unusable(name, f"the base case has no {joined(above)} of that length", value)
+                other = f"a place below [{len(place)}]" if isinstance(place, list) else "the whole list"
+                message = f"the base case has no {joined(above)} of that length; expected {other}"
+                raise unusable(name, message, value)
         elif isinstance(place, list):
             raise unusable(name, f"{joined(above)} is a list: say which one, such as {joined(above)}[0]", value)
         elif not isinstance(place, dict):  # the base case is wrong there, which its own check tells
