@@ -46,6 +46,8 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"dimers": {"radii": ["1e999 mm", "0.2 mm"]}}, 'dimers.radii[0] = "1e999 mm": expected a length'),
     ({"beads": {"density": 4000}}, "beads.density = 4000: expected a density with its unit"),
     ({"drive": {"peak_acceleration": "-4 g"}}, "must be zero or more"),
+    ({"drive": {"peak_acceleration": "1e6 m/s^2"}}, "must lie between 1e-09 and 10000 m/s^2"),
+    ({"drive": {"peak_acceleration": "2000 g"}}, "must lie between 1.02e-10 and 1020 g"),
     ({"drive": {"frequency": "500 rad/s"}}, "(cycles per second, not an angular frequency)"),
     ({"contact": {"youngs_modulus": "1 MPa"}}, "must lie between 5 and 1000 MPa"),
     ({"liquid": {"contact_angle": "120 deg"}}, "must lie between 0 and 90 deg"),
@@ -63,6 +65,9 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"run": {"cycles": "allways"}}, 'run.cycles = "allways": expected a whole number, or "auto"'),
     ({"dimers": {"replicates": 1.5}}, "expected a whole number"),
     ({"run": {"allow_unstable": "yes please"}}, "expected true or false"),
+    ({"run": {"allow_unstable": "yes"}}, 'run.allow_unstable = "yes": expected true or false'),
+    ({"dimers": {"meet": "yes"}}, 'dimers.meet = "yes": expected true or false'),
+    ({"liquid": {"conserved": 1}}, "liquid.conserved = 1: expected true or false"),
     ({"drive": "x"}, 'drive = "x": expected a table'),
     ({"beads": {"material": "rubi"}}, 'beads.material = "rubi": not in the library'),
     ({"liquid": {"name": "Si AK 5"}}, 'did you mean "Si AK5"'),
@@ -79,19 +84,24 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"liquid": {"contact_angle": "84 deg"}, "dimers": {"gap": "-1 nm"}}, 'liquid.contact_angle = "84 deg": exp'),
     ({"liquid": {"contact_angle": "90 deg"}, "environment": {"gravity": "0 g"}}, "bead 1 and the boundary apart"),
     ({"run": {"time_step": "20 us"}}, 'run.time_step = "20 us": beyond the rayleigh'),
+    ({"run": {"time_step": "3 us"}, "liquid": {"name": "glycerol 87 %"},
+      "boundary": {"shape": "groove", "opening": "60 deg"}}, "beyond the viscous limit; expected less than 2.59 us"),
     ({"run": {"cycles": 10, "settling_cycles": 10}}, "run.settling_cycles = 10: expected at most"),
     ({"run": {"bridge_samples_per_cycle": 3}}, "run.bridge_samples_per_cycle = 3: expected a divisor"),
     ({"run": {"cycles": 999_999}}, f"run.cycles = 999999: expected at most {(2**31 - 1) // 3200}: "),
     ({"run": {"cycles": 20, "frames_per_second": 4.0}}, "run.frames_per_second"),
     ({"run": {"ranks": 2}}, "run.ranks = 2"),
+    ({"run": {"silence": "20 s"}}, 'run.silence = "20 s": expected none: this key has ended'),
     # Bodies and boundaries
     ({"dimers": {"radii": None, "mean_radius": "0.2 mm"}}, "dimers.sin_delta: missing"),
     ({"dimers": {"sin_delta": 0.2}}, "dimers.sin_delta = 0.2: expected either the radii or"),
     ({"dimers": {"gap": "1 um"}}, 'dimers.gap = "1 um": expected zero or less'),
-    ({"dimers": {"gap": "-50 um"}}, "overlap by more than 2 %"),
+    ({"dimers": {"gap": "-50 um"}}, "overlap by more than 2 % of the smallest radius: expected -4 um or more"),
+    ({"dimers": {"radii": ["2 mm", "0.2 mm"]}, "contact": {"youngs_modulus": "5 MPa"}},
+     "more than 2 % of the smallest radius: expected a larger modulus, or dimers.gap"),
     ({"dimers": {"replicates": 2, "spacing": "0.5 mm"}}, 'dimers.spacing = "0.5 mm": neighbouring walkers would touch'),
     ({"dimers": {"replicates": 4, "spacing": "0.9 mm", "meet": True}}, "expected at least 0.99 mm"),
-    ({"dimers": {"replicates": 9, "spacing": "1 mm", "meet": True}}, "at their start angles, beads of two walkers"),
+    ({"dimers": {"replicates": 9, "spacing": "1 mm", "meet": True}}, "would overlap at the start; expected more"),
     (cluster("star", "0.3 mm", "0.2 mm"), 'arrangement = "star": expected one of chain, fan, diamond, ring, raft'),
     (cluster("ring", "0.3 mm", "0.2 mm"), "clusters[0].radii"),
     (cluster("raft", "0.3 mm", "0.2 mm", "0.2 mm"), "expected the same radius for all beads of a raft"),
@@ -109,15 +119,23 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"boundary": {"tilt": "-5 deg", **GLASS}}, 'must be zero or more; boundary.uphill = "180 deg" turns the slope'),
     ({"boundary": {"width": "1 mm", **GLASS}}, 'boundary.width = "1 mm": expected none of a plane'),
     ({**cluster("fan", "0.3 mm", "0.2 mm", "0.2 mm"), "boundary": {"shape": "channel", "width": "0.7 mm"}},
-     "do not fit between the walls"),
+     "do not fit between the walls of the channel: expected fewer or smaller walkers"),
     ({"placed": [bead("1 mm", "9 mm"), bead("0.1 mm", "30 mm"), bead("0.5 mm", "10.4 mm")]}, "overlaps with placed[0]"),
     ({"placed": [bead("1 mm", "9 mm", "0.9 mm")]}, "expected a bead within the boundary"),
     ({"dimers": None, "placed": [bead("1 mm", "9 mm")], "run": {"seed": 3}}, "run.seed = 3: expected none with placed"),
+    ({"placed": [bead("1 mm", "9 mm"), bead("0.1 mm", "30 mm"), bead("0.5 mm", "10.4 mm")]},
+     "overlaps with placed[0]; expected their centres at least 1.495 mm apart"),
+    ({"run": {"cycles": None, "settling_cycles": None, "duration": "1e4 s"}},
+     'run.duration = "1e4 s": expected at most 8388 s: the engine counts'),
     # What is missing
     ({"dimers": None}, "dimers: missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]"),
     ({"beads": {"material": None}}, "beads.density: missing; expected such as"),
     ({"drive": {"frequency": None}}, "drive.frequency: missing"),
     ({"drive": {"peak_acceleration": None}}, "drive.peak_acceleration: missing"),
+    ({"liquid": {"name": None, "surface_tension": "19 mN/m", "density": "1 g/cm^3"}},
+     "liquid.kinematic_viscosity: missing; expected a liquid of the library by name, or"),
+    ({"liquid": {"name": "mine", "surface_tension": "19 mN/m", "kinematic_viscosity": "5 mm^2/s"}},
+     'liquid.name = "mine": not in the library'),
 ]  # fmt: skip
 
 
@@ -135,6 +153,7 @@ def test_bad_values(changes: dict[str, Any], told: str) -> None:
     assert told in message
     assert message.startswith("bad.toml: ")
     assert message.count("\n") == 0, "one problem, one line"
+    assert "expected" in message or "unknown key" in message
 
 
 READING = ("plot", "render", "render --film", "report", *(f"export --to {form}" for form in ("vtk", "xyz", "archive")))
@@ -199,6 +218,8 @@ REFUSED: list[tuple[str, str]] = [
     ("shw fig1b", 'no such command; did you mean "show"?'),
     ("new {case}", "exists already"),
     ("new mine --from fig1", 'did you mean "fig1b"?'),
+    *((f"new '{name}'", f"{name or '.'}: expected a name") for name in ("", ".", "/", "..")),
+    ("show fig1b --set 'run.seed=3\nfoo=4'", 'fig1b: --set run.seed = "3\\nfoo=4": expected a whole number'),
     ("list --out {runs} --older-than soon", "expected an age with its unit"),
     ("list --out {runs} --where frequency", "expected KEY=VALUE"),
     ("list --out {runs} --where frequenzy=2", "no run has such a key"),
@@ -385,7 +406,9 @@ def test_long_values_and_those_of_several_lines_are_quoted_on_one(in_folder: Pat
     settings = (f"drive.frequency={long}", f"{long}=3", f"liquid.name={long}")
     words = [("show", "base.toml", "--set", one) for one in settings]
     words += [("sweep", f"{name}.toml") for name in ("value", "key", "lines")]
-    for arguments in (*words, ("plot", "base.toml", "--format", long)):
+    odd = "xxx\n\x1b[31m"
+    words += [("plot", "base.toml", "--format", long), ("new", "mine", "--from", odd), ("show", odd)]
+    for arguments in words:
         message = _message(*arguments)
         assert message.count("\n") == 1
         assert message.rstrip("\n").isprintable()

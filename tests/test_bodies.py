@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations
-from math import cos, pi, radians, sin
+from math import cos, dist, pi, radians, sin
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from walkers.runner.summary import summarise
 
 import walkers
 from tests.conftest import REFERENCE, document, make_case
@@ -171,6 +172,30 @@ def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
     assert len(makes[1]["sliding"]) == 6
 
 
+@pytest.mark.parametrize("count", [2, 3, 4, 6, 9, 12, 16])
+def test_neighbours_on_a_tray_face_opposite_ways(count: int) -> None:
+    """Along the rows and across them; so they do in a square of odd rows by their numbers alone."""
+    case = of_tables(dimers=dimers(count, meet=True))
+    _, tray = place((case,))
+    least = 1.1 * case.walkers[0].spacing
+    near = [(one, other) for one, other in combinations(tray, 2) if dist(one.origin, other.origin) < least]
+    assert len(near) >= count - 1
+    assert all(one.facing == -other.facing for one, other in near)
+
+
+def test_a_tray_has_another_name_where_its_walkers_face_other_ways() -> None:
+    """They do in even rows, unless they face any way, or are told one; walkers that do not meet keep their names."""
+    turned = {"angle_spread": "180 deg"}
+    for count, start, moved in [(16, {}, True), (9, {}, False), (16, turned, False), (16, {"facing": "right"}, False)]:
+        assert ("shifted_rows" in of_tables(dimers=dimers(count, meet=True, **start)).determinants()) == moved
+    assert "shifted_rows" not in of_tables(dimers=dimers(16)).determinants()
+
+
+def test_walkers_on_a_tray_of_even_rows_meet(tmp_path: Path) -> None:
+    close = dimers(4, spacing="1.6 mm", meet=True)
+    assert walkers.run(of_tables(dimers=close, run={"cycles": 60, "settling_cycles": 18}), tmp_path).result["merged"]
+
+
 def test_walkers_on_a_tray_meet_and_stick(tmp_path: Path) -> None:
     """Heads that run into each other stick; the table of meetings and the bridges between walkers say the same."""
     close = dimers(9, spacing="1.6 mm", meet=True, angle_spread="20 deg")
@@ -268,6 +293,43 @@ def test_a_bead_rests_on_both_walls_of_a_groove() -> None:
     height = groove.rest_height(3e-4)
     assert height == pytest.approx(2.0 * 3e-4)
     assert [np.dot(wall.normal, (0.0, 0.0, height)) for wall in groove.walls] == pytest.approx([3e-4, 3e-4])
+
+
+@pytest.mark.parametrize("first", ["x", "y"])
+def test_walkers_face_along_the_first_of_equal_harmonics(first: str) -> None:
+    axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+    tones = [{"axis": axis, "frequency": "80 Hz", "peak_acceleration": "2 g"} for axis in dict.fromkeys((first, *axes))]
+    case = resolve_case({**document(), "drive": {"harmonics": tones}})
+    assert case.drive_axis == axes[first]
+    ((_, standing),) = case.standing()
+    large, small = standing.beads
+    assert np.sign(np.round([large.x - small.x, large.y - small.y], 9)).tolist() == list(axes[first][:2])
+
+
+@pytest.mark.parametrize(
+    ("boundary", "walls"),
+    [
+        ({"shape": "groove", "opening": "30 deg"}, 1.0 + np.sqrt(0.75)),
+        ({"shape": "groove", "opening": "60 deg"}, 1.5),
+        ({"shape": "groove", "opening": "90 deg"}, 1.0),
+        ({"shape": "groove", "opening": "120 deg"}, 1.5),
+        ({"shape": "channel", "width": "0.6 mm"}, 2.0),
+        ({"shape": "channel", "width": "0.62 mm"}, 1.0),
+    ],
+)
+def test_the_viscous_limit_counts_the_walls_that_a_bead_touches_at_once(boundary: dict[str, str], walls: float) -> None:
+    """Two walls damp a bead by c (n n + m m), whose largest eigenvalue is c (1 + |n·m|)."""
+
+    def rate(**changes: str) -> float:
+        case = make_case(dimers={"radii": ["0.3 mm", "0.3 mm"]}, liquid={"name": "glycerol 87 %"}, boundary=changes)
+        found = summarise(case)["time_step"]["limits"]["viscous"]
+        assert case.run.time_step == pytest.approx(0.4 * found, rel=0.02)
+        return float(2.0 / found)
+
+    case = make_case(liquid={"name": "glycerol 87 %"})
+    mass = 4.0 / 3.0 * np.pi * 3e-4**3 * case.density
+    of_a_wall = 6.0 * np.pi * case.liquid.dynamic_viscosity * 3e-4 / case.contact.minimum_separation_ratio / mass
+    assert (rate(**boundary) - rate()) / of_a_wall == pytest.approx(walls - 1.0, abs=1e-9)
 
 
 def test_a_dimer_in_a_groove_rolls_on_both_walls(tmp_path: Path) -> None:

@@ -94,7 +94,6 @@ def resting(case: Case, frames: int | None = None) -> Motion:
         (4.6e-3, units.DYNAMIC_VISCOSITY, "4.6 mPa*s"),
         (4000.0, units.DENSITY, "4 g/cm^3"),
         (2e-6, units.TIME, "2 us"),
-        (6.4e7, units.FILE_SIZE, "64 MB"),
     ],
 )
 def test_quantities_are_written_in_the_unit_of_their_example(value: float, kind: Kind, text: str) -> None:

@@ -307,9 +307,9 @@ class Sweep:
     @property
     def status(self) -> str:
         """``finished``, ``running``, ``failed`` (some points) or ``interrupted`` (points are missing)."""
-        from walkers.sweeps.table import states, worst_status
+        from walkers.sweeps.table import checked_states, worst_status
 
-        return worst_status(state.status for state in states(self._record))
+        return worst_status(state.status for state in checked_states(self._record))
 
     @property
     def runs(self) -> list[Run]:

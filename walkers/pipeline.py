@@ -139,7 +139,7 @@ def _load_postprocess() -> None:
 
 
 def sweep(
-    sweep: str | Path,
+    sweep: str | Path | Mapping[str, Any],
     out: str | Path = DEFAULT_OUT,
     *,
     jobs: int | None = None,
@@ -151,7 +151,7 @@ def sweep(
     Parameters
     ----------
     sweep
-        A sweep file, or the name of a shipped sweep.
+        A sweep file, the name of a shipped sweep, or the tables of a sweep file.
     out
         Folder of the run directories.
     jobs

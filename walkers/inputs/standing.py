@@ -69,7 +69,8 @@ def _walkers(case: Case, walkers: Walkers, first: int) -> Iterator[Standing]:
     x, y, _ = case.drive_axis
     resting = contact_loads(case, walkers).overlaps
     for number in range(first, first + walkers.replicates):
-        facing = {"right": 1, "left": -1}.get(walkers.facing, 1 if number % 2 == 0 else -1)
+        row = number // case.shifted_rows if case.shifted_rows else 0
+        facing = {"right": 1, "left": -1}.get(walkers.facing, 1 if (number + row) % 2 == 0 else -1)
         turn, press = _draws(case.run.seed, number)
         angle, factor = walkers.angle + walkers.angle_spread * turn, 1.0 + walkers.gap_spread * press
         overlaps = [(overlap if walkers.gap is None else -walkers.gap) * factor for overlap in resting]
@@ -232,9 +233,9 @@ def _check_overlaps(beads: list[_Held]) -> None:
         first, second = beads[one], beads[other]
         apart, touching = dist(first.place, second.place), first.radius + second.radius
         if apart < touching - OVERLAP * min(first.radius, second.radius):
-            by = f"{1e3 * (touching - apart):.3g} mm; they touch at a distance of {1e3 * touching:.4g} mm"
+            by, expected = f"{1e3 * (touching - apart):.3g} mm", f"expected their centres {1e3 * touching:.4g} mm apart"
             if second.walker >= 0:
-                message = f"at their start angles, beads of two walkers would overlap by {by}"
+                message = f"beads of two walkers would overlap at the start by {by}; expected more"
                 raise unusable(f"{second.key}.spacing", message)
             whom = first.key if first.walker < 0 else f"one of {first.key}"
-            raise unusable(f"{second.key}.at", f"overlaps with {whom} by {by}")
+            raise unusable(f"{second.key}.at", f"overlaps with {whom} by {by}; {expected}, where they touch")

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator, Mapping
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, ValidationInfo
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError, PydanticUndefined
@@ -23,7 +23,6 @@ from walkers.inputs.units import WRITTEN, is_auto, kind_in, shown_in_file
 T = TypeVar("T")
 SAME_RUN = "same run"
 """Annotation of a key: another value does not make another run, by itself."""
-Flag = StrictBool
 
 
 def _only_derived(value: object, info: ValidationInfo) -> object:
@@ -91,12 +90,11 @@ class Table(BaseModel):
         return type(self) is type(other) and self._values == other._values
 
     def but(self, **values: Any) -> Self:
-        """The same table with other values, which are not validated.
-
-        `model_copy` would keep the cached properties of the former values.
-        """
-        kept = {name: getattr(self, name) for name in type(self).model_fields}
-        return type(self).model_construct({*self.model_fields_set, *values}, **{**kept, **values})  # type: ignore[return-value]
+        """The same table with other values, which are not validated."""
+        table = self.model_copy(update=values)
+        for name in table.__dict__.keys() - type(self).model_fields.keys():
+            del table.__dict__[name]  # cached properties of the former values
+        return table
 
     def put(self, name: str, value: Any) -> Self:
         """The same tables with another value at a dotted key, which is not validated."""
@@ -162,7 +160,8 @@ class Table(BaseModel):
                         yield Problem(joined([*parts_of(place), name]), None, f"missing; expected {example}{instead}")
 
 
-def keys_in(model: type[BaseModel]) -> dict[str, FieldInfo]:
+@cache
+def keys_in(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
     """The keys of a table, as a file has them, with their fields."""
     fields = model.model_fields.items()
     return {field.alias or name: field for name, field in fields if _DERIVED not in field.metadata}
@@ -171,6 +170,13 @@ def keys_in(model: type[BaseModel]) -> dict[str, FieldInfo]:
 def field_name(model: type[BaseModel], name: str) -> str:
     """The field of a key of a table."""
     return name if name in model.model_fields else next(one for one, f in model.model_fields.items() if f.alias == name)
+
+
+@cache
+def _tables_in(model: type[Table]) -> Mapping[str, type[Table]]:
+    """The keys of a table that hold tables, alone or in a list."""
+    tables = {name: table_in(field.annotation) for name, field in keys_in(model).items()}
+    return {name: table for name, table in tables.items() if table is not None}
 
 
 def table_in(annotation: Any) -> type[Table] | None:
@@ -193,14 +199,11 @@ def contradictions(model: type[Table], document: Any, place: str = "") -> Iterat
     if not isinstance(document, Mapping):
         return
     yield from model.problems(document, place)
-    for name, field in keys_in(model).items():
-        below, inner = document.get(name), table_in(field.annotation)
-        if inner is None or below is None:
-            continue
-        for number, one in enumerate(below) if isinstance(below, list) else [(None, below)]:
-            yield from contradictions(
-                inner, one, joined([*parts_of(place), name, *([] if number is None else [number])])
-            )
+    for name in _tables_in(model).keys() & document.keys():
+        below, where = document[name], f"{place}.{name}".removeprefix(".")
+        for number, one in enumerate(below if isinstance(below, list) else [below]):
+            there = f"{where}[{number}]" if isinstance(below, list) else where
+            yield from contradictions(_tables_in(model)[name], one, there)
 
 
 def alternatives(model: type[Table], name: str) -> set[str]:
@@ -235,7 +238,9 @@ def _put(model: type[Table] | None, tables: dict[str, Any], name: str, value: An
         above = parts[:number]
         if isinstance(part, int):
             if not isinstance(place, list) or part >= len(place):
-                raise unusable(name, f"the base case has no {joined(above)} of that length", value)
+                other = f"a place below [{len(place)}]" if isinstance(place, list) else "the whole list"
+                message = f"the base case has no {joined(above)} of that length; expected {other}"
+                raise unusable(name, message, value)
         elif isinstance(place, list):
             raise unusable(name, f"{joined(above)} is a list: say which one, such as {joined(above)}[0]", value)
         elif not isinstance(place, dict):  # the base case is wrong there, which its own check tells
