@@ -163,6 +163,8 @@ def _ranges(value: object) -> object:
 Ranges = Annotated[dict[str, Any], BeforeValidator(_ranges)]
 """As a sweep's samplers take them: for each key ``{"uniform": [low, high]}`` or ``{"loguniform": [low, high]}``."""
 _BODIES = ("dimers", "clusters", "mixture", "placed")
+_IN_WORDS = ("run.cycles", "run.settling_cycles", "run.samples_per_cycle")
+"""Keys whose numbers say less than the words of their sources: ``until constant within 0.2 %, at most 60``."""
 _ABOUT = ("document", "sources", "recorded_law", "uncertain")
 """Fields that are part of no comparison: where values are from, and the law as its run has recorded it."""
 
@@ -330,11 +332,14 @@ class Case(Table):
                 continue
             raw, kind = value_at(self.document, parts_of(name)), kind_in([*field.metadata, field.annotation])
             if raw is not MISSING and not (units.is_auto(raw)):
-                origins[name] = Origin(name, text_of(raw), "given", value=value)
+                # The step of the run is a little shorter, so that it fits into a cycle.
+                limit = units.parse_quantity(raw, units.TIME) if name == "run.time_step" else value
+                origins[name] = Origin(name, text_of(raw), "given", value=limit)
             elif (source := self.sources.get(name)) and (source.text or value is not None):
                 text = source.text or text_of(value, kind)
                 about = (source.origin, source.why, source.range, source.logarithmic)
-                origins[name] = Origin(name, text, *about, value=value)
+                in_words = source.text and (value is None or name in _IN_WORDS)
+                origins[name] = Origin(name, text, *about, value=text if in_words else value)
             elif value not in (None, "", ()):
                 origins[name] = Origin(name, text_of(value, kind), "default", value=value)
         for name, given in self.uncertain.items():

@@ -47,7 +47,7 @@ class Origin:
     uncertain
         Whether the case calls it so.
     value
-        In SI units.
+        In SI units; as text if the case says it in words, such as ``auto``.
     """
 
     key: str

@@ -89,12 +89,11 @@ def differing(cases: Sequence[FlatCase]) -> list[str]:
     """The keys whose values differ among flattened cases, in the cases' order, without those that follow from others.
 
     What none of the cases gives itself (a time step that ``"auto"`` chose, the numbers of a liquid that the library
-    knows by name) is left out where something else differs; cycles of runs that end when they are constant always.
+    knows by name) is left out where something else differs.
     """
     keys = dict.fromkeys(key for case in cases for key in case)
     varied = [key for key in keys if len({_comparable(case.get(key)) for case in cases}) > 1]
-    given = [key for key in varied if any(key in case.given for case in cases)]
-    return given or [key for key in varied if key not in ("run.cycles", "run.settling_cycles")]
+    return [key for key in varied if any(key in case.given for case in cases)] or varied
 
 
 def short_keys(keys: Sequence[str], others: Iterable[str] = ("name",)) -> list[str]:
