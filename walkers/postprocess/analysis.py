@@ -217,15 +217,6 @@ class Analysis(ABC):
         """Values of `columns` of a result; NaN for missing ones."""
         return {one.column: one.value(result) for one in self.quantities({}) if one.column}
 
-    def can_show(self, result: Mapping[str, Any]) -> bool:
-        """Whether a result contains all quantities of the analysis."""
-        try:
-            self.row(result)
-            self.lines(result)
-        except (KeyError, TypeError, ValueError):
-            return False
-        return True
-
     def derived_of(self, case: Case) -> dict[str, float]:
         """The columns `derived` of a case."""
         del case
@@ -379,28 +370,21 @@ def current_result(directory: str | Path) -> dict[str, Any]:
     from walkers.postprocess.tables import intact
 
     directory = Path(directory)
-    kept: dict[str, Any] | None = None
-    damaged = False
+    wanted = analyses_of(case_of(directory))
+    names = [name for one in wanted for name in one.tables]
+    result: dict[str, Any] | None = None
+    damaged = not intact(directory, [name for name in names if (directory / f"{name}.parquet").is_file()])
     try:
-        result = read_result(directory)
-        wanted = analyses_of(case_of(directory))
-        result.setdefault("rests_on", [])  # missing in old runs
-        lines_of_rest(result["rests_on"])
-        versions = {one.name: one.version for one in wanted}
-        there = analyses_in(result)  # without later ones
-        if bool(there) == bool(wanted) and all(one.can_show(result) for one in there):
-            kept = result
-        names = [name for one in wanted for name in one.tables]
-        whole = intact(directory, names)
-        damaged = not intact(directory, [name for name in names if (directory / f"{name}.parquet").is_file()])
-        if kept and whole and check_unchanged(directory, [RESULT_NAME]) and result["analyses"] == versions:
+        result = {"rests_on": [], **read_result(directory)}  # none in old runs
+        is_current = result.get("analyses") == {one.name: one.version for one in wanted}
+        if is_current and intact(directory, names) and check_unchanged(directory, [RESULT_NAME]):
             return result
     except FileChanged:
         raise
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        damaged = isinstance(error, ValueError)
-    if kept is not None and not any(name.endswith(".bin") for name in files_of_segments(directory)):
-        return kept
+    except (OSError, ValueError) as error:
+        damaged |= isinstance(error, ValueError)
+    if result and not any(name.endswith(".bin") for name in files_of_segments(directory)) and _has_all(result, wanted):
+        return result
     if damaged:
         text = "the result or a table is incomplete or damaged; it is recomputed from the dumps"
         warnings.warn(f"{directory}: {text}", stacklevel=2)
@@ -411,6 +395,18 @@ def current_result(directory: str | Path) -> dict[str, Any]:
         if error.errno not in (errno.EACCES, errno.EPERM, errno.EROFS):
             raise
     return result
+
+
+def _has_all(result: Mapping[str, Any], wanted: Sequence[Analysis]) -> bool:
+    """Whether a result of earlier versions contains all that analyses show."""
+    try:
+        lines_of_rest(result["rests_on"])
+        for analysis in (present := analyses_in(result)):
+            analysis.row(result)
+            analysis.lines(result)
+    except (KeyError, TypeError, ValueError):
+        return False
+    return bool(present) == bool(wanted)
 
 
 def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool = False) -> str:

@@ -45,7 +45,7 @@ _UPHILL = {
     "axial_velocity": "velocity up the slope",
 }
 """Names of columns if the drive axis goes up a slope."""
-_FIRST_MAKE = ("rotation", "sliding", "open")
+_FIRST_MAKE = ("rotation", "sliding", "sliding_pair", "open", "open_pair")
 _OF_ALL = ("orientation_end", "separated_fraction")
 """Columns that are means over walkers of the first make, and over all walkers."""
 _NUMERICAL = {"run.time_step": ("time step", max), "contact.youngs_modulus": ("softened beads", min)}

@@ -74,10 +74,10 @@ NEAR = 1.5
 
 _WAYS = {"climb": ("climbs", "climb"), "down": ("goes down", "go down")}
 """Ways of walkers on slopes: of a single walker, of several."""
-_CONTACTS = "contacts: beads with the wall, in order, then pairs of beads that touch at the start"
 _ROTATION = "rotation velocity -R dphi/dt of a bead"
-_SLIDING = f"sliding velocity; {_CONTACTS}"
-_OPEN = f"fraction of the time during which the contact is open, in steps of a tenth of a sample; {_CONTACTS}"
+_SLIDING = "sliding velocity of"
+_OPEN = "fraction of the time, in steps of a tenth of a sample, without contact of"
+_WALL, _PAIR = "a bead and its wall", "a pair of beads that touch at the start"
 _SEPARATED = "fraction of the samples in which two beads are farther apart than the rupture distance of a bridge"
 
 
@@ -98,8 +98,10 @@ class Trajectory:
         "velocity of the centre of mass relative to the substrate, along the heading (from small to large beads)",
     ]
     rotation: Annotated[FloatArray, "m/s", _ROTATION, NUMBERED]
-    sliding: Annotated[FloatArray, "m/s", _SLIDING, NUMBERED]
-    gap: Annotated[FloatArray, "m", f"gap, negative for overlap; {_CONTACTS}", NUMBERED]
+    sliding: Annotated[FloatArray, "m/s", f"{_SLIDING} {_WALL}", NUMBERED]
+    sliding_pair: Annotated[FloatArray, "m/s", f"{_SLIDING} {_PAIR}", NUMBERED]
+    gap: Annotated[FloatArray, "m", f"gap, negative for overlap, of {_WALL}", NUMBERED]
+    gap_pair: Annotated[FloatArray, "m", f"gap, negative for overlap, of {_PAIR}", NUMBERED]
 
 
 @dataclass(frozen=True)
@@ -127,8 +129,10 @@ class WalkerRows:
     ]
     separated_fraction: Annotated[FloatArray, "", _SEPARATED]
     rotation: Annotated[FloatArray, "m/s", _ROTATION, NUMBERED]
-    sliding: Annotated[FloatArray, "m/s", _SLIDING, NUMBERED]
-    open: Annotated[FloatArray, "", _OPEN, NUMBERED]
+    sliding: Annotated[FloatArray, "m/s", f"{_SLIDING} {_WALL}", NUMBERED]
+    sliding_pair: Annotated[FloatArray, "m/s", f"{_SLIDING} {_PAIR}", NUMBERED]
+    open: Annotated[FloatArray, "", f"{_OPEN} {_WALL}", NUMBERED]
+    open_pair: Annotated[FloatArray, "", f"{_OPEN} {_PAIR}", NUMBERED]
 
 
 @dataclass(frozen=True)
@@ -154,7 +158,7 @@ class Walking(Analysis):
 
     order = 0
     name = "walking"
-    version = 8
+    version = 9
     tables: ClassVar[Mapping[str, type]] = {"trajectory": Trajectory, "walkers": WalkerRows, "bridges": BridgeRows}
     headlines = ("velocity",)
     derived: ClassVar[Described] = {
@@ -238,11 +242,11 @@ class Walking(Analysis):
             number = bead.partition("_")[2]
             label = f"rotation of bead {number}{these}, −R dφ/dt"
             yield Quantity(f"rotation.{bead}", label, "m/s", f"rotation_{number}", _ROTATION)
-        contacts = result.get("contacts", {f"contact_{number}": "" for number in (1, 2, 3)})
+        contacts = result.get("contacts", dict.fromkeys(("bead_1", "bead_2", "pair_1"), ""))
         families = {"sliding": ("sliding", "m/s", _SLIDING), "open": ("contact open", "share", _OPEN)}
-        for (family, (label, unit, told)), (contact, name) in product(families.items(), contacts.items()):
-            column = f"{family}_{contact.partition('_')[2]}"
-            yield Quantity(f"{family}.{contact}", f"{label}, {name}{these}", unit, column, told)
+        for (family, (label, unit, text)), (contact, name) in product(families.items(), contacts.items()):
+            column, meaning = f"{family}_{contact.removeprefix('bead_')}", _PAIR if contact[0] == "p" else _WALL
+            yield Quantity(f"{family}.{contact}", f"{label}, {name}{these}", unit, column, f"{text} {meaning}")
         label = "beads farther apart than the rupture distance"
         yield Quantity("separated_fraction", label, "share", "separated_fraction", _SEPARATED)
         label = "orientation at the end, from the direction of facing"
@@ -328,7 +332,8 @@ class Walking(Analysis):
         from walkers.postprocess.figures import gait_panels, walk_panels
 
         groups = run.motion.groups
-        return {"walk": walk_panels(groups), "gait": gait_panels(groups[0])}
+        shown = run.motion.of_walkers(groups[0].walkers[:1]).groups[0]  # gaits of hundreds need a gigabyte
+        return {"walk": walk_panels(groups), "gait": gait_panels(shown)}
 
     def draw(self, name: str, panels: Sequence[Panel], run: Measured) -> Figure:
         """Figure of the walk."""
@@ -358,18 +363,27 @@ def _trajectory(group: Group, motion: Gait) -> Trajectory:
         time,
         time * group.case.drive.frequency,
         *along(group.mass_centre).T,
-        *map(along, (group.orientation, motion.velocity, motion.rotation, motion.sliding, motion.gap)),
+        *map(along, (group.orientation, motion.velocity, motion.rotation)),
+        **{name: along(values) for name, values in _by_kind(group, sliding=motion.sliding, gap=motion.gap).items()},
     )
 
 
+def _by_kind(group: Group, **contacts: FloatArray) -> dict[str, FloatArray]:
+    """Values at contacts (`Gait`) of beads with walls, and as ``…_pair`` of pairs of beads."""
+    beads = len(group.radii)
+    walls = {name: values[..., :beads] for name, values in contacts.items()}
+    return walls | {f"{name}_pair": values[..., beads:] for name, values in contacts.items()}
+
+
 def _rows(group: Group, motion: Gait) -> WalkerRows:
-    samples, beads = settled_samples(group), len(group.radii)
+    samples, beads, mean = settled_samples(group), len(group.radii), averages(group)
     reach = np.array(contact_loads(group.case, group.make).rupture[beads:])
     starts = ("walker", "make", "facing", "start_angle")
     return WalkerRows(
         **{name: np.array([getattr(walker, name) for walker in group.walkers]) for name in starts},
         **vars(walk(group)),
-        **vars(averages(group)),
+        rotation=mean.rotation,
+        **_by_kind(group, sliding=mean.sliding, open=mean.open),
         orientation_mean=group.orientation[samples].mean(axis=0),
         orientation_end=group.orientation[-1],
         turned_at=turned_over_at(group),
@@ -432,9 +446,11 @@ def _summary(walkers: Columns, case: Case) -> dict[str, Any]:
     facing = sides(walkers["facing"], walkers["start_angle"])
     turned, same = np.isfinite(walkers["turned_at"]), alike(facing, uphill=case.goes_uphill)
 
-    def means(family: str, named: str) -> dict[str, float | None]:
-        columns = [name for name in walkers if name.rpartition("_")[0] == family]
-        return {f"{named}_{name.rpartition('_')[2]}": _mean(walkers[name][same]) for name in columns}
+    def means(family: str) -> dict[str, float | None]:
+        """By the names of beads and pairs."""
+        kinds = {family: "bead", f"{family}_pair": "pair"}
+        split = [(name, *name.rpartition("_")[::2]) for name in walkers]
+        return {f"{kinds[kind]}_{number}": _mean(walkers[name][same]) for name, kind, number in split if kind in kinds}
 
     return {
         "velocity": spread(velocity[same]),
@@ -446,9 +462,7 @@ def _summary(walkers: Columns, case: Case) -> dict[str, Any]:
             "left_facing": _mean(axial[facing < 0]),
         },
         "lateral_velocity": {"mean": _mean(walkers["lateral_velocity"])},
-        "rotation": means("rotation", "bead"),
-        "sliding": means("sliding", "contact"),
-        "open": means("open", "contact"),
+        **{family: means(family) for family in ("rotation", "sliding", "open")},
         "separated_fraction": _mean(walkers["separated_fraction"]),
         "orientation_end": spread(walkers["orientation_end"]),
         "steady": int(np.sum(walkers["steady"])),
@@ -485,9 +499,9 @@ def _posture(groups: Iterable[Group], walkers: Columns) -> dict[str, Any]:
 
 def _contact_names(group: Group) -> dict[str, str]:
     pairs = group.make.pairs
-    names = [f"bead {bead + 1}" for bead in range(len(group.radii))]
-    names += ["bead on bead"] if len(pairs) == 1 else [f"beads {one + 1}-{other + 1}" for one, other in pairs]
-    return {f"contact_{number}": name for number, name in enumerate(names, 1)}
+    names = ["bead on bead"] if len(pairs) == 1 else [f"beads {one + 1}-{other + 1}" for one, other in pairs]
+    beads = {f"bead_{number}": f"bead {number}" for number in range(1, len(group.radii) + 1)}
+    return beads | {f"pair_{number}": name for number, name in enumerate(names, 1)}
 
 
 def walkers_met(groups: Iterable[Group]) -> bool:
