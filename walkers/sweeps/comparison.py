@@ -132,7 +132,7 @@ def _number_of(value: Any) -> float:
 
 def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
     """All numbers that the analyses give for two runs."""
-    results = [result_in(run) for run in runs]
+    results = [with_bands(run, result_in(run)) for run in runs]
     rows = [row_of(result) for result in results]
     scatters = [_scatters(run, result) for run, result in zip(runs, results, strict=True)]
     numerical = hypot(*map(_numerical_error, results))

@@ -571,11 +571,12 @@ def _numerical(result: Mapping[str, Any]) -> list[str]:
         changes = ", ".join(result.get("checks", ()))
         told = f"numerical error not measured{': run and compare with ' * bool(changes)}{changes}"
         return [told] if has_error(result) else []
+    source = f"measured {f'by {runs}' if (runs := ' and '.join(result.get('measured_by', ()))) else 'for this case'}"
     if own < STEADY_SPEED:
-        return [f"numerical error {_error(error['total'])} (measured for this case: half the time step, {harder})"]
+        return [f"numerical error {_error(error['total'])} ({source}: half the time step, {harder})"]
     half_step, stiffer, total = (100.0 * error[name] / own for name in ("half_step", "stiffer", "total"))
     parts = f"half the time step {half_step:+.2g} %, {harder} {stiffer:+.2g} %"
-    return [f"numerical error {total:.2g} % (measured for this case: {parts})"]
+    return [f"numerical error {total:.2g} % ({source}: {parts})"]
 
 
 def _scatter(result: Mapping[str, Any]) -> list[str]:
