@@ -43,6 +43,7 @@ _UPHILL = {
     "right_facing": "along the heading, facing up",
     "left_facing": "along the heading, facing down",
     "axial_velocity": "velocity up the slope",
+    "axial_left_facing": "velocity up the slope, facing down",
 }
 """Names of columns if the drive axis goes up a slope."""
 _FIRST_MAKE = ("rotation", "sliding", "sliding_pair", "open", "open_pair")

@@ -234,8 +234,12 @@ class Walking(Analysis):
             if uphill_velocities(result):
                 label = f"velocity up the slope, walkers that started facing {way}"
                 yield Quantity(f"axial_velocity.{name}_facing", label, "m/s")
-        told = "mean velocity of the walkers that started facing right (on a slope, up) along the drive axis (uphill)"
-        yield Quantity("axial_velocity.mean", "", "m/s", "axial_velocity", told)
+        for part, column, way in (
+            ("mean", "axial_velocity", "right (on a slope, up)"),
+            ("left_facing", "axial_left_facing", "left (on a slope, down)"),
+        ):
+            told = f"mean velocity of the walkers that started facing {way} along the drive axis (uphill)"
+            yield Quantity(f"axial_velocity.{part}", "", "m/s", column, told)
         yield Quantity("lateral_velocity.mean", "" if came_apart(result) else "velocity across the drive axis", "m/s")
         these = ", walkers that started facing up" if result.get("goes_uphill") else ""
         for bead in result.get("rotation", ("bead_1", "bead_2")):
