@@ -319,3 +319,11 @@ def test_shares_of_open_contacts_say_their_resolution_and_work_whose_it_is(runs_
     told = describe_result(done.directory, {**done.result, "open": open_ones})
     assert "22.9 % of the time, in steps of 0.5 %" in told
     assert "inertial work of the drive per cycle" in told
+
+
+def test_texts_of_results_are_as_wide_as_a_page(runs_folder: Path) -> None:
+    done = walkers.run(load_case("fig1b"), runs_folder)
+    long = {**done.result, "goes_uphill": True, "drive": "plane tilted by 20°, right is up, " * 5}
+    told = describe_result(done.directory, long, cached=True).splitlines()
+    assert "(already run)" in "".join(told[:3])
+    assert not [line for line in told if len(line) > 110 and str(done.directory) not in line]

@@ -24,7 +24,7 @@ from walkers.inputs.errors import refused
 from walkers.inputs.rounding import SHOWN_UNITS, rounded
 from walkers.inputs.run_tables import limits_of
 from walkers.postprocess.drawing import FORMATS, check_formats, save_figure
-from walkers.postprocess.uncertainty import bands_text, lines_of_rest, not_known, rests_on, with_bands
+from walkers.postprocess.uncertainty import bands_text, lines_of_rest, not_known, rests_on, with_bands, wrapped_line
 from walkers.runner.directory import SEGMENT_NAME, case_of, files_of_segments, segment_directories
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import MANIFEST_NAME, FileChanged, check_unchanged, forget_tables, record_tables
@@ -420,7 +420,9 @@ def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool 
     if cached and not result.get("by_hand"):  # it was never made by a command
         lines[0] += " (already run)"
     warnings = [f"  warning: {warning}" for warning in warnings_of(result)]
-    return "\n".join([*lines, *lines_of_rest(result["rests_on"]), *warnings, f"  run        {directory}"])
+    return "\n".join(
+        [*map(wrapped_line, lines), *lines_of_rest(result["rests_on"]), *warnings, f"  run        {directory}"]
+    )
 
 
 def warnings_of(result: Mapping[str, Any]) -> list[str]:

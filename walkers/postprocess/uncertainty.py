@@ -74,6 +74,12 @@ def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
     return lines
 
 
+def wrapped_line(line: str) -> str:
+    """A line of a result's text, wrapped below the text after its label."""
+    listed = line.startswith("    ") and line[4:5] != " "
+    return textwrap.fill(line, _WIDTH, subsequent_indent=" " * (6 if listed else 13))
+
+
 def wrapped(sentences: Iterable[str]) -> list[str]:
     """Sentences as indented lines of a text."""
     wrapper = textwrap.TextWrapper(_WIDTH, "    ", "      ", break_on_hyphens=False, break_long_words=False)

@@ -223,7 +223,7 @@ class Pile(Analysis):
                 f"{climb['height'] * 1e3:.2f} mm {where} {' '.join(climb['walls'])} at {speed} mm/s, led by a "
                 f"{_leader(climb)} bead, {climb['size']} beads ({climb['large']} large)"
                 + (f"; over the rim, at {result['rim'] * 1e3:g} mm" if climb["height"] > result["rim"] else "")
-                + ("" if climb["out_of_pile"] else "; on the wall since the beads were poured")
+                + ("" if climb["out_of_pile"] else "; on the wall since the start of the drive")
             )
         return lines + wrapped(self.uncertainty(result))
 

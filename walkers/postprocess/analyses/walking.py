@@ -12,7 +12,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import degrees, nan
-from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
@@ -218,7 +217,7 @@ class Walking(Analysis):
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
         """Quantities of all walkers: velocities, contacts, makes, postures; sweeps have the contacts of dimers."""
         first, second = ways(uphill=result.get("goes_uphill", False))
-        label = f"along the heading, positive {_toward(result)}"
+        label = f"along the heading, positive {_toward(result)}".removesuffix(", positive along the heading")
         shown = "" if uphill_velocities(result) or came_apart(result) else f"velocity {label}"  # on slopes by direction
         told = f"mean velocity of the walkers, on a slope of those that started facing up, {label}"
         yield Quantity("velocity", shown, "m/s", "velocity", told)
@@ -291,16 +290,15 @@ class Walking(Analysis):
             *_of_walkers(result, drive),
             *wrapped(self.uncertainty(result)[told:]),
             *_of_sides(result),
-            fill(f"  rotation   {these}{beads} mm/s", 110, subsequent_indent=" " * 13),
-            fill(f"  sliding    {these}{sliding} mm/s", 110, subsequent_indent=" " * 13),
+            f"  rotation   {these}{beads} mm/s",
+            f"  sliding    {these}{sliding} mm/s",
         ]
         if not result["meet"]:  # on trays each from its own direction: the figure and the orders say more
             angles = f"{_angle(end['smallest'])}° to {_angle(end['largest'])}°"
             lines.append(f"  orientation at the end {angles} from the direction of facing")
         if any(open_ones.values()):
             shares = ", ".join(f"{name} {100 * open_ones[contact]:.1f} %" for contact, name in names.items())
-            text = f"  contacts open: {shares} of the time, in steps of {percent(result['open_resolution'])}"
-            lines.append(fill(text, 110, subsequent_indent=" " * 13))
+            lines.append(f"  contacts open: {shares} of the time, in steps of {percent(result['open_resolution'])}")
         return lines + [
             f"  of {radii_text(one['radii'])} mm  {_speed(one['velocity']['mean'])} mm/s; {_steady(one)}"
             for one in result.get("makes", [])
@@ -516,7 +514,9 @@ def walkers_met(groups: Iterable[Group]) -> bool:
 
 
 def _toward(result: Mapping[str, Any]) -> str:
-    """The positive direction of velocities along the heading, as text."""
+    """The positive direction of velocities along the heading, as text; without a result, that of all walkers."""
+    if not result:
+        return "from small to large beads, of equal ones from the last to the first"
     return {0.0: "toward bead 1", None: "along the heading"}.get(result.get("sin_delta", nan), "toward the large bead")
 
 
@@ -540,7 +540,7 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
     headline += "; depends on the start" if result["depends_on_start"] else ""
     if told := came_apart(result):
         headline = f"none: walkers {told}"
-    return [*_headlines(result, drive), fill(f"  velocity   {headline}", 110, subsequent_indent=" " * 13)]
+    return [*_headlines(result, drive), f"  velocity   {headline}"]
 
 
 def _of_sides(result: Mapping[str, Any]) -> list[str]:
@@ -606,7 +606,7 @@ def _scatter(result: Mapping[str, Any]) -> list[str]:
 def _headlines(result: Mapping[str, Any], drive: str) -> list[str]:
     """The drive; before it, on a slope, the posture of the walkers; after it what is true of a tray."""
     speed, *end = of_tray(result) or [""]
-    tray = [fill(f"  tray       {speed}; at the end {', '.join(end)}", 110, subsequent_indent=" " * 13)] if end else []
+    tray = [f"  tray       {speed}; at the end {', '.join(end)}"] if end else []
     if result["posture"] is None:
         return [f"{result['case']}: {drive}", *tray]
     first = "; ".join([*_told_ways(result), _told_posture(result)])
