@@ -47,9 +47,9 @@ class Quantity:
 
     Attributes
     ----------
-    path, error
-        Dotted keys of the number, such as ``surface.end``, and of its standard error. The path of a mean over copies
-        also leads to scatter, smallest and largest.
+    path
+        Dotted key of the number, such as ``surface.end``; that of a mean over copies also leads to scatter, smallest
+        and largest.
     label
         Label of the row in reports; empty for none.
     unit
@@ -63,7 +63,6 @@ class Quantity:
     unit: str = ""
     column: str = ""
     meaning: str = ""
-    error: str = ""
     of: Callable[[Mapping[str, Any]], Any] | None = None
 
     def value(self, result: Mapping[str, Any]) -> Any:
@@ -78,7 +77,7 @@ class Quantity:
 
     def row(self, result: Mapping[str, Any]) -> Row:
         """Row of a report."""
-        keys = [self.path, self.error]
+        keys = [self.path]
         if number_of(result, f"{self.path}.n") is not None:
             keys = [f"{self.path}.{what}" for what in ("mean", "scatter", "smallest", "largest")]
         return Row(self.label, *(number_of(result, key, self.unit) for key in keys))
@@ -101,10 +100,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Row:
-    """Label and number; for several copies also scatter, smallest and largest.
-
-    The scatter is a standard deviation, or the standard error of a single number that has one (`Quantity`).
-    """
+    """Label and number; for several copies also scatter (standard deviation), smallest and largest."""
 
     name: str
     value: Number | None

@@ -191,7 +191,7 @@ class Pile(Analysis):
             name = f"climb {number + 1} ({' '.join(climb['walls'])}, led by a {_leader(climb)} bead)"
             for what, unit in {"begin": "s", "end": "s", "gain": "m", "height": "m"}.items():
                 yield Quantity(f"{place}.{what}", f"{name}: {what}", unit)
-            yield Quantity(f"{place}.speed", f"{name}: speed", "m/s", error=f"{place}.standard_error")
+            yield Quantity(f"{place}.speed", f"{name}: speed", "m/s")
             yield Quantity(f"{place}.size", f"{name}: beads")
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:

@@ -370,7 +370,7 @@ def _trajectory(group: Group, motion: Gait) -> Trajectory:
     )
 
 
-def _by_kind(group: Group, **contacts: FloatArray) -> dict[str, FloatArray]:
+def _by_kind(group: Group, **contacts: FloatArray) -> dict[str, Any]:
     """Values at contacts (`Gait`) of beads with walls, and as ``…_pair`` of pairs of beads."""
     beads = len(group.radii)
     walls = {name: values[..., :beads] for name, values in contacts.items()}
