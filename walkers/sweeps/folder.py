@@ -154,8 +154,7 @@ def _run(path: Path, now: float) -> Entry | None:
         if notes := result.get("by_hand"):
             given["reason"] = "edited and run by hand" if "edited" in " ".join(notes) else notes[0]
     except (OSError, ValueError, AttributeError, TypeError) as error:
-        state = "has changed" if isinstance(error, FileChanged) else "cannot be read"
-        given["reason"] = f"its {RESULT_NAME} {state}"
+        given["reason"] = f"its {RESULT_NAME} {'has changed' if isinstance(error, FileChanged) else 'cannot be read'}"
     return Entry(name, case_name, "finished", path, _age(path / MANIFEST_NAME, now), size, parameters, **given)
 
 
