@@ -31,6 +31,7 @@ from walkers.runner.directory import finished_places, run_place
 from walkers.runner.summary import summarise
 from walkers.sweeps.folder import as_text, inventory
 from walkers.sweeps.making import make_runs
+from walkers.sweeps.table import row_of
 from walkers.templates.scene import place
 from walkers.theory.prediction import motion_of, predict
 
@@ -166,9 +167,19 @@ def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
     assert "of 0.3 / 0.2 / 0.2 mm" in done.describe()
     assert {path.name for path in done.plot()} == {"walk.png", "gait.png"}
     assert done.export("vtk").exists()
-    # Contact 3 is bead on bead of a dimer, and bead 3 on the floor of a trimer: they are not averaged.
+    # A column is of one kind of contact: of the third bead and the floor, or of two beads.
+    assert list(makes[0]["sliding"]) == ["bead_1", "bead_2", "pair_1"]
+    assert list(makes[1]["open"]) == ["bead_1", "bead_2", "bead_3", "pair_1", "pair_2", "pair_3"]
     assert done.result["sliding"] == makes[0]["sliding"]
-    assert len(makes[1]["sliding"]) == 6
+    for family, table in (("sliding", done.walkers), ("open", done.walkers), ("gap", done.trajectory)):
+        third, pair = (table[f"{family}_{name}"][table["walker"] < 2] for name in ("3", "pair_1"))
+        assert third.isna().all()
+        assert pair.notna().all()
+    chain = walkers.run(of_tables(cluster("chain", "Lss", replicates=1), run=BRIEF), tmp_path)
+    assert (
+        row_of(chain.result)["sliding_pair_1"] == chain.result["sliding"]["pair_1"] == chain.walkers.sliding_pair_1[0]
+    )
+    assert list(chain.result["contacts"].values()) == ["bead 1", "bead 2", "bead 3", "beads 1-2", "beads 2-3"]
 
 
 @pytest.mark.parametrize("count", [2, 3, 4, 6, 9, 12, 16])

@@ -43,9 +43,10 @@ _UPHILL = {
     "right_facing": "along the heading, facing up",
     "left_facing": "along the heading, facing down",
     "axial_velocity": "velocity up the slope",
+    "axial_left_facing": "velocity up the slope, facing down",
 }
 """Names of columns if the drive axis goes up a slope."""
-_FIRST_MAKE = ("rotation", "sliding", "open")
+_FIRST_MAKE = ("rotation", "sliding", "sliding_pair", "open", "open_pair")
 _OF_ALL = ("orientation_end", "separated_fraction")
 """Columns that are means over walkers of the first make, and over all walkers."""
 _NUMERICAL = {"run.time_step": ("time step", max), "contact.youngs_modulus": ("softened beads", min)}
@@ -132,7 +133,7 @@ def _number_of(value: Any) -> float:
 
 def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
     """All numbers that the analyses give for two runs."""
-    results = [result_in(run) for run in runs]
+    results = [with_bands(run, result_in(run)) for run in runs]
     rows = [row_of(result) for result in results]
     scatters = [_scatters(run, result) for run, result in zip(runs, results, strict=True)]
     numerical = hypot(*map(_numerical_error, results))

@@ -24,6 +24,7 @@ from walkers.inputs.errors import InputError, Problem, refused
 from walkers.inputs.readable import agrees, check_wanted, differing, flattened, has_key, kind_of, readable, short_keys
 from walkers.inputs.rounding import counted, duration_text, rounded
 from walkers.physics.units import Kind, parse_quantity
+from walkers.postprocess.analysis import RESULT_NAME
 from walkers.postprocess.sides import REST, came_apart, of_tray, sides_apart, uphill_velocities
 from walkers.postprocess.uncertainty import SPREAD, SPREAD_NAME
 from walkers.runner.directory import (
@@ -37,7 +38,7 @@ from walkers.runner.directory import (
     recover,
 )
 from walkers.runner.files import read_json
-from walkers.runner.manifest import MANIFEST_NAME
+from walkers.runner.manifest import MANIFEST_NAME, FileChanged
 from walkers.sweeps.making import progress_at
 from walkers.sweeps.table import (
     PARSL,
@@ -142,7 +143,7 @@ def _run(path: Path, now: float) -> Entry | None:
             reason = progress.share
         return Entry(name, case_name, status, path, age, size, parameters, reason, state.message)
     given: dict[str, Any] = {}
-    with suppress(OSError, ValueError, AttributeError, TypeError):
+    try:
         result = recorded_result(path)
         velocity, climbs = result.get("velocity") or {}, result.get("climbs")
         sides = uphill_velocities(result)
@@ -152,6 +153,8 @@ def _run(path: Path, now: float) -> Entry | None:
         given["climbs"] = None if climbs is None else len(climbs)
         if notes := result.get("by_hand"):
             given["reason"] = "edited and run by hand" if "edited" in " ".join(notes) else notes[0]
+    except (OSError, ValueError, AttributeError, TypeError) as error:
+        given["reason"] = f"its {RESULT_NAME} {'has changed' if isinstance(error, FileChanged) else 'cannot be read'}"
     return Entry(name, case_name, "finished", path, _age(path / MANIFEST_NAME, now), size, parameters, **given)
 
 
