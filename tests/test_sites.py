@@ -92,7 +92,7 @@ def test_texts_that_a_shell_would_take_for_more_are_refused_or_quoted(in_folder:
     for key in ("partition", "account", "provider.qos", "provider.clusters", "executor.address"):
         with pytest.raises(InputError, match=rf"site\.toml: {key} = .*: expected letters"):
             _load(in_folder, SLURM + f"{key} = {json.dumps(text, ensure_ascii=False)}\n")
-    with pytest.raises(InputError, match=r"--out: .* expected letters"):
+    with pytest.raises(InputError, match=r"^out: .* expected letters"):
         check_path(in_folder / text / "fig2")
     (in_folder / "site.toml").write_text(SLURM + f"modules = [{json.dumps(text, ensure_ascii=False)}]\n")
     script = pilots(load_site(in_folder / "site.toml"), in_folder / "parsl").executors[0].provider.worker_init
