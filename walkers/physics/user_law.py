@@ -75,14 +75,11 @@ def _called(function: Callable[..., Any], *arguments: object) -> Any:
 
 
 def _executed(place: str) -> ModuleType:
-    """A file as a module; it is in `sys.modules` while it runs, where its dataclasses look for it.
-
-    Python's imports would take an edited file for the former one if it has the same length and second.
-    """
+    """A file as a module; it is in `sys.modules` while it runs, where its dataclasses look for it."""
     key = f"walkers_law_{place}"
     module = sys.modules[key] = ModuleType(key)
     module.__file__ = place
-    try:
+    try:  # not as Python imports it, which takes an edited file of the same length and second for the former one
         _called(lambda: exec(compile(Path(place).read_bytes(), place, "exec"), vars(module)))
     finally:
         del sys.modules[key]
