@@ -112,7 +112,7 @@ def test_a_deck_that_is_edited_and_run_again_is_read_again(folder: Path) -> None
     assert " finished: edited and run by hand " in call("list", "--out", str(folder.parent)).stdout
     _edit(folder, restitution="0.5")
     assert "walker.lig is newer than" in load(folder).result["by_hand"][-1]
-    with pytest.raises(InputError, match="hand: its deck was edited and run by hand: --set is for cases"):
+    with pytest.raises(InputError, match="hand: its deck was edited and run by hand: changes are for cases"):
         load(folder, changes={"drive.frequency": "70 Hz"})
 
 

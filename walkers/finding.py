@@ -116,7 +116,7 @@ def case_at(
     with _refusing_damage(there.path, "the case of the run cannot be read"):
         case = case_of(files_of(there.path))
     if changes and not case.as_read and is_deck_folder(there.path):
-        reason = "its deck was edited and run by hand: --set is for cases, and for runs of unedited ones"
+        reason = "its deck was edited and run by hand: changes are for cases, and for runs of unedited ones"
         raise refused(what, reason)
     return with_changes(case, changes), there.path.parent
 

@@ -196,7 +196,7 @@ def _curves(
 
 
 def _column(table: pd.DataFrame, wanted: str | None) -> str:
-    return find_name("--y", wanted, table.columns) if wanted else default_column(table)
+    return find_name("y", wanted, table.columns) if wanted else default_column(table)
 
 
 def _tell(message: str) -> None:

@@ -146,9 +146,9 @@ class Beads:
     height: FloatArray
     large: BoolArray
     surface: FloatArray
-    bulk: Sequence[BoolArray] = ()
-    first: int = 0
-    wall_names: Sequence[str] = ()
+    bulk: Sequence[BoolArray]
+    first: int
+    wall_names: Sequence[str]
 
 
 @dataclass(frozen=True)

@@ -240,7 +240,7 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
     tables = [load(directory) for directory in (first, second)]
     numbers = [name for name in tables[0].columns if name in tables[1] and tables[0][name].dtype.kind in "fiu"]
     default = default_column(max(tables, key=sides_differ))
-    column = find_name("--y", column, numbers) if column else default
+    column = find_name("column", column, numbers) if column else default
     varied = list(dict.fromkeys(name for table in tables for name in varied_columns(table)))  # of the longest lists
     both = _matched([table[table["status"] == "finished"] for table in tables], varied)
     if both.empty:

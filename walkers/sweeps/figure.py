@@ -189,7 +189,7 @@ def drawn_column(
 
     ``down`` is the column of walkers that face down a slope, if the first is of those that face up.
     """
-    column = _numbers(rows, name, "--y")
+    column = _numbers(rows, name, "y")
     size = readable_unit(rows.attrs["units"].get(name, ""))[1]
     errors = np.full(len(rows), np.nan)
     if name in ERRORS:
@@ -235,24 +235,24 @@ def layout_of(
     for option, name in (("x", x), ("hue", hue), ("panels", panels)):
         if name is not None and not (name == _NONE and option != "x"):
             keys = [key for factor in factors for key in factor.keys]
-            found = find_name(f"--{option}", name, [*keys, *table.columns])
+            found = find_name(option, name, [*keys, *table.columns])
             given = next((one for one in factors if found in one.keys), None)
             if given is None and rows[found].map(lambda value: isinstance(value, str)).all():
                 given = Factor((found,), readable_key(found), rows[found].tolist(), False)
-            asked[option] = given or _numbers(rows, found, f"--{option}")
+            asked[option] = given or _numbers(rows, found, option)
             left = [one for one in left if not _same(one, asked[option])]
     samples = [factor for factor in left if factor.is_sample]
     left = [factor for factor in left if not factor.is_sample]
     undistinguished = [one.name for one in samples] if "x" in asked else []
     along = [asked["x"]] if "x" in asked else samples
     if not along:
-        along = [_along(left, rows) or _numbers(rows, "point", "--x")]
+        along = [_along(left, rows) or _numbers(rows, "point", "x")]
         left = [factor for factor in left if factor.keys != along[0].keys]
     left = sorted((one for one in left if one.keys[0] not in _SEEDS), key=lambda one: -len(one.levels))
     colours = asked.get("hue") or (left.pop(0) if left and hue is None else None)
     apart = asked.get("panels")
     if len(along) > 1 and apart is not None:
-        raise refused("--panels", "expected --x too: the samples have a panel for each key")
+        raise refused("panels", "expected x too: the samples have a panel for each key")
     if apart is None and panels is None and left and len(along) == 1:
         while prod(len(one.levels) for one in left) > _MOST_PANELS:
             undistinguished.append(left.pop(0 if len(left[0].levels) > _MOST_PANELS else -1).name)
@@ -297,7 +297,7 @@ def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Fig
     ``log`` names logarithmic axes (``x``, ``y`` or ``xy``), which leave out zero and negative numbers.
     """
     if "x" in log and not all(one.is_number for one in layout.x):
-        raise refused("--logx", f"{layout.x[0].label} has no numbers")
+        raise refused("log", f"{layout.x[0].label} has no numbers")
     parts = [(x, np.ones(len(drawn.values), dtype=bool), "") for x in layout.x]
     if (panels := layout.panels) is not None:
         parts = [(layout.x[0], panels.where(level), panels.text(level, by_name=True)) for level in panels.levels]

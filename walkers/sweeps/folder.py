@@ -214,25 +214,25 @@ def select(
         try:
             oldest = parse_quantity(older_than, AGE)
         except ValueError as error:
-            raise refused("--older-than", f'"{older_than}": {error}') from error
+            raise refused("older_than", f'"{older_than}": {error}') from error
     conditions = []
     runs = [entry for entry in entries if not entry.is_sweep]
     for text in where:
         key, _, value = (part.strip() for part in text.partition("="))
         if key in ("case", "status"):
-            raise refused("--where", f'"{text}": expected --{key} {value}'.rstrip())
+            raise refused("where", f'"{text}": expected {key} as an argument of its own')
         if not (key and value):
             told = 'expected KEY=VALUE, such as "drive.frequency=80 Hz"'
-            raise refused("--where", f'"{text}": {told}')
+            raise refused("where", f'"{text}": {told}')
         if runs and not any(has_key(run.parameters, key) for run in runs):
             known = ", ".join(dict.fromkeys(one for run in runs for one in run.parameters))
-            raise InputError("--where", [Problem(key, None, f"no run has such a key; they have {known}")])
+            raise InputError("where", [Problem(key, None, f"no run has such a key; they have {known}")])
         alike = {key: 0.0} if kind_of(key) and "/" not in value else {}  # if there are no runs to compare with
         for parameters in [run.parameters for run in runs] or [alike]:
             try:
                 check_wanted(parameters, key, value)
             except ValueError as error:
-                raise refused("--where", f'"{text}": {error}') from error
+                raise refused("where", f'"{text}": {error}') from error
         conditions.append((key, value))
     return [
         entry
@@ -432,7 +432,7 @@ def _found(place: Path, entries: Sequence[Entry]) -> list[Entry]:
     found = [one for one in entries if place == one.directory.resolve()]
     found = found or [one for one in entries if place == one.place.resolve()]
     if not found:
-        raise refused(place, "no run or sweep in the folder of runs (see walkers list; --out names another folder)")
+        raise refused(place, "no run or sweep in the folder of runs (see walkers list)")
     return found
 
 

@@ -87,7 +87,7 @@ def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
     elif audit is not None and not audit.passed and not allow_failed_audit:
         raise AuditFailed(
             f"this engine failed its audit in {len(audit.failures)} line(s), first: {audit.failures[0]}; "
-            "for details: walkers check engine (--allow-failed-audit runs anyway)"
+            "for details: walkers check engine (--allow-failed-audit, in Python allow_failed_audit=True, runs anyway)"
         )
 
 
