@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import degrees
 
 from walkers.inputs.case import Case
-from walkers.inputs.rounding import counted
+from walkers.rounding import counted
 
 
 def caption(case: Case) -> str:
