@@ -18,7 +18,7 @@ from walkers.runner.provenance import software
 from walkers.templates.deck import CONTENT_VERSION
 
 MANIFEST_NAME = "manifest.json"
-FORMAT = 2
+FORMAT = 3
 _SMALL_BYTES = 8 << 20
 """Smaller amounts are hashed faster without threads."""
 _MOST_THREADS = 4
