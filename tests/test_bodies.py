@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from walkers.runner.summary import summarise
 
 import walkers
 from tests.conftest import REFERENCE, document, make_case
 from walkers.errors import InputError
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
-from walkers.inputs.drive import Excitation, Harmonic, common_frequency
+from walkers.inputs.drive import Excitation, Sine, common_frequency
 from walkers.inputs.loads import contact_loads
 from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.standing import standing
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.analyses.meetings import Course, collective
 from walkers.postprocess.analysis import describe_result, figures_of, read_result
@@ -30,8 +30,10 @@ from walkers.postprocess.sides import of_tray
 from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import finished_places, run_place
+from walkers.show import summarise
 from walkers.sweeps.folder import as_text, inventory
 from walkers.sweeps.making import make_runs
+from walkers.sweeps.table import row_of
 from walkers.templates.scene import place
 from walkers.theory.prediction import motion_of, predict
 
@@ -167,9 +169,19 @@ def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
     assert "of 0.3 / 0.2 / 0.2 mm" in done.describe()
     assert {path.name for path in done.plot()} == {"walk.png", "gait.png"}
     assert done.export("vtk").exists()
-    # Contact 3 is bead on bead of a dimer, and bead 3 on the floor of a trimer: they are not averaged.
+    # A column is of one kind of contact: of the third bead and the floor, or of two beads.
+    assert list(makes[0]["sliding"]) == ["bead_1", "bead_2", "pair_1"]
+    assert list(makes[1]["open"]) == ["bead_1", "bead_2", "bead_3", "pair_1", "pair_2", "pair_3"]
     assert done.result["sliding"] == makes[0]["sliding"]
-    assert len(makes[1]["sliding"]) == 6
+    for family, table in (("sliding", done.walkers), ("open", done.walkers), ("gap", done.trajectory)):
+        third, pair = (table[f"{family}_{name}"][table["walker"] < 2] for name in ("3", "pair_1"))
+        assert third.isna().all()
+        assert pair.notna().all()
+    chain = walkers.run(of_tables(cluster("chain", "Lss", replicates=1), run=BRIEF), tmp_path)
+    assert (
+        row_of(chain.result)["sliding_pair_1"] == chain.result["sliding"]["pair_1"] == chain.walkers.sliding_pair_1[0]
+    )
+    assert list(chain.result["contacts"].values()) == ["bead 1", "bead 2", "bead 3", "beads 1-2", "beads 2-3"]
 
 
 @pytest.mark.parametrize("count", [2, 3, 4, 6, 9, 12, 16])
@@ -299,9 +311,9 @@ def test_a_bead_rests_on_both_walls_of_a_groove() -> None:
 def test_walkers_face_along_the_first_of_equal_harmonics(first: str) -> None:
     axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
     tones = [{"axis": axis, "frequency": "80 Hz", "peak_acceleration": "2 g"} for axis in dict.fromkeys((first, *axes))]
-    case = resolve_case({**document(), "drive": {"harmonics": tones}})
+    case = Case.read({**document(), "drive": {"harmonics": tones}})
     assert case.drive_axis == axes[first]
-    ((_, standing),) = case.standing()
+    ((_, standing),) = standing(case)
     large, small = standing.beads
     assert np.sign(np.round([large.x - small.x, large.y - small.y], 9)).tolist() == list(axes[first][:2])
 
@@ -409,7 +421,7 @@ def test_frequencies_without_a_cycle_are_refused() -> None:
 
 
 def test_a_drive_is_its_largest_harmonic_where_one_number_is_asked_for() -> None:
-    drive = Excitation((Harmonic((1.0, 0.0, 0.0), 160.0, 10.0), Harmonic((0.0, 0.0, 1.0), 80.0, 30.0, 1.0)), "container")
+    drive = Excitation((Sine((1.0, 0.0, 0.0), 160.0, 10.0), Sine((0.0, 0.0, 1.0), 80.0, 30.0, 1.0)), "container")
     assert (drive.direction, drive.peak_acceleration, drive.frequency) == ((0.0, 0.0, 1.0), 30.0, 80.0)
     assert [one.peak_acceleration for one in drive.with_peak(60.0).harmonics] == [20.0, 60.0]
     case = replace(make_case(), drive=drive)
@@ -437,7 +449,9 @@ def test_a_triangle_is_the_sum_of_its_harmonics() -> None:
     assert case.drive.frame == "container"
     cycle = np.linspace(0.0, 1.0, 401)
     phases = [one.angular_frequency * cycle / 80.0 + one.phase for one in case.excitation.harmonics]
-    summed = sum(one.peak_acceleration * np.sin(phase) for one, phase in zip(case.excitation.harmonics, phases, strict=True))
+    summed = sum(
+        one.peak_acceleration * np.sin(phase) for one, phase in zip(case.excitation.harmonics, phases, strict=True)
+    )
     triangle = 39.2 * 2.0 / np.pi * np.arcsin(np.sin(2.0 * np.pi * cycle))
     assert np.abs(summed - triangle).max() < 0.045 * 39.2
     flank = np.abs(triangle) < 0.8 * 39.2
@@ -449,7 +463,9 @@ def test_a_sawtooth_moves_a_symmetric_dimer(run_directory: Callable[..., Path]) 
     drive = {"waveform": "sawtooth", "peak_acceleration": "4 g", "axis": "x"}
     case = make_case(dimers={"radii": ["0.25 mm", "0.25 mm"], "replicates": 2}, drive=drive, run=DRIVEN)
     time = np.linspace(-0.5, 0.5, 201)[20:-20] / 80.0
-    waves = [one.peak_acceleration * np.sin(one.angular_frequency * time + one.phase) for one in case.excitation.harmonics]
+    waves = [
+        one.peak_acceleration * np.sin(one.angular_frequency * time + one.phase) for one in case.excitation.harmonics
+    ]
     np.testing.assert_allclose(sum(waves), 39.2 * 2.0 * 80.0 * time, atol=0.12 * 39.2)
     result = read_result(run_directory(case))
     assert result["axial_velocity"]["mean"] == pytest.approx(0.206e-3, rel=0.03)
@@ -463,7 +479,7 @@ def test_two_tones_move_a_symmetric_dimer_and_their_phase_says_which_way(run_dir
 
     def speed(phase: float) -> float:
         x = (1.0, 0.0, 0.0)
-        drive = Excitation((Harmonic(x, 80.0, 39.2), Harmonic(x, 160.0, 29.4, phase)), "container")
+        drive = Excitation((Sine(x, 80.0, 39.2), Sine(x, 160.0, 29.4, phase)), "container")
         return float(read_result(run_directory(replace(case, drive=drive)))["velocity"]["mean"])
 
     one_way = speed(pi / 2.0)

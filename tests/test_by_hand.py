@@ -85,7 +85,8 @@ def test_an_edited_parameter_is_another_case(name: str, folder: Path, run_direct
     assert found.case.run.period == pytest.approx(same.case.run.period)
     told, *constant = found.result["by_hand"][1:]
     assert told.startswith("the deck was edited: ")
-    assert all("are not constant within 0.2 %" in one for one in constant)  # in so few cycles
+    assert len(constant) == (name != "tension")  # the others need more cycles
+    assert all("are not constant within 0.2 %" in one for one in constant)
     assert all(re.search(rf"{parameter} \S+, was [\d.e-]+", told) for parameter in edits)
     assert "other line" not in told
     # What commands show and compare: the edits, which are given, and nothing else.

@@ -31,6 +31,7 @@ from walkers.physics.laws import by_name
 from walkers.postprocess.analysis import current_result, read_result, tabulate
 from walkers.postprocess.dump import BinaryDump, DumpError, local_frames
 from walkers.postprocess.motion import read_bridges, read_motion
+from walkers.postprocess.tables import read_columns
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import FIRST_SEGMENT, finished_run, write_deck
 from walkers.runner.failures import DiskFull, EngineError
@@ -239,6 +240,20 @@ def test_a_run_that_was_damaged_is_told_in_a_line_by_all_that_read_it(name: str,
             assert told in lines[0], (command, lines)
             assert len(lines) == 1, (command, lines)
     assert all(path.read_bytes() == contents for path, contents in files.items()), "nothing on disk is lost"
+
+
+@pytest.mark.parametrize(("name", "more"), [("result.json", b"\n"), ("walkers.parquet", b"PAR1")])
+def test_a_run_with_an_edited_result_is_measured_again(name: str, more: bytes, short_run: Path) -> None:
+    known, edited = read_result(short_run), short_run / name
+    edited.write_bytes(edited.read_bytes() + more)
+    with pytest.raises(FileChanged, match=rf"{name} has changed .*; to measure the run again, delete the file and do"):
+        current_result(short_run) and read_columns(short_run, "walkers")
+    listed = call("list", "--all", "--out", str(short_run.parent), check=True).stdout
+    assert (" finished: its result.json has changed " in listed) == (name == "result.json")
+    edited.unlink()
+    call("run", str(short_run), check=True)
+    assert read_result(short_run) == known
+    assert len(read_columns(short_run, "walkers")["walker"]) == known["walkers"]
 
 
 def test_a_sweep_goes_on_without_a_damaged_run_and_says_which(short_case: Path) -> None:

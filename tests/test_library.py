@@ -195,14 +195,14 @@ def test_a_library_within_a_case_is_checked_as_a_file_is() -> None:
     pair = {"materials": ["rubby", "chromium-coated glass"], "friction": {"value": 0.2, "source": "measured"}}
     told = r'library\.surface_pairs\[0\]\.materials = "rubby": not in the library.*did you mean "ruby"'
     with pytest.raises(InputError, match=told):
-        resolve_case(document(library={"surface_pairs": [pair]}))
+        Case.read(document(library={"surface_pairs": [pair]}))
 
 
 @pytest.mark.parametrize(
     "viscosity", [{"dynamic_viscosity": "5 mPa*s"}, {"kinematic_viscosity": "5 mm^2/s", "density": "1 g/cm^3"}]
 )
 def test_a_liquid_of_ones_own_needs_no_library(viscosity: dict[str, str]) -> None:
-    case = resolve_case(document(liquid={"name": "mine", "surface_tension": "30 mN/m", **viscosity}))
+    case = Case.read(document(liquid={"name": "mine", "surface_tension": "30 mN/m", **viscosity}))
     assert case.liquid.name == "mine"
     assert (case.liquid.surface_tension, case.liquid.dynamic_viscosity) == pytest.approx((0.03, 5e-3))
 

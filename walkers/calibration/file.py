@@ -37,7 +37,7 @@ from walkers.inputs.toml import read_toml
 from walkers.inputs.units import ANGLE, SPEED, WRITTEN, Kind, Number, Whole, parse_quantity
 
 _MOST = 10_000
-Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_3"]
+Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_pair_1"]
 """A column of a sweep's table that is a speed."""
 QUANTITIES: dict[str, Kind] = {**dict.fromkeys(get_args(Speed), SPEED), "misalignment": ANGLE}
 """Quantities of observations: columns of the table of a sweep, or the largest angle to the drive axis."""

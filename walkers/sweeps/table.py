@@ -60,15 +60,17 @@ STATE = {
 _RESULTS = ("velocity", "climbs")
 SIDES = ("right_facing", "left_facing")
 """Velocity columns that replace the mean if `sides_differ`."""
+FACING_DOWN = {"right_facing": "left_facing", "axial_velocity": "axial_left_facing"}
+"""Columns of walkers that face down, by the columns of those that face up (`main_columns`)."""
 ERRORS = {"velocity": "scatter"}
 """Columns that contain the scatter of other columns over copies."""
 FORMATS = ("csv", "parquet", "json")
 _LEFT_OUT = {
     *("mass_asymmetry", "frequency", "peak_acceleration", "peak_velocity", "amplitude", "radius_1", "radius_2"),
-    *("scatter", "axial_velocity", "right_facing", "left_facing", "sliding_2", "sliding_3", "open_1", "open_2"),
-    *("open_3", "separated_fraction", "orientation_end", "turned_round", "walkers_met", "lost", "reason"),
+    *("scatter", "axial_velocity", "right_facing", "left_facing", "sliding_2", "sliding_pair_1", "open_1", "open_2"),
+    *("open_pair_1", "separated_fraction", "orientation_end", "turned_round", "walkers_met", "lost", "reason"),
     *("smallest", "largest", "rotation_2", "cycles", "ended_early", "parted", "largest_group", "meeting_rate"),
-    *("largest_cluster", "nematic_order", "polar_order", "joined_speed", "speed_ratio"),
+    *("largest_cluster", "nematic_order", "polar_order", "joined_speed", "speed_ratio", "axial_left_facing"),
 }
 """Columns that the printed table leaves out."""
 _VARIED = "varied"
