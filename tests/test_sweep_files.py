@@ -165,7 +165,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"axes": {"dimers.radii": [["0.3 mm", "0.2 mm"]], "dimers.radii[1]": ["0.1 mm"]}}, "radii.*varies on two axes"),
     ({"axes": {".": [1]}}, "is not a key of a case"),
     ({"case": ""}, 'case = "": no such file'),
-    ({"sample": {"points": 4}}, r"sample = .*\[\[name\]\]"),
+    ({"sample": {"points": 4}}, r"sample = .*expected tables \[\[sample\]\]"),
     ({"axis": {}}, 'unknown key; a sweep takes .*did you mean "axes"'),
     ({"case": "fig1c"}, 'case = "fig1c": no such file, run or sweep, nor a shipped case .*did you mean "fig1b"'),
     ({"set": {"drive.frequncy": "60 Hz"}}, "drive.frequncy: unknown key"),

@@ -118,6 +118,8 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
             message += suggestion(str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"])))
         elif kind in ("list_type", "tuple_type") and field and field.examples:
             message = f"expected a list, {example}"
+        elif kind in ("list_type", "tuple_type") and field and _table_in(field.annotation)[0]:
+            message = f"expected tables [[{key}]]"
         elif kind in ("model_type", "dict_type") and str(context.get("class_name", "")).startswith("Sourced"):
             message = 'expected { value = ..., source = "..." }'
         if field and AUTO in field.metadata and kind != "value_error":
