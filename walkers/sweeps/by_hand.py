@@ -199,6 +199,7 @@ def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float]
         changes |= {"run.time_step": f"{step!r} s", "run.allow_unstable": True}
     if cycles != run.cycles or (other and "duration" in table):
         changes["run.cycles"] = cycles
+    if cycles != run.cycles:
         document["run"] = {name: value for name, value in table.items() if name != "settling_cycles"}
     if other and (case.loose or "frames_per_second" in table):
         often = {"samples_per_cycle": parts} if parts > 1 else {"frames_per_second": frequency / run.cycles_per_sample}
