@@ -377,7 +377,7 @@ def test_liquid_is_conserved(bench: Bench, ranks: int) -> None:
 
     @cache
     def rupture(one: int, other: int, volume: float) -> float:
-        meeting = Surfaces.of(sizes[one], sizes[other] if other >= 0 else inf, case.liquid, 0.01)
+        meeting = Surfaces.of(sizes[one], sizes[other] if other >= 0 else inf, case.liquid.of_bridges, 0.01)
         return by_name(case.liquid.law)(replace(meeting, volume=volume)).rupture
 
     pairs = [(one, other) for one in range(16) for other in range(one + 1, 16)]

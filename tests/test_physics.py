@@ -111,7 +111,7 @@ def _resistance(case: Case) -> np.ndarray:
         (small, np.inf, [1.0, 0.0, -1.0], [0.0, 0.0, -1.0 / small]),
         (small, large, [0.0, 1.0, 1.0], [0.0, -1.0 / large, 1.0 / small]),
     ):
-        surfaces = Surfaces.of(radius, other, case.liquid, case.contact.minimum_separation_ratio)
+        surfaces = Surfaces.of(radius, other, case.liquid.of_bridges, case.contact.minimum_separation_ratio)
         _, _, sliding, coupling, rolling = by_name(case.liquid.law)(surfaces).forces(np.zeros(1)).columns()[0]
         motions = np.array([slides, rolls])
         total += motions.T @ np.array([[sliding, coupling], [coupling, rolling]]) @ motions

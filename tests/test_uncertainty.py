@@ -17,7 +17,7 @@ from walkers.inputs import library
 from walkers.inputs.axes import ranges_of
 from walkers.inputs.case import Case
 from walkers.inputs.numerical import INFLUENCE, STIFFER, measured, numerical_error
-from walkers.inputs.reading import load_case, with_changes
+from walkers.inputs.reading import load_case
 from walkers.inputs.units import parse_quantity
 from walkers.paper.published import outside_of_the_paper
 from walkers.pipeline import find_side
@@ -73,18 +73,18 @@ def test_runs_beside_a_run_measure_its_numerical_error(tmp_path: Path) -> None:
     asked = re.search(r"run and compare with (run\S+), +(contact\S+)", " ".join(done.describe().split()))
     assert asked is not None
     changes = [dict([one.split("=")]) for one in asked.groups()]
-    half = walkers.run(with_changes(case, changes[0]), tmp_path)
+    half = walkers.run(case.changed(changes[0]), tmp_path)
     told = " ".join(done.describe().split())
     assert f"numerical error not measured: run and compare with {asked[2]}" in told
     assert asked[1] not in told
-    harder = walkers.run(with_changes(case, changes[1]), tmp_path)
+    harder = walkers.run(case.changed(changes[1]), tmp_path)
     own, *others = (one.result["velocity"]["mean"] for one in (done, half, harder))
     parts = [100.0 * (one / own - 1.0) for one in others]
     told = " ".join(done.describe().split())
     runs = f"{half.directory.name} and {harder.directory.name}"
     said = f"half the time step {parts[0]:+.2g} %, 10 times Young's modulus {parts[1]:+.2g} %"
     assert f"numerical error {np.hypot(*parts):.2g} % (measured by {runs}: {said})" in told
-    faster = walkers.run(with_changes(case, {"drive.frequency": "90 Hz"}), tmp_path)
+    faster = walkers.run(case.changed({"drive.frequency": "90 Hz"}), tmp_path)
     sides = (find_side(one.directory) for one in (done, faster))
     text = compare_runs(*sides).text
     assert f"{done.directory.name}: the numerical error is not measured" not in text
