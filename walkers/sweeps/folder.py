@@ -37,7 +37,7 @@ from walkers.runner.directory import (
     recover,
 )
 from walkers.runner.files import read_json
-from walkers.runner.manifest import MANIFEST_NAME
+from walkers.runner.manifest import MANIFEST_NAME, read_result
 from walkers.sweeps.making import progress_at
 from walkers.sweeps.readable import (
     FlatCase,
@@ -55,7 +55,6 @@ from walkers.sweeps.table import (
     RECORD_NAME,
     derived_columns,
     read_record,
-    recorded_result,
     result_columns,
     states,
     unfinished_state,
@@ -154,7 +153,7 @@ def _run(path: Path, now: float) -> Entry | None:
         return Entry(name, case_name, status, path, age, size, parameters, reason, state.message)
     given: dict[str, Any] = {}
     with suppress(OSError, ValueError, AttributeError, TypeError):
-        result = recorded_result(path)
+        result = read_result(path)
         velocity, climbs = result.get("velocity") or {}, result.get("climbs")
         sides = uphill_velocities(result)
         own = next(iter(sides.values()), velocity.get("mean"))
