@@ -114,7 +114,7 @@ def _default(field: FieldInfo) -> str:
 def _row(name: str, field: FieldInfo, *, supplied: bool) -> tuple[str, str, str, str]:
     """Key, meaning, what it expects with an example, default."""
     example = example_of(field)
-    expected = _expected(Annotated[field.annotation, *field.metadata, None])
+    expected = _expected(Annotated[field.annotation, *field.metadata, "at least one annotation"])
     expected += f"; {example}" if example.startswith("such as") and example not in expected else ""
     return f"`{name}`", str(field.description), expected, "from the library" if supplied else _default(field)
 
@@ -122,14 +122,11 @@ def _row(name: str, field: FieldInfo, *, supplied: bool) -> tuple[str, str, str,
 def tables_of_keys(model: type[Table] = Case, place: str = "") -> Iterator[tuple[str, str]]:
     """Tables of a case file: heading, and its keys as a table of Markdown with what excludes what."""
     fields = keys_in(model)
-    path, below = (
-        f"{place.strip('[]')}.".lstrip("."),
-        {name: table_in(one.annotation) for name, one in fields.items()},
-    )
-    rows = [
-        _row(name, field, supplied=f"{path}{name}" in SUPPLIED) for name, field in fields.items() if not below[name]
-    ]
-    text = _table(["key", "meaning", "expects", "default"], iter(rows))
+    below = {name: table_in(field.annotation) for name, field in fields.items()}
+    path = f"{place.strip('[]')}.".lstrip(".")
+    keys = [name for name in fields if not below[name]]
+    rows = (_row(name, fields[name], supplied=f"{path}{name}" in SUPPLIED) for name in keys)
+    text = _table(["key", "meaning", "expects", "default"], rows)
     for choice in model.choices:
         ways = "; ".join(" and ".join(f"`{name}`" for name in way) for way in choice.ways)
         needed = choice.required and not any(f"{path}{name}" in SUPPLIED for way in choice.ways for name in way)

@@ -45,9 +45,7 @@ _SWEEP_FILE = "A sweep file, or the name of a shipped sweep such as fig2."
 def new(
     name: str = Argument(metavar="NAME", help=_NAME),
     case: str = Argument("fig1b", metavar="CASE", help=_COPIED, autocompletion=offering("case")),
-    schema: bool = Option(
-        False, "--schema", help="Also write case.schema.json, which editors use."
-    ),
+    schema: bool = Option(False, "--schema", help="Also write case.schema.json, which editors use."),
 ) -> None:
     """Write a commented case file as a starting point."""
     from walkers.new import write_case
