@@ -52,7 +52,7 @@ class Harmonic(Table):
     """One of ``[[drive.harmonics]]``; exactly one of ``peak_acceleration`` and ``gamma0``."""
 
     choices: ClassVar[tuple[Choice, ...]] = (Choice((("peak_acceleration",), ("gamma0",))),)
-    axis: Annotated[Any, BeforeValidator(_axis), WithJsonSchema(_AXIS)] = key(
+    axis: Filled[Annotated[Any, BeforeValidator(_axis), WithJsonSchema(_AXIS)]] = key(
         "Direction of the shaking. Default: `x`; in containers `z`.",
         None,
     )
