@@ -17,7 +17,7 @@ class Sourced(Table, Generic[Q]):
     """``{ value = …, source = "…" }``: a number of a library, and both ends of where it can lie if it is uncertain."""
 
     value: Q
-    source: Annotated[str, Field(min_length=1)]
+    source: Annotated[str, Field(min_length=1, examples=["weighed"])]
     range: tuple[Q, Q] | None = None
 
     @field_validator("range")

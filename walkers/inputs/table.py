@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, ValidationInfo
 from pydantic.fields import FieldInfo
@@ -151,7 +151,8 @@ class Table(BaseModel):
             said = [way for way in choice.ways if any(name in given and not is_auto(given[name]) for name in way)]
             if len(said) > 1:
                 name = next(name for name in said[1] if name in given)
-                yield Problem(joined([*parts_of(place), name]), None, f"expected either {choice.text}")
+                two = Choice(tuple(said[:2])).text
+                yield Problem(joined([*parts_of(place), name]), None, f"expected either {two}, not both")
             elif said or choice.required:
                 way = said[0] if said else choice.ways[0]
                 others = [other for other in choice.ways if other is not way] if not said else []
@@ -181,18 +182,21 @@ def table_in(annotation: Any) -> type[Table] | None:
 
 
 def example_of(field: FieldInfo) -> str:
-    """An example of what a key takes: ``such as "80 Hz"``."""
+    """An example of what a key takes: ``such as "80 Hz"``; its type if the field has none."""
     if field.examples:
         return f"such as {shown_in_file(field.examples[0])}"
     kind = kind_in([*field.metadata, field.annotation])
-    return f'such as "{kind.example}"' if kind else "a value"
+    kinds = {str: "text in quotes", int: "a whole number", float: "a number", list: "a list", dict: "a table"}
+    return (
+        f'such as "{kind.example}"' if kind else kinds.get(get_origin(field.annotation) or field.annotation, "a value")
+    )
 
 
 def contradictions(model: type[Table], document: Any, place: str = "") -> Iterator[Problem]:
     """What the tables of a document say in no way, or in two (`Table.problems`)."""
     if not isinstance(document, Mapping):
         return
-    yield from model.problems(document, place)
+    yield from model.problems({name: value for name, value in document.items() if value != []}, place)
     for name, field in keys_in(model).items():
         below, inner = document.get(name), table_in(field.annotation)
         if inner is None or below is None:

@@ -139,7 +139,7 @@ def row_of(result: Mapping[str, Any]) -> dict[str, Any]:
 def derived_of(case: Case) -> dict[str, float]:
     """The columns `derived_columns` of a case, SI units."""
     known = {key: value for one in analyses_of(case) for key, value in one.derived_of(case).items()}
-    return known | {key: getattr(case.drive, key) for key in _DRIVE}
+    return known | {key: getattr(case.excitation, key) for key in _DRIVE}
 
 
 def describe_sweep(sweep: Sweep, cases: Sequence[Case], engine: Engine, out: Path) -> SweepRecord:
