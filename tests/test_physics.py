@@ -61,7 +61,7 @@ def test_symmetric_dimer_does_not_walk(walked: Walked) -> None:
     assert abs(walked(dimers={"radii": ["0.25 mm", "0.25 mm"]}).velocity[0]) < 0.01 * MM_PER_S
     # As shipped it leaves the axis meanwhile: a hundredth of a walker's 1.3 mm/s.
     shipped = load_case("symmetric")
-    shorter = replace(shipped, run=replace(shipped.run, cycles=30, settling_cycles=10))
+    shorter = shipped.but(run=shipped.run.but(cycles=30, settling_cycles=10))
     assert np.all(np.abs(walked(shorter).velocity) < 0.02 * MM_PER_S)
 
 
@@ -111,7 +111,7 @@ def _resistance(case: Case) -> np.ndarray:
         (small, np.inf, [1.0, 0.0, -1.0], [0.0, 0.0, -1.0 / small]),
         (small, large, [0.0, 1.0, 1.0], [0.0, -1.0 / large, 1.0 / small]),
     ):
-        surfaces = Surfaces.of(radius, other, case.liquid, case.contact.minimum_separation_ratio)
+        surfaces = Surfaces.of(radius, other, case.liquid.of_bridges, case.contact.minimum_separation_ratio)
         _, _, sliding, coupling, rolling = by_name(case.liquid.law)(surfaces).forces(np.zeros(1)).columns()[0]
         motions = np.array([slides, rolls])
         total += motions.T @ np.array([[sliding, coupling], [coupling, rolling]]) @ motions
@@ -131,7 +131,7 @@ def test_a_cycle_is_a_whole_multiple_of_the_sampling_interval(frequency: str, st
 def test_substrate_moves_as_prescribed(trajectory: Moved, axis: str, frame: str) -> None:
     """A sin ωt along the axis, zero across: of the walls that move, or are held in thought; walkers start at rest."""
     moved = trajectory(drive={"axis": axis, "frame": frame}, run={"cycles": 4, "settling_cycles": 1})
-    drive, motion, along = moved.case.drive, moved.motion, "xyz".index(axis)
+    drive, motion, along = moved.case.excitation, moved.motion, "xyz".index(axis)
     phase = drive.largest.angular_frequency * moved.time
     places, speeds = motion.substrate, motion.substrate_velocity[:, along]
     np.testing.assert_allclose(places[:, along], drive.amplitude * np.sin(phase), atol=1e-9 * drive.amplitude + 1e-15)
@@ -169,7 +169,7 @@ def test_rolling_friction_turns_a_walker_to_the_axis_and_a_symmetric_dimer_away(
 def ensemble() -> Case:
     """The shipped walker of Fig. 1b, six replicates, ten cycles."""
     case = load_case("fig1b")
-    return replace(case, run=replace(case.run, cycles=10, settling_cycles=4, until_steady=False))
+    return case.but(run=case.run.but(cycles=10, settling_cycles=4, until_steady=False))
 
 
 def test_replicates_are_perturbed_and_keep_their_distance(trajectory: Callable[..., Group], ensemble: Case) -> None:
@@ -185,7 +185,7 @@ def test_replicates_are_perturbed_and_keep_their_distance(trajectory: Callable[.
     centre = moved.mass_centre[..., :2]
     first, second = np.triu_indices(6, 1)
     assert np.linalg.norm(centre[:, first] - centre[:, second], axis=-1).min() > 0.5 * ensemble.walkers[0].spacing
-    other = {walker.start_angle for walker in render_deck(replace(ensemble, seed=2)).layout.walkers}
+    other = {walker.start_angle for walker in render_deck(ensemble.put("run.seed", 2)).layout.walkers}
     assert not other & set(angles)
 
 

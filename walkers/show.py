@@ -137,7 +137,7 @@ def summarise(case: Case) -> dict[str, Any]:
         walkers), ``time_step`` (limits, None if one does not apply; the chosen step; its shares of the limits and those
         of ``"auto"``), ``run`` (steps, samples, predicted seconds).
     """
-    run, drive, limits = case.run, case.drive, limits_of(case).as_dict()
+    run, drive, limits = case.run, case.excitation, limits_of(case).as_dict()
     volume = _volume(case)
     known = _youngs_modulus(case)
     summary: dict[str, Any] = {

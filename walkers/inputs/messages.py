@@ -16,7 +16,7 @@ from pydantic_core import ErrorDetails
 from walkers.errors import InputError, Problem, shown, suggestion, unusable
 from walkers.inputs.keys import MISSING, joined, parts_of, value_at
 from walkers.inputs.table import Table, example_of, keys_in
-from walkers.inputs.units import AUTO, WRITTEN, shown_in_file
+from walkers.inputs.units import AUTO, WRITTEN
 
 File = TypeVar("File", bound=BaseModel)
 
@@ -137,15 +137,8 @@ def _elsewhere(parts: Sequence[str | int]) -> str:
 def _in_a_table(parts: Sequence[str | int], field: FieldInfo | None) -> str:
     """How a table begins; empty for other keys."""
     table = _table_in(field.annotation)[0] if field else None
-    keys = {name: text for name, one in keys_in(table).items() if (text := example_of(one))} if table else {}
-    such = next(
-        (
-            f", such as {name} = {text.removeprefix('such as ')}"
-            for name, text in keys.items()
-            if text.startswith("such as ")
-        ),
-        "",
-    )
+    texts = {name: example_of(one).partition("such as ")[2] for name, one in keys_in(table).items()} if table else {}
+    such = next((f", such as {name} = {text}" for name, text in texts.items() if text), "")
     return f"a table [{joined(parts)}]{such}" if table else ""
 
 

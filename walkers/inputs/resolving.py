@@ -19,7 +19,7 @@ from walkers.inputs.library import Known, Library, unmeasured
 from walkers.inputs.loads import bridge_at_rest, contact_loads, dimer_of, reach
 from walkers.inputs.origins import Source
 from walkers.inputs.run import with_run
-from walkers.inputs.standing import OVERLAP, check_bodies, overlap
+from walkers.inputs.standing import OVERLAP, check_bodies, overlaps
 from walkers.inputs.units import TEMPERATURE, parse_quantity
 from walkers.physics.laws import LAWS
 from walkers.physics.mixtures import MIXTURES
@@ -257,9 +257,8 @@ def _check_places(cluster: Cluster, key: str) -> None:
         raise unusable(key, f"expected a place for each of the {len(everyone)} beads")
     if overlapping := touching(places, cluster.radii, -OVERLAP):
         one, other = overlapping[0]
-        raise unusable(
-            f"{key}[{other}]", overlap(f"{key}[{one}]", dist(places[one], places[other]), cluster.rigid(one, other))
-        )
+        apart = dist(places[one], places[other]), cluster.rigid(one, other)
+        raise unusable(f"{key}[{other}]", overlaps(f"{key}[{one}]", *apart))
     if not any(cluster.front):
         raise unusable(key, "expected some beads ahead of others: this walker has no heading")
     joined = {0}

@@ -233,13 +233,13 @@ def _check_overlaps(beads: list[_Held]) -> None:
         apart, touching = dist(first.place, second.place), first.radius + second.radius
         if apart < touching - OVERLAP * min(first.radius, second.radius):
             if second.walker >= 0:
-                message = f"at their start angles, a bead {overlap('one of another walker', apart, touching)}"
+                message = f"at their start angles, a bead {overlaps('one of another walker', apart, touching)}"
                 raise unusable(f"{second.key}.spacing", message)
             whom = first.key if first.walker < 0 else f"one of {first.key}"
-            raise unusable(f"{second.key}.at", overlap(whom, apart, touching))
+            raise unusable(f"{second.key}.at", overlaps(whom, apart, touching))
 
 
-def overlap(whom: str, apart: float, touching: float) -> str:
+def overlaps(whom: str, apart: float, touching: float) -> str:
     """A message about a bead at a distance (m) from another, which it touches at a larger distance (m)."""
     by = f"{1e3 * (touching - apart):.3g} mm; they touch at a distance of {1e3 * touching:.4g} mm"
     return f"overlaps with {whom} by {by}"

@@ -186,7 +186,13 @@ def example_of(field: FieldInfo) -> str:
     if field.examples:
         return f"such as {shown_in_file(field.examples[0])}"
     kind = kind_in([*field.metadata, field.annotation])
-    kinds = {str: "text in quotes", int: "a whole number", float: "a number", list: "a list", dict: "a table"}
+    kinds: dict[Any, str] = {
+        str: "text in quotes",
+        int: "a whole number",
+        float: "a number",
+        list: "a list",
+        dict: "a table",
+    }
     return (
         f'such as "{kind.example}"' if kind else kinds.get(get_origin(field.annotation) or field.annotation, "a value")
     )
