@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations
-from math import cos, pi, radians, sin
+from math import cos, radians, sin
 from pathlib import Path
 from typing import Any
 
