@@ -37,7 +37,7 @@ MOST_PERIODS = 1000
 
 def _axis(value: object) -> object:
     """An axis by its name, or a direction by its components."""
-    if value in ("x", "y", "z"):
+    if value in (None, "x", "y", "z"):
         return value
     if isinstance(value, (list, tuple)) and len(value) == 3 and any(value):
         numbers = tuple(float(one) for one in value if type(one) in (int, float) and isfinite(one))
