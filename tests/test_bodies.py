@@ -139,6 +139,28 @@ def test_a_chain_of_two_is_a_dimer() -> None:
     np.testing.assert_allclose(*([bead.centre for bead in place((case,))[0].beads] for case in cases), atol=1e-15)
 
 
+@pytest.mark.parametrize(
+    ("body", "written"),
+    [
+        ("dimers", {"radii": None, "diameters": ["1 mm", "0.6 mm"]}),
+        ("mixture", {"small": None, "small_diameters": ["0.6 mm", "0.63 mm"]}),
+        ("mixture", {"large": None, "large_diameters": ["1 mm", "1.18 mm"]}),
+        ("placed", {"radius": None, "diameter": "0.8 mm"}),
+        ("clusters", {"radii": None, "diameters": ["0.6 mm", "0.4 mm", "0.4 mm"]}),
+    ],
+)
+def test_diameters_are_twice_the_radii(body: str, written: dict[str, Any]) -> None:
+    """The same deck, and the same run."""
+    bodies = {"clusters": [{"arrangement": "fan", "radii": ["0.3 mm", "0.2 mm", "0.2 mm"], "replicates": 1}]}
+    tables = EVERYTHING if body != "clusters" else {**FIG1B, **bodies}
+    given = tables[body]
+    said = {**(given[0] if isinstance(given, list) else given), **written}
+    said = {key: value for key, value in said.items() if value is not None}
+    by_radii, by_diameters = Case.read(tables), Case.read({**tables, body: [said] if isinstance(given, list) else said})
+    assert numbers_of(by_diameters) == numbers_of(by_radii)
+    assert by_diameters.determinants() == by_radii.determinants()
+
+
 def test_a_raft_holds_together_and_stays(run_directory: Callable[..., Path], tmp_path: Path) -> None:
     """Seven equal beads, each in the ring joined to three: none is large, and the drive has no direction."""
     run = {"cycles": 12, "settling_cycles": 6, "samples_per_cycle": 10}

@@ -126,6 +126,25 @@ def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(own: Pat
         load_case("mine.toml")
 
 
+def test_a_liquid_of_ones_own_is_described_in_the_case() -> None:
+    """By all of its numbers, whatever its name; each that is missing is told."""
+    numbers = {"surface_tension": "20 mN/m", "volume_fraction": 0.02, "contact_angle": "5 deg"}
+    dynamic = document(liquid={"name": "mine", **numbers, "dynamic_viscosity": "5 mPa*s"})
+    kinematic = document(liquid={"name": "mine", **numbers, "kinematic_viscosity": "5 mm^2/s", "density": "1 g/cm^3"})
+    for tables in (dynamic, kinematic):
+        liquid = Case.read(tables).liquid.of_bridges
+        assert (liquid.surface_tension, liquid.volume_fraction, liquid.viscosity) == (0.02, 0.02, 0.005)
+    assert Case.read(dynamic).determinants() == Case.read(kinematic).determinants()
+    for missing in ("surface_tension", "dynamic_viscosity"):
+        del dynamic["liquid"][missing]
+        with pytest.raises(InputError, match=r'liquid\.name = "mine": not in the library'):
+            Case.read(dynamic)
+    del dynamic["liquid"]["name"]
+    with pytest.raises(InputError) as caught:
+        Case.read(dynamic)
+    assert [one.key for one in caught.value.problems] == ["liquid.surface_tension", "liquid.dynamic_viscosity"]
+
+
 def test_a_library_elsewhere_is_named(own: Path) -> None:
     (own / "library.toml").rename(own / "other.toml")
     assert "weighed" in call("--library", "other.toml", "show", "mine.toml", check=True).stdout
