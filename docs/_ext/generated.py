@@ -21,12 +21,12 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 from typer.main import get_command
 from walkers.inputs.catalogue import COMMANDS, NOT_KNOWN, catalogue
-from walkers.inputs.schema import CaseFile, fields_of
 from walkers.physics.units import ABSENT, ACCELERATION, AUTO, AUTO_FAR, TEMPERATURE, Kind, quantity_text
 
 from walkers.inputs.library import Known
 from walkers.inputs.numerical import measured
 from walkers.inputs.resolving import SUPPLIED
+from walkers.inputs.schema import CaseFile, fields_of
 from walkers.inputs.toml import read_toml
 from walkers.main import _program
 from walkers.postprocess.analysis import analyses
