@@ -43,6 +43,9 @@ figures: setup .venv/with-theory ## The paper's figures and published numbers be
 calibrate: setup .venv/with-calibrate ## Calibrate friction and drag to the published numbers (CALIBRATION=ruby); goes on where it was interrupted
 	@$(WALKERS) calibrate $(CALIBRATION) --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
 
+# Tests start hundreds of Python processes; each would compile its imports where the environment forbids bytecode.
+test test-slow: export PYTHONDONTWRITEBYTECODE :=
+
 .PHONY: test
 test: setup cluster chromium .venv/with-dev ## Lint, check types, run the tests (a 2-bead smoke test first)
 	.venv/bin/ruff check .

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations
-from math import cos, radians, sin
+from math import cos, dist, radians, sin
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.drive import Excitation, Sine, common_frequency
 from walkers.inputs.loads import contact_loads
 from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.standing import standing
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.analyses.meetings import Course, collective
 from walkers.postprocess.analysis import describe_result, figures_of, read_result
@@ -29,8 +30,10 @@ from walkers.postprocess.sides import of_tray
 from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import finished_places, run_place
+from walkers.show import summarise
 from walkers.sweeps.folder import as_text, inventory
 from walkers.sweeps.making import make_runs
+from walkers.sweeps.table import row_of
 from walkers.templates.deck import render_deck
 from walkers.templates.scene import place
 from walkers.theory.prediction import motion_of, predict
@@ -195,9 +198,43 @@ def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
     assert "of 0.3 / 0.2 / 0.2 mm" in done.describe()
     assert {path.name for path in done.plot()} == {"walk.png", "gait.png"}
     assert done.export("vtk").exists()
-    # Contact 3 is bead on bead of a dimer, and bead 3 on the floor of a trimer: they are not averaged.
+    # A column is of one kind of contact: of the third bead and the floor, or of two beads.
+    assert list(makes[0]["sliding"]) == ["bead_1", "bead_2", "pair_1"]
+    assert list(makes[1]["open"]) == ["bead_1", "bead_2", "bead_3", "pair_1", "pair_2", "pair_3"]
     assert done.result["sliding"] == makes[0]["sliding"]
-    assert len(makes[1]["sliding"]) == 6
+    for family, table in (("sliding", done.walkers), ("open", done.walkers), ("gap", done.trajectory)):
+        third, pair = (table[f"{family}_{name}"][table["walker"] < 2] for name in ("3", "pair_1"))
+        assert third.isna().all()
+        assert pair.notna().all()
+    chain = walkers.run(of_tables(cluster("chain", "Lss", replicates=1), run=BRIEF), tmp_path)
+    assert (
+        row_of(chain.result)["sliding_pair_1"] == chain.result["sliding"]["pair_1"] == chain.walkers.sliding_pair_1[0]
+    )
+    assert list(chain.result["contacts"].values()) == ["bead 1", "bead 2", "bead 3", "beads 1-2", "beads 2-3"]
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 6, 9, 12, 16])
+def test_neighbours_on_a_tray_face_opposite_ways(count: int) -> None:
+    """Along the rows and across them; so they do in a square of odd rows by their numbers alone."""
+    case = of_tables(dimers=dimers(count, meet=True))
+    _, tray = place((case,))
+    least = 1.1 * case.walkers[0].spacing
+    near = [(one, other) for one, other in combinations(tray, 2) if dist(one.origin, other.origin) < least]
+    assert len(near) >= count - 1
+    assert all(one.facing == -other.facing for one, other in near)
+
+
+def test_a_tray_has_another_name_where_its_walkers_face_other_ways() -> None:
+    """They do in even rows, unless they face any way, or are told one; walkers that do not meet keep their names."""
+    turned = {"angle_spread": "180 deg"}
+    for count, start, moved in [(16, {}, True), (9, {}, False), (16, turned, False), (16, {"facing": "right"}, False)]:
+        assert ("shifted_rows" in of_tables(dimers=dimers(count, meet=True, **start)).determinants()) == moved
+    assert "shifted_rows" not in of_tables(dimers=dimers(16)).determinants()
+
+
+def test_walkers_on_a_tray_of_even_rows_meet(tmp_path: Path) -> None:
+    close = dimers(4, spacing="1.6 mm", meet=True)
+    assert walkers.run(of_tables(dimers=close, run={"cycles": 60, "settling_cycles": 18}), tmp_path).result["merged"]
 
 
 def test_walkers_on_a_tray_meet_and_stick(tmp_path: Path) -> None:
@@ -297,6 +334,43 @@ def test_a_bead_rests_on_both_walls_of_a_groove() -> None:
     height = groove.rest_height(3e-4)
     assert height == pytest.approx(2.0 * 3e-4)
     assert [np.dot(wall.normal, (0.0, 0.0, height)) for wall in groove.walls] == pytest.approx([3e-4, 3e-4])
+
+
+@pytest.mark.parametrize("first", ["x", "y"])
+def test_walkers_face_along_the_first_of_equal_harmonics(first: str) -> None:
+    axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+    tones = [{"axis": axis, "frequency": "80 Hz", "peak_acceleration": "2 g"} for axis in dict.fromkeys((first, *axes))]
+    case = Case.read({**document(), "drive": {"harmonics": tones}})
+    assert case.drive_axis == axes[first]
+    ((_, start),) = standing(case)
+    large, small = start.beads
+    assert np.sign(np.round([large.x - small.x, large.y - small.y], 9)).tolist() == list(axes[first][:2])
+
+
+@pytest.mark.parametrize(
+    ("boundary", "walls"),
+    [
+        ({"shape": "groove", "opening": "30 deg"}, 1.0 + np.sqrt(0.75)),
+        ({"shape": "groove", "opening": "60 deg"}, 1.5),
+        ({"shape": "groove", "opening": "90 deg"}, 1.0),
+        ({"shape": "groove", "opening": "120 deg"}, 1.5),
+        ({"shape": "channel", "width": "0.6 mm"}, 2.0),
+        ({"shape": "channel", "width": "0.62 mm"}, 1.0),
+    ],
+)
+def test_the_viscous_limit_counts_the_walls_that_a_bead_touches_at_once(boundary: dict[str, str], walls: float) -> None:
+    """Two walls damp a bead by c (n n + m m), whose largest eigenvalue is c (1 + |n·m|)."""
+
+    def rate(**changes: str) -> float:
+        case = make_case(dimers={"radii": ["0.3 mm", "0.3 mm"]}, liquid={"name": "glycerol 87 %"}, boundary=changes)
+        found = summarise(case)["time_step"]["limits"]["viscous"]
+        assert case.run.time_step == pytest.approx(0.4 * found, rel=0.02)
+        return float(2.0 / found)
+
+    case = make_case(liquid={"name": "glycerol 87 %"})
+    mass = 4.0 / 3.0 * np.pi * 3e-4**3 * case.density
+    of_a_wall = 6.0 * np.pi * case.liquid.dynamic_viscosity * 3e-4 / case.contact.minimum_separation_ratio / mass
+    assert (rate(**boundary) - rate()) / of_a_wall == pytest.approx(walls - 1.0, abs=1e-9)
 
 
 def test_a_dimer_in_a_groove_rolls_on_both_walls(tmp_path: Path) -> None:

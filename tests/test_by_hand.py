@@ -87,7 +87,8 @@ def test_an_edited_parameter_is_another_case(name: str, folder: Path, run_direct
     assert found.case.run.period == pytest.approx(same.case.run.period)
     told, *constant = found.result["by_hand"][1:]
     assert told.startswith("the deck was edited: ")
-    assert all("are not constant within 0.2 %" in one for one in constant)  # in so few cycles
+    assert len(constant) == (name != "tension")  # the others need more cycles
+    assert all("are not constant within 0.2 %" in one for one in constant)
     assert all(re.search(rf"{parameter} \S+, was [\d.e-]+", told) for parameter in edits)
     assert "other line" not in told
     # What commands show and compare.
@@ -111,7 +112,7 @@ def test_a_deck_that_is_edited_and_run_again_is_read_again(folder: Path) -> None
     assert " finished: edited and run by hand " in call("list", "--out", str(folder.parent)).stdout
     _edit(folder, restitution="0.5")
     assert "walker.lig is newer than" in load(folder).result["by_hand"][-1]
-    with pytest.raises(InputError, match="hand: its deck was edited and run by hand: --set is for cases"):
+    with pytest.raises(InputError, match="hand: its deck was edited and run by hand: changes are for cases"):
         load(folder, changes={"drive.frequency": "70 Hz"})
 
 

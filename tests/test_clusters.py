@@ -1,6 +1,6 @@
 """Climbs of made-up trajectories: what counts, what does not, and what becomes of clusters that meet or part."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -20,7 +20,7 @@ from walkers.postprocess.clusters import (
     follow,
     held_clusters,
 )
-from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.dump import BoolArray, FloatArray
 from walkers.postprocess.motion import Bridges
 
 BULK = list(range(20))
@@ -49,8 +49,8 @@ class Scene:
         self.pairs = [[(20, 21), (22, 19), (23, 19)] for _ in TIME]
         self.walls: list[dict[int, int]] = [{20: SIDE, 0: SIDE, 1: 0} for _ in TIME]
 
-    def beads(self, height: FloatArray) -> Beads:
-        return Beads(TIME, height, self.large, np.zeros(FRAMES), wall_names=NAMES)
+    def beads(self, height: FloatArray, surface: FloatArray | None = None, bulk: Sequence[BoolArray] = ()) -> Beads:
+        return Beads(TIME, height, self.large, np.zeros(FRAMES) if surface is None else surface, bulk, 0, NAMES)
 
     def climbs(self, definition: ClimbCriteria | None = None) -> tuple[list[Track], list[Climb]]:
         rule = definition or ClimbCriteria()
@@ -60,7 +60,7 @@ class Scene:
             labels = connected(24, bridges.beads)
             bulks.append(bulk_of(labels, bridges))
             clusters.append(list(held_clusters(labels, bridges, bulks[-1])))
-        beads = self.seen = Beads(TIME, self.height, self.large, np.zeros(FRAMES), bulks, 0, NAMES)
+        beads = self.seen = self.beads(self.height, bulk=bulks)
         tracks = follow(TIME, clusters, rule)
         climbs = [classify(number, track, beads, rule) for number, track in enumerate(tracks)]
         self.events = [(event.event, event.track, event.other) for event in events_of(tracks, climbs, beads, rule)]
@@ -86,7 +86,7 @@ def test_a_climber_is_above_the_surface_as_it_is_then() -> None:
     scene = Scene()
     scene.height[:, 20:22] += 3e-3 * TIME[:, None]
     (track,), _ = scene.climbs()
-    beads = Beads(TIME, scene.height, scene.large, np.linspace(3e-3, 1e-3, FRAMES), wall_names=NAMES)
+    beads = scene.beads(scene.height, np.linspace(3e-3, 1e-3, FRAMES))
     climb = classify(0, track, beads, ClimbCriteria())
     assert climb.height == pytest.approx(5e-3 + 3e-3 * TIME[-1])
     assert climb.above_surface == pytest.approx(4e-3 + 3e-3 * TIME[-1])

@@ -31,6 +31,7 @@ from walkers.physics.laws import by_name
 from walkers.postprocess.analysis import current_result, read_result, tabulate
 from walkers.postprocess.dump import BinaryDump, DumpError, local_frames
 from walkers.postprocess.motion import read_bridges, read_motion
+from walkers.postprocess.tables import read_columns
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import FIRST_SEGMENT, finished_run, write_deck
 from walkers.runner.failures import DiskFull, EngineError
@@ -241,6 +242,20 @@ def test_a_run_that_was_damaged_is_told_in_a_line_by_all_that_read_it(name: str,
     assert all(path.read_bytes() == contents for path, contents in files.items()), "nothing on disk is lost"
 
 
+@pytest.mark.parametrize(("name", "more"), [("result.json", b"\n"), ("walkers.parquet", b"PAR1")])
+def test_a_run_with_an_edited_result_is_measured_again(name: str, more: bytes, short_run: Path) -> None:
+    known, edited = read_result(short_run), short_run / name
+    edited.write_bytes(edited.read_bytes() + more)
+    with pytest.raises(FileChanged, match=rf"{name} has changed .*; to measure the run again, delete the file and do"):
+        current_result(short_run) and read_columns(short_run, "walkers")
+    listed = call("list", "--all", "--out", str(short_run.parent), check=True).stdout
+    assert (" finished: its result.json has changed " in listed) == (name == "result.json")
+    edited.unlink()
+    call("run", str(short_run), check=True)
+    assert read_result(short_run) == known
+    assert len(read_columns(short_run, "walkers")["walker"]) == known["walkers"]
+
+
 def test_a_sweep_goes_on_without_a_damaged_run_and_says_which(short_case: Path) -> None:
     call("sweep", "sweep.toml", check=True)
     runs = list(load_table("runs/sweep")["run"])
@@ -255,12 +270,20 @@ def test_a_sweep_goes_on_without_a_damaged_run_and_says_which(short_case: Path) 
         assert list(table["run"]) == runs
         told = {}
         for command in ("list runs/sweep", "plot runs/sweep", "list --all", "sweep sweep.toml"):
-            done = call(*command.split(), check=True)
+            done = call(*command.split())
             assert "Traceback" not in done.stderr, (command, done.stderr)
             assert "99000" not in done.stdout
+            assert done.returncode == int(command.startswith("sweep") and not whole), (command, name)
             told[command] = done.stdout + done.stderr
         rows = [line.split() for line in told["list runs/sweep"].splitlines() if line[:6].strip() in {"0", "1"}]
         assert ([row[-1] for row in rows] == ["failed", "finished"]) is not whole, name
+        status = "finished" if whole else "failed"
+        for command in ("list runs/sweep", "sweep sweep.toml"):
+            assert f"2 points, {'2 finished' if whole else '1 finished, 1 failed'}\n" in told[command], (command, name)
+        assert (walkers.load("runs/sweep").status, told["sweep sweep.toml"].count("point 0")) == (
+            status,
+            2 * (not whole),
+        )
         assert ("1 of 2 points left out: 1 failed" in told["plot runs/sweep"]) is not whole, name
 
 

@@ -178,6 +178,26 @@ def test_a_library_elsewhere_is_named(own: Path) -> None:
             '[[surface_pairs]]\nmaterials = ["glas", "zirconia"]',
             'surface_pairs[0].materials = "glas": not in the library; expected one of ruby, glass',
         ),
+        (
+            '[[surface_pairs]]\nmaterials = ["glass", "brass"]\n[[surface_pairs]]\nmaterials = ["brass", "glass"]',
+            "surface_pairs[1] = brass on glass: is given twice",
+        ),
+        (
+            'file = "/etc/passwd"',
+            'file = "/etc/passwd": unknown key; a library takes materials, liquids, surface_pairs',
+        ),
+        (
+            '[materials."a\\u001b[31m"]\ndensity = { value = "2 g/cm^3", source = "x" }',
+            "materials.a\\x1b[31m: expected printable text on one line",
+        ),
+        (
+            '[materials.a]\ndensity = { value = "2 g/cm^3", source = "" }',
+            'materials.a.density.source = "": expected printable text on one line',
+        ),
+        (
+            '[materials.a]\ndensity = { value = "2 g/cm^3", source = "x\\u001b[31m" }',
+            'materials.a.density.source = "x\\u001b[31m": expected printable text on one line',
+        ),
     ],
 )
 def test_a_library_that_is_none_is_one_message(own: Path, text: str, told: str) -> None:
@@ -186,4 +206,29 @@ def test_a_library_that_is_none_is_one_message(own: Path, text: str, told: str) 
         done = call(*command)
         assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
         assert "library.toml: " in done.stderr
+        assert done.stderr.rstrip("\n").isprintable()
         assert told in done.stderr
+
+
+def test_a_library_within_a_case_is_checked_as_a_file_is() -> None:
+    pair = {"materials": ["rubby", "chromium-coated glass"], "friction": {"value": 0.2, "source": "measured"}}
+    told = r'library\.surface_pairs\[0\]\.materials = "rubby": not in the library.*did you mean "ruby"'
+    with pytest.raises(InputError, match=told):
+        Case.read(document(library={"surface_pairs": [pair]}))
+
+
+@pytest.mark.parametrize(
+    "viscosity", [{"dynamic_viscosity": "5 mPa*s"}, {"kinematic_viscosity": "5 mm^2/s", "density": "1 g/cm^3"}]
+)
+def test_a_liquid_of_ones_own_needs_no_library(viscosity: dict[str, str]) -> None:
+    case = Case.read(document(liquid={"name": "mine", "surface_tension": "30 mN/m", **viscosity}))
+    assert case.liquid.name == "mine"
+    assert (case.liquid.surface_tension, case.liquid.dynamic_viscosity) == pytest.approx((0.03, 5e-3))
+
+
+def test_each_number_stands_in_its_column(in_folder: Path) -> None:
+    number = '{ value = 0.0125, source = "tilting table" }'
+    pair = f'[[surface_pairs]]\nmaterials = ["chrome steel", "glass"]\nrolling_friction = {number}\n'
+    (in_folder / "library.toml").write_text(pair)
+    (line,) = (one for one in call("library", check=True).stdout.splitlines() if "chrome steel on glass" in one)
+    assert line.split("glass", 1)[1].split()[:2] == ["-", "0.0125"]

@@ -126,6 +126,14 @@ def test_ranges_that_are_none_are_refused(ranges: dict[str, object], told: str) 
     assert told in str(caught.value)
 
 
+def test_a_range_holds_the_value_of_its_case_which_points_of_sweeps_may_leave() -> None:
+    tables = {**GLASS, "uncertain": {"contact.friction.bead_wall": [0.4, 0.6]}}
+    with pytest.raises(InputError, match=r"^<case>: uncertain\.contact\.friction\.bead_wall: expected .* value, 0\.3$"):
+        load_case(tables)
+    assert load_case(tables, {"contact.friction.bead_wall": 0.4}).contact.friction.bead_wall == 0.4
+    assert Case.read(tables).contact.friction.bead_wall == 0.3
+
+
 def test_a_changed_value_is_validated_like_a_file() -> None:
     case = load_case("fig1b", {"drive.frequency": "70 Hz"})
     assert case == Case.read(case.document, name="fig1b")
@@ -333,8 +341,8 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     assert "uncertain parameters: volume fraction, viscosity ratio, contact angle, friction, restitution" in " ".join(
         unspread.describe().split()
     )
-    with pytest.raises(InputError, match=r"uncertain.contact.restitution.*: expected a range with the value"):
-        Case.read({**GLASS, "uncertain": {"contact.restitution": [0.4, 0.8]}}, name="beside")
+    with pytest.raises(InputError, match=r"uncertain.contact.restitution.*: expected a range that holds"):
+        spread_sweep(Case.read({**GLASS, "uncertain": {"contact.restitution": [0.4, 0.8]}}, name="beside"))
     # A case of which all is given has none.
     with pytest.raises(InputError, match="no value is uncertain"):
         run_spread(Case.read(REFERENCE), runs_folder, Options(2))

@@ -300,9 +300,9 @@ def test_dimers_turn_as_the_pendulum_does_but_as_much_faster_as_their_beads_are_
 
 
 def test_modes_and_postures_are_told_apart(sources: Sources) -> None:
-    rolling = {"velocity": 1e-3, "sliding_1": 0.0, "open_1": 0.0, "open_2": 0.0, "open_3": 0.0}
+    rolling = {"velocity": 1e-3, "sliding_1": 0.0, "open_1": 0.0, "open_2": 0.0, "open_pair_1": 0.0}
     rolling |= {"steady": 2, "walkers": 2, "turned_round": 0}
-    changes = [{"velocity": 0.0}, {}, {}, {"steady": 1}, {"open_3": 0.1}, {"turned_round": 1}]
+    changes = [{"velocity": 0.0}, {}, {}, {"steady": 1}, {"open_pair_1": 0.1}, {"turned_round": 1}]
     modes = classify(pd.DataFrame([rolling | change for change in changes]), [0.0, 0.0, 0.4, 0.0, 0.0, 0.0])
     assert [list(MODES)[mode] for mode in modes] == [*MODES, "leaves the axis"]
     table = sources.finished("modes")
@@ -315,7 +315,7 @@ def test_modes_and_postures_are_told_apart(sources: Sources) -> None:
 
 
 def test_the_program_draws_what_is_asked_for(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("walkers.inputs.run_tables._MOST_CYCLES", 12)  # of 60: Fig. 4b would take them all
+    monkeypatch.setattr("walkers.inputs.run._MOST_CYCLES", 12)  # of 60: Fig. 4b would take them all
     done = call("paper", "figures", "--only", "fig4", "-j", "1", check=True)
     assert done.stdout.splitlines() == ["figures/fig4.png", "figures/fig4.svg"]
     done = call("paper", "figures", "--only", "fig4", "--format", "pdf", "-j", "1", check=True)

@@ -596,6 +596,19 @@ def test_ranks_take_cores_of_this_machine_and_of_a_cluster() -> None:
         Options(6, site).for_ranks(16)
 
 
+@pytest.mark.parametrize(("cores", "share"), [(1, "share 1 core of"), (2, "")])
+def test_more_processes_than_cores_are_noted_before_a_run(cores: int, share: str) -> None:
+    ours = os.sched_getaffinity(0)
+    if len(ours) < cores:
+        pytest.skip(f"this machine has less than {cores} cores")
+    os.sched_setaffinity(0, sorted(ours)[:cores])
+    try:
+        told = notes(load_case("pile-ci", {"run.ranks": 2}))
+    finally:
+        os.sched_setaffinity(0, ours)
+    assert [f"2 MPI processes (run.ranks) {share}" in note for note in told] == [True] * bool(share)
+
+
 @pytest.mark.parametrize(("shape", "walls"), [("cylinder", 1), ("octagon", 8)])
 def test_a_container_holds_its_beads(shape: str, walls: int, tmp_path: Path) -> None:
     run = {"duration": "0.03 s", "frames_per_second": 680.0, **QUICK}

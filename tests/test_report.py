@@ -242,6 +242,7 @@ def test_words_and_numbers() -> None:
     assert {unit: (one.text, one.unit) for unit, one in shown.items() if one} == told
     case = make_case()
     assert "glass, Si AK5; 80 Hz" in caption(case)
+    assert caption(case).startswith("1 walker of R = 0.3 / 0.2 mm on a plane")
     assert "liquid of 19.2 mN/m; 80 Hz" in caption(replace(case, liquid=replace(case.liquid, name=None)))
     tilted = replace(case, boundary=replace(case.boundary, tilt=pi / 3.0))
     assert caption(tilted).endswith("plane tilted by 60°, right is up")

@@ -14,7 +14,7 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.analyses.walking import Walking, walkers_met
 from walkers.postprocess.analyses.work import Working
-from walkers.postprocess.analysis import RESULT_NAME, current_result, describe_result, read_result
+from walkers.postprocess.analysis import RESULT_NAME, Measured, current_result, describe_result, read_result
 from walkers.postprocess.figures import gait_panels, walk_panels
 from walkers.postprocess.gait import Averages, averages, fit_slopes, gait, gaps, settled_samples, steady_walkers, walk
 from walkers.postprocess.motion import Group, read_motion
@@ -76,6 +76,32 @@ def test_a_result_of_before_is_made_anew_if_it_can_be(
     assert current_result(copy) == {**known, "analyses": {"walking": Walking.version - 1}}
 
 
+def test_an_error_in_a_text_is_no_reason_to_measure_again(
+    directory: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copy = Path(shutil.copytree(directory, tmp_path / directory.name))
+    known, tables = current_result(copy), {path: path.stat().st_mtime_ns for path in copy.glob("*.parquet")}
+
+    def wrong(*_: object) -> list[str]:
+        raise TypeError("a number of text")
+
+    monkeypatch.setattr(Working, "lines", wrong)
+    assert current_result(copy) == known
+    assert {path: path.stat().st_mtime_ns for path in copy.glob("*.parquet")} == tables
+    with pytest.raises(TypeError, match="a number of text"):
+        describe_result(copy, known)
+
+
+def test_the_gait_that_is_drawn_is_measured_of_the_walker_that_is_drawn(directory: Path, moved: Group) -> None:
+    """Of that walker alone, because the gaits of hundreds take a gigabyte."""
+    drawn = Walking().panels(Measured(directory))["gait"]
+    assert drawn
+    for panel, expected in zip(drawn, gait_panels(moved), strict=True):
+        for line, other in zip(panel.lines, expected.lines, strict=True):
+            assert line.label == other.label
+            np.testing.assert_allclose(line.y, other.y, rtol=1e-12, atol=1e-12)
+
+
 def test_symmetric_dimers_need_not_be_on_the_axis_to_be_kept(run_directory: Callable[..., Path]) -> None:
     short = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
     aside = {"angle": "80 deg", "facing": "right"}
@@ -134,8 +160,8 @@ def test_the_result_follows_the_papers_protocol(directory: Path) -> None:
 
 
 NUMBERED = {
-    "trajectory": {"rotation": 2, "sliding": 3, "gap": 3},
-    "walkers": {"rotation": 2, "sliding": 3, "open": 3},
+    "trajectory": {"rotation": 2, "sliding": 2, "sliding_pair": 1, "gap": 2, "gap_pair": 1},
+    "walkers": {"rotation": 2, "sliding": 2, "sliding_pair": 1, "open": 2, "open_pair": 1},
     "bridges": {},
 }
 """Columns of the tables of dimers that there are for each bead or contact."""

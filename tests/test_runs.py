@@ -138,16 +138,18 @@ def test_a_run_is_found_by_its_directory_its_name_or_its_case_with_other_values_
 
 def test_a_running_simulation_is_looked_at_stopped_and_continued(in_folder: Path) -> None:
     case_file = _toml(in_folder, **LONG)
-    run = walkers.start(case_file)
+    program = subprocess.Popen([PROGRAM, "run", case_file], stderr=subprocess.DEVNULL)
+    wait_for(lambda: list(Path("runs").glob("*.lock")))
+    (place,) = Path("runs").glob("*.lock")
+    run = walkers.load(place.with_suffix(""))
+    assert isinstance(run, walkers.Run)
     wait_for(lambda: run.progress and run.progress.step > 2 * run.case.run.steps_per_cycle)
     assert (run.status, walkers.load(case_file).status, len(engines_in(in_folder))) == ("running", "running", 1)
     assert "running: " in call("list", check=True).stdout
-    frame = run.last_frame
-    assert (frame.position.shape, frame.time[0] > 0.0) == ((1, 2, 3), True)
     assert f"{run.directory}: the run is running: " in call("plot", case_file).stderr
-    assert run.stop() == "interrupted"
-    assert engines_in(in_folder) == []
-    assert run.last_frame.time[0] >= frame.time[0]
+    program.send_signal(signal.SIGINT)
+    assert program.wait(30) == 130
+    assert (run.status, run.progress, engines_in(in_folder)) == ("interrupted", None, [])
     refused = call("plot", f"{run.directory}.incomplete").stderr
     assert f"the run is interrupted; continue it with: walkers run {run.directory}" in refused
     stopped = call("run", str(run.directory), "--limit", "0.2")

@@ -92,7 +92,7 @@ def test_texts_that_a_shell_would_take_for_more_are_refused_or_quoted(in_folder:
     for key in ("partition", "account", "provider.qos", "provider.clusters", "executor.address"):
         with pytest.raises(InputError, match=rf"site\.toml: {key} = .*: expected letters"):
             _load(in_folder, SLURM + f"{key} = {json.dumps(text, ensure_ascii=False)}\n")
-    with pytest.raises(InputError, match=r"--out: .* expected letters"):
+    with pytest.raises(InputError, match=r"^out: .* expected letters"):
         check_path(in_folder / text / "fig2")
     (in_folder / "site.toml").write_text(SLURM + f"modules = [{json.dumps(text, ensure_ascii=False)}]\n")
     script = pilots(load_site(in_folder / "site.toml"), in_folder / "parsl").executors[0].provider.worker_init
@@ -223,7 +223,7 @@ def test_sweeps_of_pilots_leave_nobody_behind(in_folder: Path) -> None:
 
 
 HEARTS = {"address": "127.0.0.1", "heartbeat_period": 1, "heartbeat_threshold": 5}
-SITE = {"scheduler": "slurm", "partition": "main", "walltime": "00:10:00", "cores": 2, "jobs": 2, "executor": HEARTS}
+SITE = {"scheduler": "slurm", "partition": "main", "walltime": "00:10:00", "cores": 1, "jobs": 2, "executor": HEARTS}
 # Twelve frequencies, a deck each; at the fifth the time step is far beyond the viscous limit of glycerol.
 STEPS = [*["2 us"] * 4, "40 us", *["2 us"] * 7]
 ZIP = {"drive.frequency": {"linspace": ["60 Hz", "71 Hz", 12]}, "run.time_step": STEPS}
@@ -248,7 +248,7 @@ def files(in_folder: Path) -> Path:
     (in_folder / "test.toml").write_text(to_toml(SWEEP))
     (in_folder / "site.toml").write_text(to_toml(SITE))
     front, log, go = in_folder / "front", in_folder / "launches", in_folder / "go"
-    # Ten launches are enough for six points, though one fails and two are cancelled; twelve points need two more.
+    # Ten launches are enough for six points, though one fails and one is cancelled; twelve points need two more.
     front.write_text(
         f"""#!/bin/sh
         echo >> {log}
@@ -278,7 +278,7 @@ def test_a_sweep_through_slurm(cluster: dict[str, str], files: Path) -> None:
 
     first = _sweep(cluster)
     wait_for(at_least(2))
-    pilot, *_ = _jobs(cluster, "-t", "running")  # the other one may have to wait for cores
+    pilot, *_ = _jobs(cluster, "-t", "running")
     subprocess.run(["scancel", pilot], env=cluster, check=True)
     wait_for(at_least(6))
     assert first.poll() is None

@@ -14,7 +14,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 import walkers
-from tests.conftest import call
+from tests.conftest import call, document, to_toml
 from walkers.errors import InputError
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
@@ -275,3 +275,24 @@ def test_a_figure_does_not_deny_what_it_varies(looked_through: Path, sweep: str,
     title = " ".join([figure.get_suptitle(), *(legend.get_title().get_text() for legend in figure.legends)])
     title = title.replace("\n", " ")
     assert ("standard deviation" in title, "not varied" in title) == (True, not varied)
+
+
+def test_walkers_that_face_down_a_slope_are_a_series_beside_those_that_face_up(tmp_path: Path) -> None:
+    short = {"cycles": 4, "settling_cycles": 1, "samples_per_cycle": 10}
+    (tmp_path / "slope.toml").write_text(to_toml(document(dimers={"replicates": 2}, run=short)))
+    (tmp_path / "tilt.toml").write_text('case = "slope.toml"\n[axes]\nboundary.tilt = ["0 deg", "10 deg", "20 deg"]\n')
+    swept = walkers.sweep(tmp_path / "tilt.toml", tmp_path / "runs")
+    table, figure = swept.table(), swept.figure()
+    assert _legend(figure) == ["started facing right (up)", "started facing left (down)"]
+    (axes,) = _panels(figure)
+    assert axes.get_ylabel() == "velocity (mm/s)"
+    series = [line.get_ydata() for line in axes.lines if len(line.get_xdata()) == 3]
+    np.testing.assert_allclose(series, 1e3 * table[["right_facing", "left_facing"]].to_numpy().T)
+    assert not _legend(swept.figure(y="right_facing"))
+    # Of walkers that lean or turned over, velocities are those up the slope.
+    drawn = drawn_column(table, "axial_velocity", down="axial_left_facing")
+    each = [walkers.load(Path(run)).walkers.set_index("facing")["axial_velocity"] for run in table["run"]]
+    np.testing.assert_allclose([drawn.values, drawn.down], [[1e3 * one[way] for one in each] for way in (1, -1)])
+    assert drawn.label == "velocity along the axis (uphill) (mm/s)"
+    alone = drawn_column(table.assign(left_facing=np.nan), "right_facing", down="left_facing")
+    assert alone.down is None

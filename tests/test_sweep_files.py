@@ -169,19 +169,39 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"axis": {}}, 'unknown key; a sweep takes .*did you mean "axes"'),
     ({"case": "fig1c"}, 'case = "fig1c": no such file, run or sweep, nor a shipped case .*did you mean "fig1b"'),
     ({"set": {"drive.frequncy": "60 Hz"}}, "drive.frequncy: unknown key"),
+    ({"case": "."}, r'case = "\.": expected a case file, or the name of a shipped case'),
+    ({"case": "./"}, r'case = "\./": expected a case file, or the name of a shipped case'),
+    ({"set": {"dimers.radii[-1]": {}}}, r"dimers\.radii\[-1\]: unknown key"),
+    ({"set": {"dimers": {}}}, "dimers: is a table of a case"),
+    ({"axes": {"run.seed": {}}}, r"run\.seed = {}: expected a list of values"),
+    *(({"axes": axes}, f"{key}: expected one of {key} and {other}, which replace each other") for axes, key, other in (
+        ({"drive.peak_acceleration": ["1 g"], "drive.gamma0": [0.5]}, "drive.peak_acceleration", "drive.gamma0"),
+        ({"dimers.sin_delta": [0.1], "dimers.radii": [["3 mm", "2 mm"]]}, "dimers.sin_delta", "dimers.radii"),
+    )),
     # What would make the same point twice
     ({"axes": {"drive.frequency": ["80 Hz", "80.0 Hz"]}}, r'"80\.0 Hz": expected different'),
     ({"axes": {"drive.frequency": {"linspace": ["80 Hz", "80 Hz", 3]}}}, "expected different values"),
     ({"sample": [{"points": 4, "ranges": {"contact.restitution": {"uniform": [0.3, 0.2]}}}]}, "smaller value first"),
-    ({"axes": {"run.silence": ["1 s", "2 s"]}}, r"run\.silence: does not vary"),
-    ({"axes": {"title": ["a", "b"]}}, "title: does not vary"),
+    ({"axes": {"run.silence": ["1 s", "2 s"]}}, r"run\.silence: expected none: this key has ended"),
+    ({"set": {"run.log_limit": "2 MB"}}, r"run\.log_limit.*: expected none: this key has ended"),
+    ({"axes": {"title": ["a", "b"]}}, "title: expected another key"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("tables", "message"), BAD)
 def test_a_sweep_that_makes_no_sense(make: Make, tables: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=f"test.toml: .*{message}"):
+    with pytest.raises(InputError, match=f"test.toml: .*{message}") as caught:
         make(**tables)
+    assert any(word in str(caught.value) for word in ("expected", "unknown key", "nor a shipped case", "must "))
+
+
+@pytest.mark.parametrize("case", ["other", "other.toml", "./other"])
+def test_the_base_case_beside_a_sweep_comes_before_that_of_the_working_directory(case: str, in_folder: Path) -> None:
+    (in_folder / "below").mkdir()
+    for place, acceleration in (("other.toml", "2 g"), ("below/other.toml", "3 g")):
+        (in_folder / place).write_text(to_toml(document(drive={"peak_acceleration": acceleration})))
+    (in_folder / "below" / "sweep.toml").write_text(f'case = "{case}"\naxes.run.seed = [1]\n')
+    assert [point.drive.peak_acceleration for point in load_sweep("below/sweep.toml").cases()] == [pytest.approx(29.4)]
 
 
 def test_a_point_that_makes_no_sense_is_named(make: Make) -> None:

@@ -383,7 +383,7 @@ def test_a_run_that_was_cut_since_is_told_and_stops_nothing(sweep_file: Callable
     frame = load("runs/test")
     assert list(frame["status"]) == ["finished", "failed", "finished"]
     assert frame["reason"][1] == "DamagedRunError"
-    assert _sweep(name).returncode == 0
+    assert _sweep(name).returncode == 1
     (run / "manifest.json").unlink()
     assert _sweep(name).returncode == 0
     assert set(load("runs/test")["status"]) == {"finished"}

@@ -17,13 +17,14 @@ from walkers.inputs import library
 from walkers.inputs.axes import ranges_of
 from walkers.inputs.case import Case
 from walkers.inputs.numerical import INFLUENCE, STIFFER, measured, numerical_error
-from walkers.inputs.reading import load_case
+from walkers.inputs.reading import load_case, with_changes
 from walkers.inputs.units import parse_quantity
 from walkers.paper.published import outside_of_the_paper
 from walkers.pipeline import find_side
 from walkers.postprocess.analyses.walking import _summary
 from walkers.postprocess.analysis import describe_result, quantities_of
 from walkers.postprocess.motion import read_motion
+from walkers.postprocess.report.run import result_html
 from walkers.postprocess.sides import fell, sides_apart, uphill_velocities
 from walkers.postprocess.tables import read_columns
 from walkers.postprocess.uncertainty import band_text
@@ -63,6 +64,32 @@ def test_the_numerical_error_is_what_a_shorter_step_and_harder_beads_change(runs
     assert own == pytest.approx(known["velocity"], rel=1e-3)
     assert half - own == pytest.approx(known["half_step"], abs=1e-6)
     assert stiff - half == pytest.approx(known["stiffer"], rel=0.02)
+
+
+def test_runs_beside_a_run_measure_its_numerical_error(tmp_path: Path) -> None:
+    """Those that its text asks for: at half the time step, and with harder beads."""
+    case = make_case(run={"cycles": 8, "settling_cycles": 4, "samples_per_cycle": 10})
+    done = walkers.run(case, tmp_path)
+    asked = re.search(r"run and compare with (run\S+), +(contact\S+)", " ".join(done.describe().split()))
+    assert asked is not None
+    changes = [dict([one.split("=")]) for one in asked.groups()]
+    half = walkers.run(with_changes(case, changes[0]), tmp_path)
+    told = " ".join(done.describe().split())
+    assert f"numerical error not measured: run and compare with {asked[2]}" in told
+    assert asked[1] not in told
+    harder = walkers.run(with_changes(case, changes[1]), tmp_path)
+    own, *others = (one.result["velocity"]["mean"] for one in (done, half, harder))
+    parts = [100.0 * (one / own - 1.0) for one in others]
+    told = " ".join(done.describe().split())
+    runs = f"{half.directory.name} and {harder.directory.name}"
+    said = f"half the time step {parts[0]:+.2g} %, 10 times Young's modulus {parts[1]:+.2g} %"
+    assert f"numerical error {np.hypot(*parts):.2g} % (measured by {runs}: {said})" in told
+    faster = walkers.run(with_changes(case, {"drive.frequency": "90 Hz"}), tmp_path)
+    sides = (find_side(one.directory) for one in (done, faster))
+    text = compare_runs(*sides).text
+    assert f"{done.directory.name}: the numerical error is not measured" not in text
+    assert f"{faster.directory.name}: the numerical error is not measured" in text
+    assert runs.partition(" ")[0] in " ".join(result_html(done.directory, done.result).split())
 
 
 def test_what_is_usual_lies_within_its_range() -> None:
@@ -293,3 +320,11 @@ def test_shares_of_open_contacts_say_their_resolution_and_work_whose_it_is(runs_
     told = describe_result(done.directory, {**done.result, "open": open_ones})
     assert "22.9 % of the time, in steps of 0.5 %" in told
     assert "inertial work of the drive per cycle" in told
+
+
+def test_texts_of_results_are_as_wide_as_a_page(runs_folder: Path) -> None:
+    done = walkers.run(load_case("fig1b"), runs_folder)
+    long = {**done.result, "goes_uphill": True, "drive": "plane tilted by 20°, right is up, " * 5}
+    told = describe_result(done.directory, long, cached=True).splitlines()
+    assert "(already run)" in "".join(told[:3])
+    assert not [line for line in told if len(line) > 110 and str(done.directory) not in line]

@@ -1,4 +1,4 @@
-"""Verdicts that must be able to fail: audits, comparisons of two engines, benchmarks, with made-up numbers."""
+"""Verdicts that must be able to fail: checks, comparisons of two engines, benchmarks, with made-up numbers."""
 
 from __future__ import annotations
 
@@ -8,13 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from walkers.check.audit import AuditReport, record
 from walkers.check.benchmarks import largest
 from walkers.check.crosscheck import Comparison, Start
 from walkers.check.report import Chapter, Line, Verdict, as_dict, outcome
 from walkers.inputs.reading import load_case
 from walkers.postprocess.motion import Motion
-from walkers.runner.binary import find_engine, read_audit
 
 GOOD, BAD = Line("good", 1.0, 1.05, 0.1), Line("bad", 1.0, 1.2, 0.1)
 CHAPTERS = (Chapter("one", "One", (GOOD,)), Chapter("two", "Two", (GOOD, BAD, GOOD)))
@@ -25,18 +23,6 @@ def test_one_failed_line_fails_all_checks() -> None:
     assert not as_dict(CHAPTERS)["passed"]
     assert as_dict(CHAPTERS[:1])["passed"]
     assert (outcome(CHAPTERS), outcome(CHAPTERS[:1])) == ("1 of 4 lines fail", "all 1 lines pass")
-
-
-def test_a_failed_audit_is_kept_with_its_failures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of another binary than the installed one, in another cache."""
-    engine = replace(find_engine(), sha256="d" * 64)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    report = AuditReport(engine, "e" * 64, "3.8.0", CHAPTERS)
-    assert [line.what for line in report.failures] == ["bad"]
-    assert record(report, quick=False) == read_audit("d" * 64, "e" * 64)
-    kept = read_audit("d" * 64, "e" * 64)
-    assert kept is not None
-    assert (kept.failures, kept.lines, kept.scope) == (("bad",), 4, "full")
 
 
 def _pile(cycles: list[float]) -> Motion:

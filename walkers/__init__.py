@@ -1,8 +1,7 @@
 """Wet granular walkers, simulated with LIGGGHTS.
 
-`load_case` reads a case. `run` and `sweep` run a case and a sweep, as the commands do. `start` does not wait for the
-run to end. `load` finds runs and sweeps. A `Run` or a `Sweep` has methods that plot, film, report and export.
-`FilmOptions` describes a film for `Run.film`.
+`load_case` reads a case. `run` and `sweep` run a case and a sweep, as the commands do. `load` finds runs and sweeps. A
+`Run` or a `Sweep` has methods that plot, film, report and export. `FilmOptions` describes a film for `Run.film`.
 """
 
 from __future__ import annotations
@@ -14,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from walkers.handles import Run, Sweep
     from walkers.inputs.reading import load_case
-    from walkers.pipeline import load, run, start, sweep
+    from walkers.pipeline import load, run, sweep
     from walkers.postprocess.films import FilmOptions
 
-__all__ = ["FilmOptions", "Run", "Sweep", "load", "load_case", "run", "start", "sweep"]
+__all__ = ["FilmOptions", "Run", "Sweep", "load", "load_case", "run", "sweep"]
 
 DEFAULT_OUT = Path("runs")
 RECORDS = {"run": "manifest.json", "sweep": "sweep.json", "calibration": "calibration.json"}
@@ -28,7 +27,7 @@ _PACKAGES = (
 )
 _MODULES = {
     **{"FilmOptions": "postprocess.films", "Run": "handles", "Sweep": "handles", "load_case": "inputs.reading"},
-    **dict.fromkeys(("load", "run", "start", "sweep"), "pipeline"),
+    **dict.fromkeys(("load", "run", "sweep"), "pipeline"),
 }
 """Modules of the public names."""
 

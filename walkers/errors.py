@@ -45,7 +45,7 @@ class Problem:
 
     def __str__(self) -> str:
         where = " = ".join(shortened(printable(part)) for part in (self.key, self.value) if part is not None)
-        expected = shortened(self.expected, _LONGEST_TEXT)
+        expected = shortened(printable(self.expected), _LONGEST_TEXT)
         return f"{where}: {expected}" if where else expected
 
 
@@ -55,7 +55,7 @@ class InputError(WalkersError):
     def __init__(self, source: str, problems: Sequence[Problem]) -> None:
         self.source = source
         self.problems = tuple(problems)
-        named = shortened(source, _LONGEST_TEXT)
+        named = shortened(printable(source), _LONGEST_TEXT)
         super().__init__("\n".join(f"{named}: {problem}" for problem in self.problems))
 
 

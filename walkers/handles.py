@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from html import escape
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from walkers.errors import refused
 from walkers.finding import files_of
-from walkers.runner.directory import FAILURE_NAME, ask_to_stop, case_of, finished_run, is_locked
+from walkers.runner.directory import FAILURE_NAME, case_of, finished_run, is_locked
 from walkers.runner.files import read_json
 
 if TYPE_CHECKING:
@@ -63,7 +62,6 @@ class Run:
     directory: Path
     cached: bool = True
     origins: tuple[Origin, ...] | None = field(default=None, repr=False)
-    _last: list[Progress] = field(default_factory=list, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Make a path of the name of a directory."""
@@ -84,33 +82,10 @@ class Run:
 
     @property
     def progress(self) -> Progress | None:
-        """Progress of a running run, in any process; between segments the last known one; None if unknown."""
+        """Progress of a running run, in any process; None between segments, and if it is not running."""
         from walkers.sweeps.making import progress_at
 
-        if not is_locked(self.directory):
-            return None
-        if found := progress_at(self.directory):
-            self._last[:] = [found]
-        return self._last[0] if self._last else None
-
-    @property
-    def last_frame(self) -> Motion:
-        """The last complete frame of the motion, also of an unfinished run."""
-        from walkers.postprocess.motion import read_last_frame
-
-        return read_last_frame(self._files)
-
-    def stop(self, patience: float = 30.0) -> str:
-        """Stop the run, in any process, and return its status after at most ``patience`` seconds.
-
-        Complete segments are kept, and ``walkers run`` continues after them. A point that shares a deck with other
-        points of a sweep does not stop.
-        """
-        ask_to_stop(self.directory)
-        end = time.monotonic() + patience
-        while is_locked(self.directory) and time.monotonic() < end:
-            time.sleep(0.05)
-        return self.status
+        return progress_at(self.directory) if is_locked(self.directory) else None
 
     @property
     def finished_directory(self) -> Path:
@@ -307,9 +282,9 @@ class Sweep:
     @property
     def status(self) -> str:
         """``finished``, ``running``, ``failed`` (some points) or ``interrupted`` (points are missing)."""
-        from walkers.sweeps.table import states, worst_status
+        from walkers.sweeps.table import checked_states, worst_status
 
-        return worst_status(state.status for state in states(self._record))
+        return worst_status(state.status for state in checked_states(self._record))
 
     @property
     def runs(self) -> list[Run]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext, suppress
 from dataclasses import replace
@@ -12,12 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers import DEFAULT_OUT
-from walkers.errors import InputError, Problem, WalkersError, check_utf8, refused
+from walkers.errors import InputError, Problem, check_utf8, refused
 from walkers.finding import NOT_A_RUN, Place, case_at, check_run, find, placed
 from walkers.handles import Run, Sweep
 from walkers.progress import progress_of, progress_of_sweep, shown_if
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import finished_run, is_locked, run_place, unfinished
+from walkers.runner.directory import finished_run, run_place, unfinished
 from walkers.runner.failures import EngineMissing, RunBusy
 
 if TYPE_CHECKING:
@@ -105,37 +104,6 @@ def run(
     return Run(made.runs[place.name].directory, cached=place.name in made.found, origins=case.origins)
 
 
-def start(case: Case | str | Path, out: str | Path = DEFAULT_OUT, **how: Any) -> Run:
-    """Start a run as `run` does, without waiting for its end.
-
-    The run stops when this Python process ends. `Run.status` and `Run.progress` follow it; `Run.stop` stops it.
-
-    Examples
-    --------
-    >>> made = walkers.start("pile-ci", tmp)
-    >>> made.stop()
-    'interrupted'
-    """
-    resolved, folder = case_at(case, out)
-    place = run_place(resolved, find_engine(how.get("engine")), folder)
-
-    failures: list[WalkersError] = []
-
-    def make() -> None:
-        try:
-            run(resolved, folder, **how)
-        except WalkersError as failure:  # the files of the run also contain a failure of the engine
-            failures.append(failure)
-
-    thread = threading.Thread(target=make, daemon=True)
-    thread.start()
-    while thread.is_alive() and not is_locked(place):
-        time.sleep(0.01)
-    if failures:
-        raise failures[0]
-    return Run(place, cached=False, origins=resolved.origins)
-
-
 def _load_postprocess() -> None:
     import pyarrow.parquet  # noqa: F401
 
@@ -143,7 +111,7 @@ def _load_postprocess() -> None:
 
 
 def sweep(
-    sweep: str | Path,
+    sweep: str | Path | Mapping[str, Any],
     out: str | Path = DEFAULT_OUT,
     *,
     jobs: int | None = None,
@@ -155,7 +123,7 @@ def sweep(
     Parameters
     ----------
     sweep
-        A sweep file, or the name of a shipped sweep.
+        A sweep file, the name of a shipped sweep, or the tables of a sweep file.
     out
         Folder of the run directories.
     jobs

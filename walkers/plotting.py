@@ -19,7 +19,7 @@ from walkers.postprocess.drawing import FORMATS, check_place, save_figure
 from walkers.runner.directory import case_of
 from walkers.sweeps.figure import Factor, draw, drawn_column, layout_of
 from walkers.sweeps.readable import readable_unit
-from walkers.sweeps.table import default_column, derived_of, find_name, load, varied_columns
+from walkers.sweeps.table import FACING_DOWN, default_column, derived_of, find_name, load, varied_columns
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -84,7 +84,8 @@ def sweep_figure(
         Keys that vary, such as ``drive.frequency`` or ``frequency``, or columns of the table (`walkers.load`);
         chosen automatically if None. ``none``: no colours or panels.
     y
-        A column of the table; default: ``velocity``, for piles ``climbs``.
+        A column of the table; default: ``velocity``, for piles ``climbs``; on slopes where the walkers that face up and
+        down differ, both.
     log
         Which axes are logarithmic: ``x``, ``y`` or ``xy``.
     theory
@@ -135,7 +136,7 @@ def _figure_of(
             _tell(f"not drawn at {number} of {len(done)} points: {reason}")
         if predicted and (beyond := [sentence for case in cases if (sentence := outside_of_the_paper(case))]):
             _tell(f"{len(beyond)} of {len(done)} points are {beyond[0]}" + (", …" if len(beyond) > 1 else ""))
-    drawn = drawn_column(done, column, predicted)
+    drawn = drawn_column(done, column, predicted, None if y else FACING_DOWN.get(column))
     if predicted:
         drawn = replace(drawn, curves=partial(_curves, done, cases, column, gaps))
     figure = draw(laid_out, drawn, title=table.attrs["title"], log=log)
@@ -194,7 +195,7 @@ def _curves(
 
 
 def _column(table: pd.DataFrame, wanted: str | None) -> str:
-    return find_name("--y", wanted, table.columns) if wanted else default_column(table)
+    return find_name("y", wanted, table.columns) if wanted else default_column(table)
 
 
 def _tell(message: str) -> None:

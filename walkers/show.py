@@ -20,7 +20,8 @@ from walkers.inputs.run import CONSTANT, limits_of
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.physics.capillary import capillary_force_limit_at_wall
 from walkers.physics.time_step import auto_fractions
-from walkers.rounding import percent
+from walkers.rounding import counted, percent
+from walkers.runner.launch import cores_here
 from walkers.templates.deck import RESTING_SEGMENTS, settling_steps
 from walkers.text import printable
 
@@ -92,13 +93,16 @@ def pairs_of_beads(case: Case) -> int:
 
 
 def notes(case: Case) -> list[str]:
-    """Notes on a case before it is run: a long time step; of a pile, beads of one size and low walls."""
+    """Notes on a case before it is run: a long time step, few cores; of a pile, beads of one size and low walls."""
     largest, reason = limits_of(case).recommended(loose=case.loose)
     times, lines = case.run.time_step / largest, []
     if times < 1e-2:
         lines = [f"the time step is {_two_digits(1.0 / times)} times smaller than needed ({reason})"]
     elif times > 1.01 and numerical_error(case) is None:
         lines = [f"the time step is {times:.2g} times the largest of auto ({reason})"]
+    if case.run.ranks > (cores := cores_here()):
+        share = f"{case.run.ranks} MPI processes (run.ranks) share {counted(cores, 'core')} of this machine"
+        lines.append(f"{share}: the run takes many times longer than predicted")
     if not (case.loose and case.boundary.closed and case.mixture):
         return lines
     numbers = {"large": case.large, "small": case.count - case.large}

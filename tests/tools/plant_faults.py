@@ -47,7 +47,8 @@ def planted(fault: Mapping[str, Any]) -> Iterator[None]:
 def failing(arguments: list[str], seconds: float) -> str | None:
     """The first test that fails, None if all pass."""
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:randomly", "-p", "no:cacheprovider", *arguments]
-    environment = {**os.environ, "PYTHONHASHSEED": "0"}  # of a set of parameters, processes have another order each
+    # Of a set of parameters, processes have another order each. Bytecode of a fault could outlive it.
+    environment = {**os.environ, "PYTHONHASHSEED": "0", "PYTHONDONTWRITEBYTECODE": "1"}
     tests = subprocess.Popen(
         command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True, start_new_session=True
     )

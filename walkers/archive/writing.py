@@ -83,7 +83,7 @@ def write_archive(directory: str | Path, to: Path | None = None, options: Archiv
     contents = contents_of(directory, dumps=options.dumps)
     to = Path(f"{contents.name}.zip") if to is None else to
     if to.suffix != ".zip" or to.is_dir():
-        raise refused("-o", f"expected the name of a .zip file, not {to}")
+        raise refused("to", f"expected the name of a .zip file, not {to}")
     metadata = json_bytes(describe_crate(contents, options.authors, options.licence))
     about = [item(METADATA_NAME, metadata), item(PREVIEW_NAME, _preview(contents, options))]
     sums = "".join(f"{one.sha256}  {one.place}\n" for one in [*contents.items, *about])
@@ -101,12 +101,12 @@ def write_archive(directory: str | Path, to: Path | None = None, options: Archiv
 def _check(options: ArchiveOptions) -> None:
     if options.licence not in LICENCES:
         message = f"expected one of {', '.join(LICENCES)}"
-        raise refused("--licence", f"{message}, not {options.licence}")
+        raise refused("licence", f"{message}, not {options.licence}")
     for author in options.authors:
         if not author.name.strip():
-            raise refused("--author", "expected a name")
+            raise refused("author", "expected a name")
         if author.orcid is not None and not _is_orcid(author.orcid):
-            raise refused("--orcid", f"expected an ORCID such as 0000-0002-1825-0097, found {author.orcid}")
+            raise refused("orcid", f"expected an ORCID such as 0000-0002-1825-0097, found {author.orcid}")
 
 
 def _is_orcid(text: str) -> bool:

@@ -256,7 +256,7 @@ def _kept(path: Path, determinants: dict[str, Any], make: Callable[[], FloatArra
             if kept[key] != now:
                 message = (
                     f"was drawn with other {key} than in the calibration file; delete this and later waves "
-                    "to draw them again (matching runs are kept), undo the change, or choose another --out"
+                    "to draw them again (matching runs are kept), undo the change, or choose another folder of runs"
                 )
                 raise InputError(str(path), [Problem(key, None, message)])
         return unit

@@ -37,12 +37,9 @@ from walkers.inputs.toml import read_toml
 from walkers.inputs.units import ANGLE, SPEED, WRITTEN, Kind, Number, Whole, parse_quantity
 
 _MOST = 10_000
-Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_3"]
+Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_pair_1"]
 """A column of a sweep's table that is a speed."""
-QUANTITIES: dict[str, Kind] = {
-    **dict.fromkeys(get_args(Speed), SPEED),
-    "misalignment": ANGLE,
-}
+QUANTITIES: dict[str, Kind] = {**dict.fromkeys(get_args(Speed), SPEED), "misalignment": ANGLE}
 """Quantities of observations: columns of the table of a sweep, or the largest angle to the drive axis."""
 Names = Annotated[list[str], Field(min_length=1)]
 
@@ -198,12 +195,8 @@ def load_calibration(calibration: str | Path) -> Calibration:
 def read_calibration(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Calibration:
     """A calibration given as nested tables; parameters and errors as for `walkers.inputs.sweep.expand`."""
     file = validated(CalibrationFile, document, source, "a calibration")
-    if problems := [
-        *_unknown_names(file),
-        *_contradictions(file),
-        *_problems_of_guesses(file),
-        *_problems_of_keys(file),
-    ]:
+    problems = [*_unknown_names(file), *_contradictions(file), *_problems_of_guesses(file), *_problems_of_keys(file)]
+    if problems:
         raise InputError(source, problems)
     parameters = []
     for label, table in file.parameters.items():

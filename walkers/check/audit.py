@@ -45,7 +45,7 @@ def selected(only: Collection[str] = (), *, quick: bool = False) -> tuple[str, .
     """Names of the checks to run: the given ones, else all, or all quick ones; `InputError` for unknown names."""
     for name in only:
         if name not in CHECKS:
-            raise refused("--only", f"no check {name!r}; {expected_of(name, CHECKS)}")
+            raise refused("only", f"no check {name!r}; {expected_of(name, CHECKS)}")
     return tuple(name for name in CHECKS if (name in only if only else not (quick and name in LONG)))
 
 

@@ -92,8 +92,9 @@ def describe(found: Sequence[Entry]) -> str:
 
 
 def _cell(numbers: Mapping[str, Known], column: str) -> str:
-    """A number with its range; the known one of the two viscosities."""
-    known = next((one for key, one in numbers.items() if f"_{key}".endswith(f"_{column}")), None)
+    """A number with its range; of ``viscosity`` whichever of the two there is."""
+    keys = ("kinematic_viscosity", "dynamic_viscosity") if column == "viscosity" else (column,)
+    known = next((numbers[key] for key in keys if key in numbers), None)
     if known is None:
         return "-"
     ends = f" ({known.range[0]} to {known.range[1]})" if known.range else ""
@@ -121,7 +122,5 @@ def describe_one(found: Sequence[Entry], name: str) -> str:
             for key, known in one.numbers.items()
         ]
     if wanted[0].kind == "materials":
-        lines.append(
-            f"The friction of {wanted[0].name} on other wet surfaces has not been measured; see walkers library."
-        )
+        lines.append(f"The friction of {wanted[0].name} on other wet surfaces is not measured; see walkers library.")
     return "\n".join(filter(None, lines))

@@ -242,7 +242,7 @@ def combinations(axes: Sequence[Axis]) -> tuple[tuple[str, ...], list[tuple[Valu
     for number, key in enumerate(keys):
         list_of = key.partition("[")[0]
         if any(other in (key, list_of) or other.partition("[")[0] == key for other in keys[:number]):
-            raise unusable(key, "varies on two axes")
+            raise unusable(key, "varies on two axes; expected one")
     if (many := prod(len(axis.rows) for axis in axes)) > MOST_POINTS:
         raise unusable("axes", f"{many} points; expected at most {MOST_POINTS}")
     return keys, [tuple(value for row in rows for value in row) for rows in product(*(axis.rows for axis in axes))]

@@ -32,9 +32,9 @@ def write_case(path: Path, kind: str = "walker", source: str | None = None) -> P
     from walkers.errors import expected_of
 
     check_utf8(path)
-    path = path if path.suffix == ".toml" else path.with_name(f"{path.name}.toml")
-    if path.stem in ("", ".", ".."):
+    if path.name in ("", "..") or path.stem in (".", ".."):
         raise refused(path, "expected a name")
+    path = path if path.suffix == ".toml" else path.with_name(f"{path.name}.toml")
     if source is not None:
         known = shipped("case")
         if source not in known:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from pydantic import Field
 
 from walkers.inputs import units
-from walkers.inputs.table import SAME_RUN, Choice, Filled, Flag, Table, key
+from walkers.inputs.table import SAME_RUN, Choice, Filled, Table, key
 from walkers.inputs.units import Diameter, Length, Number, Radius, SignedLength, Whole
 
 Apart = Callable[[int, int], float]
@@ -31,7 +31,7 @@ _LEAST_LEVER = 0.1
 """Of a cluster's extent: large and small beads whose centroids are nearer than that give no heading."""
 _TOUCHING = 0.02
 """Radii by which beads that are given places may be apart and still touch."""
-_TOO_SMALL = "a bead is too small to touch two beads that touch each other"
+_TOO_SMALL = "a bead is too small to touch two beads that touch each other; expected a larger one"
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def _fan(radii: Sequence[float], apart: Apart) -> Places:
             raise ValueError(_TOO_SMALL)
         turns.append(turns[-1] + acos(cosine))
     if turns[-1] + turns[-1] / max(len(turns) - 1, 1) > 2.0 * pi * (1.0 + 1e-9):
-        raise ValueError("too many beads to fit around the first one")
+        raise ValueError("too many beads to fit around the first one; expected fewer")
     front = apart(0, 1) * radii[0] / (radii[0] + radii[1])
     behind = [(apart(0, bead), pi - turns[-1] / 2.0 + turn) for bead, turn in enumerate(turns, 1)]
     return [(front, 0.0), *((front + away * cos(turn), away * sin(turn)) for away, turn in behind)]
@@ -108,7 +108,7 @@ def _ring(radii: Sequence[float], apart: Apart) -> Places:
         return [2.0 * asin(min(chord / (2.0 * radius), 1.0)) for chord in chords]
 
     if sum(turns(low)) < 2.0 * pi:
-        raise ValueError("these beads do not form a closed ring")
+        raise ValueError("these beads do not form a closed ring; expected more beads, or more similar radii")
     for _ in range(200):
         middle = (low + high) / 2.0
         low, high = (middle, high) if sum(turns(middle)) > 2.0 * pi else (low, middle)
@@ -198,7 +198,7 @@ class Walkers(Table):
         " touch at the start.",
         None,
     )
-    meet: Flag = key(
+    meet: units.Flag = key(
         "Whether the walkers may meet. If false, the walkers are replicates, and a meeting gives a warning.", False
     )
 
@@ -279,7 +279,8 @@ class Walkers(Table):
         def apart(one: int, other: int) -> float:
             between = self.radii[one] + self.radii[other] - known[min(one, other), max(one, other)]
             if between < abs(heights[one] - heights[other]):
-                raise ValueError("the radii differ too much: the beads do not touch when they rest on the boundary")
+                message = "the radii differ too much: the beads do not touch when they rest on the boundary"
+                raise ValueError(f"{message}; expected more similar radii")
             return sqrt(between**2 - (heights[one] - heights[other]) ** 2)
 
         return ARRANGEMENTS[self.arrangement].places(self.radii, apart)

@@ -181,6 +181,16 @@ class Boundary(Table):
                 walls.append(Flat((half * x, half * y, 0.0), (-x, -y, 0.0), name))
         return tuple(walls)
 
+    def damping(self, radius: float) -> float:
+        """Damping of a bead of a radius (m) by the walls that it touches at once, over that by one of them.
+
+        It is the largest eigenvalue of the sum of n nᵀ over their normals n. Neighbouring sides of an octagon (1.7) do
+        not count: the step of loose beads allows for more neighbours (`walkers.inputs.bodies.Mixture.bridged`).
+        """
+        if self.shape == "groove":
+            return 1.0 + abs(cos(self.opening))
+        return 2.0 if (self.width or inf) < 2.02 * radius else 1.0
+
     def room(
         self, half_x: float, half_y: float, *, height: float, margin: float, largest: float
     ) -> tuple[Vector, Vector]:
@@ -214,9 +224,7 @@ class Boundary(Table):
 
     def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
         """Places about the origin for walkers that stand ``spacing`` (m) apart: a square grid, or a row along x."""
-        if self.shape in ("channel", "groove"):
-            return [((place - (number - 1) / 2.0) * spacing, 0.0) for place in range(number)]
-        columns = ceil(sqrt(number))
+        columns = 1 if self.shape in ("channel", "groove") else ceil(sqrt(number))
         rows = ceil(number / columns)
         cells = (divmod(place, columns) for place in range(number))
         return [((row - (rows - 1) / 2.0) * spacing, (column - (columns - 1) / 2.0) * spacing) for row, column in cells]

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from html import escape
-from math import cos, hypot, inf, sin
+from math import cos, hypot, inf, isclose, pi, sin
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import BeforeValidator, Field, ValidationError
@@ -28,17 +28,15 @@ from walkers.inputs.messages import blaming, blaming_changes, check_key, validat
 from walkers.inputs.origins import Origin, Source, Whence, text_of
 from walkers.inputs.resolving import NAMES, SUPPLIED, resolve, supplied
 from walkers.inputs.run import Run
-from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Flag, Table, changed, contradictions, key
+from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Table, changed, contradictions, key
 from walkers.inputs.units import Coefficient, Number, kind_in
 from walkers.physics.laws import by_name
-from walkers.physics.liquid import BridgeLiquid
+from walkers.physics.liquid import DEFAULT_LAW, BridgeLiquid
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from walkers.physics.bridge import BridgeLaw
-
-DEFAULT_LAW = "young-laplace"
 
 
 class Beads(Table):
@@ -63,7 +61,7 @@ class Liquid(Table):
     bridges. ``law`` is the bridge law: one of `walkers.physics.laws`, or your own function, ``file.py:function``.
     """
 
-    choices: ClassVar = (Choice((("dynamic_viscosity",), ("kinematic_viscosity",))),)
+    choices: ClassVar = (Choice((("dynamic_viscosity",), ("kinematic_viscosity",)), instead="a liquid of the library"),)
     name: Annotated[str | None, SAME_RUN] = key(
         "Liquid from the library. The other keys override its values.", None, "Si AK5"
     )
@@ -87,7 +85,7 @@ class Liquid(Table):
         "Contact angle at every bridge, between beads and at the boundary. A case whose bridges push the "
         "beads of a walker apart at rest is refused."
     )
-    conserved: Flag = key(
+    conserved: units.Flag = key(
         "Whether a bridge takes its volume from the films of its beads and gives it back when it breaks, so "
         "that bridges share the liquid; otherwise the volume of a bridge does not depend on other bridges. "
         "For piles.",
@@ -228,18 +226,20 @@ class Case(Table):
         source: str = "<case>",
         name: str = "case",
         changes: Mapping[str, Any] | None = None,
+        around: bool = False,
     ) -> Case:
         """A case given as the tables of a case file, quantities as strings with units.
 
         ``source`` is what messages call it; run directories begin with its ``name``; ``changes`` are other values by
-        dotted keys. Raises `InputError` with all that is wrong in the tables, or with what contradicts something else.
+        dotted keys; ``around``: uncertain ranges must hold the values of the case, which points of sweeps may leave.
+        Raises `InputError` with all that is wrong in the tables, or with what contradicts something else.
         """
         if changes:
             with blaming_changes(changes):
                 with blaming(source):
                     each(lambda one: check_key(cls, one), changes)
                     document = changed(cls, document, changes)
-                return cls.read(document, source=source, name=name)
+                return cls.read(document, source=source, name=name, around=around)
         with blaming(source, document):
             tables, sources, unknown = supplied(document, library_of(document, source))
             try:
@@ -252,11 +252,11 @@ class Case(Table):
                 case = resolve(case.but(name=name, document=dict(document), sources=sources))
             except ArithmeticError as error:
                 raise refused(source, f"inconsistent values: {error}") from error
-            case._check_uncertain(tables, source)
+            case._check_uncertain(tables, source, around=around)
         return case
 
-    def _check_uncertain(self, tables: Mapping[str, Any], source: str) -> None:
-        """Uncertain values are keys of the case, which could say both ends of the range and lie between them."""
+    def _check_uncertain(self, tables: Mapping[str, Any], source: str, *, around: bool) -> None:
+        """Uncertain values are keys of the case, which could say both ends of the range."""
         for name, given in self.uncertain.items():
             ends = next(iter(given.values()))
             try:
@@ -266,9 +266,9 @@ class Case(Table):
                 problems = [replace(one, key=f"uncertain.{one.key}") for one in error.problems]
                 raise InputError(source, problems) from error
             value = self.value_of(name)
-            if isinstance(value, (int, float)) and not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9):
+            if around and isinstance(value, (int, float)) and not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9):
                 text = next((one.text for one in self.origins if one.key == name), str(value))
-                message = f"expected a range with the value of the case in it, {text}"
+                message = f"expected a range that holds the case's own value, {text}"
                 raise InputError(source, [Problem(f"uncertain.{name}", None, message)])
 
     def changed(self, changes: Mapping[str, Any]) -> Case:
@@ -287,6 +287,8 @@ class Case(Table):
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Case:
         """A case from `as_dict` (a run directory's ``case.json``); raises `ValueError` if it is none."""
+        if "walkers" in values:
+            raise ValueError("is of an earlier version of this program: run the case again")
         try:
             return cls.model_validate(values)
         except ValidationError as error:
@@ -326,7 +328,7 @@ class Case(Table):
             raw, kind = value_at(self.document, parts_of(name)), kind_in([*field.metadata, field.annotation])
             if raw is not MISSING and not (units.is_auto(raw)):
                 origins[name] = Origin(name, text_of(raw), "given", value=value)
-            elif source := self.sources.get(name):
+            elif (source := self.sources.get(name)) and (source.text or value is not None):
                 text = source.text or text_of(value, kind)
                 about = (source.origin, source.why, source.range, source.logarithmic)
                 origins[name] = Origin(name, text, *about, value=value)
@@ -436,9 +438,18 @@ class Case(Table):
         """Whether walkers may meet."""
         return any(walkers.meet for walkers in self.walkers)
 
+    @cached_property
+    def shifted_rows(self) -> int:
+        """Even length of rows of which every second one begins facing left, so that neighbours meet; 0 if none does."""
+        if not (self.meets and any(one.facing == "both" and not isclose(one.angle_spread, pi) for one in self.walkers)):
+            return 0
+        rows = [x for x, _ in self.boundary.grid(sum(one.replicates for one in self.walkers), 1.0)]
+        length = rows.count(rows[0])
+        return length if length % 2 == 0 and length < len(rows) else 0
+
     @property
     def drive_axis(self) -> Vector:
-        """Reference direction of orientations: the drive in the plane of the floor, or x if it has none there."""
+        """Direction of the largest harmonic (the first of equal ones) in the plane of the floor; x if it has none."""
         x, y, _ = self.excitation.direction
         length = hypot(x, y)
         return (x / length, y / length, 0.0) if length else AXES["x"]

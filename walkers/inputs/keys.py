@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import lru_cache
 from typing import Any
 
@@ -50,10 +51,10 @@ def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool] = lambda _:
     flat: dict[str, Any] = {}
     for name, value in table.items():
         below = {name: value}
-        if isinstance(value, Mapping) and not is_leaf(value):
+        if isinstance(value, Mapping) and value and not is_leaf(value):
             below = {f"{name}.{key}": one for key, one in flatten(value, is_leaf).items()}
         if twice := flat.keys() & below.keys():
-            raise unusable(twice.pop(), "is given twice")
+            raise unusable(twice.pop(), "is given twice; expected one value")
         flat |= below
     return flat
 
@@ -89,16 +90,15 @@ def settings_of(words: Iterable[str]) -> dict[str, Value]:
         if not (key and separator and text):
             raise InputError("--set", [Problem(word, None, "expected key=value, such as drive.frequency=70Hz")])
         if key in settings:
-            raise InputError("--set", [Problem(key, text, "is given twice")])
+            raise InputError("--set", [Problem(key, text, "is given twice; expected one value")])
         settings[key] = _value(text)
     return settings
 
 
 def _value(text: str) -> Value:
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except (tomllib.TOMLDecodeError, KeyError):
-        pass
+    with suppress(ValueError):  # no TOML, or further keys on further lines
+        (value,) = tomllib.loads(f"value = {text}").values()
+        return value
     if text.startswith("[") and text.endswith("]") and "[" not in text[1:]:
         return [_value(part.strip()) for part in text[1:-1].split(",")]
     return text

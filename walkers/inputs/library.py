@@ -153,20 +153,22 @@ def check_library(tables: object, source: str) -> None:
         raise refused(source, "expected the tables of a library: materials, liquids, surface_pairs")
     validated(LibraryFile, tables, source, "a library")
     shipped, text = _contents(), "is in the library of the program; expected "
-    again = [
-        Problem(f"{kind}.{name}", None, f"{text}another name")
-        for kind in ("materials", "liquids")
-        for name in tables.get(kind, ())
-        if name in shipped[kind]
-    ]
-    pairs = [sorted(one["materials"]) for one in shipped["surface_pairs"]]
-    again += [
-        Problem(f"surface_pairs[{number}]", " on ".join(pair["materials"]), f"{text}its numbers in the case instead")
-        for number, pair in enumerate(tables.get("surface_pairs", ()))
-        if sorted(pair["materials"]) in pairs
-    ]
-    if again:
-        raise InputError(source, again)
+    kinds = ("materials", "liquids")
+    again = [f"{kind}.{name}" for kind in kinds for name in tables.get(kind, ()) if name in shipped[kind]]
+    problems = [Problem(key, None, f"{text}another name") for key in again]
+    known, pairs = Library(tables).names("materials"), [sorted(one["materials"]) for one in shipped["surface_pairs"]]
+    given = list(pairs)
+    for number, materials in enumerate(one["materials"] for one in tables.get("surface_pairs", ())):
+        key, pair = f"surface_pairs[{number}]", sorted(materials)
+        if pair in given:
+            why = f"{text}its numbers in the case instead" if pair in pairs else "is given twice; expected one table"
+            problems.append(Problem(key, " on ".join(materials), why))
+        given.append(pair)
+        for name in sorted({*materials}.difference(known)):
+            why = f"not in the library; {expected_of(name, known)}"
+            problems.append(Problem(f"{key}.materials", shown(name), why))
+    if problems:
+        raise InputError(source, problems)
 
 
 def library_of(document: Mapping[str, Any], source: str = "") -> Library:
@@ -195,22 +197,11 @@ def read_library(folder: Path) -> dict[str, Any]:
     if not (inputs.chosen_library or path.is_file()):
         return {}
     tables = read_toml(path)
+    if "file" in tables:  # as in a case that names the file of its library
+        message = "unknown key; a library takes materials, liquids, surface_pairs"
+        raise InputError(str(path), [Problem("file", shown(tables["file"]), message)])
     check_library(tables, str(path))
-    _check_pairs(tables, str(path))
     return {"file": str(path), **tables}
-
-
-def _check_pairs(tables: Mapping[str, Any], source: str) -> None:
-    """Refuse surface pairs of materials that are in no library."""
-    library = Library(tables)
-    unknown = [
-        Problem(f"surface_pairs[{number}].materials", shown(name), f"not in the library; {message}")
-        for number, pair in enumerate(tables.get("surface_pairs", ()))
-        for name in pair["materials"]
-        if not library.has("materials", name) and (message := expected_of(name, library.names("materials")))
-    ]
-    if unknown:
-        raise InputError(source, unknown)
 
 
 @cache

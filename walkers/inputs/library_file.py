@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Generic, TypeVar
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from walkers.inputs import units
 from walkers.inputs.table import Table
@@ -13,11 +13,21 @@ from walkers.inputs.units import Coefficient, Number
 Q = TypeVar("Q")
 
 
+def _printable(text: str) -> str:
+    if not text or not text.isprintable():
+        raise ValueError("expected printable text on one line")
+    return text
+
+
+Text = Annotated[str, AfterValidator(_printable)]
+"""A name or a source, which commands and reports print as it is."""
+
+
 class Sourced(Table, Generic[Q]):
     """``{ value = …, source = "…" }``: a number of a library, and both ends of where it can lie if it is uncertain."""
 
     value: Q
-    source: Annotated[str, Field(min_length=1, examples=["weighed"])]
+    source: Text = Field(examples=["weighed"])
     range: tuple[Q, Q] | None = None
 
     @field_validator("range")
@@ -56,7 +66,7 @@ class LiquidTable(Table):
 class SurfacePairTable(Table):
     """``[[surface_pairs]]``: how wet surfaces of two materials touch."""
 
-    materials: tuple[str, str]
+    materials: tuple[Text, Text]
     friction: Sourced[Coefficient] | None = None
     rolling_friction: Sourced[Coefficient] | None = None
     restitution: Sourced[Number] | None = None
@@ -70,6 +80,6 @@ class LibraryFile(Table):
     """A library: materials, liquids and surface pairs, each number with its source; ``file`` is where it was read."""
 
     file: str = ""
-    materials: dict[str, MaterialTable] = Field(default={})
-    liquids: dict[str, LiquidTable] = Field(default={})
+    materials: dict[Text, MaterialTable] = Field(default={})
+    liquids: dict[Text, LiquidTable] = Field(default={})
     surface_pairs: list[SurfacePairTable] = Field(default=[])

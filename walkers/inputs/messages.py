@@ -38,6 +38,8 @@ _SENTENCES = {
     **dict.fromkeys(("model_type", "dict_type", "model_attributes_type"), "expected a table [{key}]"),
 }
 """By the type of an error of pydantic, with the values of its context."""
+_ENDED = ("run.silence", "run.log_limit")
+"""Keys of cases of earlier versions."""
 _GIVEN_ELSEWHERE = {"beads": "a material", "liquid": "a liquid", "contact": "surfaces"}
 """What the library knows that gives keys of these tables."""
 
@@ -95,7 +97,8 @@ def validated(
 
 
 def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[BaseModel], whole: str) -> Problem:
-    location, kind, context = details["loc"], details["type"], details.get("ctx", {})
+    kind, context = details["type"], details.get("ctx", {})
+    location = tuple(part for part in details["loc"] if part != "[key]")  # of a name of the user's
     of_list = kind == "missing" and isinstance(location[-1], int)
     parts: tuple[str | int, ...] = location[:-1] if of_list else location
     key, field = joined(parts), _field_at(file, parts)
@@ -183,7 +186,7 @@ def check_key(model: type[Table], key: str) -> None:
     """Refuse a key that no case has; raises `InputError` if it is one."""
     parts, known = re.sub(r"\[\d+\]", "", key).split("."), keys_of(model)
     if "" in parts:
-        raise unusable(key, "is not a key of a case")
+        raise unusable(key, "is not a key of a case; expected one such as drive.frequency")
     if ".".join(parts) not in known:
         raise unusable(key, _unknown_key(parts, model, "a case"))
     if known[".".join(parts)]:
@@ -192,6 +195,8 @@ def check_key(model: type[Table], key: str) -> None:
 
 def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
     *tables, word = location
+    if ".".join(location) in _ENDED:
+        return "expected none: this key has ended; the program limits the engine itself"
     known, place = keys_of(file), ""
     for part in tables:
         below = f"{place}.{part}".lstrip(".")

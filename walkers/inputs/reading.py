@@ -68,7 +68,7 @@ def load_case(case: str | Path | Mapping[str, Any], changes: Mapping[str, Any] |
     from walkers.inputs.case import Case
 
     source = "<case>" if isinstance(case, Mapping) else str(case)
-    return Case.read(document, source=source, name=path.stem, changes=changes)
+    return Case.read(document, source=source, name=path.stem, changes=changes, around=True)
 
 
 def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from walkers.inputs.run import with_run
 from walkers.inputs.standing import OVERLAP, check_bodies, overlaps
 from walkers.inputs.units import TEMPERATURE, parse_quantity
 from walkers.physics.laws import LAWS
+from walkers.physics.liquid import DEFAULT_LAW
 from walkers.physics.mixtures import MIXTURES
 
 if TYPE_CHECKING:
@@ -40,9 +41,10 @@ _OF_SURFACES = (
 )
 _VISCOSITIES = ("liquid.kinematic_viscosity", "liquid.dynamic_viscosity")
 _OF_LIQUIDS = ("liquid.surface_tension", "liquid.density", *_VISCOSITIES)
+_LIQUIDS = ((_OF_LIQUIDS[0], _VISCOSITIES[1]), _OF_LIQUIDS[:3])
+"""What a liquid of its own says: its surface tension, and its dynamic viscosity or density and kinematic viscosity."""
 SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_OF_SURFACES)
 """Keys that a case may leave out because the library has values or defaults."""
-DEFAULT_LAW = "young-laplace"
 
 
 # --- from the library -------------------------------------------------------------------------------------------------
@@ -91,12 +93,10 @@ def _unknown(
 ) -> list[Problem]:
     """Names that are not in the library, of things of which the case does not say all itself."""
     described = given.issuperset(_FRICTION)
-    liquids = {"liquid.surface_tension", "liquid.volume_fraction", "liquid.contact_angle"}
-    of_its_own = given.issuperset(liquids) and not given.isdisjoint(_VISCOSITIES)
     problems = []
     for key, name, kind, says_all in (
         ("beads.material", bead, "materials", described and "beads.density" in given),
-        ("liquid.name", liquid, "liquids", of_its_own),
+        ("liquid.name", liquid, "liquids", any(given.issuperset(keys) for keys in _LIQUIDS)),
         ("boundary.material", wall, "materials", described),
     ):
         if name is not None and not says_all and not library.has(kind, name):
@@ -247,7 +247,8 @@ def _check_arrangement(cluster: Cluster, key: str) -> None:
     except ValueError as error:
         raise unusable(key, str(error)) from error
     if overlapping:
-        raise unusable(key, f"beads {overlapping[0][0] + 1} and {overlapping[0][1] + 1} would overlap in a {name}")
+        one, other = (bead + 1 for bead in overlapping[0])
+        raise unusable(key, f"beads {one} and {other} would overlap in a {name}; expected similar radii")
 
 
 def _check_places(cluster: Cluster, key: str) -> None:
@@ -321,8 +322,12 @@ def _spacing(case: Case) -> Case:
         _check_held(case, walkers)
         overlaps = contact_loads(case, walkers).overlaps if gap is None else (-gap,)
         if max(overlaps) * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):
-            blamed = f"{key}.gap" if gap is not None else "contact.youngs_modulus"
-            raise unusable(blamed, "the beads overlap by more than 2 % of the smallest radius")
+            blamed, other = "contact.youngs_modulus", f"a larger modulus, or {key}.gap"
+            if gap is not None:
+                least = -0.02e6 * min(walkers.radii) / (1.0 + walkers.gap_spread)
+                blamed, other = f"{key}.gap", f"{least:.3g} um or more"
+            message = f"the beads overlap by more than 2 % of the smallest radius: expected {other}"
+            raise unusable(blamed, message)
         if gap is None:
             case = case.noted(f"{key}.gap", "where the forces at rest balance", text="auto")
         # Beads of different walkers may touch, but not overlap, if they are meant to meet.

@@ -9,7 +9,8 @@ from pydantic import Field
 
 from walkers.errors import unusable
 from walkers.inputs import units
-from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Flag, Table, key
+from walkers.inputs.origins import Source
+from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Table, key
 from walkers.inputs.units import AUTO, Duration, Number, Whole
 from walkers.physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
 from walkers.rounding import percent
@@ -67,7 +68,7 @@ class Run(Table):
         "Time step, or its upper limit; the program shortens it so that a cycle contains a whole number of samples.",
         None,
     )
-    allow_unstable: Annotated[Flag, SAME_RUN] = key("Accept a time step beyond a stability limit.", False)
+    allow_unstable: Annotated[units.Flag, SAME_RUN] = key("Accept a time step beyond a stability limit.", False)
     cycles: Annotated[Filled[_Cycles], AUTO] = key(
         "Number of drive cycles. `auto`: until the walkers are steady. See [](../cases.md#length-of-a-run).", None, 60
     )
@@ -170,7 +171,7 @@ def limits_of(case: Case) -> TimeStepLimits:
     """Limits of the time step for the bodies of a case."""
     contact = case.contact
     return time_step_limits(
-        [entry for body in case.bodies for entry in body.bridged],
+        [(*entry, case.boundary.damping(entry[0])) for body in case.bodies for entry in body.bridged],
         density=case.beads.density,
         youngs_modulus=contact.youngs_modulus,
         poissons_ratio=contact.poissons_ratio,
@@ -199,8 +200,8 @@ def with_run(case: Case) -> Case:
     _check_length(case, cycles, settling, cycles_per_sample)
     most = MOST_STEPS // steps - (ceil((rest + 1.0) * frequency) if rest else 0)
     if cycles > most:
-        name, message = ("cycles", f"expected at most {most}") if table.duration is None else ("duration", "too long")
-        raise unusable(f"run.{name}", f"{message}: the engine counts steps up to 2^31")
+        name, longest = ("cycles", f"{most}") if table.duration is None else ("duration", f"{most // frequency:g} s")
+        raise unusable(f"run.{name}", f"expected at most {longest}: the engine counts steps up to 2^31")
     segment = table.segment if table.segment is not None else _SEGMENT_SECONDS if loose else inf
     # Segments end with a sample, so that each begins where the last one ended.
     samples_of_segment = max(1, round(min(segment * frequency, cycles) / cycles_per_sample))
@@ -217,32 +218,34 @@ def with_run(case: Case) -> Case:
         settled_below=(table.settled_below or _SETTLED_BELOW) if rest else None,
         longest_settling=rest or None,
     )
-    return _explained(case.but(run=run), table, reason)
+    return case.but(run=run, sources={**case.sources, **_sources(run, case, reason)})
 
 
-def _explained(case: Case, table: Run, reason: str) -> Case:
-    """The case with the origins of the values of its run; ``table`` is the run as it was given."""
-    run = case.run
-    often = run.samples_per_cycle if run.cycles_per_sample == 1 else f"1 in {run.cycles_per_sample} cycles"
+def _sources(run: Run, case: Case, reason: str) -> dict[str, Source]:
+    """Where the values of a run are from that its table does not give."""
     cycles = f"until constant within {percent(CONSTANT)}, at most {run.cycles}" if run.until_steady else ""
     checked = "checked after 12 and 24 cycles" if run.until_steady else "not checked earlier"
-    whence = "from the duration" if table.duration else checked
-    if run.cycles_per_sample > 1:
+    whence = "from the duration" if run.duration else checked
+    often = "" if run.cycles_per_sample == 1 else f"1 in {run.cycles_per_sample} cycles"
+    if often:
         whence += f", rounded up to a multiple of {run.cycles_per_sample} cycles (one sample)"
     settling = ", ".join(f"{settling_of(cycles)} of {cycles}" for cycles in run.attempts) if run.until_steady else ""
-    sampled = "from frames_per_second" if case.loose or table.frames_per_second else ""
-    case = case.noted("run.samples_per_cycle", sampled, "derived" if sampled else "default", text=str(often))
+    by_time = case.loose or run.frames_per_second
+    sampled = Source("derived", "from frames_per_second", often) if by_time else Source("default", text=often)
+    sources = {
+        "run.samples_per_cycle": sampled,
+        "run.time_step": Source("derived", f"auto: {reason}, a whole number of steps per cycle"),
+        "run.cycles": Source("derived", whence, cycles),
+        "run.settling_cycles": Source("derived", "a third of the cycles, at most 20", settling),
+        "run.longest_settling": Source("default", "of loose beads"),
+        "run.settled_below": Source("default"),
+    }
     if case.loose:
         length = units.quantity_text(run.cycles_per_segment / case.excitation.frequency, units.DURATION)
-        case = case.noted("run.segment", "about 0.5 s", text=length)
-    if run.rests:
-        case = case.noted("run.longest_settling", "of loose beads" if case.loose else "", "default")
-        case = case.noted("run.settled_below", "", "default")
-    case = case.noted("run.time_step", f"auto: {reason}, a whole number of steps per cycle")
-    case = case.noted("run.cycles", whence, text=cycles)
-    if case.walkers:
-        return case.noted("run.settling_cycles", "a third of the cycles, at most 20", text=settling)
-    return case.noted("run.settling_cycles", "of loose beads", "default")
+        sources["run.segment"] = Source("derived", "about 0.5 s", length)
+    if not case.walkers:
+        sources["run.settling_cycles"] = Source("default", "of loose beads")
+    return sources
 
 
 def _check_length(case: Case, cycles: int, settling: int, cycles_per_sample: int) -> None:

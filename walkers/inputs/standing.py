@@ -69,7 +69,8 @@ def _walkers(case: Case, walkers: Walkers, first: int) -> Iterator[Standing]:
     x, y, _ = case.drive_axis
     resting = contact_loads(case, walkers).overlaps
     for number in range(first, first + walkers.replicates):
-        facing = {"right": 1, "left": -1}.get(walkers.facing, 1 if number % 2 == 0 else -1)
+        row = number // case.shifted_rows if case.shifted_rows else 0
+        facing = {"right": 1, "left": -1}.get(walkers.facing, 1 if (number + row) % 2 == 0 else -1)
         turn, press = _draws(case.run.seed, number)
         angle, factor = walkers.angle + walkers.angle_spread * turn, 1.0 + walkers.gap_spread * press
         overlaps = [(overlap if walkers.gap is None else -walkers.gap) * factor for overlap in resting]
@@ -241,5 +242,5 @@ def _check_overlaps(beads: list[_Held]) -> None:
 
 def overlaps(whom: str, apart: float, touching: float) -> str:
     """A message about a bead at a distance (m) from another, which it touches at a larger distance (m)."""
-    by = f"{1e3 * (touching - apart):.3g} mm; they touch at a distance of {1e3 * touching:.4g} mm"
-    return f"overlaps with {whom} by {by}"
+    by, expected = f"{1e3 * (touching - apart):.3g} mm", f"expected their centres {1e3 * touching:.4g} mm apart"
+    return f"overlaps with {whom} by {by}; {expected}, where they touch"

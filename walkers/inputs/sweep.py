@@ -16,6 +16,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from html import escape
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -38,14 +39,14 @@ from walkers.inputs.axes import (
 from walkers.inputs.case import Case
 from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
-from walkers.inputs.reading import find_input, read_case
-from walkers.inputs.table import Table, changed
+from walkers.inputs.reading import find_input, read_case, shipped
+from walkers.inputs.table import Table, alternatives, changed
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import Speed, Whole
+from walkers.rounding import counted
 
 _LONGEST_NAME = 120
-_SAME_RUN = ("title",)
-"""Keys that do not determine a run."""
+_SHOWN = 20
 
 
 class SampleTable(Table):
@@ -115,7 +116,7 @@ class Descent:
         return abs(velocity) < self.until_below
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Sweep:
     """A base case and its variations.
 
@@ -146,6 +147,16 @@ class Sweep:
     descent: Descent | None
     file: Mapping[str, Any] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        varied = ", ".join(self.keys) or "nothing"
+        return f"<Sweep {self.name} of {self.case_name}: {counted(len(self.rows), 'point')}, varies {varied}>"
+
+    def _repr_html_(self) -> str:
+        """The points, for notebooks: at most the first `_SHOWN`."""
+        rows = [self.keys, *([str(value) for value in row] for row in self.rows[:_SHOWN])]
+        cells = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
+        return f"<table><caption>{escape(repr(self))}</caption>{cells}</table>"
+
     def cases(self) -> Iterator[Case]:
         """The case of each point, resolved; raises `InputError` if a point cannot be used; it says which."""
         for number, row in enumerate(self.rows):
@@ -159,25 +170,26 @@ class Sweep:
             yield case.but(title=f"{shortened(self.name)}: {shortened(text)}") if text else case
 
 
-def load_sweep(sweep: str | Path, changes: Mapping[str, Value] | None = None) -> Sweep:
-    """Read a sweep file, or a shipped sweep such as ``fig2``, and expand it.
+def load_sweep(sweep: str | Path | Mapping[str, Any], changes: Mapping[str, Value] | None = None) -> Sweep:
+    """Read a sweep file, a shipped sweep such as ``fig2``, or the tables of a sweep file, and expand it.
 
     ``changes`` are put beside its ``[set]``, by dotted keys; its name tells of them. Raises `InputError` if there
     is no such file or anything in it cannot be used; its points are checked by `Sweep.cases`.
     """
-    path = find_input(sweep, "sweep")
-    document, name = read_toml(path), path.stem
+    path = Path("sweep.toml") if isinstance(sweep, Mapping) else find_input(sweep, "sweep")
+    document, name = dict(sweep) if isinstance(sweep, Mapping) else read_toml(path), path.stem
+    source = "<sweep>" if isinstance(sweep, Mapping) else str(sweep)
     if changes:
-        with blaming(str(sweep)):
+        with blaming(source):
             if not isinstance(document.get("set", {}), Mapping):
                 raise unusable("set", "expected a table of keys")
             document = {**document, "set": {**settings_in(document.get("set", {})), **changes}}
         name = _name_with(name, changes)
     with blaming_changes(changes or {}):
-        made = expand(document, source=str(sweep), name=name, folder=path.parent)
+        made = expand(document, source=source, name=name, folder=path.parent)
         text = "varies in this sweep and cannot be set"
         if problems := [Problem(key, f'"{value}"', text) for key, value in (changes or {}).items() if key in made.keys]:
-            raise InputError(str(sweep), problems)
+            raise InputError(source, problems)
     return made
 
 
@@ -207,9 +219,12 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
                 unit_of(axis.keys[at], [row[at] for row in axis.rows]) for axis in axes for at in range(len(axis.keys))
             ]
             for key in keys:
-                if key in _SAME_RUN:
-                    raise unusable(key, f"does not vary: points with another {key} alone are the same run")
+                if key == "title":
+                    raise unusable(key, f"expected another key, for {key} does not determine a run")
             each(partial(check_key, Case), [key for key in (*settings, *keys) if key != "library"])
+            for key in keys:
+                for other in alternatives(Case, key) & {*keys}:
+                    raise unusable(key, f"expected one of {key} and {other}, which replace each other")
             tables = changed(Case, read_case(base, folder), settings)
             changed(Case, tables, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:
@@ -236,10 +251,14 @@ def settings_in(tables: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _base(case: str, source: str, folder: Path) -> Path:
+    """The file of the base case: beside the sweep, with or without ``.toml``, or as a command finds it."""
+    names = [case] if case in shipped("case") else [case, f"{case}.toml"]
     try:
-        beside = folder / case
-        return beside if case and beside.is_file() else find_input(case or "no name", "case")
-    except OSError as error:
-        raise InputError(source, [Problem("case", f'"{case[:40]}…"', f"cannot be read: {error.strerror}")]) from error
-    except InputError as error:
-        raise InputError(source, [Problem("case", f'"{case}"', error.problems[0].expected)]) from error
+        beside = (folder / name for name in names if case and (folder / name).is_file())
+        base = next(beside, None) or find_input(case or "no name", "case")
+        if base.is_dir():
+            raise refused(base, "expected a case file, or the name of a shipped case")
+    except (OSError, InputError) as error:
+        why = error.problems[0].expected if isinstance(error, InputError) else f"cannot be read: {error.strerror}"
+        raise InputError(source, [Problem("case", f'"{case}"', why)]) from error
+    return base

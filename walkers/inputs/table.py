@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator, Mapping
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args, get_origin
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, ValidationInfo
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError, PydanticUndefined
@@ -23,7 +23,7 @@ from walkers.inputs.units import WRITTEN, is_auto, kind_in, shown_in_file
 T = TypeVar("T")
 SAME_RUN = "same run"
 """Annotation of a key: another value does not make another run, by itself."""
-Flag = StrictBool
+_TYPES: Mapping[Any, str] = {str: "text in quotes", int: "a whole number", list: "a list", dict: "a table"}
 
 
 def _only_derived(value: object, info: ValidationInfo) -> object:
@@ -59,10 +59,11 @@ def key(meaning: str, default: Any = PydanticUndefined, example: Any = None, **b
 
 
 class Choice(NamedTuple):
-    """Keys of a table that say the same in other words: exactly one of the ways, or at most one."""
+    """Keys of a table that say the same in other words: exactly one of the ways, or at most one; or something else."""
 
     ways: tuple[tuple[str, ...], ...]
     required: bool = True
+    instead: str = ""
 
     @property
     def text(self) -> str:
@@ -91,12 +92,11 @@ class Table(BaseModel):
         return type(self) is type(other) and self._values == other._values
 
     def but(self, **values: Any) -> Self:
-        """The same table with other values, which are not validated.
-
-        `model_copy` would keep the cached properties of the former values.
-        """
-        kept = {name: getattr(self, name) for name in type(self).model_fields}
-        return type(self).model_construct({*self.model_fields_set, *values}, **{**kept, **values})  # type: ignore[return-value]
+        """The same table with other values, which are not validated."""
+        table = self.model_copy(update=values)
+        for name in table.__dict__.keys() - type(self).model_fields.keys():
+            del table.__dict__[name]  # cached properties of the former values
+        return table
 
     def put(self, name: str, value: Any) -> Self:
         """The same tables with another value at a dotted key, which is not validated."""
@@ -156,6 +156,7 @@ class Table(BaseModel):
             elif said or choice.required:
                 way = said[0] if said else choice.ways[0]
                 others = [other for other in choice.ways if other is not way] if not said else []
+                others += [(choice.instead,)] if choice.instead else []
                 instead = "".join(f", or {' and '.join(other)}" for other in others)
                 for name in way:
                     if name not in given:
@@ -163,7 +164,8 @@ class Table(BaseModel):
                         yield Problem(joined([*parts_of(place), name]), None, f"missing; expected {example}{instead}")
 
 
-def keys_in(model: type[BaseModel]) -> dict[str, FieldInfo]:
+@cache
+def keys_in(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
     """The keys of a table, as a file has them, with their fields."""
     fields = model.model_fields.items()
     return {field.alias or name: field for name, field in fields if _DERIVED not in field.metadata}
@@ -172,6 +174,13 @@ def keys_in(model: type[BaseModel]) -> dict[str, FieldInfo]:
 def field_name(model: type[BaseModel], name: str) -> str:
     """The field of a key of a table."""
     return name if name in model.model_fields else next(one for one, f in model.model_fields.items() if f.alias == name)
+
+
+@cache
+def _tables_in(model: type[Table]) -> Mapping[str, type[Table]]:
+    """The keys of a table that hold tables, alone or in a list."""
+    tables = {name: table_in(field.annotation) for name, field in keys_in(model).items()}
+    return {name: table for name, table in tables.items() if table is not None}
 
 
 def table_in(annotation: Any) -> type[Table] | None:
@@ -186,16 +195,9 @@ def example_of(field: FieldInfo) -> str:
     if field.examples:
         return f"such as {shown_in_file(field.examples[0])}"
     kind = kind_in([*field.metadata, field.annotation])
-    kinds: dict[Any, str] = {
-        str: "text in quotes",
-        int: "a whole number",
-        float: "a number",
-        list: "a list",
-        dict: "a table",
-    }
-    return (
-        f'such as "{kind.example}"' if kind else kinds.get(get_origin(field.annotation) or field.annotation, "a value")
-    )
+    if kind:
+        return f'such as "{kind.example}"'
+    return _TYPES.get(get_origin(field.annotation) or field.annotation, "a value")
 
 
 def contradictions(model: type[Table], document: Any, place: str = "") -> Iterator[Problem]:
@@ -203,14 +205,10 @@ def contradictions(model: type[Table], document: Any, place: str = "") -> Iterat
     if not isinstance(document, Mapping):
         return
     yield from model.problems({name: value for name, value in document.items() if value != []}, place)
-    for name, field in keys_in(model).items():
-        below, inner = document.get(name), table_in(field.annotation)
-        if inner is None or below is None:
-            continue
-        for number, one in enumerate(below) if isinstance(below, list) else [(None, below)]:
-            yield from contradictions(
-                inner, one, joined([*parts_of(place), name, *([] if number is None else [number])])
-            )
+    for name, inner in _tables_in(model).items():
+        below, where = document.get(name), f"{place}.{name}".removeprefix(".")
+        for number, one in enumerate(below if isinstance(below, list) else [below]):
+            yield from contradictions(inner, one, f"{where}[{number}]" if isinstance(below, list) else where)
 
 
 def alternatives(model: type[Table], name: str) -> set[str]:
@@ -245,7 +243,9 @@ def _put(model: type[Table] | None, tables: dict[str, Any], name: str, value: An
         above = parts[:number]
         if isinstance(part, int):
             if not isinstance(place, list) or part >= len(place):
-                raise unusable(name, f"the base case has no {joined(above)} of that length", value)
+                other = f"a place below [{len(place)}]" if isinstance(place, list) else "the whole list"
+                message = f"the base case has no {joined(above)} of that length; expected {other}"
+                raise unusable(name, message, value)
         elif isinstance(place, list):
             raise unusable(name, f"{joined(above)} is a list: say which one, such as {joined(above)}[0]", value)
         elif not isinstance(place, dict):  # the base case is wrong there, which its own check tells
@@ -255,7 +255,7 @@ def _put(model: type[Table] | None, tables: dict[str, Any], name: str, value: An
             field = keys_in(model).get(part) if model and isinstance(part, str) else None
             model = table_in(field.annotation) if field else model if isinstance(part, int) else None
     last = parts[-1]
-    for ways, _ in model.choices if model else ():
+    for ways, *_ in model.choices if model else ():
         if any(last in way for way in ways):
             for other in {one for way in ways if last not in way for one in way}:
                 if joined([*parts[:-1], other]) not in changes:

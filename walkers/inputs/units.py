@@ -188,7 +188,7 @@ WRITTEN = "written"
 
 LENGTH = Kind("length", "m", "0.3 mm", 1.0, 1e-9, POSITIVE)
 FREQUENCY = Kind("frequency", "Hz", "80 Hz", 1e6, 1e-2, POSITIVE)
-ACCELERATION = Kind("acceleration", "m/s^2", "4 g", 1e6, 1e-9, NOT_NEGATIVE)
+ACCELERATION = Kind("acceleration", "m/s^2", "4 g", 1e4, 1e-9, NOT_NEGATIVE)
 SPEED = Kind("speed", "m/s", "0.02 mm/s", 1e4, 1e-12, POSITIVE)
 TIME = Kind("time", "s", "2 us", 1.0, 1e-12, POSITIVE)
 DURATION = Kind("duration", "s", "4 s", 1e4, 1e-6, POSITIVE)
@@ -236,6 +236,7 @@ class _Auto:
 
 
 AUTO = _Auto()
+Flag = Annotated[bool, Field(strict=True)]
 Whole = Annotated[int, Field(strict=True)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 """TOML's integers and floats only: neither "0.3" nor true is a coefficient."""

@@ -98,9 +98,9 @@ def make_figures(
     chosen = list(only) or [name for name in known if name == COMPARISON or not FIGURES[name].only_asked]
     for name in chosen:
         if name not in known:
-            raise refused("--only", f'no figure "{name}"; expected one of {", ".join(known)}')
+            raise refused("only", f'no figure "{name}"; expected one of {", ".join(known)}')
     check_formats(formats)
-    for option, folder in (("--out", out), ("--to", to)):
+    for option, folder in (("out", out), ("to", to)):
         if folder.exists() and not folder.is_dir():
             raise refused(option, f"expected a folder, {folder} is a file")
     needed = [FIGURES[name].sweeps if name in FIGURES else COMPARED for name in chosen]

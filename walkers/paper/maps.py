@@ -174,7 +174,7 @@ def classify(table: pd.DataFrame, shares: Sequence[float]) -> npt.NDArray[np.int
     The first mode that applies: detached (a contact is open in some samples); at rest (velocity and mean sliding of the
     large bead below `REST`); leaves the axis (some replicates not steady or turned round); slides (`SLIDES`); rolls.
     """
-    opened = table[["open_1", "open_2", "open_3"]].max(axis=1) > 0.0
+    opened = table[["open_1", "open_2", "open_pair_1"]].max(axis=1) > 0.0
     still = (table["velocity"].abs() < REST) & (table["sliding_1"].abs() < REST)
     astray = (table["steady"] < table["walkers"]) | (table["turned_round"] > 0)
     modes: npt.NDArray[np.int64] = np.select([opened, still, astray, np.asarray(shares) > SLIDES], [4, 0, 3, 2], 1)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+DEFAULT_LAW = "young-laplace"
+
 
 @dataclass(frozen=True, kw_only=True)
 class BridgeLiquid:
@@ -26,4 +28,4 @@ class BridgeLiquid:
     contact_angle: float
     volume_fraction: float
     conserved: bool = False
-    law: str = "young-laplace"
+    law: str = DEFAULT_LAW

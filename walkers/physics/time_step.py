@@ -6,7 +6,11 @@ third, velocities are wrong without any warning (a glycerol climber: 10.9 mm/s a
     Rayleigh    π R √(ρ/G)/(0.1631 ν + 0.8766) of the smallest bead
     Hertz       2.87 (m*²/(R* E*² v))^(1/5) for an impact at the substrate's peak velocity v
     viscous     2/Σ(c/m) over the bridges of a bead, c = 6πηR*/ε the largest normal drag and m the mass that it slows
-                (the bead's own at a wall, the reduced mass between beads)
+                (the bead's own at a wall, the reduced mass between beads); two walls at an angle φ count as 1 + |cos φ|
+
+The sum takes the bridges to other beads as parallel, which is safe for clusters: the shipped climber, at 0.86 of its
+limit, has the velocity (within 0.02 %) and the kinetic energy (0.05 %) of a quarter of that step. In a groove of 60° a
+dimer takes 23 times the work of shorter steps at 1.3 of its limit, and theirs within 3 % at 0.87.
 
 Speeds of the AK5 walker agree within 0.5 % from 1 to 10 µs, the latter being its Rayleigh time.
 """
@@ -27,8 +31,8 @@ WALKER_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.4, "hertz": 0.2, "viscous
 are within 0.25 % of those at 0.05 (Figs. 1b, 2, 3, 4a, 4b); between 0.59 and 0.71 of the limit they become wrong."""
 LONGEST_WALKER_STEP = 4e-6
 """s; longest step of walkers, independent of their stiffness."""
-Bridged = Sequence[tuple[float, Sequence[float]]]
-"""Radius of each bead and the radii of those that bridges join to it, beside a wall, m."""
+Bridged = Sequence[tuple[float, Sequence[float], float]]
+"""Of each bead its radius, the radii of those that bridges join to it, m, and its damping by walls over that by one."""
 
 
 def auto_fractions(*, loose: bool) -> Mapping[str, float]:
@@ -78,18 +82,16 @@ def time_step_limits(
 
     modulus = reduced_modulus(youngs_modulus, poissons_ratio)
     impacts, rates = [], []
-    for radius, neighbours in bridged:
+    for radius, neighbours, walls in bridged:
         mass = _mass(radius, density)
         impacts.append((mass, radius))
-        rates.append(drag(radius) / mass)
-        between = 0.0
+        rates.append(walls * drag(radius) / mass)
         for other in neighbours:
             other_mass, reduced = _mass(other, density), radius * other / (radius + other)
             impacts.append((mass * other_mass / (mass + other_mass), reduced))
-            between += drag(reduced) * (1.0 / mass + 1.0 / other_mass)
-        rates[-1] += between
+            rates[-1] += drag(reduced) * (1.0 / mass + 1.0 / other_mass)
     shear_modulus = youngs_modulus / (2.0 * (1.0 + poissons_ratio))
-    slowest = pi * min(radius for radius, _ in bridged) * sqrt(density / shear_modulus)
+    slowest = pi * min(radius for radius, *_ in bridged) * sqrt(density / shear_modulus)
     return TimeStepLimits(
         rayleigh=slowest / (0.1631 * poissons_ratio + 0.8766),
         hertz=min(2.87 * float((mass**2 / (radius * modulus**2 * peak_velocity)) ** 0.2) for mass, radius in impacts)

@@ -23,7 +23,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.run import limits_of
 from walkers.postprocess.caption import conditions
 from walkers.postprocess.drawing import FORMATS, check_formats, save_figure
-from walkers.postprocess.uncertainty import bands_text, lines_of_rest, not_known, rests_on, with_bands
+from walkers.postprocess.uncertainty import bands_text, lines_of_rest, not_known, rests_on, with_bands, wrapped_line
 from walkers.rounding import SHOWN_UNITS, rounded
 from walkers.runner.directory import SEGMENT_NAME, case_of, files_of_segments, segment_directories
 from walkers.runner.files import read_json, write_json
@@ -47,9 +47,9 @@ class Quantity:
 
     Attributes
     ----------
-    path, error
-        Dotted keys of the number, such as ``surface.end``, and of its standard error. The path of a mean over copies
-        also leads to scatter, smallest and largest.
+    path
+        Dotted key of the number, such as ``surface.end``; that of a mean over copies also leads to scatter, smallest
+        and largest.
     label
         Label of the row in reports; empty for none.
     unit
@@ -63,7 +63,6 @@ class Quantity:
     unit: str = ""
     column: str = ""
     meaning: str = ""
-    error: str = ""
     of: Callable[[Mapping[str, Any]], Any] | None = None
 
     def value(self, result: Mapping[str, Any]) -> Any:
@@ -78,7 +77,7 @@ class Quantity:
 
     def row(self, result: Mapping[str, Any]) -> Row:
         """Row of a report."""
-        keys = [self.path, self.error]
+        keys = [self.path]
         if number_of(result, f"{self.path}.n") is not None:
             keys = [f"{self.path}.{what}" for what in ("mean", "scatter", "smallest", "largest")]
         return Row(self.label, *(number_of(result, key, self.unit) for key in keys))
@@ -101,10 +100,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Row:
-    """Label and number; for several copies also scatter, smallest and largest.
-
-    The scatter is a standard deviation, or the standard error of a single number that has one (`Quantity`).
-    """
+    """Label and number; for several copies also scatter (standard deviation), smallest and largest."""
 
     name: str
     value: Number | None
@@ -216,15 +212,6 @@ class Analysis(ABC):
     def row(self, result: Mapping[str, Any]) -> dict[str, Any]:
         """Values of `columns` of a result; NaN for missing ones."""
         return {one.column: one.value(result) for one in self.quantities({}) if one.column}
-
-    def can_show(self, result: Mapping[str, Any]) -> bool:
-        """Whether a result contains all quantities of the analysis."""
-        try:
-            self.row(result)
-            self.lines(result)
-        except (KeyError, TypeError, ValueError):
-            return False
-        return True
 
     def derived_of(self, case: Case) -> dict[str, float]:
         """The columns `derived` of a case."""
@@ -379,28 +366,21 @@ def current_result(directory: str | Path) -> dict[str, Any]:
     from walkers.postprocess.tables import intact
 
     directory = Path(directory)
-    kept: dict[str, Any] | None = None
-    damaged = False
+    wanted = analyses_of(case_of(directory))
+    names = [name for one in wanted for name in one.tables]
+    result: dict[str, Any] | None = None
+    damaged = not intact(directory, [name for name in names if (directory / f"{name}.parquet").is_file()])
     try:
-        result = read_result(directory)
-        wanted = analyses_of(case_of(directory))
-        result.setdefault("rests_on", [])  # missing in old runs
-        lines_of_rest(result["rests_on"])
-        versions = {one.name: one.version for one in wanted}
-        there = analyses_in(result)  # without later ones
-        if bool(there) == bool(wanted) and all(one.can_show(result) for one in there):
-            kept = result
-        names = [name for one in wanted for name in one.tables]
-        whole = intact(directory, names)
-        damaged = not intact(directory, [name for name in names if (directory / f"{name}.parquet").is_file()])
-        if kept and whole and check_unchanged(directory, [RESULT_NAME]) and result["analyses"] == versions:
+        result = {"rests_on": [], **read_result(directory)}  # none in old runs
+        is_current = result.get("analyses") == {one.name: one.version for one in wanted}
+        if is_current and intact(directory, names) and check_unchanged(directory, [RESULT_NAME]):
             return result
     except FileChanged:
         raise
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        damaged = isinstance(error, ValueError)
-    if kept is not None and not any(name.endswith(".bin") for name in files_of_segments(directory)):
-        return kept
+    except (OSError, ValueError) as error:
+        damaged |= isinstance(error, ValueError)
+    if result and not any(name.endswith(".bin") for name in files_of_segments(directory)) and _has_all(result, wanted):
+        return result
     if damaged:
         text = "the result or a table is incomplete or damaged; it is recomputed from the dumps"
         warnings.warn(f"{directory}: {text}", stacklevel=2)
@@ -411,6 +391,18 @@ def current_result(directory: str | Path) -> dict[str, Any]:
         if error.errno not in (errno.EACCES, errno.EPERM, errno.EROFS):
             raise
     return result
+
+
+def _has_all(result: Mapping[str, Any], wanted: Sequence[Analysis]) -> bool:
+    """Whether a result of earlier versions contains all that analyses show."""
+    try:
+        lines_of_rest(result["rests_on"])
+        for analysis in (present := analyses_in(result)):
+            analysis.row(result)
+            analysis.lines(result)
+    except (KeyError, TypeError, ValueError):
+        return False
+    return bool(present) == bool(wanted)
 
 
 def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool = False) -> str:
@@ -424,7 +416,9 @@ def describe_result(directory: Path, result: Mapping[str, Any], *, cached: bool 
     if cached and not result.get("by_hand"):  # it was never made by a command
         lines[0] += " (already run)"
     warnings = [f"  warning: {warning}" for warning in warnings_of(result)]
-    return "\n".join([*lines, *lines_of_rest(result["rests_on"]), *warnings, f"  run        {directory}"])
+    return "\n".join(
+        [*map(wrapped_line, lines), *lines_of_rest(result["rests_on"]), *warnings, f"  run        {directory}"]
+    )
 
 
 def warnings_of(result: Mapping[str, Any]) -> list[str]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from math import degrees
 
 from walkers.inputs.case import Case
+from walkers.rounding import counted
 
 
 def caption(case: Case) -> str:
@@ -17,7 +18,7 @@ def caption(case: Case) -> str:
     >>> caption(load_case("fig4a"))
     '6 walkers of R = 0.6 / 0.3 mm on a plane of glass, Si AK5; 80 Hz, a0 = 19.6 m/s²'
     """
-    bodies = [f"{make.replicates} walkers of R = {radii_text(make.radii)} mm" for make in case.walkers]
+    bodies = [f"{counted(make.replicates, 'walker')} of R = {radii_text(make.radii)} mm" for make in case.walkers]
     if case.loose:
         bodies.append(f"{case.count - sum(len(make.all_radii) for make in case.walkers)} loose beads")
     boundary = f"in a {case.boundary.shape}" if case.boundary.closed else f"on a {case.boundary.shape}"

@@ -146,9 +146,9 @@ class Beads:
     height: FloatArray
     large: BoolArray
     surface: FloatArray
-    bulk: Sequence[BoolArray] = ()
-    first: int = 0
-    wall_names: Sequence[str] = ()
+    bulk: Sequence[BoolArray]
+    first: int
+    wall_names: Sequence[str]
 
 
 @dataclass(frozen=True)
@@ -204,7 +204,7 @@ def classify(number: int, track: Track, beads: Beads, definition: ClimbCriteria)
     leader = topmost.most_common(1)[0][0]
     speed, error = _speed(seconds[begin : end + 1], gained[begin : end + 1])
     last, members, walls, first = track.frames[end], track.members[end], sorted(track.walls[end]), track.members[0]
-    # Beads that were hardly in the bulk have hung on a wall since they were poured.
+    # Beads that were hardly in the bulk have hung on a wall since before the drive.
     bulk = [one[list(first)].mean() >= definition.min_overlap for one in beads.bulk[beads.first : track.frames[0]]]
     in_bulk = float(np.diff(time[beads.first : track.frames[0] + 1])[bulk].sum())
     return Climb(

@@ -148,7 +148,7 @@ def parse_size(text: str) -> tuple[int, int]:
     if text in _SIZES:
         return _SIZES[text]
     expected = f"expected {', '.join(_SIZES)}, or width and height such as 1280x720, at least 64"
-    raise refused("--size", f"{text!r}: {expected}")
+    raise refused("size", f"{text!r}: {expected}")
 
 
 def parse_time(option: str, text: str) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -18,9 +17,7 @@ from walkers.inputs.drive import Excitation
 from walkers.postprocess.dump import BinaryDump, BoolArray, DumpError, FloatArray, IntArray, NoNumberError, local_frames
 from walkers.runner.directory import (
     SEGMENT_NAME,
-    SEGMENTS,
     case_of,
-    drive_from,
     layout_of,
     run_of,
     segment_directories,
@@ -364,24 +361,6 @@ def _motion(case: Case, segments: dict[Path, tuple[dict[str, Any], Layout, Binar
         frames += [(segment, number) for number in range(begin, len(data))]
     data = np.concatenate(stacks) if len(stacks) > 1 else stacks[0]
     return _of_frames(case, segments, data, steps, frames)
-
-
-def read_last_frame(directory: Path) -> Motion:
-    """The last complete frame of a run directory, also of an unfinished segment; `DumpError` if there is none."""
-    case, new = case_of(directory), sorted((directory / SEGMENTS).glob("*.new"))
-    whole = [(path, *_opened(path)) for path in segment_directories(directory)]
-    records = [record for _, record, _, _ in whole]
-    found = [(path, layout, dump) for path, _, layout, dump in whole]
-    with suppress(OSError, ValueError, KeyError, TypeError):  # no output yet
-        found += [
-            (path, layout := layout_of(path), BinaryDump(path / layout.bead_dump, layout.bead_columns)) for path in new
-        ]
-    for path, layout, dump in reversed(found):
-        if number := len(dump):
-            record = {"end": case.run.steps, "drive_from": drive_from(case, records)}
-            frame, steps = dump.frame(number - 1)[None], [int(dump.steps[-1])]
-            return _of_frames(case, {path: (record, layout, dump)}, frame, steps, [(path, number - 1)])
-    raise DumpError(f"{directory}: no frame is complete yet")
 
 
 def _of_frames(

@@ -6,16 +6,19 @@ import re
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from math import isfinite
+from math import hypot, isfinite
 from pathlib import Path
 from typing import Any
 
+from walkers.errors import WalkersError
 from walkers.inputs.library import unmeasured
 from walkers.inputs.numerical import STIFFER
 from walkers.inputs.origins import Origin
 from walkers.rounding import SHOWN_UNITS, rounded
-from walkers.runner.directory import CASE_NAME
+from walkers.runner.binary import Engine
+from walkers.runner.directory import case_of, run_place
 from walkers.runner.files import read_json
+from walkers.runner.manifest import MANIFEST_NAME
 
 SPREAD = "-spread"
 SPREAD_NAME = "spread.json"
@@ -70,6 +73,12 @@ def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
     return lines
 
 
+def wrapped_line(line: str) -> str:
+    """A line of a result's text, wrapped below the text after its label."""
+    listed = line.startswith("    ") and line[4:5] != " "
+    return textwrap.fill(line, _WIDTH, subsequent_indent=" " * (6 if listed else 13))
+
+
 def wrapped(sentences: Iterable[str]) -> list[str]:
     """Sentences as indented lines of a text."""
     wrapper = textwrap.TextWrapper(_WIDTH, "    ", "      ", break_on_hyphens=False, break_long_words=False)
@@ -98,7 +107,8 @@ def spread_of(directory: Path) -> Path:
 def with_bands(directory: Path, result: Mapping[str, Any]) -> dict[str, Any]:
     """A result with the ``bands`` of its quantities, if a spread of the run over the same ranges is beside it.
 
-    If its numerical error is not measured, it also has the changes of the case that measure it, as ``checks``.
+    If its numerical error is not measured for its case, it also has the numerical error by the runs beside it, or
+    ``checks`` (`_numerical_error`).
     """
     known, unknown = dict(result), (OSError, ValueError, KeyError, TypeError)
     with suppress(*unknown):
@@ -110,13 +120,31 @@ def with_bands(directory: Path, result: Mapping[str, Any]) -> dict[str, Any]:
         known |= {"bands": spread["bands"]} if drawn == ranges else {}
     if result.get("numerical_error", 0) is None and not result.get("by_hand"):  # piles have no such error
         with suppress(*unknown):  # a result that is not shown where its case is
-            case = read_json(directory / CASE_NAME)
-            step, modulus = case["run"]["time_step"], case["contact"]["youngs_modulus"]
-            known["checks"] = [
-                f"run.time_step={0.5e6 * step:.4g}us",
-                f"contact.youngs_modulus={1e-6 * STIFFER * modulus:.4g}MPa",
-            ]
+            known |= _numerical_error(directory.resolve(), result["velocity"]["mean"])
     return known
+
+
+def _numerical_error(directory: Path, velocity: float) -> dict[str, Any]:
+    """Numerical error of a velocity (m/s) by the two finished runs beside its run that measure it, and their names.
+
+    As long as one is missing, the changes of the case that make it, as ``checks``.
+    """
+    from walkers.postprocess.analysis import read_result
+
+    case = case_of(directory)
+    engine = Engine(directory, read_json(directory / MANIFEST_NAME)["engine"]["sha256"])
+    changes = {
+        "half_step": ("run.time_step", f"{0.5e6 * case.run.time_step:.4g}us"),
+        "stiffer": ("contact.youngs_modulus", f"{1e-6 * STIFFER * case.contact.youngs_modulus:.4g}MPa"),
+    }
+    error, runs = {}, {}
+    for kind, change in changes.items():
+        with suppress(OSError, ValueError, KeyError, TypeError, WalkersError):  # a case that cannot be, or no run
+            run = run_place(case.changed(dict([change])), engine, directory.parent)
+            error[kind], runs[kind] = read_result(run)["velocity"]["mean"] - velocity, run.name
+    if missing := [f"{key}={value}" for kind, (key, value) in changes.items() if kind not in runs]:
+        return {"checks": missing}
+    return {"numerical_error": {**error, "total": hypot(*error.values())}, "measured_by": list(runs.values())}
 
 
 def has_error(result: Mapping[str, Any]) -> bool:

@@ -316,7 +316,6 @@ def _lock(file: Path, end: float) -> int | None:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(descriptor), file.stat()):
-                    os.ftruncate(descriptor, 0)  # nobody has asked us to stop
                     return descriptor
         except BlockingIOError:
             if time.monotonic() > end:
@@ -336,15 +335,3 @@ def is_locked(place: Path) -> bool:
     except BlockingIOError:
         return True
     return False
-
-
-def ask_to_stop(place: Path) -> None:
-    """Ask the process that makes a run to stop, by a word in the lock file."""
-    if is_locked(place):
-        with suppress(FileNotFoundError), _lock_file(place).open("r+b") as file:
-            file.write(b"stop")
-
-
-def is_to_stop(descriptor: int) -> bool:
-    """Whether a stop of the run with this open lock file was requested."""
-    return os.fstat(descriptor).st_size > 0

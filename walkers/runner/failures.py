@@ -15,19 +15,27 @@ from walkers.templates.engine import AUDITED_VERSION
 class EngineFailure(WalkersError):
     """Base class of the failures of a run; ``failure.json`` contains the name of the class.
 
-    ``directory`` contains the files of the failed run; ``lost`` is the number of lost beads.
+    ``directory`` contains the files of the failed run; ``lost`` is the number of lost beads. ``hits`` says which points
+    of a sweep such a failure hits: every point; all at first, until a point is finished; one point, by its parameters
+    or another process; or empty if this is not certain.
     """
+
+    hits = ""
 
     def __init__(self, message: str, directory: Path | None = None, *, lost: int = 0) -> None:
         self.directory, self.lost = directory, lost
         super().__init__(f"{message} (see {directory})" if directory else message)
 
+    def __init_subclass__(cls, hits: str = "") -> None:
+        """Mark a class and the classes that derive from it."""
+        cls.hits = hits or cls.hits
 
-class EngineMissing(EngineFailure):
+
+class EngineMissing(EngineFailure, hits="every point"):
     """No liggghts was found. Detected before anything is written."""
 
 
-class OtherEngine(EngineFailure):
+class OtherEngine(EngineFailure, hits="every point"):
     """The contact model was written for another version of the engine."""
 
     def __init__(self, path: Path, version: str) -> None:
@@ -35,22 +43,22 @@ class OtherEngine(EngineFailure):
         super().__init__(f"{path} is {version}: {needed}")
 
 
-class ContactModelMissing(EngineFailure):
+class ContactModelMissing(EngineFailure, hits="every point"):
     """The contact model cannot be compiled. Detected before the engine starts."""
 
     def __init__(self, why: str) -> None:
         super().__init__(f"no contact model for the engine: {why}")
 
 
-class EngineDiffers(EngineFailure):
+class EngineDiffers(EngineFailure, hits="every point"):
     """A worker of a sweep has another engine than the process that started the sweep."""
 
 
-class ProgramDiffers(EngineFailure):
+class ProgramDiffers(EngineFailure, hits="every point"):
     """A worker gives a run another name than the process that started the sweep: resolved cases or decks differ."""
 
 
-class EngineNeverStarted(EngineFailure):
+class EngineNeverStarted(EngineFailure, hits="all at first"):
     """The engine ended before it printed its version, also when it was started again."""
 
 
@@ -74,7 +82,7 @@ class MissingFrames(EngineFailure):
     """The engine ended normally, but a dump is too short."""
 
 
-class BeadsLost(EngineFailure):
+class BeadsLost(EngineFailure, hits="one point"):
     """Beads left the simulation box. Detected from the number of atoms, which the engine prints every cycle."""
 
 
@@ -82,15 +90,15 @@ class BeadsOverTheTop(BeadsLost):
     """Beads left the simulation box at its top: before, the bead closest to its sides was the highest one."""
 
 
-class BlowUp(EngineFailure):
+class BlowUp(EngineFailure, hits="one point"):
     """A bead is faster than the drive can make it, or its speed is NaN; usually the time step is too long."""
 
 
-class TimeLimitExceeded(EngineFailure):
+class TimeLimitExceeded(EngineFailure, hits="one point"):
     """The run exceeded its time limit."""
 
 
-class DiskFull(EngineFailure):
+class DiskFull(EngineFailure, hits="every point"):
     """No room for the output. Detected before the run from the known size of the dump, or while the engine writes."""
 
     def __init__(self, needed: int | None, free: int, directory: Path) -> None:
@@ -98,22 +106,22 @@ class DiskFull(EngineFailure):
         super().__init__(f"disk full: {wanted}{free / 1e6:.3g} MB are free", directory)
 
 
-class OutputGone(EngineFailure):
+class OutputGone(EngineFailure, hits="every point"):
     """The directory of a run or a sweep was removed during the run."""
 
     def __init__(self, directory: Path) -> None:
         super().__init__(f"{directory} was removed while it was written")
 
 
-class WalkersMet(EngineFailure):
+class WalkersMet(EngineFailure, hits="one point"):
     """Walkers of different cases in a shared deck came close to each other. Detected when the output is split."""
 
 
-class RunBusy(EngineFailure):
+class RunBusy(EngineFailure, hits="one point"):
     """Another process, perhaps an engine whose launcher was killed, is writing into this run."""
 
 
-class AuditFailed(EngineFailure):
+class AuditFailed(EngineFailure, hits="every point"):
     """The engine's binary failed its audit: its results cannot be trusted."""
 
 

@@ -365,12 +365,10 @@ class _Watch:
         if self.failure is not None:
             raise self.failure
         if self.read > deck.log_limit:
-            message = (
-                f"the engine's log grew beyond {deck.log_limit / 1e6:g} MB (run.log_limit) {after}; it was stopped"
-            )
+            message = f"the engine's log grew beyond {deck.log_limit / 1e6:g} MB {after}; it was stopped"
             raise failures.LogTooLong(message, self.directory)
         if self.silent > deck.silence:
-            message = f"the engine wrote nothing for {deck.silence:g} s (run.silence) {after} of {self.layout.steps}"
+            message = f"the engine wrote nothing for {deck.silence:g} s {after} of {self.layout.steps}"
             raise failures.EngineSilent(f"{message}; it was stopped", self.directory)
         if self.elapsed > self.time_limit:
             message = f"time limit of {self.time_limit:g} s reached at step {self.step} of {self.layout.steps}"

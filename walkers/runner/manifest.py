@@ -18,7 +18,7 @@ from walkers.runner.provenance import software
 from walkers.templates.deck import CONTENT_VERSION
 
 MANIFEST_NAME = "manifest.json"
-FORMAT = 2
+FORMAT = 3
 _SMALL_BYTES = 8 << 20
 """Smaller amounts are hashed faster without threads."""
 _MOST_THREADS = 4
@@ -106,8 +106,10 @@ def check_unchanged(directory: Path, names: Collection[str]) -> bool:
     wanted = {name: sums[name] for name in names if name in sums}
     for name, now in checksums(directory, wanted).items():
         if now != wanted[name]:
-            message = "has changed since the run was finished; list all changes with: walkers check files"
-            raise FileChanged(f"{directory / name} {message} {directory}")
+            message = f"has changed since the run was finished; list all changes with: walkers check files {directory}"
+            if name == "result.json" or name.endswith(".parquet"):
+                message += f"; to measure the run again, delete the file and do: walkers run {directory}"
+            raise FileChanged(f"{directory / name} {message}")
     return len(wanted) == len(names)
 
 

@@ -160,7 +160,7 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
 
         ``each`` has each climb as in the results, whenever it qualified, with the name of its run.
 
-        ``on_plain_walls``, ``in_corners`` and ``out_of_pile`` (without clusters that hang on a wall since the pouring)
+        ``on_plain_walls``, ``in_corners`` and ``out_of_pile`` (without those on a wall since before the drive)
         have all of these items for a part of the climbs, by the same time.
     """
     results = [result_in(run) for run in runs]

@@ -43,9 +43,10 @@ _UPHILL = {
     "right_facing": "along the heading, facing up",
     "left_facing": "along the heading, facing down",
     "axial_velocity": "velocity up the slope",
+    "axial_left_facing": "velocity up the slope, facing down",
 }
 """Names of columns if the drive axis goes up a slope."""
-_FIRST_MAKE = ("rotation", "sliding", "open")
+_FIRST_MAKE = ("rotation", "sliding", "sliding_pair", "open", "open_pair")
 _OF_ALL = ("orientation_end", "separated_fraction")
 """Columns that are means over walkers of the first make, and over all walkers."""
 _NUMERICAL = {"run.time_step": ("time step", max), "contact.youngs_modulus": ("softened beads", min)}
@@ -132,7 +133,7 @@ def _number_of(value: Any) -> float:
 
 def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
     """All numbers that the analyses give for two runs."""
-    results = [result_in(run) for run in runs]
+    results = [with_bands(run, result_in(run)) for run in runs]
     rows = [row_of(result) for result in results]
     scatters = [_scatters(run, result) for run, result in zip(runs, results, strict=True)]
     numerical = hypot(*map(_numerical_error, results))
@@ -239,7 +240,7 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
     tables = [load(directory) for directory in (first, second)]
     numbers = [name for name in tables[0].columns if name in tables[1] and tables[0][name].dtype.kind in "fiu"]
     default = default_column(max(tables, key=sides_differ))
-    column = find_name("--y", column, numbers) if column else default
+    column = find_name("column", column, numbers) if column else default
     varied = list(dict.fromkeys(name for table in tables for name in varied_columns(table)))  # of the longest lists
     both = _matched([table[table["status"] == "finished"] for table in tables], varied)
     if both.empty:

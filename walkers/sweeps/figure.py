@@ -36,6 +36,9 @@ _SEEDS = ("run.seed", "seed")
 _SYMBOLS = {"gamma0": "Γ0", "sin_delta": "sin δ"}
 _SYMBOLS |= {"right_facing": "velocity, facing right (up)", "left_facing": "velocity, facing left (down)"}
 _SYMBOLS |= {"axial_velocity": "velocity along the axis (uphill), facing right (up)"}
+_SYMBOLS |= {"axial_left_facing": "velocity along the axis (uphill), facing left (down)"}
+_UP: dict[str, Any] = {"marker": "o", "color": "0.3", "label": "started facing right (up)"}
+_DOWN: dict[str, Any] = {"marker": "v", "color": "0.3", "label": "started facing left (down)"}
 _LEAST_ASYMMETRIES = 3  # smallest number of pairs of radii that are shown by sin δ
 _MOST_PANELS = 12
 _MARKERS = "osD^vXP<>*"
@@ -114,6 +117,8 @@ class Drawn:
     bars: str = SCATTER
     curves: Curves | None = None
     """Predictions of models between and beyond the points."""
+    down: FloatArray | None = None
+    """Values of walkers that started facing down a slope; the others are then of those facing up."""
 
 
 def factors_of(table: pd.DataFrame) -> list[Factor]:
@@ -177,16 +182,25 @@ def readable_key(key: str) -> str:
     return words.replace(".", " ").replace("_", " ")
 
 
-def drawn_column(rows: pd.DataFrame, name: str, theory: Mapping[str, FloatArray] | None = None) -> Drawn:
-    """A column of numbers of a sweep's table, with the predictions of models (SI units), in readable units."""
-    column = _numbers(rows, name, "--y")
+def drawn_column(
+    rows: pd.DataFrame, name: str, theory: Mapping[str, FloatArray] | None = None, down: str | None = None
+) -> Drawn:
+    """A column of numbers of a sweep's table, with the predictions of models (SI units), in readable units.
+
+    ``down`` is the column of walkers that face down a slope, if the first is of those that face up.
+    """
+    column = _numbers(rows, name, "y")
     size = readable_unit(rows.attrs["units"].get(name, ""))[1]
     errors = np.full(len(rows), np.nan)
     if name in ERRORS:
         errors = rows[ERRORS[name]].to_numpy(dtype=float, na_value=np.nan) / size
     predicted = {model: numbers / size for model, numbers in (theory or {}).items()}
     bars = SCATTER.partition(" (")[0] if {*unmeasured()} & {*varied_columns(rows)} else SCATTER
-    return Drawn(column.label, np.array(column.values), errors, predicted, bars)
+    drawn = Drawn(column.label, np.array(column.values), errors, predicted, bars)
+    if down is None or rows[down].isna().all():
+        return drawn
+    label = drawn.label.replace(", facing right (up)", "")
+    return replace(drawn, label=label, down=np.array(_numbers(rows, down, "--y").values))
 
 
 def _numbers(rows: pd.DataFrame, name: str, option: str) -> Factor:
@@ -221,24 +235,24 @@ def layout_of(
     for option, name in (("x", x), ("hue", hue), ("panels", panels)):
         if name is not None and not (name == _NONE and option != "x"):
             keys = [key for factor in factors for key in factor.keys]
-            found = find_name(f"--{option}", name, [*keys, *table.columns])
+            found = find_name(option, name, [*keys, *table.columns])
             given = next((one for one in factors if found in one.keys), None)
             if given is None and rows[found].map(lambda value: isinstance(value, str)).all():
                 given = Factor((found,), readable_key(found), rows[found].tolist(), False)
-            asked[option] = given or _numbers(rows, found, f"--{option}")
+            asked[option] = given or _numbers(rows, found, option)
             left = [one for one in left if not _same(one, asked[option])]
     samples = [factor for factor in left if factor.is_sample]
     left = [factor for factor in left if not factor.is_sample]
     undistinguished = [one.name for one in samples] if "x" in asked else []
     along = [asked["x"]] if "x" in asked else samples
     if not along:
-        along = [_along(left, rows) or _numbers(rows, "point", "--x")]
+        along = [_along(left, rows) or _numbers(rows, "point", "x")]
         left = [factor for factor in left if factor.keys != along[0].keys]
     left = sorted((one for one in left if one.keys[0] not in _SEEDS), key=lambda one: -len(one.levels))
     colours = asked.get("hue") or (left.pop(0) if left and hue is None else None)
     apart = asked.get("panels")
     if len(along) > 1 and apart is not None:
-        raise refused("--panels", "expected --x too: the samples have a panel for each key")
+        raise refused("panels", "expected x too: the samples have a panel for each key")
     if apart is None and panels is None and left and len(along) == 1:
         while prod(len(one.levels) for one in left) > _MOST_PANELS:
             undistinguished.append(left.pop(0 if len(left[0].levels) > _MOST_PANELS else -1).name)
@@ -283,7 +297,7 @@ def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Fig
     ``log`` names logarithmic axes (``x``, ``y`` or ``xy``), which leave out zero and negative numbers.
     """
     if "x" in log and not all(one.is_number for one in layout.x):
-        raise refused("--logx", f"{layout.x[0].label} has no numbers")
+        raise refused("log", f"{layout.x[0].label} has no numbers")
     parts = [(x, np.ones(len(drawn.values), dtype=bool), "") for x in layout.x]
     if (panels := layout.panels) is not None:
         parts = [(layout.x[0], panels.where(level), panels.text(level, by_name=True)) for level in panels.levels]
@@ -352,12 +366,16 @@ def _panel(axes: Axes, x: Factor, here: npt.NDArray[np.bool_], drawn: Drawn, col
         bars: Any = errors if np.isfinite(errors).any() and errors_seen(drawn.errors, drawn.values) else None
         line = "-" if joined and not drawn.theory else "none"
         axes.errorbar(places[rows] + aside, y, yerr=bars, capsize=2, lw=0.9, ls=line, **look)
+        if drawn.down is not None:
+            shape = {"marker": _DOWN["marker"], "mfc": "none"}
+            axes.plot(places[rows] + aside, drawn.down[rows], lw=0.9, ls="--" if joined else "none", **look | shape)
         along = _along_axis(x, log) if joined and drawn.curves else places[rows] + aside
         along, curves = drawn.curves(rows, x, along) if joined and drawn.curves else (along, {})
         for model, (name, values) in enumerate(drawn.theory.items()):
             at, shown = (along, curves[name]) if name in curves else (places[rows] + aside, values[rows])
             axes.plot(at, shown, zorder=1, **_model_look(model, name in curves, look["color"]))
-    if np.nanmin(drawn.values) <= 0.0 <= np.nanmax(drawn.values):
+    values = drawn.values if drawn.down is None else np.concatenate([drawn.values, drawn.down])
+    if np.nanmin(values) <= 0.0 <= np.nanmax(values):
         axes.axhline(0.0, color="0.4", lw=0.6, zorder=0)
 
 
@@ -406,7 +424,8 @@ def _scale_y(axes: Axes, drawn: Drawn, log: str) -> None:
         axes.set_yscale("log", nonpositive="mask")
         return
     errors = np.nan_to_num(drawn.errors)
-    shown = np.concatenate([drawn.values - errors, drawn.values + errors, *list(drawn.theory.values())[:1]])
+    others = [*list(drawn.theory.values())[:1], *([] if drawn.down is None else [drawn.down])]
+    shown = np.concatenate([drawn.values - errors, drawn.values + errors, *others])
     low, high = float(np.nanmin(shown)), float(np.nanmax(shown))
     if np.all(np.mod(drawn.values[np.isfinite(drawn.values)], 1.0) == 0.0):  # counts
         axes.yaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
@@ -431,6 +450,8 @@ def _legend(figure: Figure, grid: npt.NDArray[Any], colours: _Colours, drawn: Dr
         title = plain_text(factor.name)
         looks = zip(colours.levels, colours.looks, strict=True)
         handles = [Line2D([], [], ls="none", label=plain_text(factor.text(level)), **look) for level, look in looks]
+    if drawn.down is not None:
+        handles += [Line2D([], [], ls="none", **_UP), Line2D([], [], ls="none", mfc="none", **_DOWN)]
     lines = {line.get_linestyle() for axes in grid.flat for line in axes.lines}
     for number, model in enumerate(drawn.theory):
         handles.append(Line2D([], [], label=model, **_model_look(number, _MODELS[number][0] in lines, "0.3")))

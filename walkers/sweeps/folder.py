@@ -23,6 +23,7 @@ from typing import Any, Literal
 from walkers.errors import InputError, Problem, refused
 from walkers.inputs.case import Case
 from walkers.inputs.units import Kind, parse_quantity
+from walkers.postprocess.analysis import RESULT_NAME
 from walkers.postprocess.sides import REST, came_apart, of_tray, sides_apart, uphill_velocities
 from walkers.postprocess.uncertainty import SPREAD, SPREAD_NAME
 from walkers.rounding import counted, duration_text, rounded
@@ -37,7 +38,7 @@ from walkers.runner.directory import (
     recover,
 )
 from walkers.runner.files import read_json
-from walkers.runner.manifest import MANIFEST_NAME
+from walkers.runner.manifest import MANIFEST_NAME, FileChanged
 from walkers.sweeps.making import progress_at
 from walkers.sweeps.readable import (
     FlatCase,
@@ -153,7 +154,7 @@ def _run(path: Path, now: float) -> Entry | None:
             reason = progress.share
         return Entry(name, case_name, status, path, age, size, parameters, reason, state.message)
     given: dict[str, Any] = {}
-    with suppress(OSError, ValueError, AttributeError, TypeError):
+    try:
         result = recorded_result(path)
         velocity, climbs = result.get("velocity") or {}, result.get("climbs")
         sides = uphill_velocities(result)
@@ -163,6 +164,8 @@ def _run(path: Path, now: float) -> Entry | None:
         given["climbs"] = None if climbs is None else len(climbs)
         if notes := result.get("by_hand"):
             given["reason"] = "edited and run by hand" if "edited" in " ".join(notes) else notes[0]
+    except (OSError, ValueError, AttributeError, TypeError) as error:
+        given["reason"] = f"its {RESULT_NAME} {'has changed' if isinstance(error, FileChanged) else 'cannot be read'}"
     return Entry(name, case_name, "finished", path, _age(path / MANIFEST_NAME, now), size, parameters, **given)
 
 
@@ -222,27 +225,26 @@ def select(
         try:
             oldest = parse_quantity(older_than, AGE)
         except ValueError as error:
-            raise refused("--older-than", f'"{older_than}": {error}') from error
+            raise refused("older_than", f'"{older_than}": {error}') from error
     conditions = []
     runs = [entry for entry in entries if not entry.is_sweep]
     for text in where:
         key, _, value = (part.strip() for part in text.partition("="))
         if key in ("case", "status"):
-            raise refused("--where", f'"{text}": expected --{key} {value}'.rstrip())
+            raise refused("where", f'"{text}": expected {key} as an argument of its own')
         if not (key and value):
             told = 'expected KEY=VALUE, such as "drive.frequency=80 Hz"'
-            raise refused("--where", f'"{text}": {told}')
+            raise refused("where", f'"{text}": {told}')
         if runs and not any(has_key(run.parameters, key) for run in runs):
             known = ", ".join(dict.fromkeys(one for run in runs for one in run.parameters))
-            raise InputError("--where", [Problem(key, None, f"no run has such a key; they have {known}")])
-        alike = (
-            FlatCase({key: 0.0}) if kind_of(key) and "/" not in value else FlatCase()
-        )  # if there are no runs to compare with
+            raise InputError("where", [Problem(key, None, f"no run has such a key; they have {known}")])
+        # If there are no runs to compare with.
+        alike = FlatCase({key: 0.0}) if kind_of(key) and "/" not in value else FlatCase()
         for parameters in [run.parameters for run in runs] or [alike]:
             try:
                 check_wanted(parameters, key, value)
             except ValueError as error:
-                raise refused("--where", f'"{text}": {error}') from error
+                raise refused("where", f'"{text}": {error}') from error
         conditions.append((key, value))
     return [
         entry
@@ -442,7 +444,7 @@ def _found(place: Path, entries: Sequence[Entry]) -> list[Entry]:
     found = [one for one in entries if place == one.directory.resolve()]
     found = found or [one for one in entries if place == one.place.resolve()]
     if not found:
-        raise refused(place, "no run or sweep in the folder of runs (see walkers list; --out names another folder)")
+        raise refused(place, "no run or sweep in the folder of runs (see walkers list)")
     return found
 
 

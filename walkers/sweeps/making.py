@@ -34,7 +34,6 @@ from walkers.runner.directory import (
     case_of,
     drive_from,
     finished_run,
-    is_to_stop,
     layout_of,
     locked,
     move_into_place,
@@ -89,7 +88,7 @@ def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
     elif audit is not None and not audit.passed and not allow_failed_audit:
         raise AuditFailed(
             f"this engine failed its audit in {len(audit.failures)} line(s), first: {audit.failures[0]}; "
-            "for details: walkers check engine (--allow-failed-audit runs anyway)"
+            "for details: walkers check engine (--allow-failed-audit, in Python allow_failed_audit=True, runs anyway)"
         )
 
 
@@ -141,7 +140,7 @@ def make_runs(
         if len(missing) == 1:
             ((place, case),) = missing.items()
             with open_locked(case, engine, place, locks, anew=force) as opened:
-                opened.make(on_progress=_stopping(on_progress, *locks), time_limit=time_limit)
+                opened.make(on_progress=on_progress, time_limit=time_limit)
                 tabulate(opened.directory)
                 runs[place.name] = opened.finish()
         elif missing:
@@ -151,18 +150,6 @@ def make_runs(
                     runs |= _make_together(left, cycles, out, engine, locks, on_progress, time_limit)
                 left = {name: case for name, case in left.items() if name not in runs}
     return Made(runs, found, busy)
-
-
-def _stopping(tell: _Tell | None, lock: int) -> _Tell:
-    """A progress function that also stops the engine when requested (`walkers.Run.stop`)."""
-
-    def advance(progress: Progress) -> None:
-        if is_to_stop(lock):
-            raise Stopped("the run was stopped; walkers run continues it")
-        if tell is not None:
-            tell(progress)
-
-    return advance
 
 
 def progress_at(place: Path) -> Progress | None:

@@ -19,7 +19,7 @@ import threading
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
@@ -45,7 +45,10 @@ from walkers.sweeps.site import Site, check_path, pilots
 from walkers.sweeps.table import (
     PARSL,
     RECORD_NAME,
+    DamagedRunError,
+    PointState,
     SweepRecord,
+    checked_states,
     describe_sweep,
     read_record,
     states,
@@ -67,17 +70,6 @@ LONGEST_SECONDS = 60.0
 _TRIALS = 24
 _AS_GOOD = 1.02
 _LOOK_SECONDS = 0.25
-
-
-_OF_ALL = frozenset(
-    [
-        *("EngineMissing", "OtherEngine", "ContactModelMissing", "AuditFailed", "EngineDiffers", "ProgramDiffers"),
-        *("DiskFull", "OutputGone", "FileNotFoundError"),  # the last of mpirun
-    ]
-)
-"""Failures that hit every point."""
-_OF_POINTS = frozenset(["BlowUp", "BeadsLost", "BeadsOverTheTop", "WalkersMet", "TimeLimitExceeded", "RunBusy"])
-"""Failures that come from the parameters of a point, or from another process."""
 _MOST_ALIKE = 3  # points that fail alone in the same way, before any point is finished
 
 
@@ -284,15 +276,20 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     if options.site is not None:
         check_path(record.directory)
     found = states(record)
-    final = [
-        Failure(point, run, state.reason or "", state.message or "", str(state.directory))
-        for point, (run, state) in enumerate(zip(record.runs, found, strict=True))
-        if state.status == "failed" and state.reason in options.final
-    ]
+    final = _failures(record, found, options.final)
     settled = {point for point, state in enumerate(found) if state.status in ("finished", "not needed")}
     settled |= {failure.point for failure in final}
     decks = _missing_decks(cases, range(len(cases)), options, settled.__contains__)
     return SweepPlan(record, cases, binary, decks, [state.status for state in found], options, final)
+
+
+def _failures(record: SweepRecord, found: Sequence[PointState], reasons: Collection[str]) -> list[Failure]:
+    """The points with such failures."""
+    return [
+        Failure(point, run, state.reason or "", state.message or "", str(state.directory))
+        for point, (run, state) in enumerate(zip(record.runs, found, strict=True))
+        if state.reason in reasons
+    ]
 
 
 def run_sweep(
@@ -339,18 +336,18 @@ def run_sweep(
             text = "replaces a sweep of the same name without common runs; figures and reports there show that one"
             warnings.warn(f"{record.directory}: {text}", SweepReplacedWarning, stacklevel=2)
     write_record(record)
-    if not plan.decks:
-        return record, plan.final
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     with suppress(ValueError, OSError):  # each point of a running deck keeps a lock file open
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-    with _workers(plan.options, record) as submit:
-        failures = _Scheduler(plan, submit).run(on_progress or (lambda _: None))
+    failures = plan.final
+    if plan.decks:
+        with _workers(plan.options, record) as submit:
+            failures = _Scheduler(plan, submit).run(on_progress or (lambda _: None))
     if not (record.directory / RECORD_NAME).is_file():
         raise OutputGone(record.directory)
     if list(read_record(record.directory).runs) != list(record.runs):
         raise SweepStopped(f"{record.directory} was replaced by another sweep of the same name; the runs are kept")
-    return record, failures
+    return record, [*failures, *_failures(record, checked_states(record), [DamagedRunError.__name__])]
 
 
 # --- workers ----------------------------------------------------------------------------------------------------------
@@ -358,10 +355,11 @@ def run_sweep(
 
 @dataclass(frozen=True)
 class Report:
-    """Outcome of a deck: velocities (m/s) of its finished runs, or name, message and directory of a failure."""
+    """Outcome of a deck: velocities (m/s) of its finished runs, or name, `hits`, message and directory of a failure."""
 
     finished: Mapping[str, float] = field(default_factory=dict)
     failure: str | None = None
+    hits: str = ""
     message: str = ""
     directory: str | None = None
 
@@ -393,14 +391,15 @@ def work(
     except (OSError, WalkersError) as error:
         if retries and not isinstance(error, Stopped):
             return work(stop, runs, cases, out, engine, time_limit, retries - 1)
-        reason, message, directory = type(error).__name__, str(error), None
+        kind, message, directory = type(error), str(error), None
         if isinstance(error, EngineFailure):
             directory = str(unfinished(out / runs[0])) if error.directory else None
         elif isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-            reason, message = DiskFull.__name__, f"disk full: {error.filename or out}"
+            kind, message = DiskFull, f"disk full: {error.filename or out}"
         elif isinstance(error, OSError) and error.filename:
+            kind = OutputGone if error.errno == errno.ENOENT else kind
             message = f"{error.filename}: {error.strerror}"
-        return Report(failure=reason, message=message, directory=directory)
+        return Report({}, kind.__name__, getattr(kind, "hits", ""), message, directory)
 
 
 @contextmanager
@@ -458,7 +457,7 @@ class _Scheduler:
         self.batches = [self._batches(chains) for chains in groups.values()]
         self.halves: list[tuple[PlannedDeck, int]] = []
         """Halves of failed decks, with their group, while no point is finished."""
-        self.alone: Counter[tuple[str, str]] = Counter()
+        self.alone: Counter[tuple[str | None, str]] = Counter()
         """Failures of points alone, by name and message."""
         self.begin, self.seconds_done = time.perf_counter(), 0.0
         self.found = self.done = len(finished)
@@ -533,7 +532,7 @@ class _Scheduler:
     def _take_in(self, deck: PlannedDeck, group: int, future: Future[Report]) -> None:
         """Count finished points, and submit the others again: in halves if the deck failed."""
         report = self._report(future)
-        if report.failure in _OF_ALL or (report.failure == "EngineNeverStarted" and self.done == self.found):
+        if report.hits == "every point" or (report.hits == "all at first" and self.done == self.found):
             raise SweepStopped(f"{report.message}; this would hit every point, and the sweep is stopped")
         self.settled |= set(report.finished)
         self.velocities |= report.finished
@@ -546,7 +545,7 @@ class _Scheduler:
             self.failures.append(Failure(left[0], run, report.failure, report.message, report.directory))
             self.settled.add(run)
             self.seconds_done += deck.seconds
-            self._check_alike(report.failure, report.message.partition(" (see ")[0])
+            self._check_alike(report)
         elif left:  # without a failure another process was making these points
             first, *second = _parts(left, 2) if report.failure else [left]
             parts = [PlannedDeck(tuple(part), deck.seconds * len(part) / len(deck.points)) for part in (first, *second)]
@@ -566,12 +565,13 @@ class _Scheduler:
                 return Report(failure=type(error).__name__, message=str(error) or repr(error))
         raise error
 
-    def _check_alike(self, reason: str, message: str) -> None:
+    def _check_alike(self, report: Report) -> None:
         """Raise `SweepStopped` if the first points all failed alone in the same way, but not by their parameters."""
-        self.alone[reason, message] += 1
-        if self.alone[reason, message] >= _MOST_ALIKE and self.done == self.found and reason not in _OF_POINTS:
+        alike = report.failure, report.message.partition(" (see ")[0]
+        self.alone[alike] += 1
+        if self.alone[alike] >= _MOST_ALIKE and self.done == self.found and report.hits != "one point":
             text = f"the first {_MOST_ALIKE} points failed in the same way, and the sweep is stopped"
-            raise SweepStopped(f"{message}; {text}")
+            raise SweepStopped(f"{alike[1]}; {text}")
 
     def _progress(self) -> SweepProgress:
         first = list(self.groups_of)[: 4 * self.plan.options.decks_at_once]  # later decks have not started

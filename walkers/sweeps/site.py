@@ -124,7 +124,7 @@ def _launchers() -> Mapping[str, str]:
 
 def check_path(folder: Path) -> None:
     """Refuse a sweep's folder with a space, a quote or the like in it: Parsl writes it into shell scripts unquoted."""
-    for source, text in (("--out", str(folder.parent.resolve())), (printable(folder.name), folder.name)):
+    for source, text in (("out", str(folder.parent.resolve())), (printable(folder.name), folder.name)):
         if odd := _ODD.search(text):
             raise refused(source, f"with a site file {_TAKEN} in the path, found {odd[0]!r} in {text!r}")
 

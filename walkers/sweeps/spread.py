@@ -36,8 +36,8 @@ _SEEDS = range(1, 65)
 """Seeds of the scrambling; the one with the least correlated columns is used. With few points in many dimensions,
 correlations of columns reach 0.7, and the influences of the values could not be separated."""
 _WORDS = {
-    "forward": "walk toward the large bead",
-    "backward": "walk toward the small bead",
+    "forward": "walk along the heading",
+    "backward": "walk against the heading",
     "at_rest": f"rest (below {1e3 * REST:g} mm/s)",
     "separated": "come apart",
 }
@@ -62,7 +62,7 @@ class Spread:
     ``varied`` are the values that were drawn from their ranges, ``held`` are unmeasured values that the case gives.
     ``bands`` has the main results by the columns of the sweep's table, without walkers that came apart; ``depends`` has
     their rank correlations (Spearman) with the drawn values, the strongest first, if larger than two standard errors.
-    ``counts`` are numbers of points whose walkers go ``forward`` (toward the large bead), …; empty for piles.
+    ``counts`` are numbers of points whose walkers go ``forward`` (along the heading), …; empty for piles.
     """
 
     directory: Path

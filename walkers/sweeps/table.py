@@ -16,7 +16,7 @@ import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import nan
 from pathlib import Path
@@ -60,15 +60,17 @@ STATE = {
 _RESULTS = ("velocity", "climbs")
 SIDES = ("right_facing", "left_facing")
 """Velocity columns that replace the mean if `sides_differ`."""
+FACING_DOWN = {"right_facing": "left_facing", "axial_velocity": "axial_left_facing"}
+"""Columns of walkers that face down, by the columns of those that face up (`main_columns`)."""
 ERRORS = {"velocity": "scatter"}
 """Columns that contain the scatter of other columns over copies."""
 FORMATS = ("csv", "parquet", "json")
 _LEFT_OUT = {
     *("mass_asymmetry", "frequency", "peak_acceleration", "peak_velocity", "amplitude", "radius_1", "radius_2"),
-    *("scatter", "axial_velocity", "right_facing", "left_facing", "sliding_2", "sliding_3", "open_1", "open_2"),
-    *("open_3", "separated_fraction", "orientation_end", "turned_round", "walkers_met", "lost", "reason"),
+    *("scatter", "axial_velocity", "right_facing", "left_facing", "sliding_2", "sliding_pair_1", "open_1", "open_2"),
+    *("open_pair_1", "separated_fraction", "orientation_end", "turned_round", "walkers_met", "lost", "reason"),
     *("smallest", "largest", "rotation_2", "cycles", "ended_early", "parted", "largest_group", "meeting_rate"),
-    *("largest_cluster", "nematic_order", "polar_order", "joined_speed", "speed_ratio"),
+    *("largest_cluster", "nematic_order", "polar_order", "joined_speed", "speed_ratio", "axial_left_facing"),
 }
 """Columns that the printed table leaves out."""
 _VARIED = "varied"
@@ -213,7 +215,7 @@ def read_record(directory: str | Path) -> SweepRecord:
 class PointState:
     """State of a point: finished, failed, running, missing, or not needed (below the end of a descent).
 
-    ``directory`` is that of the finished or failed run; the other fields describe a failure.
+    ``directory`` is that of the finished or failed run, ``result`` is from `checked_states`; others describe a failure.
     """
 
     status: str
@@ -221,6 +223,7 @@ class PointState:
     reason: str | None = None
     message: str | None = None
     lost: int = 0
+    result: Mapping[str, Any] = field(default_factory=dict)
 
 
 def states(record: SweepRecord) -> list[PointState]:
@@ -236,6 +239,18 @@ def states(record: SweepRecord) -> list[PointState]:
                 found[number] = PointState("not needed")
             elif found[number].status == "finished":
                 stopped = record.descent.at_rest(velocity_of(places[number]))
+    return found
+
+
+def checked_states(record: SweepRecord) -> list[PointState]:
+    """State of each point as from `states`, with its result; finished runs that are damaged have failed."""
+    found = states(record)
+    for number, state in enumerate(found):
+        if state.status == "finished" and state.directory is not None:
+            try:
+                found[number] = replace(state, result=result_in(state.directory))
+            except DamagedRunError as error:
+                found[number] = PointState("failed", state.directory, type(error).__name__, str(error))
     return found
 
 
@@ -321,7 +336,7 @@ def load(directory: str | Path) -> pd.DataFrame:
     described = {"point": ("", "number of the point"), **varied, **found, **STATE}
     rows = [
         dict.fromkeys(found, nan) | _row(record, number, state)
-        for number, state in enumerate(states(record))
+        for number, state in enumerate(checked_states(record))
         if state.status != "not needed"
     ]
     frame = _with_units(pd.DataFrame(rows, columns=list(described)), described)
@@ -342,12 +357,7 @@ def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
     row |= record.derived[number]
     row |= {"status": state.status, "lost": state.lost, "reason": state.reason or ""}
     row["run"] = os.path.relpath(state.directory) if state.directory else ""
-    if state.status != "finished" or state.directory is None:
-        return row
-    try:
-        return row | row_of(result_in(state.directory))
-    except DamagedRunError:
-        return row | {"status": "failed", "reason": DamagedRunError.__name__}
+    return row | row_of(state.result) if state.result else row
 
 
 def varied_columns(frame: pd.DataFrame) -> list[str]:
@@ -496,7 +506,7 @@ def thresholds(directory: str | Path) -> pd.DataFrame:
 
 def describe_status(record: SweepRecord) -> str:
     """Numbers of points by status, failures with their messages, and the thresholds of descents."""
-    found = states(record)
+    found = checked_states(record)
     count = Counter(state.status for state in found)
     text = ", ".join(f"{count[status]} {status}" for status in _STATUSES if count[status])
     lines = [f"{record.name}: {len(found)} points, {text or 'none'}"]

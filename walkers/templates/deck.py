@@ -11,7 +11,7 @@ from walkers.errors import InputError, Problem
 from walkers.inputs.case import Case, Contact
 from walkers.inputs.drive import Vector
 from walkers.inputs.loads import bridge_at_rest, hop_height, reach
-from walkers.inputs.run import Run, limits_of
+from walkers.inputs.run import limits_of
 from walkers.templates.layout import (
     BEAD_COLUMNS,
     FILM_COLUMN,
@@ -279,7 +279,9 @@ def compose(plan: Plan) -> Deck:
     files[BRIDGES_NAME] = tables_of(case, surfaces, {(bead.surface, bead.radius) for bead in scene.beads})
     fastest = plan.fastest or fastest_of(case, scene)
     beyond = bool(limits_of(case).exceeded_by(case.run.time_step))
-    bounds = (longest_silence(case.run, len(scene.beads)), max(_LOG_BYTES, case.run.cycles * _LOG_BYTES_PER_CYCLE))
+    # The engine writes once a sample, and several times a cycle.
+    slowest = min(case.run.steps_per_sample, case.run.steps_per_cycle) * len(scene.beads) * _SLOWEST_STEP
+    bounds = (max(_SILENCE, slowest), max(_LOG_BYTES, case.run.cycles * _LOG_BYTES_PER_CYCLE))
     return Deck(text, files, layout, (scene.lower, scene.upper), fastest, *bounds, beyond)
 
 
@@ -357,12 +359,6 @@ def fastest_of(case: Case, scene: Scene) -> float:
     deep = hop_height(case) if case.boundary.tilt == 0.0 else reach(case)
     fall = sqrt(2.0 * case.environment.gravity * (max(scene.upper[2], deep) if case.loose else deep))
     return (20.0 if case.loose else 10.0) * case.excitation.peak_velocity + fall + sqrt(2.0 * work / mass)
-
-
-def longest_silence(run: Run, beads: int) -> float:
-    """Longest time, s, for which an engine with a number of beads may write nothing to log and dump."""
-    # It writes once a sample, and several times a cycle.
-    return max(_SILENCE, min(run.steps_per_sample, run.steps_per_cycle) * beads * _SLOWEST_STEP)
 
 
 def _layout(plan: Plan) -> Layout:

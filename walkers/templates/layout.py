@@ -14,12 +14,7 @@ FILM_COLUMN = "f_film"
 FORCE_COLUMNS = ("fx", "fy", "fz", "tqx", "tqy", "tqz")
 """Optional further columns (N, N m)."""
 
-PAIR_BRIDGES = {
-    "x1 y1 z1 x2 y2 z2": "pos",
-    "id1 id2 periodic": "id",
-    "fx fy fz": "force",
-    "overlap": "delta",
-}
+PAIR_BRIDGES = {"x1 y1 z1 x2 y2 z2": "pos", "id1 id2 periodic": "id", "fx fy fz": "force", "overlap": "delta"}
 """Output of the engine for bridges between beads, in its order: columns and the option that gives them."""
 WALL_BRIDGES = ("x", "y", "z", "bead_x", "bead_y", "bead_z", "wall", "id", "fx", "fy", "fz", "overlap")
 """Output of the fix of the walls for bridges to walls, in its order: foot, bead, number of the wall, …"""

@@ -194,7 +194,7 @@ def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
         found = {
             "velocity": result[side]["mean"],
             "rotation": [rotation["bead_1"], rotation["bead_2"]],
-            "sliding": [sliding[f"contact_{number}"] for number in (1, 2, 3)],
+            "sliding": list(sliding.values()),
         }
         # The result has rotation and sliding of all walkers together.
         mixed = side == "right_facing" and result["left_facing"]["n"] > 0
@@ -264,7 +264,7 @@ def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, Floa
     reasons
         Reasons why points lack a value of `MODEL`, or velocities one of `PAPER`, with the number of points.
     """
-    family, _, number = column.rpartition("_")
+    family, _, number = column.replace("_pair_1", "_3").rpartition("_")  # contact 3 of the theory
     is_velocity = column in ("velocity", "right_facing", "left_facing")
     if not is_velocity and family not in ("rotation", "sliding"):
         return {}, {f"the theory has no {column}": len(cases)}

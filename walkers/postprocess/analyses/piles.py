@@ -191,7 +191,7 @@ class Pile(Analysis):
             name = f"climb {number + 1} ({' '.join(climb['walls'])}, led by a {_leader(climb)} bead)"
             for what, unit in {"begin": "s", "end": "s", "gain": "m", "height": "m"}.items():
                 yield Quantity(f"{place}.{what}", f"{name}: {what}", unit)
-            yield Quantity(f"{place}.speed", f"{name}: speed", "m/s", error=f"{place}.standard_error")
+            yield Quantity(f"{place}.speed", f"{name}: speed", "m/s")
             yield Quantity(f"{place}.size", f"{name}: beads")
 
     def lines(self, result: Mapping[str, Any]) -> list[str]:
@@ -223,7 +223,7 @@ class Pile(Analysis):
                 f"{climb['height'] * 1e3:.2f} mm {where} {' '.join(climb['walls'])} at {speed} mm/s, led by a "
                 f"{_leader(climb)} bead, {climb['size']} beads ({climb['large']} large)"
                 + (f"; over the rim, at {result['rim'] * 1e3:g} mm" if climb["height"] > result["rim"] else "")
-                + ("" if climb["out_of_pile"] else "; on the wall since the beads were poured")
+                + ("" if climb["out_of_pile"] else "; on the wall since the start of the drive")
             )
         return lines + wrapped(self.uncertainty(result))
 

@@ -12,7 +12,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import degrees, nan
-from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
@@ -75,10 +74,10 @@ NEAR = 1.5
 
 _WAYS = {"climb": ("climbs", "climb"), "down": ("goes down", "go down")}
 """Ways of walkers on slopes: of a single walker, of several."""
-_CONTACTS = "contacts: beads with the wall, in order, then pairs of beads that touch at the start"
 _ROTATION = "rotation velocity -R dphi/dt of a bead"
-_SLIDING = f"sliding velocity; {_CONTACTS}"
-_OPEN = f"fraction of the time during which the contact is open, in steps of a tenth of a sample; {_CONTACTS}"
+_SLIDING = "sliding velocity of"
+_OPEN = "fraction of the time, in steps of a tenth of a sample, without contact of"
+_WALL, _PAIR = "a bead and its wall", "a pair of beads that touch at the start"
 _SEPARATED = "fraction of the samples in which two beads are farther apart than the rupture distance of a bridge"
 
 
@@ -99,8 +98,10 @@ class Trajectory:
         "velocity of the centre of mass relative to the substrate, along the heading (from small to large beads)",
     ]
     rotation: Annotated[FloatArray, "m/s", _ROTATION, NUMBERED]
-    sliding: Annotated[FloatArray, "m/s", _SLIDING, NUMBERED]
-    gap: Annotated[FloatArray, "m", f"gap, negative for overlap; {_CONTACTS}", NUMBERED]
+    sliding: Annotated[FloatArray, "m/s", f"{_SLIDING} {_WALL}", NUMBERED]
+    sliding_pair: Annotated[FloatArray, "m/s", f"{_SLIDING} {_PAIR}", NUMBERED]
+    gap: Annotated[FloatArray, "m", f"gap, negative for overlap, of {_WALL}", NUMBERED]
+    gap_pair: Annotated[FloatArray, "m", f"gap, negative for overlap, of {_PAIR}", NUMBERED]
 
 
 @dataclass(frozen=True)
@@ -128,8 +129,10 @@ class WalkerRows:
     ]
     separated_fraction: Annotated[FloatArray, "", _SEPARATED]
     rotation: Annotated[FloatArray, "m/s", _ROTATION, NUMBERED]
-    sliding: Annotated[FloatArray, "m/s", _SLIDING, NUMBERED]
-    open: Annotated[FloatArray, "", _OPEN, NUMBERED]
+    sliding: Annotated[FloatArray, "m/s", f"{_SLIDING} {_WALL}", NUMBERED]
+    sliding_pair: Annotated[FloatArray, "m/s", f"{_SLIDING} {_PAIR}", NUMBERED]
+    open: Annotated[FloatArray, "", f"{_OPEN} {_WALL}", NUMBERED]
+    open_pair: Annotated[FloatArray, "", f"{_OPEN} {_PAIR}", NUMBERED]
 
 
 @dataclass(frozen=True)
@@ -155,7 +158,7 @@ class Walking(Analysis):
 
     order = 0
     name = "walking"
-    version = 8
+    version = 9
     tables: ClassVar[Mapping[str, type]] = {"trajectory": Trajectory, "walkers": WalkerRows, "bridges": BridgeRows}
     headlines = ("velocity",)
     derived: ClassVar[Described] = {
@@ -215,7 +218,7 @@ class Walking(Analysis):
     def quantities(self, result: Mapping[str, Any]) -> Iterator[Quantity]:
         """Quantities of all walkers: velocities, contacts, makes, postures; sweeps have the contacts of dimers."""
         first, second = ways(uphill=result.get("goes_uphill", False))
-        label = f"along the heading, positive {_toward(result)}"
+        label = f"along the heading, positive {_toward(result)}".removesuffix(", positive along the heading")
         shown = "" if uphill_velocities(result) or came_apart(result) else f"velocity {label}"  # on slopes by direction
         told = f"mean velocity of the walkers, on a slope of those that started facing up, {label}"
         yield Quantity("velocity", shown, "m/s", "velocity", told)
@@ -231,19 +234,23 @@ class Walking(Analysis):
             if uphill_velocities(result):
                 label = f"velocity up the slope, walkers that started facing {way}"
                 yield Quantity(f"axial_velocity.{name}_facing", label, "m/s")
-        told = "mean velocity of the walkers that started facing right (on a slope, up) along the drive axis (uphill)"
-        yield Quantity("axial_velocity.mean", "", "m/s", "axial_velocity", told)
+        for part, column, way in (
+            ("mean", "axial_velocity", "right (on a slope, up)"),
+            ("left_facing", "axial_left_facing", "left (on a slope, down)"),
+        ):
+            told = f"mean velocity of the walkers that started facing {way} along the drive axis (uphill)"
+            yield Quantity(f"axial_velocity.{part}", "", "m/s", column, told)
         yield Quantity("lateral_velocity.mean", "" if came_apart(result) else "velocity across the drive axis", "m/s")
         these = ", walkers that started facing up" if result.get("goes_uphill") else ""
         for bead in result.get("rotation", ("bead_1", "bead_2")):
             number = bead.partition("_")[2]
             label = f"rotation of bead {number}{these}, −R dφ/dt"
             yield Quantity(f"rotation.{bead}", label, "m/s", f"rotation_{number}", _ROTATION)
-        contacts = result.get("contacts", {f"contact_{number}": "" for number in (1, 2, 3)})
+        contacts = result.get("contacts", dict.fromkeys(("bead_1", "bead_2", "pair_1"), ""))
         families = {"sliding": ("sliding", "m/s", _SLIDING), "open": ("contact open", "share", _OPEN)}
-        for (family, (label, unit, told)), (contact, name) in product(families.items(), contacts.items()):
-            column = f"{family}_{contact.partition('_')[2]}"
-            yield Quantity(f"{family}.{contact}", f"{label}, {name}{these}", unit, column, told)
+        for (family, (label, unit, text)), (contact, name) in product(families.items(), contacts.items()):
+            column, meaning = f"{family}_{contact.removeprefix('bead_')}", _PAIR if contact[0] == "p" else _WALL
+            yield Quantity(f"{family}.{contact}", f"{label}, {name}{these}", unit, column, f"{text} {meaning}")
         label = "beads farther apart than the rupture distance"
         yield Quantity("separated_fraction", label, "share", "separated_fraction", _SEPARATED)
         label = "orientation at the end, from the direction of facing"
@@ -284,16 +291,15 @@ class Walking(Analysis):
             *_of_walkers(result, drive),
             *wrapped(self.uncertainty(result)[told:]),
             *_of_sides(result),
-            fill(f"  rotation   {these}{beads} mm/s", 110, subsequent_indent=" " * 13),
-            fill(f"  sliding    {these}{sliding} mm/s", 110, subsequent_indent=" " * 13),
+            f"  rotation   {these}{beads} mm/s",
+            f"  sliding    {these}{sliding} mm/s",
         ]
         if not result["meet"]:  # on trays each from its own direction: the figure and the orders say more
             angles = f"{_angle(end['smallest'])}° to {_angle(end['largest'])}°"
             lines.append(f"  orientation at the end {angles} from the direction of facing")
         if any(open_ones.values()):
             shares = ", ".join(f"{name} {100 * open_ones[contact]:.1f} %" for contact, name in names.items())
-            text = f"  contacts open: {shares} of the time, in steps of {percent(result['open_resolution'])}"
-            lines.append(fill(text, 110, subsequent_indent=" " * 13))
+            lines.append(f"  contacts open: {shares} of the time, in steps of {percent(result['open_resolution'])}")
         return lines + [
             f"  of {radii_text(one['radii'])} mm  {_speed(one['velocity']['mean'])} mm/s; {_steady(one)}"
             for one in result.get("makes", [])
@@ -329,7 +335,8 @@ class Walking(Analysis):
         from walkers.postprocess.figures import gait_panels, walk_panels
 
         groups = run.motion.groups
-        return {"walk": walk_panels(groups), "gait": gait_panels(groups[0])}
+        shown = run.motion.of_walkers(groups[0].walkers[:1]).groups[0]  # gaits of hundreds need a gigabyte
+        return {"walk": walk_panels(groups), "gait": gait_panels(shown)}
 
     def draw(self, name: str, panels: Sequence[Panel], run: Measured) -> Figure:
         """Figure of the walk."""
@@ -359,18 +366,27 @@ def _trajectory(group: Group, motion: Gait) -> Trajectory:
         time,
         time * group.case.excitation.frequency,
         *along(group.mass_centre).T,
-        *map(along, (group.orientation, motion.velocity, motion.rotation, motion.sliding, motion.gap)),
+        *map(along, (group.orientation, motion.velocity, motion.rotation)),
+        **{name: along(values) for name, values in _by_kind(group, sliding=motion.sliding, gap=motion.gap).items()},
     )
 
 
+def _by_kind(group: Group, **contacts: FloatArray) -> dict[str, Any]:
+    """Values at contacts (`Gait`) of beads with walls, and as ``…_pair`` of pairs of beads."""
+    beads = len(group.radii)
+    walls = {name: values[..., :beads] for name, values in contacts.items()}
+    return walls | {f"{name}_pair": values[..., beads:] for name, values in contacts.items()}
+
+
 def _rows(group: Group, motion: Gait) -> WalkerRows:
-    samples, beads = settled_samples(group), len(group.radii)
+    samples, beads, mean = settled_samples(group), len(group.radii), averages(group)
     reach = np.array(contact_loads(group.case, group.make).rupture[beads:])
     starts = ("walker", "make", "facing", "start_angle")
     return WalkerRows(
         **{name: np.array([getattr(walker, name) for walker in group.walkers]) for name in starts},
         **vars(walk(group)),
-        **vars(averages(group)),
+        rotation=mean.rotation,
+        **_by_kind(group, sliding=mean.sliding, open=mean.open),
         orientation_mean=group.orientation[samples].mean(axis=0),
         orientation_end=group.orientation[-1],
         turned_at=turned_over_at(group),
@@ -433,9 +449,11 @@ def _summary(walkers: Columns, case: Case) -> dict[str, Any]:
     facing = sides(walkers["facing"], walkers["start_angle"])
     turned, same = np.isfinite(walkers["turned_at"]), alike(facing, uphill=case.goes_uphill)
 
-    def means(family: str, named: str) -> dict[str, float | None]:
-        columns = [name for name in walkers if name.rpartition("_")[0] == family]
-        return {f"{named}_{name.rpartition('_')[2]}": _mean(walkers[name][same]) for name in columns}
+    def means(family: str) -> dict[str, float | None]:
+        """By the names of beads and pairs."""
+        kinds = {family: "bead", f"{family}_pair": "pair"}
+        split = [(name, *name.rpartition("_")[::2]) for name in walkers]
+        return {f"{kinds[kind]}_{number}": _mean(walkers[name][same]) for name, kind, number in split if kind in kinds}
 
     return {
         "velocity": spread(velocity[same]),
@@ -447,9 +465,7 @@ def _summary(walkers: Columns, case: Case) -> dict[str, Any]:
             "left_facing": _mean(axial[facing < 0]),
         },
         "lateral_velocity": {"mean": _mean(walkers["lateral_velocity"])},
-        "rotation": means("rotation", "bead"),
-        "sliding": means("sliding", "contact"),
-        "open": means("open", "contact"),
+        **{family: means(family) for family in ("rotation", "sliding", "open")},
         "separated_fraction": _mean(walkers["separated_fraction"]),
         "orientation_end": spread(walkers["orientation_end"]),
         "steady": int(np.sum(walkers["steady"])),
@@ -486,9 +502,9 @@ def _posture(groups: Iterable[Group], walkers: Columns) -> dict[str, Any]:
 
 def _contact_names(group: Group) -> dict[str, str]:
     pairs = group.make.pairs
-    names = [f"bead {bead + 1}" for bead in range(len(group.radii))]
-    names += ["bead on bead"] if len(pairs) == 1 else [f"beads {one + 1}-{other + 1}" for one, other in pairs]
-    return {f"contact_{number}": name for number, name in enumerate(names, 1)}
+    names = ["bead on bead"] if len(pairs) == 1 else [f"beads {one + 1}-{other + 1}" for one, other in pairs]
+    beads = {f"bead_{number}": f"bead {number}" for number in range(1, len(group.radii) + 1)}
+    return beads | {f"pair_{number}": name for number, name in enumerate(names, 1)}
 
 
 def walkers_met(groups: Iterable[Group]) -> bool:
@@ -499,7 +515,9 @@ def walkers_met(groups: Iterable[Group]) -> bool:
 
 
 def _toward(result: Mapping[str, Any]) -> str:
-    """The positive direction of velocities along the heading, as text."""
+    """The positive direction of velocities along the heading, as text; without a result, that of all walkers."""
+    if not result:
+        return "from small to large beads, of equal ones from the last to the first"
     return {0.0: "toward bead 1", None: "along the heading"}.get(result.get("sin_delta", nan), "toward the large bead")
 
 
@@ -523,7 +541,7 @@ def _of_walkers(result: Mapping[str, Any], drive: str) -> list[str]:
     headline += "; depends on the start" if result["depends_on_start"] else ""
     if told := came_apart(result):
         headline = f"none: walkers {told}"
-    return [*_headlines(result, drive), fill(f"  velocity   {headline}", 110, subsequent_indent=" " * 13)]
+    return [*_headlines(result, drive), f"  velocity   {headline}"]
 
 
 def _of_sides(result: Mapping[str, Any]) -> list[str]:
@@ -558,11 +576,12 @@ def _numerical(result: Mapping[str, Any]) -> list[str]:
         changes = ", ".join(result.get("checks", ()))
         told = f"numerical error not measured{': run and compare with ' * bool(changes)}{changes}"
         return [told] if has_error(result) else []
+    source = f"measured {f'by {runs}' if (runs := ' and '.join(result.get('measured_by', ()))) else 'for this case'}"
     if own < STEADY_SPEED:
-        return [f"numerical error {_error(error['total'])} (measured for this case: half the time step, {harder})"]
+        return [f"numerical error {_error(error['total'])} ({source}: half the time step, {harder})"]
     half_step, stiffer, total = (100.0 * error[name] / own for name in ("half_step", "stiffer", "total"))
     parts = f"half the time step {half_step:+.2g} %, {harder} {stiffer:+.2g} %"
-    return [f"numerical error {total:.2g} % (measured for this case: {parts})"]
+    return [f"numerical error {total:.2g} % ({source}: {parts})"]
 
 
 def _scatter(result: Mapping[str, Any]) -> list[str]:
@@ -588,7 +607,7 @@ def _scatter(result: Mapping[str, Any]) -> list[str]:
 def _headlines(result: Mapping[str, Any], drive: str) -> list[str]:
     """The drive; before it, on a slope, the posture of the walkers; after it what is true of a tray."""
     speed, *end = of_tray(result) or [""]
-    tray = [fill(f"  tray       {speed}; at the end {', '.join(end)}", 110, subsequent_indent=" " * 13)] if end else []
+    tray = [f"  tray       {speed}; at the end {', '.join(end)}"] if end else []
     if result["posture"] is None:
         return [f"{result['case']}: {drive}", *tray]
     first = "; ".join([*_told_ways(result), _told_posture(result)])
