@@ -26,6 +26,9 @@ Apart = Callable[[int, int], float]
 Places = list[tuple[float, float]]
 Pairs = tuple[tuple[int, int], ...]
 _Place = tuple[SignedLength, SignedLength]
+_Range = tuple[Radius, Radius]
+_DiameterRange = tuple[Diameter, Diameter]
+_FEW = Field(min_length=2, max_length=100)
 MOST_BEADS = 20_000
 _LEAST_LEVER = 0.1
 """Of a cluster's extent: large and small beads whose centroids are nearer than that give no heading."""
@@ -174,33 +177,20 @@ class Walkers(Table):
         @property
         def at(self) -> tuple[tuple[float, float], ...]: ...  # noqa: D102
 
-    replicates: Annotated[Whole, Field(ge=1, le=1000)] = key(
-        "Number of walkers. They stand far apart, and each starts with a small random perturbation.", 6
-    )
+    replicates: Whole = key("Number of walkers, each with a small random perturbation at the start.", 6, ge=1, le=1000)
     facing: Literal["both", "right", "left", "up", "down"] = key(
-        "Direction of the walkers along the drive axis: `right` or `up`, `left` or `down`, or alternately `both`.",
-        "both",
+        "Direction along the drive axis: `right` or `up`, `left` or `down`, or alternately `both`.", "both"
     )
     angle: units.Angle = key("Angle at the start between the whole walker and that direction.", 0.0)
-    angle_spread: units.NonNegativeAngle = key(
-        "Range of the random angle at the start: `angle` ± this value.", pi / 180.0
-    )
+    angle_spread: units.NonNegativeAngle = key("Range of the random angle at the start: `angle` ± this.", pi / 180.0)
     gap: Annotated[Filled[SignedLength], units.AUTO] = key(
-        "Gap at all contacts at the start, negative for overlap. `auto`: the overlap at which the elastic "
-        "repulsion balances the capillary force.",
-        None,
+        "Gap at all contacts at the start, negative for overlap. `auto`: where repulsion and pull balance.", None
     )
-    gap_spread: Annotated[Number, Field(ge=0, lt=1)] = key(
-        "Range of the random factor that multiplies the overlap of each walker: 1 ± this value.", 0.2
-    )
+    gap_spread: Number = key("Range of the random factor of the overlap of each walker: 1 ± this.", 0.2, ge=0, lt=1)
     spacing: Annotated[Filled[Length], units.AUTO] = key(
-        "Distance between the walkers. `auto`: large enough that walkers do not meet, or, with `meet`, do not"
-        " touch at the start.",
-        None,
+        "Distance between the walkers. `auto`: they do not meet, or, with `meet`, not touch at the start.", None
     )
-    meet: units.Flag = key(
-        "Whether the walkers may meet. If false, the walkers are replicates, and a meeting gives a warning.", False
-    )
+    meet: units.Flag = key("Whether the walkers may meet. If not, a meeting gives a warning.", False)
 
     @property
     def all_radii(self) -> list[float]:
@@ -296,38 +286,31 @@ class Dimers(Walkers):
     arrangement: ClassVar[str] = "chain"
     at: ClassVar[tuple[_Place, ...]] = ()
     radii: Filled[tuple[Radius, Radius]] = key("Radii of the beads. The first bead leads.", None, ["0.3 mm", "0.2 mm"])
-    diameters: Annotated[Filled[tuple[Diameter, Diameter]], SAME_RUN] = key(
-        "Diameters of the beads, instead of `radii`.", None, ["0.6 mm", "0.4 mm"]
+    diameters: Filled[tuple[Diameter, Diameter]] = key(
+        "Diameters, instead of `radii`.", None, ["0.6 mm", "0.4 mm"], SAME_RUN
     )
-    mean_radius: Annotated[Filled[Radius], SAME_RUN] = key(
-        "Mean radius of a dimer, together with `sin_delta` instead of `radii`.", None, "0.25 mm"
+    mean_radius: Filled[Radius] = key("Mean radius, with `sin_delta` instead of `radii`.", None, "0.25 mm", SAME_RUN)
+    sin_delta: Filled[Number] = key(
+        "Asymmetry of a dimer, sin δ = (R1 − R2)/(R1 + R2).", None, 0.2, SAME_RUN, gt=-0.9, lt=0.9
     )
-    sin_delta: Annotated[Filled[Annotated[Number, Field(gt=-0.9, lt=0.9)]], SAME_RUN] = key(
-        "Asymmetry of a dimer, sin δ = (R1 − R2)/(R1 + R2).", None, 0.2
-    )
+
+
+_THREE = ["0.3 mm", "0.2 mm", "0.2 mm"], ["0.6 mm", "0.4 mm", "0.4 mm"]
 
 
 class Cluster(Walkers):
-    """One of ``[[clusters]]``: walkers of several beads, in an ``arrangement``, or ``at`` a place for each.
-
-    The places are ahead and to the left, in the direction that the walker faces.
-    """
+    """One of ``[[clusters]]``: walkers of several beads, in an ``arrangement``, or ``at`` a place for each."""
 
     choices: ClassVar = (Choice((("radii",), ("diameters",))), Choice((("arrangement",), ("at",))))
-    radii: Filled[Annotated[tuple[Radius, ...], Field(min_length=2, max_length=100)]] = key(
-        "Radii of the beads. The first bead leads.", None, ["0.3 mm", "0.2 mm", "0.2 mm"]
+    radii: Filled[Annotated[tuple[Radius, ...], _FEW]] = key(
+        "Radii of the beads. The first bead leads.", None, _THREE[0]
     )
-    diameters: Annotated[Filled[Annotated[tuple[Diameter, ...], Field(min_length=2, max_length=100)]], SAME_RUN] = key(
-        "Diameters of the beads, instead of `radii`.", None, ["0.6 mm", "0.4 mm", "0.4 mm"]
+    diameters: Filled[Annotated[tuple[Diameter, ...], _FEW]] = key(
+        "Diameters, instead of `radii`.", None, _THREE[1], SAME_RUN
     )
-    arrangement: str = key(
-        "Arrangement of the beads of a cluster: `chain`, `fan`, `diamond`, `ring` or `raft`. See "
-        "[](../cases.md#bodies).",
-        "",
-        "fan",
-    )
+    arrangement: str = key("`chain`, `fan`, `diamond`, `ring` or `raft`. See [](../cases.md#bodies).", "", "fan")
     at: Annotated[tuple[_Place, ...], Field(max_length=100)] = key(
-        "Positions of the beads of a cluster (distance ahead, distance to the left), instead of an arrangement.",
+        "Place of each bead, distance ahead and to the left, instead of an arrangement.",
         (),
         [["0.2 mm", "0 mm"], ["-0.3 mm", "0 mm"]],
     )
@@ -336,10 +319,6 @@ class Cluster(Walkers):
 def _beside(one: float, other: float) -> list[tuple[float, list[float]]]:
     """`Walkers.bridged` of two beads, radii in m."""
     return [(one, [other]), (other, [one])]
-
-
-_Range = tuple[Radius, Radius]
-_RangeOfDiameters = tuple[Diameter, Diameter]
 
 
 class Mixture(Table):
@@ -355,19 +334,13 @@ class Mixture(Table):
     )
     small: Filled[_Range] = key("Range of radii of the small beads.", None, ["0.3 mm", "0.315 mm"])
     large: Filled[_Range] = key("Range of radii of the large beads.", None, ["0.5 mm", "0.59 mm"])
-    small_diameters: Annotated[Filled[_RangeOfDiameters], SAME_RUN] = key(
-        "Range of diameters of the small beads, instead of `small`.", None, ["0.6 mm", "0.63 mm"]
-    )
-    large_diameters: Annotated[Filled[_RangeOfDiameters], SAME_RUN] = key(
-        "Range of diameters of the large beads, instead of `large`.", None, ["1 mm", "1.18 mm"]
-    )
-    small_share: Annotated[Number, Field(ge=0, le=1)] = key("Share of the small beads.", 0.5)
+    small_diameters: Filled[_DiameterRange] = key("Instead of `small`.", None, ["0.6 mm", "0.63 mm"], SAME_RUN)
+    large_diameters: Filled[_DiameterRange] = key("Instead of `large`.", None, ["1 mm", "1.18 mm"], SAME_RUN)
+    small_share: Number = key("Share of the small beads.", 0.5, ge=0, le=1)
     mixed_by: Literal["mass", "volume", "number"] = key("Quantity that `small_share` refers to.", "mass")
-    sizes: Annotated[Whole, Field(ge=1, le=20)] = key("Number of different radii in each range.", 4)
-    count: Filled[Annotated[Whole, Field(ge=1, le=MOST_BEADS)]] = key("Number of beads.", None, 200)
-    fill_height: Annotated[Filled[Length], SAME_RUN] = key(
-        "Height of the bed, instead of a number of beads.", None, "3 mm"
-    )
+    sizes: Whole = key("Number of different radii in each range.", 4, ge=1, le=20)
+    count: Filled[Whole] = key("Number of beads.", None, 200, ge=1, le=MOST_BEADS)
+    fill_height: Filled[Length] = key("Height of the bed, instead of a number of beads.", None, "3 mm", SAME_RUN)
 
     @cached_property
     def small_radii(self) -> tuple[float, ...]:
@@ -436,10 +409,9 @@ class PlacedBead(Table):
 
     choices: ClassVar = (Choice((("radius",), ("diameter",))),)
     radius: Filled[Radius] = key("Radius of the bead.", None, "0.3 mm")
-    diameter: Annotated[Filled[Diameter], SAME_RUN] = key("Diameter of the bead, instead of `radius`.", None, "0.6 mm")
+    diameter: Filled[Diameter] = key("Diameter of the bead, instead of `radius`.", None, "0.6 mm", SAME_RUN)
     at: tuple[SignedLength, SignedLength, SignedLength] = key(
-        "Position of the bead's centre at the start: x, y, z from the middle of the floor.",
-        example=["5 mm", "-3 mm", "0.3 mm"],
+        "Centre of the bead at the start: x, y, z from the middle of the floor.", example=["5 mm", "-3 mm", "0.3 mm"]
     )
 
 

@@ -102,18 +102,13 @@ _CORNERS = {"+x+y": (1.0, 1.0), "+x-y": (1.0, -1.0), "-x+y": (-1.0, 1.0), "-x-y"
 class Boundary(Table):
     """``[boundary]``: the walls.
 
-    A plane, a channel (a floor and two upright walls, a ``width`` apart), a groove (two walls that meet in the x axis,
-    their angle the ``opening``), or a container open above, its floor about the origin (``width`` is its inner side or
-    diameter; the walls of the simulation go on to twice its ``height``, where beads are lost). It leans by ``tilt``: 0°
-    is level, a plane at 90° a wall. ``uphill`` is the direction of the steepest way up, from that of the drive within
-    the floor; of a resolved case from its x axis toward y.
+    A groove is two walls that meet in the x axis; a container is open above, its floor about the origin. A plane at 90°
+    is a wall. ``uphill`` of a file is from the direction of the drive, of a resolved case from its x axis toward y.
     """
 
     shape: Shape = key("Shape of the boundary. See [](../cases.md#boundaries).", "plane")
-    material: Annotated[str, SAME_RUN] = key(
-        "Material of the boundary, from the library. Any other name is possible if the case gives all "
-        "friction coefficients.",
-        example="chromium-coated glass",
+    material: str = key(
+        "Material, from the library, or any other name beside all friction coefficients.", ..., "glass", SAME_RUN
     )
     opening: Filled[Annotated[float, replace(units.ANGLE, smallest=0.5, largest=3.1, sign=units.POSITIVE)]] = key(
         "Angle between the two walls of a groove.", None, "120 deg"

@@ -42,11 +42,8 @@ if TYPE_CHECKING:
 class Beads(Table):
     """``[beads]``: what all beads are made of."""
 
-    material: Annotated[str | None, SAME_RUN] = key(
-        "Material of all beads, from the library. It gives the density and, with the boundary's material, the"
-        " friction.",
-        None,
-        "ruby",
+    material: str | None = key(
+        "Material of all beads, from the library, which gives the density.", None, "ruby", SAME_RUN
     )
     density: units.Density = key("Density of the beads.")
 
@@ -54,42 +51,32 @@ class Beads(Table):
 class Liquid(Table):
     """``[liquid]``: a name from the library, numbers, or both (numbers take precedence).
 
-    ``mass_fraction`` (of glycerol) and ``temperature`` (default: 20 °C) belong to ``water-glycerol``.
-    ``volume_fraction`` is the volume of the liquid on a bead over that of the bead, ``viscosity_ratio`` the viscosity
-    of the bridges over that of the liquid. If liquid is ``conserved``, a bridge takes its volume from the films of its
-    beads and gives it back when it breaks (Shi and McCarthy 2008); otherwise its volume does not depend on other
-    bridges. ``law`` is the bridge law: one of `walkers.physics.laws`, or your own function, ``file.py:function``.
+    If liquid is ``conserved``, a bridge takes its volume from the films of its beads and gives it back when it breaks
+    (Shi and McCarthy 2008); otherwise its volume does not depend on other bridges. ``law`` is one of
+    `walkers.physics.laws`, or your own function, ``file.py:function``.
     """
 
-    choices: ClassVar = (Choice((("dynamic_viscosity",), ("kinematic_viscosity",)), instead="a liquid of the library"),)
-    name: Annotated[str | None, SAME_RUN] = key(
-        "Liquid from the library. The other keys override its values.", None, "Si AK5"
+    choices: ClassVar = (Choice((("dynamic_viscosity",), ("kinematic_viscosity",))),)
+    name: str | None = key("Liquid from the library. The other keys override its values.", None, "Si AK5", SAME_RUN)
+    mass_fraction: Filled[Number] = key(
+        "Mass fraction of glycerol in `water-glycerol`.", None, 0.87, SAME_RUN, ge=0, le=1
     )
-    mass_fraction: Annotated[Filled[Annotated[Number, Field(ge=0, le=1)]], SAME_RUN] = key(
-        "Mass fraction of glycerol in the liquid `water-glycerol`.", None, 0.87
-    )
-    temperature: Annotated[Filled[units.Temperature], SAME_RUN] = key(
-        "Temperature of the liquid `water-glycerol`. Default: 20 °C.", None
+    temperature: Filled[units.Temperature] = key(
+        "Temperature of `water-glycerol`. Default: 20 °C.", None, None, SAME_RUN
     )
     surface_tension: units.SurfaceTension = key("Surface tension.")
-    density: Annotated[Filled[units.Density], SAME_RUN] = key("Density of the liquid.", None)
-    kinematic_viscosity: Annotated[Filled[units.KinematicViscosity], SAME_RUN] = key("Kinematic viscosity.", None)
+    density: Filled[units.Density] = key("Density of the liquid.", None, None, SAME_RUN)
+    kinematic_viscosity: Filled[units.KinematicViscosity] = key("Kinematic viscosity.", None, None, SAME_RUN)
     dynamic_viscosity: Filled[units.DynamicViscosity] = key("Dynamic viscosity, instead of the kinematic one.", None)
-    volume_fraction: Annotated[Number, Field(ge=1e-9, le=0.5)] = key(
-        "Volume of liquid on a bead divided by the volume of the bead.", example=0.01
-    )
-    viscosity_ratio: Annotated[Number, Field(ge=0, le=1e4)] = key(
-        "Viscosity of the bridges divided by the viscosity of the liquid. It scales the drag of the bridges.", 1.0
+    volume_fraction: Number = key("Volume of liquid on a bead over that of the bead.", example=0.01, ge=1e-9, le=0.5)
+    viscosity_ratio: Number = key(
+        "Viscosity of the bridges over that of the liquid. It scales the drag of the bridges.", 1.0, ge=0, le=1e4
     )
     contact_angle: units.UpToRightAngle = key(
-        "Contact angle at every bridge, between beads and at the boundary. A case whose bridges push the "
-        "beads of a walker apart at rest is refused."
+        "Contact angle at every bridge. A case whose bridges push the beads of a walker apart at rest is refused."
     )
     conserved: units.Flag = key(
-        "Whether a bridge takes its volume from the films of its beads and gives it back when it breaks, so "
-        "that bridges share the liquid; otherwise the volume of a bridge does not depend on other bridges. "
-        "For piles.",
-        False,
+        "Whether bridges take their liquid from the films of their beads, and give it back. For piles.", False
     )
     law: str = key("Law of the bridges. See [](../../how-to/bridge-law.md).", DEFAULT_LAW)
 
@@ -120,20 +107,14 @@ class Contact(Table):
     """
 
     friction: Friction = key("")
-    rolling_friction: Coefficient = key(
-        "Coefficient of rolling friction (constant-directional-torque model); 0 switches it off.", example=0.01
-    )
-    restitution: Annotated[Number, Field(gt=0.05, le=1)] = key(
-        "Coefficient of restitution of the dry contact.", example=0.5
-    )
+    rolling_friction: Coefficient = key("Coefficient of rolling friction (constant directional torque).", example=0.01)
+    restitution: Number = key("Coefficient of restitution of the dry contact.", example=0.5, gt=0.05, le=1)
     youngs_modulus: Annotated[float, replace(units.MODULUS, smallest=5e6, largest=1e9)] = key(
-        "Young's modulus of the beads and the boundary. It is lower than the real one, so that the time step "
-        "can be longer.",
-        5e7,
+        "Young's modulus of beads and boundary: lower than the real one, so that the time step can be longer.", 5e7
     )
-    poissons_ratio: Annotated[Number, Field(ge=0, lt=0.5)] = key("Poisson's ratio.", 0.3)
-    minimum_separation_ratio: Annotated[Number, Field(ge=1e-6, le=1)] = key(
-        "Gap, divided by the reduced radius, below which the drag of the bridges stops growing.", example=0.05
+    poissons_ratio: Number = key("Poisson's ratio.", 0.3, ge=0, lt=0.5)
+    minimum_separation_ratio: Number = key(
+        "Gap over the reduced radius below which the drag of the bridges stops growing.", example=0.05, ge=1e-6, le=1
     )
 
 

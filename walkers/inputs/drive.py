@@ -59,11 +59,8 @@ class Harmonic(Table):
     )
     frequency: units.Frequency = key("Frequency in cycles per second.")
     peak_acceleration: Filled[units.Acceleration] = key("Peak acceleration of the boundary; `g` is 9.8 m/s².", None)
-    gamma0: Annotated[Filled[Coefficient], SAME_RUN] = key(
-        "Dimensionless peak force Γ0 = a0 M/(4πγR̄), instead of the peak acceleration. M is the mass of both "
-        "beads, R̄ their mean radius.",
-        None,
-        0.5,
+    gamma0: Filled[Coefficient] = key(
+        "Γ0 = a0 M/(4πγR̄) of the dimer of mass M and mean radius R̄, instead of a0.", None, 0.5, SAME_RUN
     )
     phase: Angle = key("Phase of the sine.", 0.0)
 

@@ -48,16 +48,10 @@ def settling_of(cycles: int) -> int:
 class Run(Table):
     """``[run]``: the time step, the length of the run and what is recorded.
 
-    The length is given by ``cycles`` or as a ``duration``, the sampling by ``samples_per_cycle`` or
-    ``frames_per_second``. Left out, or ``cycles = "auto"``, walkers run until their velocities are constant, for 60
-    cycles (``most_cycles``) of 20 samples at most, a third of them, at most 20, to settle; loose beads have a duration,
-    are recorded 60 times a second, and rest before the drive (``settled_below``, ``longest_settling``; 0 of walkers,
-    which stand from the first).
-
-    A cycle is a whole multiple of the sampling interval: beads are recorded ``samples_per_cycle`` times a cycle, or
-    once in ``cycles_per_sample`` (one of the two is 1), bridges with one of ``samples_per_bridge_sample`` samples. If
-    there are several segments, each has a restart file at its end. If ``until_steady``, fewer cycles do if velocities
-    are constant after them (`walkers.postprocess.gait.are_constant`).
+    Left out, or ``cycles = "auto"``, walkers run until their velocities are constant; loose beads rest before the drive
+    (``longest_settling``; None of walkers, which stand from the first). Beads are recorded ``samples_per_cycle`` times
+    a cycle, or once in ``cycles_per_sample`` (one of the two is 1), bridges with one of ``samples_per_bridge_sample``
+    samples. If there are several segments, each has a restart file at its end.
     """
 
     choices: ClassVar = (
@@ -65,46 +59,43 @@ class Run(Table):
         Choice((("samples_per_cycle",), ("frames_per_second",)), required=False),
     )
     time_step: Annotated[Filled[units.Time], AUTO] = key(
-        "Time step, or its upper limit; the program shortens it so that a cycle contains a whole number of samples.",
-        None,
+        "Time step, or its upper limit: the program fits a whole number of samples into a cycle.", None
     )
-    allow_unstable: Annotated[units.Flag, SAME_RUN] = key("Accept a time step beyond a stability limit.", False)
+    allow_unstable: units.Flag = key("Accept a time step beyond a stability limit.", False, None, SAME_RUN)
     cycles: Annotated[Filled[_Cycles], AUTO] = key(
         "Number of drive cycles. `auto`: until the walkers are steady. See [](../cases.md#length-of-a-run).", None, 60
     )
-    most_cycles: Annotated[Filled[_Cycles], SAME_RUN] = key('Upper limit for `cycles = "auto"`. Default: 60.', None, 60)
-    duration: Annotated[Filled[Duration], SAME_RUN] = key(
-        "Duration of the drive, instead of a number of cycles. Mixtures and placed beads need it.", None
+    most_cycles: Filled[_Cycles] = key('Upper limit for `cycles = "auto"`. Default: 60.', None, 60, SAME_RUN)
+    duration: Filled[Duration] = key(
+        "Duration of the drive, instead of `cycles`. Loose beads need it.", None, None, SAME_RUN
     )
-    settling_cycles: Filled[Annotated[Whole, Field(ge=0, le=1_000_000)]] = key(
-        "Cycles at the start that are excluded from means and velocities. Default: a third of the cycles, at most 20.",
-        None,
-        20,
+    settling_cycles: Filled[Whole] = key(
+        "Cycles at the start that no mean contains. Default: a third, at most 20.", None, 20, ge=0, le=1_000_000
     )
     samples_per_cycle: Filled[_Samples] = key("Samples of the beads per cycle. Default: 20.", None, 20)
-    bridge_samples_per_cycle: Annotated[Filled[_Samples], SAME_RUN] = key(
-        "Samples of the bridges per cycle, a divisor of `samples_per_cycle`. Default: 1; all samples for loose beads.",
+    bridge_samples_per_cycle: Filled[_Samples] = key(
+        "Samples of the bridges per cycle, a divisor of `samples_per_cycle`. Default: 1; loose beads: all.",
         None,
         1,
+        SAME_RUN,
     )
-    frames_per_second: Annotated[Filled[Annotated[Number, Field(gt=0, le=1e6)]], SAME_RUN] = key(
-        "Samples per second, instead of per cycle. Default for loose beads: 60.", None, 60
+    frames_per_second: Filled[Number] = key(
+        "Samples per second, instead of per cycle. Default for loose beads: 60.", None, 60, SAME_RUN, gt=0, le=1e6
     )
-    segment: Annotated[Filled[Duration], SAME_RUN] = key(
-        "Length of a segment. A run of several segments can continue after an interruption. Default for loose"
-        " beads: 0.5 s.",
+    segment: Filled[Duration] = key(
+        "Length of a segment; a run can continue after the last whole one. Default for loose beads: 0.5 s.",
         None,
+        None,
+        SAME_RUN,
     )
     settled_below: Filled[units.Speed] = key(
-        "Root mean square velocity at which a pile counts as settled. Default for loose beads: 5 mm/s.", None
+        "Root mean square velocity of a settled pile. Default for loose beads: 5 mm/s.", None
     )
     longest_settling: Filled[units.NonNegativeDuration] = key(
         "Longest time for settling before the drive starts. Default for loose beads: 0.5 s.", None
     )
-    ranks: Annotated[Whole, Field(ge=1, le=64)] = key(
-        "Number of MPI processes. More than one helps large piles only.", 1
-    )
-    seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)] = key("Seed of the random perturbations and of poured beads.", 1)
+    ranks: Whole = key("Number of MPI processes. More than one helps large piles only.", 1, ge=1, le=64)
+    seed: Whole = key("Seed of the random perturbations and of poured beads.", 1, ge=0, le=2**63 - 1)
     steps_per_cycle: Derived[int] = 0
     until_steady: Derived[bool] = False
     cycles_per_sample: Derived[int] = 1

@@ -53,9 +53,14 @@ else:
             return Annotated[kind, _DERIVED, SkipJsonSchema()]
 
 
-def key(meaning: str, default: Any = PydanticUndefined, example: Any = None, **bounds: Any) -> Any:
-    """A key of a table: its meaning, default (required without one), an example as a file has it, and bounds."""
-    return Field(default, description=meaning, examples=None if example is None else [example], **bounds)
+def key(meaning: str, default: Any = PydanticUndefined, example: Any = None, *notes: Any, **bounds: Any) -> Any:
+    """A key of a table: its meaning, default (required without one), an example as a file has it, notes and bounds.
+
+    Notes, such as `SAME_RUN`, are as in ``Annotated``.
+    """
+    field = Field(default, description=meaning, examples=None if example is None else [example], **bounds)
+    field.metadata.extend(notes)
+    return field
 
 
 class Choice(NamedTuple):
