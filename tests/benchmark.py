@@ -53,7 +53,7 @@ _STOCK_LIQUID = """
 fix tension all property/global surfaceTension scalar {liquid.surface_tension!r}
 fix angle all property/global contactAngle peratomtype 0.0 0.0
 fix content all property/global surfaceLiquidContentInitial scalar {liquid.volume_fraction!r}
-fix viscosity all property/global fluidViscosity scalar {liquid.dynamic_viscosity!r}
+fix viscosity all property/global fluidViscosity scalar {liquid.viscosity!r}
 fix nearest all property/global minSeparationDistanceRatio scalar {contact.minimum_separation_ratio!r}
 fix farthest all property/global maxSeparationDistanceRatio scalar 1.2
 """
@@ -153,7 +153,7 @@ def _minimal(deck: Deck, case: Case) -> str:
     walls += "variable push equal ${peak_acceleration}*sin(2*PI*${frequency}*${time_step}*step)\n"
     walls += "fix push all gravity v_push vector 0.0 0.0 1.0\n"
     text = re.sub(r"(?m)^fix +walls all .*\n", "", text)
-    model = f"pair_style {_STOCK_MODEL}\n" + _STOCK_LIQUID.format(liquid=case.liquid, contact=case.contact)
+    model = f"pair_style {_STOCK_MODEL}\n" + _STOCK_LIQUID.format(liquid=case.liquid.of_bridges, contact=case.contact)
     text = re.sub(r"(?m)^pair_style .*\n", lambda _: model, text)
     return re.sub(r"(?m)^fix +motion ", lambda found: walls + found[0], text)
 
