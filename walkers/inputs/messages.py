@@ -151,10 +151,13 @@ def _first_key(table: type[BaseModel]) -> str:
 def _field_at(file: type[BaseModel], parts: Sequence[str | int]) -> FieldInfo | None:
     """The field of a key of a file; None if it has none."""
     model: type[BaseModel] | None = file
-    field = None
+    field, named = None, ""
     for part in (part for part in parts if isinstance(part, str)):
+        if named:  # a name of the user's
+            named = ""
+            continue
         field = keys_in(model).get(part) if model else None
-        model = _table_in(field.annotation)[0] if field else None
+        model, named = _table_in(field.annotation) if field else (None, "")
     return field
 
 
