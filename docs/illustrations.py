@@ -22,8 +22,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from walkers.inputs.changes import flatten
-
 from walkers import load_case, run, sweep
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.file import load_calibration
@@ -31,6 +29,7 @@ from walkers.calibration.report import write_outcome
 from walkers.check.report import validate
 from walkers.errors import InputError, Problem
 from walkers.inputs.case import Case
+from walkers.inputs.keys import flatten
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.make import COMPARED, FIGURES, make_figures
 from walkers.postprocess.analysis import analyses

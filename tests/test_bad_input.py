@@ -8,12 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from jsonschema import Draft202012Validator
 
 from tests.conftest import SHORT, call, document, make_case, to_toml
 from walkers.errors import InputError
 from walkers.inputs import units
 from walkers.inputs.case import Case
-from walkers.inputs.reading import load_case
+from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.schema import case_schema
+from walkers.inputs.toml import read_toml
 from walkers.inputs.units import parse_quantity
 from walkers.postprocess.analysis import read_result
 from walkers.templates.deck import render_deck
@@ -37,6 +40,7 @@ def bead(radius: str, x: str, z: str = "1 mm") -> dict[str, Any]:
     return {"radius": radius, "at": [x, "0 mm", z]}
 
 
+MIXTURE = {"small": ["0.3 mm", "0.315 mm"], "large": ["0.5 mm", "0.59 mm"], "count": 20}
 HARMONICS = {"harmonics": [{"frequency": "80 Hz", "peak_acceleration": "1 g"}]}
 # Changed tables (None: left out), and what the message says after the file.
 BAD: list[tuple[dict[str, Any], str]] = [
@@ -52,7 +56,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"contact": {"youngs_modulus": "1 MPa"}}, "must lie between 5 and 1000 MPa"),
     ({"liquid": {"contact_angle": "120 deg"}}, "must lie between 0 and 90 deg"),
     # Numbers, lists, tables, names
-    ({"dimers": {"radii": ["0.3 mm"]}}, 'dimers.radii = ["0.3 mm"]: expected two radii'),
+    ({"dimers": {"radii": ["0.3 mm"]}}, '["0.3 mm"]: has 1 value; expected 2, such as ["0.3 mm", "0.2 mm"]'),
     ({"dimers": {"radii": "0.3 mm"}}, 'dimers.radii = "0.3 mm": expected a list'),
     ({"beads": {"material": 3}}, "beads.material = 3: expected text"),
     ({"liquid": {"volume_fraction": "1 %"}}, 'liquid.volume_fraction = "1 %": expected a plain number'),
@@ -64,9 +68,11 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"drive": {"frame": "labs"}}, 'did you mean "lab"'),
     ({"run": {"cycles": "allways"}}, 'run.cycles = "allways": expected a whole number, or "auto"'),
     ({"dimers": {"replicates": 1.5}}, "expected a whole number"),
-    ({"run": {"allow_unstable": "yes please"}}, "expected true or false"),
     ({"run": {"allow_unstable": "yes"}}, 'run.allow_unstable = "yes": expected true or false'),
-    ({"dimers": {"meet": "yes"}}, 'dimers.meet = "yes": expected true or false'),
+    ({"dimers": {"meet": 1}}, "dimers.meet = 1: expected true or false"),
+    ({"clusters": {**WALKER, "arrangement": "chain"}}, ": expected tables [[clusters]]"),
+    ({"dimers": None, "placed": [], "clusters": []}, "dimers: missing; expected bodies: "),
+    ({"placed": [{"radius": "1 mm", "at": ["1 mm", "1 mm"]}]}, '"1 mm"]: has 2 values; expected 3, such as ["5 mm", '),
     ({"liquid": {"conserved": 1}}, "liquid.conserved = 1: expected true or false"),
     ({"drive": "x"}, 'drive = "x": expected a table'),
     ({"beads": {"material": "rubi"}}, 'beads.material = "rubi": not in the library'),
@@ -75,10 +81,23 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"liquid": {"volume_fracton": 0.01}}, 'liquid.volume_fracton = 0.01: unknown key; [liquid] takes name, '),
     ({"frequency": "80 Hz"}, 'frequency = "80 Hz": unknown key; a case takes '),
     ({"dimers": {"seed": 2}}, 'did you mean "run.seed"'),
+    ({"run": {"steps_per_cycle": 3}}, "run.steps_per_cycle = 3: unknown key; [run] takes time_step, "),
+    ({"run": {"until_steady": True}}, "run.until_steady = true: unknown key"),
+    *(({name: value}, ": unknown key; a case takes title, beads")
+      for name, value in (("name", "x"), ("document", {}), ("sources", {}), ("recorded_law", 1))),
     # What contradicts something else
     ({"liquid": {"dynamic_viscosity": "5 mPa*s", "kinematic_viscosity": "5 mm^2/s"}}, "not both"),
     ({"drive": {"gamma0": 0.5}}, "drive.gamma0 = 0.5: expected either peak_acceleration or gamma0, not both"),
-    ({"drive": HARMONICS}, 'drive.frequency = "80 Hz": expected none beside drive.harmonics: write drive.harmonics['),
+    ({"drive": {**HARMONICS, "peak_acceleration": None}}, "beside drive.harmonics: write drive.harmonics[0].frequency"),
+    ({"drive": {"frequency": None, "harmonics": []}}, 'drive.frequency: missing; expected such as "80 Hz", or harm'),
+    ({"run": {"duration": "1 s"}}, 'run.duration = "1 s": expected either cycles or duration, not both'),
+    ({"dimers": {"diameters": ["0.6 mm", "0.4 mm"]}}, "expected either radii or diameters, not both"),
+    ({"clusters": [{**WALKER, "arrangement": "chain", "diameters": ["0.6 mm", "0.4 mm"]}]},
+     'clusters[0].diameters = ["0.6 mm", "0.4 mm"]: expected either radii or diameters, not both'),
+    ({"placed": [{**bead("1 mm", "9 mm"), "diameter": "2 mm"}]},
+     'placed[0].diameter = "2 mm": expected either radius or diameter, not both'),
+    ({"dimers": None, "mixture": {**MIXTURE, "small_diameters": ["0.6 mm", "0.63 mm"]}},
+     'mixture.small_diameters = ["0.6 mm", "0.63 mm"]: expected either small or small_diameters, not both'),
     ({"drive": {"phase": "10 deg", "frame": "lab"}}, 'drive.frame = "lab": expected "container"'),
     ({"liquid": {"contact_angle": "84 deg"}}, "expected a smaller angle or less liquid: at rest, the"),
     ({"liquid": {"contact_angle": "84 deg"}, "dimers": {"gap": "-1 nm"}}, 'liquid.contact_angle = "84 deg": exp'),
@@ -94,14 +113,16 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"run": {"silence": "20 s"}}, 'run.silence = "20 s": expected none: this key has ended'),
     # Bodies and boundaries
     ({"dimers": {"radii": None, "mean_radius": "0.2 mm"}}, "dimers.sin_delta: missing"),
-    ({"dimers": {"sin_delta": 0.2}}, "dimers.sin_delta = 0.2: expected either the radii or"),
+    ({"dimers": {"sin_delta": 0.2}},
+     "dimers.sin_delta = 0.2: expected either radii or mean_radius and sin_delta, not both"),
     ({"dimers": {"gap": "1 um"}}, 'dimers.gap = "1 um": expected zero or less'),
     ({"dimers": {"gap": "-50 um"}}, "overlap by more than 2 % of the smallest radius: expected -4 um or more"),
     ({"dimers": {"radii": ["2 mm", "0.2 mm"]}, "contact": {"youngs_modulus": "5 MPa"}},
      "more than 2 % of the smallest radius: expected a larger modulus, or dimers.gap"),
     ({"dimers": {"replicates": 2, "spacing": "0.5 mm"}}, 'dimers.spacing = "0.5 mm": neighbouring walkers would touch'),
     ({"dimers": {"replicates": 4, "spacing": "0.9 mm", "meet": True}}, "expected at least 0.99 mm"),
-    ({"dimers": {"replicates": 9, "spacing": "1 mm", "meet": True}}, "would overlap at the start; expected more"),
+    ({"dimers": {"replicates": 9, "spacing": "1 mm", "meet": True}},
+     "a bead overlaps with one of another walker by 0.188 mm; expected their centres 0.6 mm apart, where they touch"),
     (cluster("star", "0.3 mm", "0.2 mm"), 'arrangement = "star": expected one of chain, fan, diamond, ring, raft'),
     (cluster("ring", "0.3 mm", "0.2 mm"), "clusters[0].radii"),
     (cluster("raft", "0.3 mm", "0.2 mm", "0.2 mm"), "expected the same radius for all beads of a raft"),
@@ -111,7 +132,8 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"clusters": [WALKER]}, "missing; expected such as \"fan\""),
     (at(["0 mm", "0 mm"], ["-1 mm", "0 mm"]), "this bead is not connected to the first"),
     (at(["0 mm", "0 mm"]), "expected a place for each"),
-    (at(["0 mm", "0 mm"], ["0.1 mm", "0 mm"]), "clusters[0].at[1]"),
+    (at(["0 mm", "0 mm"], ["0.1 mm", "0 mm"]),
+     "overlaps with clusters[0].at[0] by 0.39 mm; expected their centres 0.4899 mm apart"),
     (at(["0 mm", "0.3 mm"], ["0 mm", "-0.3 mm"], radii=("0.3 mm", "0.3 mm")), "this walker has no heading"),
     ({"dimers": {"radii": ["0.5 mm", "0.2 mm"]}, "boundary": {"shape": "groove", "opening": "30 deg"}},
      "the radii differ too much: the beads do not touch"),
@@ -119,21 +141,26 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"boundary": {"tilt": "-5 deg", **GLASS}}, 'must be zero or more; boundary.uphill = "180 deg" turns the slope'),
     ({"boundary": {"width": "1 mm", **GLASS}}, 'boundary.width = "1 mm": expected none of a plane'),
     ({**cluster("fan", "0.3 mm", "0.2 mm", "0.2 mm"), "boundary": {"shape": "channel", "width": "0.7 mm"}},
-     "do not fit between the walls of the channel: expected fewer or smaller walkers"),
-    ({"placed": [bead("1 mm", "9 mm"), bead("0.1 mm", "30 mm"), bead("0.5 mm", "10.4 mm")]}, "overlaps with placed[0]"),
+     "do not fit between the walls of the channel; expected a wider boundary"),
+    ({"dimers": {"replicates": 9, "spacing": "1 mm", "meet": True},
+      "boundary": {"shape": "box", "width": "3 mm", "height": "9 mm"}},
+     "dimers.replicates = 9: the walkers do not fit between the walls of the box; expected at most 8 at this spacing"),
+    ({"placed": [bead("1 mm", "9 mm"), bead("0.1 mm", "30 mm"), bead("0.5 mm", "10.4 mm")]},
+     "overlaps with placed[0] by 0.1 mm; expected their centres 1.5 mm apart, where they touch"),
     ({"placed": [bead("1 mm", "9 mm", "0.9 mm")]}, "expected a bead within the boundary"),
     ({"dimers": None, "placed": [bead("1 mm", "9 mm")], "run": {"seed": 3}}, "run.seed = 3: expected none with placed"),
-    ({"placed": [bead("1 mm", "9 mm"), bead("0.1 mm", "30 mm"), bead("0.5 mm", "10.4 mm")]},
-     "overlaps with placed[0]; expected their centres at least 1.495 mm apart"),
     ({"run": {"cycles": None, "settling_cycles": None, "duration": "1e4 s"}},
      'run.duration = "1e4 s": expected at most 8388 s: the engine counts'),
     # What is missing
     ({"dimers": None}, "dimers: missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]"),
-    ({"beads": {"material": None}}, "beads.density: missing; expected such as"),
+    ({"beads": {"material": None}}, 'beads.density: missing; expected such as "4.0 g/cm^3", or a material of the'),
+    ({"boundary": None}, 'boundary: missing; expected a table [boundary], such as material = "'),
+    ({"liquid": {"name": None, "kinematic_viscosity": "5 mm^2/s", "surface_tension": "20 mN/m"}},
+     "liquid.density: missing; expected the liquid's density beside its kinematic_viscosity"),
     ({"drive": {"frequency": None}}, "drive.frequency: missing"),
     ({"drive": {"peak_acceleration": None}}, "drive.peak_acceleration: missing"),
     ({"liquid": {"name": None, "surface_tension": "19 mN/m", "density": "1 g/cm^3"}},
-     "liquid.kinematic_viscosity: missing; expected a liquid of the library by name, or"),
+     'liquid.dynamic_viscosity: missing; expected such as "4.6 mPa*s", or kinematic_viscosity, or a liquid of the lib'),
     ({"liquid": {"name": "mine", "surface_tension": "19 mN/m", "kinematic_viscosity": "5 mm^2/s"}},
      'liquid.name = "mine": not in the library'),
 ]  # fmt: skip
@@ -150,7 +177,7 @@ def test_bad_values(changes: dict[str, Any], told: str) -> None:
     with pytest.raises(InputError) as caught:
         Case.read(_said(document(**changes)), source="bad.toml")
     message = str(caught.value)
-    assert told in message
+    assert told in message, message
     assert message.startswith("bad.toml: ")
     assert message.count("\n") == 0, "one problem, one line"
     assert "expected" in message or "unknown key" in message
@@ -326,10 +353,11 @@ def test_all_that_is_missing_is_told_at_once(in_folder: Path) -> None:
 
 
 def test_several_mistakes_are_told_at_once_and_before_the_first_run(in_folder: Path) -> None:
-    (in_folder / "bad.toml").write_text(to_toml(document(drive={"frequency": "80 mm", "axis": "w"})))
-    message = _message("run", "fig1b", "bad.toml")
-    assert 'bad.toml: drive.frequency = "80 mm"' in message
-    assert "bad.toml: drive.axis" in message
+    wrong = document(drive={"frequency": "80 mm", "axis": "w"}, beads={"material": "rubi"}, liquid={"name": "oil"})
+    (in_folder / "bad.toml").write_text(to_toml(wrong | {"titel": "x"}))
+    told = _message("run", "fig1b", "bad.toml").removeprefix("walkers: ").splitlines()
+    keys = ("beads.material", "drive.axis", "drive.frequency", "liquid.name", "titel")
+    assert sorted(line.partition(" = ")[0] for line in told) == [f"bad.toml: {key}" for key in keys]
     assert not (in_folder / "runs").exists()
 
 
@@ -353,7 +381,7 @@ def test_bridges_may_push_loose_beads_but_hold_walkers(run_directory: Callable[.
 def test_a_liquid_may_have_no_viscosity() -> None:
     assert make_case(run={"time_step": "20 us", "allow_unstable": True}).run.time_step > 19e-6
     case = make_case(liquid={"viscosity_ratio": 0})
-    assert case.liquid.dynamic_viscosity == 0.0
+    assert case.liquid.of_bridges.viscosity == 0.0
     tables = render_deck(case).files["bridges.txt"].splitlines()
     resistances = [[float(number) for number in line.split()[2:]] for line in tables if line[0] in "0123456789"]
     assert len(resistances) > 100
@@ -414,6 +442,42 @@ def test_long_values_and_those_of_several_lines_are_quoted_on_one(in_folder: Pat
         assert message.rstrip("\n").isprintable()
         assert any(part in message for part in ("xxx", "one two", "no finished run"))
         assert len(message) < 1500
+
+
+# --- the schema for editors -------------------------------------------------------------------------------------------
+
+
+SCHEMA = Draft202012Validator(case_schema())
+
+
+@pytest.mark.parametrize("name", sorted(shipped("case")))
+def test_shipped_cases_are_what_the_schema_says(name: str) -> None:
+    SCHEMA.validate(read_toml(shipped("case")[name]))
+
+
+@pytest.mark.parametrize(
+    ("changes", "path"),
+    [
+        ({"drive": {"frequency": 80}}, "drive.frequency"),
+        ({"drive": {"frequency": "80"}}, "drive.frequency"),
+        ({"dimers": {"radii": ["0.3 mm"]}}, "dimers.radii"),
+        ({"dimers": {"radii": ["0.3 mm", 0.2]}}, "dimers.radii.1"),
+        ({"dimers": {"spacing": 3}}, "dimers.spacing"),
+        ({"dimers": {"meet": "yes"}}, "dimers.meet"),
+        ({"dimers": {"facing": "north"}}, "dimers.facing"),
+        ({"contact": {"restitution": 1.2}}, "contact.restitution"),
+        ({"drive": {"frequenzy": "80 Hz"}}, "drive"),
+        ({"run": {"steps_per_cycle": 3}}, "run"),
+        ({"name": "x"}, ""),
+        ({"drive": None}, ""),
+    ],
+)
+def test_a_case_that_is_refused_is_not_what_the_schema_says(changes: dict[str, Any], path: str) -> None:
+    SCHEMA.validate(document())
+    (error,) = SCHEMA.iter_errors(_said(document(**changes)))
+    assert ".".join(map(str, error.absolute_path)) == path
+    with pytest.raises(InputError):
+        Case.read(_said(document(**changes)))
 
 
 # --- quantities, in the units of the field ----------------------------------------------------------------------------

@@ -20,7 +20,6 @@ from tests.conftest import call, make_case, to_toml
 from walkers import run as run_case
 from walkers.check.bridges import willett_simple
 from walkers.errors import InputError
-from walkers.inputs.case import Liquid
 from walkers.inputs.loads import bridge_at_rest, dimer_of
 from walkers.inputs.reading import load_case
 from walkers.inputs.run import limits_of
@@ -33,6 +32,7 @@ from walkers.physics.capillary import rupture_distance as rupture_of_lian
 from walkers.physics.laplace import force_curve, rupture_distance
 from walkers.physics.laws import LAWS, by_name, rabinovich, willett, young_laplace
 from walkers.physics.laws import soulie as soulie_law
+from walkers.physics.liquid import BridgeLiquid
 from walkers.physics.time_step import AUTO_FRACTIONS, WALKER_FRACTIONS
 from walkers.templates.bridge_tables import TOLERANCE, tabulated
 
@@ -41,10 +41,8 @@ pytestmark = pytest.mark.filterwarnings("ignore::walkers.physics.laws.ExecutedLa
 PAIRS = [(1.0, inf), (1.0, 1.0), (0.5, 1.0), (0.2, 1.0)]
 
 
-def _liquid(surface_tension: float, viscosity: float, angle: float) -> Liquid:
-    return Liquid(
-        surface_tension=surface_tension, dynamic_viscosity=viscosity, volume_fraction=0.01, contact_angle=angle
-    )
+def _liquid(surface_tension: float, viscosity: float, angle: float) -> BridgeLiquid:
+    return BridgeLiquid(surface_tension=surface_tension, viscosity=viscosity, volume_fraction=0.01, contact_angle=angle)
 
 
 def surfaces(
@@ -294,8 +292,8 @@ def test_names_that_are_no_laws(name: str, message: str) -> None:
 
 
 CASE = make_case(liquid={"contact_angle": "20 deg"})
-AT_WALL = Surfaces.of(3e-4, inf, CASE.liquid, CASE.contact.minimum_separation_ratio)
-BETWEEN = Surfaces.of(3e-4, 2e-4, CASE.liquid, CASE.contact.minimum_separation_ratio)
+AT_WALL = Surfaces.of(3e-4, inf, CASE.liquid.of_bridges, CASE.contact.minimum_separation_ratio)
+BETWEEN = Surfaces.of(3e-4, 2e-4, CASE.liquid.of_bridges, CASE.contact.minimum_separation_ratio)
 
 
 @pytest.mark.parametrize("given", [AT_WALL, BETWEEN], ids=["wall", "beads"])

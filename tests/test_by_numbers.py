@@ -19,8 +19,8 @@ from walkers.inputs.axes import Range
 from walkers.inputs.boundary import Boundary, Round
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Sine, waveform
-from walkers.inputs.keys import changed
 from walkers.inputs.loads import bridge_at_rest, contact_loads
+from walkers.inputs.table import changed
 from walkers.inputs.units import Kind, quantity_text
 from walkers.postprocess.analyses.piles import _bed, _joined
 from walkers.postprocess.analyses.walking import _rows, spread
@@ -117,10 +117,14 @@ def test_quarters_of_a_range(scale: bool, median: float | None, quarters: list[f
 
 def test_a_key_within_a_list_puts_what_says_the_same_out_of_force() -> None:
     tables = {"drive": {"harmonics": [{"gamma0": 0.4, "axis": "x"}, {"gamma0": 0.2}]}}
-    found = changed(tables, {"drive.harmonics[1].peak_acceleration": "2 g"})
+    found = changed(Case, tables, {"drive.harmonics[1].peak_acceleration": "2 g"})
     assert found["drive"]["harmonics"] == [{"gamma0": 0.4, "axis": "x"}, {"peak_acceleration": "2 g"}]
     both = {"drive.harmonics[0].peak_acceleration": "2 g", "drive.harmonics[0].gamma0": 0.3}
-    assert changed(tables, both)["drive"]["harmonics"][0] == {"gamma0": 0.3, "axis": "x", "peak_acceleration": "2 g"}
+    assert changed(Case, tables, both)["drive"]["harmonics"][0] == {
+        "gamma0": 0.3,
+        "axis": "x",
+        "peak_acceleration": "2 g",
+    }
 
 
 @pytest.mark.parametrize("name", ["triangle", "sawtooth"])

@@ -1,7 +1,6 @@
 """The deck: readable and exact."""
 
 import re
-from dataclasses import replace
 from hashlib import sha256
 
 import pytest
@@ -73,7 +72,7 @@ def test_a_change_of_what_decks_compute_asks_for_another_version() -> None:
     piles = [load_case("pile-ci"), load_case("cluster")]
     square = piles[0].boundary
     round_one = Boundary(shape="cylinder", material=square.material, width=square.width, height=square.height)
-    piles += [replace(piles[0], run=replace(piles[0].run, ranks=2)), replace(piles[0], boundary=round_one)]
+    piles += [piles[0].put("run.ranks", 2), piles[0].but(boundary=round_one)]
     for case in piles:
         settled = settling_steps(case)
         end = settled + case.run.cycles_per_segment * case.run.steps_per_cycle
@@ -84,5 +83,5 @@ def test_a_change_of_what_decks_compute_asks_for_another_version() -> None:
 
 def test_a_mixture_is_placed_by_its_seed() -> None:
     pile = load_case("pile-ci")
-    places = [[bead.centre for bead in place((replace(pile, seed=seed),))[0].beads] for seed in (1, 1, 2)]
+    places = [[bead.centre for bead in place((pile.put("run.seed", seed),))[0].beads] for seed in (1, 1, 2)]
     assert places[0] == places[1] != places[2]

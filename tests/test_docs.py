@@ -141,7 +141,7 @@ def test_names_in_docstrings_are_there() -> None:
 
 
 def test_names_of_the_package_on_pages_and_in_templates_are_there() -> None:
-    places = {ROOT: ("README.md", "CONTRIBUTING.md", "walkers/**/*.j2"), DOCS: ("**/*.md", "**/*.rst", "_ext/*.toml")}
+    places = {ROOT: ("README.md", "CONTRIBUTING.md", "walkers/**/*.j2"), DOCS: ("**/*.md", "**/*.rst")}
     files = [file for folder, kinds in places.items() for kind in kinds for file in folder.glob(kind)]
     found = {(file, name) for file in files for name in _OF_PACKAGE.findall(file.read_text("utf-8"))}
     named = {(file, name) for file, name in found if name.split(".")[1] not in _FILES}
@@ -228,16 +228,28 @@ def test_pages_are_written_anew(tmp_path: Path) -> None:
 def test_examples_give_what_they_say(module: str, runs_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a folder of the tests (``tmp``), with what a user would have imported."""
     if module == "walkers.pipeline":  # its sweep is there for its table: Fig. 4b would take all of 60 cycles
-        monkeypatch.setattr("walkers.inputs.run_tables._MOST_CYCLES", 12)
+        monkeypatch.setattr("walkers.inputs.run._MOST_CYCLES", 12)
     failed, tried = doctest.testmod(import_module(module), extraglobs={"tmp": runs_folder, "walkers": walkers})
     assert tried
     assert not failed
 
 
-def test_each_key_of_a_case_file_has_its_meaning() -> None:
-    rows = generated.key_rows()  # `KeyError` if one has none
-    assert {"`radii`", "`friction.bead_wall`", "`gravity`"} <= {row[0] for table in rows.values() for row in table}
-    assert all(meaning.endswith((".", ")", "`")) for table in rows.values() for _, meaning, _, _ in table)
+def test_each_key_of_a_case_file_has_its_meaning_and_says_what_it_expects() -> None:
+    tables = dict(generated.tables_of_keys())
+    rows = {
+        (place, cells[0]): cells[1:]
+        for place, text in tables.items()
+        for cells in (line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| `"))
+    }
+    assert {("[[clusters]]", "`at`"), ("[contact.friction]", "`bead_wall`"), ("[environment]", "`gravity`")} <= {*rows}
+    assert not {key for key, (meaning, *_) in rows.items() if not meaning.endswith((".", ")", "`"))}
+    assert {key for key, (_, expected, *_) in rows.items() if expected.startswith("a table")} == {
+        ("Top level", "`uncertain`")
+    }
+    assert "a list of 2, each a length with its unit; 0.001 to 20 mm; such as" in rows["[dimers]", "`radii`"][1]
+    assert 'a time with its unit; 1e-06 to 1e+06 us, or `"auto"`; such as "2 us"' in rows["[run]", "`time_step`"][1]
+    assert "Exactly one of: `radii`; `diameters`; `mean_radius` and `sin_delta`." in tables["[dimers]"]
+    assert "At most one of: `dynamic_viscosity`; `kinematic_viscosity`." in tables["[liquid]"]  # the library has them
 
 
 @pytest.mark.parametrize("name", generated.PAGES)

@@ -119,11 +119,30 @@ def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(own: Pat
     (own / "library.toml").unlink()
     again = Case.read(Case.from_dict(case.as_dict()).document, name="mine")
     assert (again, again.determinants()) == (case, case.determinants())
-    assert [point.density for point in sweep.cases()] == [2450.0, 2450.0]
+    assert [point.beads.density for point in sweep.cases()] == [2450.0, 2450.0]
     spread = expand({**varied.file, "case": "mine.toml"}, source="s", name="s", folder=own)
-    assert [point.density for point in spread.cases()] == [2450.0, 2450.0]
+    assert [point.beads.density for point in spread.cases()] == [2450.0, 2450.0]
     with pytest.raises(InputError, match=r'beads\.material = "my beads": not in the library'):
         load_case("mine.toml")
+
+
+def test_a_liquid_of_ones_own_is_described_in_the_case() -> None:
+    """By all of its numbers, whatever its name; each that is missing is told."""
+    numbers = {"surface_tension": "20 mN/m", "volume_fraction": 0.02, "contact_angle": "5 deg"}
+    dynamic = document(liquid={"name": "mine", **numbers, "dynamic_viscosity": "5 mPa*s"})
+    kinematic = document(liquid={"name": "mine", **numbers, "kinematic_viscosity": "5 mm^2/s", "density": "1 g/cm^3"})
+    for tables in (dynamic, kinematic):
+        liquid = Case.read(tables).liquid.of_bridges
+        assert (liquid.surface_tension, liquid.volume_fraction, liquid.viscosity) == (0.02, 0.02, 0.005)
+    assert Case.read(dynamic).determinants() == Case.read(kinematic).determinants()
+    for missing in ("surface_tension", "dynamic_viscosity"):
+        del dynamic["liquid"][missing]
+        with pytest.raises(InputError, match=r'liquid\.name = "mine": not in the library'):
+            Case.read(dynamic)
+    del dynamic["liquid"]["name"]
+    with pytest.raises(InputError) as caught:
+        Case.read(dynamic)
+    assert [one.key for one in caught.value.problems] == ["liquid.surface_tension", "liquid.dynamic_viscosity"]
 
 
 def test_a_library_elsewhere_is_named(own: Path) -> None:
@@ -138,7 +157,7 @@ def test_a_library_elsewhere_is_named(own: Path) -> None:
     [
         ("materials = 3", "materials = 3: expected a table [materials]"),
         ('[materials.mine]\ndensity = "2 g/cm^3"', 'density = "2 g/cm^3": expected { value = ..., source = "..." }'),
-        ('[materials.mine]\ndensity = { value = "2 g/cm^3" }', "density.source: missing; expected where the number is"),
+        ('[materials.mine]\ndensity = { value = "2 g/cm^3" }', 'density.source: missing; expected such as "weighed"'),
         ('[materials.mine]\ndensity = { value = 2, source = "x" }', "density.value = 2: expected a density with its"),
         ("[material.mine]", 'material = {"mine": {}}: unknown key'),
         ('[materials.glass]\ndensity = { value = "2 g/cm^3", source = "x" }', "materials.glass: is in the library of"),
@@ -153,7 +172,7 @@ def test_a_library_elsewhere_is_named(own: Path) -> None:
         ),
         (
             '[materials.m]\ndensity = { value = "2 g/cm^3", source = "x", range = ["1 g/cm^3"] }',
-            'materials.m.density.range = ["1 g/cm^3"]: too short',
+            'materials.m.density.range = ["1 g/cm^3"]: has 1 value; expected 2, such as "4.0 g/cm^3"',
         ),
         (
             '[[surface_pairs]]\nmaterials = ["glas", "zirconia"]',

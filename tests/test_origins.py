@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,10 +15,11 @@ from tests.conftest import REFERENCE, call, document, make_case, origins, to_tom
 from walkers.errors import InputError
 from walkers.inputs import library
 from walkers.inputs.case import Case
-from walkers.inputs.keys import changed, settings_of
+from walkers.inputs.keys import settings_of
 from walkers.inputs.origins import Origin
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.sweep import load_sweep
+from walkers.inputs.table import changed
 from walkers.postprocess.gait import SEPARATED
 from walkers.postprocess.uncertainty import SPREAD_NAME, band_of, band_text, lines_of_rest, rests_on
 from walkers.runner.files import read_json
@@ -87,7 +88,8 @@ def test_the_origins_tell_the_numbers_of_the_case(name: str) -> None:
     assert len(matter) >= 10
     told = settings_of(f"{one.key} = {one.text}" for one in matter)
     again = load_case(name, told)
-    assert (again.liquid, again.contact, again.density) == (case.liquid, case.contact, case.beads.density)
+    assert (again.contact, again.beads) == (case.contact, case.beads)
+    assert again.liquid.of_bridges == case.liquid.of_bridges
     assert {one.origin for one in again.origins if one.key in told} == {"given"}
 
 
@@ -124,6 +126,14 @@ def test_ranges_that_are_none_are_refused(ranges: dict[str, object], told: str) 
     assert told in str(caught.value)
 
 
+def test_a_range_holds_the_value_of_its_case_which_points_of_sweeps_may_leave() -> None:
+    tables = {**GLASS, "uncertain": {"contact.friction.bead_wall": [0.4, 0.6]}}
+    with pytest.raises(InputError, match=r"^<case>: uncertain\.contact\.friction\.bead_wall: expected .* value, 0\.3$"):
+        load_case(tables)
+    assert load_case(tables, {"contact.friction.bead_wall": 0.4}).contact.friction.bead_wall == 0.4
+    assert Case.read(tables).contact.friction.bead_wall == 0.3
+
+
 def test_a_changed_value_is_validated_like_a_file() -> None:
     case = load_case("fig1b", {"drive.frequency": "70 Hz"})
     assert case == Case.read(case.document, name="fig1b")
@@ -137,42 +147,88 @@ def test_a_changed_value_is_validated_like_a_file() -> None:
             load_case("fig1b", changes)
         assert told in str(caught.value)
     with pytest.raises(InputError, match=r"clusters is a list: say which one, such as clusters\[0\]"):
-        changed({"clusters": [{}]}, {"clusters.angle": "45 deg"})
+        changed(Case, {"clusters": [{}]}, {"clusters.angle": "45 deg"})
     # What says the same in other words goes, in one of several harmonics as well.
     assert load_case("fig1b", {"drive.gamma0": 0.5}).drive.peak_acceleration > 50.0
     harmonic = {"drive.harmonics[0].peak_acceleration": "4 g"}
-    assert changed({"drive": {"harmonics": [{"gamma0": 1.0}]}}, harmonic)["drive"]["harmonics"] == [
-        {"peak_acceleration": "4 g"}
-    ]
+    tables = changed(Case, {"drive": {"harmonics": [{"gamma0": 1.0}]}}, harmonic)
+    assert tables["drive"]["harmonics"] == [{"peak_acceleration": "4 g"}]
 
 
-def test_a_case_changed_after_it_was_read_tells_nothing_of_its_values(tmp_path: Path) -> None:
-    """What its file says is not so any more: neither where values come from, nor the file in an archive."""
+def test_a_case_is_changed_as_its_file_would_be(tmp_path: Path) -> None:
+    """All values follow, with their origins; the case itself stays as it was."""
     case = load_case("fig1b", {"run.cycles": 2, "run.settling_cycles": 0, "dimers.replicates": 1})
-    changed = replace(case, contact=replace(case.contact, friction_bead_wall=0.5))
-    assert case.origins
-    assert changed.origins == ()
-    assert changed.as_dict()["document"] == {}
-    assert case.for_cycles(2).origins == case.origins
-    assert case.renamed("other").origins == case.origins
+    faster = case.changed({"drive.frequency": "120 Hz", "contact.friction.bead_wall": 0.5, "liquid.name": "Si AK10"})
+    assert (case.drive.frequency, case.changed({})) == (80.0, case)
+    assert (faster.drive.frequency, faster.contact.friction.bead_wall, faster.name) == (120.0, 0.5, "fig1b")
+    assert faster.run.period == pytest.approx(1.0 / 120.0, rel=1e-12)
+    assert faster.liquid.dynamic_viscosity == pytest.approx(9.3e-3)
+    assert origins(faster)["contact.friction.bead_wall"].word == "given"
+    assert faster.document["drive"]["frequency"] == "120 Hz"
+    assert case.for_cycles(2).origins == case.but(name="other").origins == case.origins
+    with pytest.raises(InputError, match=r'fig1b: --set drive\.frequency = "80 mm": expected a frequency'):
+        case.changed({"drive.frequency": "80 mm"})
+    # Values that are put in without validation do not run with the steps of others.
+    with pytest.raises(InputError, match=r"drive.frequency = 120 Hz: time step and sampling are of 80 Hz"):
+        walkers.run(case.put("drive.frequency", 120.0), tmp_path)
+    with pytest.raises(InputError, match=r"run.time_step = .* limit of the case as changed"):
+        walkers.run(case.put("contact.youngs_modulus", 1e10), tmp_path)
+
+
+def test_a_case_may_be_a_dictionary() -> None:
+    case = load_case(REFERENCE)
+    assert (case, case.name) == (Case.read(REFERENCE), "case")
+    assert load_case(REFERENCE, {"drive.frequency": "70 Hz"}).drive.frequency == 70.0
+    with pytest.raises(InputError, match=r'^<case>: drive\.frequency = "80": expected a frequency with its unit'):
+        load_case(document(drive={"frequency": "80"}))
+
+
+def test_a_case_shows_what_is_given_and_where_the_rest_is_from() -> None:
+    case = load_case("fig1b", {"title": "<1b>"})
+    assert repr(case).startswith("<Case fig1b: ")
+    assert "drive.frequency = 80 Hz" in repr(case)
+    assert "density" not in repr(case)
+    shown = case._repr_html_()
+    assert "<caption>&lt;1b&gt;</caption>" in shown
+    assert "<tr><td>drive.frequency</td><td>80 Hz</td><td>given</td><td></td></tr>" in shown
+    assert re.search(r"<td>beads.density</td><td>4.0 g/cm\^3</td><td>library</td><td>\w", shown)
+
+
+HARMONICS = [{"frequency": "80 Hz", "gamma0": 0.2}, {"frequency": "120 Hz", "peak_acceleration": "1 g", "axis": "y"}]
+ODD: dict[str, dict[str, Any]] = {
+    "harmonics": {"drive": {"harmonics": HARMONICS}},
+    "aslant": {"drive": {**REFERENCE["drive"], "axis": [1, 0, 2], "waveform": "sawtooth", "phase": "10 deg"}},
+    "places": {"clusters": [{"diameters": ["0.6 mm", "0.4 mm"], "at": [["0.2 mm", "0 mm"], ["-0.29 mm", "0 mm"]]}]},
+    "mean": {"dimers": {"mean_radius": "0.25 mm", "sin_delta": 0.2, "gap": "auto"}, "run": {"cycles": "auto"}},
+    "placed": {"placed": [{"diameter": "2 mm", "at": ["19 mm", "0 mm", "1 mm"]}], "run": {"duration": "0.1 s"}},
+    "uncertain": {"uncertain": {"dimers.radii[1]": ["0.1 mm", "0.3 mm"], "contact": {"restitution": [0.2, 0.4]}}},
+    "slope": {"boundary": {"material": "glass", "tilt": "20 deg", "uphill": "180 deg"}},
+}
+
+
+@pytest.mark.parametrize("name", [*sorted(shipped("case")), *ODD])
+def test_a_case_is_kept_as_json(name: str) -> None:
+    """With all of its values, where they are from, and its file."""
+    case = Case.read({**document(), **ODD[name]}, name=name) if name in ODD else load_case(name)
     again = Case.from_dict(json.loads(json.dumps(case.as_dict())))
-    assert again.as_read
-    for damaged in ([], {**case.as_dict(), "document": 3}, {**case.as_dict(), "origins": [{"key": 1}]}):
+    assert (again, again.name, again.document) == (case, case.name, case.document)
+    assert again.determinants() == case.determinants()
+    assert again.origins == case.origins
+    assert [one.value for one in again.origins] == [one.value for one in case.origins]
+
+
+def test_damaged_json_is_no_case() -> None:
+    kept = load_case("fig1b").as_dict()
+    run = {key: value for key, value in kept["run"].items() if key != "time_step"}
+    for damaged in (
+        [],
+        {**kept, "document": 3},
+        {**kept, "sources": {"key": 1}},
+        {**kept, "beads": {}},
+        {**kept, "run": [run]},
+    ):
         with pytest.raises(ValueError, match=":"):
             Case.from_dict(damaged)  # type: ignore[arg-type]
-    assert [one.text for one in again.origins] == [one.text for one in case.origins]
-    assert replace(again, gravity=0.0).origins == ()
-    with pytest.raises(InputError, match="changed after it was read"):
-        spread_sweep(changed)
-    faster = replace(case.drive, harmonics=(replace(case.excitation.largest, frequency=120.0),))
-    with pytest.raises(ValueError, match=r'120 Hz, but time step and sampling of one of 80 Hz: use load_case\("fig1b"'):
-        replace(case, drive=faster)
-    stiff = replace(case, contact=replace(case.contact, youngs_modulus=1e10))
-    with pytest.raises(InputError, match=r"run.time_step = .* limit of the case as changed"):
-        walkers.run(stiff, tmp_path)
-    done = walkers.run(changed, tmp_path)
-    assert done.result["rests_on"] == []
-    assert done.case.document == {}
 
 
 def test_what_is_called_uncertain_keeps_where_it_comes_from(tmp_path: Path) -> None:
@@ -208,7 +264,7 @@ def test_settings_are_read_as_a_file_would() -> None:
 
 def test_set_on_the_command_line() -> None:
     shown = json.loads(call("show", "fig1b", "--set", "drive.frequency=70Hz", "--json", check=True).stdout)
-    assert shown["case"]["drive"]["harmonics"][0]["frequency"] == 70.0
+    assert shown["case"]["drive"]["frequency"] == 70.0
     (given,) = [one for one in shown["case"]["origins"] if one["key"] == "drive.frequency"]
     assert {"text": "70Hz", "value": 70.0, "origin": "given"}.items() <= given.items()
     text = call("show", "fig1b", check=True).stdout
@@ -233,7 +289,7 @@ def test_names_and_what_no_law_asks_for_do_not_determine_a_run() -> None:
         beads={"material": "rubies", "density": "4.0 g/cm^3"},
         boundary={"material": "chromium"},
         liquid={"surface_tension": "19.2 mN/m", "dynamic_viscosity": "4.6 mPa*s"},
-        run={"settled_below": "1 mm/s", "silence": "20 s"},
+        run={"settled_below": "1 mm/s"},
     )
     del tables["liquid"]["name"]
     named = Case.read(tables)

@@ -12,10 +12,12 @@ import tomllib
 import venv
 import zipfile
 from collections.abc import Callable, Iterable
+from graphlib import TopologicalSorter
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import grimp
 import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
@@ -207,6 +209,12 @@ def test_every_package_of_the_tests_is_pinned() -> None:
     pinned = {canonicalize_name(line.partition("==")[0]) for line in lines}
     assert all("==" in line for line in lines)
     assert not closure([*PROJECT["dependencies"], *OPTIONAL["dev"]]) - pinned
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    """Imports inside of functions count, those for types alone do not. The error names the circle."""
+    graph = grimp.build_graph("walkers", exclude_type_checking_imports=True)
+    TopologicalSorter({one: graph.find_modules_directly_imported_by(one) for one in graph.modules}).prepare()
 
 
 def test_faults_to_plant_are_in_the_code_once_and_name_tests_that_are_there() -> None:

@@ -105,15 +105,16 @@ def test_progress_is_plain_lines_without_a_terminal(in_folder: Path, monkeypatch
     assert "\x1b" not in done.stderr
 
 
-@pytest.mark.parametrize("kind", ["walker", "cluster", "tray", "pile"])
+@pytest.mark.parametrize("name", ["fig1b", "climber", "cluster", "tray", "pile-small"])
 def test_a_new_case_runs_and_its_lines_that_are_commented_out_say_what_holds_without_them(
-    kind: str, in_folder: Path
+    name: str, in_folder: Path
 ) -> None:
-    assert call("new", "mine", "--kind", kind, check=True).stdout == "mine.toml\n"
-    short = ["--set", "run.duration=0.05s"] if kind in ("tray", "pile") else []
-    short += ["--set", "run.longest_settling=0s"] if kind == "pile" else []
-    assert "mine: 170 Hz" if kind == "pile" else "mm/s" in call("run", "mine", *short, check=True).stdout
+    assert call("new", "mine", *([] if name == "fig1b" else [name]), check=True).stdout == "mine.toml\n"
     text = Path("mine.toml").read_text()
+    assert text == shipped("case")[name].read_text()
+    short = {"run.duration": "0.05 s", "run.longest_settling": "0 s"} if "duration" in text else {}
+    case = load_case("mine", short)
+    assert "mine: 170 Hz" if case.loose else "mm/s" in call("run", "mine", *settings(short), check=True).stdout
     table, tried = "", 0
     for head, key, value in re.findall(r"(?m)^(?:(?:# )?\[+(\w+)\]+.*|# ([\w.]+) *= *(.+?)(?: *#.*)?)$", text):
         table = {"clusters": "clusters[0]"}.get(head, head) or table
@@ -123,8 +124,21 @@ def test_a_new_case_runs_and_its_lines_that_are_commented_out_say_what_holds_wit
             assert re.sub(r"(\.\d{12})\d+", r"\1", said) == re.sub(r"(\.\d{12})\d+", r"\1", without), key
             tried += 1
     assert tried >= 3
-    call("new", "copy.toml", "--from", "climber", check=True)
-    assert Path("copy.toml").read_text() == shipped("case")["climber"].read_text()
+
+
+def settings(changes: dict[str, str]) -> list[str]:
+    return [word for key, value in changes.items() for word in ("--set", f"{key}={value}")]
+
+
+def test_a_new_case_is_a_copy_of_a_shipped_one_and_replaces_no_file(in_folder: Path) -> None:
+    refused = call("new", "mine", "fig1")
+    assert (refused.returncode, refused.stderr.count("\n")) == (2, 1)
+    assert "fig1: expected one of climber-dimer, climber, cluster, fig1b, " in refused.stderr
+    assert 'did you mean "fig1b"?' in refused.stderr
+    Path("mine.toml").write_text("mine")
+    assert "mine.toml: exists already" in call("new", "mine", "--schema").stderr
+    assert [path.name for path in in_folder.iterdir()] == ["mine.toml"]
+    assert Path("mine.toml").read_text() == "mine"
 
 
 # --- help, version, completion ----------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext, suppress
 from dataclasses import replace
+from math import isclose
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -84,6 +85,9 @@ def run(
     if exceeded := [] if case.run.allow_unstable else limits_of(case).exceeded_by(case.run.time_step):
         message = f"beyond the {' and the '.join(exceeded)} limit of the case as changed: use case.changed(changes)"
         raise InputError(case.name, [Problem("run.time_step", f"{case.run.time_step:.3g} s", message)])
+    if not isclose(case.run.period * case.excitation.frequency, 1.0, rel_tol=1e-9):
+        message = f"time step and sampling are of {1.0 / case.run.period:g} Hz: use case.changed(changes)"
+        raise InputError(case.name, [Problem("drive.frequency", f"{case.excitation.frequency:g} Hz", message)])
     binary = find_engine(engine)
     place = run_place(case, binary, out)
     if finished_run(place) is not None and not force:

@@ -7,27 +7,25 @@ They are tracked, so that they can be read without a build, which writes them to
 
 from __future__ import annotations
 
-import inspect
 import json
 import re
 import types
 from collections.abc import Iterator, Mapping, Sequence
 from math import hypot
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BeforeValidator
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticUndefined
 from typer.main import get_command
-from walkers.inputs.catalogue import COMMANDS, NOT_KNOWN, catalogue
-from walkers.physics.units import ABSENT, ACCELERATION, AUTO, AUTO_FAR, TEMPERATURE, Kind, quantity_text
 
+from walkers.commands.catalogue import COMMANDS, NOT_KNOWN, catalogue
+from walkers.inputs.case import Case
 from walkers.inputs.library import Known
 from walkers.inputs.numerical import measured
 from walkers.inputs.resolving import SUPPLIED
-from walkers.inputs.schema import CaseFile, fields_of
-from walkers.inputs.toml import read_toml
+from walkers.inputs.table import Table, example_of, keys_in, table_in
+from walkers.inputs.units import ACCELERATION, AUTO, TEMPERATURE, Kind, kind_in, quantity_text
 from walkers.main import _program
 from walkers.postprocess.analysis import analyses
 from walkers.postprocess.tables import described
@@ -37,10 +35,9 @@ if TYPE_CHECKING:
     from sphinx.application import Sphinx
     from sphinx.config import Config
 
-MEANINGS = Path(__file__).with_name("meanings.toml")
 FOLDER = Path(__file__).parents[1] / "reference" / "generated"
 
-_BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
+_BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤", "min_length": "length ≥", "max_length": "length ≤"}
 _AT_REST = 1e-6  # m/s
 _PAGE = re.compile(r"docs/(\S+?\.md)")
 
@@ -59,17 +56,6 @@ def _described(columns: Mapping[str, tuple[str, str]]) -> str:
 # --- keys of a case file ----------------------------------------------------------------------------------------------
 
 
-def _parts(hint: Any) -> Iterator[Any]:
-    """A type hint and all that is in it, what annotates it included."""
-    yield hint
-    for part in get_args(hint):
-        yield from _parts(part)
-
-
-def _tables_in(hint: Any) -> list[type]:
-    return [part for part in _parts(hint) if inspect.isclass(part) and fields_of(part)]
-
-
 def _expected(hint: Any) -> str:
     """What a key expects, in the words of the message that a wrong value gets."""
     if get_origin(hint) is Annotated:
@@ -81,29 +67,25 @@ def _expected(hint: Any) -> str:
             for name, sign in _BOUNDS.items()
             if isinstance(getattr(one, name, None), (int, float))
         )
-        expected = next(
-            (_refusal(note) for note in notes if isinstance(note, (BeforeValidator, Kind)) and note != AUTO), None
-        )
-        expected = expected or _expected(inner)
-        expected += ', or `"auto"`' if AUTO in notes or AUTO_FAR in notes else ""
+        refusals = (_refusal(note) for note in notes if isinstance(note, (BeforeValidator, Kind)))
+        expected = next(refusals, None) or _expected(inner)
+        expected += ', or `"auto"`' if AUTO in notes else ""
         return f"{expected}; {bounds}" if bounds else expected
     if get_origin(hint) is Literal:
         return "one of " + ", ".join(f'`"{one}"`' for one in get_args(hint))
     if get_origin(hint) in (Union, types.UnionType):
         return " or ".join(_expected(one) for one in get_args(hint) if one is not types.NoneType)
-    if get_origin(hint) in (list, tuple):
-        parts = list(dict.fromkeys(_expected(one) for one in get_args(hint) if one is not ...))
-        return f"a list, each {' or '.join(parts)}"
-    if get_origin(hint) is dict:
-        return "a table"
+    if get_origin(hint) is tuple:
+        number = "" if ... in get_args(hint) else f" of {len(get_args(hint))}"
+        return f"a list{number}, each {_expected(get_args(hint)[0])}"
     words = {str: "text", bool: "true or false", int: "a whole number", float: "a plain number without a unit"}
-    return words.get(hint, getattr(hint, "__name__", str(hint)))
+    return words.get(hint, "a table")
 
 
 def _refusal(validator: BeforeValidator | Kind) -> str | None:
     if isinstance(validator, Kind):
         low, high = (_in_unit(end, validator) for end in (validator.smallest, validator.largest))
-        words = validator.expectation.removeprefix("expected ")
+        words = validator.expectation.removeprefix("expected ").partition(", such as")[0]
         if validator.unit == "rad" and validator.largest > 10.0:  # any angle
             return words
         either = "" if validator.sign or validator.unit == TEMPERATURE.unit else " in absolute value"
@@ -121,69 +103,45 @@ def _in_unit(value: float, kind: Kind) -> str:
     return f"{float(f'{float(number):.4g}'):g} {unit}"
 
 
-def _default(field: FieldInfo, hint: Any) -> str:
+def _default(field: FieldInfo) -> str:
     """The default in the units of the messages, where a value has a unit."""
-    if field.default is PydanticUndefined:
+    if field.is_required() or field.default in (None, "", (), {}):
         return "required" if field.is_required() else ""
-    if field.default is None or fields_of(type(field.default)) or field.default in ABSENT:
-        return ""
-    kind = next((one for one in _parts(hint) if isinstance(one, Kind)), None)
-    if isinstance(field.default, float) and kind:
-        return f"`{_in_unit(field.default, kind)}`"
-    return f"`{json.dumps(field.default)}`" if field.default != {} else ""
+    kind = kind_in([*field.metadata, field.annotation])
+    return f"`{_in_unit(field.default, kind)}`" if kind else f"`{json.dumps(field.default)}`"
 
 
-def _meanings() -> dict[str, str]:
-    """What each key means, by its dotted name; clusters have the keys of dimers."""
-    contents = read_toml(MEANINGS)
-    found = {key: text for key, text in contents.items() if isinstance(text, str)}
-    for table, entries in contents.items():
-        if isinstance(entries, dict):
-            found |= {f"{table}.{key}": text for key, text in entries.items()}
-    return found
+def _row(name: str, field: FieldInfo, *, supplied: bool) -> tuple[str, str, str, str]:
+    """Key, meaning, what it expects with an example, default."""
+    example = example_of(field)
+    expected = _expected(Annotated[field.annotation, *field.metadata, "at least one annotation"])
+    expected += f"; {example}" if example.startswith("such as") and example not in expected else ""
+    return f"`{name}`", str(field.description), expected, "from the library" if supplied else _default(field)
 
 
-def _tables_of_keys() -> Iterator[tuple[str, dict[str, tuple[Any, FieldInfo]]]]:
-    """The tables of a case file: heading and keys, each with its type hint and field."""
-
-    def tables(model: type, name: str) -> Iterator[tuple[str, dict[str, tuple[Any, FieldInfo]]]]:
-        hints = get_type_hints(model, include_extras=True)
-        fields = {key: (hints[name], field) for key, (name, field) in fields_of(model).items()}
-        yield name, {key: (hint, field) for key, (hint, field) in fields.items() if not _tables_in(hint)}
-        for key, (hint, _) in fields.items():
-            for inner in _tables_in(hint)[:1]:
-                path = f"{name.strip('[]')}.{key}".strip(".")
-                yield from tables(inner, f"[[{path}]]" if list in map(get_origin, _parts(hint)) else f"[{path}]")
-
-    return tables(CaseFile, "")
-
-
-def key_rows() -> dict[str, list[tuple[str, str, str, str]]]:
-    """The keys of a case file by table: key, meaning, what it expects, default. `KeyError` if one has no meaning."""
-    meanings, found = _meanings(), {}
-    for name, fields in _tables_of_keys():
-        bare = name.strip("[]")
-        rows = []
-        for key, (hint, field) in fields.items():
-            path = f"{bare}.{key}".strip(".").replace("clusters.", "dimers.").replace("drive.harmonics.", "drive.")
-            default = "from the library" if f"{bare}.{key}" in SUPPLIED else _default(field, hint)
-            rows.append((f"`{key}`", meanings[path], _expected(hint), default))
-        found[name] = rows
-    return found
+def tables_of_keys(model: type[Table] = Case, place: str = "") -> Iterator[tuple[str, str]]:
+    """Tables of a case file: heading, and its keys as a table of Markdown with what excludes what."""
+    fields = keys_in(model)
+    below = {name: table_in(field.annotation) for name, field in fields.items()}
+    path = f"{place.strip('[]')}.".lstrip(".")
+    keys = [name for name in fields if not below[name]]
+    rows = (_row(name, fields[name], supplied=f"{path}{name}" in SUPPLIED) for name in keys)
+    text = _table(["key", "meaning", "expects", "default"], rows)
+    for choice in model.choices:
+        ways = "; ".join(" and ".join(f"`{name}`" for name in way) for way in choice.ways)
+        needed = choice.required and not any(f"{path}{name}" in SUPPLIED for way in choice.ways for name in way)
+        text += f"\n{'Exactly' if needed else 'At most'} one of: {ways}.\n"
+    yield place or "Top level", text
+    for name, inner in below.items():
+        if inner:
+            several = "tuple" in str(fields[name].annotation)
+            yield from tables_of_keys(inner, f"[[{path}{name}]]" if several else f"[{path}{name}]")
 
 
 def _keys() -> str:
     """Keys of case files and columns of tables, read off the declarations that the program itself uses."""
-    text = ["# Keys and columns\n\n## Keys of a case file\n\n`walkers show CASE` prints every value.\n"]
-    listed = key_rows()
-    for name, rows in listed.items():
-        if name == "[[clusters]]":
-            text.append("\n### [[clusters]]\n\nThe keys of `[dimers]`.\n")
-        elif rows:
-            text.append(
-                f"\n### {name or 'Top level'}\n\n{_table(['key', 'meaning', 'expects', 'default'], iter(rows))}"
-            )
-    return "".join(text) + _columns()
+    text = "# Keys and columns\n\n## Keys of a case file\n\n`walkers show CASE` prints every value.\n"
+    return text + "".join(f"\n### {place}\n\n{table}" for place, table in tables_of_keys()) + _columns()
 
 
 def _columns() -> str:

@@ -140,7 +140,8 @@ def _write(archive: zipfile.ZipFile, item: Item, moment: tuple[int, ...]) -> Non
 
 
 def _preview(contents: Contents, options: ArchiveOptions) -> bytes:
-    from walkers.postprocess.analysis import describe_result, read_result
+    from walkers.postprocess.analysis import describe_result
+    from walkers.runner.manifest import read_result
     from walkers.sweeps.table import load, short_text
 
     first = contents.runs[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from typer import Argument, Option
 
@@ -34,7 +34,7 @@ from walkers.completion import offering
 _MANY = 10_000
 """Number of points that take seconds to resolve."""
 _NAME = "Name of the case; the file is NAME.toml."
-_FROM = "Copy this shipped case, such as pile-small (list: walkers library)."
+_COPIED = "Shipped case to copy: fig1b (a walker), climber, cluster, tray, pile-small, ... (list: walkers library)."
 _OFFERED = offering("case", "run")
 _CASES = "Case files, names of shipped cases, or runs (name or folder)."
 _LIMIT = "Time limit in s for each run; for piles, for each segment."
@@ -44,14 +44,13 @@ _SWEEP_FILE = "A sweep file, or the name of a shipped sweep such as fig2."
 
 def new(
     name: str = Argument(metavar="NAME", help=_NAME),
-    kind: Literal["walker", "cluster", "tray", "pile"] = Option("walker", help="Kind of simulation."),
-    source: str | None = Option(None, "--from", metavar="CASE", help=_FROM, autocompletion=offering("case")),
+    case: str = Argument("fig1b", metavar="CASE", help=_COPIED, autocompletion=offering("case")),
+    schema: bool = Option(False, "--schema", help="Also write case.schema.json, which editors use."),
 ) -> None:
     """Write a commented case file as a starting point."""
-    from walkers.inputs.beginning import write_case
+    from walkers.new import write_case
 
-    refuse("--kind", source is not None and kind != "walker", "has no meaning with --from")
-    print(write_case(Path(name), kind, source))
+    print(*write_case(Path(name), case, schema=schema), sep="\n")
 
 
 def show(

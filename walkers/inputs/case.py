@@ -26,7 +26,7 @@ from walkers.inputs.keys import MISSING, flatten, parts_of, value_at
 from walkers.inputs.library import library_of
 from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
 from walkers.inputs.origins import Origin, Source, Whence, text_of
-from walkers.inputs.resolving import SUPPLIED, resolve, supplied
+from walkers.inputs.resolving import NAMES, SUPPLIED, resolve, supplied
 from walkers.inputs.run import Run
 from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Table, changed, contradictions, key
 from walkers.inputs.units import Coefficient, Number, kind_in
@@ -61,7 +61,7 @@ class Liquid(Table):
     bridges. ``law`` is the bridge law: one of `walkers.physics.laws`, or your own function, ``file.py:function``.
     """
 
-    choices: ClassVar = (Choice((("dynamic_viscosity",), ("kinematic_viscosity",))),)
+    choices: ClassVar = (Choice((("dynamic_viscosity",), ("kinematic_viscosity",)), instead="a liquid of the library"),)
     name: Annotated[str | None, SAME_RUN] = key(
         "Liquid from the library. The other keys override its values.", None, "Si AK5"
     )
@@ -212,10 +212,6 @@ class Case(Table):
             and not run.keys() & {"duration", "cycles"}
         ):
             yield Problem("run.duration", None, 'missing; expected such as "4 s"')
-        if isinstance(drive := given.get("drive"), Mapping) and drive.get("harmonics"):
-            for name in sorted(drive.keys() - {"harmonics", "frame"}):
-                instead = f": write drive.harmonics[0].{name}" if name != "waveform" else ""
-                yield Problem(f"drive.{name}", None, f"expected none beside drive.harmonics{instead}")
         yield from super().problems(given, place)
 
     @cached_property
@@ -250,9 +246,10 @@ class Case(Table):
             tables, sources, unknown = supplied(document, library_of(document, source))
             try:
                 case = validated(cls, tables, source, further=[*unknown, *contradictions(cls, tables)])
-            except InputError as error:  # what an unknown name would have given is not missing too
-                problems = [one for one in error.problems if not (unknown and one.key in SUPPLIED and not one.value)]
-                raise InputError(source, problems or unknown) from error
+            except InputError as error:  # what a wrong name would have given is not missing too
+                wrong = {one.key for one in error.problems if one.value} & {*NAMES}
+                problems = [one for one in error.problems if not (wrong and one.key in SUPPLIED and not one.value)]
+                raise InputError(source, problems) from error
             try:
                 case = resolve(case.but(name=name, document=dict(document), sources=sources))
             except ArithmeticError as error:

@@ -5,7 +5,7 @@ The cycle of a drive is the common period of its sines; its peak acceleration, a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -14,6 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
+from walkers.errors import Problem
 from walkers.inputs import units
 from walkers.inputs.table import SAME_RUN, Choice, Filled, Table, key
 from walkers.inputs.units import Angle, Coefficient
@@ -36,7 +37,7 @@ MOST_PERIODS = 1000
 
 def _axis(value: object) -> object:
     """An axis by its name, or a direction by its components."""
-    if value in ("x", "y", "z", None):
+    if value in (None, "x", "y", "z"):
         return value
     if isinstance(value, (list, tuple)) and len(value) == 3 and any(value):
         numbers = tuple(float(one) for one in value if type(one) in (int, float) and isfinite(one))
@@ -52,7 +53,7 @@ class Harmonic(Table):
     """One of ``[[drive.harmonics]]``; exactly one of ``peak_acceleration`` and ``gamma0``."""
 
     choices: ClassVar[tuple[Choice, ...]] = (Choice((("peak_acceleration",), ("gamma0",))),)
-    axis: Annotated[Any, BeforeValidator(_axis), WithJsonSchema(_AXIS)] = key(
+    axis: Filled[Annotated[Any, BeforeValidator(_axis), WithJsonSchema(_AXIS)]] = key(
         "Direction of the shaking. Default: `x`; in containers `z`.",
         None,
     )
@@ -93,6 +94,16 @@ class Drive(Harmonic):
         "container",
     )
     harmonics: Annotated[tuple[Harmonic, ...], Field(max_length=24)] = key("Several harmonics.", ())
+
+    @classmethod
+    def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
+        """Keys of a single harmonic beside several, or what every table lacks or says twice."""
+        if not given.get("harmonics"):
+            yield from super().problems(given, place)
+            return
+        for name in sorted(given.keys() & Harmonic.model_fields.keys() | given.keys() & {"waveform"}):
+            instead = f": write {place}.harmonics[0].{name}" if name != "waveform" else ""
+            yield Problem(f"{place}.{name}", None, f"expected none beside {place}.harmonics{instead}")
 
     @cached_property
     def excitation(self) -> Excitation:

@@ -27,7 +27,7 @@ class Sourced(Table, Generic[Q]):
     """``{ value = …, source = "…" }``: a number of a library, and both ends of where it can lie if it is uncertain."""
 
     value: Q
-    source: Text
+    source: Text = Field(examples=["weighed"])
     range: tuple[Q, Q] | None = None
 
     @field_validator("range")

@@ -16,7 +16,7 @@ from pydantic_core import ErrorDetails
 from walkers.errors import InputError, Problem, shown, suggestion, unusable
 from walkers.inputs.keys import MISSING, joined, parts_of, value_at
 from walkers.inputs.table import Table, example_of, keys_in
-from walkers.inputs.units import AUTO, WRITTEN, shown_in_file
+from walkers.inputs.units import AUTO, WRITTEN
 
 File = TypeVar("File", bound=BaseModel)
 
@@ -103,23 +103,23 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
     parts: tuple[str | int, ...] = location[:-1] if of_list else location
     key, field = joined(parts), _field_at(file, parts)
     example = example_of(field) if field else "a value"
+    such = f", {example}" if example.startswith("such as") else ""
     if kind == "extra_forbidden":
         message = _unknown_key([str(part) for part in location if isinstance(part, str)], file, whole)
     elif of_list or kind in ("too_long", "too_short"):
         value = value_at(document, parts_of(key))
         number = len(value) if isinstance(value, list) else 0
-        message = f"has {number} values; expected {_many(field, context)}{example}"
+        bound = str(location[-1] + 1) if of_list else _bound(context)  # type: ignore[operator]
+        message = f"has {number} value{'s' * (number != 1)}; expected {bound}{such}"
     elif kind == "missing":
-        message = f"missing; expected {example}{_elsewhere(parts, field)}"
+        message = f"missing; expected {_in_a_table(parts, field) or example}{_elsewhere(parts)}"
     else:
         form = _SENTENCES.get(kind, "expected {example}")
         message = form.format(**{"example": example, "key": key, **context})
         if kind == "literal_error":
             message += suggestion(str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"])))
-        elif kind in ("list_type", "tuple_type") and field and field.examples:
-            message = f"expected a list, {example}"
-        elif kind in ("list_type", "tuple_type") and field and _table_in(field.annotation)[0]:
-            message = f"expected tables [[{key}]]"
+        elif kind in ("list_type", "tuple_type") and field:
+            message = f"expected tables [[{key}]]" if _table_in(field.annotation)[0] else f"expected a list{such}"
         elif kind in ("model_type", "dict_type") and str(context.get("class_name", "")).startswith("Sourced"):
             message = 'expected { value = ..., source = "..." }'
         if field and AUTO in field.metadata and kind != "value_error":
@@ -127,31 +127,29 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
     return Problem(key, quoted(document, parts_of(key)), message)
 
 
-def _many(field: FieldInfo | None, context: Mapping[str, Any]) -> str:
-    """How many values a list has: ``2, ``."""
-    if "max_length" in context:
-        return f"at most {context['max_length']}, "
-    if "min_length" in context:
-        return f"at least {context['min_length']}, "
-    return f"{len(field.examples[0])}, " if field and field.examples else ""
+def _bound(context: Mapping[str, Any]) -> str:
+    """How many values a list may have: ``at most 2``."""
+    return f"at most {context['max_length']}" if "max_length" in context else f"at least {context['min_length']}"
 
 
-def _elsewhere(parts: Sequence[str | int], field: FieldInfo | None) -> str:
-    """What else may give a key: a name that the library knows; or how a table begins."""
-    if field is not None and (table := _table_in(field.annotation)[0]) is not None:
-        return f": a table [{joined(parts)}]{_first_key(table)}"
+def _elsewhere(parts: Sequence[str | int]) -> str:
+    """What else may give a key: a name that the library knows."""
     return f", or {known} of the library" if (known := _GIVEN_ELSEWHERE.get(str(parts[0]))) and len(parts) > 1 else ""
 
 
-def _first_key(table: type[BaseModel]) -> str:
-    name, field = next(((name, one) for name, one in keys_in(table).items() if one.examples), ("", None))
-    return f", such as {name} = {shown_in_file(field.examples[0])}" if field and field.examples else ""
+def _in_a_table(parts: Sequence[str | int], field: FieldInfo | None) -> str:
+    """How a table begins; empty for other keys."""
+    table = _table_in(field.annotation)[0] if field else None
+    texts = {name: example_of(one).partition("such as ")[2] for name, one in keys_in(table).items()} if table else {}
+    such = next((f", such as {name} = {text}" for name, text in texts.items() if text), "")
+    return f"a table [{joined(parts)}]{such}" if table else ""
 
 
 def _field_at(file: type[BaseModel], parts: Sequence[str | int]) -> FieldInfo | None:
     """The field of a key of a file; None if it has none."""
     model: type[BaseModel] | None = file
-    field, named = None, ""
+    field = None
+    named = ""
     for part in (part for part in parts if isinstance(part, str)):
         if named:  # a name of the user's
             named = ""

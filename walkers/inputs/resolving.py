@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
-from math import atan2, inf
+from math import atan2, dist, inf
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.errors import Problem, expected_of, shown, unusable
@@ -19,7 +19,7 @@ from walkers.inputs.library import Known, Library, unmeasured
 from walkers.inputs.loads import bridge_at_rest, contact_loads, dimer_of, reach
 from walkers.inputs.origins import Source
 from walkers.inputs.run import with_run
-from walkers.inputs.standing import OVERLAP, check_bodies
+from walkers.inputs.standing import OVERLAP, check_bodies, overlaps
 from walkers.inputs.units import TEMPERATURE, parse_quantity
 from walkers.physics.laws import LAWS
 from walkers.physics.liquid import DEFAULT_LAW
@@ -32,6 +32,8 @@ _PACKING = 0.55
 """Packing fraction of a settled wet pile, for the count that fills a height."""
 _FACING = {"up": "right", "down": "left"}
 """The words for climbers."""
+NAMES = ("beads.material", "boundary.material", "liquid.name")
+"""Keys whose values are names of the library."""
 _FRICTION = ("contact.friction.bead_bead", "contact.friction.bead_wall", "contact.rolling_friction")
 _OF_SURFACES = (
     *("liquid.viscosity_ratio", "liquid.volume_fraction", "liquid.contact_angle"),
@@ -60,8 +62,7 @@ def supplied(document: Mapping[str, Any], library: Library) -> Supplied:
     """The tables of a case with what they leave out and the library has of the materials and the liquid they name."""
     said = {key: value_at(document, parts_of(key)) for key in (*SUPPLIED, "liquid.law")}
     given = {key for key, value in said.items() if value is not MISSING}
-    keys = ("beads.material", "boundary.material", "liquid.name")
-    named = (value_at(document, parts_of(key)) for key in keys)
+    named = (value_at(document, parts_of(key)) for key in NAMES)
     bead, wall, liquid = (name if isinstance(name, str) else None for name in named)
     problems = list(_unknown(library, given, bead, wall, liquid))
     mixture, sources, problem = _mixture(document, liquid)
@@ -257,7 +258,8 @@ def _check_places(cluster: Cluster, key: str) -> None:
         raise unusable(key, f"expected a place for each of the {len(everyone)} beads")
     if overlapping := touching(places, cluster.radii, -OVERLAP):
         one, other = overlapping[0]
-        raise unusable(f"{key}[{other}]", f"overlaps with {key}[{one}]; expected beads that touch")
+        apart = dist(places[one], places[other]), cluster.rigid(one, other)
+        raise unusable(f"{key}[{other}]", overlaps(f"{key}[{one}]", *apart))
     if not any(cluster.front):
         raise unusable(key, "expected some beads ahead of others: this walker has no heading")
     joined = {0}

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import json
+import re
 from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
-from pydantic_core.core_schema import NullableSchema, WithDefaultSchema
+from pydantic_core.core_schema import NullableSchema, TupleSchema, WithDefaultSchema
 
 from walkers.inputs.case import Case
+
+_LINK = re.compile(r" See \[\]\(\S+\)\.")
+"""To a page, from the page of keys."""
 
 
 class _Generator(GenerateJsonSchema):
@@ -15,6 +20,13 @@ class _Generator(GenerateJsonSchema):
 
     def field_title_should_be_set(self, schema: Any) -> bool:  # noqa: ARG002
         return False
+
+    def tuple_schema(self, schema: TupleSchema) -> JsonSchemaValue:
+        """Lists of a fixed length whose entries are alike: older drafts, which editors read, know ``items`` alone."""
+        made = super().tuple_schema(schema)
+        if entries := made.pop("prefixItems", None):
+            made["items"] = entries[0]
+        return made
 
     def nullable_schema(self, schema: NullableSchema) -> JsonSchemaValue:
         return self.generate_inner(schema["schema"])
@@ -29,6 +41,7 @@ def case_schema() -> dict[str, Any]:
     It does not say what excludes what (`walkers.inputs.table.Choice`), nor what the library knows.
     """
     schema = Case.model_json_schema(schema_generator=_Generator)
+    schema = json.loads(_LINK.sub("", json.dumps(schema)))
     schema["properties"]["library"] = {"type": "object", "description": "Materials and liquids of the case itself."}
     for table in ("Beads", "Liquid", "Contact", "Friction"):  # the library may give what they lack
         schema["$defs"][table].pop("required", None)

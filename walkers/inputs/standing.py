@@ -233,9 +233,14 @@ def _check_overlaps(beads: list[_Held]) -> None:
         first, second = beads[one], beads[other]
         apart, touching = dist(first.place, second.place), first.radius + second.radius
         if apart < touching - OVERLAP * min(first.radius, second.radius):
-            by, expected = f"{1e3 * (touching - apart):.3g} mm", f"expected their centres {1e3 * touching:.4g} mm apart"
             if second.walker >= 0:
-                message = f"beads of two walkers would overlap at the start by {by}; expected more"
+                message = f"at their start angles, a bead {overlaps('one of another walker', apart, touching)}"
                 raise unusable(f"{second.key}.spacing", message)
             whom = first.key if first.walker < 0 else f"one of {first.key}"
-            raise unusable(f"{second.key}.at", f"overlaps with {whom} by {by}; {expected}, where they touch")
+            raise unusable(f"{second.key}.at", overlaps(whom, apart, touching))
+
+
+def overlaps(whom: str, apart: float, touching: float) -> str:
+    """A message about a bead at a distance (m) from another, which it touches at a larger distance (m)."""
+    by, expected = f"{1e3 * (touching - apart):.3g} mm", f"expected their centres {1e3 * touching:.4g} mm apart"
+    return f"overlaps with {whom} by {by}; {expected}, where they touch"

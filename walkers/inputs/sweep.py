@@ -62,10 +62,10 @@ class DescendTable(Table):
     """``[descend]``: a key that is lowered step by step until the walkers stop."""
 
     key: str = "drive.peak_acceleration"
-    start: Any = Field(alias="from")
-    to: Any
-    step: Any
-    until_below: Speed
+    start: Any = Field(alias="from", examples=["4 g"])
+    to: Any = Field(examples=["0.5 g"])
+    step: Any = Field(examples=["0.1 g"])
+    until_below: Speed = Field(examples=["0.02 mm/s"])
 
     def values(self) -> list[Value]:
         """From the start down."""
@@ -83,7 +83,7 @@ class SweepFile(Table):
     """A sweep file."""
 
     title: str = ""
-    case: str
+    case: str = Field(examples=["fig1b"])
     set: dict[str, Any] = Field({})
     axes: dict[str, Any] = Field({})
     zip: list[dict[str, Any]] = Field([])

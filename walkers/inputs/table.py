@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator, Mapping
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 from pydantic.fields import FieldInfo
@@ -23,6 +23,7 @@ from walkers.inputs.units import WRITTEN, is_auto, kind_in, shown_in_file
 T = TypeVar("T")
 SAME_RUN = "same run"
 """Annotation of a key: another value does not make another run, by itself."""
+_TYPES: Mapping[Any, str] = {str: "text in quotes", int: "a whole number", list: "a list", dict: "a table"}
 
 
 def _only_derived(value: object, info: ValidationInfo) -> object:
@@ -58,10 +59,11 @@ def key(meaning: str, default: Any = PydanticUndefined, example: Any = None, **b
 
 
 class Choice(NamedTuple):
-    """Keys of a table that say the same in other words: exactly one of the ways, or at most one."""
+    """Keys of a table that say the same in other words: exactly one of the ways, or at most one; or something else."""
 
     ways: tuple[tuple[str, ...], ...]
     required: bool = True
+    instead: str = ""
 
     @property
     def text(self) -> str:
@@ -149,10 +151,12 @@ class Table(BaseModel):
             said = [way for way in choice.ways if any(name in given and not is_auto(given[name]) for name in way)]
             if len(said) > 1:
                 name = next(name for name in said[1] if name in given)
-                yield Problem(joined([*parts_of(place), name]), None, f"expected either {choice.text}")
+                two = Choice(tuple(said[:2])).text
+                yield Problem(joined([*parts_of(place), name]), None, f"expected either {two}, not both")
             elif said or choice.required:
                 way = said[0] if said else choice.ways[0]
                 others = [other for other in choice.ways if other is not way] if not said else []
+                others += [(choice.instead,)] if choice.instead else []
                 instead = "".join(f", or {' and '.join(other)}" for other in others)
                 for name in way:
                     if name not in given:
@@ -187,23 +191,24 @@ def table_in(annotation: Any) -> type[Table] | None:
 
 
 def example_of(field: FieldInfo) -> str:
-    """An example of what a key takes: ``such as "80 Hz"``."""
+    """An example of what a key takes: ``such as "80 Hz"``; its type if the field has none."""
     if field.examples:
         return f"such as {shown_in_file(field.examples[0])}"
     kind = kind_in([*field.metadata, field.annotation])
-    return f'such as "{kind.example}"' if kind else "a value"
+    if kind:
+        return f'such as "{kind.example}"'
+    return _TYPES.get(get_origin(field.annotation) or field.annotation, "a value")
 
 
 def contradictions(model: type[Table], document: Any, place: str = "") -> Iterator[Problem]:
     """What the tables of a document say in no way, or in two (`Table.problems`)."""
     if not isinstance(document, Mapping):
         return
-    yield from model.problems(document, place)
-    for name in _tables_in(model).keys() & document.keys():
-        below, where = document[name], f"{place}.{name}".removeprefix(".")
+    yield from model.problems({name: value for name, value in document.items() if value != []}, place)
+    for name, inner in _tables_in(model).items():
+        below, where = document.get(name), f"{place}.{name}".removeprefix(".")
         for number, one in enumerate(below if isinstance(below, list) else [below]):
-            there = f"{where}[{number}]" if isinstance(below, list) else where
-            yield from contradictions(_tables_in(model)[name], one, there)
+            yield from contradictions(inner, one, f"{where}[{number}]" if isinstance(below, list) else where)
 
 
 def alternatives(model: type[Table], name: str) -> set[str]:
@@ -250,7 +255,7 @@ def _put(model: type[Table] | None, tables: dict[str, Any], name: str, value: An
             field = keys_in(model).get(part) if model and isinstance(part, str) else None
             model = table_in(field.annotation) if field else model if isinstance(part, int) else None
     last = parts[-1]
-    for ways, _ in model.choices if model else ():
+    for ways, *_ in model.choices if model else ():
         if any(last in way for way in ways):
             for other in {one for way in ways if last not in way for one in way}:
                 if joined([*parts[:-1], other]) not in changes:

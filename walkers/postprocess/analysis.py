@@ -27,7 +27,15 @@ from walkers.postprocess.uncertainty import bands_text, lines_of_rest, not_known
 from walkers.rounding import SHOWN_UNITS, rounded
 from walkers.runner.directory import SEGMENT_NAME, case_of, files_of_segments, segment_directories
 from walkers.runner.files import read_json, write_json
-from walkers.runner.manifest import MANIFEST_NAME, FileChanged, check_unchanged, forget_tables, record_tables
+from walkers.runner.manifest import (
+    MANIFEST_NAME,
+    RESULT_NAME,
+    FileChanged,
+    check_unchanged,
+    forget_tables,
+    read_result,
+    record_tables,
+)
 
 if TYPE_CHECKING:  # the progress of a sweep needs no numpy
     from matplotlib.figure import Figure
@@ -36,7 +44,6 @@ if TYPE_CHECKING:  # the progress of a sweep needs no numpy
     from walkers.postprocess.motion import Bridges, Motion
     from walkers.postprocess.tables import Columns
 
-RESULT_NAME = "result.json"
 Described = Mapping[str, tuple[str, str]]
 """Units and meanings of columns, by name."""
 
@@ -333,21 +340,6 @@ def tables_of(directory: Path) -> dict[str, Columns]:
         if intact(directory, names):
             return {name: read_columns(directory, name) for name in names}
     return _measured(directory)[1]
-
-
-def read_result(directory: str | Path) -> dict[str, Any]:
-    """The result of a run, as `tabulate` wrote it.
-
-    Raises
-    ------
-    OSError, ValueError
-        If it cannot be read.
-    runner.manifest.FileChanged
-        If it is not what it was when the run was finished.
-    """
-    result = read_json(Path(directory) / RESULT_NAME)
-    check_unchanged(Path(directory), [RESULT_NAME])
-    return result
 
 
 def current_result(directory: str | Path) -> dict[str, Any]:

@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from walkers.inputs.run import CONSTANT
-from walkers.postprocess.analysis import read_result
 from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
 from walkers.postprocess.motion import Group, Motion, read_motion
 from walkers.postprocess.sides import REST, SEPARATED, STEADY_SPEED
 from walkers.postprocess.tables import read_table
+from walkers.runner.manifest import read_result
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -129,7 +129,7 @@ def _numerical_error(directory: Path, velocity: float) -> dict[str, Any]:
 
     As long as one is missing, the changes of the case that make it, as ``checks``.
     """
-    from walkers.postprocess.analysis import read_result
+    from walkers.runner.manifest import read_result
 
     case = case_of(directory)
     engine = Engine(directory, read_json(directory / MANIFEST_NAME)["engine"]["sha256"])

@@ -18,6 +18,7 @@ from walkers.runner.provenance import software
 from walkers.templates.deck import CONTENT_VERSION
 
 MANIFEST_NAME = "manifest.json"
+RESULT_NAME = "result.json"
 FORMAT = 3
 _SMALL_BYTES = 8 << 20
 """Smaller amounts are hashed faster without threads."""
@@ -111,6 +112,21 @@ def check_unchanged(directory: Path, names: Collection[str]) -> bool:
                 message += f"; to measure the run again, delete the file and do: walkers run {directory}"
             raise FileChanged(f"{directory / name} {message}")
     return len(wanted) == len(names)
+
+
+def read_result(directory: str | Path) -> dict[str, Any]:
+    """The result of a run, of any version of its analyses.
+
+    Raises
+    ------
+    OSError, ValueError
+        If it cannot be read.
+    FileChanged
+        If it is not what it was when the run was finished.
+    """
+    result = read_json(Path(directory) / RESULT_NAME)
+    check_unchanged(Path(directory), [RESULT_NAME])
+    return result
 
 
 def _sums(contents: dict[str, Any], directory: Path) -> dict[str, str]:

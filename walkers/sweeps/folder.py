@@ -23,7 +23,6 @@ from typing import Any, Literal
 from walkers.errors import InputError, Problem, refused
 from walkers.inputs.case import Case
 from walkers.inputs.units import Kind, parse_quantity
-from walkers.postprocess.analysis import RESULT_NAME
 from walkers.postprocess.sides import REST, came_apart, of_tray, sides_apart, uphill_velocities
 from walkers.postprocess.uncertainty import SPREAD, SPREAD_NAME
 from walkers.rounding import counted, duration_text, rounded
@@ -38,7 +37,7 @@ from walkers.runner.directory import (
     recover,
 )
 from walkers.runner.files import read_json
-from walkers.runner.manifest import MANIFEST_NAME, FileChanged
+from walkers.runner.manifest import MANIFEST_NAME, RESULT_NAME, FileChanged, read_result
 from walkers.sweeps.making import progress_at
 from walkers.sweeps.readable import (
     FlatCase,
@@ -56,7 +55,6 @@ from walkers.sweeps.table import (
     RECORD_NAME,
     derived_columns,
     read_record,
-    recorded_result,
     result_columns,
     states,
     unfinished_state,
@@ -155,7 +153,7 @@ def _run(path: Path, now: float) -> Entry | None:
         return Entry(name, case_name, status, path, age, size, parameters, reason, state.message)
     given: dict[str, Any] = {}
     try:
-        result = recorded_result(path)
+        result = read_result(path)
         velocity, climbs = result.get("velocity") or {}, result.get("climbs")
         sides = uphill_velocities(result)
         own = next(iter(sides.values()), velocity.get("mean"))

@@ -69,10 +69,10 @@ class Site(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    scheduler: str
+    scheduler: str = Field(examples=["slurm"])
     partition: str | None = None
     account: str | None = None
-    walltime: Annotated[str, Field(pattern=r"^\d+:\d\d:\d\d$")] | None = None
+    walltime: Annotated[str, Field(pattern=r"^\d+:\d\d:\d\d$")] | None = Field(None, examples=["02:00:00"])
     nodes: _Count = 1
     cores: _Count
     jobs: _Count = 1

@@ -105,8 +105,8 @@ def _half(one: Origin) -> str:
 def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> Sweep:
     """A sweep over the uncertain values of a case by Sobol's sequence, scrambled for the least correlated columns.
 
-    The medians are the values of the case. `InputError` if no value is uncertain, a range does not contain the value of
-    the case, or the case was changed after it was read.
+    The medians are the values of the case. `InputError` if no value is uncertain, or a range does not contain the value
+    of the case.
     """
     import numpy as np
 

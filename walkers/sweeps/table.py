@@ -26,13 +26,13 @@ from walkers.errors import InputError, Problem, WalkersError, refused, suggestio
 from walkers.inputs.axes import is_axis, plain
 from walkers.inputs.case import Case
 from walkers.inputs.keys import flatten
-from walkers.postprocess.analysis import RESULT_NAME, Described, analyses, analyses_in, analyses_of, current_result
+from walkers.postprocess.analysis import Described, analyses, analyses_in, analyses_of, current_result
 from walkers.postprocess.sides import differ
 from walkers.rounding import DIGITS, SHOWN_UNITS, rounded
 from walkers.runner.binary import Engine
 from walkers.runner.directory import FAILURE_NAME, finished_run, is_locked, run_place, unfinished
 from walkers.runner.files import json_bytes, read_json, write_bytes, write_json
-from walkers.runner.manifest import check_unchanged
+from walkers.runner.manifest import read_result
 from walkers.sweeps.readable import short_keys
 
 if TYPE_CHECKING:
@@ -286,16 +286,10 @@ def velocity_in(result: Mapping[str, Any]) -> float:
 def velocity_of(directory: Path) -> float:
     """Mean velocity in the recorded result of a finished run, m/s; NaN if the files are damaged."""
     with suppress(OSError, ValueError, KeyError, TypeError):
-        return velocity_in(recorded_result(directory))
+        return velocity_in(read_result(directory))
     with suppress(DamagedRunError):
         return velocity_in(result_in(directory))
     return nan
-
-
-def recorded_result(directory: Path) -> dict[str, Any]:
-    """The recorded result of a finished run, of any version; `OSError` or `ValueError` if the file was changed."""
-    check_unchanged(directory, [RESULT_NAME])
-    return read_json(directory / RESULT_NAME)
 
 
 class DamagedRunError(WalkersError):

@@ -1,0 +1,53 @@
+"""New case files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from walkers.errors import check_utf8, expected_of, refused
+from walkers.inputs.reading import shipped
+from walkers.runner.files import write_json
+
+_SCHEMA = "case.schema.json"
+
+
+def write_case(path: Path, case: str = "fig1b", *, schema: bool = False) -> list[Path]:
+    """Write a new case file, a copy of a shipped case, whose comments explain its keys.
+
+    Parameters
+    ----------
+    path
+        The file; ``.toml`` is appended if it is left out.
+    case
+        The name of a shipped case.
+    schema
+        Whether to write the JSON schema of case files beside it too. The first line of the case names it for editors.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    InputError
+        If there is such a file already, or no such shipped case.
+    """
+    check_utf8(path)
+    path = path if path.suffix == ".toml" else path.with_name(f"{path.name}.toml")
+    if path.stem in ("", ".", ".."):
+        raise refused(path, "expected a name")
+    if case not in (known := shipped("case")):
+        raise refused(case, expected_of(case, known))
+    text = known[case].read_text("utf-8")
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(f"#:schema {_SCHEMA}\n\n{text}" if schema else text)
+    except FileExistsError as error:
+        raise refused(path, "exists already: it is not overwritten") from error
+    if not schema:
+        return [path]
+    from walkers.inputs.schema import case_schema
+
+    write_json(path.with_name(_SCHEMA), case_schema())
+    return [path, path.with_name(_SCHEMA)]
