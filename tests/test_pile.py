@@ -316,7 +316,7 @@ def test_an_error_of_the_engine_leaves_the_parts_before(tmp_path: Path) -> None:
 
 BAD: list[tuple[dict[str, dict[str, Any]], str]] = [
     ({"mixture": {"count": None}}, "mixture.count"),
-    ({"mixture": {"fill_height": "3 mm"}}, "mixture.count"),
+    ({"mixture": {"fill_height": "3 mm"}}, "expected either count or fill_height"),
     ({"mixture": {"large": ["0.29 mm", "0.4 mm"]}}, "mixture.large"),
     ({"mixture": {"small": ["0.32 mm", "0.3 mm"]}}, "mixture.small"),
     ({"boundary": {"width": "1.5 mm"}}, "boundary.width"),
@@ -342,7 +342,10 @@ def test_counts_of_beads_by_fill_height_mass_and_number() -> None:
     by_mass, by_number = load_case("pile-fig1a").mixture, small(mixture={"mixed_by": "number"}).mixture
     assert None not in (by_height, by_mass, by_number)
     assert 60 <= sum(by_height.counts) <= 90  # a packing fraction of 0.55, with beads of 0.24 mm³ in the mean
-    volumes = [sum(4.0 / 3.0 * np.pi * r**3 for r in sizes) / len(sizes) for sizes in (by_mass.small, by_mass.large)]
+    volumes = [
+        sum(4.0 / 3.0 * np.pi * r**3 for r in sizes) / len(sizes)
+        for sizes in (by_mass.small_radii, by_mass.large_radii)
+    ]
     assert by_mass.counts[0] * volumes[0] == pytest.approx(by_mass.counts[1] * volumes[1], rel=0.01)
     assert by_number.counts == (30, 30)
 

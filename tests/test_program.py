@@ -261,6 +261,6 @@ def test_the_package_claims_one_name_and_exports_few_that_are_documented() -> No
     modules = "walkers.inputs, walkers.pipeline, walkers.postprocess.report.run, walkers.sweeps.report"
     wanted = "{'inputs', 'runner', 'sweeps', 'IPython'}"
     assert _python(f"import sys, {modules}; print(sorted({wanted} & set(sys.modules)))", "/") == "[]"
-    names = ["FilmOptions", "Run", "Sweep", "load", "load_case", "run", "start", "sweep"]
+    names = ["FilmOptions", "Run", "Sweep", "load", "load_case", "run", "sweep"]
     assert dir(walkers) == walkers.__all__ == names
     assert all(getattr(walkers, name).__doc__ for name in walkers.__all__)

@@ -45,7 +45,7 @@ def _shipped(angle: float = 0.0, **drive: Any) -> Case:
 def _turning() -> Case:
     """A walker that still turns to the axis after 12 cycles, and less and less after 24: little drags it."""
     case = _shipped(4.0, peak_acceleration="8 g")
-    return case.put("liquid.dynamic_viscosity", 4.6e-3)
+    return case.put("liquid.viscosity_ratio", 1.0)
 
 
 def test_a_steady_walker_ends_early_at_the_speed_of_a_long_run(runs_folder: Path) -> None:
@@ -110,7 +110,7 @@ def test_what_settles_slowly_runs_in_full_and_numbers_are_obeyed() -> None:
 @pytest.mark.parametrize(
     ("key", "run", "expected"),
     [
-        ("run.cycles", {"cycles": 30, "most_cycles": 60}, "expected none: with run.most_cycles"),
+        ("run.most_cycles", {"cycles": 30, "most_cycles": 60}, "either cycles or duration or most_cycles"),
         ("run.settling_cycles", {"cycles": "auto", "settling_cycles": 5}, "expected none: with run.cycles"),
         ("run.segment", {"most_cycles": 60, "segment": "0.1 s"}, "expected none: with run.most_cycles"),
     ],
@@ -130,7 +130,7 @@ def _companions() -> list[Case]:
         "uphill": ("boundary.tilt", 0.3),
         "light": ("environment.gravity", 5.0),
         "rough": ("contact.friction.bead_wall", 0.2),
-        "thin": ("liquid.dynamic_viscosity", 2e-3),
+        "thin": ("liquid.viscosity_ratio", 0.4),
     }
     others = [case.put(*change).but(name=name) for name, change in changes.items()]
     return [others[0], _turning().but(name="turning"), *others[1:]]
