@@ -109,7 +109,9 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
     elif of_list or kind in ("too_long", "too_short"):
         value = value_at(document, parts_of(key))
         number = len(value) if isinstance(value, list) else 0
-        bound = str(location[-1] + 1) if of_list else _bound(context)  # type: ignore[operator]
+        bounds = {"max_length": "at most ", "min_length": "at least "}
+        bound = next((f"{word}{context[name]}" for name, word in bounds.items() if name in context), "")
+        bound = bound or f"{int(location[-1]) + 1}"
         message = f"has {number} value{'s' * (number != 1)}; expected {bound}{such}"
     elif kind == "missing":
         message = f"missing; expected {_in_a_table(parts, field) or example}{_elsewhere(parts)}"
@@ -125,11 +127,6 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
         if field and AUTO in field.metadata and kind != "value_error":
             message += ', or "auto"'
     return Problem(key, quoted(document, parts_of(key)), message)
-
-
-def _bound(context: Mapping[str, Any]) -> str:
-    """How many values a list may have: ``at most 2``."""
-    return f"at most {context['max_length']}" if "max_length" in context else f"at least {context['min_length']}"
 
 
 def _elsewhere(parts: Sequence[str | int]) -> str:
