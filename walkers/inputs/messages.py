@@ -28,6 +28,7 @@ _SENTENCES = {
     "finite_number": "expected a finite number",
     "string_type": "expected text in quotes",
     "string_too_short": "expected text in quotes",
+    "string_pattern_mismatch": "expected {meaning}{such}",
     "float_type": "expected a plain number without a unit",
     "int_type": "expected a whole number",
     "bool_type": "expected true or false",
@@ -117,7 +118,8 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
         message = f"missing; expected {_in_a_table(parts, field) or example}{_elsewhere(parts)}"
     else:
         form = _SENTENCES.get(kind, "expected {example}")
-        message = form.format(**{"example": example, "key": key, **context})
+        known = {"example": example, "such": such, "meaning": field.description if field else "", "key": key}
+        message = form.format(**{**known, **context})
         if kind == "literal_error":
             message += suggestion(str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"])))
         elif kind in ("list_type", "tuple_type") and field:
