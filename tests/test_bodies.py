@@ -224,12 +224,12 @@ def test_neighbours_on_a_tray_face_opposite_ways(count: int) -> None:
     assert all(one.facing == -other.facing for one, other in near)
 
 
-def test_a_tray_has_another_name_where_its_walkers_face_other_ways() -> None:
-    """They do in even rows, unless they face any way, or are told one; walkers that do not meet keep their names."""
+def test_rows_of_a_tray_are_shifted_where_neighbours_would_face_the_same_way() -> None:
+    """In even rows, unless walkers face any way, or are told one, or do not meet."""
     turned = {"angle_spread": "180 deg"}
-    for count, start, moved in [(16, {}, True), (9, {}, False), (16, turned, False), (16, {"facing": "right"}, False)]:
-        assert ("shifted_rows" in of_tables(dimers=dimers(count, meet=True, **start)).determinants()) == moved
-    assert "shifted_rows" not in of_tables(dimers=dimers(16)).determinants()
+    for count, start, shifted in [(16, {}, 4), (9, {}, 0), (16, turned, 0), (16, {"facing": "right"}, 0)]:
+        assert of_tables(dimers=dimers(count, meet=True, **start)).shifted_rows == shifted
+    assert of_tables(dimers=dimers(16)).shifted_rows == 0
 
 
 def test_walkers_on_a_tray_of_even_rows_meet(tmp_path: Path) -> None:
@@ -368,8 +368,8 @@ def test_the_viscous_limit_counts_the_walls_that_a_bead_touches_at_once(boundary
         return float(2.0 / found)
 
     case = make_case(liquid={"name": "glycerol 87 %"})
-    mass = 4.0 / 3.0 * np.pi * 3e-4**3 * case.density
-    of_a_wall = 6.0 * np.pi * case.liquid.dynamic_viscosity * 3e-4 / case.contact.minimum_separation_ratio / mass
+    mass = 4.0 / 3.0 * np.pi * 3e-4**3 * case.beads.density
+    of_a_wall = 6.0 * np.pi * case.liquid.of_bridges.viscosity * 3e-4 / case.contact.minimum_separation_ratio / mass
     assert (rate(**boundary) - rate()) / of_a_wall == pytest.approx(walls - 1.0, abs=1e-9)
 
 

@@ -87,6 +87,7 @@ def export(
         from walkers.archive.writing import ArchiveOptions, write_archive
         from walkers.finding import NOT_A_RUN, find
 
+        refuse("-o", output is not None and output.suffix != ".zip", "expected the name of a .zip file")
         refuse("--orcid", len(orcid or ()) > len(author or ()), "expected an --author for each")
         authors = [Author(name, number) for name, number in zip_longest(author or (), orcid or ())]
         place = find(what, out, changes_of(settings))

@@ -188,7 +188,7 @@ class Case(Table):
             yield Problem("dimers", None, "missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]")
         run = given.get("run", {})
         if (
-            ("mixture" in given or "placed" in given)
+            given.keys() & {"mixture", "placed"}
             and isinstance(run, Mapping)
             and not run.keys() & {"duration", "cycles"}
         ):

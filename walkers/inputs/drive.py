@@ -98,7 +98,7 @@ class Drive(Harmonic):
         if not given.get("harmonics"):
             yield from super().problems(given, place)
             return
-        for name in sorted(given.keys() & Harmonic.model_fields.keys() | given.keys() & {"waveform"}):
+        for name in sorted(given.keys() & {*Harmonic.model_fields, "waveform"}):
             instead = f": write {place}.harmonics[0].{name}" if name != "waveform" else ""
             yield Problem(f"{place}.{name}", None, f"expected none beside {place}.harmonics{instead}")
 

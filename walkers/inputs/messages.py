@@ -28,6 +28,7 @@ _SENTENCES = {
     "finite_number": "expected a finite number",
     "string_type": "expected text in quotes",
     "string_too_short": "expected text in quotes",
+    "string_pattern_mismatch": "expected {meaning}{such}",
     "float_type": "expected a plain number without a unit",
     "int_type": "expected a whole number",
     "bool_type": "expected true or false",
@@ -109,13 +110,16 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
     elif of_list or kind in ("too_long", "too_short"):
         value = value_at(document, parts_of(key))
         number = len(value) if isinstance(value, list) else 0
-        bound = str(location[-1] + 1) if of_list else _bound(context)  # type: ignore[operator]
+        bounds = {"max_length": "at most ", "min_length": "at least "}
+        bound = next((f"{word}{context[name]}" for name, word in bounds.items() if name in context), "")
+        bound = bound or f"{int(location[-1]) + 1}"
         message = f"has {number} value{'s' * (number != 1)}; expected {bound}{such}"
     elif kind == "missing":
         message = f"missing; expected {_in_a_table(parts, field) or example}{_elsewhere(parts)}"
     else:
         form = _SENTENCES.get(kind, "expected {example}")
-        message = form.format(**{"example": example, "key": key, **context})
+        known = {"example": example, "such": such, "meaning": field.description if field else "", "key": key}
+        message = form.format(**{**known, **context})
         if kind == "literal_error":
             message += suggestion(str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"])))
         elif kind in ("list_type", "tuple_type") and field:
@@ -125,11 +129,6 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
         if field and AUTO in field.metadata and kind != "value_error":
             message += ', or "auto"'
     return Problem(key, quoted(document, parts_of(key)), message)
-
-
-def _bound(context: Mapping[str, Any]) -> str:
-    """How many values a list may have: ``at most 2``."""
-    return f"at most {context['max_length']}" if "max_length" in context else f"at least {context['min_length']}"
 
 
 def _elsewhere(parts: Sequence[str | int]) -> str:

@@ -72,7 +72,9 @@ class Site(BaseModel):
     scheduler: str = Field(examples=["slurm"])
     partition: str | None = None
     account: str | None = None
-    walltime: Annotated[str, Field(pattern=r"^\d+:\d\d:\d\d$")] | None = Field(None, examples=["02:00:00"])
+    walltime: Annotated[str, Field(pattern=r"^\d+:\d\d:\d\d$")] | None = Field(
+        None, description="hours, minutes and seconds", examples=["02:00:00"]
+    )
     nodes: _Count = 1
     cores: _Count
     jobs: _Count = 1
