@@ -244,7 +244,7 @@ REFUSED: list[tuple[str, str]] = [
     # Mistyped names
     ("shw fig1b", 'no such command; did you mean "show"?'),
     ("new {case}", "exists already"),
-    ("new mine --from fig1", 'did you mean "fig1b"?'),
+    ("new mine fig1", 'did you mean "fig1b"?'),
     *((f"new '{name}'", f"{name or '.'}: expected a name") for name in ("", ".", "/", "..")),
     ("show fig1b --set 'run.seed=3\nfoo=4'", 'fig1b: --set run.seed = "3\\nfoo=4": expected a whole number'),
     ("list --out {runs} --older-than soon", "expected an age with its unit"),
@@ -435,7 +435,7 @@ def test_long_values_and_those_of_several_lines_are_quoted_on_one(in_folder: Pat
     words = [("show", "base.toml", "--set", one) for one in settings]
     words += [("sweep", f"{name}.toml") for name in ("value", "key", "lines")]
     odd = "xxx\n\x1b[31m"
-    words += [("plot", "base.toml", "--format", long), ("new", "mine", "--from", odd), ("show", odd)]
+    words += [("plot", "base.toml", "--format", long), ("new", "mine", odd), ("show", odd)]
     for arguments in words:
         message = _message(*arguments)
         assert message.count("\n") == 1

@@ -34,9 +34,9 @@ def write_case(path: Path, case: str = "fig1b", *, schema: bool = False) -> list
         If there is such a file already, or no such shipped case.
     """
     check_utf8(path)
-    path = path if path.suffix == ".toml" else path.with_name(f"{path.name}.toml")
-    if path.stem in ("", ".", ".."):
+    if path.name in ("", "..") or path.stem in (".", ".."):
         raise refused(path, "expected a name")
+    path = path if path.suffix == ".toml" else path.with_name(f"{path.name}.toml")
     if case not in (known := shipped("case")):
         raise refused(case, expected_of(case, known))
     text = known[case].read_text("utf-8")

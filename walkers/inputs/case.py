@@ -56,7 +56,7 @@ class Liquid(Table):
     `walkers.physics.laws`, or your own function, ``file.py:function``.
     """
 
-    choices: ClassVar = (Choice((("dynamic_viscosity",), ("kinematic_viscosity",))),)
+    choices: ClassVar = (Choice((("dynamic_viscosity",), ("kinematic_viscosity",)), also="a liquid of the library"),)
     name: str | None = key("Liquid from the library. The other keys override its values.", None, "Si AK5", SAME_RUN)
     mass_fraction: Filled[Number] = key(
         "Mass fraction of glycerol in `water-glycerol`.", None, 0.87, SAME_RUN, ge=0, le=1
@@ -144,7 +144,7 @@ def _ranges(value: object) -> object:
 Ranges = Annotated[dict[str, Any], BeforeValidator(_ranges)]
 """As a sweep's samplers take them: for each key ``{"uniform": [low, high]}`` or ``{"loguniform": [low, high]}``."""
 _BODIES = ("dimers", "clusters", "mixture", "placed")
-_IN_WORDS = ("run.cycles", "run.settling_cycles", "run.samples_per_cycle")
+_IN_WORDS = ("run.cycles", "run.samples_per_cycle")
 """Keys whose numbers say less than the words of their sources: ``until constant within 0.2 %, at most 60``."""
 _ABOUT = ("document", "sources", "recorded_law", "uncertain")
 """Fields that are part of no comparison: where values are from, and the law as its run has recorded it."""
