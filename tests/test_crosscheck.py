@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from hashlib import sha256
 from math import cos, inf, pi, sin, sqrt
 from pathlib import Path
 from typing import Any
@@ -41,7 +43,7 @@ from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.physics.laws import law_of
 from walkers.postprocess.dump import BinaryDump, FloatArray, local_frames
 from walkers.postprocess.motion import Motion, read_motion
-from walkers.runner.binary import find_engine
+from walkers.runner.binary import SOURCES, find_engine
 from walkers.runner.failures import EngineError
 from walkers.templates.deck import Plan, compose
 from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, FORCE_COLUMNS, WALL_BRIDGES
@@ -333,6 +335,20 @@ def test_a_dry_contact_with_a_wall_begins_without_friction(bench: Bench) -> None
     assert height[60] == pytest.approx(height[0], rel=1e-12)
     assert series.forces[60, 0, 2] > 1e-6
     assert np.abs(series.forces[41:, 0, :2]).max() < 1e-9 * abs(shear)
+
+
+FORCES = {8: "8834c71c4689b3d6"}
+
+
+def test_a_change_of_the_contact_model_asks_for_another_version_of_its_forces() -> None:
+    """Runs and audits are named by ``FORCES_VERSION`` of ``bridge.cpp``; comments and blanks do not count.
+
+    If this fails: raise it, unless dumps of piles are the same bytes, and write it and the digest down.
+    """
+    texts = [(SOURCES / name).read_text("utf-8") for name in ("bridge.cpp", "table.h")]
+    (version,) = re.findall(r"(?m)^// FORCES_VERSION (\d+)$", texts[0])
+    code = [re.sub(r"\s+", "", re.sub(r"(?s)/\*.*?\*/|//[^\n]*", "", text)) for text in texts]
+    assert {int(version): sha256("".join(code).encode()).hexdigest()[:16]} == FORCES
 
 
 def test_a_restart_with_other_walls_is_refused(bench: Bench) -> None:

@@ -49,7 +49,7 @@ RUN_NAME = "run.sh"
 SCALED_NAME = "bridges.scaled.txt"
 SCALE_NAME = "scale.awk"
 """Script beside decks to be run by hand: rescales the tables for an edited surface tension or viscosity."""
-CONTENT_VERSION = 7
+CONTENT_VERSION = 8
 """Version of what decks compute, part of the names of runs: increase it if a case gives other numbers.
 
 Do not increase it if decks with another text give the same numbers bit for bit.
