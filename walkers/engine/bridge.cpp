@@ -35,48 +35,28 @@ enum { BRIDGE_ID = 21 };  // of a cohesion model; Debian's engine has none of th
 enum { TABLE, SPRING, HISTORY = SPRING + 3, WALL = -1 };  // places in a history; instead of a second bead
 const char *const NAME = "cohesion_model bridge";
 
-/* A vector, of numbers or of several numbers at once. */
-template<class T> struct Of {
-  T x, y, z;
+struct Vec {
+  double x, y, z;
 };
-template<class T> inline Of<T> operator+(const Of<T> &a, const Of<T> &b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-template<class T> inline Of<T> operator-(const Of<T> &a, const Of<T> &b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-template<class T> inline Of<T> operator*(const T &s, const Of<T> &a) { return {s * a.x, s * a.y, s * a.z}; }
-template<class T> inline T dot(const Of<T> &a, const Of<T> &b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-template<class T> inline Of<T> cross(const Of<T> &a, const Of<T> &b)
+inline Vec operator+(const Vec a, const Vec b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline Vec operator-(const Vec a, const Vec b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline Vec operator*(const double s, const Vec a) { return {s * a.x, s * a.y, s * a.z}; }
+inline double dot(const Vec a, const Vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline Vec cross(const Vec a, const Vec b)
 {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-typedef Of<double> Vec;
 inline double length(const Vec a) { return std::sqrt(dot(a, a)); }
 inline Vec &vec(double *const p) { return *reinterpret_cast<Vec *>(p); }
 inline void add_to(double *const p, const Vec a) { vec(p) = vec(p) + a; }
 
-/* Numbers of several contacts, computed at once: by AVX2 where the machine has it, without other digits. */
-enum { LANES = 4 };
-typedef double Lanes __attribute__((vector_size(LANES * sizeof(double))));
+/* Of loops over contacts: the compiler has them compute several at once, four by AVX2 where the machine has it, else
+   two, with the same digits. It compiles both, and the loader chooses. */
 #if defined(__x86_64__)
 #define BY_LANES __attribute__((noinline, target_clones("avx2", "default")))
 #else
 #define BY_LANES __attribute__((noinline))
 #endif
-inline Lanes root_of(Lanes a)
-{
-  for (int lane = 0; lane < LANES; lane++) a[lane] = std::sqrt(a[lane]);
-  return a;
-}
-inline void put(Lanes *const into, const unsigned k, const double a) { into[k / LANES][k % LANES] = a; }
-inline double get(const Lanes *const from, const unsigned k) { return from[k / LANES][k % LANES]; }
-inline void put(Of<Lanes> *const into, const unsigned k, const Vec a)
-{
-  put(&into[k / LANES].x, k % LANES, a.x);
-  put(&into[k / LANES].y, k % LANES, a.y);
-  put(&into[k / LANES].z, k % LANES, a.z);
-}
-inline Vec get(const Of<Lanes> *const from, const unsigned k)
-{
-  return {from[k / LANES].x[k % LANES], from[k / LANES].y[k % LANES], from[k / LANES].z[k % LANES]};
-}
 
 /* What the materials of two types give to their contacts. */
 struct Materials {
@@ -85,17 +65,29 @@ struct Materials {
 
 /* Contacts of the same materials, whose forces are computed at once. */
 struct Batch {
-  enum { MOST = 32, SIZE = MOST / LANES };
-  typedef Lanes Numbers[SIZE];
-  typedef Of<Lanes> Vecs[SIZE];
-  int count, i[MOST], j[MOST];
-  const Materials *materials;
-  double *history[MOST];
+  enum { MOST = 32, LANES = 4 };
+  typedef double Numbers[MOST];
+  struct Vecs {
+    Numbers x, y, z;
+    inline Vec get(const int k) const { return {x[k], y[k], z[k]}; }
+    inline void put(const int k, const Vec a)
+    {
+      x[k] = a.x;
+      y[k] = a.y;
+      z[k] = a.z;
+    }
+  };
   Vecs d, v, omega_i, omega_j, spring;  // d: from j to i; v: of i, seen from j
   Numbers radius_i, radius_j, mass_i, mass_j, bridge[bridge::COLUMNS];
   Numbers inverse, gap, reduced_radius, reduced_mass;  // inverse: of the length of d
   Vecs force, torque_i, torque_j;
-} batch;
+  int count, i[MOST], j[MOST];
+  const Materials *materials;
+  double *history[MOST];
+
+  /* The count in whole lanes. */
+  int whole() const { return (count + LANES - 1) / LANES * LANES; }
+} batch __attribute__((aligned(32)));
 
 class Law : protected Pointers {
 public:
@@ -213,17 +205,17 @@ public:
     batch.i[k] = i;
     batch.j[k] = j;
     batch.history[k] = history;
-    put(batch.d, k, d);
-    put(batch.v, k, v);
-    put(batch.omega_i, k, omega_i);
-    put(batch.omega_j, k, omega_j);
-    put(batch.radius_i, k, radius_i);
-    put(batch.radius_j, k, radius_j);
-    put(batch.spring, k, vec(history + SPRING));
+    batch.d.put(k, d);
+    batch.v.put(k, v);
+    batch.omega_i.put(k, omega_i);
+    batch.omega_j.put(k, omega_j);
+    batch.radius_i[k] = radius_i;
+    batch.radius_j[k] = radius_j;
+    batch.spring.put(k, vec(history + SPRING));
     double between[bridge::COLUMNS] = {0., 0., 0., 0., 0.};
     const double *const f = table ? table->at(gap, between) : between;
     for (int c = 0; c < bridge::COLUMNS; c++)
-      put(batch.bridge[c], k, c == bridge::COUPLING ? std::copysign(1., history[TABLE]) * f[c] : f[c]);
+      batch.bridge[c][k] = c == bridge::COUPLING ? std::copysign(1., history[TABLE]) * f[c] : f[c];
     return k;
   }
 
@@ -231,8 +223,8 @@ public:
   BY_LANES void measure() const
   {
     Batch &b = batch;
-    for (int k = 0; k * LANES < b.count; k++) {
-      const Lanes distance = root_of(dot(b.d[k], b.d[k])), sum = b.radius_i[k] + b.radius_j[k];
+    for (int k = 0, count = b.whole(); k < count; k++) {
+      const double distance = length(b.d.get(k)), sum = b.radius_i[k] + b.radius_j[k];
       b.inverse[k] = 1. / distance;
       b.gap[k] = distance - sum;
       b.reduced_radius[k] = b.radius_i[k] * b.radius_j[k] / sum;
@@ -243,42 +235,48 @@ public:
   /* Forces and torques of the batch; springs are kept up if so asked. */
   BY_LANES void act(const bool update, const double time_step) const
   {
+    if (rolls_) act<true>(update ? time_step : 0.);
+    else act<false>(update ? time_step : 0.);
+    for (int k = 0; update && k < batch.count; k++) vec(batch.history[k] + SPRING) = batch.spring.get(k);
+  }
+
+  template<bool ROLLS> __attribute__((always_inline)) inline void act(const double stretched) const
+  {
     Batch &b = batch;
-    const Materials &of = *b.materials;
-    const Lanes stretched = Lanes{} + (update ? time_step : 0.), none = Lanes{}, whole = none + 1.;
-    for (int k = 0; k * LANES < b.count; k++) {
-      const Lanes apart = b.inverse[k] * dot(b.v[k], b.d[k]), gap = b.gap[k];
-      const Lanes arm_i = b.radius_i[k] + 0.5 * gap, arm_j = b.radius_j[k] + 0.5 * gap;
-      const Of<Lanes> n = b.inverse[k] * b.d[k], spin = b.omega_i[k] - b.omega_j[k], rolling = cross(n, spin);
-      const Of<Lanes> sliding = b.v[k] - apart * n + cross(n, arm_i * b.omega_i[k] + arm_j * b.omega_j[k]);
+    const Materials of = *b.materials;
+    for (int k = 0, count = b.whole(); k < count; k++) {
+      const Vec d = b.d.get(k), v = b.v.get(k), omega_i = b.omega_i.get(k), omega_j = b.omega_j.get(k);
+      const double gap = b.gap[k], apart = b.inverse[k] * dot(v, d);
+      const double arm_i = b.radius_i[k] + 0.5 * gap, arm_j = b.radius_j[k] + 0.5 * gap;
+      const Vec n = b.inverse[k] * d, spin = omega_i - omega_j, rolling = cross(n, spin);
+      const Vec sliding = v - apart * n + cross(n, arm_i * omega_i + arm_j * omega_j);
       // Surfaces apart have no repulsion, and all that is in proportion to it vanishes.
-      const Lanes depth = gap < 0. ? -gap : none, root = root_of(b.reduced_radius[k] * depth);
+      const double depth = gap < 0. ? -gap : 0., root = std::sqrt(b.reduced_radius[k] * depth);
       // Both dampings are 2 sqrt(5/6) beta sqrt(k m) of their stiffness k, which is a modulus times the root.
-      const Lanes damping = root_of(root * b.reduced_mass[k]);
-      const Lanes elastic = of.stiffness * root * depth, limit = of.friction * elastic;
-      Of<Lanes> stretch = b.spring[k] + stretched * sliding;
+      const double damping = std::sqrt(root * b.reduced_mass[k]);
+      const double elastic = of.stiffness * root * depth, limit = of.friction * elastic;
+      Vec stretch = b.spring.get(k) + stretched * sliding;
       stretch = stretch - dot(stretch, n) * n;
-      Of<Lanes> hold = of.shear_stiffness * root * stretch;
+      Vec hold = of.shear_stiffness * root * stretch;
       // A spring beyond Coulomb's limit slips, without damping; else spring and damping together are limited.
-      const Lanes held = dot(hold, hold);
-      const auto slips = held > limit * limit;
-      hold = hold + (slips ? none : of.shear_damping * damping) * sliding;
-      const Lanes most = limit / (root_of(slips ? held : dot(hold, hold)) + 1e-150), part = most < 1. ? most : whole;
-      b.spring[k] = (slips ? part : whole) * stretch;
-      const Lanes coupling = b.bridge[bridge::COUPLING][k];
+      const double held = dot(hold, hold), shear_damping = of.shear_damping * damping;
+      const bool slips = held > limit * limit;
+      hold = hold + (slips ? 0. : shear_damping) * sliding;
+      const double most = limit / (std::sqrt(slips ? held : dot(hold, hold)) + 1e-150), part = most < 1. ? most : 1.;
+      b.spring.put(k, (slips ? part : 1.) * stretch);
+      const double coupling = b.bridge[bridge::COUPLING][k];
       hold = part * hold + b.bridge[bridge::SLIDING][k] * sliding + coupling * rolling;
-      const Lanes drag = of.damping * damping + b.bridge[bridge::NORMAL][k];
-      b.force[k] = (elastic - b.bridge[bridge::PULL][k] - drag * apart) * n - hold;
-      const Of<Lanes> t = cross(n, hold);
-      Of<Lanes> couple = cross(n, coupling * sliding + b.bridge[bridge::ROLLING][k] * rolling);
-      if (rolls_) {
-        const Lanes speed = root_of(dot(spin, spin)) + 1e-150;
+      const double drag = of.damping * damping + b.bridge[bridge::NORMAL][k];
+      b.force.put(k, (elastic - b.bridge[bridge::PULL][k] - drag * apart) * n - hold);
+      const Vec t = cross(n, hold);
+      Vec couple = cross(n, coupling * sliding + b.bridge[bridge::ROLLING][k] * rolling);
+      if (ROLLS) {
+        const double speed = length(spin) + 1e-150;
         couple = couple - of.rolling_friction * elastic * b.reduced_radius[k] / speed * (spin - dot(spin, n) * n);
       }
-      b.torque_i[k] = arm_i * t + couple;
-      b.torque_j[k] = arm_j * t - couple;
+      b.torque_i.put(k, arm_i * t + couple);
+      b.torque_j.put(k, arm_j * t - couple);
     }
-    for (int k = 0; update && k < b.count; k++) vec(b.history[k] + SPRING) = get(b.spring, k);
   }
 
 private:
@@ -390,16 +388,16 @@ public:
       act(update, time_step);
       for (int k = 0; k < batch.count; k++) {
         const int i = batch.i[k], j = batch.j[k];
-        const Vec on = get(batch.force, k), turn = get(batch.torque_i, k);
+        const Vec on = batch.force.get(k), turn = batch.torque_i.get(k);
         if (compute) {
           f[i] = f[i] + on;
           torque[i] = torque[i] + turn;
         }
         if (compute && j < last) {
           f[j] = f[j] - on;
-          torque[j] = torque[j] + get(batch.torque_j, k);
+          torque[j] = torque[j] + batch.torque_j.get(k);
         }
-        if (tell) report(pair, i, j, newton, add, get(batch.d, k), on, turn, batch.history[k]);
+        if (tell) report(pair, i, j, newton, add, batch.d.get(k), on, turn, batch.history[k]);
       }
       batch.count = 0;
     };
@@ -427,8 +425,8 @@ public:
         if (!flags[jj]) continue;
         const int k =
           Law::add(finish, i, j, type_i, type[j], d, vi - v[j], wi, omega[j], ri, rj, table, gap, history);
-        put(batch.mass_i, k, mi);
-        put(batch.mass_j, k, mass[j]);
+        batch.mass_i[k] = mi;
+        batch.mass_j[k] = mass[j];
       }
     }
     finish();
@@ -460,37 +458,49 @@ class FixWallBridge : public Fix {
 public:
   FixWallBridge(LAMMPS *lmp, int count, char **args) : Fix(lmp, count, args), law_(0), type_(0), begin_(0), moves_(true)
   {
-    Arguments words = {*this, args + 3, args + count};
+    int at = 3;
+    const auto next = [&]() {
+      if (at == count) this->error->fix_error(FLERR, this, "the command ends early");
+      return args[at++];
+    };
+    const auto number = [&]() { return this->force->numeric(FLERR, next()); };
+    const auto vector = [&]() {
+      const double x = number(), y = number();
+      return Vec{x, y, number()};
+    };
     std::string file;
-    while (words.at < words.end) {
-      const std::string word = words.next();
-      if (word == "type") type_ = static_cast<int>(words.number());
+    Vec gravity = {0., 0., 0.};
+    while (at < count) {
+      const std::string word = next();
+      if (word == "type") type_ = static_cast<int>(number());
       else if (word == "plane") {
-        const Vec point = words.vector(), normal = words.vector();
+        const Vec point = vector(), normal = vector();
         if (!(length(normal) > 0.)) error->fix_error(FLERR, this, "a plane has a normal of no length");
         walls_.push_back({1. / length(normal) * normal, point, 0.});
       } else if (word == "cylinder") {
-        const double x = words.number(), y = words.number();
-        walls_.push_back({{0., 0., 0.}, {x, y, 0.}, words.number()});
+        const double x = number(), y = number();
+        walls_.push_back({{0., 0., 0.}, {x, y, 0.}, number()});
         if (!(walls_.back().radius > 0.)) error->fix_error(FLERR, this, "a cylinder has a radius that is not above 0");
       } else if (word == "shaken") {
-        const Vec amplitude = words.vector();
-        const double frequency = 2. * M_PI * words.number();
-        waves_.push_back({amplitude, frequency, words.number(), 0.});
-      } else if (word == "begin") begin_ = static_cast<bigint>(words.number());
+        const Vec amplitude = vector();
+        const double frequency = 2. * M_PI * number();
+        waves_.push_back({amplitude, frequency, number(), 0.});
+      } else if (word == "gravity") gravity = vector();
+      else if (word == "begin") begin_ = static_cast<bigint>(number());
       else if (word == "frame") {
-        const std::string frame = words.next();
+        const std::string frame = next();
         moves_ = frame == "lab";
         if (!moves_ && frame != "walls")
           error->fix_error(FLERR, this, ("expected lab or walls, not " + frame).c_str());
       }
-      else if (word == "loads") file = words.next();
+      else if (word == "loads") file = next();
       else error->fix_error(FLERR, this, ("unknown keyword " + word).c_str());
     }
     if (walls_.empty()) error->fix_error(FLERR, this, "expected a plane or a cylinder");
     if (type_ < 1 || type_ > atom->ntypes) error->fix_error(FLERR, this, "expected a type, of those of the box");
     if (moves_ && !file.empty()) error->fix_error(FLERR, this, "loads need the walls' frame: expected frame walls");
-    load_width_ = 3 * (1 + waves_.size());
+    loads_.push_back(gravity);
+    for (const Wave &wave : waves_) loads_.push_back(wave.amplitude);
     if (!file.empty()) read_loads(file);
     width_ = HISTORY * walls_.size();
     create_attribute = restart_peratom = local_flag = local_freq = nevery = 1;
@@ -591,29 +601,11 @@ private:
 
   struct Wave {
     Vec amplitude;
-    double frequency, phase, now;  // rad/s, rad; sine
+    double frequency, phase, push;  // rad/s, rad; inertial acceleration now for an amplitude of 1
   };
 
   struct Near {
     int bead, wall;
-  };
-
-  /* The words of a command after the style, read one by one. */
-  struct Arguments {
-    FixWallBridge &fix;
-    char **at, **end;
-
-    std::string next()
-    {
-      if (at == end) fix.error->fix_error(FLERR, &fix, "the command ends early");
-      return *at++;
-    }
-    double number() { return fix.force->numeric(FLERR, const_cast<char *>(next().c_str())); }
-    Vec vector()
-    {
-      const double x = number(), y = number();
-      return {x, y, number()};
-    }
   };
 
   const Law *law_;
@@ -622,11 +614,10 @@ private:
   std::vector<double> history_;  // of each bead at each wall
   std::vector<Wave> waves_;
   std::vector<Near> near_;
-  std::vector<double> loads_;  // by the ids of beads: gravity, amplitude of the acceleration of each wave
-  size_t load_width_;
+  std::vector<Vec> loads_;  // by the ids of beads, first the command's: gravity, amplitude of each wave
   bigint begin_;
-  bool moves_;                   // in the frame of the laboratory
-  Vec shift_, velocity_, push_;  // of the walls now; force on a mass of 1
+  bool moves_;             // in the frame of the laboratory
+  Vec shift_, velocity_;  // of the walls now
   std::vector<double> cells_;
   std::vector<double *> rows_;
 
@@ -635,13 +626,13 @@ private:
   void read_loads(const std::string &file)
   {
     std::ifstream in(file.c_str());
-    const int most = atom->tag_max();
-    loads_.resize((most + 1) * load_width_);
+    const size_t most = atom->tag_max(), width = loads_.size();
+    while (loads_.size() < (most + 1) * width) loads_.push_back(loads_[loads_.size() - width]);
     bool whole = static_cast<bool>(in);
-    for (int bead; whole && in >> bead;) {
+    for (size_t bead; whole && in >> bead;) {
       whole = bead > 0 && bead <= most;
-      for (size_t column = 0; whole && column < load_width_; column++)
-        whole = static_cast<bool>(in >> loads_[bead * load_width_ + column]);
+      for (size_t k = bead * width; whole && k < (bead + 1) * width; k++)
+        whole = static_cast<bool>(in >> loads_[k].x >> loads_[k].y >> loads_[k].z);
     }
     if (!whole || !in.eof()) error->fix_error(FLERR, this, (file + " has no loads that can be read").c_str());
   }
@@ -651,31 +642,28 @@ private:
   /* Puts the walls where they are in this step, with the velocity of some time before. */
   void move(const double before)
   {
-    shift_ = velocity_ = push_ = {0., 0., 0.};
+    shift_ = velocity_ = {0., 0., 0.};
     const double time = (update->ntimestep - begin_) * update->dt;
     for (Wave &wave : waves_) {
       const double w = wave.frequency;
-      wave.now = time < 0. ? 0. : std::sin(w * time + wave.phase);
-      if (time < 0.) continue;
-      if (moves_) {
-        shift_ = shift_ + wave.now * wave.amplitude;
-        velocity_ = velocity_ + w * std::cos(w * (time - before) + wave.phase) * wave.amplitude;
-      } else push_ = push_ + w * w * wave.now * wave.amplitude;
+      const double sine = time < 0. ? 0. : std::sin(w * time + wave.phase);
+      wave.push = moves_ ? 0. : w * w * sine;
+      if (time < 0. || !moves_) continue;
+      shift_ = shift_ + sine * wave.amplitude;
+      velocity_ = velocity_ + w * std::cos(w * (time - before) + wave.phase) * wave.amplitude;
     }
   }
 
-  /* The inertial force where the frame is that of shaken walls, and the beads' own loads. */
+  /* Gravity, and the inertial force where the frame is that of shaken walls. */
   void push()
   {
-    if (loads_.empty() && (moves_ || waves_.empty())) return;
+    const size_t width = 1 + waves_.size(), beads = loads_.size() / width;
     for (int i = 0; i < atom->nlocal; i++) {
       if (!(atom->mask[i] & groupbit)) continue;
-      Vec acceleration = push_;
-      if (!loads_.empty()) {
-        double *load = &loads_[atom->tag[i] * load_width_];
-        acceleration = acceleration + vec(load);
-        for (const Wave &wave : waves_) acceleration = acceleration + wave.now * vec(load += 3);
-      }
+      const size_t tag = atom->tag[i];
+      const Vec *load = &loads_[tag < beads ? tag * width : 0];
+      Vec acceleration = *load;
+      for (const Wave &wave : waves_) acceleration = acceleration + wave.push * *++load;
       add_to(atom->f[i], atom->rmass[i] * acceleration);
     }
   }
@@ -722,10 +710,10 @@ private:
       const double radius = atom->radius[i];
       const int k = law_->add(finish, i, one.wall, atom->type[i], type_, n, v, vec(atom->omega[i]), none, radius, 0.,
                               table, gap, history);
-      put(batch.inverse, k, 1.);
-      put(batch.gap, k, gap);
-      put(batch.reduced_radius, k, radius);
-      put(batch.reduced_mass, k, atom->rmass[i]);
+      batch.inverse[k] = 1.;
+      batch.gap[k] = gap;
+      batch.reduced_radius[k] = radius;
+      batch.reduced_mass[k] = atom->rmass[i];
     }
     finish();
   }
@@ -737,15 +725,15 @@ private:
     law_->act(stretch, update->dt);
     for (int k = 0; k < b.count; k++) {
       const int i = b.i[k];
-      const Vec on = get(b.force, k), x = vec(atom->x[i]);
+      const Vec on = b.force.get(k), x = vec(atom->x[i]);
       if (add) {
         add_to(atom->f[i], on);
-        add_to(atom->torque[i], get(b.torque_i, k));
+        add_to(atom->torque[i], b.torque_i.get(k));
       }
       if (!told) continue;
-      const Vec foot = x - (atom->radius[i] + get(b.gap, k)) * get(b.d, k);
+      const Vec foot = x - (atom->radius[i] + b.gap[k]) * b.d.get(k);
       for (const double cell : {foot.x, foot.y, foot.z, x.x, x.y, x.z, 1. * b.j[k], 1. * atom->tag[i], on.x, on.y,
-                                on.z, -get(b.gap, k)})
+                                on.z, -b.gap[k]})
         told->push_back(cell);
     }
     b.count = 0;
