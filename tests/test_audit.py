@@ -21,6 +21,7 @@ from walkers.check.audit import CHECKS, AuditReport, record, run_audit, selected
 from walkers.check.report import Chapter, Line, Verdict, count
 from walkers.check.scenes import SCENES, Bench, full_case, in_walls, law, prescribed, second_engine, standing
 from walkers.inputs.errors import InputError
+from walkers.inputs.reading import load_case
 from walkers.physics.bridge import Surfaces
 from walkers.runner import binary
 from walkers.runner.binary import AuditRecord, find_engine, read_audit, write_audit
@@ -48,6 +49,16 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for part in (kept, kept.with_suffix(".json")):
         shutil.copy(part, tmp_path / "cache" / "granular-walkers")
     return tmp_path
+
+
+def _change_model(folder: Path, monkeypatch: pytest.MonkeyPatch, right: str, other: str) -> None:
+    """Have another text in the contact model."""
+    sources = folder / "engine"
+    shutil.copytree(binary.SOURCES, sources)
+    text = (sources / "bridge.cpp").read_text()
+    assert text.count(right) == 1
+    (sources / "bridge.cpp").write_text(text.replace(right, other))
+    monkeypatch.setattr(binary, "SOURCES", sources)
 
 
 def _audit_of(run: Run) -> dict[str, Any] | None:
@@ -114,15 +125,23 @@ WRONG = {
 def test_a_wrong_contact_model_is_found(wrong: str, own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene, right, other = WRONG[wrong]
     monkeypatch.setattr("walkers.check.scenes.SCENES", {scene: SCENES[scene]})
-    sources = own_cache / "engine"
-    shutil.copytree(binary.SOURCES, sources)
-    text = (sources / "bridge.cpp").read_text()
-    assert text.count(right) == 1
-    (sources / "bridge.cpp").write_text(text.replace(right, other))
-    monkeypatch.setattr(binary, "SOURCES", sources)
+    _change_model(own_cache, monkeypatch, right, other)
     report = run_audit(["scenes"])
     assert count(report.chapters, Verdict.FAIL)
     assert not count(report.chapters, Verdict.ERROR)
+
+
+@pytest.mark.parametrize("rolling_friction", [0.0, 0.01])
+def test_a_machine_without_avx2_gives_the_same_bytes(
+    rolling_friction: float, own_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """There the loader takes the other half of the contact model, which is compiled for both."""
+    case = load_case("cluster", {"run.cycles": 8, "contact.rolling_friction": rolling_friction})
+    wide = run_case(case, own_cache / "wide").motion
+    _change_model(own_cache, monkeypatch, ', target_clones("avx2", "default")', "")
+    narrow = run_case(case, own_cache / "narrow").motion
+    for name in ("position", "velocity", "spin"):
+        assert np.array_equal(getattr(wide, name), getattr(narrow, name)), name
 
 
 def test_the_scenes_cover_contacts_and_bridges_closed_and_open_with_all_terms(tmp_path: Path) -> None:
