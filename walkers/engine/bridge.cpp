@@ -50,10 +50,10 @@ inline double length(const Vec a) { return std::sqrt(dot(a, a)); }
 inline Vec &vec(double *const p) { return *reinterpret_cast<Vec *>(p); }
 inline void add_to(double *const p, const Vec a) { vec(p) = vec(p) + a; }
 
-/* Of loops over contacts: the compiler has them compute several at once, four by AVX2 where the machine has it, else
-   two, with the same digits. It compiles both, and the loader chooses. */
+/* Of loops over contacts: the compiler has them compute several at once, with the same digits: eight, four or two. The
+   library contains all, and chooses when it is loaded on a machine. */
 #if defined(__x86_64__)
-#define BY_LANES __attribute__((noinline, target_clones("avx2", "default")))
+#define BY_LANES __attribute__((noinline, target_clones("avx512f", "avx2", "default")))
 #else
 #define BY_LANES __attribute__((noinline))
 #endif
@@ -65,7 +65,7 @@ struct Materials {
 
 /* Contacts of the same materials, whose forces are computed at once. */
 struct Batch {
-  enum { MOST = 32, LANES = 4 };
+  enum { MOST = 32, LANES = 8 };
   typedef double Numbers[MOST];
   struct Vecs {
     Numbers x, y, z;
@@ -87,7 +87,7 @@ struct Batch {
 
   /* The count in whole lanes. */
   int whole() const { return (count + LANES - 1) / LANES * LANES; }
-} batch __attribute__((aligned(32)));
+} batch __attribute__((aligned(64)));
 
 class Law : protected Pointers {
 public:

@@ -39,10 +39,10 @@ _FORCES_VERSION = re.compile(rb"^// FORCES_VERSION \d+$", re.MULTILINE)
 """The line of ``bridge.cpp`` that is part of the names of runs and audits; the rest of the sources is not."""
 _PACKAGES = ("g++", "libliggghts-dev", "libopenmpi-dev")
 _HEADERS = Path("/usr/include/liggghts")
-# Without -march, all machines of an architecture give the same numbers (no fused operations). -O3 does not reorder. It
-# computes several contacts at once only without traps.
+# All machines of an architecture give the same numbers: -O3 does not reorder, and there are no fused operations. Only
+# without traps does it compute several contacts at once.
 _OPTIONS = (
-    *("-shared", "-fPIC", "-std=gnu++11", "-O3", "-fno-math-errno", "-fno-trapping-math"),
+    *("-shared", "-fPIC", "-std=gnu++11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
     *("-DNDEBUG", "-DOMPI_SKIP_MPICXX", "-Wall", "-Wextra"),
 )
 _BANNER = re.compile(rb"\(Version ([^,\n]+),")
