@@ -92,7 +92,10 @@ struct Batch {
 class Law : protected Pointers {
 public:
   Law(LAMMPS *lmp, const bool rolls) : Pointers(lmp), rolls_(rolls), formed_(0.), film_(0) { laws()[lmp] = this; }
-  ~Law() { if (laws()[lmp] == this) laws().erase(lmp); }
+  ~Law()
+  {
+    if (laws()[lmp] == this) laws().erase(lmp);
+  }
 
   /* The laws of engines, for their walls. */
   static std::map<LAMMPS *, const Law *> &laws()
@@ -132,17 +135,18 @@ public:
     }
     if (force->cg_active()) error->cg(FLERR, NAME);
     if (tables_[0].volume > 0.)
-      film_ = static_cast<FixPropertyAtom *>(
-        modify->find_fix_property("film", "property/atom", "scalar", 0, 0, NAME));
+      film_ = static_cast<FixPropertyAtom *>(modify->find_fix_property("film", "property/atom", "scalar", 0, 0, NAME));
     types_ = atom->ntypes + 1;
     materials_.assign(types_ * types_, Materials());
     for (int i = 1; i < types_; i++)
       for (int j = 1; j < types_; j++) {
         const double damping = -2. * std::sqrt(5. / 6.) * ratio[i][j];
-        materials_[i * types_ + j] = {4. / 3. * modulus[i][j], 8. * shear_modulus[i][j],
+        materials_[i * types_ + j] = {4. / 3. * modulus[i][j],
+                                      8. * shear_modulus[i][j],
                                       damping * std::sqrt(2. * modulus[i][j]),
                                       damping * std::sqrt(8. * shear_modulus[i][j]),
-                                      friction[i][j], rolls_ ? rolling_friction[i][j] : 0.};
+                                      friction[i][j],
+                                      rolls_ ? rolling_friction[i][j] : 0.};
       }
     // The engine looks for neighbours up to a multiple of the sum of the radii; a wall has none.
     double reach = 0.;
@@ -192,8 +196,7 @@ public:
   }
 
   /* Adds a contact to the batch, but for masses; `finish` is called before if it is full or of other materials. */
-  template<class Finish>
-  __attribute__((always_inline)) inline int
+  template<class Finish> __attribute__((always_inline)) inline int
   add(const Finish &finish, const int i, const int j, const int type_i, const int type_j, const Vec d, const Vec v,
       const Vec omega_i, const Vec omega_j, const double radius_i, const double radius_j,
       const bridge::Table *const table, const double gap, double *const history) const
@@ -423,8 +426,7 @@ public:
                   : table    ? CONTACT_COHESION_MODEL
                              : 0;
         if (!flags[jj]) continue;
-        const int k =
-          Law::add(finish, i, j, type_i, type[j], d, vi - v[j], wi, omega[j], ri, rj, table, gap, history);
+        const int k = Law::add(finish, i, j, type_i, type[j], d, vi - v[j], wi, omega[j], ri, rj, table, gap, history);
         batch.mass_i[k] = mi;
         batch.mass_j[k] = mass[j];
       }
@@ -490,10 +492,8 @@ public:
       else if (word == "frame") {
         const std::string frame = next();
         moves_ = frame == "lab";
-        if (!moves_ && frame != "walls")
-          error->fix_error(FLERR, this, ("expected lab or walls, not " + frame).c_str());
-      }
-      else if (word == "loads") file = next();
+        if (!moves_ && frame != "walls") error->fix_error(FLERR, this, ("expected lab or walls, not " + frame).c_str());
+      } else if (word == "loads") file = next();
       else error->fix_error(FLERR, this, ("unknown keyword " + word).c_str());
     }
     if (walls_.empty()) error->fix_error(FLERR, this, "expected a plane or a cylinder");
@@ -616,7 +616,7 @@ private:
   std::vector<Near> near_;
   std::vector<Vec> loads_;  // by the ids of beads, first the command's: gravity, amplitude of each wave
   bigint begin_;
-  bool moves_;             // in the frame of the laboratory
+  bool moves_;            // in the frame of the laboratory
   Vec shift_, velocity_;  // of the walls now
   std::vector<double> cells_;
   std::vector<double *> rows_;
@@ -732,8 +732,8 @@ private:
       }
       if (!told) continue;
       const Vec foot = x - (atom->radius[i] + b.gap[k]) * b.d.get(k);
-      for (const double cell : {foot.x, foot.y, foot.z, x.x, x.y, x.z, 1. * b.j[k], 1. * atom->tag[i], on.x, on.y,
-                                on.z, -b.gap[k]})
+      for (const double cell :
+           {foot.x, foot.y, foot.z, x.x, x.y, x.z, 1. * b.j[k], 1. * atom->tag[i], on.x, on.y, on.z, -b.gap[k]})
         told->push_back(cell);
     }
     b.count = 0;
