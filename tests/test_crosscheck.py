@@ -47,7 +47,7 @@ from walkers.runner.binary import SOURCES, find_engine
 from walkers.runner.failures import EngineError
 from walkers.templates.deck import Plan, compose
 from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, FORCE_COLUMNS, WALL_BRIDGES
-from walkers.templates.scene import Bead
+from walkers.templates.scene import Bead, loading_of
 
 RADIUS, STILL = 3e-4, (0.0, 0.0, 0.0)
 NO_BRIDGES = ("capillary", "lubrication")
@@ -290,6 +290,22 @@ def test_a_wall_that_moves_meets_beads_that_do_not(bench: Bench) -> None:
     (row,), _ = _rows(bench, prescribed(case, standing(beads), case.run.steps_per_cycle // 4))
     told = dict(zip(WALL_BRIDGES, row.tolist(), strict=True))
     assert (told["id"], told["overlap"]) == pytest.approx((1, 1e-6), rel=1e-5)
+
+
+def test_loads_of_a_bead_are_those_of_a_command(bench: Bench) -> None:
+    """Gravity and drive of another case, bead by bead, give the same bytes as in a deck of that case."""
+    one, other = (
+        bench_case(drive={"peak_acceleration": f"{2 * n} g", "axis": [1, 0, 1]}, environment={"gravity": f"{n} m/s^2"})
+        for n in (2, 3)
+    )
+    beads = [over(FLOOR, 1e-3, RADIUS), over(FLOOR, 1e-3, RADIUS, x=4.0 * RADIUS)]
+    scene = standing([beads[0], replace(beads[1], loading=1)])
+    shared = bench.run(prescribed(one, replace(scene, loadings=(loading_of(one), loading_of(other))), 50))
+    alone = [bench.run(prescribed(case, standing(beads), 50)) for case in (one, other)]
+    assert (shared.directory / "loads.txt").read_text("utf-8").split()[0] == "2"
+    for bead, deck in enumerate(alone):
+        assert shared.forces[:, bead].tobytes() == deck.forces[:, bead].tobytes()
+    assert np.all(np.abs(alone[0].forces[1:, 0] - alone[1].forces[1:, 0])[:, [0, 2]] > 0.0)
 
 
 REFUSED_WALLS = {
