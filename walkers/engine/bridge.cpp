@@ -70,12 +70,7 @@ struct Batch {
   struct Vecs {
     Numbers x, y, z;
     inline Vec get(const int k) const { return {x[k], y[k], z[k]}; }
-    inline void put(const int k, const Vec a)
-    {
-      x[k] = a.x;
-      y[k] = a.y;
-      z[k] = a.z;
-    }
+    inline void put(const int k, const Vec a) { x[k] = a.x, y[k] = a.y, z[k] = a.z; }
   };
   Vecs d, v, omega_i, omega_j, spring;  // d: from j to i; v: of i, seen from j
   Numbers radius_i, radius_j, mass_i, mass_j, bridge[bridge::COLUMNS];
@@ -389,19 +384,22 @@ public:
       if (!batch.count) return;
       measure();
       act(update, time_step);
-      for (int k = 0; k < batch.count; k++) {
-        const int i = batch.i[k], j = batch.j[k];
-        const Vec on = batch.force.get(k), turn = batch.torque_i.get(k);
-        if (compute) {
-          f[i] = f[i] + on;
-          torque[i] = torque[i] + turn;
-        }
-        if (compute && j < last) {
-          f[j] = f[j] - on;
+      for (int k = 0; compute && k < batch.count;) {
+        const int i = batch.i[k];
+        Vec on = f[i], turn = torque[i];  // in registers, for all contacts of a bead
+        for (; k < batch.count && batch.i[k] == i; k++) {
+          const Vec force = batch.force.get(k);
+          on = on + force;
+          turn = turn + batch.torque_i.get(k);
+          const int j = batch.j[k];
+          if (j >= last) continue;
+          f[j] = f[j] - force;
           torque[j] = torque[j] + batch.torque_j.get(k);
         }
-        if (tell) report(pair, i, j, newton, add, batch.d.get(k), on, turn, batch.history[k]);
+        f[i] = on;
+        torque[i] = turn;
       }
+      for (int k = 0; tell && k < batch.count; k++) report(pair, k, newton, add);
       batch.count = 0;
     };
     for (int ii = 0; ii < list->inum; ii++) {
@@ -438,20 +436,21 @@ public:
 private:
   const int64_t hash_;
 
-  __attribute__((noinline)) void report(PairGran *pair, const int i, const int j, const bool newton, const int add,
-                                        const Vec d, const Vec of, const Vec torque, double *const history)
+  __attribute__((noinline)) void report(PairGran *pair, const int k, const bool newton, const int add)
   {
+    const int i = batch.i[k], j = batch.j[k];
+    const Vec on = batch.force.get(k), d = batch.d.get(k);
     if (pair->cpl() && add) {
       SurfacesIntersectData surfaces;
       ForceData forces;
       surfaces.i = i;
       surfaces.j = j;
-      surfaces.contact_history = history;
-      add_to(forces.delta_F, of);
-      add_to(forces.delta_torque, torque);
+      surfaces.contact_history = batch.history[k];
+      add_to(forces.delta_F, on);
+      add_to(forces.delta_torque, batch.torque_i.get(k));
       pair->cpl_add_pair(surfaces, forces);
     }
-    if (pair->evflag) pair->ev_tally_xyz(i, j, atom->nlocal, newton, 0., 0., of.x, of.y, of.z, d.x, d.y, d.z);
+    if (pair->evflag) pair->ev_tally_xyz(i, j, atom->nlocal, newton, 0., 0., on.x, on.y, on.z, d.x, d.y, d.z);
   }
 };
 
