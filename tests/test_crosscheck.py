@@ -315,6 +315,7 @@ REFUSED_WALLS = {
     "type 2 plane 0 0 0 0 0 0": "a normal of no length",
     "type 2 cylinder 0 0 -1": "a radius that is not above 0",
     "type 2 cylinder 0 0": "ends early",
+    "type 2 plane 0 0 0 0 0 1 gravity 0 0": "ends early",
     "type 2 wobble": "unknown keyword wobble",
     "type 2 plane 0 0 0 0 0 1 frame moon": "expected lab or walls, not moon",
     "type 2 plane 0 0 0 0 0 1 frame walls loads missing.txt": "missing.txt has no loads",
