@@ -152,6 +152,7 @@ def _minimal(deck: Deck, case: Case) -> str:
         )
     walls += "variable push equal ${peak_acceleration}*sin(2*PI*${frequency}*${time_step}*step)\n"
     walls += "fix push all gravity v_push vector 0.0 0.0 1.0\n"
+    walls += "fix gravity all gravity ${gravity} vector 0.0 0.0 -1.0\n"
     text = re.sub(r"(?m)^fix +walls all .*\n", "", text)
     model = f"pair_style {_STOCK_MODEL}\n" + _STOCK_LIQUID.format(liquid=case.liquid.of_bridges, contact=case.contact)
     text = re.sub(r"(?m)^pair_style .*\n", lambda _: model, text)

@@ -21,6 +21,7 @@ from walkers.check.audit import CHECKS, AuditReport, record, run_audit, selected
 from walkers.check.report import Chapter, Line, Verdict, count
 from walkers.check.scenes import SCENES, Bench, full_case, in_walls, law, prescribed, second_engine, standing
 from walkers.errors import InputError
+from walkers.inputs.reading import load_case
 from walkers.physics.bridge import Surfaces
 from walkers.runner import binary
 from walkers.runner.binary import AuditRecord, find_engine, read_audit, write_audit
@@ -50,6 +51,16 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def _change_model(folder: Path, monkeypatch: pytest.MonkeyPatch, right: str, other: str) -> None:
+    """Have another text in the contact model."""
+    sources = folder / "engine"
+    shutil.copytree(binary.SOURCES, sources)
+    text = (sources / "bridge.cpp").read_text()
+    assert text.count(right) == 1
+    (sources / "bridge.cpp").write_text(text.replace(right, other))
+    monkeypatch.setattr(binary, "SOURCES", sources)
+
+
 def _audit_of(run: Run) -> dict[str, Any] | None:
     """What the manifest of a run says of its engine's audit."""
     audit: dict[str, Any] | None = FinishedRun(run.directory).manifest["engine"]["audit"]
@@ -70,33 +81,25 @@ def test_the_installed_engine_passes(report: AuditReport) -> None:
 WRONG = {
     "the sign of the coupling": (
         "two beads separate",
-        "f[bridge::SLIDING] * c.sliding + f[bridge::COUPLING] * c.rolling);",
-        "f[bridge::SLIDING] * c.sliding - f[bridge::COUPLING] * c.rolling);",
+        "* sliding + coupling * rolling;",
+        "* sliding - coupling * rolling;",
     ),
-    "the couple's reaction": (
-        "two beads separate",
-        "add_to(torque[j], -1. * c.couple -",
-        "add_to(torque[j], c.couple -",
-    ),
+    "the couple's reaction": ("two beads separate", "arm_j * t - couple", "arm_j * t + couple"),
     "the arm of open bridges to walls": (
         "a bead leaves the floor",
-        "const double arm = radius + 0.5 * c.gap;",
-        "const double arm = radius + 0.5 * std::min(c.gap, 0.);",
+        "b.radius_i[k] + 0.5 * gap",
+        "b.radius_i[k] + 0.5 * (gap < 0. ? gap : 0.)",
     ),
     "a spring that does not turn with the contact": (
         "beads leave a cylindrical wall",
-        "stretch = stretch - dot(stretch, c.n) * c.n;",
+        "stretch = stretch - dot(stretch, n) * n;",
         "",
     ),
-    "a spring stiffer by 1e-4": (
-        "a bead slides",
-        "8. * shear_modulus_[i][j] * root",
-        "8.001 * shear_modulus_[i][j] * root",
-    ),
+    "a spring stiffer by 1e-4": ("a bead slides", "= of.shear_stiffness", "= 1.0001 * of.shear_stiffness"),
     "a limit that leaves out the damping": (
         "a bead slides",
-        "if (dot(hold, hold) > limit * limit) hold = limit / length(hold) * hold;",
-        "",
+        "std::sqrt(slips ? held : dot(hold, hold))",
+        "std::sqrt(held)",
     ),
     "a rupture later by 1 %": (
         "a bead leaves the floor",
@@ -105,19 +108,15 @@ WRONG = {
     ),
     "the coupling's order": (
         "two beads separate, the smaller first",
-        "if (history[TABLE] < 0.) f[bridge::COUPLING] = -f[bridge::COUPLING];",
-        "",
+        "std::copysign(1., history[TABLE]) * f[c]",
+        "f[c]",
     ),
     "walls at rest": (
         "the floor oscillates horizontally",
-        "vec(atom->v[i]) - velocity_;",
-        "vec(atom->v[i]) - 0. * velocity_;",
+        "vec(atom->v[i]) - velocity_,",
+        "vec(atom->v[i]) - 0. * velocity_,",
     ),
-    "the damping": (
-        "a bead approaches the floor",
-        "std::sqrt(5. / 6.)",
-        "0.913",
-    ),
+    "the damping": ("a bead approaches the floor", "std::sqrt(5. / 6.)", "0.913"),
 }
 """Faults of the contact model: the scene that shows each, the right and the wrong text."""
 
@@ -126,21 +125,29 @@ WRONG = {
 def test_a_wrong_contact_model_is_found(wrong: str, own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene, right, other = WRONG[wrong]
     monkeypatch.setattr("walkers.check.scenes.SCENES", {scene: SCENES[scene]})
-    sources = own_cache / "engine"
-    shutil.copytree(binary.SOURCES, sources)
-    text = (sources / "bridge.cpp").read_text()
-    assert text.count(right) == 1
-    (sources / "bridge.cpp").write_text(text.replace(right, other))
-    monkeypatch.setattr(binary, "SOURCES", sources)
+    _change_model(own_cache, monkeypatch, right, other)
     monkeypatch.setattr(binary, "_OPTIONS", [*binary._OPTIONS, "-O1"])  # it is compiled in half the time
     report = run_audit(["scenes"])
     assert count(report.chapters, Verdict.FAIL)
     assert not count(report.chapters, Verdict.ERROR)
 
 
+@pytest.mark.parametrize("rolling_friction", [0.0, 0.01])
+def test_a_machine_without_wide_instructions_gives_the_same_bytes(
+    rolling_friction: float, own_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The contact model is compiled for machines with and without AVX, and chooses when it is loaded."""
+    case = load_case("cluster", {"run.cycles": 8, "contact.rolling_friction": rolling_friction})
+    wide = run_case(case, own_cache / "wide").motion
+    _change_model(own_cache, monkeypatch, ', target_clones("avx512f", "avx2", "default")', "")
+    narrow = run_case(case, own_cache / "narrow").motion
+    for name in ("position", "velocity", "spin"):
+        assert np.array_equal(getattr(wide, name), getattr(narrow, name)), name
+
+
 def test_the_scenes_cover_contacts_and_bridges_closed_and_open_with_all_terms(tmp_path: Path) -> None:
     """So that their agreement says something of each: forms, gaps at which a bridge forms, and rupture."""
-    curve = law(Surfaces.of(3e-4, 2e-4, full_case().liquid, 0.01))
+    curve = law(Surfaces.of(3e-4, 2e-4, full_case().liquid.of_bridges, 0.01))
     assert np.all(curve.forces(np.linspace(0.0, curve.rupture, 50)).columns() != 0.0)
     bench, seen = Bench(find_engine(), tmp_path), set()
     for name in ("a bead approaches the floor", "a bead leaves the floor", "two beads separate", "two beads approach"):

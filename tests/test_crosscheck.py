@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from hashlib import sha256
 from math import cos, inf, pi, sin, sqrt
 from pathlib import Path
 from typing import Any
@@ -42,11 +44,11 @@ from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.physics.laws import by_name
 from walkers.postprocess.dump import BinaryDump, FloatArray, local_frames
 from walkers.postprocess.motion import Motion, read_motion
-from walkers.runner.binary import find_engine
+from walkers.runner.binary import SOURCES, find_engine
 from walkers.runner.failures import EngineError
 from walkers.templates.deck import Plan, compose
 from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, FORCE_COLUMNS, WALL_BRIDGES
-from walkers.templates.scene import Bead
+from walkers.templates.scene import Bead, loading_of
 
 RADIUS, STILL = 3e-4, (0.0, 0.0, 0.0)
 NO_BRIDGES = ("capillary", "lubrication")
@@ -294,6 +296,22 @@ def test_a_wall_that_moves_meets_beads_that_do_not(bench: Bench) -> None:
     assert (told["id"], told["overlap"]) == pytest.approx((1, 1e-6), rel=1e-5)
 
 
+def test_loads_of_a_bead_are_those_of_a_command(bench: Bench) -> None:
+    """Gravity and drive of another case, bead by bead, give the same bytes as in a deck of that case."""
+    one, other = (
+        bench_case(drive={"peak_acceleration": f"{2 * n} g", "axis": [1, 0, 1]}, environment={"gravity": f"{n} m/s^2"})
+        for n in (2, 3)
+    )
+    beads = [over(FLOOR, 1e-3, RADIUS), over(FLOOR, 1e-3, RADIUS, x=4.0 * RADIUS)]
+    scene = standing([beads[0], replace(beads[1], loading=1)])
+    shared = bench.run(prescribed(one, replace(scene, loadings=(loading_of(one), loading_of(other))), 50))
+    alone = [bench.run(prescribed(case, standing(beads), 50)) for case in (one, other)]
+    assert (shared.directory / "loads.txt").read_text("utf-8").split()[0] == "2"
+    for bead, deck in enumerate(alone):
+        assert shared.forces[:, bead].tobytes() == deck.forces[:, bead].tobytes()
+    assert np.all(np.abs(alone[0].forces[1:, 0] - alone[1].forces[1:, 0])[:, [0, 2]] > 0.0)
+
+
 REFUSED_WALLS = {
     "plane 0 0 0 0 0 1": "expected a type",
     "type 3 plane 0 0 0 0 0 1": "expected a type",
@@ -301,6 +319,7 @@ REFUSED_WALLS = {
     "type 2 plane 0 0 0 0 0 0": "a normal of no length",
     "type 2 cylinder 0 0 -1": "a radius that is not above 0",
     "type 2 cylinder 0 0": "ends early",
+    "type 2 plane 0 0 0 0 0 1 gravity 0 0": "ends early",
     "type 2 wobble": "unknown keyword wobble",
     "type 2 plane 0 0 0 0 0 1 frame moon": "expected lab or walls, not moon",
     "type 2 plane 0 0 0 0 0 1 frame walls loads missing.txt": "missing.txt has no loads",
@@ -337,6 +356,20 @@ def test_a_dry_contact_with_a_wall_begins_without_friction(bench: Bench) -> None
     assert height[60] == pytest.approx(height[0], rel=1e-12)
     assert series.forces[60, 0, 2] > 1e-6
     assert np.abs(series.forces[41:, 0, :2]).max() < 1e-9 * abs(shear)
+
+
+FORCES = {8: "bc6f476ac81dec9a"}
+
+
+def test_a_change_of_the_contact_model_asks_for_another_version_of_its_forces() -> None:
+    """Runs and audits are named by ``FORCES_VERSION`` of ``bridge.cpp``; comments and blanks do not count.
+
+    If this fails: raise it, unless dumps of piles are the same bytes, and write it and the digest down.
+    """
+    texts = [(SOURCES / name).read_text("utf-8") for name in ("bridge.cpp", "table.h")]
+    (version,) = re.findall(r"(?m)^// FORCES_VERSION (\d+)$", texts[0])
+    code = [re.sub(r"\s+", "", re.sub(r"(?s)/\*.*?\*/|//[^\n]*", "", text)) for text in texts]
+    assert {int(version): sha256("".join(code).encode()).hexdigest()[:16]} == FORCES
 
 
 def test_a_restart_with_other_walls_is_refused(bench: Bench) -> None:

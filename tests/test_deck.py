@@ -35,7 +35,7 @@ def test_numbers_are_rendered_in_full_precision(name: str) -> None:
     assert starts == [bead.centre for bead in scene.beads]
 
 
-CONTENT = {7: "669414fbec8ffddc"}
+CONTENT = {8: "29bebb5b15f61619"}
 """Digest of all that the engine reads of some cases, for the version of the decks' content."""
 
 

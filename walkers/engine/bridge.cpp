@@ -1,37 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Copyright (c) 2026, the granular-walkers developers
-/* A contact model for LIGGGHTS: liquid bridges whose forces are tables.
+/* A contact model for LIGGGHTS: liquid bridges whose forces are tables. README.md has its commands and its laws, table.h
+   the tables. LD_PRELOAD loads it into Debian's liggghts.
 
-   Loaded with LD_PRELOAD into Debian's liggghts, it makes the engine know
+   The engine's own walls are slow meshes, or primitives of whose contacts it tells nothing. Its loops are written out
+   here for spheres. A contact's history is the number of its table, 0 without a bridge, and the spring; the number is
+   negative where i is the second bead of the table, for which the coupling has the other sign (n and s turn round, q
+   does not). Contacts are gathered in batches, and the forces of several are computed at once.
 
-       pair_style gran model hertz tangential history cohesion bridge [rolling_friction cdt] table FILE
-       fix ID GROUP wall/bridge type TYPE [plane X Y Z NX NY NZ]... [cylinder X Y RADIUS]...
-                                [shaken AX AY AZ FREQUENCY PHASE]... [begin STEP] [frame lab | walls]
-                                [loads FILE]
-
-   Spheres repel each other by Hertz's law, damped, and hold each other by Mindlin's spring, damped, up to Coulomb's
-   limit: mu times the elastic repulsion, damping included. Rolling friction is cdt's. A bridge (table.h) forms when the
-   gap falls to its table's FORMATION (0: on touch) and breaks at its RUPTURE; between, with n the unit vector from j to
-   i, w the velocity apart, s that of the surfaces along each other, q = n x (omega_i - omega_j),
-
-       force on i  -(PULL + NORMAL w) n - (SLIDING s + COUPLING q),    couple  M = -(COUPLING s + ROLLING q)
-
-   with the torques that conserve momentum and angular momentum. Overlapping surfaces have the bridge of gap 0.
-
-   Where tables have liquid, beads have films, and their liquid is conserved: a bridge that forms takes a volume, that of
-   one of the tables of its surfaces, and gives it back where it breaks (`move_liquid`). How full a film is, is the
-   property "film" of its bead (fix property/atom).
-
-   Walls have the contacts of the pair style, with a surface of infinite radius: planes through a point, beads on the
-   side of the normal; cylinders along z, beads within. They are shaken as one, from a step on, by the sum of
-   A sin(2 pi f t + phase); in their own frame they rest, and beads have the inertial force instead. Gravity
-   and more inertial forces may differ from bead to bead: a file has them, for each. The engine's own
-   walls are meshes of triangles, whose bookkeeping takes longer than all forces, or primitives, of whose contacts it
-   tells nothing; its forces by a formula read the formula's text in every step.
-
-   The engine's loops are written out for spheres: no heat, energies, rigid bodies, stored contact forces, virial of
-   walls. A contact's history is the number of its table, 0 without a bridge, and the spring; the number is negative
-   where i is the second bead of the table, for which the coupling has the other sign (n and s turn round, q does not). */
+   The next line is part of the names of runs and audits: another number where the same deck gives other numbers. */
+// FORCES_VERSION 8
 #include "granular_pair_style.h"
 #include "contact_models.h"
 #include "fix_insert_stream.h"  // which pair_gran_base.h forgets
@@ -54,8 +32,7 @@ using namespace LIGGGHTS::ContactModels;
 namespace {
 
 enum { BRIDGE_ID = 21 };  // of a cohesion model; Debian's engine has none of this number
-enum { TABLE, SPRING, HISTORY = SPRING + 3 };
-enum { WALL = -1 };  // instead of a second bead
+enum { TABLE, SPRING, HISTORY = SPRING + 3, WALL = -1 };  // places in a history; instead of a second bead
 const char *const NAME = "cohesion_model bridge";
 
 struct Vec {
@@ -70,40 +47,56 @@ inline Vec cross(const Vec a, const Vec b)
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 inline double length(const Vec a) { return std::sqrt(dot(a, a)); }
-inline Vec vec(const double *const p) { return {p[0], p[1], p[2]}; }
-inline void add_to(double *const p, const Vec a)
-{
-  p[0] += a.x;
-  p[1] += a.y;
-  p[2] += a.z;
-}
+inline Vec &vec(double *const p) { return *reinterpret_cast<Vec *>(p); }
+inline void add_to(double *const p, const Vec a) { vec(p) = vec(p) + a; }
 
-/* How two surfaces move, and what follows: the force on i, and the couple that acts on i and, reversed, on j. */
-struct Contact {
-  int type_i, type_j;
-  double gap, reduced_radius, reduced_mass;
-  Vec n, sliding, rolling;  // rolling: n x (omega_i - omega_j)
-  double apart;             // velocity along n
-  Vec spin;                 // omega_i - omega_j
-  Vec force, couple;
+/* Of loops over contacts: the compiler has them compute several at once, with the same digits: eight, four or two. The
+   library contains all, and chooses when it is loaded on a machine. */
+#if defined(__x86_64__)
+#define BY_LANES __attribute__((noinline, target_clones("avx512f", "avx2", "default")))
+#else
+#define BY_LANES __attribute__((noinline))
+#endif
+
+/* What the materials of two types give to their contacts. */
+struct Materials {
+  double stiffness, shear_stiffness, damping, shear_damping, friction, rolling_friction;
 };
+
+/* Contacts of the same materials, whose forces are computed at once. */
+struct Batch {
+  enum { MOST = 32, LANES = 8 };
+  typedef double Numbers[MOST];
+  struct Vecs {
+    Numbers x, y, z;
+    inline Vec get(const int k) const { return {x[k], y[k], z[k]}; }
+    inline void put(const int k, const Vec a) { x[k] = a.x, y[k] = a.y, z[k] = a.z; }
+  };
+  Vecs d, v, omega_i, omega_j, spring;  // d: from j to i; v: of i, seen from j
+  Numbers radius_i, radius_j, mass_i, mass_j, bridge[bridge::COLUMNS];
+  Numbers inverse, gap, reduced_radius, reduced_mass;  // inverse: of the length of d
+  Vecs force, torque_i, torque_j;
+  int count, i[MOST], j[MOST];
+  const Materials *materials;
+  double *history[MOST];
+
+  /* The count in whole lanes. */
+  int whole() const { return (count + LANES - 1) / LANES * LANES; }
+} batch __attribute__((aligned(64)));
 
 class Law : protected Pointers {
 public:
-  Law(LAMMPS *lmp, const bool rolls) : Pointers(lmp), rolls_(rolls), formed_(0.), film_(0)
-  {
-    known()[lmp] = this;
-  }
+  Law(LAMMPS *lmp, const bool rolls) : Pointers(lmp), rolls_(rolls), formed_(0.), film_(0) { laws()[lmp] = this; }
   ~Law()
   {
-    if (known()[lmp] == this) known().erase(lmp);
+    if (laws()[lmp] == this) laws().erase(lmp);
   }
 
-  /* The law of an engine, for its walls; none before its pair style. */
-  static const Law *of(LAMMPS *const lmp)
+  /* The laws of engines, for their walls. */
+  static std::map<LAMMPS *, const Law *> &laws()
   {
-    const std::map<LAMMPS *, const Law *>::const_iterator found = known().find(lmp);
-    return found == known().end() ? 0 : found->second;
+    static std::map<LAMMPS *, const Law *> all;
+    return all;
   }
 
   void settings(const int n, char **const args)
@@ -126,26 +119,29 @@ public:
     registry.registerProperty("Geff", &MODEL_PARAMS::createGeff, NAME);
     registry.registerProperty("betaeff", &MODEL_PARAMS::createBetaEff, NAME);
     registry.registerProperty("coeffFrict", &MODEL_PARAMS::createCoeffFrict);
-    registry.connect("Yeff", modulus_, NAME);
-    registry.connect("Geff", shear_modulus_, NAME);
-    double **ratio;  // minus the damping ratio
+    double **modulus, **shear_modulus, **friction, **rolling_friction, **ratio;  // minus the damping ratio
+    registry.connect("Yeff", modulus, NAME);
+    registry.connect("Geff", shear_modulus, NAME);
     registry.connect("betaeff", ratio, NAME);
-    registry.connect("coeffFrict", friction_, NAME);
+    registry.connect("coeffFrict", friction, NAME);
     if (rolls_) {
       registry.registerProperty("coeffRollFrict", &MODEL_PARAMS::createCoeffRollFrict);
-      registry.connect("coeffRollFrict", rolling_friction_, NAME);
+      registry.connect("coeffRollFrict", rolling_friction, NAME);
     }
     if (force->cg_active()) error->cg(FLERR, NAME);
     if (tables_[0].volume > 0.)
-      film_ = static_cast<FixPropertyAtom *>(
-        modify->find_fix_property("film", "property/atom", "scalar", 0, 0, NAME));
-    const int types = atom->ntypes + 1;
-    dampings_.assign(types * types, Damping());
-    for (int i = 1; i < types; i++)
-      for (int j = 1; j < types; j++) {
+      film_ = static_cast<FixPropertyAtom *>(modify->find_fix_property("film", "property/atom", "scalar", 0, 0, NAME));
+    types_ = atom->ntypes + 1;
+    materials_.assign(types_ * types_, Materials());
+    for (int i = 1; i < types_; i++)
+      for (int j = 1; j < types_; j++) {
         const double damping = -2. * std::sqrt(5. / 6.) * ratio[i][j];
-        dampings_[i * types + j] = {damping * std::sqrt(2. * modulus_[i][j]),
-                                    damping * std::sqrt(8. * shear_modulus_[i][j])};
+        materials_[i * types_ + j] = {4. / 3. * modulus[i][j],
+                                      8. * shear_modulus[i][j],
+                                      damping * std::sqrt(2. * modulus[i][j]),
+                                      damping * std::sqrt(8. * shear_modulus[i][j]),
+                                      friction[i][j],
+                                      rolls_ ? rolling_friction[i][j] : 0.};
       }
     // The engine looks for neighbours up to a multiple of the sum of the radii; a wall has none.
     double reach = 0.;
@@ -194,73 +190,102 @@ public:
     return 0;
   }
 
-  inline void wet(Contact &c, const bridge::Table &table, const double *const history) const
+  /* Adds a contact to the batch, but for masses; `finish` is called before if it is full or of other materials. */
+  template<class Finish> __attribute__((always_inline)) inline int
+  add(const Finish &finish, const int i, const int j, const int type_i, const int type_j, const Vec d, const Vec v,
+      const Vec omega_i, const Vec omega_j, const double radius_i, const double radius_j,
+      const bridge::Table *const table, const double gap, double *const history) const
   {
-    double f[bridge::COLUMNS];
-    table.at(c.gap, f);
-    if (history[TABLE] < 0.) f[bridge::COUPLING] = -f[bridge::COUPLING];
-    c.force = c.force - (f[bridge::PULL] + f[bridge::NORMAL] * c.apart) * c.n
-            - (f[bridge::SLIDING] * c.sliding + f[bridge::COUPLING] * c.rolling);
-    c.couple = c.couple - cross(c.n, -1. * (f[bridge::COUPLING] * c.sliding + f[bridge::ROLLING] * c.rolling));
+    const Materials *const materials = &materials_[type_i * types_ + type_j];
+    if (batch.count == Batch::MOST || (materials != batch.materials && batch.count)) finish();
+    const int k = batch.count++;
+    batch.materials = materials;
+    batch.i[k] = i;
+    batch.j[k] = j;
+    batch.history[k] = history;
+    batch.d.put(k, d);
+    batch.v.put(k, v);
+    batch.omega_i.put(k, omega_i);
+    batch.omega_j.put(k, omega_j);
+    batch.radius_i[k] = radius_i;
+    batch.radius_j[k] = radius_j;
+    batch.spring.put(k, vec(history + SPRING));
+    double between[bridge::COLUMNS] = {0., 0., 0., 0., 0.};
+    const double *const f = table ? table->at(gap, between) : between;
+    for (int c = 0; c < bridge::COLUMNS; c++)
+      batch.bridge[c][k] = c == bridge::COUPLING ? std::copysign(1., history[TABLE]) * f[c] : f[c];
+    return k;
   }
 
-  /* Repulsion, friction and rolling friction of surfaces that touch. */
-  inline void touch(Contact &c, double *const spring, const bool update, const double time_step) const
+  /* Gaps, and what the sizes of two beads give. */
+  BY_LANES void measure() const
   {
-    const int i = c.type_i, j = c.type_j;
-    const double root = std::sqrt(-c.reduced_radius * c.gap);
-    const double along = 8. * shear_modulus_[i][j] * root, elastic = -4. / 3. * modulus_[i][j] * root * c.gap;
-    // Both dampings are 2 sqrt(5/6) beta sqrt(k m) of their stiffness k, which is a modulus times the root.
-    const double damping = std::sqrt(root * c.reduced_mass);
-    const Damping &of = dampings_[i * (atom->ntypes + 1) + j];
-    Vec stretch = vec(spring);
-    if (update) {
-      stretch = stretch + time_step * c.sliding;
-      stretch = stretch - dot(stretch, c.n) * c.n;
+    Batch &b = batch;
+    for (int k = 0, count = b.whole(); k < count; k++) {
+      const double distance = length(b.d.get(k)), sum = b.radius_i[k] + b.radius_j[k];
+      b.inverse[k] = 1. / distance;
+      b.gap[k] = distance - sum;
+      b.reduced_radius[k] = b.radius_i[k] * b.radius_j[k] / sum;
+      b.reduced_mass[k] = b.mass_i[k] * b.mass_j[k] / (b.mass_i[k] + b.mass_j[k]);
     }
-    Vec hold = along * stretch;
-    const double limit = friction_[i][j] * elastic;
-    if (dot(hold, hold) > limit * limit) {
-      const double share = limit / length(hold);
-      stretch = share * stretch;
-      hold = share * hold;
-    } else {
-      hold = hold + of.along * damping * c.sliding;
-      if (dot(hold, hold) > limit * limit) hold = limit / length(hold) * hold;
-    }
-    if (update) {
-      spring[0] = stretch.x;
-      spring[1] = stretch.y;
-      spring[2] = stretch.z;
-    }
-    c.force = c.force + (elastic - of.normal * damping * c.apart) * c.n - hold;
-    if (rolls_) {
-      const double speed = length(c.spin);
-      if (speed > 0.) {
-        const Vec against = rolling_friction_[i][j] * elastic * c.reduced_radius / speed * c.spin;
-        c.couple = c.couple - (against - dot(against, c.n) * c.n);
+  }
+
+  /* Forces and torques of the batch; springs are kept up if so asked. */
+  BY_LANES void act(const bool update, const double time_step) const
+  {
+    if (rolls_) act<true>(update ? time_step : 0.);
+    else act<false>(update ? time_step : 0.);
+    for (int k = 0; update && k < batch.count; k++) vec(batch.history[k] + SPRING) = batch.spring.get(k);
+  }
+
+  template<bool ROLLS> __attribute__((always_inline)) inline void act(const double stretched) const
+  {
+    Batch &b = batch;
+    const Materials of = *b.materials;
+    for (int k = 0, count = b.whole(); k < count; k++) {
+      const Vec d = b.d.get(k), v = b.v.get(k), omega_i = b.omega_i.get(k), omega_j = b.omega_j.get(k);
+      const double gap = b.gap[k], apart = b.inverse[k] * dot(v, d);
+      const double arm_i = b.radius_i[k] + 0.5 * gap, arm_j = b.radius_j[k] + 0.5 * gap;
+      const Vec n = b.inverse[k] * d, spin = omega_i - omega_j, rolling = cross(n, spin);
+      const Vec sliding = v - apart * n + cross(n, arm_i * omega_i + arm_j * omega_j);
+      // Surfaces apart have no repulsion, and all that is in proportion to it vanishes.
+      const double depth = gap < 0. ? -gap : 0., root = std::sqrt(b.reduced_radius[k] * depth);
+      // Both dampings are 2 sqrt(5/6) beta sqrt(k m) of their stiffness k, which is a modulus times the root.
+      const double damping = std::sqrt(root * b.reduced_mass[k]);
+      const double elastic = of.stiffness * root * depth, limit = of.friction * elastic;
+      Vec stretch = b.spring.get(k) + stretched * sliding;
+      stretch = stretch - dot(stretch, n) * n;
+      Vec hold = of.shear_stiffness * root * stretch;
+      // A spring beyond Coulomb's limit slips, without damping; else spring and damping together are limited.
+      const double held = dot(hold, hold), shear_damping = of.shear_damping * damping;
+      const bool slips = held > limit * limit;
+      hold = hold + (slips ? 0. : shear_damping) * sliding;
+      const double most = limit / (std::sqrt(slips ? held : dot(hold, hold)) + 1e-150), part = most < 1. ? most : 1.;
+      b.spring.put(k, (slips ? part : 1.) * stretch);
+      const double coupling = b.bridge[bridge::COUPLING][k];
+      hold = part * hold + b.bridge[bridge::SLIDING][k] * sliding + coupling * rolling;
+      const double drag = of.damping * damping + b.bridge[bridge::NORMAL][k];
+      b.force.put(k, (elastic - b.bridge[bridge::PULL][k] - drag * apart) * n - hold);
+      const Vec t = cross(n, hold);
+      Vec couple = cross(n, coupling * sliding + b.bridge[bridge::ROLLING][k] * rolling);
+      if (ROLLS) {
+        const double speed = length(spin) + 1e-150;
+        couple = couple - of.rolling_friction * elastic * b.reduced_radius[k] / speed * (spin - dot(spin, n) * n);
       }
+      b.torque_i.put(k, arm_i * t + couple);
+      b.torque_j.put(k, arm_j * t - couple);
     }
   }
 
 private:
-  struct Damping {
-    double normal, along;
-  };
   const bool rolls_;
   double formed_;
-  double **modulus_, **shear_modulus_, **friction_, **rolling_friction_;
-  std::vector<Damping> dampings_;  // by both types
+  int types_;
+  std::vector<Materials> materials_;  // by both types
   std::string file_;
   std::vector<bridge::Table> tables_;
   FixPropertyAtom *film_;
   std::vector<double> films_;
-
-  static std::map<LAMMPS *, const Law *> &known()
-  {
-    static std::map<LAMMPS *, const Law *> laws;
-    return laws;
-  }
 
   /* The table of a new bridge. Where liquid is conserved it is that of the volume nearest to what the films offer, up to
      1.2 times as much (volumes are steps), or -1 if films are too thin for any. */
@@ -318,10 +343,8 @@ class Pair : public PairStyles::IGranularPairStyle, private Law {
 public:
   Pair(LAMMPS *lmp, PairGran *parent, const int64_t hash, const bool rolls) : Law(lmp, rolls), hash_(hash)
   {
-    parent->add_history_value("bridge", "1");  // "1": the sign changes where the engine swaps i and j
-    parent->add_history_value("shearx", "1");
-    parent->add_history_value("sheary", "1");
-    parent->add_history_value("shearz", "1");
+    for (const char *const value : {"bridge", "shearx", "sheary", "shearz"})
+      parent->add_history_value(value, "1");  // "1": the sign changes where the engine swaps i and j
   }
   void settings(int n, char **args, IContactHistorySetup *) { Law::settings(n, args); }
   void init_granular() { connect(); }
@@ -344,98 +367,90 @@ public:
     begin_step();
     if (pair->fr_pair() || pair->storeSumDelta() || pair->storeContactForces() || pair->storeContactForcesStress())
       error->all(FLERR, "cohesion bridge has no rigid bodies, multicontact or stored contact forces");
-    double **const x = atom->x, **const f = atom->f, **const torque = atom->torque;
-    const double *const radius = atom->radius;
     const bool newton = force->newton_pair, compute = pair->computeflag(), update = compute && pair->shearupdate();
     const bool tell = (pair->cpl() && add) || pair->evflag;
-    const double time_step = this->update->dt;
-    const int width = pair->dnum(), nlocal = atom->nlocal;
+    const double time_step = this->update->dt, most = formed();
+    const int width = pair->dnum(), last = newton ? std::numeric_limits<int>::max() : atom->nlocal;
     NeighList *const list = pair->list;
+    if (!list->inum) return;
+    // Rows of these arrays are one block.
+    const Vec *const x = &vec(atom->x[0]), *const v = &vec(atom->v[0]), *const omega = &vec(atom->omega[0]);
+    Vec *const f = &vec(atom->f[0]), *const torque = &vec(atom->torque[0]);
+    const double *const radius = atom->radius, *const mass = atom->rmass;
+    const int *const type = atom->type;
 
+    batch.count = 0;
+    const auto finish = [&]() __attribute__((noinline)) {
+      if (!batch.count) return;
+      measure();
+      act(update, time_step);
+      for (int k = 0; compute && k < batch.count;) {
+        const int i = batch.i[k];
+        Vec on = f[i], turn = torque[i];  // in registers, for all contacts of a bead
+        for (; k < batch.count && batch.i[k] == i; k++) {
+          const Vec force = batch.force.get(k);
+          on = on + force;
+          turn = turn + batch.torque_i.get(k);
+          const int j = batch.j[k];
+          if (j >= last) continue;
+          f[j] = f[j] - force;
+          torque[j] = torque[j] + batch.torque_j.get(k);
+        }
+        f[i] = on;
+        torque[i] = turn;
+      }
+      for (int k = 0; tell && k < batch.count; k++) report(pair, k, newton, add);
+      batch.count = 0;
+    };
     for (int ii = 0; ii < list->inum; ii++) {
-      const int i = list->ilist[ii], count = list->numneigh[i];
+      const int i = list->ilist[ii], count = list->numneigh[i], type_i = type[i];
       const int *const neighbours = list->firstneigh[i];
       int *const flags = list->listgranhistory->firstneigh[i];
-      double *const histories = list->listgranhistory->firstdouble[i];
-      const Vec xi = vec(x[i]);
-      const double ri = radius[i];
-      Vec force_i = {0., 0., 0.}, torque_i = {0., 0., 0.};
+      double *history = list->listgranhistory->firstdouble[i] - width;
+      const Vec xi = x[i], vi = v[i], wi = omega[i];
+      const double ri = radius[i], mi = mass[i];
       for (int jj = 0; jj < count; jj++) {
+        history += width;
         const int j = neighbours[jj] & NEIGHMASK;
-        const Vec d = xi - vec(x[j]);
-        const double squared = dot(d, d), sum = ri + radius[j], reach = sum + formed();
+        const double rj = radius[j], sum = ri + rj, reach = sum + most;
+        const Vec d = xi - x[j];
+        const double squared = dot(d, d);
         if (squared > reach * reach && !flags[jj]) continue;
-        double *const history = histories + width * jj;
-        Contact c;
-        const double distance = std::sqrt(squared);
-        c.gap = distance - sum;
-        c.n = 1. / distance * d;
-        if (!act(c, i, j, history, update, time_step, flags[jj])) continue;
-        const Vec t = cross(c.n, c.force);
-        const double share = 0.5 * c.gap;
-        const Vec torque_of_i = c.couple - (ri + share) * t;
-        force_i = force_i + c.force;
-        torque_i = torque_i + torque_of_i;
-        if (compute && (newton || j < nlocal)) {
-          add_to(f[j], -1. * c.force);
-          add_to(torque[j], -1. * c.couple - (radius[j] + share) * t);
-        }
-        if (tell) report(pair, i, j, newton, add, d, c.force, torque_of_i, history);
-      }
-      if (compute) {
-        add_to(f[i], force_i);
-        add_to(torque[i], torque_i);
+        const bool touching = squared < sum * sum;
+        const double gap = touching ? -0. : std::sqrt(squared) - sum;  // only that between surfaces apart matters here
+        if (!touching) history[SPRING] = history[SPRING + 1] = history[SPRING + 2] = 0.;
+        const bridge::Table *const table = bridge_of(history, gap, i, j, type[j], rj);
+        flags[jj] = touching ? CONTACT_NORMAL_MODEL | CONTACT_COHESION_MODEL | CONTACT_TANGENTIAL_MODEL
+                  : table    ? CONTACT_COHESION_MODEL
+                             : 0;
+        if (!flags[jj]) continue;
+        const int k = Law::add(finish, i, j, type_i, type[j], d, vi - v[j], wi, omega[j], ri, rj, table, gap, history);
+        batch.mass_i[k] = mi;
+        batch.mass_j[k] = mass[j];
       }
     }
+    finish();
     if (pair->cpl() && add) pair->cpl_pair_finalize();
   }
 
 private:
   const int64_t hash_;
 
-  /* Fills in a contact whose gap and normal are known; false if nothing acts. */
-  inline bool act(Contact &c, const int i, const int j, double *const history, const bool update,
-                  const double time_step, int &flag)
+  __attribute__((noinline)) void report(PairGran *pair, const int k, const bool newton, const int add)
   {
-    const double ri = atom->radius[i], rj = atom->radius[j];
-    const bool touching = c.gap < 0.;
-    c.type_i = atom->type[i];
-    c.type_j = atom->type[j];
-    if (!touching) history[SPRING] = history[SPRING + 1] = history[SPRING + 2] = 0.;
-    const bridge::Table *const table = bridge_of(history, c.gap, i, j, c.type_j, rj);
-    flag = touching ? CONTACT_NORMAL_MODEL | CONTACT_COHESION_MODEL | CONTACT_TANGENTIAL_MODEL
-         : table    ? CONTACT_COHESION_MODEL
-                    : 0;
-    if (!flag) return false;
-    const Vec v = vec(atom->v[i]) - vec(atom->v[j]), wi = vec(atom->omega[i]), wj = vec(atom->omega[j]);
-    c.apart = dot(v, c.n);
-    c.sliding = v - c.apart * c.n + cross(c.n, (ri + 0.5 * c.gap) * wi + (rj + 0.5 * c.gap) * wj);
-    c.spin = wi - wj;
-    c.rolling = cross(c.n, c.spin);
-    c.force = c.couple = {0., 0., 0.};
-    if (touching) {
-      c.reduced_radius = ri * rj / (ri + rj);
-      c.reduced_mass = atom->rmass[i] * atom->rmass[j] / (atom->rmass[i] + atom->rmass[j]);
-      touch(c, history + SPRING, update, time_step);
-    }
-    if (table) wet(c, *table, history);
-    return true;
-  }
-
-  __attribute__((noinline)) void report(PairGran *pair, const int i, const int j, const bool newton, const int add,
-                                        const Vec d, const Vec of, const Vec torque, double *const history)
-  {
+    const int i = batch.i[k], j = batch.j[k];
+    const Vec on = batch.force.get(k), d = batch.d.get(k);
     if (pair->cpl() && add) {
       SurfacesIntersectData surfaces;
       ForceData forces;
       surfaces.i = i;
       surfaces.j = j;
-      surfaces.contact_history = history;
-      add_to(forces.delta_F, of);
-      add_to(forces.delta_torque, torque);
+      surfaces.contact_history = batch.history[k];
+      add_to(forces.delta_F, on);
+      add_to(forces.delta_torque, batch.torque_i.get(k));
       pair->cpl_add_pair(surfaces, forces);
     }
-    if (pair->evflag) pair->ev_tally_xyz(i, j, atom->nlocal, newton, 0., 0., of.x, of.y, of.z, d.x, d.y, d.z);
+    if (pair->evflag) pair->ev_tally_xyz(i, j, atom->nlocal, newton, 0., 0., on.x, on.y, on.z, d.x, d.y, d.z);
   }
 };
 
@@ -444,32 +459,47 @@ class FixWallBridge : public Fix {
 public:
   FixWallBridge(LAMMPS *lmp, int count, char **args) : Fix(lmp, count, args), law_(0), type_(0), begin_(0), moves_(true)
   {
-    Arguments words(*this, count, args);
+    int at = 3;
+    const auto next = [&]() {
+      if (at == count) this->error->fix_error(FLERR, this, "the command ends early");
+      return args[at++];
+    };
+    const auto number = [&]() { return this->force->numeric(FLERR, next()); };
+    const auto vector = [&]() {
+      const double x = number(), y = number();
+      return Vec{x, y, number()};
+    };
     std::string file;
-    while (words.more()) {
-      const std::string word = words.next();
-      if (word == "type") type_ = static_cast<int>(words.number());
+    Vec gravity = {0., 0., 0.};
+    while (at < count) {
+      const std::string word = next();
+      if (word == "type") type_ = static_cast<int>(number());
       else if (word == "plane") {
-        const Vec point = words.vector(), normal = words.vector();
+        const Vec point = vector(), normal = vector();
         if (!(length(normal) > 0.)) error->fix_error(FLERR, this, "a plane has a normal of no length");
         walls_.push_back({1. / length(normal) * normal, point, 0.});
       } else if (word == "cylinder") {
-        const double x = words.number(), y = words.number();
-        walls_.push_back({{0., 0., 0.}, {x, y, 0.}, words.number()});
+        const double x = number(), y = number();
+        walls_.push_back({{0., 0., 0.}, {x, y, 0.}, number()});
         if (!(walls_.back().radius > 0.)) error->fix_error(FLERR, this, "a cylinder has a radius that is not above 0");
       } else if (word == "shaken") {
-        const Vec amplitude = words.vector();
-        const double frequency = 2. * M_PI * words.number();
-        waves_.push_back({amplitude, frequency, words.number(), 0.});
-      } else if (word == "begin") begin_ = static_cast<bigint>(words.number());
-      else if (word == "frame") moves_ = words.one_of("lab", "walls");
-      else if (word == "loads") file = words.next();
+        const Vec amplitude = vector();
+        const double frequency = 2. * M_PI * number();
+        waves_.push_back({amplitude, frequency, number(), 0.});
+      } else if (word == "gravity") gravity = vector();
+      else if (word == "begin") begin_ = static_cast<bigint>(number());
+      else if (word == "frame") {
+        const std::string frame = next();
+        moves_ = frame == "lab";
+        if (!moves_ && frame != "walls") error->fix_error(FLERR, this, ("expected lab or walls, not " + frame).c_str());
+      } else if (word == "loads") file = next();
       else error->fix_error(FLERR, this, ("unknown keyword " + word).c_str());
     }
     if (walls_.empty()) error->fix_error(FLERR, this, "expected a plane or a cylinder");
     if (type_ < 1 || type_ > atom->ntypes) error->fix_error(FLERR, this, "expected a type, of those of the box");
     if (moves_ && !file.empty()) error->fix_error(FLERR, this, "loads need the walls' frame: expected frame walls");
-    load_width_ = 3 * (1 + waves_.size());
+    loads_.push_back(gravity);
+    for (const Wave &wave : waves_) loads_.push_back(wave.amplitude);
     if (!file.empty()) read_loads(file);
     width_ = HISTORY * walls_.size();
     create_attribute = restart_peratom = local_flag = local_freq = nevery = 1;
@@ -489,7 +519,7 @@ public:
   int max_type() { return type_; }
   void init()
   {
-    law_ = Law::of(lmp);
+    law_ = Law::laws()[lmp];
     if (!law_) error->fix_error(FLERR, this, "the pair style has no cohesion bridge");
   }
 
@@ -570,44 +600,11 @@ private:
 
   struct Wave {
     Vec amplitude;
-    double frequency, phase, now;  // rad/s, rad; sine
+    double frequency, phase, push;  // rad/s, rad; inertial acceleration now for an amplitude of 1
   };
 
   struct Near {
     int bead, wall;
-  };
-
-  /* The words of a command after the style, read one by one. */
-  class Arguments {
-  public:
-    Arguments(FixWallBridge &fix, const int count, char **const args) : fix_(fix), at_(args + 3), end_(args + count) {}
-    bool more() const { return at_ < end_; }
-    std::string next()
-    {
-      if (!more()) fix_.error->fix_error(FLERR, &fix_, "the command ends early");
-      return *at_++;
-    }
-    double number()
-    {
-      const std::string word = next();
-      return fix_.force->numeric(FLERR, const_cast<char *>(word.c_str()));
-    }
-    Vec vector()
-    {
-      const double x = number(), y = number(), z = number();
-      return {x, y, z};
-    }
-    bool one_of(const std::string &yes, const std::string &no)
-    {
-      const std::string found = next();
-      if (found != yes && found != no)
-        fix_.error->fix_error(FLERR, &fix_, ("expected " + yes + " or " + no + ", not " + found).c_str());
-      return found == yes;
-    }
-
-  private:
-    FixWallBridge &fix_;
-    char **at_, **end_;
   };
 
   const Law *law_;
@@ -616,11 +613,10 @@ private:
   std::vector<double> history_;  // of each bead at each wall
   std::vector<Wave> waves_;
   std::vector<Near> near_;
-  std::vector<double> loads_;  // by the ids of beads: gravity, amplitude of the acceleration of each wave
-  size_t load_width_;
+  std::vector<Vec> loads_;  // by the ids of beads, first the command's: gravity, amplitude of each wave
   bigint begin_;
-  bool moves_;                   // in the frame of the laboratory
-  Vec shift_, velocity_, push_;  // of the walls now; force on a mass of 1
+  bool moves_;            // in the frame of the laboratory
+  Vec shift_, velocity_;  // of the walls now
   std::vector<double> cells_;
   std::vector<double *> rows_;
 
@@ -629,13 +625,13 @@ private:
   void read_loads(const std::string &file)
   {
     std::ifstream in(file.c_str());
-    const int most = atom->tag_max();
-    loads_.resize((most + 1) * load_width_);
+    const size_t most = atom->tag_max(), width = loads_.size();
+    while (loads_.size() < (most + 1) * width) loads_.push_back(loads_[loads_.size() - width]);
     bool whole = static_cast<bool>(in);
-    for (int bead; whole && in >> bead;) {
+    for (size_t bead; whole && in >> bead;) {
       whole = bead > 0 && bead <= most;
-      for (size_t column = 0; whole && column < load_width_; column++)
-        whole = static_cast<bool>(in >> loads_[bead * load_width_ + column]);
+      for (size_t k = bead * width; whole && k < (bead + 1) * width; k++)
+        whole = static_cast<bool>(in >> loads_[k].x >> loads_[k].y >> loads_[k].z);
     }
     if (!whole || !in.eof()) error->fix_error(FLERR, this, (file + " has no loads that can be read").c_str());
   }
@@ -645,31 +641,28 @@ private:
   /* Puts the walls where they are in this step, with the velocity of some time before. */
   void move(const double before)
   {
-    shift_ = velocity_ = push_ = {0., 0., 0.};
+    shift_ = velocity_ = {0., 0., 0.};
     const double time = (update->ntimestep - begin_) * update->dt;
     for (Wave &wave : waves_) {
       const double w = wave.frequency;
-      wave.now = time < 0. ? 0. : std::sin(w * time + wave.phase);
-      if (time < 0.) continue;
-      if (moves_) {
-        shift_ = shift_ + wave.now * wave.amplitude;
-        velocity_ = velocity_ + w * std::cos(w * (time - before) + wave.phase) * wave.amplitude;
-      } else push_ = push_ + w * w * wave.now * wave.amplitude;
+      const double sine = time < 0. ? 0. : std::sin(w * time + wave.phase);
+      wave.push = moves_ ? 0. : w * w * sine;
+      if (time < 0. || !moves_) continue;
+      shift_ = shift_ + sine * wave.amplitude;
+      velocity_ = velocity_ + w * std::cos(w * (time - before) + wave.phase) * wave.amplitude;
     }
   }
 
-  /* The inertial force where the frame is that of shaken walls, and the beads' own loads. */
+  /* Gravity, and the inertial force where the frame is that of shaken walls. */
   void push()
   {
-    if (loads_.empty() && (moves_ || waves_.empty())) return;
+    const size_t width = 1 + waves_.size(), beads = loads_.size() / width;
     for (int i = 0; i < atom->nlocal; i++) {
       if (!(atom->mask[i] & groupbit)) continue;
-      Vec acceleration = push_;
-      if (!loads_.empty()) {
-        const double *load = &loads_[atom->tag[i] * load_width_];
-        acceleration = acceleration + vec(load);
-        for (const Wave &wave : waves_) acceleration = acceleration + wave.now * vec(load += 3);
-      }
+      const size_t tag = atom->tag[i];
+      const Vec *load = &loads_[tag < beads ? tag * width : 0];
+      Vec acceleration = *load;
+      for (const Wave &wave : waves_) acceleration = acceleration + wave.push * *++load;
       add_to(atom->f[i], atom->rmass[i] * acceleration);
     }
   }
@@ -699,57 +692,54 @@ private:
   void evaluate(const bool add, const bool stretch, std::vector<double> *const told)
   {
     const double formed = law_->formed();
+    const auto finish = [&]() { this->finish(add, stretch, told); };
+    batch.count = 0;
     for (const Near &one : near_) {
-      double *const history = history_of(one.bead, one.wall);
+      const int i = one.bead;
+      double *const history = history_of(i, one.wall);
       Vec n;
-      const double gap = gap_at(one.wall, one.bead, n);
+      const double gap = gap_at(one.wall, i, n);
+      if (std::isnan(gap)) error->one(FLERR, "fix wall/bridge: a bead's position is no number");
       if (!(gap < 0.)) std::fill_n(history + SPRING, HISTORY - SPRING, 0.);
       if (gap > formed && history[TABLE] == 0.) continue;
-      touch(one.bead, one.wall, gap, n, history, add, stretch, told);
+      const bridge::Table *const table =
+        law_->bridge_of(history, gap, i, WALL, type_, std::numeric_limits<double>::infinity());
+      if (!(gap < 0.) && !table) continue;
+      const Vec v = vec(atom->v[i]) - velocity_, none = {0., 0., 0.};
+      const double radius = atom->radius[i];
+      const int k = law_->add(finish, i, one.wall, atom->type[i], type_, n, v, vec(atom->omega[i]), none, radius, 0.,
+                              table, gap, history);
+      batch.inverse[k] = 1.;
+      batch.gap[k] = gap;
+      batch.reduced_radius[k] = radius;
+      batch.reduced_mass[k] = atom->rmass[i];
     }
+    finish();
   }
 
-  void touch(const int i, const int wall, const double gap, const Vec n, double *const history, const bool add,
-             const bool stretch, std::vector<double> *const told)
+  void finish(const bool add, const bool stretch, std::vector<double> *const told)
   {
-    if (std::isnan(gap)) error->one(FLERR, "fix wall/bridge: a bead's position is no number");
-    const double radius = atom->radius[i];
-    const bool touching = gap < 0.;
-    Contact c;
-    c.gap = gap;
-    c.n = n;
-    c.type_i = atom->type[i];
-    c.type_j = type_;
-    const bridge::Table *const table =
-      law_->bridge_of(history, c.gap, i, WALL, type_, std::numeric_limits<double>::infinity());
-    if (!touching && !table) return;
-    const double arm = radius + 0.5 * c.gap;
-    const Vec v = vec(atom->v[i]) - velocity_;
-    c.spin = vec(atom->omega[i]);
-    c.apart = dot(v, c.n);
-    c.rolling = cross(c.n, c.spin);
-    c.sliding = v - c.apart * c.n + arm * c.rolling;
-    c.force = c.couple = {0., 0., 0.};
-    if (touching) {
-      c.reduced_radius = radius;
-      c.reduced_mass = atom->rmass[i];
-      law_->touch(c, history + SPRING, stretch, update->dt);
-    }
-    if (table) law_->wet(c, *table, history);
-    if (add) {
-      add_to(atom->f[i], c.force);
-      add_to(atom->torque[i], c.couple - arm * cross(c.n, c.force));
-    }
-    if (told) {
-      const Vec x = vec(atom->x[i]), foot = x - (radius + c.gap) * c.n;
-      for (const double cell : {foot.x, foot.y, foot.z, x.x, x.y, x.z, 1. * wall, 1. * atom->tag[i], c.force.x,
-                                c.force.y, c.force.z, -c.gap})
+    Batch &b = batch;
+    if (!b.count) return;
+    law_->act(stretch, update->dt);
+    for (int k = 0; k < b.count; k++) {
+      const int i = b.i[k];
+      const Vec on = b.force.get(k), x = vec(atom->x[i]);
+      if (add) {
+        add_to(atom->f[i], on);
+        add_to(atom->torque[i], b.torque_i.get(k));
+      }
+      if (!told) continue;
+      const Vec foot = x - (atom->radius[i] + b.gap[k]) * b.d.get(k);
+      for (const double cell :
+           {foot.x, foot.y, foot.z, x.x, x.y, x.z, 1. * b.j[k], 1. * atom->tag[i], on.x, on.y, on.z, -b.gap[k]})
         told->push_back(cell);
     }
+    b.count = 0;
   }
 };
 
-/* The engine's table of fixes is private, and has no other entry: a pointer to the member, by explicit instantiation. */
+/* The engine's table of fixes is private, without another entry: a pointer to the member, by explicit instantiation. */
 typedef std::map<std::string, Fix *(*)(LAMMPS *, int, char **)> Fixes;
 struct Styles {
   typedef Fixes *Modify::*Member;

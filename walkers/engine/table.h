@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Copyright (c) 2026, the granular-walkers developers
-/* Forces of a bridge against the gap, from a table, whose format README.md describes.
+/* Forces of a bridge against the gap, from a file with a table for each two surfaces that may meet; '#' begins a comment:
 
-   A file holds one table for each two surfaces that may meet; '#' begins a comment. A table is
-
-       bridge TYPE TYPE RADIUS RADIUS           atom types, radii in m; of a plane the radius is "inf"
+       bridge TYPE TYPE RADIUS RADIUS           atom types, radii in m; that of a wall is "inf"
        [liquid VOLUME SHARE SHARE FILM FILM]    of beads whose liquid is conserved (README.md), m3
        range FORMATION RUPTURE SCALE OCTAVES CELLS
-       GAP PULL NORMAL SLIDING COUPLING ROLLING (3 * CELLS * (OCTAVES + 2) + 1 such rows, by the gap)
+       GAP PULL NORMAL SLIDING COUPLING ROLLING (3 * CELLS * (OCTAVES + 2) + 1 such rows, by the gap: m, N, N s/m, N s/m,
+                                                N s, N m s); COUPLING has its sign where i is the first of the two
 
    Near contact the gap h is divided by octaves of 1 + h/SCALE, each into CELLS cells (a power of two), up to
-   m = SCALE * (2^OCTAVES - 1); beyond it are 2 * CELLS cells of sqrt((RUPTURE - h)/(RUPTURE - m)), for the pull of a
-   bridge that breaks ends with an infinite slope. Within a cell forces are cubic, through four rows. */
+   m = SCALE (2^OCTAVES - 1); beyond it are 2 CELLS cells, even in sqrt((RUPTURE - h)/(RUPTURE - m)), for the pull of a
+   bridge may end with an infinite slope. Within a cell forces are cubic, through rows at its begin, at 1/3 and 2/3 of it
+   and the next one; the last row is the rupture. The row at part t of cell c is in octave k (from 0) at
+   h = SCALE (2^k (1 + (c + t)/CELLS) - 1), beyond m at h = m + (RUPTURE - m) (1 - (1 - (c + t)/(2 CELLS))^2). */
 #ifndef BRIDGE_TABLE_H
 #define BRIDGE_TABLE_H
 
@@ -69,7 +70,6 @@ private:
 };
 
 struct Cell {
-  double begin, inverse_width;
   double coefficient[4][COLUMNS];
 };
 
@@ -79,21 +79,19 @@ public:
   double radius[2], formation, rupture, contact[COLUMNS];
   double volume, share[2], film[2];  // m3; the volume is 0 where liquid is not conserved
 
-  void at(const double gap, double *const forces) const
+  /* The forces at a gap, which are those of the contact or are written to a place. */
+  const double *at(const double gap, double *const place) const
   {
+    if (gap <= 0.) return contact;
     double t;
     const Cell *cell;
-    if (gap <= 0.) {
-      std::memcpy(forces, contact, sizeof(contact));
-      return;
-    }
     if (gap < middle) {
       // The exponent and the first bits of the mantissa of 1 + h/SCALE number the cells.
       const double x = 1. + gap * inverse_scale;
       uint64_t bits;
       std::memcpy(&bits, &x, sizeof(bits));
       cell = &near_[(bits >> shift) - first];
-      t = (x - cell->begin) * cell->inverse_width;
+      t = (bits & within) * part;
     } else {
       const double y = (1. - std::sqrt(std::max(0., rupture - gap) * inverse_rest)) * far_.size();
       const size_t number = std::min(static_cast<size_t>(y), far_.size() - 1);
@@ -101,8 +99,9 @@ public:
       t = y - number;
     }
     for (int c = 0; c < COLUMNS; c++)
-      forces[c] = ((cell->coefficient[3][c] * t + cell->coefficient[2][c]) * t + cell->coefficient[1][c]) * t
-                + cell->coefficient[0][c];
+      place[c] = ((cell->coefficient[3][c] * t + cell->coefficient[2][c]) * t + cell->coefficient[1][c]) * t
+               + cell->coefficient[0][c];
+    return place;
   }
 
   bool joins(const int type_1, const int type_2, const double radius_1, const double radius_2) const
@@ -139,6 +138,8 @@ public:
       throw std::runtime_error("the range of a table is not usable");
     inverse_scale = 1. / scale;
     shift = 52 - power;
+    within = (static_cast<uint64_t>(1) << shift) - 1;
+    part = std::ldexp(1., -shift);
     first = static_cast<uint64_t>(1023) << power;
     middle = scale * (std::ldexp(1., octaves) - 1.);
     if (!(middle < rupture)) throw std::runtime_error("the octaves of a table reach beyond the rupture");
@@ -154,28 +155,24 @@ public:
     std::memcpy(contact, rows.data(), sizeof(contact));
     near_.clear();
     for (int octave = 0; octave < octaves; octave++)
-      for (int number = 0; number < cells; number++) {
-        const double width = std::ldexp(1., octave) / cells;
-        near_.push_back(cell(&rows[3 * COLUMNS * near_.size()], std::ldexp(1., octave) + number * width, width));
-      }
+      for (int number = 0; number < cells; number++) near_.push_back(cell(&rows[3 * COLUMNS * near_.size()]));
     far_.clear();
     for (int number = 0; number < 2 * cells; number++)
-      far_.push_back(cell(&rows[3 * COLUMNS * (near_.size() + far_.size())], number, 1.));
+      far_.push_back(cell(&rows[3 * COLUMNS * (near_.size() + far_.size())]));
   }
 
 private:
   double middle, inverse_scale, inverse_rest;
   int shift;
-  uint64_t first;
+  uint64_t first, within;
+  double part;
   std::vector<Cell> near_, far_;
 
   static bool same(const double a, const double b) { return a == b || std::fabs(a - b) <= 1e-9 * std::fabs(a); }
 
-  static Cell cell(const double *const row, const double begin, const double width)
+  static Cell cell(const double *const row)
   {
     Cell made;
-    made.begin = begin;
-    made.inverse_width = 1. / width;
     for (int c = 0; c < COLUMNS; c++) {
       const double f0 = row[c], f1 = row[c + COLUMNS], f2 = row[c + 2 * COLUMNS], f3 = row[c + 3 * COLUMNS];
       made.coefficient[0][c] = f0;

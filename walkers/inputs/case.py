@@ -56,7 +56,7 @@ class Liquid(Table):
     `walkers.physics.laws`, or your own function, ``file.py:function``.
     """
 
-    choices: ClassVar = (Choice((("dynamic_viscosity",), ("kinematic_viscosity",)), also="a liquid of the library"),)
+    choices: ClassVar = (Choice((("dynamic_viscosity",), ("kinematic_viscosity",)), instead="a liquid of the library"),)
     name: str | None = key("Liquid from the library. The other keys override its values.", None, "Si AK5", SAME_RUN)
     mass_fraction: Filled[Number] = key(
         "Mass fraction of glycerol in `water-glycerol`.", None, 0.87, SAME_RUN, ge=0, le=1

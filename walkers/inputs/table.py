@@ -68,7 +68,6 @@ class Choice(NamedTuple):
 
     ways: tuple[tuple[str, ...], ...]
     required: bool = True
-    also: str = ""
     instead: str = ""
 
     @property
@@ -163,7 +162,7 @@ class Table(BaseModel):
                 way = said[0] if said else choice.ways[0]
                 others = [other for other in choice.ways if other is not way] if not said else []
                 others += [(choice.instead,)] if choice.instead else []
-                instead = "".join(f", or {one}" for one in [*map(" and ".join, others), choice.also] if one)
+                instead = "".join(f", or {' and '.join(other)}" for other in others)
                 for name in way:
                     if name not in given:
                         example = example_of(cls.model_fields[name])

@@ -35,18 +35,14 @@ ENGINE_VARIABLE = "WALKERS_ENGINE"
 SOURCES = Path(str(files("walkers.engine")))
 _MODEL = ("bridge.cpp", "table.h")
 """Source files of the contact model."""
-_SAME_FORCES: dict[str, str] = {
-    "ae6303f19ec381fc": "ecd8412d33f54c1329668425b8ac97c4d7e7672adc9e342cbea915745cb8648f",  # bridge.cpp
-    "3bff326fe52a6fb0": "02ef0839f90a565c96427c28b402a3ccbf5247d92c7dd7528d9a013773474248",  # table.h
-}
-"""SHA-256 of sources of the contact model (16 digits), and of earlier ones that gave the same numbers bit for bit.
-
-Runs and audits of the earlier ones keep their names."""
+_FORCES_VERSION = re.compile(rb"^// FORCES_VERSION \d+$", re.MULTILINE)
+"""The line of ``bridge.cpp`` that is part of the names of runs and audits; the rest of the sources is not."""
 _PACKAGES = ("g++", "libliggghts-dev", "libopenmpi-dev")
 _HEADERS = Path("/usr/include/liggghts")
-# Without -march, all machines of an architecture give the same numbers (no fused operations). -O3 does not reorder.
+# All machines of an architecture give the same numbers: -O3 does not reorder, and there are no fused operations. Only
+# without traps does it compute several contacts at once.
 _OPTIONS = (
-    *("-shared", "-fPIC", "-std=gnu++11", "-O3", "-fno-math-errno"),
+    *("-shared", "-fPIC", "-std=gnu++11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
     *("-DNDEBUG", "-DOMPI_SKIP_MPICXX", "-Wall", "-Wextra"),
 )
 _BANNER = re.compile(rb"\(Version ([^,\n]+),")
@@ -56,7 +52,7 @@ _LIBRARY = re.compile(r"libliggghts\S* => (\S+)")
 
 @dataclass(frozen=True)
 class Engine:
-    """A liggghts binary: its path, and the SHA-256 of it, of the library that it loads and of the contact model."""
+    """A liggghts binary: its path, and the SHA-256 of it, of its library and of the version of the contact model."""
 
     path: Path
     sha256: str
@@ -73,10 +69,10 @@ def find_engine(wanted: str | None = None) -> Engine:
         text = "is not an executable file on this machine; install it with: sudo apt-get install liggghts"
         raise EngineMissing(f"no engine: {name} {text}")
     path, digest = Path(found).resolve(), hashlib.sha256()
-    for part in [*_parts_of(path, path.stat().st_mtime_ns), *(SOURCES / name for name in _MODEL)]:
+    for part in _parts_of(path, path.stat().st_mtime_ns):
         about = part.stat()
-        own = _sha256(part, about.st_mtime_ns, about.st_size)
-        digest.update(bytes.fromhex(_SAME_FORCES.get(own[:16], own)))
+        digest.update(bytes.fromhex(_sha256(part, about.st_mtime_ns, about.st_size)))
+    digest.update(*_FORCES_VERSION.findall((SOURCES / "bridge.cpp").read_bytes()))
     return Engine(path, digest.hexdigest())
 
 

@@ -1,8 +1,6 @@
-"""Tables of a bridge law that the contact model ``cohesion bridge`` interpolates (its format: walkers/engine/table.h).
+"""Tables of a bridge law that the contact model ``cohesion bridge`` interpolates.
 
-Near contact, cells divide the octaves of 1 + h/scale evenly, where h is the gap; from the end m of the last octave to
-the rupture, cells are even in sqrt((rupture - h)/(rupture - m)). A law may have a kink at h = scale, between two cells,
-and end with an infinite slope. Within a cell, the engine interpolates by a cubic through four rows.
+``walkers/engine/table.h`` describes their format. A law may have a kink at the gap ``scale``, between two cells.
 """
 
 from __future__ import annotations
@@ -31,7 +29,7 @@ _COARSEST, _FINEST = 8, 256
 class Table:
     """The table of a law for two surfaces, as the engine reads it.
 
-    ``curve`` says where the bridge forms and breaks, ``scale`` (m), ``octaves`` and ``cells`` the grid (see above).
+    ``curve`` says where the bridge forms and breaks, ``scale`` (m), ``octaves`` and ``cells`` the grid.
     ``rows`` are the forces at its gaps, shape (3 cells (octaves + 2) + 1, 5), as `walkers.physics.bridge.Forces`.
     """
 

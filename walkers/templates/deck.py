@@ -48,7 +48,7 @@ RUN_NAME = "run.sh"
 SCALED_NAME = "bridges.scaled.txt"
 SCALE_NAME = "scale.awk"
 """Script beside decks to be run by hand: rescales the tables for an edited surface tension or viscosity."""
-CONTENT_VERSION = 7
+CONTENT_VERSION = 8
 """Version of what decks compute, part of the names of runs: increase it if a case gives other numbers.
 
 Do not increase it if decks with another text give the same numbers bit for bit.
@@ -222,7 +222,8 @@ def compose(plan: Plan) -> Deck:
     case, scene = plan.case, plan.scene
     layout, gravity = _layout(plan), case.environment.gravity
     surfaces = scene.surfaces or (surface_of(case),)
-    several = len(scene.loadings) > 1
+    files = {BRIDGES_NAME: tables_of(case, surfaces, {(bead.surface, bead.radius) for bead in scene.beads})}
+    files |= {LOADS_NAME: _loads(scene)} if len(scene.loadings) > 1 else {}
     contacts = [contact for contact, _ in surfaces]
     radii = [bead.radius for bead in scene.beads]
     smallest, largest = min(radii), max(radii)
@@ -263,7 +264,7 @@ def compose(plan: Plan) -> Deck:
         down=[component / gravity for component in case.gravity_vector] if gravity else [],
         plan=plan,
         shaken=plan.drive_from is not None,
-        several=several,
+        files=files,
         along=along,
         loads_name=LOADS_NAME,
         pair_bridge_terms=[f"c_pair_bridges[{pair_columns.index(one) + 1}]" for one in layout.pair_bridge_columns],
@@ -275,8 +276,6 @@ def compose(plan: Plan) -> Deck:
         bin_size=None if plan.skin else max(4.0 * largest, (space / 2e4) ** (1.0 / 3.0)),
         wide=not plan.skin and space > _MOST_BINS * largest**3,
     )  # fmt: skip
-    files = {LOADS_NAME: _loads(scene)} if several else {}
-    files[BRIDGES_NAME] = tables_of(case, surfaces, {(bead.surface, bead.radius) for bead in scene.beads})
     fastest = plan.fastest or fastest_of(case, scene)
     beyond = bool(limits_of(case).exceeded_by(case.run.time_step))
     # The engine writes once a sample, and several times a cycle.
@@ -296,23 +295,22 @@ def tables_of(case: Case, surfaces: Sequence[Surface], sizes: Collection[tuple[i
 
 
 def _loads(scene: Scene) -> str:
-    """Gravity and the amplitude of the inertial acceleration of each harmonic, bead by bead, as the engine reads it."""
-    rows = []
-    for bead in scene.beads:
-        load = scene.loadings[bead.loading]
-        rows.append(" ".join([str(bead.id), *(repr(x) for vector in (load.gravity, *load.harmonics) for x in vector)]))
-    return "\n".join(rows) + "\n"
+    """Gravity and the amplitude of each harmonic for beads whose loading is not the first, as the engine reads them."""
+    return "".join(
+        " ".join([str(bead.id), *(repr(x) for vector in scene.loadings[bead.loading] for x in vector)]) + "\n"
+        for bead in scene.beads
+        if bead.loading
+    )
 
 
 def _parameters(plan: Plan, surfaces: Sequence[Surface]) -> tuple[list[Parameter], list[Parameter]]:
     """The named parameters of a deck, and the values that follow from them."""
     case, recording, begin = plan.case, plan.recording, plan.drive_from
-    several = len(plan.scene.loadings) > 1
-    drive, of_it = of_drive(case.excitation, amplitudes=begin is not None and not several)
+    drive, of_it = of_drive(case.excitation, amplitudes=begin is not None)
     stable = min(limits_of(case).as_dict().values())
     time, of_that = of_time(case, None if recording.begin else begin, recording.steps, stable)
     given = [*drive, *time]
-    if case.environment.gravity > 0.0 and not several:
+    if case.environment.gravity > 0.0:
         given.append(Parameter("gravity", number(case.environment.gravity), "m/s^2"))
     if not plan.restart_from:
         given.append(Parameter("density", number(case.beads.density), "kg/m^3", "of the beads"))

@@ -38,15 +38,8 @@ class Bead:
     density: float | None = None  # None: that of the case
 
 
-@dataclass(frozen=True)
-class Loading:
-    """Accelerations of a bead other than by contacts, in the frame of the boundary, m/s².
-
-    Gravity, and the amplitude of the inertial acceleration of each harmonic of the drive.
-    """
-
-    gravity: Vector
-    harmonics: tuple[Vector, ...]
+Loading = tuple[Vector, ...]
+"""Loads on a bead: gravity (m/s²), and the amplitude (m) of each harmonic of the drive."""
 
 
 @dataclass(frozen=True)
@@ -68,9 +61,8 @@ def surface_of(case: Case) -> Surface:
 
 def loading_of(case: Case) -> Loading:
     """Loads on the beads of a case."""
-    amplitudes = [(one.peak_acceleration, one.direction) for one in case.excitation.harmonics]
-    inertia = tuple((a * x, a * y, a * z) for a, (x, y, z) in amplitudes)
-    return Loading(case.gravity_vector, inertia)
+    amplitudes = [(one.amplitude, one.direction) for one in case.excitation.harmonics]
+    return case.gravity_vector, *((a * x, a * y, a * z) for a, (x, y, z) in amplitudes)
 
 
 def sharing_key(case: Case) -> Hashable:
