@@ -294,13 +294,6 @@ class Case(Table):
         """The same case with a fixed number of cycles in one segment."""
         return self.but(run=self.run.for_cycles(cycles))
 
-    def determinants(self) -> dict[str, Any]:
-        """All values that determine the results, as plain JSON types: without names and limits of the engine.
-
-        A field of another name, or another default of a key that a file leaves out, renames all runs.
-        """
-        return super().determinants()
-
     @cached_property
     def origins(self) -> tuple[Origin, ...]:
         """Origins of the values, in the order of the tables of a case file."""
@@ -309,7 +302,7 @@ class Case(Table):
             if name in ("title", "uncertain") or name.startswith("placed["):  # no value, or hundreds
                 continue
             raw, kind = value_at(self.document, parts_of(name)), kind_in([*field.metadata, field.annotation])
-            if raw is not MISSING and not (units.is_auto(raw)):
+            if raw is not MISSING and not units.is_auto(raw):
                 # The step of the run is a little shorter, so that it fits into a cycle.
                 limit = units.parse_quantity(raw, units.TIME) if name == "run.time_step" else value
                 origins[name] = Origin(name, text_of(raw), "given", value=limit)

@@ -138,7 +138,10 @@ class Table(BaseModel):
                 yield place, value, field
 
     def determinants(self) -> dict[str, Any]:
-        """The values that make another run if they differ; absent ones are left out: new keys rename no runs."""
+        """The values that make another run if they differ, by the fields that hold them; absent ones are left out.
+
+        A new key therefore renames no runs; a field of another name, or another default, renames all.
+        """
         kept = {}
         for name, field in type(self).model_fields.items():
             if SAME_RUN in field.metadata or (value := getattr(self, name)) in (None, ()):
