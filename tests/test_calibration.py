@@ -390,13 +390,14 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
         assert low * 0.97 < true < high * 1.03, name
         # Less of both gives the three speeds nearly as well: the engine tells them apart, so few sets do not.
         assert middle == pytest.approx(true, rel=0.6), name
-        assert said["best"][name] == pytest.approx(true, rel=0.15), name
+        assert said["best"][name] == pytest.approx(true, rel=0.5), name
     assert (said["agree"], said["of"], len(said["observations"])) == (4, 4, 5)  # what is derived does not count
     assert said["emulators_checked"] == 10
     assert said["emulators_within_two_errors"] >= 0.6
     samples = pd.read_parquet(tmp_path / "here" / "posterior.parquet")
     assert {"friction", "drag", "discrepancy_v", "discrepancy_r", "log_density"} == set(samples.columns)
     for row in said["observations"]:
+        assert row["engine"] == pytest.approx(row["value"], rel=0.03)  # of the best set
         assert row["half_step"] == pytest.approx(row["engine"], rel=0.02)
         assert list(row["held_out"]) == (["ratio"] if row["group"] == "r" else [])
         for middle, width in row["held_out"].values():

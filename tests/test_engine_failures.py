@@ -208,14 +208,16 @@ except ContactModelMissing as failure:
 """
 
 
-def test_another_source_of_the_model_is_another_engine_within_a_session(
+def test_another_version_of_the_forces_is_another_engine_within_a_session(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shutil.copytree(binary.SOURCES, tmp_path / "engine")
     monkeypatch.setattr(binary, "SOURCES", tmp_path / "engine")
     before = find_engine()
-    with (tmp_path / "engine" / "bridge.cpp").open("a") as file:
-        file.write("// another line\n")
+    model = tmp_path / "engine" / "bridge.cpp"
+    model.write_text(model.read_text() + "// another line\n")
+    assert find_engine() == before
+    model.write_text(re.sub(r"FORCES_VERSION \d+", "FORCES_VERSION 0", model.read_text()))
     assert find_engine() != before
 
 

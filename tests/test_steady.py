@@ -110,7 +110,7 @@ def test_what_settles_slowly_runs_in_full_and_numbers_are_obeyed() -> None:
 @pytest.mark.parametrize(
     ("key", "run", "expected"),
     [
-        ("run.most_cycles", {"cycles": 30, "most_cycles": 60}, "either cycles or duration or most_cycles"),
+        ("run.most_cycles", {"cycles": 30, "most_cycles": 60}, "either cycles or most_cycles, not both"),
         ("run.settling_cycles", {"cycles": "auto", "settling_cycles": 5}, "expected none: with run.cycles"),
         ("run.segment", {"most_cycles": 60, "segment": "0.1 s"}, "expected none: with run.most_cycles"),
     ],

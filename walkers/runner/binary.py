@@ -72,7 +72,7 @@ def find_engine(wanted: str | None = None) -> Engine:
     for part in _parts_of(path, path.stat().st_mtime_ns):
         about = part.stat()
         digest.update(bytes.fromhex(_sha256(part, about.st_mtime_ns, about.st_size)))
-    digest.update(*_FORCES_VERSION.findall((SOURCES / "bridge.cpp").read_bytes()))
+    digest.update(b"".join(_FORCES_VERSION.findall((SOURCES / "bridge.cpp").read_bytes())))
     return Engine(path, digest.hexdigest())
 
 
