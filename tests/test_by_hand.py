@@ -59,6 +59,20 @@ def test_a_deck_run_by_hand_is_read_and_says_so(folder: Path, run_directory: Cal
     assert (folder / "result.json").stat().st_mtime_ns == written
 
 
+def test_the_law_of_a_deck_is_not_executed_when_it_is_read(tmp_path: Path) -> None:
+    """Neither the file that the case names, which may be anybody's by now, nor the copy beside the deck."""
+    law = tmp_path / "spring.py"
+    law.write_text("from walkers.physics.laws.soulie import law as spring\n")
+    case = make_case(run=SHORT, liquid={"law": f"{law}:spring"})
+    write_folder(case, tmp_path / "hand")
+    _run(tmp_path / "hand")
+    for file in (law, tmp_path / "hand" / "law.py"):
+        file.write_text(f"open({str(tmp_path / 'executed')!r}, 'w')\n{file.read_text()}")
+    found = load(tmp_path / "hand")
+    assert found.result["by_hand"] == ["run by hand"]
+    assert not (tmp_path / "executed").exists()
+
+
 EDITED = {
     "acceleration": ({"peak_acceleration": "29.4"}, {"drive.peak_acceleration": "29.4 m/s^2"}),
     "amplitude": ({"amplitude": "1.1636e-4"}, {"drive.peak_acceleration": "29.4 m/s^2"}),

@@ -132,12 +132,13 @@ class FinishedRun:
 def case_of(directory: Path) -> Case:
     """The resolved case of a run directory; raises `OSError` or `ValueError` if it is unreadable or was changed."""
     check_unchanged(directory, [CASE_NAME])
-    case = Case.from_dict(read_json(directory / CASE_NAME))
-    return case if case.liquid.law in LAWS else _with_recorded_law(case, directory)
+    return with_recorded_law(Case.from_dict(read_json(directory / CASE_NAME)), directory)
 
 
-def _with_recorded_law(case: Case, directory: Path) -> Case:
-    """A case with the bridges that its run has recorded: the file of its law is not executed."""
+def with_recorded_law(case: Case, directory: Path) -> Case:
+    """A case with the bridges that a directory has of a law of a user, whose file is not executed."""
+    if case.liquid.law in LAWS:
+        return case
     from walkers.templates.bridge_tables import RecordedLaw
 
     places = (directory, *segment_directories(directory))

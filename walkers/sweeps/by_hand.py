@@ -20,11 +20,21 @@ from walkers.inputs.case import Case
 from walkers.inputs.drive import AXES, Excitation, Sine
 from walkers.inputs.run import CONSTANT
 from walkers.inputs.table import changed as table_changed
+from walkers.physics.laws import source_of
 from walkers.postprocess.analysis import tabulate
 from walkers.postprocess.dump import DumpError
 from walkers.rounding import percent
 from walkers.runner.binary import find_engine, plugin_of, run_script
-from walkers.runner.directory import CASE_NAME, DECK_RECORD_NAME, SEGMENT_NAME, finished_run, layout_of, write_deck
+from walkers.runner.directory import (
+    CASE_NAME,
+    DECK_RECORD_NAME,
+    LAW_NAME,
+    SEGMENT_NAME,
+    finished_run,
+    layout_of,
+    with_recorded_law,
+    write_deck,
+)
 from walkers.runner.failures import EngineFailure, MissingFrames
 from walkers.runner.files import read_json, write_json
 from walkers.runner.launch import EngineReport, judge
@@ -81,6 +91,8 @@ def write_folder(case: Case, folder: Path) -> Path:
         write_deck(deck, folder)
         (folder / SCALE_NAME).write_text(_SCALE, encoding="utf-8")
         (folder / RUN_NAME).write_text(run_script(engine, plugin, deck.layout.ranks), encoding="utf-8")
+        if law := source_of(case.liquid.law):
+            shutil.copyfile(law, folder / LAW_NAME)
         write_json(folder / DECK_RECORD_NAME, {"case": case.as_dict(), "deck": deck.text})
     except OSError as error:  # a disk that is full names no file
         error.filename = str(folder)
@@ -111,7 +123,7 @@ def take_in(folder: Path) -> None:
         return
     try:
         record = read_json(folder / DECK_RECORD_NAME)
-        case, written = Case.from_dict(record["case"]), str(record["deck"])
+        case, written = with_recorded_law(Case.from_dict(record["case"]), folder), str(record["deck"])
         now = (folder / DECK_NAME).read_text(encoding="utf-8", errors="surrogateescape")
         logs = [folder / name for name in _LOGS if (folder / name).is_file()]
         if not logs:
