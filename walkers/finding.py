@@ -88,21 +88,23 @@ def _is_begun(place: Path) -> bool:
 
 
 def case_at(
-    what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None
+    what: Case | str | Path | Mapping[str, Any], out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None
 ) -> tuple[Case, Path]:
     """The case that a user names, and the folder in which its run belongs.
 
     Parameters
     ----------
     what
-        A case (resolved, file or shipped name), or a run (directory, or name in ``out``): then its case, and the folder
-        that contains the run.
+        A case (resolved, tables, file or shipped name), or a run (directory, or name in ``out``): then its case, and
+        the folder that contains the run.
     out
         Folder of the run directories.
     changes
         Values that replace those of the case, by dotted keys.
     """
     out = Path(out)
+    if isinstance(what, Mapping):
+        return load_case(what, changes), out
     if not isinstance(what, (str, Path)):
         return what.changed(changes or {}), out
     there = placed(what, out)
@@ -118,7 +120,9 @@ def case_at(
     return case.changed(changes or {}), there.path.parent
 
 
-def find(what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None) -> Place:
+def find(
+    what: Case | str | Path | Mapping[str, Any], out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None
+) -> Place:
     """Find what a user names, in the same way for all commands. Its contents are not read.
 
     Parameters

@@ -162,7 +162,7 @@ def sweep(
 
 
 def load(
-    what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None
+    what: Case | str | Path | Mapping[str, Any], out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None
 ) -> Run | Sweep:
     """Find a sweep, or a run, finished or not.
 
@@ -193,14 +193,16 @@ def load(
 
 
 def load_finished(
-    what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None
+    what: Case | str | Path | Mapping[str, Any], out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None
 ) -> Run | Sweep:
     """Find a sweep or a finished run; otherwise `InputError`."""
     found = load(what, out, changes)
     return found if isinstance(found, Sweep) else replace(found, directory=found.finished_directory)
 
 
-def load_run(what: Case | str | Path, out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None) -> Run:
+def load_run(
+    what: Case | str | Path | Mapping[str, Any], out: str | Path = DEFAULT_OUT, changes: Mapping[str, Any] | None = None
+) -> Run:
     """Find a finished run; otherwise `InputError`."""
     found = load_finished(what, out, changes)
     if isinstance(found, Sweep):
@@ -219,7 +221,7 @@ def load_sweep(what: str | Path, out: str | Path = DEFAULT_OUT) -> Sweep:
     raise refused(what, f"no sweep in {out}; walkers list shows what is there")
 
 
-def finished_at(what: Case | str | Path, out: Path = DEFAULT_OUT) -> Run | None:
+def finished_at(what: Case | str | Path | Mapping[str, Any], out: Path = DEFAULT_OUT) -> Run | None:
     """The finished run with a name or a directory; None for a case."""
     there = placed(what, out) if isinstance(what, (str, Path)) else None
     return run_at(there, str(what)) if there and there.kind == "run" and finished_run(there.path) else None

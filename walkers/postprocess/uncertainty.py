@@ -22,6 +22,8 @@ from walkers.runner.manifest import MANIFEST_NAME
 
 SPREAD = "-spread"
 SPREAD_NAME = "spread.json"
+_STIFFEST = 1e9
+"""Pa; no case may have stiffer contacts."""
 """End of the name of a spread's directory (`spread_of`), and name of the file with the bands in it."""
 LEAST_PER_VALUE = 3
 """Draws per varied value below which the band is approximate and rank correlations are not significant."""
@@ -137,6 +139,8 @@ def _numerical_error(directory: Path, velocity: float) -> dict[str, Any]:
         "half_step": ("run.time_step", f"{0.5e6 * case.run.time_step:.4g}us"),
         "stiffer": ("contact.youngs_modulus", f"{1e-6 * STIFFER * case.contact.youngs_modulus:.4g}MPa"),
     }
+    if STIFFER * case.contact.youngs_modulus > _STIFFEST:
+        return {}
     error, runs = {}, {}
     for kind, change in changes.items():
         with suppress(OSError, ValueError, KeyError, TypeError, WalkersError):  # a case that cannot be, or no run

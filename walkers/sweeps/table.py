@@ -28,7 +28,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.keys import flatten
 from walkers.postprocess.analysis import Described, analyses, analyses_in, analyses_of, current_result
 from walkers.postprocess.sides import differ
-from walkers.rounding import DIGITS, SHOWN_UNITS, rounded
+from walkers.rounding import DIGITS, SHOWN_UNITS, counted, rounded
 from walkers.runner.binary import Engine
 from walkers.runner.directory import FAILURE_NAME, finished_run, is_locked, run_place, unfinished
 from walkers.runner.files import json_bytes, read_json, write_bytes, write_json
@@ -503,7 +503,7 @@ def describe_status(record: SweepRecord) -> str:
     found = checked_states(record)
     count = Counter(state.status for state in found)
     text = ", ".join(f"{count[status]} {status}" for status in _STATUSES if count[status])
-    lines = [f"{record.name}: {len(found)} points, {text or 'none'}"]
+    lines = [f"{record.name}: {counted(len(found), 'point')}, {text or 'none'}"]
     failed = [(number, state) for number, state in enumerate(found) if state.status == "failed"]
     lines += [f"  failed     point {number}: {state.message}" for number, state in failed[:_MOST_FAILURES]]
     if len(failed) > _MOST_FAILURES:
