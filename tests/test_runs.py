@@ -373,3 +373,10 @@ def test_nohup_outlives_a_closed_terminal(in_folder: Path) -> None:
     program.terminate()
     assert program.wait() == 143
     assert not engines_in(in_folder)
+
+
+def test_tables_are_run_as_their_file_is(tmp_path: Path, run_directory: Callable[..., Path]) -> None:
+    found = walkers.run(document(run=SHORT), tmp_path)
+    assert found.result["velocity"] == walkers.load(run_directory(run=SHORT)).result["velocity"]
+    with pytest.raises(InputError, match=r"no finished run .*; first do: walkers run case --set run\.seed=3"):
+        walkers.load(document(run=SHORT), tmp_path, {"run.seed": 3})
