@@ -43,28 +43,17 @@ _KINDS = {
 class Known:
     """A number of the library.
 
-    Attributes
-    ----------
-    value, written, source
-        SI; as the library has it, with its unit; where it is from.
-    range
-        Ends between which an unmeasured number may lie, or a calibrated one (5 to 95 % of the posterior), as a case
-        would write them.
-    calibrated_with
-        Names of the liquids of the experiments that it was calibrated to; empty if it was not.
-    origin
-        Of whose library it is.
-    logarithmic
-        Whether the range is of magnitudes.
+    The ``range`` of an unmeasured number has the ends between which it may lie, that of a calibrated one 5 to 95 % of
+    the posterior, as a case would write them.
     """
 
-    value: float
-    written: Any
+    value: float  # SI
+    written: Any  # as the library has it, with its unit
     source: str = ""
     range: tuple[Any, Any] | None = None
-    calibrated_with: tuple[str, ...] = ()
+    calibrated_with: tuple[str, ...] = ()  # names of the liquids of the experiments; empty: not calibrated
     origin: Whence = "library"
-    logarithmic: bool = False
+    logarithmic: bool = False  # whether the range is of magnitudes
 
 
 class Collection(NamedTuple):

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from math import atan2, dist, inf
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from walkers.errors import Problem, expected_of, shown, unusable
 from walkers.inputs.bodies import ARRANGEMENTS, MOST_BEADS, Cluster, Walkers, touching
@@ -50,16 +50,11 @@ SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_OF_SURFACES)
 # --- from the library -------------------------------------------------------------------------------------------------
 
 
-class Supplied(NamedTuple):
-    """The tables of a case with what the library gives, the sources of that, and names that it does not know."""
+def supplied(document: Mapping[str, Any], library: Library) -> tuple[dict[str, Any], dict[str, Source], list[Problem]]:
+    """The tables of a case with what they leave out and the library has of the materials and the liquid they name.
 
-    tables: dict[str, Any]
-    sources: dict[str, Source]
-    problems: list[Problem]
-
-
-def supplied(document: Mapping[str, Any], library: Library) -> Supplied:
-    """The tables of a case with what they leave out and the library has of the materials and the liquid they name."""
+    Also the sources of these values, and names that the library does not know.
+    """
     said = {key: value_at(document, parts_of(key)) for key in (*SUPPLIED, "liquid.law")}
     given = {key for key, value in said.items() if value is not MISSING}
     named = (value_at(document, parts_of(key)) for key in NAMES)
@@ -77,7 +72,7 @@ def supplied(document: Mapping[str, Any], library: Library) -> Supplied:
         if key in values and not (key in given or instead) and isinstance(tables.get(key.split(".")[0]), Mapping):
             tables = _with(tables, parts_of(key), values[key].written)
             sources[key] = _source_of(key, values[key], calibrated)
-    return Supplied(tables, sources, problems)
+    return tables, sources, problems
 
 
 def _with(table: Any, parts: Sequence[str | int], value: Any) -> Any:

@@ -118,34 +118,18 @@ class Descent:
 
 @dataclass(frozen=True, repr=False)
 class Sweep:
-    """A base case and its variations.
+    """A base case and its variations."""
 
-    Attributes
-    ----------
-    name, title, source
-        Of the sweep (its file's); for people; what messages call the file.
-    case_name, document
-        Of the base case; the runs' directories begin with its name. Its tables have those of ``[set]``.
-    keys, units
-        What varies, and the unit of each, None where it has none.
-    rows
-        The points: one value a key.
-    descent
-        How the points depend on each other, if they do.
-    file
-        Tables of the sweep file, if it is from one.
-    """
-
-    name: str
+    name: str  # of its file
     title: str
-    source: str
-    case_name: str
-    document: Mapping[str, Any]
-    keys: tuple[str, ...]
-    units: tuple[str | None, ...]
-    rows: Sequence[tuple[Value, ...]]
-    descent: Descent | None
-    file: Mapping[str, Any] = field(default_factory=dict)
+    source: str  # the file, as messages call it
+    case_name: str  # of the base case, with which the runs' directories begin
+    document: Mapping[str, Any]  # tables of the base case, changed by ``[set]``
+    keys: tuple[str, ...]  # that vary
+    units: tuple[str | None, ...]  # of each key; None if it has none
+    rows: Sequence[tuple[Value, ...]]  # the points: one value a key
+    descent: Descent | None  # how the points depend on each other, if they do
+    file: Mapping[str, Any] = field(default_factory=dict)  # tables of the sweep file
 
     def __repr__(self) -> str:
         varied = ", ".join(self.keys) or "nothing"

@@ -192,7 +192,7 @@ def _tables_in(model: type[Table]) -> Mapping[str, type[Table]]:
 
 
 def table_in(annotation: Any) -> type[Table] | None:
-    """The table that a field holds, alone or in a tuple."""
+    """The table that a field holds, alone, in a tuple or by names."""
     if isinstance(annotation, type) and issubclass(annotation, Table):
         return annotation
     return next((table for one in get_args(annotation) if (table := table_in(one))), None)
