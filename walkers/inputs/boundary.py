@@ -107,8 +107,8 @@ class Boundary(Table):
     """
 
     shape: Shape = key("Shape of the boundary. See [](../cases.md#boundaries).", "plane")
-    material: str = key(
-        "Material, from the library, or any other name beside all friction coefficients.", ..., "glass", SAME_RUN
+    material: Annotated[str, SAME_RUN] = key(
+        "Material, from the library, or any other name beside all friction coefficients.", ..., "glass"
     )
     opening: Filled[Annotated[float, replace(units.ANGLE, smallest=0.5, largest=3.1, sign=units.POSITIVE)]] = key(
         "Angle between the two walls of a groove.", None, "120 deg"

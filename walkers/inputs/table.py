@@ -35,32 +35,19 @@ def _only_derived(value: object, info: ValidationInfo) -> object:
 _DERIVED = BeforeValidator(_only_derived)
 if TYPE_CHECKING:
     Filled = Annotated[T, "filled"]
-    """A key that a file may leave out: None until it is filled in."""
-    Derived = Annotated[T, "derived"]
-    """A field that follows from others, which no file has."""
+    Indirect = Annotated[T, "indirect"]
 else:
-
-    class Filled:
-        """A key that a file may leave out: None until it is filled in."""
-
-        def __class_getitem__(cls, kind: Any) -> Any:
-            return kind | None
-
-    class Derived:
-        """A field that follows from others, which no file has."""
-
-        def __class_getitem__(cls, kind: Any) -> Any:
-            return Annotated[kind, _DERIVED, SkipJsonSchema()]
+    Filled = T | None
+    """A key that a file may leave out: None until it is filled in."""
+    Indirect = Annotated[T | None, SAME_RUN]
+    """A key that acts through others: None unless it is given, and no determinant of the run."""
+Derived = Annotated[T, _DERIVED, SkipJsonSchema()]
+"""A field that follows from others, which no file has."""
 
 
-def key(meaning: str, default: Any = PydanticUndefined, example: Any = None, *notes: Any, **bounds: Any) -> Any:
-    """A key of a table: its meaning, default (required without one), an example as a file has it, notes and bounds.
-
-    Notes, such as `SAME_RUN`, are as in ``Annotated``.
-    """
-    field = Field(default, description=meaning, examples=None if example is None else [example], **bounds)
-    field.metadata.extend(notes)
-    return field
+def key(meaning: str, default: Any = PydanticUndefined, example: Any = None, **bounds: Any) -> Any:
+    """A key of a table: its meaning, default (required without one), an example as a file has it, and bounds."""
+    return Field(default, description=meaning, examples=None if example is None else [example], **bounds)
 
 
 class Choice(NamedTuple):
