@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import product
 from math import isfinite, prod
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.errors import unusable
 from walkers.inputs.keys import Value, flatten
@@ -26,8 +25,7 @@ _SPACINGS = ("linspace", "geomspace")
 _DISTRIBUTIONS = ("uniform", "loguniform")
 
 
-@dataclass(frozen=True)
-class Range:
+class Range(NamedTuple):
     """Range of a random number, in a unit (None: a plain number), uniform or log-uniform.
 
     With a ``median``, half of the draws are below it and half above, each half spread over its side of the range.
@@ -50,8 +48,7 @@ class Range:
         return np.asarray(np.interp(shares, known, quantiles))
 
 
-@dataclass(frozen=True)
-class Axis:
+class Axis(NamedTuple):
     """Keys that vary together: ``rows`` has one value per key for each point of the axis."""
 
     keys: tuple[str, ...]
@@ -61,6 +58,11 @@ class Axis:
     def of(cls, columns: Mapping[str, Sequence[Value]]) -> Axis:
         """Make an axis from the values of each key."""
         return cls(tuple(columns), tuple(zip(*columns.values(), strict=True)))
+
+    @property
+    def units(self) -> tuple[str | None, ...]:
+        """The unit of each key, as `unit_of` its values."""
+        return tuple(map(unit_of, self.keys, zip(*self.rows, strict=True)))
 
 
 def is_axis(value: object) -> bool:
@@ -202,6 +204,17 @@ def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> A
     for share, (key, one) in zip(shares, ends.items(), strict=True):
         columns[key] = [written(float(number), one.unit) for number in one.at(share)]
     return Axis.of(columns)
+
+
+def descending(key: str, ends: Mapping[str, Value]) -> Axis:
+    """An axis of a key from a value down to another in steps; ``ends`` has the three by their keys in a sweep file."""
+    start, to, step = (number_of(name, value) for name, value in ends.items())
+    unit = unit_of(key, list(ends.values()))
+    if not (start >= to and step > 0 and start - to < MOST_POINTS * step):
+        first, last, _ = ends.values()
+        raise unusable("descend", "`from` must not be below `to`, and `step` must be positive", f"{first} to {last}")
+    number = int((start - to) / step + 1e-9) + 1
+    return Axis.of({key: [written(start - step * count, unit) for count in range(number)]})
 
 
 def ranges_of(ranges: Mapping[str, Any]) -> dict[str, Range]:

@@ -152,11 +152,6 @@ class Boundary(Table):
         return "g" if self.tilt > 1.57 else f"g sin {degrees(self.tilt):.4g}°"
 
     @property
-    def drive_axis(self) -> Literal["x", "z"]:
-        """Default axis of the drive."""
-        return "z" if self.closed else "x"
-
-    @property
     def walls(self) -> tuple[Wall, ...]:
         """The floor first, if there is one, then the side walls."""
         if self.shape == "groove":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from math import inf, pi
 from typing import TYPE_CHECKING, NamedTuple
@@ -25,8 +24,7 @@ def dimer_of(case: Case) -> Dimer:
     return Dimer((radii[0], radii[1]), case.beads.density, case.liquid.surface_tension)
 
 
-@dataclass(frozen=True)
-class ContactLoads:
+class ContactLoads(NamedTuple):
     """Forces and overlaps at the contacts of a walker at rest: its beads on the floor, then its pairs of beads.
 
     ``capillary`` in N, ``bridge_volumes`` in m³, ``rupture`` and ``overlaps`` in m, each in that order.

@@ -269,7 +269,8 @@ def _drive(case: Case) -> Case:
     several = {f"drive.harmonics[{number}]": one for number, one in enumerate(case.drive.harmonics)}
     for key, one in (several or {"drive": case.drive}).items():
         if one.axis is None:
-            case = case.filled(f"{key}.axis", boundary.drive_axis, f"of a {boundary.shape}", "default")
+            axis = "z" if boundary.closed else "x"
+            case = case.filled(f"{key}.axis", axis, f"of a {boundary.shape}", "default")
         if one.gamma0 is not None:
             if not case.walkers or len(case.walkers[0].radii) != 2:
                 raise unusable(f"{key}.gamma0", "expected peak_acceleration: only a dimer has a Γ0")

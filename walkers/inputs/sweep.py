@@ -27,13 +27,11 @@ from walkers.inputs.axes import (
     MOST_POINTS,
     Axis,
     combinations,
+    descending,
     is_axis,
     listed,
-    number_of,
     one_at_a_time,
     sampled,
-    unit_of,
-    written,
     zipped,
 )
 from walkers.inputs.case import Case
@@ -67,16 +65,9 @@ class DescendTable(Table):
     step: Any = Field(examples=["0.1 g"])
     until_below: Speed = Field(examples=["0.02 mm/s"])
 
-    def values(self) -> list[Value]:
+    def axis(self) -> Axis:
         """From the start down."""
-        given = {"descend.from": self.start, "descend.to": self.to, "descend.step": self.step}
-        start, to, step = (number_of(name, value) for name, value in given.items())
-        unit = unit_of(self.key, list(given.values()))
-        if not (start >= to and step > 0 and start - to < MOST_POINTS * step):
-            message = "`from` must not be below `to`, and `step` must be positive"
-            raise unusable("descend", message, f"{self.start} to {self.to}")
-        number = int((start - to) / step + 1e-9) + 1
-        return [written(start - step * count, unit) for count in range(number)]
+        return descending(self.key, {"descend.from": self.start, "descend.to": self.to, "descend.step": self.step})
 
 
 class SweepFile(Table):
@@ -97,7 +88,7 @@ class SweepFile(Table):
         axes += [zipped(table) for table in self.zip]
         axes += [one_at_a_time(self.one_at_a_time)] if self.one_at_a_time else []
         axes += [sampled(table.method, table.points, table.seed, table.ranges) for table in self.sample]
-        return axes + ([Axis.of({self.descend.key: self.descend.values()})] if self.descend else [])
+        return axes + ([self.descend.axis()] if self.descend else [])
 
 
 @dataclass(frozen=True)
@@ -199,9 +190,7 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
         with blaming(source):
             axes, settings = file.all_axes(), settings_in(file.set)
             keys, rows = combinations(axes)
-            units = [
-                unit_of(axis.keys[at], [row[at] for row in axis.rows]) for axis in axes for at in range(len(axis.keys))
-            ]
+            units = tuple(unit for axis in axes for unit in axis.units)
             for key in keys:
                 if key == "title":
                     raise unusable(key, f"expected another key, for {key} does not determine a run")
@@ -221,7 +210,7 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
         case_name=base.stem,
         document=tables,
         keys=keys,
-        units=tuple(units),
+        units=units,
         rows=rows,
         descent=Descent(descend.key, len(axes[-1].rows), descend.until_below) if descend else None,
         file=document,

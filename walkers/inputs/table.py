@@ -7,7 +7,7 @@ with other values (`Table.but`, `Table.put`).
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args, get_origin
 
@@ -208,11 +208,14 @@ def contradictions(model: type[Table], document: Any, place: str = "") -> Iterat
 
 def alternatives(model: type[Table], name: str) -> set[str]:
     """Dotted keys that say in other words what a key says."""
-    *path, last = [part for part in parts_of(name) if isinstance(part, str)]
-    for part in path:
-        model = table_in(keys_in(model)[part].annotation) or model
+    *path, last = parts_of(name)
+    for part in (part for part in path if isinstance(part, str)):
+        field = keys_in(model).get(part)
+        if (table := table_in(field.annotation) if field else None) is None:
+            return set()
+        model = table
     ways = [way for choice in model.choices if any(last in way for way in choice.ways) for way in choice.ways]
-    return {joined([*parts_of(name)[:-1], other]) for way in ways if last not in way for other in way}
+    return {joined([*path, other]) for way in ways if last not in way for other in way}
 
 
 def changed(model: type[Table], document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -227,11 +230,11 @@ def changed(model: type[Table], document: Mapping[str, Any], changes: Mapping[st
     """
     tables = copy.deepcopy(dict(document))
     for name, value in changes.items():
-        _put(model, tables, name, value, changes)
+        _put(tables, name, value, alternatives(model, name) - changes.keys())
     return tables
 
 
-def _put(model: type[Table] | None, tables: dict[str, Any], name: str, value: Any, changes: Mapping[str, Any]) -> None:
+def _put(tables: dict[str, Any], name: str, value: Any, instead_of: Collection[str]) -> None:
     place: Any = tables
     parts = parts_of(name)
     for number, part in enumerate(parts):
@@ -247,12 +250,6 @@ def _put(model: type[Table] | None, tables: dict[str, Any], name: str, value: An
             return
         if number + 1 < len(parts):
             place = place[part] if isinstance(part, int) else place.setdefault(part, {})
-            field = keys_in(model).get(part) if model and isinstance(part, str) else None
-            model = table_in(field.annotation) if field else model if isinstance(part, int) else None
-    last = parts[-1]
-    for ways, *_ in model.choices if model else ():
-        if any(last in way for way in ways):
-            for other in {one for way in ways if last not in way for one in way}:
-                if joined([*parts[:-1], other]) not in changes:
-                    place.pop(other, None)
-    place[last] = value
+    for other in instead_of:
+        place.pop(parts_of(other)[-1], None)
+    place[parts[-1]] = value

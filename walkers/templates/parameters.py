@@ -8,8 +8,9 @@ variable would have 15 digits.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil, inf
+from typing import NamedTuple
 
 from walkers.inputs.case import Case, Contact
 from walkers.inputs.drive import Excitation, Vector
@@ -22,8 +23,7 @@ PRINTED = "parameters:"
 """Start of the line in which the engine prints the parameters."""
 
 
-@dataclass(frozen=True)
-class Parameter:
+class Parameter(NamedTuple):
     """A line of a deck: name, value (a number, or a formula in ``$()``), unit, and a remark."""
 
     name: str
