@@ -34,8 +34,6 @@ _LEAST_LEVER = 0.1
 """Of a cluster's extent: large and small beads whose centroids are nearer than that give no heading."""
 _TOUCHING = 0.02
 """Radii by which beads that are given places may be apart and still touch."""
-_CROSSED = ((0, 1), (0, 2), (1, 2), (1, 3), (2, 3))
-"""Pairs of a diamond."""
 _TOO_SMALL = "a bead is too small to touch two beads that touch each other; expected a larger one"
 
 
@@ -78,6 +76,11 @@ def _fan(radii: Sequence[float], apart: Apart) -> Places:
     front = apart(0, 1) * radii[0] / (radii[0] + radii[1])
     behind = [(apart(0, bead), pi - turns[-1] / 2.0 + turn) for bead, turn in enumerate(turns, 1)]
     return [(front, 0.0), *((front + away * cos(turn), away * sin(turn)) for away, turn in behind)]
+
+
+def _crossed(number: int) -> Pairs:
+    del number
+    return ((0, 1), (0, 2), (1, 2), (1, 3), (2, 3))
 
 
 def _diamond(radii: Sequence[float], apart: Apart) -> Places:
@@ -135,6 +138,10 @@ def _sites(number: int) -> Places:
     return sorted(sites, key=lambda at: (round(hypot(*at), 6), round(atan2(-at[1], -at[0]) % (2.0 * pi), 6)))[:number]
 
 
+def _neighbours(number: int) -> Pairs:
+    return touching(_sites(number), [0.5] * number, _TOUCHING)
+
+
 def _raft(radii: Sequence[float], apart: Apart) -> Places:
     if len(set(radii)) > 1:
         raise ValueError("expected the same radius for all beads of a raft")
@@ -145,16 +152,9 @@ def _raft(radii: Sequence[float], apart: Apart) -> Places:
 ARRANGEMENTS: Mapping[str, Arrangement] = {
     "chain": Arrangement(_row, _chain, 2, "one behind the other, the first in front"),
     "fan": Arrangement(_spokes, _fan, 2, "the first in front, the others side by side behind it"),
-    "diamond": Arrangement(
-        lambda _: _CROSSED, _diamond, 4, "one in front, two side by side behind it, one at the back", most=4
-    ),
+    "diamond": Arrangement(_crossed, _diamond, 4, "one in front, two side by side behind it, one at the back", most=4),
     "ring": Arrangement(_closed, _ring, 3, "in a ring, the first in front"),
-    "raft": Arrangement(
-        lambda number: touching(_sites(number), [0.5] * number, _TOUCHING),
-        _raft,
-        3,
-        "of one radius, on a hexagonal lattice, the first in the middle",
-    ),
+    "raft": Arrangement(_neighbours, _raft, 3, "of one radius, on a hexagonal lattice, the first in the middle"),
 }
 """Arrangements by their names in case files."""
 

@@ -84,27 +84,17 @@ class Library:
         """Names of the ``materials`` or of the ``liquids``."""
         return tuple(dict.fromkeys(name for one in self.collections for name in one.tables.get(kind, ())))
 
-    def has(self, kind: str, name: str | None) -> bool:
-        """Whether there is a material or liquid of a name."""
-        return any(name in one.tables.get(kind, ()) for one in self.collections)
+    def numbers(self, kind: str, name: str, mixture: tuple[float, float] | None = None) -> Mapping[str, Known]:
+        """Numbers of one of the ``materials`` or ``liquids``, in SI units; empty if there is none of this name.
 
-    def material(self, name: str) -> Mapping[str, Known]:
-        """Density (kg/m³), Young's modulus (Pa) and Poisson's ratio of a material (KeyError: there is none)."""
-        return self._numbers("materials", name, {})
-
-    def liquid(self, name: str, mixture: tuple[float, float] | None = None) -> Mapping[str, Known]:
-        """Surface tension (N/m), a viscosity (m²/s or Pa s) and density (kg/m³) of a liquid (KeyError: there is none).
-
-        ``mixture`` is the mass fraction and the temperature (K) of one whose numbers depend on them; `HALF` if None.
+        ``mixture`` is the mass fraction and the temperature (K) of a liquid whose numbers depend on them.
         """
-        return self._numbers("liquids", name, MIXTURES[name](*mixture or HALF) if name in MIXTURES else {})
-
-    def _numbers(self, kind: str, name: str, computed: Mapping[str, float]) -> Mapping[str, Known]:
         for one in self.collections:
             if found := one.tables.get(kind, {}).get(name):
+                computed = MIXTURES[name](*mixture or HALF) if name in MIXTURES else {}
                 texts = {key: quantity_text(float(f"{value:.4g}"), _KINDS[key]) for key, value in computed.items()}
                 return {key: _known(key, {"value": texts.get(key), **entry}, one) for key, entry in found.items()}
-        raise KeyError(name)
+        return {}
 
     def surface_pair(self, first: str | None, second: str | None) -> Mapping[str, Known]:
         """Contact parameters of two wet surfaces; empty if there are none.

@@ -94,7 +94,7 @@ def _unknown(
         ("liquid.name", liquid, "liquids", any(given.issuperset(keys) for keys in _LIQUIDS)),
         ("boundary.material", wall, "materials", described),
     ):
-        if name is not None and not says_all and not library.has(kind, name):
+        if name is not None and not says_all and name not in library.names(kind):
             message = "not in the library, nor in a library.toml beside the case"
             expected = f"{message}; {expected_of(name, library.names(kind))}"
             problems.append(Problem(key, shown(name), expected))
@@ -129,9 +129,9 @@ def _values(
 ) -> dict[str, Known]:
     """What is usual, and what the library has of materials and a liquid, by the keys of a case."""
     on_bead, on_wall = library.surface_pair(bead, bead), library.surface_pair(bead, wall)
-    of_liquid = library.liquid(liquid, mixture) if liquid and library.has("liquids", liquid) else {}
+    of_liquid = library.numbers("liquids", liquid or "", mixture)
     values = {
-        "beads.density": library.material(bead)["density"] if bead and library.has("materials", bead) else None,
+        "beads.density": library.numbers("materials", bead or "").get("density"),
         "contact.friction.bead_bead": on_bead.get("friction"),
         "contact.friction.bead_wall": on_wall.get("friction"),
         **{key: on_wall.get(key.split(".")[1]) for key in _OF_SURFACES},

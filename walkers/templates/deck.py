@@ -220,7 +220,6 @@ def compose(plan: Plan) -> Deck:
         derived=derived,
         printed=parameters.PRINTED,
         named=named,
-        run_steps=_run_steps(plan, named),
         in_cycles=partial(in_cycles, steps_per_cycle=case.run.steps_per_cycle),
         run_name=RUN_NAME,
         types=len(surfaces) + 1,
@@ -287,13 +286,6 @@ def _parameters(plan: Plan, surfaces: Sequence[Surface]) -> tuple[list[Parameter
     if len(surfaces) == 1:
         given += parameters.of_liquid(surfaces[0], min(bead.radius for bead in plan.scene.beads))
     return given, [*of_it, *of_that]
-
-
-def _run_steps(plan: Plan, named: Mapping[str, str]) -> str:
-    """The number of steps, as a formula of the parameters."""
-    if "cycles" not in named:
-        return str(plan.segment.end)
-    return f"$({'v_rest_steps+' if 'rest_steps' in named else ''}v_cycles*v_steps_per_cycle)"
 
 
 def _coefficients(contacts: Sequence[Contact], named: Collection[str], of_beads: str, of_walls: str = "") -> list[str]:
