@@ -9,7 +9,6 @@ which the first two touch is the origin.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from math import acos, asin, atan2, cos, dist, hypot, pi, sin, sqrt
@@ -309,7 +308,7 @@ class Cluster(Walkers):
     )
 
 
-def _beside(one: float, other: float) -> list[tuple[float, list[float]]]:
+def beside(one: float, other: float) -> list[tuple[float, list[float]]]:
     """`Walkers.bridged` of two beads, radii in m."""
     return [(one, [other]), (other, [one])]
 
@@ -378,7 +377,7 @@ class Mixture(Table):
         Beads of a pile have more neighbours, and its viscous limit is lower; ``auto``'s share of the limit allows for
         it: a glycerol pile at 0.4 of it is agitated as at a quarter of that step, within 0.1 %, and at 0.8 it heats up.
         """
-        return _beside(max(self.large_radii), min(self.small_radii))
+        return beside(max(self.large_radii), min(self.small_radii))
 
     @property
     def all_radii(self) -> list[float]:
@@ -406,29 +405,3 @@ class PlacedBead(Table):
     at: tuple[SignedLength, SignedLength, SignedLength] = key(
         "Centre of the bead at the start: x, y, z from the middle of the floor.", example=["5 mm", "-3 mm", "0.3 mm"]
     )
-
-
-@dataclass(frozen=True)
-class PlacedBeads:
-    """All beads that are placed one by one, at least one."""
-
-    beads: tuple[PlacedBead, ...]
-
-    @property
-    def all_radii(self) -> list[float]:
-        """Radius of every bead, m."""
-        return [bead.radius for bead in self.beads]
-
-    @property
-    def radii(self) -> tuple[float, ...]:
-        """The different radii, m."""
-        return tuple(sorted(set(self.all_radii)))
-
-    @property
-    def bridged(self) -> list[tuple[float, list[float]]]:
-        """The largest bead beside the smallest."""
-        return _beside(self.radii[-1], self.radii[0])
-
-
-Body = Walkers | Mixture | PlacedBeads
-"""Kinds of bodies."""

@@ -19,7 +19,7 @@ from pydantic import BeforeValidator, Field, ValidationError
 from walkers.errors import InputError, Problem, each, refused
 from walkers.inputs import units
 from walkers.inputs.axes import is_axis, ranges_of
-from walkers.inputs.bodies import MOST_BEADS, Body, Cluster, Dimers, Mixture, PlacedBead, PlacedBeads, Walkers
+from walkers.inputs.bodies import MOST_BEADS, Cluster, Dimers, Mixture, PlacedBead, Walkers
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.drive import AXES, Drive, Excitation, Vector
 from walkers.inputs.keys import MISSING, flatten, parts_of, value_at
@@ -351,15 +351,15 @@ class Case(Table):
         return law
 
     @cached_property
-    def bodies(self) -> tuple[Body, ...]:
-        """All bodies, the walkers first."""
-        placed = (PlacedBeads(self.placed),) if self.placed else ()
-        return (*self.walkers, *((self.mixture,) if self.mixture else ()), *placed)
+    def bodies(self) -> tuple[Walkers | Mixture, ...]:
+        """All bodies of several beads, the walkers first."""
+        return (*self.walkers, *((self.mixture,) if self.mixture else ()))
 
     @cached_property
     def all_radii(self) -> list[float]:
         """Radius of every bead, m."""
-        return [radius for body in self.bodies for radius in body.all_radii]
+        radii = [radius for body in self.bodies for radius in body.all_radii]
+        return [*radii, *(bead.radius for bead in self.placed)]
 
     @property
     def count(self) -> int:
@@ -379,7 +379,8 @@ class Case(Table):
     @property
     def radii(self) -> list[float]:
         """The different radii of the beads, m, in the order of the bodies."""
-        return list(dict.fromkeys(radius for body in self.bodies for radius in body.radii))
+        radii = [radius for body in self.bodies for radius in body.radii]
+        return list(dict.fromkeys([*radii, *sorted(bead.radius for bead in self.placed)]))
 
     @property
     def loose(self) -> bool:

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from walkers.errors import unusable
 from walkers.inputs import units
+from walkers.inputs.bodies import beside
 from walkers.inputs.origins import Source
 from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, key
 from walkers.inputs.units import AUTO, Duration, Number, Whole
@@ -152,9 +153,11 @@ class Run(Table):
 
 def limits_of(case: Case) -> TimeStepLimits:
     """Limits of the time step for the bodies of a case."""
-    contact = case.contact
+    contact, placed = case.contact, [bead.radius for bead in case.placed]
+    bridged = [entry for body in case.bodies for entry in body.bridged]
+    bridged += beside(max(placed), min(placed)) if placed else []
     return time_step_limits(
-        [(*entry, case.boundary.damping(entry[0])) for body in case.bodies for entry in body.bridged],
+        [(*entry, case.boundary.damping(entry[0])) for entry in bridged],
         density=case.beads.density,
         youngs_modulus=contact.youngs_modulus,
         poissons_ratio=contact.poissons_ratio,

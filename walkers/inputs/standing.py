@@ -52,10 +52,10 @@ def standing(case: Case) -> Iterator[tuple[int, Standing]]:
             for one in _walkers(case, body, first):
                 yield number, one
             first += body.replicates
-        elif isinstance(body, Mixture):
-            yield number, _poured(case, body)
         else:
-            yield number, Standing(tuple(StandingBead(*bead.at, bead.radius) for bead in body.beads))
+            yield number, _poured(case, body)
+    if case.placed:
+        yield len(case.bodies), Standing(tuple(StandingBead(*bead.at, bead.radius) for bead in case.placed))
 
 
 def _walkers(case: Case, walkers: Walkers, first: int) -> Iterator[Standing]:

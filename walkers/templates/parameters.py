@@ -31,12 +31,6 @@ class Parameter(NamedTuple):
     unit: str = ""
     note: str = ""
 
-    @property
-    def line(self) -> str:
-        """The command, and a comment."""
-        about = ": ".join(text for text in (self.unit, self.note) if text)
-        return f"{f'variable        {self.name} string {self.value}':55} {f'# {about}' if about else ''}".rstrip()
-
 
 def number(value: float) -> str:
     """The shortest text that reads back as the same double."""
