@@ -185,16 +185,9 @@ def one_at_a_time(table: Mapping[str, Any]) -> Axis:
 
 
 def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> Axis:
-    """Points of a sampler of `scipy.stats.qmc` in the ranges of several keys.
+    """Points of a sampler of `scipy.stats.qmc` in the ranges of several keys (`ranges_of`).
 
-    Parameters
-    ----------
-    method, seed
-        ``sobol``, ``halton`` or ``latin-hypercube``, and the seed of its scrambling.
-    points
-        How many; a power of two suits Sobol's sequence.
-    ranges
-        See `ranges_of`.
+    The method is ``sobol`` (which a power of two suits), ``halton`` or ``latin-hypercube``, scrambled with the seed.
     """
     ends = ranges_of(ranges)
     if not ends:

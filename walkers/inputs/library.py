@@ -67,13 +67,8 @@ class Collection(NamedTuple):
 class Library:
     """The materials, liquids and surface pairs that a case can name.
 
-    They are those of the user's own library and those that come with the program. No name has two meanings: the user's
-    library cannot redefine a name of the program.
-
-    Parameters
-    ----------
-    own
-        The tables of the user's own library, validated.
+    They are those of the user's own library, given by its validated tables, and those that come with the program. No
+    name has two meanings: the user's library cannot redefine a name of the program.
     """
 
     def __init__(self, own: Mapping[str, Any] | None = None) -> None:

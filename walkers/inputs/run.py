@@ -124,10 +124,9 @@ class Run(Table):
     @property
     def continuation(self) -> str:
         """What `walkers run` does after the cycles tried first; empty for a fixed number of cycles."""
-        further = (
-            f"walkers run continues to {self.cycles} if the velocities are not constant within {percent(CONSTANT)}"
-        )
-        return f"{further}: then set cycles to {self.cycles}" if len(self.attempts) > 1 else ""
+        constant, most = f"the velocities are not constant within {percent(CONSTANT)}", self.cycles
+        further = f"walkers run continues to {most} if {constant}: then set cycles to {most}"
+        return further if len(self.attempts) > 1 else ""
 
     def steps_until(self, cycles: int) -> int:
         """Steps of the attempts up to the one for so many cycles."""

@@ -80,16 +80,9 @@ def of_drive(drive: Excitation, *, amplitudes: bool) -> tuple[list[Parameter], l
 
 
 def of_time(case: Case, drive_from: int | None, steps: int, stable: float) -> tuple[list[Parameter], list[Parameter]]:
-    """Given and derived parameters of the time step and of the length of the run.
+    """Given and derived parameters of the time step, stable below a limit (s), and of the length of the run, in steps.
 
-    Parameters
-    ----------
-    case
-        Case with the run.
-    drive_from, steps
-        Step at which the drive begins (None: the length is not a parameter); number of steps.
-    stable
-        Time step below which the integration is stable, s.
+    The length is no parameter if no step is given at which the drive begins.
     """
     run = case.run
     frequency = "frequency" if len(case.excitation.harmonics) == 1 else "cycle_frequency"
