@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from math import ceil, inf, pi, prod, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from walkers.errors import InputError, Problem
 from walkers.inputs.case import Case, Contact
@@ -34,9 +33,12 @@ LAYOUT_NAME = "layout.json"
 BRIDGES_NAME = "bridges.txt"
 LOADS_NAME = "loads.txt"
 RUN_NAME = "run.sh"
-SCALED_NAME = "bridges.scaled.txt"
 SCALE_NAME = "scale.awk"
 """Script beside decks to be run by hand: rescales the tables for an edited surface tension or viscosity."""
+_NAMES = {
+    **{"layout": LAYOUT_NAME, "bridges": BRIDGES_NAME, "scaled": "bridges.scaled.txt"},
+    **{"loads": LOADS_NAME, "run": RUN_NAME, "scale": SCALE_NAME},
+}
 CONTENT_VERSION = 8
 """Version of what decks compute, part of the names of runs: increase it if a case gives other numbers.
 
@@ -194,56 +196,34 @@ def compose(plan: Plan) -> Deck:
     surfaces = scene.surfaces or (surface_of(case),)
     files = {BRIDGES_NAME: tables_of(case, surfaces, {(bead.surface, bead.radius) for bead in scene.beads})}
     files |= {LOADS_NAME: _loads(scene)} if len(scene.loadings) > 1 else {}
-    contacts = [contact for contact, _ in surfaces]
-    radii = [bead.radius for bead in scene.beads]
-    smallest, largest = min(radii), max(radii)
-    skin = plan.skin or smallest
-    # At least the number of the smallest beads that fit into the search distance of the largest one.
-    sight = largest + 2.0 * smallest + skin
-    most_neighbours = max(_LEAST_NEIGHBOURS, ceil((sight**3 - largest**3) / smallest**3))
-    space = prod(high - low for low, high in zip(scene.lower, scene.upper, strict=True))
     pair_columns = " ".join(PAIR_BRIDGES).split()
-    moduli = [*(contact.youngs_modulus for contact in contacts), case.contact.youngs_modulus]
     given, derived = _parameters(plan, surfaces)
     named = {one.name: one.value for one in (*given, *derived)}
     text = rendered(
         "walkers.templates",
         "walker.lig.j2",
+        plan=plan,
         case=case,
         scene=scene,
         layout=layout,
-        layout_name=LAYOUT_NAME,
-        bridges_name=BRIDGES_NAME,
-        scaled_name=SCALED_NAME,
-        scale_name=SCALE_NAME,
+        names=_NAMES,
+        files=files,
         given=given,
         derived=derived,
         printed=parameters.PRINTED,
         named=named,
-        in_cycles=partial(in_cycles, steps_per_cycle=case.run.steps_per_cycle),
-        run_name=RUN_NAME,
+        in_cycles=in_cycles,
+        along=along,
         types=len(surfaces) + 1,
         ends_of_harmonics=suffixes(len(case.excitation.harmonics)),
-        moduli=" ".join(["${youngs_modulus}"] * len(moduli) if "youngs_modulus" in named else map(number, moduli)),
-        stiff=max(moduli) > _STIFFEST,
-        friction=_coefficients(contacts, named, "friction.bead_bead", "friction.bead_wall"),
-        rolling_friction=_coefficients(contacts, named, "rolling_friction"),
-        restitution=_coefficients(contacts, named, "restitution"),
         down=[component / gravity for component in case.gravity_vector] if gravity else [],
-        plan=plan,
         shaken=plan.segment.drive_from is not None,
-        files=files,
-        along=along,
-        loads_name=LOADS_NAME,
         pair_bridge_terms=[f"c_pair_bridges[{pair_columns.index(one) + 1}]" for one in layout.pair_bridge_columns],
         wall_bridge_terms=[f"f_walls[{WALL_BRIDGES.index(one) + 1}]" for one in layout.wall_bridge_columns],
         pair_bridge_options=" ".join(PAIR_BRIDGES.values()),
-        skin=skin,
-        most_neighbours=most_neighbours,
-        # At most about ten thousand bins, none smaller than two beads (m).
-        bin_size=None if plan.skin else max(4.0 * largest, (space / 2e4) ** (1.0 / 3.0)),
-        wide=not plan.skin and space > _MOST_BINS * largest**3,
-    )  # fmt: skip
+        **_contacts(case, [contact for contact, _ in surfaces], named),
+        **_search(plan),
+    )
     fastest = plan.fastest or fastest_of(case, scene)
     beyond = bool(limits_of(case).exceeded_by(case.run.time_step))
     # The engine writes once a sample, and several times a cycle.
@@ -286,6 +266,35 @@ def _parameters(plan: Plan, surfaces: Sequence[Surface]) -> tuple[list[Parameter
     if len(surfaces) == 1:
         given += parameters.of_liquid(surfaces[0], min(bead.radius for bead in plan.scene.beads))
     return given, [*of_it, *of_that]
+
+
+def _search(plan: Plan) -> dict[str, Any]:
+    """The search for neighbours: skin and width of the bins (m), neighbours of a bead, whether bins are many."""
+    radii = [bead.radius for bead in plan.scene.beads]
+    smallest, largest = min(radii), max(radii)
+    skin = plan.skin or smallest
+    sight = largest + 2.0 * smallest + skin
+    space = prod(high - low for low, high in zip(plan.scene.lower, plan.scene.upper, strict=True))
+    return {
+        "skin": skin,
+        # At least the number of the smallest beads that fit into the search distance of the largest one.
+        "most_neighbours": max(_LEAST_NEIGHBOURS, ceil((sight**3 - largest**3) / smallest**3)),
+        # At most about ten thousand bins, none smaller than two beads.
+        "bin_size": None if plan.skin else max(4.0 * largest, (space / 2e4) ** (1.0 / 3.0)),
+        "wide": not plan.skin and space > _MOST_BINS * largest**3,
+    }
+
+
+def _contacts(case: Case, contacts: Sequence[Contact], named: Collection[str]) -> dict[str, Any]:
+    """Values or names of the contact parameters of all atom types; the walls come last."""
+    moduli = [*(contact.youngs_modulus for contact in contacts), case.contact.youngs_modulus]
+    return {
+        "moduli": " ".join(["${youngs_modulus}"] * len(moduli) if "youngs_modulus" in named else map(number, moduli)),
+        "stiff": max(moduli) > _STIFFEST,
+        "friction": _coefficients(contacts, named, "friction.bead_bead", "friction.bead_wall"),
+        "rolling_friction": _coefficients(contacts, named, "rolling_friction"),
+        "restitution": _coefficients(contacts, named, "restitution"),
+    }
 
 
 def _coefficients(contacts: Sequence[Contact], named: Collection[str], of_beads: str, of_walls: str = "") -> list[str]:
