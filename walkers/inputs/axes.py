@@ -139,10 +139,7 @@ def written(number: float, unit: str | None) -> Value:
 def unit_of(key: str, values: Sequence[Value]) -> str | None:
     """The unit of the values of an axis; None if they are plain numbers, or no numbers at all (names, "auto").
 
-    Raises
-    ------
-    InputError
-        If they are in several units.
+    Raises `InputError` if they are in several units.
     """
     parts = [part for value in values for part in (value if isinstance(value, list) else [value])]
     units = {found[1] for found in map(_quantity, parts) if found is not None}

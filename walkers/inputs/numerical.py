@@ -35,10 +35,7 @@ def measured() -> Mapping[str, Mapping[str, Any]]:
 def numerical_error(case: Case) -> dict[str, float] | None:
     """The numerical error of the velocity of a case, m/s; None unless it is that of a shipped case that was measured.
 
-    Returns
-    -------
-    dict
-        ``half_step`` and ``stiffer``, the changes of the velocity; ``total``, the root of the sum of their squares.
+    ``half_step`` and ``stiffer`` are the changes of the velocity, ``total`` is the root of the sum of their squares.
     """
     asked = digest(case)
     for one in measured().values():

@@ -221,12 +221,8 @@ def alternatives(model: type[Table], name: str) -> set[str]:
 def changed(model: type[Table], document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """A document with other values at dotted keys (``dimers.radii[0]`` for one of a list).
 
-    What a new value says in other words (`Table.choices`) goes, unless it changes too.
-
-    Raises
-    ------
-    InputError
-        If there is no such place in a list.
+    What a new value says in other words (`Table.choices`) goes, unless it changes too. Raises `InputError` if a list
+    has no such place.
     """
     tables = copy.deepcopy(dict(document))
     for name, value in changes.items():

@@ -91,10 +91,7 @@ class Kind:
 def parse_quantity(text: str, kind: Kind) -> float:
     """Read a quantity of a kind, such as ``"0.3 mm"``, as a number in SI units; ``g`` of an acceleration is 9.8 m/s².
 
-    Raises
-    ------
-    ValueError
-        If the text is no quantity, has no unit, or has the dimension of something else.
+    Raises `ValueError` if the text is no quantity, has no unit, or has the dimension of something else.
     """
     match = _NUMBER_AND_UNIT.fullmatch(text.strip())
     if match is None:

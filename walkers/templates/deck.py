@@ -150,13 +150,7 @@ def render_deck(case: Case, segment: Segment | None = None) -> Deck:
 
 
 def render_shared_deck(cases: Sequence[Case]) -> Deck:
-    """Render one deck for the walkers of several cases, in their order.
-
-    Raises
-    ------
-    ValueError
-        If they cannot share a deck (see `walkers.templates.scene.sharing_key`).
-    """
+    """Render one deck for the walkers of several cases, in their order; raises `ValueError` as `place`."""
     return compose(plan_of(*cases))
 
 
@@ -185,13 +179,7 @@ def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
 
 
 def compose(plan: Plan) -> Deck:
-    """Compose a deck from its blocks.
-
-    Raises
-    ------
-    InputError
-        If the law of the bridges cannot be tabulated.
-    """
+    """Compose a deck from its blocks; raises `InputError` if the law of the bridges cannot be tabulated."""
     case, scene, layout, gravity = plan.case, plan.scene, _layout(plan), plan.case.environment.gravity
     surfaces = scene.surfaces or (surface_of(case),)
     files = {BRIDGES_NAME: tables_of(case, surfaces, {(bead.surface, bead.radius) for bead in scene.beads})}
