@@ -180,12 +180,8 @@ class Case(Table):
         """Bodies that are missing, and the length of a run of loose beads."""
         if not any(body in given for body in _BODIES):
             yield Problem("dimers", None, "missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]")
-        run = given.get("run", {})
-        if (
-            given.keys() & {"mixture", "placed"}
-            and isinstance(run, Mapping)
-            and not run.keys() & {"duration", "cycles"}
-        ):
+        run, loose = given.get("run", {}), given.keys() & {"mixture", "placed"}
+        if loose and isinstance(run, Mapping) and not run.keys() & {"duration", "cycles"}:
             yield Problem("run.duration", None, 'missing; expected such as "4 s"')
         yield from super().problems(given, place)
 

@@ -54,8 +54,7 @@ class Harmonic(Table):
 
     choices: ClassVar[tuple[Choice, ...]] = (Choice((("peak_acceleration",), ("gamma0",))),)
     axis: Filled[Annotated[Any, BeforeValidator(_axis), WithJsonSchema(_AXIS)]] = key(
-        "Direction of the shaking. Default: `x`; in containers `z`.",
-        None,
+        "Direction of the shaking. Default: `x`; in containers `z`.", None
     )
     frequency: units.Frequency = key("Frequency in cycles per second.")
     peak_acceleration: Filled[units.Acceleration] = key("Peak acceleration of the boundary; `g` is 9.8 m/s².", None)

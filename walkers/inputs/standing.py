@@ -72,14 +72,11 @@ def _walkers(case: Case, walkers: Walkers, first: int) -> Iterator[Standing]:
         angle, factor = walkers.angle + walkers.angle_spread * turn, 1.0 + walkers.gap_spread * press
         overlaps = [(overlap if walkers.gap is None else -walkers.gap) * factor for overlap in resting]
         heading = atan2(y, x) + angle + (0.0 if facing > 0 else pi)
-        of_beads = overlaps[: len(walkers.radii)]  # the first are those with the floor
-        heights = [
-            case.boundary.rest_height(radius - overlap) for radius, overlap in zip(walkers.radii, of_beads, strict=True)
-        ]
+        pressed = zip(walkers.radii, overlaps, strict=False)  # the first overlaps are those with the floor
+        heights = [case.boundary.rest_height(radius - overlap) for radius, overlap in pressed]
+        ahead, left = cos(heading), sin(heading)
         beads = [
-            StandingBead(
-                along * cos(heading) - aside * sin(heading), along * sin(heading) + aside * cos(heading), *rest
-            )
+            StandingBead(along * ahead - aside * left, along * left + aside * ahead, *rest)
             for (along, aside), *rest in zip(walkers.places(heights, overlaps), heights, walkers.radii, strict=True)
         ]
         yield Standing(tuple(beads), facing, angle, walks=True)
