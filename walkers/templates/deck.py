@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from math import ceil, inf, pi, prod, sqrt
 from typing import Any, NamedTuple
 
@@ -291,19 +292,14 @@ def _coefficients(contacts: Sequence[Contact], named: Collection[str], of_beads:
     Beads of different surfaces never meet.
     """
     wall, names = len(contacts), (of_beads, of_walls or of_beads)
-    named_so = [name.replace(".", "_") for name in names]
-    values = [
-        [
-            f"${{{one}}}" if one in named else number(of.value_of(name))
-            for one, name in zip(named_so, names, strict=True)
-        ]
-        for of in contacts
-    ]
-    return [
-        values[min(one, other, wall - 1)][int(max(one, other) == wall)]
-        for one in range(wall + 1)
-        for other in range(wall + 1)
-    ]
+
+    def text(contact: Contact, name: str) -> str:
+        parameter = name.replace(".", "_")
+        return f"${{{parameter}}}" if parameter in named else number(contact.value_of(name))
+
+    values = [[text(contact, name) for name in names] for contact in contacts]
+    pairs = product(range(wall + 1), repeat=2)
+    return [values[min(one, other, wall - 1)][int(max(one, other) == wall)] for one, other in pairs]
 
 
 def fastest_of(case: Case, scene: Scene) -> float:
