@@ -168,20 +168,15 @@ def _radii(case: Case) -> Case:
         shares = (1.0 + dimers.sin_delta, 1.0 - dimers.sin_delta)
         radii = tuple(float(f"{dimers.mean_radius * share:.15g}") for share in shares)
         case = case.filled("dimers.radii", radii, "from mean_radius and sin_delta")
-    for key, one in case.walkers_by_key.items():
-        if (diameters := getattr(one, "diameters", None)) is not None:
-            case = case.filled(f"{key}.radii", _halves(diameters), "from the diameters")
-    for name in ("small", "large") if case.mixture else ():
-        if (diameters := getattr(case.mixture, f"{name}_diameters")) is not None:
-            case = case.filled(f"mixture.{name}", _halves(diameters), "from the diameters")
+    given = {f"{key}.radii": getattr(one, "diameters", None) for key, one in case.walkers_by_key.items()}
+    given |= {f"mixture.{name}": getattr(case.mixture, f"{name}_diameters", None) for name in ("small", "large")}
+    for key, diameters in given.items():
+        if diameters is not None:
+            case = case.filled(key, tuple(diameter / 2.0 for diameter in diameters), "from the diameters")
     if any(bead.radius is None for bead in case.placed):
         beads = (bead if bead.diameter is None else bead.but(radius=bead.diameter / 2.0) for bead in case.placed)
         case = case.but(placed=tuple(beads))
     return case
-
-
-def _halves(diameters: Sequence[float]) -> tuple[float, ...]:
-    return tuple(diameter / 2.0 for diameter in diameters)
 
 
 def _viscosity(case: Case) -> Case:
