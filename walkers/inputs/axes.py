@@ -160,6 +160,11 @@ def listed(key: str, given: object) -> Axis:
     return Axis.of({key: values})
 
 
+def crossed(table: Mapping[str, Any]) -> list[Axis]:
+    """An axis of each key."""
+    return [listed(key, given) for key, given in flatten(table, is_axis).items()]
+
+
 def zipped(table: Mapping[str, Any]) -> Axis:
     """An axis of keys that vary together, first value with first value."""
     columns = {key: values_of(key, axis) for key, axis in flatten(table, is_axis).items()}
@@ -175,7 +180,7 @@ def zipped(table: Mapping[str, Any]) -> Axis:
 
 def one_at_a_time(table: Mapping[str, Any]) -> Axis:
     """The first values of all keys, then each other value of one key with the first values of the others."""
-    columns = {key: listed(key, axis).rows for key, axis in flatten(table, is_axis).items()}
+    columns = {axis.keys[0]: axis.rows for axis in crossed(table)}
     usual = {key: rows[0][0] for key, rows in columns.items()}
     changes = [{}, *({key: value} for key, rows in columns.items() for (value,) in rows[1:])]
     return Axis(tuple(usual), tuple(tuple((usual | change).values()) for change in changes))
@@ -184,7 +189,7 @@ def one_at_a_time(table: Mapping[str, Any]) -> Axis:
 def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> Axis:
     """Points of a sampler of `scipy.stats.qmc` in the ranges of several keys (`ranges_of`).
 
-    The method is ``sobol`` (which a power of two suits), ``halton`` or ``latin-hypercube``, scrambled with the seed.
+    The method is ``sobol`` (best for a power of two), ``halton`` or ``latin-hypercube``, scrambled with the seed.
     """
     ends = ranges_of(ranges)
     if not ends:

@@ -23,17 +23,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from walkers.errors import InputError, Problem, each, refused, shortened, unusable
-from walkers.inputs.axes import (
-    MOST_POINTS,
-    Axis,
-    combinations,
-    descending,
-    is_axis,
-    listed,
-    one_at_a_time,
-    sampled,
-    zipped,
-)
+from walkers.inputs.axes import MOST_POINTS, Axis, combinations, crossed, descending, one_at_a_time, sampled, zipped
 from walkers.inputs.case import Case
 from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
@@ -84,8 +74,7 @@ class SweepFile(Table):
 
     def all_axes(self) -> list[Axis]:
         """In the order in which they run, the last one fastest: that of a descent."""
-        axes = [listed(key, given) for key, given in flatten(self.axes, is_axis).items()]
-        axes += [zipped(table) for table in self.zip]
+        axes = [*crossed(self.axes), *(zipped(table) for table in self.zip)]
         axes += [one_at_a_time(self.one_at_a_time)] if self.one_at_a_time else []
         axes += [sampled(table.method, table.points, table.seed, table.ranges) for table in self.sample]
         return axes + ([self.descend.axis()] if self.descend else [])
