@@ -14,16 +14,7 @@ from walkers.inputs.drive import Vector
 from walkers.inputs.loads import bridge_at_rest, hop_height, reach
 from walkers.inputs.run import limits_of
 from walkers.templates import parameters
-from walkers.templates.layout import (
-    BEAD_COLUMNS,
-    FILM_COLUMN,
-    MEAN_SPIN_COLUMNS,
-    PAIR_BRIDGES,
-    WALL_BRIDGE_COLUMNS,
-    WALL_BRIDGES,
-    Layout,
-    PlacedWalker,
-)
+from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, MEAN_SPIN_COLUMNS, Layout, PlacedWalker
 from walkers.templates.parameters import STATUS_LINES_PER_CYCLE, Parameter, along, in_cycles, number, suffixes
 from walkers.templates.scene import Scene, Surface, place, surface_of
 from walkers.text import rendered
@@ -104,7 +95,7 @@ class Plan:
     bridge_every: int  # … of bridges …
     status_every: int  # … and lines of the engine's log
     bead_columns: tuple[str, ...] = BEAD_COLUMNS
-    wall_bridge_columns: tuple[str, ...] = WALL_BRIDGE_COLUMNS
+    wall_bridge_columns: tuple[str, ...] = Layout.wall_bridge_columns
     walkers: tuple[PlacedWalker, ...] = ()  # with the ids of their beads
     prescribed: bool = False  # beads keep their velocities instead of following the forces
     ranks: int = 1  # number of MPI processes
@@ -185,7 +176,6 @@ def compose(plan: Plan) -> Deck:
     surfaces = scene.surfaces or (surface_of(case),)
     files = {BRIDGES_NAME: tables_of(case, surfaces, {(bead.surface, bead.radius) for bead in scene.beads})}
     files |= {LOADS_NAME: _loads(scene)} if len(scene.loadings) > 1 else {}
-    pair_columns = " ".join(PAIR_BRIDGES).split()
     given, derived = _parameters(plan, surfaces)
     named = {one.name: one.value for one in (*given, *derived)}
     text = rendered(
@@ -207,9 +197,7 @@ def compose(plan: Plan) -> Deck:
         ends_of_harmonics=suffixes(len(case.excitation.harmonics)),
         down=[component / gravity for component in case.gravity_vector] if gravity else [],
         shaken=plan.segment.drive_from is not None,
-        pair_bridge_terms=[f"c_pair_bridges[{pair_columns.index(one) + 1}]" for one in layout.pair_bridge_columns],
-        wall_bridge_terms=[f"f_walls[{WALL_BRIDGES.index(one) + 1}]" for one in layout.wall_bridge_columns],
-        pair_bridge_options=" ".join(PAIR_BRIDGES.values()),
+        **layout.bridge_terms(),
         **_contacts(case, [contact for contact, _ in surfaces], named),
         **_search(plan),
     )

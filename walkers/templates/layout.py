@@ -54,7 +54,7 @@ class Layout:
     pair_bridge_dump: str = "bridges.pairs.txt"
     pair_bridge_columns: tuple[str, ...] = PAIR_BRIDGE_COLUMNS
     wall_bridge_dump: str = "bridges.walls.txt"
-    wall_bridge_columns: tuple[str, ...]
+    wall_bridge_columns: tuple[str, ...] = WALL_BRIDGE_COLUMNS
     bridge_every: int
     bridge_frames: int
     atoms: int
@@ -68,6 +68,15 @@ class Layout:
         """Size of the complete bead dump."""
         header = 8 + 8 + 4 + 6 * 4 + 6 * 8 + 4 + 4 + 4 * self.ranks
         return self.frames * (header + 8 * self.atoms * len(self.bead_columns))
+
+    def bridge_terms(self) -> dict[str, Any]:
+        """What the engine calls the columns of bridges, and the options that give those between beads."""
+        pairs = " ".join(PAIR_BRIDGES).split()
+        return {
+            "pair_bridge_options": " ".join(PAIR_BRIDGES.values()),
+            "pair_bridge_terms": [f"c_pair_bridges[{pairs.index(one) + 1}]" for one in self.pair_bridge_columns],
+            "wall_bridge_terms": [f"f_walls[{WALL_BRIDGES.index(one) + 1}]" for one in self.wall_bridge_columns],
+        }
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types."""
