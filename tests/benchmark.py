@@ -135,8 +135,8 @@ def _shaken_pile(name: str, folder: Path) -> Deck:
         replace(bead, centre=tuple(place), velocity=tuple(velocity), spin=tuple(spin))
         for bead, (place, velocity, spin) in zip(plan.scene.beads, now, strict=True)
     ]
-    every = replace(plan.recording, sample_every=steps, bridge_every=steps)
-    return compose(replace(plan, scene=replace(plan.scene, beads=tuple(beads)), recording=every))
+    scene = replace(plan.scene, beads=tuple(beads))
+    return compose(replace(plan, scene=scene, sample_every=steps, bridge_every=steps))
 
 
 def _minimal(deck: Deck, case: Case) -> str:

@@ -46,7 +46,7 @@ from walkers.postprocess.dump import BinaryDump, FloatArray, local_frames
 from walkers.postprocess.motion import Motion, read_motion
 from walkers.runner.binary import SOURCES, find_engine
 from walkers.runner.failures import EngineError
-from walkers.templates.deck import Plan, compose
+from walkers.templates.deck import Plan, Segment, compose
 from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, FORCE_COLUMNS, WALL_BRIDGES
 from walkers.templates.scene import Bead, loading_of
 
@@ -249,7 +249,7 @@ def bench(tmp_path: Path) -> Bench:
 
 def _rows(bench: Bench, plan: Plan) -> tuple[FloatArray, FloatArray]:
     """Contacts of the last step, all columns, and the beads' places then."""
-    plan = replace(plan, recording=replace(plan.recording, wall_bridge_columns=WALL_BRIDGES))
+    plan = replace(plan, wall_bridge_columns=WALL_BRIDGES)
     series = bench.run(plan)
     *_, (_, rows) = local_frames(series.directory / "bridges.walls.txt", WALL_BRIDGES)
     return rows, series.frames[-1, :, :3]
@@ -264,7 +264,7 @@ def test_a_bead_at_rest_in_a_cylinder_presses_with_its_weight(bench: Bench) -> N
     wall, weight = Round(3e-3), 4.0 / 3.0 * pi * RADIUS**3 * case.beads.density * GRAVITY
     overlap = hertz_overlap(weight, RADIUS, reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio))
     bead = Bead(0, (0.0, -(wall.radius - RADIUS + overlap), 5e-3), RADIUS)
-    (row,), _ = _rows(bench, Plan(case, standing([bead], [FLOOR, wall]), recording(20_000, 20_000)))
+    (row,), _ = _rows(bench, Plan(case, standing([bead], [FLOOR, wall]), **recording(20_000, 20_000)))
     told = dict(zip(WALL_BRIDGES, row.tolist(), strict=True))
     assert told["overlap"] == pytest.approx(overlap, rel=1e-4)
     assert (told["fx"], told["fy"], told["fz"]) == pytest.approx((0.0, weight, 0.0), rel=1e-4, abs=1e-6 * weight)
@@ -377,7 +377,7 @@ def test_a_restart_with_other_walls_is_refused(bench: Bench) -> None:
     first = prescribed(case, standing(beads), 10, restart_to="half.restart")
     carry = bench.run(first).directory / "half.restart"
     scene = standing(beads, [FLOOR, Round(2.5e-3)])
-    second = replace(first, recording=replace(recording(20), begin=10), restart_to=None, restart_from="half.restart")
+    second = replace(first, segment=Segment(10, 20, 0), restart_to=None, restart_from="half.restart")
     with pytest.raises(EngineError, match="another number of walls"):
         bench.run(replace(second, scene=scene), carry)
 
@@ -394,8 +394,8 @@ def test_liquid_is_conserved(bench: Bench, ranks: int) -> None:
     places = [tuple(one) for one in start.tolist()]
     beads = [Bead(0, *of) for of in zip(places, sizes.tolist(), map(tuple, velocity.tolist()), strict=True)]
     plan = prescribed(case, standing(beads), steps, ranks=ranks)
-    plan = replace(plan, recording=replace(plan.recording, bead_columns=(*BEAD_COLUMNS, *FORCE_COLUMNS, FILM_COLUMN)))
-    dump = BinaryDump(bench.run(plan).directory / "beads.bin", plan.recording.bead_columns)
+    plan = replace(plan, bead_columns=(*BEAD_COLUMNS, *FORCE_COLUMNS, FILM_COLUMN))
+    dump = BinaryDump(bench.run(plan).directory / "beads.bin", plan.bead_columns)
     found = dump.stack()[:, :, -1]
     places_then = start + np.arange(steps + 1)[:, None, None] * dt * velocity
     own, held = 0.02 * 4.0 / 3.0 * np.pi * sizes**3, dict[tuple[int, int], float]()

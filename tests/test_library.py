@@ -33,11 +33,11 @@ friction  = { value = 0.21, source = "tilting table", range = [0.18, 0.24] }
 
 def test_every_number_of_the_library_has_a_source_and_defaults_lie_within_their_ranges() -> None:
     materials, liquids = SHIPPED.names("materials"), SHIPPED.names("liquids")
-    known = [number for name in materials for number in SHIPPED.material(name).values()]
-    known += [number for name in liquids for number in SHIPPED.liquid(name).values()]
+    known = [number for name in materials for number in SHIPPED.numbers("materials", name).values()]
+    known += [number for name in liquids for number in SHIPPED.numbers("liquids", name).values()]
     assert len(known) >= 90
     assert all(number.value > 0 and len(number.source) > 8 for number in known)
-    densities = {name: SHIPPED.material(name)["density"].value for name in materials}
+    densities = {name: SHIPPED.numbers("materials", name)["density"].value for name in materials}
     assert sorted(densities, key=lambda name: densities[name])[:: len(densities) - 1] == ["polystyrene", "brass"]
 
 

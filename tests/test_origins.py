@@ -43,7 +43,7 @@ def test_values_know_where_they_come_from() -> None:
     found = origins(load_case("fig1b"))
     assert (found["drive.frequency"].origin, found["drive.frequency"].text) == ("given", "80 Hz")
     assert found["beads.density"] == Origin(
-        "beads.density", "4.0 g/cm^3", "library", library.library_of({}).material("ruby")["density"].source
+        "beads.density", "4.0 g/cm^3", "library", library.library_of({}).numbers("materials", "ruby")["density"].source
     )
     friction = found["contact.friction.bead_wall"]
     assert friction.origin == "calibrated"

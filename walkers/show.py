@@ -126,8 +126,7 @@ def _volume(case: Case) -> float:
 
 def _youngs_modulus(case: Case) -> Known | None:
     """Young's modulus of the material of the beads, if the library has it."""
-    known_to, name = library_of(case.document), case.beads.material
-    return known_to.material(name).get("youngs_modulus") if name and known_to.has("materials", name) else None
+    return library_of(case.document).numbers("materials", case.beads.material or "").get("youngs_modulus")
 
 
 def summarise(case: Case) -> dict[str, Any]:

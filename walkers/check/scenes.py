@@ -35,7 +35,7 @@ from walkers.runner.binary import Engine
 from walkers.runner.directory import write_deck
 from walkers.runner.launch import launch
 from walkers.templates.bridge_tables import tabulated
-from walkers.templates.deck import BRIDGES_NAME, Deck, Plan, Recording, compose, plan_of
+from walkers.templates.deck import BRIDGES_NAME, Deck, Plan, Segment, compose, plan_of
 from walkers.templates.layout import BEAD_COLUMNS, FORCE_COLUMNS
 from walkers.templates.scene import Bead, Scene
 from walkers.text import rendered
@@ -140,14 +140,15 @@ def standing(beads: Sequence[Bead], walls: Sequence[Wall] = (FLOOR,)) -> Scene:
     return Scene(numbered, tuple(walls), (-0.01,) * 3, (0.01,) * 3)
 
 
-def recording(steps: int, sample_every: int = 1) -> Recording:
-    """Record beads with their forces and torques; bridges at the start and the end only."""
-    return Recording(steps, sample_every, steps, steps, bead_columns=(*BEAD_COLUMNS, *FORCE_COLUMNS))
+def recording(steps: int, sample_every: int = 1) -> dict[str, Any]:
+    """Of a plan that records beads with their forces and torques, and bridges at the start and the end only."""
+    every = {"sample_every": sample_every, "bridge_every": steps, "status_every": steps}
+    return {"segment": Segment(0, steps, 0), **every, "bead_columns": (*BEAD_COLUMNS, *FORCE_COLUMNS)}
 
 
 def prescribed(case: Case, scene: Scene, steps: int = 2000, **options: Any) -> Plan:
     """Move the beads of a scene with their velocities, recording each step."""
-    return Plan(case, scene, recording(steps), prescribed=True, **options)
+    return Plan(case, scene, prescribed=True, **recording(steps), **options)
 
 
 def second_engine(case: Case, scene: Scene) -> SecondEngine:
@@ -179,7 +180,7 @@ class Bench:
     _numbers: itertools.count[int] = field(default_factory=itertools.count)
 
     def run(self, plan: Plan | Deck, carry: Path | None = None) -> Measured:
-        """Run a plan whose `recording` has forces, or its deck, with a file such as a restart file beside it."""
+        """Run a plan that records forces, or its deck, with a file such as a restart file beside it."""
         deck = compose(plan) if isinstance(plan, Plan) else plan
         deck = replace(deck, fastest=inf)  # prescribed beads may be faster than shaken ones
         directory = self.folder / f"deck-{next(self._numbers):03d}"
@@ -220,7 +221,7 @@ class Setting:
         engine = second_engine(case, scene)
         if self.freely:
             every = self.freely // 100
-            series = bench.run(Plan(case, scene, recording(self.freely, every)))
+            series = bench.run(Plan(case, scene, **recording(self.freely, every)))
             start, frames = series.frames[0, :, :3], engine.run(self.freely, every)
             found = {
                 "displacement": farthest(series.frames[1:, :, :3] - start, frames[..., :3] - start),
@@ -336,7 +337,7 @@ def restart_lines(bench: Bench) -> Iterator[Line]:
     whole = bench.run(prescribed(full_case(), scene, 1000))
     first = prescribed(full_case(), scene, 500, restart_to="half.restart")
     carry = bench.run(first).directory / "half.restart"
-    second = replace(first, recording=replace(recording(1000), begin=500), restart_to=None, restart_from="half.restart")
+    second = replace(first, segment=Segment(500, 1000, 0), restart_to=None, restart_from="half.restart")
     forces = bench.run(second, carry).forces[1:, :, :3]
     kept = ("wall spring", 0), ("pair spring", 1), ("open wall bridge", 3), ("open pair bridge", 5)
     for what, number in kept:
@@ -396,9 +397,7 @@ def company_lines(bench: Bench) -> Iterator[Line]:
     sloping = alone.put("boundary.tilt", 0.3)
 
     def ran(*cases: Case) -> Measured:
-        plan = plan_of(*cases)
-        columns = (*BEAD_COLUMNS, *FORCE_COLUMNS)
-        return bench.run(replace(plan, recording=replace(plan.recording, bead_columns=columns)))
+        return bench.run(replace(plan_of(*cases), bead_columns=(*BEAD_COLUMNS, *FORCE_COLUMNS)))
 
     first, again, together = ran(alone), ran(alone), ran(other, alone, sloping)
     ways = [series.frames[..., :3] - series.frames[0, :, :3] for series in (first, together)]
@@ -415,7 +414,7 @@ def step_lines(bench: Bench) -> Iterator[Line]:
         cycle = case.run.steps_per_cycle * finer
         run = case.run.but(time_step=case.run.time_step / finer, steps_per_cycle=cycle)
         plan, steps = plan_of(case.but(run=run)), 4 * cycle
-        frames = bench.run(replace(plan, recording=recording(steps, steps))).frames
+        frames = bench.run(replace(plan, **recording(steps, steps))).frames
         ways.append(frames[-1, :, :3] - frames[0, :, :3])
     coarse, fine = farthest(ways[0], ways[2]), farthest(ways[1], ways[2])
     yield Line("displacement of a walker: half and quarter time step", 0.0, fine, 2e-3)

@@ -60,10 +60,10 @@ def catalogue(*, of_others: bool = True) -> list[Entry]:
 def _of_library(known_to: Library) -> Iterator[Entry]:
     for one in known_to.collections:
         for name in one.tables.get("materials", ()):
-            yield Entry("materials", name, one.place, known_to.material(name))
+            yield Entry("materials", name, one.place, known_to.numbers("materials", name))
         for name in one.tables.get("liquids", ()):
             note = f"at mass_fraction = {HALF[0]}, {quantity_text(HALF[1], TEMPERATURE)}" if name in MIXTURES else ""
-            yield Entry("liquids", name, one.place, known_to.liquid(name), note)
+            yield Entry("liquids", name, one.place, known_to.numbers("liquids", name), note)
         for pair in one.tables.get("surface_pairs", ()):
             first, second = pair["materials"]
             yield Entry("surface pairs", f"{first} on {second}", one.place, known_to.surface_pair(first, second))

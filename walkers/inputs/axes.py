@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import product
 from math import isfinite, prod
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.errors import unusable
 from walkers.inputs.keys import Value, flatten
@@ -26,8 +25,7 @@ _SPACINGS = ("linspace", "geomspace")
 _DISTRIBUTIONS = ("uniform", "loguniform")
 
 
-@dataclass(frozen=True)
-class Range:
+class Range(NamedTuple):
     """Range of a random number, in a unit (None: a plain number), uniform or log-uniform.
 
     With a ``median``, half of the draws are below it and half above, each half spread over its side of the range.
@@ -50,8 +48,7 @@ class Range:
         return np.asarray(np.interp(shares, known, quantiles))
 
 
-@dataclass(frozen=True)
-class Axis:
+class Axis(NamedTuple):
     """Keys that vary together: ``rows`` has one value per key for each point of the axis."""
 
     keys: tuple[str, ...]
@@ -61,6 +58,11 @@ class Axis:
     def of(cls, columns: Mapping[str, Sequence[Value]]) -> Axis:
         """Make an axis from the values of each key."""
         return cls(tuple(columns), tuple(zip(*columns.values(), strict=True)))
+
+    @property
+    def units(self) -> tuple[str | None, ...]:
+        """The unit of each key, as `unit_of` its values."""
+        return tuple(map(unit_of, self.keys, zip(*self.rows, strict=True)))
 
 
 def is_axis(value: object) -> bool:
@@ -137,10 +139,7 @@ def written(number: float, unit: str | None) -> Value:
 def unit_of(key: str, values: Sequence[Value]) -> str | None:
     """The unit of the values of an axis; None if they are plain numbers, or no numbers at all (names, "auto").
 
-    Raises
-    ------
-    InputError
-        If they are in several units.
+    Raises `InputError` if they are in several units.
     """
     parts = [part for value in values for part in (value if isinstance(value, list) else [value])]
     units = {found[1] for found in map(_quantity, parts) if found is not None}
@@ -161,6 +160,11 @@ def listed(key: str, given: object) -> Axis:
     return Axis.of({key: values})
 
 
+def crossed(table: Mapping[str, Any]) -> list[Axis]:
+    """An axis of each key."""
+    return [listed(key, given) for key, given in flatten(table, is_axis).items()]
+
+
 def zipped(table: Mapping[str, Any]) -> Axis:
     """An axis of keys that vary together, first value with first value."""
     columns = {key: values_of(key, axis) for key, axis in flatten(table, is_axis).items()}
@@ -176,23 +180,16 @@ def zipped(table: Mapping[str, Any]) -> Axis:
 
 def one_at_a_time(table: Mapping[str, Any]) -> Axis:
     """The first values of all keys, then each other value of one key with the first values of the others."""
-    columns = {key: listed(key, axis).rows for key, axis in flatten(table, is_axis).items()}
+    columns = {axis.keys[0]: axis.rows for axis in crossed(table)}
     usual = {key: rows[0][0] for key, rows in columns.items()}
     changes = [{}, *({key: value} for key, rows in columns.items() for (value,) in rows[1:])]
     return Axis(tuple(usual), tuple(tuple((usual | change).values()) for change in changes))
 
 
 def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> Axis:
-    """Points of a sampler of `scipy.stats.qmc` in the ranges of several keys.
+    """Points of a sampler of `scipy.stats.qmc` in the ranges of several keys (`ranges_of`).
 
-    Parameters
-    ----------
-    method, seed
-        ``sobol``, ``halton`` or ``latin-hypercube``, and the seed of its scrambling.
-    points
-        How many; a power of two suits Sobol's sequence.
-    ranges
-        See `ranges_of`.
+    The method is ``sobol`` (best for a power of two), ``halton`` or ``latin-hypercube``, scrambled with the seed.
     """
     ends = ranges_of(ranges)
     if not ends:
@@ -202,6 +199,17 @@ def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> A
     for share, (key, one) in zip(shares, ends.items(), strict=True):
         columns[key] = [written(float(number), one.unit) for number in one.at(share)]
     return Axis.of(columns)
+
+
+def descending(key: str, ends: Mapping[str, Value]) -> Axis:
+    """An axis of a key from a value down to another in steps; ``ends`` has the three by their keys in a sweep file."""
+    start, to, step = (number_of(name, value) for name, value in ends.items())
+    unit = unit_of(key, list(ends.values()))
+    if not (start >= to and step > 0 and start - to < MOST_POINTS * step):
+        first, last, _ = ends.values()
+        raise unusable("descend", "`from` must not be below `to`, and `step` must be positive", f"{first} to {last}")
+    number = int((start - to) / step + 1e-9) + 1
+    return Axis.of({key: [written(start - step * count, unit) for count in range(number)]})
 
 
 def ranges_of(ranges: Mapping[str, Any]) -> dict[str, Range]:

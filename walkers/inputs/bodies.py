@@ -9,16 +9,15 @@ which the first two touch is the origin.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from math import acos, asin, atan2, cos, dist, hypot, pi, sin, sqrt
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple
 
 from pydantic import Field
 
 from walkers.inputs import units
-from walkers.inputs.table import SAME_RUN, Choice, Filled, Table, key
+from walkers.inputs.table import Choice, Filled, Indirect, Table, key
 from walkers.inputs.units import Diameter, Length, Number, Radius, SignedLength, Whole
 
 Apart = Callable[[int, int], float]
@@ -37,8 +36,7 @@ _TOUCHING = 0.02
 _TOO_SMALL = "a bead is too small to touch two beads that touch each other; expected a larger one"
 
 
-@dataclass(frozen=True)
-class Arrangement:
+class Arrangement(NamedTuple):
     """Arrangement of ``fewest`` to ``most`` beads: touching pairs, and positions from radii and `Apart`."""
 
     pairs: Callable[[int], Pairs]
@@ -286,13 +284,9 @@ class Dimers(Walkers):
     arrangement: ClassVar[str] = "chain"
     at: ClassVar[tuple[_Place, ...]] = ()
     radii: Filled[tuple[Radius, Radius]] = key("Radii of the beads. The first bead leads.", None, ["0.3 mm", "0.2 mm"])
-    diameters: Filled[tuple[Diameter, Diameter]] = key(
-        "Diameters, instead of `radii`.", None, ["0.6 mm", "0.4 mm"], SAME_RUN
-    )
-    mean_radius: Filled[Radius] = key("Mean radius, with `sin_delta` instead of `radii`.", None, "0.25 mm", SAME_RUN)
-    sin_delta: Filled[Number] = key(
-        "Asymmetry of a dimer, sin δ = (R1 − R2)/(R1 + R2).", None, 0.2, SAME_RUN, gt=-0.9, lt=0.9
-    )
+    diameters: Indirect[tuple[Diameter, Diameter]] = key("Diameters, instead of `radii`.", None, ["0.6 mm", "0.4 mm"])
+    mean_radius: Indirect[Radius] = key("Mean radius, with `sin_delta` instead of `radii`.", None, "0.25 mm")
+    sin_delta: Indirect[Number] = key("Asymmetry of a dimer, sin δ = (R1 − R2)/(R1 + R2).", None, 0.2, gt=-0.9, lt=0.9)
 
 
 _THREE = ["0.3 mm", "0.2 mm", "0.2 mm"], ["0.6 mm", "0.4 mm", "0.4 mm"]
@@ -305,9 +299,7 @@ class Cluster(Walkers):
     radii: Filled[Annotated[tuple[Radius, ...], _FEW]] = key(
         "Radii of the beads. The first bead leads.", None, _THREE[0]
     )
-    diameters: Filled[Annotated[tuple[Diameter, ...], _FEW]] = key(
-        "Diameters, instead of `radii`.", None, _THREE[1], SAME_RUN
-    )
+    diameters: Indirect[Annotated[tuple[Diameter, ...], _FEW]] = key("Diameters, instead of `radii`.", None, _THREE[1])
     arrangement: str = key("`chain`, `fan`, `diamond`, `ring` or `raft`. See [](../cases.md#bodies).", "", "fan")
     at: Annotated[tuple[_Place, ...], Field(max_length=100)] = key(
         "Place of each bead, distance ahead and to the left, instead of an arrangement.",
@@ -316,7 +308,7 @@ class Cluster(Walkers):
     )
 
 
-def _beside(one: float, other: float) -> list[tuple[float, list[float]]]:
+def beside(one: float, other: float) -> list[tuple[float, list[float]]]:
     """`Walkers.bridged` of two beads, radii in m."""
     return [(one, [other]), (other, [one])]
 
@@ -334,13 +326,13 @@ class Mixture(Table):
     )
     small: Filled[_Range] = key("Range of radii of the small beads.", None, ["0.3 mm", "0.315 mm"])
     large: Filled[_Range] = key("Range of radii of the large beads.", None, ["0.5 mm", "0.59 mm"])
-    small_diameters: Filled[_DiameterRange] = key("Instead of `small`.", None, ["0.6 mm", "0.63 mm"], SAME_RUN)
-    large_diameters: Filled[_DiameterRange] = key("Instead of `large`.", None, ["1 mm", "1.18 mm"], SAME_RUN)
+    small_diameters: Indirect[_DiameterRange] = key("Instead of `small`.", None, ["0.6 mm", "0.63 mm"])
+    large_diameters: Indirect[_DiameterRange] = key("Instead of `large`.", None, ["1 mm", "1.18 mm"])
     small_share: Number = key("Share of the small beads.", 0.5, ge=0, le=1)
     mixed_by: Literal["mass", "volume", "number"] = key("Quantity that `small_share` refers to.", "mass")
     sizes: Whole = key("Number of different radii in each range.", 4, ge=1, le=20)
     count: Filled[Whole] = key("Number of beads.", None, 200, ge=1, le=MOST_BEADS)
-    fill_height: Filled[Length] = key("Height of the bed, instead of a number of beads.", None, "3 mm", SAME_RUN)
+    fill_height: Indirect[Length] = key("Height of the bed, instead of a number of beads.", None, "3 mm")
 
     @cached_property
     def small_radii(self) -> tuple[float, ...]:
@@ -385,7 +377,7 @@ class Mixture(Table):
         Beads of a pile have more neighbours, and its viscous limit is lower; ``auto``'s share of the limit allows for
         it: a glycerol pile at 0.4 of it is agitated as at a quarter of that step, within 0.1 %, and at 0.8 it heats up.
         """
-        return _beside(max(self.large_radii), min(self.small_radii))
+        return beside(max(self.large_radii), min(self.small_radii))
 
     @property
     def all_radii(self) -> list[float]:
@@ -409,33 +401,7 @@ class PlacedBead(Table):
 
     choices: ClassVar = (Choice((("radius",), ("diameter",))),)
     radius: Filled[Radius] = key("Radius of the bead.", None, "0.3 mm")
-    diameter: Filled[Diameter] = key("Diameter of the bead, instead of `radius`.", None, "0.6 mm", SAME_RUN)
+    diameter: Indirect[Diameter] = key("Diameter of the bead, instead of `radius`.", None, "0.6 mm")
     at: tuple[SignedLength, SignedLength, SignedLength] = key(
         "Centre of the bead at the start: x, y, z from the middle of the floor.", example=["5 mm", "-3 mm", "0.3 mm"]
     )
-
-
-@dataclass(frozen=True)
-class PlacedBeads:
-    """All beads that are placed one by one, at least one."""
-
-    beads: tuple[PlacedBead, ...]
-
-    @property
-    def all_radii(self) -> list[float]:
-        """Radius of every bead, m."""
-        return [bead.radius for bead in self.beads]
-
-    @property
-    def radii(self) -> tuple[float, ...]:
-        """The different radii, m."""
-        return tuple(sorted(set(self.all_radii)))
-
-    @property
-    def bridged(self) -> list[tuple[float, list[float]]]:
-        """The largest bead beside the smallest."""
-        return _beside(self.radii[-1], self.radii[0])
-
-
-Body = Walkers | Mixture | PlacedBeads
-"""Kinds of bodies."""

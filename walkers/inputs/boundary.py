@@ -7,9 +7,9 @@ Most have a floor, the plane z = 0 in their own frame, and may have side walls. 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil, cos, degrees, inf, pi, sin, sqrt
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 from walkers.errors import Problem
 from walkers.inputs import units
@@ -32,8 +32,7 @@ _RIM = 2e-4
 """m; the simulation box of a container reaches this far beyond its walls."""
 
 
-@dataclass(frozen=True)
-class Flat:
+class Flat(NamedTuple):
     """A plane: point (m), unit normal toward the beads, name."""
 
     point: Vector
@@ -50,8 +49,7 @@ class Flat:
         return 0.0 * places + self.normal
 
 
-@dataclass(frozen=True)
-class Round:
+class Round(NamedTuple):
     """Inside of a vertical cylinder around the origin: radius (m), name."""
 
     radius: float
@@ -73,8 +71,7 @@ BOTTOM = Flat((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 """The floor of all boundaries with a floor."""
 
 
-@dataclass(frozen=True)
-class Layer:
+class Layer(NamedTuple):
     """A layer of positions from which beads are poured: positions (m), pitch (m), and largest displacement."""
 
     places: Sequence[tuple[float, float]]
@@ -107,8 +104,8 @@ class Boundary(Table):
     """
 
     shape: Shape = key("Shape of the boundary. See [](../cases.md#boundaries).", "plane")
-    material: str = key(
-        "Material, from the library, or any other name beside all friction coefficients.", ..., "glass", SAME_RUN
+    material: Annotated[str, SAME_RUN] = key(
+        "Material, from the library, or any other name beside all friction coefficients.", ..., "glass"
     )
     opening: Filled[Annotated[float, replace(units.ANGLE, smallest=0.5, largest=3.1, sign=units.POSITIVE)]] = key(
         "Angle between the two walls of a groove.", None, "120 deg"
@@ -150,11 +147,6 @@ class Boundary(Table):
     def pull(self) -> str:
         """Component of gravity down the slope, as text: ``g sin 60°``; ``g`` for a wall."""
         return "g" if self.tilt > 1.57 else f"g sin {degrees(self.tilt):.4g}°"
-
-    @property
-    def drive_axis(self) -> Literal["x", "z"]:
-        """Default axis of the drive."""
-        return "z" if self.closed else "x"
 
     @property
     def walls(self) -> tuple[Wall, ...]:

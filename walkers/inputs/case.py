@@ -19,7 +19,7 @@ from pydantic import BeforeValidator, Field, ValidationError
 from walkers.errors import InputError, Problem, each, refused
 from walkers.inputs import units
 from walkers.inputs.axes import is_axis, ranges_of
-from walkers.inputs.bodies import MOST_BEADS, Body, Cluster, Dimers, Mixture, PlacedBead, PlacedBeads, Walkers
+from walkers.inputs.bodies import MOST_BEADS, Cluster, Dimers, Mixture, PlacedBead, Walkers
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.drive import AXES, Drive, Excitation, Vector
 from walkers.inputs.keys import MISSING, flatten, parts_of, value_at
@@ -28,7 +28,7 @@ from walkers.inputs.messages import blaming, blaming_changes, check_key, validat
 from walkers.inputs.origins import Origin, Source, Whence, text_of
 from walkers.inputs.resolving import NAMES, SUPPLIED, resolve, supplied
 from walkers.inputs.run import Run
-from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Table, changed, contradictions, key
+from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, changed, contradictions, key
 from walkers.inputs.units import Coefficient, Number, kind_in
 from walkers.physics.laws import by_name
 from walkers.physics.liquid import DEFAULT_LAW, BridgeLiquid
@@ -42,9 +42,7 @@ if TYPE_CHECKING:
 class Beads(Table):
     """``[beads]``: what all beads are made of."""
 
-    material: str | None = key(
-        "Material of all beads, from the library, which gives the density.", None, "ruby", SAME_RUN
-    )
+    material: Indirect[str] = key("Material of all beads, from the library, which gives the density.", None, "ruby")
     density: units.Density = key("Density of the beads.")
 
 
@@ -57,16 +55,12 @@ class Liquid(Table):
     """
 
     choices: ClassVar = (Choice((("dynamic_viscosity",), ("kinematic_viscosity",)), instead="a liquid of the library"),)
-    name: str | None = key("Liquid from the library. The other keys override its values.", None, "Si AK5", SAME_RUN)
-    mass_fraction: Filled[Number] = key(
-        "Mass fraction of glycerol in `water-glycerol`.", None, 0.87, SAME_RUN, ge=0, le=1
-    )
-    temperature: Filled[units.Temperature] = key(
-        "Temperature of `water-glycerol`. Default: 20 °C.", None, None, SAME_RUN
-    )
+    name: Indirect[str] = key("Liquid from the library. The other keys override its values.", None, "Si AK5")
+    mass_fraction: Indirect[Number] = key("Mass fraction of glycerol in `water-glycerol`.", None, 0.87, ge=0, le=1)
+    temperature: Indirect[units.Temperature] = key("Temperature of `water-glycerol`. Default: 20 °C.", None)
     surface_tension: units.SurfaceTension = key("Surface tension.")
-    density: Filled[units.Density] = key("Density of the liquid.", None, None, SAME_RUN)
-    kinematic_viscosity: Filled[units.KinematicViscosity] = key("Kinematic viscosity.", None, None, SAME_RUN)
+    density: Indirect[units.Density] = key("Density of the liquid.", None)
+    kinematic_viscosity: Indirect[units.KinematicViscosity] = key("Kinematic viscosity.", None)
     dynamic_viscosity: Filled[units.DynamicViscosity] = key("Dynamic viscosity, instead of the kinematic one.", None)
     volume_fraction: Number = key("Volume of liquid on a bead over that of the bead.", example=0.01, ge=1e-9, le=0.5)
     viscosity_ratio: Number = key(
@@ -186,12 +180,8 @@ class Case(Table):
         """Bodies that are missing, and the length of a run of loose beads."""
         if not any(body in given for body in _BODIES):
             yield Problem("dimers", None, "missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]")
-        run = given.get("run", {})
-        if (
-            given.keys() & {"mixture", "placed"}
-            and isinstance(run, Mapping)
-            and not run.keys() & {"duration", "cycles"}
-        ):
+        run, loose = given.get("run", {}), given.keys() & {"mixture", "placed"}
+        if loose and isinstance(run, Mapping) and not run.keys() & {"duration", "cycles"}:
             yield Problem("run.duration", None, 'missing; expected such as "4 s"')
         yield from super().problems(given, place)
 
@@ -357,15 +347,15 @@ class Case(Table):
         return law
 
     @cached_property
-    def bodies(self) -> tuple[Body, ...]:
-        """All bodies, the walkers first."""
-        placed = (PlacedBeads(self.placed),) if self.placed else ()
-        return (*self.walkers, *((self.mixture,) if self.mixture else ()), *placed)
+    def bodies(self) -> tuple[Walkers | Mixture, ...]:
+        """All bodies of several beads, the walkers first."""
+        return (*self.walkers, *((self.mixture,) if self.mixture else ()))
 
     @cached_property
     def all_radii(self) -> list[float]:
         """Radius of every bead, m."""
-        return [radius for body in self.bodies for radius in body.all_radii]
+        radii = [radius for body in self.bodies for radius in body.all_radii]
+        return [*radii, *(bead.radius for bead in self.placed)]
 
     @property
     def count(self) -> int:
@@ -385,7 +375,8 @@ class Case(Table):
     @property
     def radii(self) -> list[float]:
         """The different radii of the beads, m, in the order of the bodies."""
-        return list(dict.fromkeys(radius for body in self.bodies for radius in body.radii))
+        radii = [radius for body in self.bodies for radius in body.radii]
+        return list(dict.fromkeys([*radii, *sorted(bead.radius for bead in self.placed)]))
 
     @property
     def loose(self) -> bool:

@@ -16,7 +16,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from walkers.errors import Problem
 from walkers.inputs import units
-from walkers.inputs.table import SAME_RUN, Choice, Filled, Table, key
+from walkers.inputs.table import Choice, Filled, Indirect, Table, key
 from walkers.inputs.units import Angle, Coefficient
 
 Vector = tuple[float, float, float]
@@ -54,13 +54,12 @@ class Harmonic(Table):
 
     choices: ClassVar[tuple[Choice, ...]] = (Choice((("peak_acceleration",), ("gamma0",))),)
     axis: Filled[Annotated[Any, BeforeValidator(_axis), WithJsonSchema(_AXIS)]] = key(
-        "Direction of the shaking. Default: `x`; in containers `z`.",
-        None,
+        "Direction of the shaking. Default: `x`; in containers `z`.", None
     )
     frequency: units.Frequency = key("Frequency in cycles per second.")
     peak_acceleration: Filled[units.Acceleration] = key("Peak acceleration of the boundary; `g` is 9.8 m/s².", None)
-    gamma0: Filled[Coefficient] = key(
-        "Γ0 = a0 M/(4πγR̄) of the dimer of mass M and mean radius R̄, instead of a0.", None, 0.5, SAME_RUN
+    gamma0: Indirect[Coefficient] = key(
+        "Γ0 = a0 M/(4πγR̄) of the dimer of mass M and mean radius R̄, instead of a0.", None, 0.5
     )
     phase: Angle = key("Phase of the sine.", 0.0)
 

@@ -43,10 +43,7 @@ def value_at(document: Any, parts: Sequence[str | int]) -> Any:
 def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool] = lambda _: False) -> dict[str, Any]:
     """Dotted keys of nested tables: ``{"drive": {"frequency": …}}`` and ``{"drive.frequency": …}`` are the same.
 
-    Raises
-    ------
-    InputError
-        If a key is given both ways.
+    Raises `InputError` if a key is given both ways.
     """
     flat: dict[str, Any] = {}
     for name, value in table.items():
@@ -74,10 +71,7 @@ def dotted(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
 def settings_of(words: Iterable[str]) -> dict[str, Value]:
     """Values from ``key=value``, the value as a case file has it; quotes about text may be left out.
 
-    Raises
-    ------
-    InputError
-        If there is no ``=``, or a key is given twice.
+    Raises `InputError` if there is no ``=``, or a key is given twice.
 
     Examples
     --------

@@ -43,28 +43,17 @@ _KINDS = {
 class Known:
     """A number of the library.
 
-    Attributes
-    ----------
-    value, written, source
-        SI; as the library has it, with its unit; where it is from.
-    range
-        Ends between which an unmeasured number may lie, or a calibrated one (5 to 95 % of the posterior), as a case
-        would write them.
-    calibrated_with
-        Names of the liquids of the experiments that it was calibrated to; empty if it was not.
-    origin
-        Of whose library it is.
-    logarithmic
-        Whether the range is of magnitudes.
+    The ``range`` of an unmeasured number has the ends between which it may lie, that of a calibrated one 5 to 95 % of
+    the posterior, as a case would write them.
     """
 
-    value: float
-    written: Any
+    value: float  # SI
+    written: Any  # as the library has it, with its unit
     source: str = ""
     range: tuple[Any, Any] | None = None
-    calibrated_with: tuple[str, ...] = ()
+    calibrated_with: tuple[str, ...] = ()  # names of the liquids of the experiments; empty: not calibrated
     origin: Whence = "library"
-    logarithmic: bool = False
+    logarithmic: bool = False  # whether the range is of magnitudes
 
 
 class Collection(NamedTuple):
@@ -78,13 +67,8 @@ class Collection(NamedTuple):
 class Library:
     """The materials, liquids and surface pairs that a case can name.
 
-    They are those of the user's own library and those that come with the program. No name has two meanings: the user's
-    library cannot redefine a name of the program.
-
-    Parameters
-    ----------
-    own
-        The tables of the user's own library, validated.
+    They are those of the user's own library, given by its validated tables, and those that come with the program. No
+    name has two meanings: the user's library cannot redefine a name of the program.
     """
 
     def __init__(self, own: Mapping[str, Any] | None = None) -> None:
@@ -95,27 +79,17 @@ class Library:
         """Names of the ``materials`` or of the ``liquids``."""
         return tuple(dict.fromkeys(name for one in self.collections for name in one.tables.get(kind, ())))
 
-    def has(self, kind: str, name: str | None) -> bool:
-        """Whether there is a material or liquid of a name."""
-        return any(name in one.tables.get(kind, ()) for one in self.collections)
+    def numbers(self, kind: str, name: str, mixture: tuple[float, float] | None = None) -> Mapping[str, Known]:
+        """Numbers of one of the ``materials`` or ``liquids``, in SI units; empty if there is none of this name.
 
-    def material(self, name: str) -> Mapping[str, Known]:
-        """Density (kg/m³), Young's modulus (Pa) and Poisson's ratio of a material (KeyError: there is none)."""
-        return self._numbers("materials", name, {})
-
-    def liquid(self, name: str, mixture: tuple[float, float] | None = None) -> Mapping[str, Known]:
-        """Surface tension (N/m), a viscosity (m²/s or Pa s) and density (kg/m³) of a liquid (KeyError: there is none).
-
-        ``mixture`` is the mass fraction and the temperature (K) of one whose numbers depend on them; `HALF` if None.
+        ``mixture`` is the mass fraction and the temperature (K) of a liquid whose numbers depend on them.
         """
-        return self._numbers("liquids", name, MIXTURES[name](*mixture or HALF) if name in MIXTURES else {})
-
-    def _numbers(self, kind: str, name: str, computed: Mapping[str, float]) -> Mapping[str, Known]:
         for one in self.collections:
             if found := one.tables.get(kind, {}).get(name):
+                computed = MIXTURES[name](*mixture or HALF) if name in MIXTURES else {}
                 texts = {key: quantity_text(float(f"{value:.4g}"), _KINDS[key]) for key, value in computed.items()}
                 return {key: _known(key, {"value": texts.get(key), **entry}, one) for key, entry in found.items()}
-        raise KeyError(name)
+        return {}
 
     def surface_pair(self, first: str | None, second: str | None) -> Mapping[str, Known]:
         """Contact parameters of two wet surfaces; empty if there are none.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from math import inf, pi
 from typing import TYPE_CHECKING, NamedTuple
@@ -13,8 +12,7 @@ from walkers.physics.dimer import Dimer
 if TYPE_CHECKING:
     from walkers.inputs.bodies import Walkers
     from walkers.inputs.case import Case
-    from walkers.physics.bridge import BridgeLaw
-    from walkers.physics.liquid import BridgeLiquid
+    from walkers.physics.bridge import BridgeLaw, Surfaces
 
 
 def dimer_of(case: Case) -> Dimer:
@@ -25,8 +23,7 @@ def dimer_of(case: Case) -> Dimer:
     return Dimer((radii[0], radii[1]), case.beads.density, case.liquid.surface_tension)
 
 
-@dataclass(frozen=True)
-class ContactLoads:
+class ContactLoads(NamedTuple):
     """Forces and overlaps at the contacts of a walker at rest: its beads on the floor, then its pairs of beads.
 
     ``capillary`` in N, ``bridge_volumes`` in m³, ``rupture`` and ``overlaps`` in m, each in that order.
@@ -48,19 +45,19 @@ class BridgeAtRest(NamedTuple):
 
 def bridge_at_rest(case: Case, radius: float, other_radius: float) -> BridgeAtRest:
     """The bridge of a bead to another, or to a plane (a radius of infinity), by the case's law; radii in m."""
-    separation = case.contact.minimum_separation_ratio
-    return _at_rest(case.law, case.liquid.of_bridges, separation, radius, other_radius)
+    return _at_rest(case.law, _surfaces(case, radius, other_radius))
+
+
+def _surfaces(case: Case, radius: float, other_radius: float) -> Surfaces:
+    from walkers.physics.bridge import Surfaces
+
+    return Surfaces.of(radius, other_radius, case.liquid.of_bridges, case.contact.minimum_separation_ratio)
 
 
 @lru_cache(maxsize=1024)  # points of a sweep have the same few bridges
-def _at_rest(
-    law: BridgeLaw, liquid: BridgeLiquid, separation: float, radius: float, other_radius: float
-) -> BridgeAtRest:
+def _at_rest(law: BridgeLaw, surfaces: Surfaces) -> BridgeAtRest:
     import numpy as np
 
-    from walkers.physics.bridge import Surfaces
-
-    surfaces = Surfaces.of(radius, other_radius, liquid, separation)
     curve = law(surfaces)
     touching = np.zeros(1)
     pull = curve.pull(touching) if curve.pull else curve.forces(touching).pull
@@ -71,10 +68,8 @@ def resistances_at_rest(case: Case, radius: float, other_radius: float) -> tuple
     """S (N s/m), C (N s) and Q (N m s) of that bridge, the smaller bead as body 1 (`walkers.physics.bridge`)."""
     import numpy as np
 
-    from walkers.physics.bridge import Surfaces
-
-    surfaces = Surfaces.of(radius, other_radius, case.liquid.of_bridges, case.contact.minimum_separation_ratio)
-    _, _, sliding, coupling, rolling = map(float, case.law(surfaces).forces(np.zeros(1)).columns()[0])
+    touching = case.law(_surfaces(case, radius, other_radius)).forces(np.zeros(1))
+    _, _, sliding, coupling, rolling = map(float, touching.columns()[0])
     return sliding, coupling, rolling
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
-from typing import Any, TypeVar, get_args, get_origin
+from typing import Any, TypeVar, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
@@ -15,7 +15,7 @@ from pydantic_core import ErrorDetails
 
 from walkers.errors import InputError, Problem, shown, suggestion, unusable
 from walkers.inputs.keys import MISSING, joined, parts_of, value_at
-from walkers.inputs.table import Table, example_of, keys_in
+from walkers.inputs.table import Table, example_of, keys_in, table_in
 from walkers.inputs.units import AUTO, WRITTEN
 
 File = TypeVar("File", bound=BaseModel)
@@ -123,7 +123,7 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
         if kind == "literal_error":
             message += suggestion(str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"])))
         elif kind in ("list_type", "tuple_type") and field:
-            message = f"expected tables [[{key}]]" if _table_in(field.annotation)[0] else f"expected a list{such}"
+            message = f"expected tables [[{key}]]" if table_in(field.annotation) else f"expected a list{such}"
         elif kind in ("model_type", "dict_type") and str(context.get("class_name", "")).startswith("Sourced"):
             message = 'expected { value = ..., source = "..." }'
         if field and AUTO in field.metadata and kind != "value_error":
@@ -138,7 +138,7 @@ def _elsewhere(parts: Sequence[str | int]) -> str:
 
 def _in_a_table(parts: Sequence[str | int], field: FieldInfo | None) -> str:
     """How a table begins; empty for other keys."""
-    table = _table_in(field.annotation)[0] if field else None
+    table = table_in(field.annotation) if field else None
     texts = {name: example_of(one).partition("such as ")[2] for name, one in keys_in(table).items()} if table else {}
     such = next((f", such as {name} = {text}" for name, text in texts.items() if text), "")
     return f"a table [{joined(parts)}]{such}" if table else ""
@@ -147,26 +147,19 @@ def _in_a_table(parts: Sequence[str | int], field: FieldInfo | None) -> str:
 def _field_at(file: type[BaseModel], parts: Sequence[str | int]) -> FieldInfo | None:
     """The field of a key of a file; None if it has none."""
     model: type[BaseModel] | None = file
-    field = None
-    named = ""
+    field, named = None, False
     for part in (part for part in parts if isinstance(part, str)):
         if named:  # a name of the user's
-            named = ""
+            named = False
             continue
         field = keys_in(model).get(part) if model else None
-        model, named = _table_in(field.annotation) if field else (None, "")
+        model, named = (table_in(field.annotation), _by_names(field)) if field else (None, False)
     return field
 
 
-def _table_in(annotation: Any) -> tuple[type[BaseModel] | None, str]:
-    """The model that a field holds, alone or in a list, or by names of the user's (then with ``.*``), or None."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation, ""
-    for inner in get_args(annotation):
-        table, named = _table_in(inner)
-        if table is not None:
-            return table, ".*" if get_origin(annotation) is dict else named
-    return None, ""
+def _by_names(field: FieldInfo) -> bool:
+    """Whether a key holds tables by names of the user's."""
+    return get_origin(field.annotation) is dict and table_in(field.annotation) is not None
 
 
 @cache
@@ -174,7 +167,7 @@ def keys_of(file: type[BaseModel]) -> Mapping[str, type[BaseModel] | None]:
     """All dotted keys of a kind of file; those of tables with the table's model."""
     keys: dict[str, type[BaseModel] | None] = {"": file}
     for name, field in keys_in(file).items():
-        table, named = _table_in(field.annotation)
+        table, named = table_in(field.annotation), ".*" if _by_names(field) else ""
         keys[name] = None if named else table
         below = keys_of(table) if table else {}
         keys |= {f"{name}{named}.{key}".rstrip("."): one for key, one in below.items()}

@@ -25,29 +25,22 @@ INFLUENCE = "0.2 to 9 %"
 
 
 @cache
-def measured() -> Mapping[str, Mapping[str, float]]:
-    """By the names of cases the ``velocity``, and its change at ``half_step`` and with ``stiffer`` beads, m/s."""
+def measured() -> Mapping[str, Mapping[str, Any]]:
+    """By names of cases the ``velocity``, its change at ``half_step`` and with ``stiffer`` beads, m/s; and a digest."""
+    table = tomllib.loads(resources.files("walkers.inputs").joinpath(TABLE).read_text("utf-8"))
     keys = ("velocity", "half_step", "stiffer")
-    return {name: {key: 1e-3 * of_case[key] for key in keys} for name, of_case in _table().items()}
-
-
-@cache
-def _table() -> Mapping[str, Mapping[str, Any]]:
-    return tomllib.loads(resources.files("walkers.inputs").joinpath(TABLE).read_text("utf-8"))
+    return {name: one | {key: 1e-3 * one[key] for key in keys} for name, one in table.items()}
 
 
 def numerical_error(case: Case) -> dict[str, float] | None:
     """The numerical error of the velocity of a case, m/s; None unless it is that of a shipped case that was measured.
 
-    Returns
-    -------
-    dict
-        ``half_step`` and ``stiffer``, the changes of the velocity; ``total``, the root of the sum of their squares.
+    ``half_step`` and ``stiffer`` are the changes of the velocity, ``total`` is the root of the sum of their squares.
     """
     asked = digest(case)
-    for name, of_case in _table().items():
-        if asked == of_case["case"]:
-            half_step, stiffer = (measured()[name][key] for key in ("half_step", "stiffer"))
+    for one in measured().values():
+        if asked == one["case"]:
+            half_step, stiffer = one["half_step"], one["stiffer"]
             return {"half_step": half_step, "stiffer": stiffer, "total": (half_step**2 + stiffer**2) ** 0.5}
     return None
 

@@ -16,15 +16,11 @@ Whence = Literal["given", "library", "own library", "calibrated", "assumed", "de
 
 
 class Source(NamedTuple):
-    """Where a value is from that a file does not give.
-
-    ``origin`` as in `Origin`; ``why``: the library's source, or what it is derived from; ``text``: the value as a case
-    file would say it, empty for its number in the unit of its key; ``range`` and ``logarithmic`` as in `Origin`.
-    """
+    """Where a value is from that a file does not give, as in `Origin`."""
 
     origin: Whence
-    why: str = ""
-    text: str = ""
+    why: str = ""  # the `Origin.source`
+    text: str = ""  # empty: the value is a number, in the unit of its key
     range: tuple[Any, Any] | None = None
     logarithmic: bool = False
 
@@ -33,31 +29,18 @@ class Source(NamedTuple):
 class Origin:
     """Origin of a value of a case.
 
-    Attributes
-    ----------
-    key, text
-        Dotted, such as ``contact.friction.bead_wall``, and the value as a case file would say it, with its unit.
-    origin, source
-        ``given`` by the case (or beside it), from the ``library`` of the program or the user's ``own library``,
-        ``calibrated``, ``assumed`` (fixed in the calibration), the ``default``, or ``derived`` from other values; the
-        library's source (after its file), or from what it is derived.
-    range, logarithmic
-        Both ends between which an unmeasured or ``uncertain`` value may lie, as a case would write them, and whether
-        the range is of magnitudes.
-    uncertain
-        Whether the case calls it so.
-    value
-        In SI units; as text if the case says it in words, such as ``auto``.
+    It is ``given`` by the case (or beside it), from the ``library`` of the program or the user's ``own library``,
+    ``calibrated``, ``assumed`` (fixed in the calibration), the ``default``, or ``derived`` from other values.
     """
 
-    key: str
-    text: str
+    key: str  # dotted, such as ``contact.friction.bead_wall``
+    text: str  # the value as a case file would say it, with its unit
     origin: Whence
-    source: str = ""
-    range: tuple[Any, Any] | None = None
-    logarithmic: bool = False
-    uncertain: bool = False
-    value: Any = field(default=None, compare=False)
+    source: str = ""  # the library's (after its file), or from what the value is derived
+    range: tuple[Any, Any] | None = None  # ends between which an unmeasured or uncertain value may lie, as in a case
+    logarithmic: bool = False  # whether the range is of magnitudes
+    uncertain: bool = False  # whether the case calls it so
+    value: Any = field(default=None, compare=False)  # SI; as text if the case says it in words, such as ``auto``
 
     @property
     def guessed(self) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from math import atan2, dist, inf
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from walkers.errors import Problem, expected_of, shown, unusable
 from walkers.inputs.bodies import ARRANGEMENTS, MOST_BEADS, Cluster, Walkers, touching
@@ -50,16 +50,11 @@ SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_OF_SURFACES)
 # --- from the library -------------------------------------------------------------------------------------------------
 
 
-class Supplied(NamedTuple):
-    """The tables of a case with what the library gives, the sources of that, and names that it does not know."""
+def supplied(document: Mapping[str, Any], library: Library) -> tuple[dict[str, Any], dict[str, Source], list[Problem]]:
+    """The tables of a case with what they leave out and the library has of the materials and the liquid they name.
 
-    tables: dict[str, Any]
-    sources: dict[str, Source]
-    problems: list[Problem]
-
-
-def supplied(document: Mapping[str, Any], library: Library) -> Supplied:
-    """The tables of a case with what they leave out and the library has of the materials and the liquid they name."""
+    Also the sources of these values, and names that the library does not know.
+    """
     said = {key: value_at(document, parts_of(key)) for key in (*SUPPLIED, "liquid.law")}
     given = {key for key, value in said.items() if value is not MISSING}
     named = (value_at(document, parts_of(key)) for key in NAMES)
@@ -77,7 +72,7 @@ def supplied(document: Mapping[str, Any], library: Library) -> Supplied:
         if key in values and not (key in given or instead) and isinstance(tables.get(key.split(".")[0]), Mapping):
             tables = _with(tables, parts_of(key), values[key].written)
             sources[key] = _source_of(key, values[key], calibrated)
-    return Supplied(tables, sources, problems)
+    return tables, sources, problems
 
 
 def _with(table: Any, parts: Sequence[str | int], value: Any) -> Any:
@@ -99,7 +94,7 @@ def _unknown(
         ("liquid.name", liquid, "liquids", any(given.issuperset(keys) for keys in _LIQUIDS)),
         ("boundary.material", wall, "materials", described),
     ):
-        if name is not None and not says_all and not library.has(kind, name):
+        if name is not None and not says_all and name not in library.names(kind):
             message = "not in the library, nor in a library.toml beside the case"
             expected = f"{message}; {expected_of(name, library.names(kind))}"
             problems.append(Problem(key, shown(name), expected))
@@ -134,9 +129,9 @@ def _values(
 ) -> dict[str, Known]:
     """What is usual, and what the library has of materials and a liquid, by the keys of a case."""
     on_bead, on_wall = library.surface_pair(bead, bead), library.surface_pair(bead, wall)
-    of_liquid = library.liquid(liquid, mixture) if liquid and library.has("liquids", liquid) else {}
+    of_liquid = library.numbers("liquids", liquid or "", mixture)
     values = {
-        "beads.density": library.material(bead)["density"] if bead and library.has("materials", bead) else None,
+        "beads.density": library.numbers("materials", bead or "").get("density"),
         "contact.friction.bead_bead": on_bead.get("friction"),
         "contact.friction.bead_wall": on_wall.get("friction"),
         **{key: on_wall.get(key.split(".")[1]) for key in _OF_SURFACES},
@@ -173,20 +168,15 @@ def _radii(case: Case) -> Case:
         shares = (1.0 + dimers.sin_delta, 1.0 - dimers.sin_delta)
         radii = tuple(float(f"{dimers.mean_radius * share:.15g}") for share in shares)
         case = case.filled("dimers.radii", radii, "from mean_radius and sin_delta")
-    for key, one in case.walkers_by_key.items():
-        if (diameters := getattr(one, "diameters", None)) is not None:
-            case = case.filled(f"{key}.radii", _halves(diameters), "from the diameters")
-    for name in ("small", "large") if case.mixture else ():
-        if (diameters := getattr(case.mixture, f"{name}_diameters")) is not None:
-            case = case.filled(f"mixture.{name}", _halves(diameters), "from the diameters")
+    given = {f"{key}.radii": getattr(one, "diameters", None) for key, one in case.walkers_by_key.items()}
+    given |= {f"mixture.{name}": getattr(case.mixture, f"{name}_diameters", None) for name in ("small", "large")}
+    for key, diameters in given.items():
+        if diameters is not None:
+            case = case.filled(key, tuple(diameter / 2.0 for diameter in diameters), "from the diameters")
     if any(bead.radius is None for bead in case.placed):
         beads = (bead if bead.diameter is None else bead.but(radius=bead.diameter / 2.0) for bead in case.placed)
         case = case.but(placed=tuple(beads))
     return case
-
-
-def _halves(diameters: Sequence[float]) -> tuple[float, ...]:
-    return tuple(diameter / 2.0 for diameter in diameters)
 
 
 def _viscosity(case: Case) -> Case:
@@ -274,7 +264,8 @@ def _drive(case: Case) -> Case:
     several = {f"drive.harmonics[{number}]": one for number, one in enumerate(case.drive.harmonics)}
     for key, one in (several or {"drive": case.drive}).items():
         if one.axis is None:
-            case = case.filled(f"{key}.axis", boundary.drive_axis, f"of a {boundary.shape}", "default")
+            axis = "z" if boundary.closed else "x"
+            case = case.filled(f"{key}.axis", axis, f"of a {boundary.shape}", "default")
         if one.gamma0 is not None:
             if not case.walkers or len(case.walkers[0].radii) != 2:
                 raise unusable(f"{key}.gamma0", "expected peak_acceleration: only a dimer has a Γ0")

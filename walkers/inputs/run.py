@@ -9,8 +9,9 @@ from pydantic import Field
 
 from walkers.errors import unusable
 from walkers.inputs import units
+from walkers.inputs.bodies import beside
 from walkers.inputs.origins import Source
-from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Table, key
+from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, key
 from walkers.inputs.units import AUTO, Duration, Number, Whole
 from walkers.physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
 from walkers.rounding import percent
@@ -61,32 +62,24 @@ class Run(Table):
     time_step: Annotated[Filled[units.Time], AUTO] = key(
         "Time step, or its upper limit: the program fits a whole number of samples into a cycle.", None
     )
-    allow_unstable: units.Flag = key("Accept a time step beyond a stability limit.", False, None, SAME_RUN)
+    allow_unstable: Annotated[units.Flag, SAME_RUN] = key("Accept a time step beyond a stability limit.", False)
     cycles: Annotated[Filled[_Cycles], AUTO] = key(
         "Number of drive cycles. `auto`: until the walkers are steady. See [](../cases.md#length-of-a-run).", None, 60
     )
-    most_cycles: Filled[_Cycles] = key('Upper limit for `cycles = "auto"`. Default: 60.', None, 60, SAME_RUN)
-    duration: Filled[Duration] = key(
-        "Duration of the drive, instead of `cycles`. Loose beads need it.", None, None, SAME_RUN
-    )
+    most_cycles: Indirect[_Cycles] = key('Upper limit for `cycles = "auto"`. Default: 60.', None, 60)
+    duration: Indirect[Duration] = key("Duration of the drive, instead of `cycles`. Loose beads need it.", None)
     settling_cycles: Filled[Whole] = key(
         "Cycles at the start that no mean contains. Default: a third, at most 20.", None, 20, ge=0, le=1_000_000
     )
     samples_per_cycle: Filled[_Samples] = key("Samples of the beads per cycle. Default: 20.", None, 20)
-    bridge_samples_per_cycle: Filled[_Samples] = key(
-        "Samples of the bridges per cycle, a divisor of `samples_per_cycle`. Default: 1; loose beads: all.",
-        None,
-        1,
-        SAME_RUN,
+    bridge_samples_per_cycle: Indirect[_Samples] = key(
+        "Samples of the bridges per cycle, a divisor of `samples_per_cycle`. Default: 1; loose beads: all.", None, 1
     )
-    frames_per_second: Filled[Number] = key(
-        "Samples per second, instead of per cycle. Default for loose beads: 60.", None, 60, SAME_RUN, gt=0, le=1e6
+    frames_per_second: Indirect[Number] = key(
+        "Samples per second, instead of per cycle. Default for loose beads: 60.", None, 60, gt=0, le=1e6
     )
-    segment: Filled[Duration] = key(
-        "Length of a segment; a run can continue after the last whole one. Default for loose beads: 0.5 s.",
-        None,
-        None,
-        SAME_RUN,
+    segment: Indirect[Duration] = key(
+        "Length of a segment; a run can continue after the last whole one. Default for loose beads: 0.5 s.", None
     )
     settled_below: Filled[units.Speed] = key(
         "Root mean square velocity of a settled pile. Default for loose beads: 5 mm/s.", None
@@ -131,10 +124,9 @@ class Run(Table):
     @property
     def continuation(self) -> str:
         """What `walkers run` does after the cycles tried first; empty for a fixed number of cycles."""
-        further = (
-            f"walkers run continues to {self.cycles} if the velocities are not constant within {percent(CONSTANT)}"
-        )
-        return f"{further}: then set cycles to {self.cycles}" if len(self.attempts) > 1 else ""
+        constant, most = f"the velocities are not constant within {percent(CONSTANT)}", self.cycles
+        further = f"walkers run continues to {most} if {constant}: then set cycles to {most}"
+        return further if len(self.attempts) > 1 else ""
 
     def steps_until(self, cycles: int) -> int:
         """Steps of the attempts up to the one for so many cycles."""
@@ -160,9 +152,11 @@ class Run(Table):
 
 def limits_of(case: Case) -> TimeStepLimits:
     """Limits of the time step for the bodies of a case."""
-    contact = case.contact
+    contact, placed = case.contact, [bead.radius for bead in case.placed]
+    bridged = [entry for body in case.bodies for entry in body.bridged]
+    bridged += beside(max(placed), min(placed)) if placed else []
     return time_step_limits(
-        [(*entry, case.boundary.damping(entry[0])) for body in case.bodies for entry in body.bridged],
+        [(*entry, case.boundary.damping(entry[0])) for entry in bridged],
         density=case.beads.density,
         youngs_modulus=contact.youngs_modulus,
         poissons_ratio=contact.poissons_ratio,

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import islice
 from math import atan2, cos, dist, inf, pi, sin
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from walkers.errors import unusable
-from walkers.inputs.bodies import Body, Mixture, PlacedBeads, Walkers
+from walkers.inputs.bodies import Mixture, Walkers
 from walkers.inputs.boundary import LOOSE, Boundary
 from walkers.inputs.loads import contact_loads
 
@@ -21,8 +20,7 @@ OVERLAP = 0.01
 """Radii by which beads that are given places may overlap with each other and the walls."""
 
 
-@dataclass(frozen=True)
-class StandingBead:
+class StandingBead(NamedTuple):
     """Centre (m) and radius (m) of a bead at the start."""
 
     x: float
@@ -31,8 +29,7 @@ class StandingBead:
     radius: float
 
 
-@dataclass(frozen=True)
-class Standing:
+class Standing(NamedTuple):
     """Beads that start together; positions relative to the walker's place (chosen by the deck) or to the boundary.
 
     ``facing`` is +1 along the drive axis or −1, and ``angle`` that to it (rad); 0 and 0 of what is no walker.
@@ -55,10 +52,10 @@ def standing(case: Case) -> Iterator[tuple[int, Standing]]:
             for one in _walkers(case, body, first):
                 yield number, one
             first += body.replicates
-        elif isinstance(body, Mixture):
-            yield number, _poured(case, body)
         else:
-            yield number, Standing(tuple(StandingBead(*bead.at, bead.radius) for bead in body.beads))
+            yield number, _poured(case, body)
+    if case.placed:
+        yield len(case.bodies), Standing(tuple(StandingBead(*bead.at, bead.radius) for bead in case.placed))
 
 
 def _walkers(case: Case, walkers: Walkers, first: int) -> Iterator[Standing]:
@@ -75,14 +72,11 @@ def _walkers(case: Case, walkers: Walkers, first: int) -> Iterator[Standing]:
         angle, factor = walkers.angle + walkers.angle_spread * turn, 1.0 + walkers.gap_spread * press
         overlaps = [(overlap if walkers.gap is None else -walkers.gap) * factor for overlap in resting]
         heading = atan2(y, x) + angle + (0.0 if facing > 0 else pi)
-        of_beads = overlaps[: len(walkers.radii)]  # the first are those with the floor
-        heights = [
-            case.boundary.rest_height(radius - overlap) for radius, overlap in zip(walkers.radii, of_beads, strict=True)
-        ]
+        pressed = zip(walkers.radii, overlaps, strict=False)  # the first overlaps are those with the floor
+        heights = [case.boundary.rest_height(radius - overlap) for radius, overlap in pressed]
+        ahead, left = cos(heading), sin(heading)
         beads = [
-            StandingBead(
-                along * cos(heading) - aside * sin(heading), along * sin(heading) + aside * cos(heading), *rest
-            )
+            StandingBead(along * ahead - aside * left, along * left + aside * ahead, *rest)
             for (along, aside), *rest in zip(walkers.places(heights, overlaps), heights, walkers.radii, strict=True)
         ]
         yield Standing(tuple(beads), facing, angle, walks=True)
@@ -102,8 +96,7 @@ def _poured(case: Case, mixture: Mixture) -> Standing:
 
     largest, draw = max(mixture.radii), default_rng(case.run.seed)
     layer = case.boundary.layer(largest)
-    floor = tops_of_others(case, mixture)
-    beads = []
+    floor, beads = _top_of_others(case), []
     for number, radius in enumerate(float(one) for one in draw.permutation(mixture.all_radii)):
         level, place = divmod(number, len(layer.places))
         x, y = layer.places[place]
@@ -113,11 +106,10 @@ def _poured(case: Case, mixture: Mixture) -> Standing:
     return Standing(tuple(beads))
 
 
-def tops_of_others(case: Case, body: Body) -> float:
-    """Largest height of the other bodies at the start, m."""
-    walkers = [2.0 * max(one.radii) for one in case.walkers if one is not body]
-    placed = () if isinstance(body, PlacedBeads) else case.placed
-    return max([*walkers, *(bead.at[2] + bead.radius for bead in placed)], default=0.0)
+def _top_of_others(case: Case) -> float:
+    """Largest height at the start of the bodies beside a mixture, m."""
+    walkers = [2.0 * max(one.radii) for one in case.walkers]
+    return max([*walkers, *(bead.at[2] + bead.radius for bead in case.placed)], default=0.0)
 
 
 def check_bodies(case: Case) -> Case:
@@ -130,7 +122,7 @@ def check_bodies(case: Case) -> Case:
     if case.liquid.conserved and (case.walkers or not boundary.closed):
         raise unusable("liquid.conserved", "expected false: only loose beads in a container share their liquid")
     if mixture is not None:
-        _check_pour(mixture, boundary, tops_of_others(case, mixture))
+        _check_pour(mixture, boundary, _top_of_others(case))
     if case.placed or case.meets or (case.walkers and not boundary.bare):
         _check_places(case)
     return case
@@ -150,8 +142,7 @@ def _check_pour(mixture: Mixture, boundary: Boundary, floor: float) -> None:
         raise unusable("boundary.height", f"too low for {mixture.count} beads; expected {needed} or more")
 
 
-@dataclass(frozen=True)
-class _Held:
+class _Held(NamedTuple):
     """A bead at its start, the key that is to blame for it, and the number of its walker, -1 of a placed bead."""
 
     key: str
@@ -162,15 +153,11 @@ class _Held:
 
 def _check_places(case: Case) -> None:
     """Walkers and beads that are placed: between the walls, and not within each other."""
-    beads = [*_standing_walkers(case), *_placed(case)]
+    placed = (_Held(f"placed[{number}]", bead.at, bead.radius) for number, bead in enumerate(case.placed))
+    beads = [*_standing_walkers(case), *placed]
     _check_walls(case, beads)
     if case.placed or case.meets:
         _check_overlaps(beads)
-
-
-def _placed(case: Case) -> Iterator[_Held]:
-    for number, bead in enumerate(case.placed):
-        yield _Held(f"placed[{number}]", bead.at, bead.radius)
 
 
 def _standing_walkers(case: Case) -> list[_Held]:
@@ -196,9 +183,8 @@ def _check_walls(case: Case, beads: list[_Held]) -> None:
     if boundary.width is not None and boundary.width < 2.0 * (1.0 - OVERLAP) * largest:
         raise unusable("boundary.width", f"expected more than a bead's diameter, {2e3 * largest:.4g} mm")
     clearances = boundary.side_clearance(np.array([bead.place for bead in beads]))
-    beside = [clear < (1.0 - OVERLAP) * bead.radius for bead, clear in zip(beads, clearances, strict=True)]
-    for bead, out in zip(beads, beside, strict=True):
-        too_high = bead.place[2] + bead.radius > top
+    for bead, clearance in zip(beads, clearances, strict=True):
+        out, too_high = clearance < (1.0 - OVERLAP) * bead.radius, bead.place[2] + bead.radius > top
         if bead.walker >= 0 and out:
             most = _most_walkers(case)
             message = f"the walkers do not fit between the walls of the {boundary.shape}; expected {most}"

@@ -23,19 +23,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from walkers.errors import InputError, Problem, each, refused, shortened, unusable
-from walkers.inputs.axes import (
-    MOST_POINTS,
-    Axis,
-    combinations,
-    is_axis,
-    listed,
-    number_of,
-    one_at_a_time,
-    sampled,
-    unit_of,
-    written,
-    zipped,
-)
+from walkers.inputs.axes import MOST_POINTS, Axis, combinations, crossed, descending, one_at_a_time, sampled, zipped
 from walkers.inputs.case import Case
 from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
@@ -67,16 +55,9 @@ class DescendTable(Table):
     step: Any = Field(examples=["0.1 g"])
     until_below: Speed = Field(examples=["0.02 mm/s"])
 
-    def values(self) -> list[Value]:
+    def axis(self) -> Axis:
         """From the start down."""
-        given = {"descend.from": self.start, "descend.to": self.to, "descend.step": self.step}
-        start, to, step = (number_of(name, value) for name, value in given.items())
-        unit = unit_of(self.key, list(given.values()))
-        if not (start >= to and step > 0 and start - to < MOST_POINTS * step):
-            message = "`from` must not be below `to`, and `step` must be positive"
-            raise unusable("descend", message, f"{self.start} to {self.to}")
-        number = int((start - to) / step + 1e-9) + 1
-        return [written(start - step * count, unit) for count in range(number)]
+        return descending(self.key, {"descend.from": self.start, "descend.to": self.to, "descend.step": self.step})
 
 
 class SweepFile(Table):
@@ -93,11 +74,10 @@ class SweepFile(Table):
 
     def all_axes(self) -> list[Axis]:
         """In the order in which they run, the last one fastest: that of a descent."""
-        axes = [listed(key, given) for key, given in flatten(self.axes, is_axis).items()]
-        axes += [zipped(table) for table in self.zip]
+        axes = [*crossed(self.axes), *(zipped(table) for table in self.zip)]
         axes += [one_at_a_time(self.one_at_a_time)] if self.one_at_a_time else []
         axes += [sampled(table.method, table.points, table.seed, table.ranges) for table in self.sample]
-        return axes + ([Axis.of({self.descend.key: self.descend.values()})] if self.descend else [])
+        return axes + ([self.descend.axis()] if self.descend else [])
 
 
 @dataclass(frozen=True)
@@ -118,34 +98,18 @@ class Descent:
 
 @dataclass(frozen=True, repr=False)
 class Sweep:
-    """A base case and its variations.
+    """A base case and its variations."""
 
-    Attributes
-    ----------
-    name, title, source
-        Of the sweep (its file's); for people; what messages call the file.
-    case_name, document
-        Of the base case; the runs' directories begin with its name. Its tables have those of ``[set]``.
-    keys, units
-        What varies, and the unit of each, None where it has none.
-    rows
-        The points: one value a key.
-    descent
-        How the points depend on each other, if they do.
-    file
-        Tables of the sweep file, if it is from one.
-    """
-
-    name: str
+    name: str  # of its file
     title: str
-    source: str
-    case_name: str
-    document: Mapping[str, Any]
-    keys: tuple[str, ...]
-    units: tuple[str | None, ...]
-    rows: Sequence[tuple[Value, ...]]
-    descent: Descent | None
-    file: Mapping[str, Any] = field(default_factory=dict)
+    source: str  # the file, as messages call it
+    case_name: str  # of the base case, with which the runs' directories begin
+    document: Mapping[str, Any]  # tables of the base case, changed by ``[set]``
+    keys: tuple[str, ...]  # that vary
+    units: tuple[str | None, ...]  # of each key; None if it has none
+    rows: Sequence[tuple[Value, ...]]  # the points: one value a key
+    descent: Descent | None  # how the points depend on each other, if they do
+    file: Mapping[str, Any] = field(default_factory=dict)  # tables of the sweep file
 
     def __repr__(self) -> str:
         varied = ", ".join(self.keys) or "nothing"
@@ -215,9 +179,7 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
         with blaming(source):
             axes, settings = file.all_axes(), settings_in(file.set)
             keys, rows = combinations(axes)
-            units = [
-                unit_of(axis.keys[at], [row[at] for row in axis.rows]) for axis in axes for at in range(len(axis.keys))
-            ]
+            units = tuple(unit for axis in axes for unit in axis.units)
             for key in keys:
                 if key == "title":
                     raise unusable(key, f"expected another key, for {key} does not determine a run")
@@ -237,7 +199,7 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
         case_name=base.stem,
         document=tables,
         keys=keys,
-        units=tuple(units),
+        units=units,
         rows=rows,
         descent=Descent(descend.key, len(axes[-1].rows), descend.until_below) if descend else None,
         file=document,

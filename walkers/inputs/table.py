@@ -7,7 +7,7 @@ with other values (`Table.but`, `Table.put`).
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args, get_origin
 
@@ -35,32 +35,19 @@ def _only_derived(value: object, info: ValidationInfo) -> object:
 _DERIVED = BeforeValidator(_only_derived)
 if TYPE_CHECKING:
     Filled = Annotated[T, "filled"]
-    """A key that a file may leave out: None until it is filled in."""
-    Derived = Annotated[T, "derived"]
-    """A field that follows from others, which no file has."""
+    Indirect = Annotated[T, "indirect"]
 else:
-
-    class Filled:
-        """A key that a file may leave out: None until it is filled in."""
-
-        def __class_getitem__(cls, kind: Any) -> Any:
-            return kind | None
-
-    class Derived:
-        """A field that follows from others, which no file has."""
-
-        def __class_getitem__(cls, kind: Any) -> Any:
-            return Annotated[kind, _DERIVED, SkipJsonSchema()]
+    Filled = T | None
+    """A key that a file may leave out: None until it is filled in."""
+    Indirect = Annotated[T | None, SAME_RUN]
+    """A key that acts through others: None unless it is given, and no determinant of the run."""
+Derived = Annotated[T, _DERIVED, SkipJsonSchema()]
+"""A field that follows from others, which no file has."""
 
 
-def key(meaning: str, default: Any = PydanticUndefined, example: Any = None, *notes: Any, **bounds: Any) -> Any:
-    """A key of a table: its meaning, default (required without one), an example as a file has it, notes and bounds.
-
-    Notes, such as `SAME_RUN`, are as in ``Annotated``.
-    """
-    field = Field(default, description=meaning, examples=None if example is None else [example], **bounds)
-    field.metadata.extend(notes)
-    return field
+def key(meaning: str, default: Any = PydanticUndefined, example: Any = None, **bounds: Any) -> Any:
+    """A key of a table: its meaning, default (required without one), an example as a file has it, and bounds."""
+    return Field(default, description=meaning, examples=None if example is None else [example], **bounds)
 
 
 class Choice(NamedTuple):
@@ -192,7 +179,7 @@ def _tables_in(model: type[Table]) -> Mapping[str, type[Table]]:
 
 
 def table_in(annotation: Any) -> type[Table] | None:
-    """The table that a field holds, alone or in a tuple."""
+    """The table that a field holds, alone, in a tuple or by names."""
     if isinstance(annotation, type) and issubclass(annotation, Table):
         return annotation
     return next((table for one in get_args(annotation) if (table := table_in(one))), None)
@@ -221,30 +208,29 @@ def contradictions(model: type[Table], document: Any, place: str = "") -> Iterat
 
 def alternatives(model: type[Table], name: str) -> set[str]:
     """Dotted keys that say in other words what a key says."""
-    *path, last = [part for part in parts_of(name) if isinstance(part, str)]
-    for part in path:
-        model = table_in(keys_in(model)[part].annotation) or model
+    *path, last = parts_of(name)
+    for part in (part for part in path if isinstance(part, str)):
+        field = keys_in(model).get(part)
+        if (table := table_in(field.annotation) if field else None) is None:
+            return set()
+        model = table
     ways = [way for choice in model.choices if any(last in way for way in choice.ways) for way in choice.ways]
-    return {joined([*parts_of(name)[:-1], other]) for way in ways if last not in way for other in way}
+    return {joined([*path, other]) for way in ways if last not in way for other in way}
 
 
 def changed(model: type[Table], document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """A document with other values at dotted keys (``dimers.radii[0]`` for one of a list).
 
-    What a new value says in other words (`Table.choices`) goes, unless it changes too.
-
-    Raises
-    ------
-    InputError
-        If there is no such place in a list.
+    What a new value says in other words (`Table.choices`) goes, unless it changes too. Raises `InputError` if a list
+    has no such place.
     """
     tables = copy.deepcopy(dict(document))
     for name, value in changes.items():
-        _put(model, tables, name, value, changes)
+        _put(tables, name, value, alternatives(model, name) - changes.keys())
     return tables
 
 
-def _put(model: type[Table] | None, tables: dict[str, Any], name: str, value: Any, changes: Mapping[str, Any]) -> None:
+def _put(tables: dict[str, Any], name: str, value: Any, instead_of: Collection[str]) -> None:
     place: Any = tables
     parts = parts_of(name)
     for number, part in enumerate(parts):
@@ -260,12 +246,6 @@ def _put(model: type[Table] | None, tables: dict[str, Any], name: str, value: An
             return
         if number + 1 < len(parts):
             place = place[part] if isinstance(part, int) else place.setdefault(part, {})
-            field = keys_in(model).get(part) if model and isinstance(part, str) else None
-            model = table_in(field.annotation) if field else model if isinstance(part, int) else None
-    last = parts[-1]
-    for ways, *_ in model.choices if model else ():
-        if any(last in way for way in ways):
-            for other in {one for way in ways if last not in way for one in way}:
-                if joined([*parts[:-1], other]) not in changes:
-                    place.pop(other, None)
-    place[last] = value
+    for other in instead_of:
+        place.pop(parts_of(other)[-1], None)
+    place[parts[-1]] = value

@@ -91,30 +91,23 @@ class Kind:
 def parse_quantity(text: str, kind: Kind) -> float:
     """Read a quantity of a kind, such as ``"0.3 mm"``, as a number in SI units; ``g`` of an acceleration is 9.8 m/s².
 
-    Raises
-    ------
-    ValueError
-        If the text is no quantity, has no unit, or has the dimension of something else.
+    Raises `ValueError` if the text is no quantity, has no unit, or has the dimension of something else.
     """
     match = _NUMBER_AND_UNIT.fullmatch(text.strip())
     if match is None:
         raise ValueError(kind.expectation)
-    usual = (kind.unit, 1.0) if _has_zero(match["unit"], kind) else _USUAL.get(match["unit"])
-    unit, factor = usual or (kind.unit, _by_pint(match["unit"], kind))
+    symbol, zero = match["unit"], _ZEROS.get(match["unit"], 0.0)
+    of_temperature = kind.unit == TEMPERATURE.unit and symbol in _ZEROS
+    usual = (kind.unit, 1.0) if of_temperature else _USUAL.get(symbol)
+    unit, factor = usual or (kind.unit, _by_pint(symbol, kind))
     if unit != kind.unit:
         raise ValueError(kind.expectation)
     # Rounded: 4.0 g/cm³ is 4000 kg/m³, not 3999.9999999999995.
-    value = float(f"{float(match['number']) * factor + _ZEROS.get(match['unit'], 0.0):.15g}")
+    value = float(f"{float(match['number']) * factor + zero:.15g}")
     if value != 0.0 and not kind.smallest <= abs(value) <= kind.largest:
-        zero = _ZEROS.get(match["unit"], 0.0)
         low, high = (f"{float(f'{(bound - zero) / factor:.4g}'):g}" for bound in (kind.smallest, kind.largest))
-        raise ValueError(f"{kind.expectation}; it must lie between {low} and {high} {match['unit']}")
+        raise ValueError(f"{kind.expectation}; it must lie between {low} and {high} {symbol}")
     return value
-
-
-def _has_zero(symbol: str, kind: Kind) -> bool:
-    """Whether the unit is a temperature with an offset."""
-    return kind.unit == TEMPERATURE.unit and symbol in _ZEROS
 
 
 @cache

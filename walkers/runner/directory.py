@@ -241,7 +241,7 @@ def write_segment_record(
     directory: Path, segment: Segment, report: EngineReport, rms_velocity: float | None = None
 ) -> dict[str, Any]:
     """Write the steps and the cost of a segment into its directory, and return this record."""
-    record = {**vars(segment), **vars(report), "root_mean_square_velocity": rms_velocity}
+    record = {**segment._asdict(), **vars(report), "root_mean_square_velocity": rms_velocity}
     write_json(directory / SEGMENT_NAME, record, at_once=False)
     return record
 

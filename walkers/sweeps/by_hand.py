@@ -277,7 +277,7 @@ def _write(
     (folder / MANIFEST_NAME).unlink(missing_ok=True)
     write_json(folder / CASE_NAME, case.as_dict(), at_once=False)
     write_json(folder / LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
-    of_segment = {**vars(segment), "root_mean_square_velocity": None, **vars(report), "by_hand": notes}
+    of_segment = {**segment._asdict(), "root_mean_square_velocity": None, **vars(report), "by_hand": notes}
     write_json(folder / SEGMENT_NAME, of_segment, at_once=False)
     wanted = before.run
     # Cycles that were enough for the finished run of a case may be too few for an edited deck.

@@ -64,10 +64,7 @@ class Table:
 def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) -> Table:
     """Tabulate a law as finely as the tolerance of the interpolated forces requires.
 
-    Raises
-    ------
-    UnusableLawError
-        If the curve is unusable (`walkers.physics.bridge.columns_at`), or no table is fine enough.
+    Raises `UnusableLawError` if the curve is unusable (`walkers.physics.bridge.columns_at`), or no table is fine.
     """
     curve = law(surfaces)
     scale = curve.scale or surfaces.closest
@@ -109,19 +106,8 @@ def bridge_tables(
 ) -> str:
     """The bridge tables of a deck: one for every two surfaces that may meet (beads of different types never meet).
 
-    Parameters
-    ----------
-    surfaces
-        Contact and liquid of each atom type; the type of the walls comes last.
-    sizes
-        Atom type and radius (m) of the beads; their atom types are their surfaces.
-    law
-        Law of all bridges; default: that of each liquid.
-
-    Raises
-    ------
-    UnusableLawError
-        As for `tabulated`.
+    The surfaces have the contact and the liquid of each atom type of beads, the sizes atom type and radius (m) of the
+    beads; the default law is that of each liquid. Raises `UnusableLawError` as `tabulated`.
     """
     parts = ["# Gap (m), pull (N), resistances: normal, sliding (N s/m), coupling (N s), rolling (N m s).\n"]
     for kind, (contact, liquid) in enumerate(surfaces, 1):

@@ -4,38 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from itertools import product
 from math import ceil, inf, pi, prod, sqrt
+from typing import Any, NamedTuple
 
 from walkers.errors import InputError, Problem
 from walkers.inputs.case import Case, Contact
 from walkers.inputs.drive import Vector
 from walkers.inputs.loads import bridge_at_rest, hop_height, reach
 from walkers.inputs.run import limits_of
-from walkers.templates.layout import (
-    BEAD_COLUMNS,
-    FILM_COLUMN,
-    MEAN_SPIN_COLUMNS,
-    PAIR_BRIDGE_COLUMNS,
-    PAIR_BRIDGES,
-    WALL_BRIDGE_COLUMNS,
-    WALL_BRIDGES,
-    Layout,
-    PlacedWalker,
-)
-from walkers.templates.parameters import (
-    PRINTED,
-    STATUS_LINES_PER_CYCLE,
-    Parameter,
-    along,
-    in_cycles,
-    number,
-    of_contacts,
-    of_drive,
-    of_liquid,
-    of_time,
-    suffixes,
-)
+from walkers.templates import parameters
+from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, MEAN_SPIN_COLUMNS, Layout, PlacedWalker
+from walkers.templates.parameters import STATUS_LINES_PER_CYCLE, Parameter, along, in_cycles, number, suffixes
 from walkers.templates.scene import Scene, Surface, place, surface_of
 from walkers.text import rendered
 
@@ -45,9 +25,12 @@ LAYOUT_NAME = "layout.json"
 BRIDGES_NAME = "bridges.txt"
 LOADS_NAME = "loads.txt"
 RUN_NAME = "run.sh"
-SCALED_NAME = "bridges.scaled.txt"
 SCALE_NAME = "scale.awk"
 """Script beside decks to be run by hand: rescales the tables for an edited surface tension or viscosity."""
+_NAMES = {
+    **{"layout": LAYOUT_NAME, "bridges": BRIDGES_NAME, "scaled": "bridges.scaled.txt"},
+    **{"loads": LOADS_NAME, "run": RUN_NAME, "scale": SCALE_NAME},
+}
 CONTENT_VERSION = 8
 """Version of what decks compute, part of the names of runs: increase it if a case gives other numbers.
 
@@ -90,21 +73,7 @@ class Deck:
     beyond_limits: bool = False  # whether the time step exceeds a limit (`run.allow_unstable`)
 
 
-@dataclass(frozen=True)
-class Recording:
-    """Last step of a deck and its recording intervals, in steps; ``begin`` is the step of the restart."""
-
-    steps: int
-    sample_every: int
-    bridge_every: int
-    status_every: int
-    bead_columns: tuple[str, ...] = BEAD_COLUMNS
-    wall_bridge_columns: tuple[str, ...] = WALL_BRIDGE_COLUMNS
-    begin: int = 0
-
-
-@dataclass(frozen=True)
-class Segment:
+class Segment(NamedTuple):
     """A segment of a run, between two steps; it begins with the restart file of the segment before, if there is one.
 
     ``drive_from`` is the step at which the drive begins; None while the beads come to rest.
@@ -121,14 +90,18 @@ class Plan:
 
     case: Case  # materials, liquid, contacts, drive, gravity and time step
     scene: Scene
-    recording: Recording
+    segment: Segment
+    sample_every: int  # steps between frames of beads, …
+    bridge_every: int  # … of bridges …
+    status_every: int  # … and lines of the engine's log
+    bead_columns: tuple[str, ...] = BEAD_COLUMNS
+    wall_bridge_columns: tuple[str, ...] = Layout.wall_bridge_columns
     walkers: tuple[PlacedWalker, ...] = ()  # with the ids of their beads
     prescribed: bool = False  # beads keep their velocities instead of following the forces
     ranks: int = 1  # number of MPI processes
     restart_to: str | None = None  # restart file to write at the end
     restart_from: str | None = None  # restart file to continue from
     fastest: float | None = None  # speed that no bead can reach, m/s; default: `fastest_of` the case
-    drive_from: int | None = 0  # step at which the drive begins; None for a segment before it
     skin: float | None = None  # search distance for neighbours beyond contact, m; default: the smallest radius, with
     # wide bins, for few beads far apart
 
@@ -169,13 +142,7 @@ def render_deck(case: Case, segment: Segment | None = None) -> Deck:
 
 
 def render_shared_deck(cases: Sequence[Case]) -> Deck:
-    """Render one deck for the walkers of several cases, in their order.
-
-    Raises
-    ------
-    ValueError
-        If they cannot share a deck (see `walkers.templates.scene.sharing_key`).
-    """
+    """Render one deck for the walkers of several cases, in their order; raises `ValueError` as `place`."""
     return compose(plan_of(*cases))
 
 
@@ -184,98 +151,56 @@ def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
     case, run = cases[0], cases[0].run
     segment = segment or first_segment(case)
     scene, walkers = place(cases)
-    recording = Recording(
-        steps=segment.end,
-        sample_every=run.steps_per_sample,
-        bridge_every=run.steps_per_sample * run.samples_per_bridge_sample,
-        status_every=-(-run.steps_per_cycle // STATUS_LINES_PER_CYCLE),
-        bead_columns=(
-            *BEAD_COLUMNS,
-            *(MEAN_SPIN_COLUMNS if walkers else ()),
-            *([FILM_COLUMN] if case.liquid.conserved else ()),
-        ),
-        begin=segment.begin,
-    )
+    columns = [*BEAD_COLUMNS, *(MEAN_SPIN_COLUMNS if walkers else ()), *([FILM_COLUMN] * case.liquid.conserved)]
     restart = None if run.in_one else RESTART_NAME
     return Plan(
         case=case,
         scene=scene,
-        recording=recording,
+        segment=segment,
+        sample_every=run.steps_per_sample,
+        bridge_every=run.steps_per_sample * run.samples_per_bridge_sample,
+        status_every=-(-run.steps_per_cycle // STATUS_LINES_PER_CYCLE),
+        bead_columns=tuple(columns),
         walkers=walkers,
         ranks=run.ranks,
         restart_to=restart,
         restart_from=PREVIOUS_RESTART_NAME if restart and segment.begin else None,
         fastest=max(fastest_of(one, scene) for one in cases),
-        drive_from=segment.drive_from,
         skin=_SKIN if case.loose else None,
     )
 
 
 def compose(plan: Plan) -> Deck:
-    """Compose a deck from its blocks.
-
-    Raises
-    ------
-    InputError
-        If the law of the bridges cannot be tabulated.
-    """
-    case, scene = plan.case, plan.scene
-    layout, gravity = _layout(plan), case.environment.gravity
+    """Compose a deck from its blocks; raises `InputError` if the law of the bridges cannot be tabulated."""
+    case, scene, layout, gravity = plan.case, plan.scene, _layout(plan), plan.case.environment.gravity
     surfaces = scene.surfaces or (surface_of(case),)
     files = {BRIDGES_NAME: tables_of(case, surfaces, {(bead.surface, bead.radius) for bead in scene.beads})}
     files |= {LOADS_NAME: _loads(scene)} if len(scene.loadings) > 1 else {}
-    contacts = [contact for contact, _ in surfaces]
-    radii = [bead.radius for bead in scene.beads]
-    smallest, largest = min(radii), max(radii)
-    skin = plan.skin or smallest
-    # At least the number of the smallest beads that fit into the search distance of the largest one.
-    sight = largest + 2.0 * smallest + skin
-    most_neighbours = max(_LEAST_NEIGHBOURS, ceil((sight**3 - largest**3) / smallest**3))
-    space = prod(high - low for low, high in zip(scene.lower, scene.upper, strict=True))
-    pair_columns = " ".join(PAIR_BRIDGES).split()
-    moduli = [*(contact.youngs_modulus for contact in contacts), case.contact.youngs_modulus]
     given, derived = _parameters(plan, surfaces)
     named = {one.name: one.value for one in (*given, *derived)}
     text = rendered(
         "walkers.templates",
         "walker.lig.j2",
+        plan=plan,
         case=case,
         scene=scene,
         layout=layout,
-        recording=plan.recording,
-        layout_name=LAYOUT_NAME,
-        bridges_name=BRIDGES_NAME,
-        scaled_name=SCALED_NAME,
-        scale_name=SCALE_NAME,
+        names=_NAMES,
+        files=files,
         given=given,
         derived=derived,
-        printed=PRINTED,
+        printed=parameters.PRINTED,
         named=named,
-        run_steps=_run_steps(plan, named),
-        in_cycles=partial(in_cycles, steps_per_cycle=case.run.steps_per_cycle),
-        run_name=RUN_NAME,
+        in_cycles=in_cycles,
+        along=along,
         types=len(surfaces) + 1,
         ends_of_harmonics=suffixes(len(case.excitation.harmonics)),
-        moduli=" ".join(["${youngs_modulus}"] * len(moduli) if "youngs_modulus" in named else map(number, moduli)),
-        stiff=max(moduli) > _STIFFEST,
-        friction=_coefficients(contacts, named, "friction.bead_bead", "friction.bead_wall"),
-        rolling_friction=_coefficients(contacts, named, "rolling_friction"),
-        restitution=_coefficients(contacts, named, "restitution"),
         down=[component / gravity for component in case.gravity_vector] if gravity else [],
-        plan=plan,
-        shaken=plan.drive_from is not None,
-        files=files,
-        along=along,
-        loads_name=LOADS_NAME,
-        pair_bridge_terms=[f"c_pair_bridges[{pair_columns.index(one) + 1}]" for one in layout.pair_bridge_columns],
-        wall_bridge_terms=[f"f_walls[{WALL_BRIDGES.index(one) + 1}]" for one in layout.wall_bridge_columns],
-        pair_bridge_options=" ".join(PAIR_BRIDGES.values()),
-        skin=skin,
-        most_neighbours=most_neighbours,
-        # At most about ten thousand bins, none smaller than two beads (m).
-        bin_size=None if plan.skin else max(4.0 * largest, (space / 2e4) ** (1.0 / 3.0)),
-        wide=not plan.skin and space > _MOST_BINS * largest**3,
-    )  # fmt: skip
+        shaken=plan.segment.drive_from is not None,
+        **layout.bridge_terms(),
+        **_contacts(case, [contact for contact, _ in surfaces], named),
+        **_search(plan),
+    )
     fastest = plan.fastest or fastest_of(case, scene)
     beyond = bool(limits_of(case).exceeded_by(case.run.time_step))
     # The engine writes once a sample, and several times a cycle.
@@ -305,26 +230,48 @@ def _loads(scene: Scene) -> str:
 
 def _parameters(plan: Plan, surfaces: Sequence[Surface]) -> tuple[list[Parameter], list[Parameter]]:
     """The named parameters of a deck, and the values that follow from them."""
-    case, recording, begin = plan.case, plan.recording, plan.drive_from
-    drive, of_it = of_drive(case.excitation, amplitudes=begin is not None)
+    case, (first, last, begin) = plan.case, plan.segment
+    drive, of_it = parameters.of_drive(case.excitation, amplitudes=begin is not None)
     stable = min(limits_of(case).as_dict().values())
-    time, of_that = of_time(case, None if recording.begin else begin, recording.steps, stable)
+    time, of_that = parameters.of_time(case, None if first else begin, last, stable)
     given = [*drive, *time]
     if case.environment.gravity > 0.0:
         given.append(Parameter("gravity", number(case.environment.gravity), "m/s^2"))
     if not plan.restart_from:
         given.append(Parameter("density", number(case.beads.density), "kg/m^3", "of the beads"))
-    given += of_contacts(case, [contact for contact, _ in surfaces])
+    given += parameters.of_contacts(case, [contact for contact, _ in surfaces])
     if len(surfaces) == 1:
-        given += of_liquid(surfaces[0], min(bead.radius for bead in plan.scene.beads))
+        given += parameters.of_liquid(surfaces[0], min(bead.radius for bead in plan.scene.beads))
     return given, [*of_it, *of_that]
 
 
-def _run_steps(plan: Plan, named: Mapping[str, str]) -> str:
-    """The number of steps, as a formula of the parameters."""
-    if "cycles" not in named:
-        return str(plan.recording.steps)
-    return f"$({'v_rest_steps+' if 'rest_steps' in named else ''}v_cycles*v_steps_per_cycle)"
+def _search(plan: Plan) -> dict[str, Any]:
+    """The search for neighbours: skin and width of the bins (m), neighbours of a bead, whether bins are many."""
+    radii = [bead.radius for bead in plan.scene.beads]
+    smallest, largest = min(radii), max(radii)
+    skin = plan.skin or smallest
+    sight = largest + 2.0 * smallest + skin
+    space = prod(high - low for low, high in zip(plan.scene.lower, plan.scene.upper, strict=True))
+    return {
+        "skin": skin,
+        # At least the number of the smallest beads that fit into the search distance of the largest one.
+        "most_neighbours": max(_LEAST_NEIGHBOURS, ceil((sight**3 - largest**3) / smallest**3)),
+        # At most about ten thousand bins, none smaller than two beads.
+        "bin_size": None if plan.skin else max(4.0 * largest, (space / 2e4) ** (1.0 / 3.0)),
+        "wide": not plan.skin and space > _MOST_BINS * largest**3,
+    }
+
+
+def _contacts(case: Case, contacts: Sequence[Contact], named: Collection[str]) -> dict[str, Any]:
+    """Values or names of the contact parameters of all atom types; the walls come last."""
+    moduli = [*(contact.youngs_modulus for contact in contacts), case.contact.youngs_modulus]
+    return {
+        "moduli": " ".join(["${youngs_modulus}"] * len(moduli) if "youngs_modulus" in named else map(number, moduli)),
+        "stiff": max(moduli) > _STIFFEST,
+        "friction": _coefficients(contacts, named, "friction.bead_bead", "friction.bead_wall"),
+        "rolling_friction": _coefficients(contacts, named, "rolling_friction"),
+        "restitution": _coefficients(contacts, named, "restitution"),
+    }
 
 
 def _coefficients(contacts: Sequence[Contact], named: Collection[str], of_beads: str, of_walls: str = "") -> list[str]:
@@ -333,19 +280,14 @@ def _coefficients(contacts: Sequence[Contact], named: Collection[str], of_beads:
     Beads of different surfaces never meet.
     """
     wall, names = len(contacts), (of_beads, of_walls or of_beads)
-    parameters = [name.replace(".", "_") for name in names]
-    values = [
-        [
-            f"${{{one}}}" if one in named else number(of.value_of(name))
-            for one, name in zip(parameters, names, strict=True)
-        ]
-        for of in contacts
-    ]
-    return [
-        values[min(one, other, wall - 1)][int(max(one, other) == wall)]
-        for one in range(wall + 1)
-        for other in range(wall + 1)
-    ]
+
+    def text(contact: Contact, name: str) -> str:
+        parameter = name.replace(".", "_")
+        return f"${{{parameter}}}" if parameter in named else number(contact.value_of(name))
+
+    values = [[text(contact, name) for name in names] for contact in contacts]
+    pairs = product(range(wall + 1), repeat=2)
+    return [values[min(one, other, wall - 1)][int(max(one, other) == wall)] for one, other in pairs]
 
 
 def fastest_of(case: Case, scene: Scene) -> float:
@@ -360,21 +302,16 @@ def fastest_of(case: Case, scene: Scene) -> float:
 
 
 def _layout(plan: Plan) -> Layout:
-    recording = plan.recording
-    steps = recording.steps - recording.begin
+    steps = plan.segment.end - plan.segment.begin
     return Layout(
-        bead_dump="beads.bin",
-        bead_columns=recording.bead_columns,
-        sample_every=recording.sample_every,
-        frames=steps // recording.sample_every + 1,
-        pair_bridge_dump="bridges.pairs.txt",
-        pair_bridge_columns=PAIR_BRIDGE_COLUMNS,
-        wall_bridge_dump="bridges.walls.txt",
-        wall_bridge_columns=recording.wall_bridge_columns,
-        bridge_every=recording.bridge_every,
-        bridge_frames=steps // recording.bridge_every + 1,
+        bead_columns=plan.bead_columns,
+        sample_every=plan.sample_every,
+        frames=steps // plan.sample_every + 1,
+        wall_bridge_columns=plan.wall_bridge_columns,
+        bridge_every=plan.bridge_every,
+        bridge_frames=steps // plan.bridge_every + 1,
         atoms=len(plan.scene.beads),
-        steps=recording.steps,
+        steps=plan.segment.end,
         time_step=plan.case.run.time_step,
         walkers=plan.walkers,
         ranks=plan.ranks,

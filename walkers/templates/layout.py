@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from functools import cache
 from typing import Any
+
+from pydantic import TypeAdapter
 
 BEAD_COLUMNS = ("id", "type", "radius", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz")
 """Columns of the bead dump, in the engine's names (m, m/s, rad/s)."""
@@ -40,18 +43,18 @@ class PlacedWalker:
     origin: tuple[float, float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Layout:
     """Dumps of a deck (file names, columns, steps between frames, frames expected) and its walkers."""
 
-    bead_dump: str
+    bead_dump: str = "beads.bin"
     bead_columns: tuple[str, ...]
     sample_every: int
     frames: int
-    pair_bridge_dump: str
-    pair_bridge_columns: tuple[str, ...]
-    wall_bridge_dump: str
-    wall_bridge_columns: tuple[str, ...]
+    pair_bridge_dump: str = "bridges.pairs.txt"
+    pair_bridge_columns: tuple[str, ...] = PAIR_BRIDGE_COLUMNS
+    wall_bridge_dump: str = "bridges.walls.txt"
+    wall_bridge_columns: tuple[str, ...] = WALL_BRIDGE_COLUMNS
     bridge_every: int
     bridge_frames: int
     atoms: int
@@ -66,16 +69,25 @@ class Layout:
         header = 8 + 8 + 4 + 6 * 4 + 6 * 8 + 4 + 4 + 4 * self.ranks
         return self.frames * (header + 8 * self.atoms * len(self.bead_columns))
 
+    def bridge_terms(self) -> dict[str, Any]:
+        """What the engine calls the columns of bridges, and the options that give those between beads."""
+        pairs = " ".join(PAIR_BRIDGES).split()
+        return {
+            "pair_bridge_options": " ".join(PAIR_BRIDGES.values()),
+            "pair_bridge_terms": [f"c_pair_bridges[{pairs.index(one) + 1}]" for one in self.pair_bridge_columns],
+            "wall_bridge_terms": [f"f_walls[{WALL_BRIDGES.index(one) + 1}]" for one in self.wall_bridge_columns],
+        }
+
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types."""
         return asdict(self)
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Layout:
-        """Rebuild from `as_dict`."""
-        walkers = tuple(
-            PlacedWalker(**{**entry, "beads": tuple(entry["beads"]), "origin": tuple(entry["origin"])})
-            for entry in values["walkers"]
-        )
-        columns = {key: tuple(values[key]) for key in values if key.endswith("_columns")}
-        return cls(**{**values, **columns, "walkers": walkers})
+        """Rebuild from `as_dict`; raises `ValueError` if it is none."""
+        return _adapter().validate_python(values)
+
+
+@cache
+def _adapter() -> TypeAdapter[Layout]:
+    return TypeAdapter(Layout)

@@ -8,8 +8,9 @@ variable would have 15 digits.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil, inf
+from typing import NamedTuple
 
 from walkers.inputs.case import Case, Contact
 from walkers.inputs.drive import Excitation, Vector
@@ -22,20 +23,13 @@ PRINTED = "parameters:"
 """Start of the line in which the engine prints the parameters."""
 
 
-@dataclass(frozen=True)
-class Parameter:
+class Parameter(NamedTuple):
     """A line of a deck: name, value (a number, or a formula in ``$()``), unit, and a remark."""
 
     name: str
     value: str
     unit: str = ""
     note: str = ""
-
-    @property
-    def line(self) -> str:
-        """The command, and a comment."""
-        about = ": ".join(text for text in (self.unit, self.note) if text)
-        return f"{f'variable        {self.name} string {self.value}':55} {f'# {about}' if about else ''}".rstrip()
 
 
 def number(value: float) -> str:
@@ -86,16 +80,9 @@ def of_drive(drive: Excitation, *, amplitudes: bool) -> tuple[list[Parameter], l
 
 
 def of_time(case: Case, drive_from: int | None, steps: int, stable: float) -> tuple[list[Parameter], list[Parameter]]:
-    """Given and derived parameters of the time step and of the length of the run.
+    """Given and derived parameters of the time step, stable below a limit (s), and of the length of the run, in steps.
 
-    Parameters
-    ----------
-    case
-        Case with the run.
-    drive_from, steps
-        Step at which the drive begins (None: the length is not a parameter); number of steps.
-    stable
-        Time step below which the integration is stable, s.
+    The length is no parameter if no step is given at which the drive begins.
     """
     run = case.run
     frequency = "frequency" if len(case.excitation.harmonics) == 1 else "cycle_frequency"

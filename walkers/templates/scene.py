@@ -92,10 +92,7 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
     Walkers stand on a grid, other beads at the places in the case. Each walker draws its start from its own random
     stream (seed, number of the walker in its case), so that walker k does not depend on the other cases.
 
-    Raises
-    ------
-    ValueError
-        If the cases cannot share a deck (`sharing_key`).
+    Raises `ValueError` if the cases cannot share a deck (`sharing_key`).
     """
     if len({sharing_key(case) for case in cases}) != 1:
         raise ValueError("these cases cannot share a deck")
