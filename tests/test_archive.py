@@ -106,7 +106,7 @@ def test_manifests_say_what_made_the_run(run: Path) -> None:
     assert manifest["sha256"] == {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files.items()}
     assert manifest["files"] == {name: path.stat().st_size for name, path in files.items()}
     assert manifest["packages"]["numpy"] == np.__version__
-    assert manifest["commit"] == software().commit
+    assert manifest["commit"] == software()["commit"]
 
 
 def test_the_commit_of_a_checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -185,7 +185,7 @@ def test_version_names_package_commit_and_engine(monkeypatch: pytest.MonkeyPatch
     wheel = shutil.copytree(Path(walkers.__file__).parent, tmp_path / "walkers")
     (wheel / COMMIT_NAME).write_text("0123abc\n")
     told_by_wheel = _python("from walkers.main import describe_version as one; print(one())", tmp_path)
-    assert told_by_wheel.startswith(f"granular-walkers {software().version} (commit 0123abc)\n")
+    assert told_by_wheel.startswith(f"granular-walkers {software()['granular_walkers']} (commit 0123abc)\n")
     monkeypatch.setenv("WALKERS_ENGINE", "no-such-engine")
     assert "no engine: no-such-engine" in call("--version", check=True).stdout
 
