@@ -72,6 +72,11 @@ def write_manifest(
     write_json(directory / MANIFEST_NAME, contents, at_once=False)
 
 
+def read_manifest(directory: Path) -> dict[str, Any]:
+    """The manifest of a finished run; raises `OSError` or `ValueError` if it is unreadable."""
+    return read_json(directory / MANIFEST_NAME)
+
+
 def _iso(seconds: float) -> str:
     return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(seconds))
 
@@ -96,7 +101,7 @@ def check_unchanged(directory: Path, names: Collection[str]) -> bool:
     unfinished run, which has no manifest.
     """
     try:
-        sums = _sums(read_json(directory / MANIFEST_NAME), directory)
+        sums = _sums(read_manifest(directory), directory)
     except FileNotFoundError:
         return True
     wanted = {name: sums[name] for name in names if name in sums}
@@ -140,7 +145,7 @@ def recomputed(directory: Path, names: Collection[str]) -> Iterator[None]:
     if not (directory / MANIFEST_NAME).is_file():
         yield
         return
-    contents = read_json(directory / MANIFEST_NAME)
+    contents = read_manifest(directory)
     sums = _sums(contents, directory)
     if [name for name in names if sums.pop(name, None)]:
         write_json(directory / MANIFEST_NAME, contents)

@@ -24,11 +24,18 @@ from walkers.postprocess.analysis import tabulate
 from walkers.postprocess.dump import DumpError
 from walkers.rounding import percent
 from walkers.runner.binary import find_engine, plugin_of, run_script
-from walkers.runner.directory import CASE_NAME, DECK_RECORD_NAME, SEGMENT_NAME, finished_run, layout_of, write_deck
+from walkers.runner.directory import (
+    CASE_NAME,
+    DECK_RECORD_NAME,
+    is_finished,
+    layout_of,
+    write_deck,
+    write_segment_record,
+)
 from walkers.runner.failures import EngineFailure, MissingFrames
 from walkers.runner.files import read_json, write_json
 from walkers.runner.launch import EngineReport, judge
-from walkers.runner.manifest import MANIFEST_NAME, write_manifest
+from walkers.runner.manifest import MANIFEST_NAME, read_manifest, write_manifest
 from walkers.templates.deck import (
     DECK_NAME,
     LAYOUT_NAME,
@@ -91,10 +98,10 @@ def write_folder(case: Case, folder: Path) -> Path:
 
 def as_run(case: Case, directory: Path | None) -> Case:
     """The case with the number of cycles of its finished run, if there is one; `InputError` if it cannot be read."""
-    if not case.run.until_steady or directory is None or (finished := finished_run(directory)) is None:
+    if not case.run.until_steady or directory is None or not is_finished(directory):
         return case
     try:
-        return case.for_cycles(int(finished.manifest["steps"]) // case.run.steps_per_cycle)
+        return case.for_cycles(int(read_manifest(directory)["steps"]) // case.run.steps_per_cycle)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise refused(directory, f"the run's {MANIFEST_NAME} cannot be read ({error})") from error
 
@@ -265,8 +272,7 @@ def _write(
     (folder / MANIFEST_NAME).unlink(missing_ok=True)
     write_json(folder / CASE_NAME, case.as_dict(), at_once=False)
     write_json(folder / LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
-    of_segment = {**vars(segment), "root_mean_square_velocity": None, **vars(report), "by_hand": notes}
-    write_json(folder / SEGMENT_NAME, of_segment, at_once=False)
+    write_segment_record(folder, segment, report, by_hand=notes)
     wanted = before.run
     # Cycles that were enough for the finished run of a case may be too few for an edited deck.
     doubtful = case.run.cycles < wanted.cycles if wanted.until_steady else case.apart and case != before
@@ -274,7 +280,7 @@ def _write(
         reached = f"the velocities are not constant within {percent(CONSTANT)} after {case.run.cycles} cycles"
         further = f"walkers run continues to {wanted.cycles}: set cycles to {wanted.cycles} and run the deck again"
         notes.append(f"{reached}; {further if wanted.until_steady else 'set cycles to more and run the deck again'}")
-        write_json(folder / SEGMENT_NAME, of_segment, at_once=False)
+        write_segment_record(folder, segment, report, by_hand=notes)
     tabulate(folder)
     about: dict[str, Any] = {"drive_from": segment.drive_from, "segments": 1, "by_hand": notes}
     write_manifest(case, folder.name, None, report, started=time.time(), directory=folder, **about)
