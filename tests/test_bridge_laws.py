@@ -396,7 +396,7 @@ def test_viscous_limit_rules_in_glycerol() -> None:
 def test_auto_respects_every_limit_with_margin(name: str) -> None:
     """And is no shorter than that asks for: loose beads by their own shares, walkers at most 4 µs."""
     case = load_case(name)
-    limits = limits_of(case).as_dict()
+    limits = vars(limits_of(case))
     shares = AUTO_FRACTIONS if case.loose else WALKER_FRACTIONS
     assert shares.keys() == limits.keys()
     assert all(0.0 < share <= 0.5 for share in shares.values())

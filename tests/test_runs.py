@@ -43,7 +43,7 @@ from walkers.runner.directory import (
     is_locked,
     layout_of,
     locked,
-    run_name,
+    run_place,
 )
 from walkers.runner.failures import RunBusy
 from walkers.runner.launch import Progress
@@ -74,7 +74,7 @@ def _forked(work: Callable[[], object]) -> int:
 
 def test_the_name_depends_on_what_determines_the_run() -> None:
     def name(**changes: object) -> str:
-        return run_name(make_case(**changes), find_engine())
+        return run_place(make_case(**changes), find_engine(), Path()).name
 
     names = {
         name(),
@@ -87,8 +87,8 @@ def test_the_name_depends_on_what_determines_the_run() -> None:
     assert len(names) == 6
     assert name(title="another title") == name()
     other = replace(find_engine(), sha256="0" * 64)
-    assert run_name(make_case(), other) != name()
-    long = run_name(make_case().but(name="a b/" * 100), other)
+    assert run_place(make_case(), other, Path()).name != name()
+    long = run_place(make_case().but(name="a b/" * 100), other, Path()).name
     assert len(long) < 100
     assert "/" not in long
 

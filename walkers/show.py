@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import asdict
-from math import ceil, inf, isfinite, pi
+from math import ceil, inf, isfinite
 from typing import Any
 
 from walkers.inputs.bodies import Walkers
@@ -18,7 +18,7 @@ from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.numerical import numerical_error
 from walkers.inputs.run import CONSTANT, limits_of
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
-from walkers.physics.capillary import capillary_force_limit_at_wall
+from walkers.physics.capillary import bead_volume, capillary_force_limit_at_wall
 from walkers.physics.time_step import auto_fractions
 from walkers.rounding import counted, percent
 from walkers.runner.launch import cores_here
@@ -48,12 +48,8 @@ _TRIED_AGAIN = (1.0, 0.1, 0.1)
 def predicted_seconds(case: Case, walkers: int | None = None) -> float:
     """Time in s that the engine takes for a run, or a deck, on as many cores as it has MPI processes.
 
-    Parameters
-    ----------
-    case
-        A case of the deck, for the number of its steps.
-    walkers
-        Number of pairs of beads in the deck (`pairs_of_beads`); default: that of the case.
+    Any ``case`` of a deck has its number of steps. ``walkers`` is the number of pairs of beads in the deck
+    (`pairs_of_beads`), by default that of the case.
     """
     run = case.run
     cycles = sum(share * cycles for share, cycles in zip(_TRIED_AGAIN, run.attempts, strict=False))
@@ -121,7 +117,7 @@ def _two_digits(number: float) -> str:
 
 def _volume(case: Case) -> float:
     """Volume of all beads, m³."""
-    return sum(4.0 / 3.0 * pi * radius**3 for radius in case.all_radii)
+    return sum(map(bead_volume, case.all_radii))
 
 
 def _youngs_modulus(case: Case) -> Known | None:
@@ -141,7 +137,7 @@ def summarise(case: Case) -> dict[str, Any]:
         walkers), ``time_step`` (limits, None if one does not apply; the chosen step; its shares of the limits and those
         of ``"auto"``), ``run`` (steps, samples, predicted seconds).
     """
-    run, drive, limits = case.run, case.excitation, limits_of(case).as_dict()
+    run, drive, limits = case.run, case.excitation, vars(limits_of(case))
     volume = _volume(case)
     known = _youngs_modulus(case)
     summary: dict[str, Any] = {
@@ -175,14 +171,9 @@ def summarise(case: Case) -> dict[str, Any]:
     }
     if case.walkers and len(case.walkers[0].radii) == 2:
         dimer = dimer_of(case)
-        summary["dimer"] = {
-            "masses": list(dimer.masses),
-            "total_mass": dimer.total_mass,
-            "mean_radius": dimer.mean_radius,
-            "gamma0": dimer.gamma0(drive.peak_acceleration),
-            "sin_delta": dimer.sin_delta,
-            "mass_asymmetry": dimer.mass_asymmetry,
-        }
+        numbers = ("total_mass", "mean_radius", "sin_delta", "mass_asymmetry")
+        summary["dimer"] = {name: getattr(dimer, name) for name in numbers}
+        summary["dimer"] |= {"masses": list(dimer.masses), "gamma0": dimer.gamma0(drive.peak_acceleration)}
     return summary
 
 

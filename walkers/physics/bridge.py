@@ -110,18 +110,10 @@ class Surfaces:
 
 @dataclass(frozen=True)
 class Forces:
-    """Pull and resistances at given gaps, arrays of shape (n,). The module defines them.
+    """Pull and resistances of the module at given gaps, each of shape (n,).
 
-    Attributes
-    ----------
-    pull
-        Pull P, N.
-    normal, sliding
-        Resistances N and S, N s/m.
-    coupling
-        Resistance C, N s.
-    rolling
-        Resistance Q, N m s.
+    ``pull`` is P in N; ``normal`` and ``sliding`` are N and S in N s/m; ``coupling`` is C in N s; ``rolling`` is Q in
+    N m s.
     """
 
     pull: FloatArray
@@ -132,7 +124,7 @@ class Forces:
 
     def columns(self) -> FloatArray:
         """Shape (N, 5), in the order of the attributes."""
-        return np.stack([self.pull, self.normal, self.sliding, self.coupling, self.rolling], axis=-1)
+        return np.stack(list(vars(self).values()), axis=-1)
 
 
 @dataclass(frozen=True)
@@ -181,9 +173,8 @@ def columns_at(curve: Curve, gaps: FloatArray) -> FloatArray:
     for number, (name, given) in enumerate(zip(_COLUMNS, vars(forces).values(), strict=True)):
         column = np.asarray(given)
         if column.dtype.kind not in "fiu" or column.shape not in ((), gaps.shape):
-            raise UnusableLawError(
-                f"the {name} has type {column.dtype} and shape {column.shape}; expected real numbers (n,)"
-            )
+            kind = f"type {column.dtype} and shape {column.shape}"
+            raise UnusableLawError(f"the {name} has {kind}; expected real numbers (n,)")
         columns[:, number] = column
         if not np.isfinite(column := columns[:, number]).all():
             raise UnusableLawError(f"the {name} is not a number at a gap of {gaps[~np.isfinite(column)][0]:g} m")

@@ -26,9 +26,8 @@ def bridge_volume_between_beads(radius_1: float, radius_2: float, volume_fractio
 
 def share_of_bead(radius: float, other_radius: float, volume_fraction: float) -> float:
     """Share of a bead's liquid in its bridge to another bead, m³."""
-    return (
-        0.5 * film_volume(radius, volume_fraction) * (1.0 - sqrt(1.0 - (other_radius / (radius + other_radius)) ** 2))
-    )
+    cap = 1.0 - sqrt(1.0 - (other_radius / (radius + other_radius)) ** 2)
+    return 0.5 * film_volume(radius, volume_fraction) * cap
 
 
 def bridge_volume_at_wall(radius: float, volume_fraction: float) -> float:
@@ -38,7 +37,12 @@ def bridge_volume_at_wall(radius: float, volume_fraction: float) -> float:
 
 def film_volume(radius: float, volume_fraction: float) -> float:
     """Volume of the liquid on a bead without bridges, m³."""
-    return 4.0 / 3.0 * pi * radius**3 * volume_fraction
+    return bead_volume(radius) * volume_fraction
+
+
+def bead_volume(radius: float) -> float:
+    """Volume of a bead, m³."""
+    return 4.0 / 3.0 * pi * radius**3
 
 
 def capillary_force_limit_at_wall(surface_tension: float, radius: float) -> float:

@@ -58,16 +58,9 @@ _THIN = 1e-5
 
 
 def curve(surfaces: Surfaces, pull: Callable[[FloatArray], FloatArray], rupture: float) -> Curve:
-    """The curve of a law with a given pull and Reynolds resistances, for a bridge that forms on contact.
+    """The curve of a law with Reynolds resistances; the bridge forms on contact and breaks at a gap ``rupture``, m.
 
-    Parameters
-    ----------
-    surfaces
-        The pair.
-    pull
-        Function from gaps (m) to the pull over the surface tension (m), both of shape (n,).
-    rupture
-        Rupture distance, m.
+    ``pull`` gives the pull over the surface tension (m) at gaps (m), both of shape (n,).
     """
 
     def pulled(gaps: FloatArray) -> FloatArray:

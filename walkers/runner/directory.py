@@ -56,8 +56,8 @@ _PATIENCE_SECONDS = 2.0
 # --- names ------------------------------------------------------------------------------------------------------------
 
 
-def run_name(case: Case, engine: Engine) -> str:
-    """Name of a run directory: name of the case, and 12 hex digits of a hash of case, engine and version of the decks.
+def run_place(case: Case, engine: Engine, out: Path) -> Path:
+    """The final directory of a run: name of the case, and 12 hex digits of a hash of case, engine and version of decks.
 
     The text of the deck is not hashed, so that a changed comment in a template keeps existing runs. The file of a
     user's own bridge law is hashed.
@@ -66,7 +66,7 @@ def run_name(case: Case, engine: Engine) -> str:
     if own := case.recorded_law.sha256 if case.recorded_law else source_sha256(case.liquid.law):
         determinants["law"] = own
     text = json.dumps(determinants, sort_keys=True, separators=(",", ":"))
-    return f"{name_of(case.name)}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
+    return out / f"{name_of(case.name)}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
 
 
 def name_of(case_name: str) -> str:
@@ -77,11 +77,6 @@ def name_of(case_name: str) -> str:
 def is_run_name(name: str) -> bool:
     """Whether a name may be that of a run directory: it ends in twelve hex digits."""
     return re.fullmatch(r".+-[0-9a-f]{12}", name) is not None
-
-
-def run_place(case: Case, engine: Engine, out: Path) -> Path:
-    """The final directory of the run of a case."""
-    return out / run_name(case, engine)
 
 
 def unfinished(place: Path) -> Path:

@@ -117,12 +117,7 @@ def check_unchanged(directory: Path, names: Collection[str]) -> bool:
 def read_result(directory: str | Path) -> dict[str, Any]:
     """The result of a run, of any version of its analyses.
 
-    Raises
-    ------
-    OSError, ValueError
-        If it cannot be read.
-    FileChanged
-        If it is not what it was when the run was finished.
+    Raises `OSError` or `ValueError` if it cannot be read, `FileChanged` if it has changed since the run was finished.
     """
     result = read_json(Path(directory) / RESULT_NAME)
     check_unchanged(Path(directory), [RESULT_NAME])

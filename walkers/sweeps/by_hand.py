@@ -23,15 +23,8 @@ from walkers.inputs.table import changed as table_changed
 from walkers.postprocess.analysis import tabulate
 from walkers.postprocess.dump import DumpError
 from walkers.rounding import percent
-from walkers.runner.binary import find_engine, plugin_of, run_script
-from walkers.runner.directory import (
-    CASE_NAME,
-    DECK_RECORD_NAME,
-    is_finished,
-    layout_of,
-    write_deck,
-    write_segment_record,
-)
+from walkers.runner.binary import find_engine, plugin_of, write_run_script
+from walkers.runner.directory import CASE_NAME, DECK_RECORD_NAME, layout_of, write_deck, write_segment_record
 from walkers.runner.failures import EngineFailure, MissingFrames
 from walkers.runner.files import read_json, write_json
 from walkers.runner.launch import EngineReport, judge
@@ -50,7 +43,7 @@ from walkers.templates.deck import (
 from walkers.templates.parameters import PRINTED, suffixes
 
 _LOGS = (OUTPUT_NAME, "log.liggghts")
-"""Output of the engine by `run_script`, and the default log of LIGGGHTS."""
+"""Output of the engine by `write_run_script`, and the default log of LIGGGHTS."""
 _PRINTED = re.compile(rf"^{PRINTED} (.+)$", re.MULTILINE)
 _GIVEN = re.compile(r"^variable +(\w+) string ([-+.\de]+)(?: |$)", re.MULTILINE)
 _LINE = re.compile(r"^variable +(\w+) string (\S+)", re.MULTILINE)
@@ -87,7 +80,7 @@ def write_folder(case: Case, folder: Path) -> Path:
     try:
         write_deck(deck, folder)
         (folder / SCALE_NAME).write_text(_SCALE, encoding="utf-8")
-        (folder / RUN_NAME).write_text(run_script(engine, plugin, deck.layout.ranks), encoding="utf-8")
+        write_run_script(folder, engine, plugin, deck.layout.ranks)
         write_json(folder / DECK_RECORD_NAME, {"case": case.as_dict(), "deck": deck.text})
     except OSError as error:  # a disk that is full names no file
         error.filename = str(folder)
@@ -98,10 +91,12 @@ def write_folder(case: Case, folder: Path) -> Path:
 
 def as_run(case: Case, directory: Path | None) -> Case:
     """The case with the number of cycles of its finished run, if there is one; `InputError` if it cannot be read."""
-    if not case.run.until_steady or directory is None or not is_finished(directory):
+    if not case.run.until_steady or directory is None:
         return case
     try:
         return case.for_cycles(int(read_manifest(directory)["steps"]) // case.run.steps_per_cycle)
+    except FileNotFoundError:
+        return case
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise refused(directory, f"the run's {MANIFEST_NAME} cannot be read ({error})") from error
 
@@ -109,10 +104,7 @@ def as_run(case: Case, directory: Path | None) -> Case:
 def take_in(folder: Path) -> None:
     """Make a run directory of the folder of a deck that was run by hand, unless it is up to date.
 
-    Raises
-    ------
-    InputError
-        If the deck was not run, is still running, or failed; or its files cannot be read.
+    `InputError` if the deck was not run, is still running, or failed; or its files cannot be read.
     """
     if _is_current(folder):
         return
@@ -199,8 +191,8 @@ def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float]
         )
     document = {name: table for name, table in case.document.items() if name != "uncertain"}
     table, other = document.get("run", {}), frequency != case.excitation.frequency
-    changes: dict[str, Any] = {key: edited[name] for name, (key, unit) in _SETTINGS.items() if name in edited}
-    changes |= {key: f"{changes[key]!r} {unit}" for key, unit in _SETTINGS.values() if unit and key in changes}
+    settings = {key: (edited[name], unit) for name, (key, unit) in _SETTINGS.items() if name in edited}
+    changes: dict[str, Any] = {key: f"{value!r} {unit}" if unit else value for key, (value, unit) in settings.items()}
     changes |= {"liquid.viscosity_ratio": 1.0} if "viscosity" in edited else {}
     if {"steps_per_cycle", "time_step"} & edited.keys() or "time_step" in table:
         changes |= {"run.time_step": f"{step!r} s", "run.allow_unstable": True}

@@ -307,7 +307,7 @@ def _parameters(plan: Plan, surfaces: Sequence[Surface]) -> tuple[list[Parameter
     """The named parameters of a deck, and the values that follow from them."""
     case, recording, begin = plan.case, plan.recording, plan.drive_from
     drive, of_it = of_drive(case.excitation, amplitudes=begin is not None)
-    stable = min(limits_of(case).as_dict().values())
+    stable = min(vars(limits_of(case)).values())
     time, of_that = of_time(case, None if recording.begin else begin, recording.steps, stable)
     given = [*drive, *time]
     if case.environment.gravity > 0.0:

@@ -31,12 +31,8 @@ class ExecutedLawWarning(UserWarning):
 def by_name(name: str) -> BridgeLaw:
     """Find a law by name: one of `LAWS`, ``file.py:function`` or ``package.module:function``.
 
-    Paths of files are relative to the working directory. A file is executed again only after it has changed.
-
-    Raises
-    ------
-    ValueError
-        If there is no law with this name, or its file or module cannot be executed.
+    Paths of files are relative to the working directory. A file is executed again only after it has changed. Raises
+    `ValueError` if there is no law with this name, or its file or module cannot be executed.
     """
     if name in LAWS:
         law: BridgeLaw = import_module(f"{__name__}.{name.replace('-', '_')}").law
