@@ -179,21 +179,19 @@ def summarise(case: Case) -> dict[str, Any]:
 
 def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
     """Loads of the contacts of a walker at rest."""
-    loads, radii = contact_loads(case, walkers), walkers.radii
-    names = [f"bead {bead} on substrate" for bead in range(1, len(radii) + 1)]
-    names += [f"bead {other + 1} on bead {one + 1}" for one, other in walkers.pairs]
-    planes = [capillary_force_limit_at_wall(case.liquid.surface_tension, radius) for radius in radii]
-    return [
-        {
-            "contact": name,
-            "bridge_volume": loads.bridge_volumes[number],
-            "capillary_force": loads.capillary[number],
-            "capillary_force_limit": planes[number] if number < len(radii) else None,
-            "rupture_distance": loads.rupture[number],
-            "overlap_at_rest": loads.overlaps[number],
-        }
-        for number, name in enumerate(names)
-    ]
+    loads, tension = contact_loads(case, walkers), case.liquid.surface_tension
+    contacts = [f"bead {bead} on substrate" for bead, _ in enumerate(walkers.radii, 1)]
+    contacts += [f"bead {other + 1} on bead {one + 1}" for one, other in walkers.pairs]
+    planes = [capillary_force_limit_at_wall(tension, radius) for radius in walkers.radii]
+    columns = {
+        "contact": contacts,
+        "bridge_volume": loads.bridge_volumes,
+        "capillary_force": loads.capillary,
+        "capillary_force_limit": [*planes, *(None for _ in walkers.pairs)],
+        "rupture_distance": loads.rupture,
+        "overlap_at_rest": loads.overlaps,
+    }
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def describe(summary: dict[str, Any]) -> str:

@@ -29,7 +29,7 @@ from math import inf
 import numpy as np
 import numpy.typing as npt
 
-from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, film_volume, share_of_bead
+from walkers.physics.capillary import film_volume, share_of_bead
 from walkers.physics.liquid import BridgeLiquid
 
 FloatArray = npt.NDArray[np.float64]
@@ -65,12 +65,10 @@ class Surfaces:
     @classmethod
     def of(cls, radius: float, other_radius: float, liquid: BridgeLiquid, minimum_separation_ratio: float) -> Surfaces:
         """Make the surfaces of a bead and another bead or a plane (infinite radius), and the volume of their bridge."""
-        if other_radius == inf:
-            volume = bridge_volume_at_wall(radius, liquid.volume_fraction)
-        else:
-            radius, other_radius = sorted((radius, other_radius))
-            volume = bridge_volume_between_beads(radius, other_radius, liquid.volume_fraction)
-        return cls(radius, other_radius, volume, liquid, minimum_separation_ratio)
+        small, large = sorted((radius, other_radius))
+        fraction = liquid.volume_fraction
+        volume = share_of_bead(small, large, fraction) + share_of_bead(large, small, fraction)
+        return cls(small, large, volume, liquid, minimum_separation_ratio)
 
     @property
     def volumes(self) -> list[Surfaces]:
@@ -85,12 +83,9 @@ class Surfaces:
     @property
     def films(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """What each surface contributes to a bridge of full films, and its liquid, m³ (a wall has none)."""
-        fraction, (small, large) = self.liquid.volume_fraction, (self.radius, self.other_radius)
-        own = film_volume(small, fraction)
-        if self.at_wall:
-            return (bridge_volume_at_wall(small, fraction), 0.0), (own, inf)
+        fraction, small, large = self.liquid.volume_fraction, self.radius, self.other_radius
         shares = share_of_bead(small, large, fraction), share_of_bead(large, small, fraction)
-        return shares, (own, film_volume(large, fraction))
+        return shares, (film_volume(small, fraction), inf if self.at_wall else film_volume(large, fraction))
 
     @property
     def at_wall(self) -> bool:
@@ -183,10 +178,9 @@ def columns_at(curve: Curve, gaps: FloatArray) -> FloatArray:
     _, _, sliding, coupling, rolling = columns.T
     gains = coupling**2 > (1.0 + 1e-9) * sliding * rolling
     if gains.any():
-        raise UnusableLawError(
-            f"sliding and rolling together generate energy at a gap of {gaps[gains][0]:g} m: the square of the "
-            "coupling exceeds the product of both resistances"
-        )
+        why = "the square of the coupling exceeds the product of both resistances"
+        at = f"at a gap of {gaps[gains][0]:g} m"
+        raise UnusableLawError(f"sliding and rolling together generate energy {at}: {why}")
     return columns
 
 

@@ -64,8 +64,7 @@ def find_engine(wanted: str | None = None) -> Engine:
     `EngineMissing` if there is no such executable.
     """
     name = wanted or os.environ.get(ENGINE_VARIABLE) or "liggghts"
-    found = shutil.which(name)
-    if found is None:
+    if (found := shutil.which(name)) is None:
         text = "is not an executable file on this machine; install it with: sudo apt-get install liggghts"
         raise EngineMissing(f"no engine: {name} {text}")
     path, digest = Path(found).resolve(), hashlib.sha256()

@@ -103,18 +103,10 @@ def launch(
 ) -> EngineReport:
     """Run a deck in a directory until its end or its first failure, an `EngineFailure`; then the engine has ended.
 
-    Parameters
-    ----------
-    deck, directory, engine
-        The deck; the directory with its files, in which the engine works; the binary.
-    on_step
-        Called a few times per second, and at the end, with the current step; an exception ends the engine.
-    time_limit
-        Wall time in s after which the run is stopped.
-    keep_open
-        File descriptors that the engine inherits (the lock of the run).
-    starts
-        Largest number of starts if the engine ends before it prints its version.
+    The engine works in the directory, which has the deck's files. A few times per second and at the end ``on_step`` is
+    called with the current step; its exceptions end the engine. The run is stopped after ``time_limit`` (wall time, s).
+    The engine inherits the file descriptors ``keep_open`` (the lock of the run). If it ends before it prints its
+    version, it is started again, at most ``starts`` times in all.
     """
     ranks, temporary = deck.layout.ranks, Path(os.environ.get("TMPDIR", "/tmp"))
     check_room(directory, deck.layout.bead_dump_bytes)

@@ -158,7 +158,9 @@ def _as_run(case: Case, written: str, now: str, said: str, source: str) -> tuple
     values, case = {**given, **printed}, case.for_cycles(case.run.attempts[0])
     edited = {name: values[name] for name, value in given.items() if values[name] != value}
     changes = [f"{name} {value:g}, was {given[name]:g}" for name, value in edited.items()]
-    before, after, follow = dict(_LINE.findall(written)), dict(_LINE.findall(now)), _derived(case)
+    before, after = dict(_LINE.findall(written)), dict(_LINE.findall(now))
+    follow = {f"amplitude{end}": one.amplitude for end, one in _by_suffix(case.excitation)}  # from other parameters
+    follow |= {"peak_velocity": case.excitation.peak_velocity, "time_step": case.run.time_step}
     changed = [name for name in printed if name in follow and name not in given and after.get(name) != before[name]]
     changes += [f"{name} {printed[name]:g}, was {follow[name]:g}" for name in changed]
     differ = edited or not all(isclose(values.get(name, one), one, rel_tol=_SAME) for name, one in follow.items())
@@ -216,12 +218,6 @@ def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float]
 
 def _by_suffix(drive: Excitation) -> list[tuple[str, Sine]]:
     return list(zip(suffixes(len(drive.harmonics)), drive.harmonics, strict=True))
-
-
-def _derived(case: Case) -> dict[str, float]:
-    """Parameters of a deck that follow from others."""
-    amplitudes = {f"amplitude{end}": one.amplitude for end, one in _by_suffix(case.excitation)}
-    return {**amplitudes, "peak_velocity": case.excitation.peak_velocity, "time_step": case.run.time_step}
 
 
 def _sine(one: Sine, end: str, values: Mapping[str, float]) -> Sine:

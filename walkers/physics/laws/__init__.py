@@ -53,11 +53,10 @@ def source_of(name: str) -> Path | None:
     if place.endswith(".py"):
         return Path(place).resolve()
     try:
-        found = find_spec(place)
+        if (found := find_spec(place)) is None:
+            raise ImportError("no such module")
     except (ImportError, ValueError, AttributeError) as error:
         raise ValueError(f"bridge law {name!r}: {place} cannot be imported: {error}") from error
-    if found is None:
-        raise ValueError(f"bridge law {name!r}: {place} cannot be imported: no such module")
     return Path(found.origin) if found.has_location and found.origin else None
 
 
