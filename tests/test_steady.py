@@ -18,7 +18,7 @@ from walkers.postprocess.gait import are_constant, walk
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import FIRST_SEGMENT
+from walkers.runner.directory import FIRST_SEGMENT, segment_directories
 from walkers.runner.launch import Progress
 from walkers.runner.manifest import read_manifest
 from walkers.sweeps.making import make_runs
@@ -175,6 +175,6 @@ def test_an_interrupted_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
     dumps = []
     for folder in ("stopped", "at-a-stretch"):
         ((_, run),) = make_runs([case], tmp_path / folder, engine).runs.items()
-        dumps.append([(path / "beads.bin").read_bytes() for path in run.segments])
+        dumps.append([(path / "beads.bin").read_bytes() for path in segment_directories(run)])
     assert len(dumps[0]) == 1
     assert dumps[0] == dumps[1]
