@@ -28,7 +28,7 @@ from walkers.archive import writing
 from walkers.archive.crate import PAPER
 from walkers.archive.writing import ArchiveOptions, ArchiveRefused, Contents, PackedRun, write_archive
 from walkers.inputs.case import Case
-from walkers.runner.directory import FinishedRun
+from walkers.runner.manifest import read_manifest
 from walkers.runner.provenance import commit_of, software
 from walkers.sweeps.table import load
 
@@ -100,13 +100,13 @@ def _verified(path: Path, status: int = 0) -> list[str]:
 
 
 def test_manifests_say_what_made_the_run(run: Path) -> None:
-    manifest = FinishedRun(run).manifest
+    manifest = read_manifest(run)
     files = {path.relative_to(run).as_posix(): path for path in run.rglob("*") if path.is_file()}
     del files["manifest.json"]
     assert manifest["sha256"] == {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files.items()}
     assert manifest["files"] == {name: path.stat().st_size for name, path in files.items()}
     assert manifest["packages"]["numpy"] == np.__version__
-    assert manifest["commit"] == software().commit
+    assert manifest["commit"] == software()["commit"]
 
 
 def test_the_commit_of_a_checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -133,7 +133,7 @@ def test_the_commit_of_a_checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 def test_what_changed_is_named(run: Path, tmp_path: Path) -> None:
     """Nothing is read from pictures and films; a folder of segments is taken for a part of the run."""
-    files = len(FinishedRun(run).manifest["files"])
+    files = len(read_manifest(run)["files"])
     assert _verified(run) == [f"{run.name}: {files} files are unchanged"]
     for name in ("film.mp4", "vtk/walkers_0000.vtp", "vtk/walkers_0001.vtp", ".DS_Store", "test.toml"):
         (run / name).parent.mkdir(exist_ok=True)
@@ -221,7 +221,7 @@ def test_an_archive_has_the_date_of_its_last_run() -> None:
 def test_what_an_archive_says_of_its_run(run: Path, tmp_path: Path) -> None:
     unpacked = tmp_path / "unpacked"
     shutil.unpack_archive(Run(run).export("archive", tmp_path / "run.zip", licence="CC0-1.0"), unpacked)
-    crate, manifest, place = ROCrate(unpacked), FinishedRun(run).manifest, f"runs/{run.name}"
+    crate, manifest, place = ROCrate(unpacked), read_manifest(run), f"runs/{run.name}"
     root = crate.root_dataset
     assert root["citation"].id == PAPER
     assert "zero" in root["license"].id
@@ -251,7 +251,7 @@ def test_an_archive_without_dumps(run: Path, tmp_path: Path) -> None:
     call("export", str(run), "--to", "archive", "-o", str(archive), "--without-dumps", check=True)
     shutil.unpack_archive(archive, tmp_path / "unpacked")
     there = tmp_path / "unpacked" / "runs" / run.name
-    files = len(FinishedRun(run).manifest["files"])
+    files = len(read_manifest(run)["files"])
     assert _verified(there)[0].endswith(f"{files - 3} files are unchanged, 3 left out of the archive")
     assert Run(there).result == Run(run).result
     call("export", str(there), "--to", "archive", "-o", str(again), "--without-dumps", check=True)

@@ -25,8 +25,8 @@ from walkers.inputs.reading import load_case
 from walkers.physics.bridge import Surfaces
 from walkers.runner import binary
 from walkers.runner.binary import AuditRecord, find_engine, read_audit, write_audit
-from walkers.runner.directory import FinishedRun
 from walkers.runner.failures import AuditFailed, UnauditedEngineWarning
+from walkers.runner.manifest import read_manifest
 
 
 @pytest.fixture(scope="session")
@@ -63,7 +63,7 @@ def _change_model(folder: Path, monkeypatch: pytest.MonkeyPatch, right: str, oth
 
 def _audit_of(run: Run) -> dict[str, Any] | None:
     """What the manifest of a run says of its engine's audit."""
-    audit: dict[str, Any] | None = FinishedRun(run.directory).manifest["engine"]["audit"]
+    audit: dict[str, Any] | None = read_manifest(run.directory)["engine"]["audit"]
     return audit
 
 
@@ -245,7 +245,7 @@ def test_a_run_with_another_contact_model_than_the_audited_is_not_audited(own_ca
         run = run_case(case, own_cache / "a")
     assert _audit_of(run) is None
     report = replace(run_audit(["stock"]), chapters=())
-    assert report.contact_model == FinishedRun(run.directory).manifest["contact_model"]["sha256"]
+    assert report.contact_model == read_manifest(run.directory)["contact_model"]["sha256"]
     record(report, quick=False)
     assert _audit_of(run_case(case, own_cache / "b")) is not None
 

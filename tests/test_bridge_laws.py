@@ -25,10 +25,10 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.run import limits_of
 from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces, UnusableLawError
-from walkers.physics.capillary import (
-    bridge_volume_at_wall,
-)
 from walkers.physics.capillary import rupture_distance as rupture_of_lian
+from walkers.physics.capillary import (
+    share_of_bead,
+)
 from walkers.physics.laplace import force_curve, rupture_distance
 from walkers.physics.laws import LAWS, by_name, rabinovich, willett, young_laplace
 from walkers.physics.laws import soulie as soulie_law
@@ -104,7 +104,7 @@ def test_rabinovichs_pull_at_contact() -> None:
 
 def test_the_force_of_pitois() -> None:
     """X² of one per cent of a bead's volume on a plane; between equal spheres 3/2 πηR² X²/h (Pitois et al. 2000)."""
-    wall = surfaces(volume=bridge_volume_at_wall(1.0, 0.01))
+    wall = surfaces(volume=share_of_bead(1.0, inf, 0.01))
     for gap, factor in ((0.025, 0.5), (0.1, 0.05)):
         normal = reynolds.resistances(wall, np.array([gap]))[0][0]
         assert normal / (6.0 * pi / gap) == pytest.approx(factor, rel=0.02)
@@ -396,7 +396,7 @@ def test_viscous_limit_rules_in_glycerol() -> None:
 def test_auto_respects_every_limit_with_margin(name: str) -> None:
     """And is no shorter than that asks for: loose beads by their own shares, walkers at most 4 µs."""
     case = load_case(name)
-    limits = limits_of(case).as_dict()
+    limits = vars(limits_of(case))
     shares = AUTO_FRACTIONS if case.loose else WALKER_FRACTIONS
     assert shares.keys() == limits.keys()
     assert all(0.0 < share <= 0.5 for share in shares.values())

@@ -119,7 +119,7 @@ def model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     sources.mkdir()
     shutil.copy(binary.SOURCES / "bridge.map", sources)
     (sources / "table.h").touch()
-    (sources / "bridge.cpp").write_text("int small = 1;\n")
+    (sources / "bridge.cpp").write_text("// FORCES_VERSION 1\nint small = 1;\n")
     monkeypatch.setattr(binary, "SOURCES", sources)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return plugin_of(find_engine())
@@ -213,11 +213,11 @@ def test_another_version_of_the_forces_is_another_engine_within_a_session(
 ) -> None:
     shutil.copytree(binary.SOURCES, tmp_path / "engine")
     monkeypatch.setattr(binary, "SOURCES", tmp_path / "engine")
-    before = find_engine()
-    model = tmp_path / "engine" / "bridge.cpp"
-    model.write_text(model.read_text() + "// another line\n")
+    before, source = find_engine(), tmp_path / "engine" / "bridge.cpp"
+    text = source.read_text()
+    source.write_text(f"{text}// another line\n")
     assert find_engine() == before
-    model.write_text(re.sub(r"FORCES_VERSION \d+", "FORCES_VERSION 0", model.read_text()))
+    source.write_text(re.sub(r"FORCES_VERSION \d+", "FORCES_VERSION 0", text))
     assert find_engine() != before
 
 

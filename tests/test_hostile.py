@@ -31,7 +31,7 @@ from walkers.postprocess.paraview import _script
 from walkers.postprocess.report.run import result_html
 from walkers.runner.directory import CASE_NAME, case_of
 from walkers.runner.files import write_json
-from walkers.runner.manifest import record_tables
+from walkers.runner.manifest import recomputed
 from walkers.show import describe, summarise
 from walkers.sweeps.table import load
 from walkers.templates.deck import render_deck
@@ -101,8 +101,8 @@ def stranger(run_directory: Callable[..., Path], tmp_path: Path) -> Callable[[st
         place = tmp_path / given.name
         shutil.rmtree(place, ignore_errors=True)
         shutil.copytree(given, place)
-        write_json(place / CASE_NAME, _with_texts(case_of(given), text).as_dict())
-        record_tables(place, [CASE_NAME])
+        with recomputed(place, [CASE_NAME]):
+            write_json(place / CASE_NAME, _with_texts(case_of(given), text).as_dict())
         return place
 
     return made

@@ -497,11 +497,11 @@ def test_of_runs_that_begin_alike_the_longest_counts(tmp_path: Path, monkeypatch
     for name, seed, cycles, version in runs:
         (tmp_path / name).mkdir()
         told = {"run": {"seed": seed, "cycles": cycles, "cycles_per_segment": min(cycles, 30)}}
-        (tmp_path / name / "manifest.json").write_text("{}")
         case = SimpleNamespace(determinants=lambda told=told: told)
         manifest = {"deck_version": version, "engine": {"sha256": "0" * 64}}
-        cases[tmp_path / name] = SimpleNamespace(directory=tmp_path / name, case=case, manifest=manifest)
-    monkeypatch.setattr("walkers.sweeps.climbing.finished_run", cases.get)
+        (tmp_path / name / "manifest.json").write_text(json.dumps(manifest))
+        cases[tmp_path / name] = case
+    monkeypatch.setattr("walkers.sweeps.climbing.case_of", cases.get)
     monkeypatch.setattr(Pile, "applies", lambda self, case: True)
     usual, other = conditions_in([tmp_path])
     assert (usual.label, usual.runs) == ("deck version = 7", [tmp_path / "b-2", tmp_path / "c-3"])

@@ -127,7 +127,7 @@ def test_numbers_of_a_report_are_the_results_and_parameters_say_whence(
     page = Page(path)
     assert wanted <= check_numbers(page, current_result(directory))
     assert path.stat().st_size < LARGEST
-    assert f"Written by granular-walkers {software().version}." in page.words
+    assert f"Written by granular-walkers {software()['granular_walkers']}." in page.words
     origins = walkers.load(directory).case.origins
     assert len(origins) > 20
     for said in ("given", "library", *(told for one in origins for told in (one.key, one.text, one.word))):

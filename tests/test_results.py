@@ -22,7 +22,7 @@ from walkers.postprocess.sides import sides
 from walkers.postprocess.tables import described, read_table
 from walkers.runner.directory import SEGMENTS
 from walkers.runner.files import write_json
-from walkers.runner.manifest import record_tables
+from walkers.runner.manifest import recomputed
 
 
 @pytest.fixture(scope="module")
@@ -59,18 +59,18 @@ def test_a_result_of_before_is_made_anew_if_it_can_be(
     assert known["analyses"] == {"walking": Walking.version, "work": Working.version}
     lacking = {key: value for key, value in known.items() if key not in ("separated_fraction", "analyses")}
     for old in ({**lacking, "analyses": {"walking": Walking.version - 1}}, lacking):
-        write_json(copy / RESULT_NAME, old)
-        record_tables(copy, [RESULT_NAME])
+        with recomputed(copy, [RESULT_NAME]):
+            write_json(copy / RESULT_NAME, old)
         assert current_result(copy) == known
         assert read_result(copy) == known
-    write_json(copy / RESULT_NAME, {**known, "analyses": {"walking": Walking.version - 1}})
-    record_tables(copy, [RESULT_NAME])
+    with recomputed(copy, [RESULT_NAME]):
+        write_json(copy / RESULT_NAME, {**known, "analyses": {"walking": Walking.version - 1}})
 
     def refuse(*_: object) -> None:
         raise OSError(EROFS, "Read-only file system")
 
     with monkeypatch.context() as patch:  # what cannot be written is told all the same
-        patch.setattr("walkers.postprocess.analysis.forget_tables", refuse)
+        patch.setattr("walkers.postprocess.analysis.recomputed", refuse)
         assert current_result(copy) == known
     shutil.rmtree(copy / SEGMENTS)  # as in an archive without dumps
     assert current_result(copy) == {**known, "analyses": {"walking": Walking.version - 1}}

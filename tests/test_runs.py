@@ -37,15 +37,17 @@ from walkers.errors import InputError
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import (
     FIRST_SEGMENT,
-    FinishedRun,
+    case_of,
     finished_places,
-    finished_run,
+    is_finished,
     is_locked,
+    layout_of,
     locked,
-    run_name,
+    run_place,
 )
 from walkers.runner.failures import RunBusy
 from walkers.runner.launch import Progress
+from walkers.runner.manifest import read_manifest
 from walkers.templates.deck import render_deck
 
 PATIENCE_OF_LOCKS = "walkers.runner.directory._PATIENCE_SECONDS"
@@ -72,7 +74,7 @@ def _forked(work: Callable[[], object]) -> int:
 
 def test_the_name_depends_on_what_determines_the_run() -> None:
     def name(**changes: object) -> str:
-        return run_name(make_case(**changes), find_engine())
+        return run_place(make_case(**changes), find_engine(), Path()).name
 
     names = {
         name(),
@@ -85,8 +87,8 @@ def test_the_name_depends_on_what_determines_the_run() -> None:
     assert len(names) == 6
     assert name(title="another title") == name()
     other = replace(find_engine(), sha256="0" * 64)
-    assert run_name(make_case(), other) != name()
-    long = run_name(make_case().but(name="a b/" * 100), other)
+    assert run_place(make_case(), other, Path()).name != name()
+    long = run_place(make_case().but(name="a b/" * 100), other, Path()).name
     assert len(long) < 100
     assert "/" not in long
 
@@ -94,20 +96,20 @@ def test_the_name_depends_on_what_determines_the_run() -> None:
 def test_contents_of_a_run_directory(tmp_path: Path) -> None:
     """And the deck can be run by hand, with the same numbers."""
     case = make_case(run=SHORT)
-    run = finished_run(run_case(case, tmp_path / "runs").directory)
-    assert run is not None
-    assert {path.name for path in run.directory.iterdir()} == {
+    run = run_case(case, tmp_path / "runs").directory
+    assert is_finished(run)
+    assert {path.name for path in run.iterdir()} == {
         *("case.json", "manifest.json", "result.json", "segments"),
         *("trajectory.parquet", "walkers.parquet", "bridges.parquet", "work.parquet"),
     }
-    assert {path.name for path in (run.directory / "segments").iterdir()} == {"0000"}
-    assert {path.name for path in (run.directory / FIRST_SEGMENT).iterdir()} == {
+    assert {path.name for path in (run / "segments").iterdir()} == {"0000"}
+    assert {path.name for path in (run / FIRST_SEGMENT).iterdir()} == {
         *("layout.json", "walker.lig", "bridges.txt", "engine.log", "segment.json", "run.sh"),
         *("beads.bin", "bridges.pairs.txt", "bridges.walls.txt"),
     }
-    assert run.case == case
-    assert run.layout == render_deck(case).layout
-    manifest = run.manifest
+    assert case_of(run) == case
+    assert layout_of(run / FIRST_SEGMENT) == render_deck(case).layout
+    manifest = read_manifest(run)
     assert (manifest["status"], manifest["steps"]) == ("finished", case.run.steps)
     assert manifest["steps_per_second"] > 0
     assert manifest["engine"]["sha256"] == find_engine().sha256
@@ -115,7 +117,7 @@ def test_contents_of_a_run_directory(tmp_path: Path) -> None:
     by_hand = tmp_path / "byhand"
     call("export", _toml(tmp_path), "--to", "deck", "-o", str(by_hand), check=True)
     subprocess.run(["sh", "run.sh"], cwd=by_hand, check=True)
-    assert (by_hand / "beads.bin").read_bytes() == (run.directory / FIRST_SEGMENT / "beads.bin").read_bytes()
+    assert (by_hand / "beads.bin").read_bytes() == (run / FIRST_SEGMENT / "beads.bin").read_bytes()
 
 
 def test_a_run_is_found_by_its_directory_its_name_or_its_case_with_other_values_too(in_folder: Path) -> None:
@@ -265,14 +267,14 @@ def test_an_interrupted_run_goes_on_after_its_last_whole_segment(tmp_path: Path)
 
 def test_a_run_that_somebody_else_finished_meanwhile_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     case = make_case(run=SHORT)
-    stamp = FinishedRun(run_case(case, tmp_path).directory).manifest["finished"]
+    stamp = read_manifest(run_case(case, tmp_path).directory)["finished"]
     # It is not there at the first look, but at the second, after the run has been locked.
-    answers = iter([None])
-    monkeypatch.setattr("walkers.pipeline.finished_run", lambda place: next(answers, finished_run(place)))
+    answers = iter([False])
+    monkeypatch.setattr("walkers.pipeline.is_finished", lambda place: next(answers, is_finished(place)))
     outcome = run_case(case, tmp_path)
     assert outcome.cached
     assert not list(answers)  # the first look has been
-    assert FinishedRun(outcome.directory).manifest["finished"] == stamp
+    assert read_manifest(outcome.directory)["finished"] == stamp
     assert not list(tmp_path.glob("*.incomplete"))
 
 
@@ -283,7 +285,7 @@ def test_a_crash_within_a_replacement_leaves_no_trace(tmp_path: Path) -> None:
     left = place.with_name(place.name + ".replaced")
     place.rename(left)
     with open_run(case, find_engine(), tmp_path):
-        assert finished_run(place) is not None
+        assert is_finished(place)
     shutil.copytree(place, left)
     assert finished_places(tmp_path) == {place.name: place}
     assert run_case(case, tmp_path).cached
@@ -340,7 +342,7 @@ def test_after_each_kill_the_next_call_runs(tmp_path: Path) -> None:
         os.kill(child, signal.SIGKILL)
         outcome = run_case(case, tmp_path)
         os.waitpid(child, 0)
-        assert finished_run(outcome.directory) is not None
+        assert is_finished(outcome.directory)
         assert not is_locked(outcome.directory)
     wait_for(lambda: not engines_in(tmp_path))
     assert not list(tmp_path.glob("*.incomplete"))

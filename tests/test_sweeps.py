@@ -27,8 +27,9 @@ from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import FIRST_SEGMENT, finished_run, locked
+from walkers.runner.directory import FIRST_SEGMENT, case_of, locked
 from walkers.runner.failures import WalkersMet
+from walkers.runner.manifest import read_manifest
 from walkers.show import predicted_overhead
 from walkers.sweeps.making import make_runs
 from walkers.sweeps.scheduler import Options, SweepReplacedWarning, SweepStopped, plan_sweep, run_sweep, work
@@ -99,19 +100,19 @@ def test_points_of_a_shared_deck_are_what_they_are_alone(tmp_path: Path) -> None
     together = make_runs(cases, tmp_path / "together", engine)
     for case, (name, there) in zip(cases, together.runs.items(), strict=True):
         alone = make_runs([case], tmp_path / "alone", engine).runs[name]
-        motion, motion_alone = read_motion(there.directory), read_motion(alone.directory)
+        motion, motion_alone = read_motion(there), read_motion(alone)
         assert motion.case == motion_alone.case == case
         for one, other in zip(motion.groups, motion_alone.groups, strict=True):
             way, way_alone = one.position - one.position[0], other.position - other.position[0]
             assert np.abs(way - way_alone).max() < 1e-12
             np.testing.assert_allclose(one.orientation, other.orientation, atol=1e-9)
         for table in ("walkers", "bridges"):
-            left, right = read_table(there.directory, table), read_table(alone.directory, table)
+            left, right = read_table(there, table), read_table(alone, table)
             pd.testing.assert_frame_equal(left, right, check_exact=False, rtol=1e-6, atol=1e-9)
         np.testing.assert_allclose(left["normal_force"], right["normal_force"], atol=1e-10)
         first = next(iter(together.runs))
-        assert there.manifest["shared_deck"] == {"first": first, "runs": len(cases), "walkers": 10}
-        names, own = ({path.name for path in run.directory.rglob("*")} for run in (there, alone))
+        assert read_manifest(there)["shared_deck"] == {"first": first, "runs": len(cases), "walkers": 10}
+        names, own = ({path.name for path in run.rglob("*")} for run in (there, alone))
         assert {"shared_deck", "walker.lig", "engine.log"} <= names
         assert own - names == set(), "what a run of its own has, one of a shared deck has too"
 
@@ -151,10 +152,10 @@ def test_the_table_of_a_sweep(sweep_file: Callable[..., str], monkeypatch: pytes
     units = frame.attrs["units"]
     assert (units["drive.peak_acceleration"], units["dimers.radii[1]"], units["velocity"]) == ("g", "mm", "m/s")
     for row in frame.itertuples():
-        run = finished_run(Path(row.run))
-        velocity = json.loads((run.directory / "result.json").read_text())["velocity"]
+        run, case = Path(row.run), case_of(Path(row.run))
+        velocity = json.loads((run / "result.json").read_text())["velocity"]
         assert [row.velocity, row.smallest] == [velocity["mean"], velocity["smallest"]]
-        assert row.gamma0 == pytest.approx(dimer_of(run.case).gamma0(run.case.excitation.peak_acceleration))
+        assert row.gamma0 == pytest.approx(dimer_of(case).gamma0(case.excitation.peak_acceleration))
     call("list", directory, "--to", "table.csv", check=True)
     read = pd.read_csv("table.csv")
     assert list(read["drive.peak_acceleration (g)"]) == [2.0, 4.0, 2.0, 4.0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,16 +16,17 @@ from walkers.runner.binary import find_engine
 from walkers.runner.directory import (
     CASE_NAME,
     UNFINISHED,
-    FinishedRun,
     case_of,
-    finished_run,
     is_deck_folder,
+    is_finished,
     is_locked,
     is_run_name,
     layout_of,
     run_place,
+    segment_directories,
     unfinished,
 )
+from walkers.runner.manifest import read_manifest
 
 if TYPE_CHECKING:
     from walkers.inputs.case import Case
@@ -79,7 +80,7 @@ def placed(name: str | Path, out: Path = DEFAULT_OUT) -> Place | None:
 
 def files_of(place: Path) -> Path:
     """The directory with the files of a run, finished or not."""
-    return place if finished_run(place) else unfinished(place)
+    return place if is_finished(place) else unfinished(place)
 
 
 def _is_begun(place: Path) -> bool:
@@ -146,7 +147,7 @@ def find(
         return there
     case, folder = case_at(what, out, changes)
     place = run_place(case, find_engine(), folder)
-    if finished_run(place) or _is_begun(place):
+    if is_finished(place) or _is_begun(place):
         return Place(place, "run", case)
     name = what if isinstance(what, (str, Path)) else case.name
     settings = [f"--set {shlex.quote(f'{key}={value}')}" for key, value in (changes or {}).items()]
@@ -164,12 +165,16 @@ def check_run(directory: Path, *, dumps: bool = True) -> None:
     """Refuse an unreadable finished run; recompute its tables if necessary."""
     from walkers.postprocess.analysis import current_result
 
-    run = FinishedRun(directory)
-    for name in ("manifest", "case", "layout"):
+    readers: dict[str, Callable[[Path], object]] = {
+        "manifest": read_manifest,
+        "case": case_of,
+        "layout": lambda run: layout_of(segment_directories(run)[0]),
+    }
+    for name, read in readers.items():
         with _refusing_damage(directory, f"the run's {name}.json cannot be read"):
-            getattr(run, name)
+            read(directory)
     if dumps:
-        _check_dumps(run)
+        _check_dumps(directory)
     with _refusing_damage(directory, "the run cannot be read"):
         current_result(directory)
 
@@ -183,16 +188,16 @@ def _refusing_damage(directory: Path, message: str) -> Iterator[None]:
         raise refused(directory, f"{message} ({error})") from error
 
 
-def _check_dumps(run: FinishedRun) -> None:
+def _check_dumps(run: Path) -> None:
     """Refuse a run without a dump, unless an archive left it out; warn if the dump is cut."""
-    left_out = run.manifest.get("left_out", ())  # of an archive
-    for segment in run.segments:
+    left_out, segments = read_manifest(run).get("left_out", ()), segment_directories(run)  # of an archive
+    for segment in segments:
         layout = layout_of(segment)
         dump = segment / layout.bead_dump
-        if dump.relative_to(run.directory).as_posix() in left_out:
+        if dump.relative_to(run).as_posix() in left_out:
             continue
         if not dump.is_file():
-            raise refused(run.directory, f"the run's {layout.bead_dump} is missing")
-        if len(run.segments) == 1 and dump.stat().st_size < layout.bead_dump_bytes:
+            raise refused(run, f"the run's {layout.bead_dump} is missing")
+        if len(segments) == 1 and dump.stat().st_size < layout.bead_dump_bytes:
             text = f"{dump} is incomplete: what is drawn or written ends early"
             warnings.warn(text, IncompleteRunWarning, stacklevel=5)

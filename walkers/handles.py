@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from walkers.errors import refused
 from walkers.finding import files_of
-from walkers.runner.directory import FAILURE_NAME, case_of, finished_run, is_locked
+from walkers.runner.directory import FAILURE_NAME, case_of, is_finished, is_locked
 from walkers.runner.files import read_json
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ class Run:
     @property
     def finished_directory(self) -> Path:
         """The directory of a finished run; otherwise `InputError`."""
-        if finished_run(self.directory) is None:
+        if not is_finished(self.directory):
             raise refused(self.directory, f"the run is {self._state}")
         return self.directory
 
@@ -149,7 +149,7 @@ class Run:
         """The result as text in mm, mm/s and degrees; of an unfinished run, its progress."""
         from walkers.postprocess.analysis import describe_result
 
-        if finished_run(self.directory) is None:
+        if not is_finished(self.directory):
             return f"{self.directory.name}: {self._state}"
         return describe_result(self.directory, self.result, cached=self.cached)
 
@@ -157,7 +157,7 @@ class Run:
         """The result in a notebook: a table with errors, units and warnings, and the parameters."""
         from walkers.postprocess.report.run import result_html
 
-        if finished_run(self.directory) is None:
+        if not is_finished(self.directory):
             return f"<p>{escape(self.describe())}</p>"
         return result_html(self.directory, self.result, self.origins)
 

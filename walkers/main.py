@@ -148,7 +148,7 @@ def describe_version() -> str:
     from walkers.runner.provenance import PROJECT, software
 
     ours = software()
-    package = f"{PROJECT} {ours.version}" + (f" (commit {ours.commit})" if ours.commit else "")
+    package = f"{PROJECT} {ours['granular_walkers']}" + (f" (commit {ours['commit']})" if ours["commit"] else "")
     try:
         path = find_engine().path
     except EngineMissing as missing:

@@ -16,7 +16,7 @@ from walkers.finding import NOT_A_RUN, Place, case_at, check_run, find, placed
 from walkers.handles import Run, Sweep
 from walkers.progress import progress_of, progress_of_sweep, shown_if
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import finished_run, run_place, unfinished
+from walkers.runner.directory import is_finished, run_place, unfinished
 from walkers.runner.failures import EngineMissing, RunBusy
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def run(
         raise InputError(case.name, [Problem("drive.frequency", f"{case.excitation.frequency:g} Hz", message)])
     binary = find_engine(engine)
     place = run_place(case, binary, out)
-    if finished_run(place) is not None and not force:
+    if is_finished(place) and not force:
         check_run(place, dumps=False)
         return Run(place, origins=case.origins)
     check_audit(binary, allow_failed_audit)
@@ -101,7 +101,7 @@ def run(
         made = make_runs([case], out, binary, force=force, on_progress=advance, time_limit=time_limit)
     if made.busy:
         raise RunBusy("another process is still running this case", unfinished(place))
-    return Run(made.runs[place.name].directory, cached=place.name in made.found, origins=case.origins)
+    return Run(made.runs[place.name], cached=place.name in made.found, origins=case.origins)
 
 
 def _load_postprocess() -> None:
@@ -224,14 +224,14 @@ def load_sweep(what: str | Path, out: str | Path = DEFAULT_OUT) -> Sweep:
 def finished_at(what: Case | str | Path | Mapping[str, Any], out: Path = DEFAULT_OUT) -> Run | None:
     """The finished run with a name or a directory; None for a case."""
     there = placed(what, out) if isinstance(what, (str, Path)) else None
-    return run_at(there, str(what)) if there and there.kind == "run" and finished_run(there.path) else None
+    return run_at(there, str(what)) if there and there.kind == "run" and is_finished(there.path) else None
 
 
 def run_at(place: Place, name: str) -> Run:
     """The run at a place with the user's name for it; `InputError` if it is no run, or finished and unreadable."""
     if place.kind != "run":
         raise refused(name, NOT_A_RUN[place.kind])
-    if finished_run(place.path):
+    if is_finished(place.path):
         check_run(place.path)
     return Run(place.path, origins=None if place.case is None else place.case.origins)
 
@@ -249,4 +249,4 @@ def find_side(what: str | Path, out: Path = DEFAULT_OUT, changes: Mapping[str, A
             directory = run_place(case, find_engine(), folder)
     name = directory.name if directory and there and there.kind == "run" else str(what)
     name = " ".join([name, *(f"{key}={value}" for key, value in (changes or {}).items())])
-    return Side(name, case, directory if directory and finished_run(directory) else None)
+    return Side(name, case, directory if directory and is_finished(directory) else None)

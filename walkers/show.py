@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import asdict
-from math import ceil, inf, isfinite, pi
+from math import ceil, inf, isfinite
 from typing import Any
 
 from walkers.inputs.bodies import Walkers
@@ -18,7 +18,7 @@ from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.numerical import numerical_error
 from walkers.inputs.run import CONSTANT, limits_of
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
-from walkers.physics.capillary import capillary_force_limit_at_wall
+from walkers.physics.capillary import bead_volume, capillary_force_limit_at_wall
 from walkers.physics.time_step import auto_fractions
 from walkers.rounding import counted, percent
 from walkers.runner.launch import cores_here
@@ -48,12 +48,8 @@ _TRIED_AGAIN = (1.0, 0.1, 0.1)
 def predicted_seconds(case: Case, walkers: int | None = None) -> float:
     """Time in s that the engine takes for a run, or a deck, on as many cores as it has MPI processes.
 
-    Parameters
-    ----------
-    case
-        A case of the deck, for the number of its steps.
-    walkers
-        Number of pairs of beads in the deck (`pairs_of_beads`); default: that of the case.
+    Any ``case`` of a deck has its number of steps. ``walkers`` is the number of pairs of beads in the deck
+    (`pairs_of_beads`), by default that of the case.
     """
     run = case.run
     cycles = sum(share * cycles for share, cycles in zip(_TRIED_AGAIN, run.attempts, strict=False))
@@ -121,7 +117,7 @@ def _two_digits(number: float) -> str:
 
 def _volume(case: Case) -> float:
     """Volume of all beads, m³."""
-    return sum(4.0 / 3.0 * pi * radius**3 for radius in case.all_radii)
+    return sum(map(bead_volume, case.all_radii))
 
 
 def _youngs_modulus(case: Case) -> Known | None:
@@ -140,7 +136,7 @@ def summarise(case: Case) -> dict[str, Any]:
         walkers), ``time_step`` (limits, None if one does not apply; the chosen step; its shares of the limits and those
         of ``"auto"``), ``run`` (steps, samples, predicted seconds).
     """
-    run, drive, limits = case.run, case.excitation, limits_of(case).as_dict()
+    run, drive, limits = case.run, case.excitation, vars(limits_of(case))
     volume = _volume(case)
     known = _youngs_modulus(case)
     summary: dict[str, Any] = {
@@ -174,34 +170,27 @@ def summarise(case: Case) -> dict[str, Any]:
     }
     if case.walkers and len(case.walkers[0].radii) == 2:
         dimer = dimer_of(case)
-        summary["dimer"] = {
-            "masses": list(dimer.masses),
-            "total_mass": dimer.total_mass,
-            "mean_radius": dimer.mean_radius,
-            "gamma0": dimer.gamma0(drive.peak_acceleration),
-            "sin_delta": dimer.sin_delta,
-            "mass_asymmetry": dimer.mass_asymmetry,
-        }
+        numbers = ("total_mass", "mean_radius", "sin_delta", "mass_asymmetry")
+        summary["dimer"] = {name: getattr(dimer, name) for name in numbers}
+        summary["dimer"] |= {"masses": list(dimer.masses), "gamma0": dimer.gamma0(drive.peak_acceleration)}
     return summary
 
 
 def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
     """Loads of the contacts of a walker at rest."""
-    loads, radii = contact_loads(case, walkers), walkers.radii
-    names = [f"bead {bead} on substrate" for bead in range(1, len(radii) + 1)]
-    names += [f"bead {other + 1} on bead {one + 1}" for one, other in walkers.pairs]
-    planes = [capillary_force_limit_at_wall(case.liquid.surface_tension, radius) for radius in radii]
-    return [
-        {
-            "contact": name,
-            "bridge_volume": loads.bridge_volumes[number],
-            "capillary_force": loads.capillary[number],
-            "capillary_force_limit": planes[number] if number < len(radii) else None,
-            "rupture_distance": loads.rupture[number],
-            "overlap_at_rest": loads.overlaps[number],
-        }
-        for number, name in enumerate(names)
-    ]
+    loads, tension = contact_loads(case, walkers), case.liquid.surface_tension
+    contacts = [f"bead {bead} on substrate" for bead, _ in enumerate(walkers.radii, 1)]
+    contacts += [f"bead {other + 1} on bead {one + 1}" for one, other in walkers.pairs]
+    planes = [capillary_force_limit_at_wall(tension, radius) for radius in walkers.radii]
+    columns = {
+        "contact": contacts,
+        "bridge_volume": loads.bridge_volumes,
+        "capillary_force": loads.capillary,
+        "capillary_force_limit": [*planes, *(None for _ in walkers.pairs)],
+        "rupture_distance": loads.rupture,
+        "overlap_at_rest": loads.overlaps,
+    }
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def describe(summary: dict[str, Any]) -> str:

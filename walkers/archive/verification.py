@@ -12,8 +12,7 @@ from walkers.archive.crate import METADATA_NAME
 from walkers.errors import refused, shortened
 from walkers.postprocess.uncertainty import SPREAD_NAME
 from walkers.runner.directory import CASE_NAME, SEGMENTS
-from walkers.runner.files import read_json
-from walkers.runner.manifest import MANIFEST_NAME, checksums
+from walkers.runner.manifest import MANIFEST_NAME, checksums, read_manifest
 from walkers.sweeps.table import PARSL, RECORD_NAME, read_record, states
 from walkers.text import printable
 
@@ -82,7 +81,7 @@ def _verify_run(directory: Path) -> Verification:
     """Compare a run with its manifest; a run without a readable manifest does not pass."""
     name = directory.resolve().name
     try:
-        contents = read_json(directory / MANIFEST_NAME)
+        contents = read_manifest(directory)
         listed = {CASE_NAME: "", **contents["sha256"]}  # every run has a case
         beside, left_out = f"{contents['name']}.toml", set(contents.get("left_out", ()))  # in archives
         there = _files_below(directory)

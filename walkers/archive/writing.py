@@ -18,9 +18,9 @@ from walkers.archive.verification import SUMS_NAME, verify
 from walkers.errors import InputError, Problem, WalkersError, refused
 from walkers.extras import require
 from walkers.postprocess.report.page import fill
-from walkers.runner.directory import CASE_NAME, FinishedRun, name_of
+from walkers.runner.directory import CASE_NAME, case_of, name_of
 from walkers.runner.files import beside, checksum, json_bytes
-from walkers.runner.manifest import MANIFEST_NAME
+from walkers.runner.manifest import MANIFEST_NAME, read_manifest
 from walkers.sweeps.table import RECORD_NAME, SweepRecord, read_record, states
 
 _STORED = ("/", ".parquet", ".png", ".mp4")
@@ -255,7 +255,7 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
 
     if not (directory / RECORD_NAME).is_file():
         run = _packed(directory, dumps)
-        return Contents(run.name, FinishedRun(directory).case.title, [run])
+        return Contents(run.name, case_of(directory).title, [run])
     record = read_record(directory)
     found = states(record)
     unfinished = sum(state.status not in ("finished", "not needed") for state in found)
@@ -275,14 +275,14 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
 
 def _packed(directory: Path, dumps: bool) -> PackedRun:
     """The files of a manifest, the manifest, and the case file, if it is known."""
-    run = FinishedRun(directory)
+    manifest = read_manifest(directory)
     for key in ("started", "finished"):
         try:
-            time.strptime(run.manifest[key], _MOMENT)
+            time.strptime(manifest[key], _MOMENT)
         except (ValueError, TypeError) as error:
             text = "expected a time such as 2026-01-31T12:00:00Z"
-            raise InputError(str(directory / MANIFEST_NAME), [Problem(key, f'"{run.manifest[key]}"', text)]) from error
-    manifest, case, place = run.manifest, run.case, f"{RUNS}/{directory.resolve().name}"
+            raise InputError(str(directory / MANIFEST_NAME), [Problem(key, f'"{manifest[key]}"', text)]) from error
+    case, place = case_of(directory), f"{RUNS}/{directory.resolve().name}"
     before, sums = set(manifest.get("left_out", ())), manifest["sha256"]
     named = {name: item(f"{place}/{name}", directory / name, sums.get(name)) for name in manifest["files"]}
     left_out = {name for name, one in named.items() if name in before or (one.role == "dump" and not dumps)}

@@ -251,7 +251,7 @@ def _largest_time_step(case: Case) -> tuple[float, str]:
     if given is None:
         return limits.recommended(loose=case.loose)
     if (exceeded := limits.exceeded_by(given)) and not case.run.allow_unstable:
-        allowed = f"{min(limits.as_dict().values()) * 1e6:.3g} us"
+        allowed = f"{min(vars(limits).values()) * 1e6:.3g} us"
         message = f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed}, "
         raise unusable("run.time_step", f'{message}"auto", or allow_unstable = true')
     return given, "given"

@@ -29,7 +29,7 @@ from math import inf
 import numpy as np
 import numpy.typing as npt
 
-from walkers.physics.capillary import bridge_volume_at_wall, bridge_volume_between_beads, film_volume, share_of_bead
+from walkers.physics.capillary import film_volume, share_of_bead
 from walkers.physics.liquid import BridgeLiquid
 
 FloatArray = npt.NDArray[np.float64]
@@ -65,12 +65,10 @@ class Surfaces:
     @classmethod
     def of(cls, radius: float, other_radius: float, liquid: BridgeLiquid, minimum_separation_ratio: float) -> Surfaces:
         """Make the surfaces of a bead and another bead or a plane (infinite radius), and the volume of their bridge."""
-        if other_radius == inf:
-            volume = bridge_volume_at_wall(radius, liquid.volume_fraction)
-        else:
-            radius, other_radius = sorted((radius, other_radius))
-            volume = bridge_volume_between_beads(radius, other_radius, liquid.volume_fraction)
-        return cls(radius, other_radius, volume, liquid, minimum_separation_ratio)
+        small, large = sorted((radius, other_radius))
+        fraction = liquid.volume_fraction
+        volume = share_of_bead(small, large, fraction) + share_of_bead(large, small, fraction)
+        return cls(small, large, volume, liquid, minimum_separation_ratio)
 
     @property
     def volumes(self) -> list[Surfaces]:
@@ -85,12 +83,9 @@ class Surfaces:
     @property
     def films(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """What each surface contributes to a bridge of full films, and its liquid, m³ (a wall has none)."""
-        fraction, (small, large) = self.liquid.volume_fraction, (self.radius, self.other_radius)
-        own = film_volume(small, fraction)
-        if self.at_wall:
-            return (bridge_volume_at_wall(small, fraction), 0.0), (own, inf)
+        fraction, small, large = self.liquid.volume_fraction, self.radius, self.other_radius
         shares = share_of_bead(small, large, fraction), share_of_bead(large, small, fraction)
-        return shares, (own, film_volume(large, fraction))
+        return shares, (film_volume(small, fraction), inf if self.at_wall else film_volume(large, fraction))
 
     @property
     def at_wall(self) -> bool:
@@ -110,18 +105,10 @@ class Surfaces:
 
 @dataclass(frozen=True)
 class Forces:
-    """Pull and resistances at given gaps, arrays of shape (n,). The module defines them.
+    """Pull and resistances of the module at given gaps, each of shape (n,).
 
-    Attributes
-    ----------
-    pull
-        Pull P, N.
-    normal, sliding
-        Resistances N and S, N s/m.
-    coupling
-        Resistance C, N s.
-    rolling
-        Resistance Q, N m s.
+    ``pull`` is P in N; ``normal`` and ``sliding`` are N and S in N s/m; ``coupling`` is C in N s; ``rolling`` is Q in
+    N m s.
     """
 
     pull: FloatArray
@@ -132,7 +119,7 @@ class Forces:
 
     def columns(self) -> FloatArray:
         """Shape (N, 5), in the order of the attributes."""
-        return np.stack([self.pull, self.normal, self.sliding, self.coupling, self.rolling], axis=-1)
+        return np.stack(list(vars(self).values()), axis=-1)
 
 
 @dataclass(frozen=True)
@@ -181,9 +168,8 @@ def columns_at(curve: Curve, gaps: FloatArray) -> FloatArray:
     for number, (name, given) in enumerate(zip(_COLUMNS, vars(forces).values(), strict=True)):
         column = np.asarray(given)
         if column.dtype.kind not in "fiu" or column.shape not in ((), gaps.shape):
-            raise UnusableLawError(
-                f"the {name} has type {column.dtype} and shape {column.shape}; expected real numbers (n,)"
-            )
+            kind = f"type {column.dtype} and shape {column.shape}"
+            raise UnusableLawError(f"the {name} has {kind}; expected real numbers (n,)")
         columns[:, number] = column
         if not np.isfinite(column := columns[:, number]).all():
             raise UnusableLawError(f"the {name} is not a number at a gap of {gaps[~np.isfinite(column)][0]:g} m")
@@ -192,10 +178,9 @@ def columns_at(curve: Curve, gaps: FloatArray) -> FloatArray:
     _, _, sliding, coupling, rolling = columns.T
     gains = coupling**2 > (1.0 + 1e-9) * sliding * rolling
     if gains.any():
-        raise UnusableLawError(
-            f"sliding and rolling together generate energy at a gap of {gaps[gains][0]:g} m: the square of the "
-            "coupling exceeds the product of both resistances"
-        )
+        why = "the square of the coupling exceeds the product of both resistances"
+        at = f"at a gap of {gaps[gains][0]:g} m"
+        raise UnusableLawError(f"sliding and rolling together generate energy {at}: {why}")
     return columns
 
 

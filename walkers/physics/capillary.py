@@ -8,7 +8,7 @@ G. Lian, C. Thornton, M. J. Adams, J. Colloid Interface Sci. 161 (1993) 138–14
 
 from __future__ import annotations
 
-from math import cbrt, pi, sqrt
+from math import cbrt, inf, pi, sqrt
 
 
 def derjaguin_radius(radius_1: float, radius_2: float) -> float:
@@ -16,29 +16,26 @@ def derjaguin_radius(radius_1: float, radius_2: float) -> float:
     return 2.0 / (1.0 / radius_1 + 1.0 / radius_2)
 
 
-def bridge_volume_between_beads(radius_1: float, radius_2: float, volume_fraction: float) -> float:
-    """Volume of the bridge between two beads, m³, from the radii (m) and the ratio of liquid to bead volume.
-
-    Each bead contributes half of its liquid film in the cap that the other bead covers (Shi and McCarthy 2008).
-    """
-    return share_of_bead(radius_1, radius_2, volume_fraction) + share_of_bead(radius_2, radius_1, volume_fraction)
-
-
 def share_of_bead(radius: float, other_radius: float, volume_fraction: float) -> float:
-    """Share of a bead's liquid in its bridge to another bead, m³."""
-    return (
-        0.5 * film_volume(radius, volume_fraction) * (1.0 - sqrt(1.0 - (other_radius / (radius + other_radius)) ** 2))
-    )
+    """Volume that a bead gives to its bridge, m³: radii in m (infinite: a plane), volume of its liquid over its own.
 
-
-def bridge_volume_at_wall(radius: float, volume_fraction: float) -> float:
-    """Volume of the bridge between a bead and a wall, m³: half of the bead's liquid."""
-    return 0.5 * film_volume(radius, volume_fraction)
+    A bead gives half of its film in the cap that another bead covers (Shi and McCarthy 2008), half of its film at a
+    plane. A plane gives nothing.
+    """
+    if radius == inf:
+        return 0.0
+    cap = 1.0 if other_radius == inf else 1.0 - sqrt(1.0 - (other_radius / (radius + other_radius)) ** 2)
+    return 0.5 * film_volume(radius, volume_fraction) * cap
 
 
 def film_volume(radius: float, volume_fraction: float) -> float:
     """Volume of the liquid on a bead without bridges, m³."""
-    return 4.0 / 3.0 * pi * radius**3 * volume_fraction
+    return bead_volume(radius) * volume_fraction
+
+
+def bead_volume(radius: float) -> float:
+    """Volume of a bead, m³."""
+    return 4.0 / 3.0 * pi * radius**3
 
 
 def capillary_force_limit_at_wall(surface_tension: float, radius: float) -> float:

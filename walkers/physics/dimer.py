@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi
 
-from walkers.physics.capillary import capillary_force_limit_at_wall
+from walkers.physics.capillary import bead_volume, capillary_force_limit_at_wall
 
 
 @dataclass(frozen=True)
@@ -23,8 +22,7 @@ class Dimer:
     @property
     def masses(self) -> tuple[float, float]:
         """m1, m2, kg."""
-        first, second = (4.0 / 3.0 * pi * radius**3 * self.density for radius in self.radii)
-        return first, second
+        return bead_volume(self.radii[0]) * self.density, bead_volume(self.radii[1]) * self.density
 
     @property
     def total_mass(self) -> float:

@@ -9,18 +9,10 @@ DEFAULT_LAW = "young-laplace"
 
 @dataclass(frozen=True, kw_only=True)
 class BridgeLiquid:
-    """Numbers of the liquid of bridges, SI units.
+    """Numbers of the liquid of bridges, SI units; ``law`` is the name of their law (`walkers.physics.laws`).
 
-    Attributes
-    ----------
-    surface_tension, viscosity, contact_angle
-        N/m; that of the bridges, Pa s; rad.
-    volume_fraction
-        Volume of the liquid on a bead over that of the bead.
-    conserved
-        Whether bridges take their volumes from the films of their beads.
-    law
-        Name of the law of the bridges (`walkers.physics.laws`).
+    ``viscosity`` is that of the bridges, ``volume_fraction`` the volume of the liquid on a bead over that of the bead.
+    Bridges take ``conserved`` liquid from the films of their beads.
     """
 
     surface_tension: float

@@ -6,34 +6,16 @@ from collections.abc import Callable, Mapping
 from itertools import pairwise
 from math import exp, pi, sin
 
-_TENSION_AT_18 = (
-    (0.0, 73.05),
-    (0.05, 72.9),
-    (0.1, 72.9),
-    (0.2, 72.4),
-    (0.3, 72.0),
-    (0.5, 70.0),
-    (0.85, 66.0),
-    (1.0, 63.0),
-)
-"""Mass fraction of glycerol and surface tension, mN/m: that of water by IAPWS, the others of the handbook."""
+_TENSIONS = ((0.0, 73.05), (0.05, 72.9), (0.1, 72.9), (0.2, 72.4), (0.3, 72.0), (0.5, 70.0), (0.85, 66.0), (1.0, 63.0))
+"""Mass fraction of glycerol and surface tension at 18 °C, mN/m: that of water by IAPWS, the others of the handbook."""
 _TENSION_SLOPE_OF_GLYCEROL = -0.0598  # mN/(m K)
 
 
 def water_glycerol(mass_fraction: float, temperature: float) -> dict[str, float]:
-    """Density, dynamic viscosity and surface tension of a mixture of water and glycerol.
+    """Density (kg/m³), dynamic viscosity (Pa s) and surface tension (N/m) of a mixture of water and glycerol.
 
-    Parameters
-    ----------
-    mass_fraction
-        Mass of the glycerol over that of the mixture.
-    temperature
-        K, between the freezing and the boiling point of water.
-
-    Returns
-    -------
-    dict
-        ``density`` (kg/m³), ``dynamic_viscosity`` (Pa s), ``surface_tension`` (N/m).
+    ``mass_fraction`` is the mass of the glycerol over that of the mixture; ``temperature`` in K, between the freezing
+    and the boiling point of water.
 
     Notes
     -----
@@ -81,7 +63,7 @@ def _tension_of_water(celsius: float) -> float:
 
 def _tension(share: float, celsius: float) -> float:
     """The table at 18 °C, shifted to a temperature, mN/m."""
-    (low, at_low), (high, at_high) = next(pair for pair in pairwise(_TENSION_AT_18) if share <= pair[1][0])
+    (low, at_low), (high, at_high) = next(pair for pair in pairwise(_TENSIONS) if share <= pair[1][0])
     at_18 = at_low + (at_high - at_low) * (share - low) / (high - low)
     of_water = _tension_of_water(celsius) - _tension_of_water(18.0)
     return at_18 + (1.0 - share) * of_water + share * _TENSION_SLOPE_OF_GLYCEROL * (celsius - 18.0)

@@ -58,16 +58,9 @@ _THIN = 1e-5
 
 
 def curve(surfaces: Surfaces, pull: Callable[[FloatArray], FloatArray], rupture: float) -> Curve:
-    """The curve of a law with a given pull and Reynolds resistances, for a bridge that forms on contact.
+    """The curve of a law with Reynolds resistances; the bridge forms on contact and breaks at a gap ``rupture``, m.
 
-    Parameters
-    ----------
-    surfaces
-        The pair.
-    pull
-        Function from gaps (m) to the pull over the surface tension (m), both of shape (n,).
-    rupture
-        Rupture distance, m.
+    ``pull`` gives the pull over the surface tension (m) at gaps (m), both of shape (n,).
     """
 
     def pulled(gaps: FloatArray) -> FloatArray:
@@ -83,18 +76,13 @@ def resistances(surfaces: Surfaces, gaps: FloatArray) -> tuple[FloatArray, Float
     """N and S (N s/m), C (N s), Q (N m s) of a bridge at gaps, m, each of shape (n,)."""
     viscosity, reduced = surfaces.liquid.viscosity, surfaces.reduced_radius
     gaps = np.maximum(gaps, surfaces.closest)
-    edge = wetted_gap(surfaces, gaps)
+    edge = np.sqrt(gaps**2 + surfaces.volume / (pi * reduced))  # H_w
     deep = edge / gaps - 1.0
     bend = 0.5 * (1.0 / surfaces.radius - 1.0 / surfaces.other_radius)
     tilting = 96.0 * pi * viscosity * reduced**3 * _tilted(deep)
     normal = 6.0 * pi * viscosity * reduced**2 / gaps * (1.0 - gaps / edge) ** 2
     shear = 2.0 * pi * viscosity * reduced * np.log1p(deep)
     return normal, shear + bend**2 * tilting, -bend * tilting, tilting
-
-
-def wetted_gap(surfaces: Surfaces, gaps: FloatArray) -> FloatArray:
-    """H_w, gap at the edge of the liquid, m (Pitois et al. 2000, for equal spheres)."""
-    return np.sqrt(gaps**2 + surfaces.volume / (pi * surfaces.reduced_radius))
 
 
 def _tilted(deep: FloatArray) -> FloatArray:

@@ -18,9 +18,10 @@ Speeds of the AK5 walker agree within 0.5 % from 1 to 10 µs, the latter being i
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from math import ceil, inf, pi, sqrt
 
+from walkers.physics.capillary import bead_volume
 from walkers.physics.contact import reduced_modulus
 
 AUTO_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.2, "hertz": 0.1, "viscous": 0.4}
@@ -48,20 +49,16 @@ class TimeStepLimits:
     hertz: float
     viscous: float
 
-    def as_dict(self) -> dict[str, float]:
-        """Name to limit in s."""
-        return asdict(self)
-
     def recommended(self, *, loose: bool) -> tuple[float, str]:
         """Largest step (s) within the shares of all limits, for loose beads or walkers; and what determines it."""
         shares = auto_fractions(loose=loose)
-        steps = [(shares[name] * at, f"{shares[name]:g} of the {name} limit") for name, at in self.as_dict().items()]
+        steps = [(shares[name] * at, f"{shares[name]:g} of the {name} limit") for name, at in vars(self).items()]
         longest = LONGEST_WALKER_STEP
         return min(steps if loose else [*steps, (longest, f"at most {longest * 1e6:g} us for walkers")])
 
     def exceeded_by(self, time_step: float) -> list[str]:
         """Names of the limits below ``time_step`` (s)."""
-        return [name for name, limit in self.as_dict().items() if time_step > limit]
+        return [name for name, limit in vars(self).items() if time_step > limit]
 
 
 def time_step_limits(
@@ -83,11 +80,11 @@ def time_step_limits(
     modulus = reduced_modulus(youngs_modulus, poissons_ratio)
     impacts, rates = [], []
     for radius, neighbours, walls in bridged:
-        mass = _mass(radius, density)
+        mass = bead_volume(radius) * density
         impacts.append((mass, radius))
         rates.append(walls * drag(radius) / mass)
         for other in neighbours:
-            other_mass, reduced = _mass(other, density), radius * other / (radius + other)
+            other_mass, reduced = bead_volume(other) * density, radius * other / (radius + other)
             impacts.append((mass * other_mass / (mass + other_mass), reduced))
             rates[-1] += drag(reduced) * (1.0 / mass + 1.0 / other_mass)
     shear_modulus = youngs_modulus / (2.0 * (1.0 + poissons_ratio))
@@ -99,10 +96,6 @@ def time_step_limits(
         else inf,
         viscous=2.0 / max(rates) if max(rates) > 0.0 else inf,
     )
-
-
-def _mass(radius: float, density: float) -> float:
-    return 4.0 / 3.0 * pi * radius**3 * density
 
 
 def fit_into_cycle(largest_time_step: float, frequency: float, samples_per_cycle: int) -> tuple[float, int]:

@@ -27,15 +27,7 @@ from walkers.postprocess.uncertainty import bands_text, lines_of_rest, not_known
 from walkers.rounding import SHOWN_UNITS, rounded
 from walkers.runner.directory import SEGMENT_NAME, case_of, files_of_segments, segment_directories
 from walkers.runner.files import read_json, write_json
-from walkers.runner.manifest import (
-    MANIFEST_NAME,
-    RESULT_NAME,
-    FileChanged,
-    check_unchanged,
-    forget_tables,
-    read_result,
-    record_tables,
-)
+from walkers.runner.manifest import MANIFEST_NAME, RESULT_NAME, FileChanged, check_unchanged, read_result, recomputed
 
 if TYPE_CHECKING:  # the progress of a sweep needs no numpy
     from matplotlib.figure import Figure
@@ -320,11 +312,10 @@ def _write(directory: Path, result: Mapping[str, Any], tables: Mapping[str, Colu
 
     names = [RESULT_NAME, *(f"{name}.parquet" for name in tables)]
     declared = {name: table for one in analyses_in(result) for name, table in one.tables.items()}
-    forget_tables(directory, names)
-    for name, columns in tables.items():
-        write_table(directory, name, declared[name], columns)
-    write_json(directory / RESULT_NAME, result)
-    record_tables(directory, names)
+    with recomputed(directory, names):
+        for name, columns in tables.items():
+            write_table(directory, name, declared[name], columns)
+        write_json(directory / RESULT_NAME, result)
 
 
 def tables_of(directory: Path) -> dict[str, Columns]:

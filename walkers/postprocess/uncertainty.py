@@ -18,7 +18,7 @@ from walkers.rounding import SHOWN_UNITS, rounded
 from walkers.runner.binary import Engine
 from walkers.runner.directory import case_of, run_place
 from walkers.runner.files import read_json
-from walkers.runner.manifest import MANIFEST_NAME
+from walkers.runner.manifest import read_manifest
 
 SPREAD = "-spread"
 SPREAD_NAME = "spread.json"
@@ -134,7 +134,7 @@ def _numerical_error(directory: Path, velocity: float) -> dict[str, Any]:
     from walkers.runner.manifest import read_result
 
     case = case_of(directory)
-    engine = Engine(directory, read_json(directory / MANIFEST_NAME)["engine"]["sha256"])
+    engine = Engine(directory, read_manifest(directory)["engine"]["sha256"])
     changes = {
         "half_step": ("run.time_step", f"{0.5e6 * case.run.time_step:.4g}us"),
         "stiffer": ("contact.youngs_modulus", f"{1e-6 * STIFFER * case.contact.youngs_modulus:.4g}MPa"),

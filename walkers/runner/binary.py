@@ -28,7 +28,7 @@ from typing import Any
 from walkers.cache import cache_folder, make_cache_folder
 from walkers.runner.failures import ContactModelMissing, EngineFailure, EngineMissing, OtherEngine
 from walkers.runner.files import checksum, read_json, write_json
-from walkers.templates.deck import DECK_NAME, OUTPUT_NAME
+from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, RUN_NAME
 from walkers.templates.engine import AUDITED_VERSION
 
 ENGINE_VARIABLE = "WALKERS_ENGINE"
@@ -37,7 +37,7 @@ _MODEL = ("bridge.cpp", "table.h")
 """Source files of the contact model."""
 _FORCES_VERSION = re.compile(rb"^// FORCES_VERSION \d+$", re.MULTILINE)
 """The line of ``bridge.cpp`` that is part of the names of runs and audits; the rest of the sources is not."""
-_PACKAGES = ("g++", "libliggghts-dev", "libopenmpi-dev")
+_PACKAGES = "g++ libliggghts-dev libopenmpi-dev"
 _HEADERS = Path("/usr/include/liggghts")
 # All machines of an architecture give the same numbers: -O3 does not reorder, and there are no fused operations. Only
 # without traps does it compute several contacts at once.
@@ -64,8 +64,7 @@ def find_engine(wanted: str | None = None) -> Engine:
     `EngineMissing` if there is no such executable.
     """
     name = wanted or os.environ.get(ENGINE_VARIABLE) or "liggghts"
-    found = shutil.which(name)
-    if found is None:
+    if (found := shutil.which(name)) is None:
         text = "is not an executable file on this machine; install it with: sudo apt-get install liggghts"
         raise EngineMissing(f"no engine: {name} {text}")
     path, digest = Path(found).resolve(), hashlib.sha256()
@@ -146,10 +145,8 @@ def _secure(folder: Path) -> None:
     if not folder.exists() or _is_safe(folder):
         return
     if folder.stat().st_uid != os.geteuid():
-        raise ContactModelMissing(
-            f"{folder} belongs to another user, whose code the engine would run; set XDG_CACHE_HOME to a folder of "
-            "your own"
-        )
+        why = f"{folder} belongs to another user, whose code the engine would run"
+        raise ContactModelMissing(f"{why}; set XDG_CACHE_HOME to a folder of your own")
     folder.chmod(0o700)
     for record in folder.glob("bridge-*.json"):
         record.unlink()
@@ -159,7 +156,7 @@ def _is_as_compiled(place: Path, fingerprint: str) -> bool:
     """Whether a compiled model is that of its record, and no other user can write the two."""
     record = place.with_suffix(".json")
     with suppress(OSError, ValueError):
-        return all(map(_is_safe, (place, record))) and read_json(record) == _record(place, fingerprint)
+        return _is_safe(place) and _is_safe(record) and read_json(record) == _record(place, fingerprint)
     return False
 
 
@@ -181,9 +178,7 @@ def _compile(place: Path, fingerprint: str) -> None:
     """Compile the model, and write its checksum and what it was compiled from beside it."""
     compiler, mpi = shutil.which("g++"), shutil.which("mpicxx")
     if compiler is None or mpi is None or not _HEADERS.is_dir():
-        raise ContactModelMissing(
-            f"it is compiled once; install what that needs: apt-get install {' '.join(_PACKAGES)}"
-        )
+        raise ContactModelMissing(f"it is compiled once; install what that needs: apt-get install {_PACKAGES}")
     asked = subprocess.run([mpi, "--showme:incdirs"], capture_output=True, text=True, check=False)
     included = [option for folder in (str(_HEADERS), *asked.stdout.split()) for option in ("-isystem", folder)]
     linked = [f"-Wl,--version-script={SOURCES / 'bridge.map'}", "-Wl,-Bsymbolic", "-l:libliggghts.so.3"]
@@ -202,14 +197,12 @@ def _compile(place: Path, fingerprint: str) -> None:
         record.replace(place.with_suffix(".json"))
 
 
-def run_script(engine: Engine, plugin: Path, ranks: int) -> str:
-    """A shell script that runs a deck by hand: it loads the model into the engine and writes the output to a file."""
+def write_run_script(directory: Path, engine: Engine, plugin: Path, ranks: int) -> None:
+    """Write a shell script that runs a deck by hand: it loads the model into the engine and writes the output."""
     parallel = f"mpirun -n {ranks} " if ranks > 1 else ""
-    return (
-        f'# Runs {DECK_NAME} with the contact model "cohesion bridge", which is loaded into the engine.\n'
-        f"exec {parallel}env LD_PRELOAD={shlex.quote(str(plugin))} {shlex.quote(str(engine.path))} -in {DECK_NAME} "
-        f"> {OUTPUT_NAME}\n"
-    )
+    command = f"{parallel}env LD_PRELOAD={shlex.quote(str(plugin))} {shlex.quote(str(engine.path))} -in {DECK_NAME}"
+    about = f'# Runs {DECK_NAME} with the contact model "cohesion bridge", which is loaded into the engine.'
+    (directory / RUN_NAME).write_text(f"{about}\nexec {command} > {OUTPUT_NAME}\n", encoding="utf-8")
 
 
 def compile_model() -> None:
@@ -261,12 +254,10 @@ def read_audit(engine: str, model: str | None) -> AuditRecord | None:
     """
     known = []
     for scope in ("full", "quick"):
-        try:
+        with suppress(OSError, ValueError, KeyError, TypeError):
             values = read_json(_record_of(engine, scope))
             record = AuditRecord(**{**values, "failures": tuple(values["failures"])})
             known += [record] if model in (None, record.contact_model) else []
-        except (OSError, ValueError, KeyError, TypeError):
-            continue
     return min(known, key=lambda record: record.passed, default=None)
 
 
@@ -274,10 +265,8 @@ def is_new(engine: str, model: str | None) -> bool:
     """Whether this is the first call for a binary and a contact model with this user's cache."""
     try:
         (make_cache_folder("audits") / f"{engine}.{model}.seen").open("x").close()
-    except FileExistsError:
-        return False
-    except OSError:  # a cache that cannot be written: it is new each time
-        pass
+    except OSError as error:  # in a cache that cannot be written it is new each time
+        return not isinstance(error, FileExistsError)
     return True
 
 

@@ -23,7 +23,6 @@ import shutil
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -57,8 +56,8 @@ _PATIENCE_SECONDS = 2.0
 # --- names ------------------------------------------------------------------------------------------------------------
 
 
-def run_name(case: Case, engine: Engine) -> str:
-    """Name of a run directory: name of the case, and 12 hex digits of a hash of case, engine and version of the decks.
+def run_place(case: Case, engine: Engine, out: Path) -> Path:
+    """The final directory of a run: name of the case, and 12 hex digits of a hash of case, engine and version of decks.
 
     The text of the deck is not hashed, so that a changed comment in a template keeps existing runs. The file of a
     user's own bridge law is hashed.
@@ -67,7 +66,7 @@ def run_name(case: Case, engine: Engine) -> str:
     if own := case.recorded_law.sha256 if case.recorded_law else source_sha256(case.liquid.law):
         determinants["law"] = own
     text = json.dumps(determinants, sort_keys=True, separators=(",", ":"))
-    return f"{name_of(case.name)}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
+    return out / f"{name_of(case.name)}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
 
 
 def name_of(case_name: str) -> str:
@@ -78,11 +77,6 @@ def name_of(case_name: str) -> str:
 def is_run_name(name: str) -> bool:
     """Whether a name may be that of a run directory: it ends in twelve hex digits."""
     return re.fullmatch(r".+-[0-9a-f]{12}", name) is not None
-
-
-def run_place(case: Case, engine: Engine, out: Path) -> Path:
-    """The final directory of the run of a case."""
-    return out / run_name(case, engine)
 
 
 def unfinished(place: Path) -> Path:
@@ -100,33 +94,6 @@ def holds_unfinished(directory: Path) -> bool:
 
 
 # --- reading ----------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class FinishedRun:
-    """A run with a manifest: its directory and the contents."""
-
-    directory: Path
-
-    @property
-    def manifest(self) -> dict[str, Any]:
-        """The manifest."""
-        return read_json(self.directory / MANIFEST_NAME)
-
-    @property
-    def case(self) -> Case:
-        """The resolved case."""
-        return case_of(self.directory)
-
-    @property
-    def segments(self) -> list[Path]:
-        """Directories of the segments, in their order."""
-        return segment_directories(self.directory)
-
-    @property
-    def layout(self) -> Layout:
-        """The layout of the dumps of the first segment."""
-        return layout_of(self.segments[0])
 
 
 def case_of(directory: Path) -> Case:
@@ -180,10 +147,11 @@ def run_of(segment: Path) -> Path:
 
 def files_of_segments(directory: Path) -> list[str]:
     """Input and output files of the engine for a run, as paths within its directory."""
-    found = [path for segment in segment_directories(directory) for path in segment.iterdir() if path.is_file()]
-    layouts = (layout_of(segment) for segment in segment_directories(directory)[:1])
+    segments = segment_directories(directory)
+    layouts = map(layout_of, segments[:1])
     dumps = {name for one in layouts for name in (one.bead_dump, one.pair_bridge_dump, one.wall_bridge_dump)}
-    by_hand = [directory] == segment_directories(directory)  # with tables and pictures beside
+    found = [path for segment in segments for path in segment.iterdir() if path.is_file()]
+    by_hand = [directory] == segments  # with tables and pictures beside
     return [path.relative_to(directory).as_posix() for path in found if not by_hand or path.name in dumps]
 
 
@@ -192,9 +160,9 @@ def is_deck_folder(folder: Path) -> bool:
     return (folder / DECK_RECORD_NAME).is_file() and (folder / DECK_NAME).is_file()
 
 
-def finished_run(directory: Path) -> FinishedRun | None:
-    """The run in a directory, or None if it has no manifest."""
-    return FinishedRun(directory) if (directory / MANIFEST_NAME).is_file() else None
+def is_finished(directory: Path) -> bool:
+    """Whether a directory is that of a finished run: it has a manifest."""
+    return (directory / MANIFEST_NAME).is_file()
 
 
 def finished_places(out: Path) -> dict[str, Path]:
@@ -238,10 +206,10 @@ def write_deck(deck: Deck, directory: Path, before: Path | None = None) -> None:
 
 
 def write_segment_record(
-    directory: Path, segment: Segment, report: EngineReport, rms_velocity: float | None = None
+    directory: Path, segment: Segment, report: EngineReport, rms_velocity: float | None = None, **more: Any
 ) -> dict[str, Any]:
     """Write the steps and the cost of a segment into its directory, and return this record."""
-    record = {**segment._asdict(), **vars(report), "root_mean_square_velocity": rms_velocity}
+    record = {**segment._asdict(), **vars(report), "root_mean_square_velocity": rms_velocity, **more}
     write_json(directory / SEGMENT_NAME, record, at_once=False)
     return record
 
@@ -328,11 +296,9 @@ def _lock(file: Path, end: float) -> int | None:
 
 def is_locked(place: Path) -> bool:
     """Whether a process is making the run of this place."""
-    try:
-        with _lock_file(place).open("rb") as file:
+    with suppress(FileNotFoundError), _lock_file(place).open("rb") as file:
+        try:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except FileNotFoundError:
-        return False
-    except BlockingIOError:
-        return True
+        except BlockingIOError:
+            return True
     return False

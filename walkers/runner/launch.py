@@ -19,8 +19,8 @@ from pathlib import Path
 
 from walkers.rounding import duration_text
 from walkers.runner import failures
-from walkers.runner.binary import Engine, plugin_of, run_script, version_in
-from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, RUN_NAME, Deck
+from walkers.runner.binary import Engine, plugin_of, version_in, write_run_script
+from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, Deck
 from walkers.templates.engine import ALONE, AUDITED_VERSION, POSITION_IS_NO_NUMBER, RANKS, STEP_VARIABLES
 
 _POLL_SECONDS = 0.05
@@ -54,10 +54,10 @@ _LOOP_TIME = re.compile(rb"^Loop time of (\S+) on", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Progress:
-    """Progress of a run: steps of the drive, done and in total; simulated time, s; wall time of this call, s.
+    """Progress of a run: steps of the drive, done and in total; simulated time, s; wall time and steps of this call.
 
-    ``made`` is the number of steps of this call. ``resting``: the beads still come to rest. ``may_end_early``: the
-    total is that of all attempts, and the last ones may not be needed.
+    ``resting``: the beads still come to rest. ``may_end_early``: the total is that of all attempts, and the last ones
+    may not be needed.
     """
 
     step: int
@@ -101,25 +101,12 @@ def launch(
     keep_open: Sequence[int] = (),
     starts: int = 3,
 ) -> EngineReport:
-    """Run a deck in a directory until its end or its first failure.
+    """Run a deck in a directory until its end or its first failure, an `EngineFailure`; then the engine has ended.
 
-    Parameters
-    ----------
-    deck, directory, engine
-        The deck; the directory with its files, in which the engine works; the binary.
-    on_step
-        Called a few times per second, and at the end, with the current step; an exception ends the engine.
-    time_limit
-        Wall time in s after which the run is stopped.
-    keep_open
-        File descriptors that the engine inherits (the lock of the run).
-    starts
-        Largest number of starts if the engine ends before it prints its version.
-
-    Raises
-    ------
-    EngineFailure
-        One of the failures of `walkers.runner.failures`; the engine and its children have ended by then.
+    The engine works in the directory, which has the deck's files. A few times per second and at the end ``on_step`` is
+    called with the current step; its exceptions end the engine. The run is stopped after ``time_limit`` (wall time, s).
+    The engine inherits the file descriptors ``keep_open`` (the lock of the run). If it ends before it prints its
+    version, it is started again, at most ``starts`` times in all.
     """
     ranks, temporary = deck.layout.ranks, Path(os.environ.get("TMPDIR", "/tmp"))
     check_room(directory, deck.layout.bead_dump_bytes)
@@ -128,7 +115,7 @@ def launch(
     if ranks > 1 and temporary.is_dir():
         check_room(temporary, _TEMPORARY_BYTES)
     plugin = plugin_of(engine)
-    (directory / RUN_NAME).write_text(run_script(engine, plugin, ranks), encoding="utf-8")
+    write_run_script(directory, engine, plugin, ranks)
     command = [*_before(ranks), "env", f"LD_PRELOAD={plugin}", str(engine.path), "-log", "none", "-in", DECK_NAME]
     while True:
         starts -= 1
@@ -359,20 +346,19 @@ class _Watch:
 
     def check(self) -> None:
         """Raise the failure that shows while the engine runs, if any."""
-        deck, after = self.deck, f"after step {self.step}"
+        deck, at = self.deck, f"step {self.step} of {self.layout.steps}"
         if self.version is not None and self.version != AUDITED_VERSION:
             raise failures.OtherEngine(self.engine, self.version)
         if self.failure is not None:
             raise self.failure
         if self.read > deck.log_limit:
-            message = f"the engine's log grew beyond {deck.log_limit / 1e6:g} MB {after}; it was stopped"
+            message = f"the engine's log grew beyond {deck.log_limit / 1e6:g} MB after step {self.step}; it was stopped"
             raise failures.LogTooLong(message, self.directory)
         if self.silent > deck.silence:
-            message = f"the engine wrote nothing for {deck.silence:g} s {after} of {self.layout.steps}"
-            raise failures.EngineSilent(f"{message}; it was stopped", self.directory)
+            message = f"the engine wrote nothing for {deck.silence:g} s after {at}; it was stopped"
+            raise failures.EngineSilent(message, self.directory)
         if self.elapsed > self.time_limit:
-            message = f"time limit of {self.time_limit:g} s reached at step {self.step} of {self.layout.steps}"
-            raise failures.TimeLimitExceeded(message, self.directory)
+            raise failures.TimeLimitExceeded(f"time limit of {self.time_limit:g} s reached at {at}", self.directory)
         missing = self.layout.bead_dump_bytes - self.written
         free = shutil.disk_usage(self.directory).free
         if missing > 0 and free < _SPARE_BYTES:
@@ -389,14 +375,12 @@ class _Watch:
             raise failures.EngineNeverStarted(f"the engine never started: exit status {status}{words}", self.directory)
         if POSITION_IS_NO_NUMBER.encode() in self.error:
             raise self._blow_up(math.nan)
-        if self.error:
-            raise failures.EngineError(f"the engine stopped: {_text(self.error)}", self.directory)
+        if self.error or status > 0:
+            why = _text(self.error) if self.error else f"exit status {status}{words}"
+            raise failures.EngineError(f"the engine stopped: {why}", self.directory)
         if status < 0:
-            known = -status in set(signal.Signals)
-            name = signal.Signals(-status).name if known else f"signal {-status}"
+            name = signal.Signals(-status).name if -status in set(signal.Signals) else f"signal {-status}"
             raise failures.EngineKilled(f"the engine was killed by {name}", self.directory)
-        if status > 0:
-            raise failures.EngineError(f"the engine stopped: exit status {status}{words}", self.directory)
         frames_of_beads = self.written / layout.bead_dump_bytes * layout.frames
         dumps = (layout.pair_bridge_dump, layout.wall_bridge_dump)
         frames_of_bridges = [(_complete_frames(self.directory / name), layout.bridge_frames) for name in dumps]

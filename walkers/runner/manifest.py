@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +53,7 @@ def write_manifest(
         },
         "deck_version": CONTENT_VERSION,
         "contact_model": model,
-        **_made_by(),
+        **software(),
         "host": platform.node(),
         "platform": platform.platform(),
         "started": _iso(started),
@@ -71,10 +72,9 @@ def write_manifest(
     write_json(directory / MANIFEST_NAME, contents, at_once=False)
 
 
-def _made_by() -> dict[str, Any]:
-    ours = software()
-    versions = {"granular_walkers": ours.version, "commit": ours.commit}
-    return {**versions, "python": ours.python, "packages": ours.packages}
+def read_manifest(directory: Path) -> dict[str, Any]:
+    """The manifest of a finished run; raises `OSError` or `ValueError` if it is unreadable."""
+    return read_json(directory / MANIFEST_NAME)
 
 
 def _iso(seconds: float) -> str:
@@ -101,7 +101,7 @@ def check_unchanged(directory: Path, names: Collection[str]) -> bool:
     unfinished run, which has no manifest.
     """
     try:
-        sums = _sums(read_json(directory / MANIFEST_NAME), directory)
+        sums = _sums(read_manifest(directory), directory)
     except FileNotFoundError:
         return True
     wanted = {name: sums[name] for name in names if name in sums}
@@ -117,12 +117,7 @@ def check_unchanged(directory: Path, names: Collection[str]) -> bool:
 def read_result(directory: str | Path) -> dict[str, Any]:
     """The result of a run, of any version of its analyses.
 
-    Raises
-    ------
-    OSError, ValueError
-        If it cannot be read.
-    FileChanged
-        If it is not what it was when the run was finished.
+    Raises `OSError` or `ValueError` if it cannot be read, `FileChanged` if it has changed since the run was finished.
     """
     result = read_json(Path(directory) / RESULT_NAME)
     check_unchanged(Path(directory), [RESULT_NAME])
@@ -135,31 +130,22 @@ def _sums(contents: dict[str, Any], directory: Path) -> dict[str, str]:
     return sums
 
 
-def forget_tables(directory: Path, names: Collection[str]) -> None:
-    """Remove from the manifest of a finished run the checksums of files that will be recomputed."""
-    _change(directory, names, anew=False)
+@contextmanager
+def recomputed(directory: Path, names: Collection[str]) -> Iterator[None]:
+    """Record in the manifest of a finished run that the block recomputes files: program, time, checksums.
 
-
-def record_tables(directory: Path, names: Collection[str]) -> None:
-    """Record in the manifest of a finished run that files were recomputed from its dumps: program, time, checksums.
-
-    Between `forget_tables` and this call the manifest does not list them, so that a kill in between gives no false
-    alarm.
+    During the block the manifest does not list the files, so that a kill gives no false alarm. An unfinished run has no
+    manifest: nothing is recorded.
     """
-    _change(directory, names, anew=True)
-
-
-def _change(directory: Path, names: Collection[str], *, anew: bool) -> None:
-    """Change the entries of files in a manifest; does nothing if the run is not finished."""
     if not (directory / MANIFEST_NAME).is_file():
+        yield
         return
-    contents = read_json(directory / MANIFEST_NAME)
+    contents = read_manifest(directory)
     sums = _sums(contents, directory)
-    known = [name for name in names if sums.pop(name, None)]
-    if anew:
-        now = checksums(directory, names)
-        sums.update(now)
-        contents.setdefault("files", {}).update({name: (directory / name).stat().st_size for name in now})
-        contents["tabulated"] = {**_made_by(), "date": _iso(time.time()), "files": list(now)}
-    if anew or known:
+    if [name for name in names if sums.pop(name, None)]:
         write_json(directory / MANIFEST_NAME, contents)
+    yield
+    sums |= checksums(directory, names)
+    contents.setdefault("files", {}).update({name: (directory / name).stat().st_size for name in names})
+    contents["tabulated"] = {**software(), "date": _iso(time.time()), "files": list(names)}
+    write_json(directory / MANIFEST_NAME, contents)

@@ -11,10 +11,10 @@ import re
 import subprocess
 import threading
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 PROJECT = "granular-walkers"
 COMMIT_NAME = "commit.txt"
@@ -22,23 +22,12 @@ COMMIT_NAME = "commit.txt"
 _PATIENCE_SECONDS = 20.0
 
 
-@dataclass(frozen=True)
-class Software:
-    """Versions of the program, of Python and of the required packages, by name.
-
-    ``commit`` is that of the checkout from which the program runs or was built, with ``+changes`` if tracked files
-    differ; None if unknown.
-    """
-
-    version: str
-    commit: str | None
-    python: str
-    packages: dict[str, str]
-
-
 @cache
-def software() -> Software:
-    """The software of this process, looked up once (30 ms)."""
+def software() -> dict[str, Any]:
+    """Versions of the program, of Python and of the required packages, as manifests have them; looked up once (30 ms).
+
+    ``commit`` is that of the checkout from which the program runs or was built (`commit_of`); None if unknown.
+    """
     try:
         version, required = metadata.version(PROJECT), metadata.requires(PROJECT) or []
     except metadata.PackageNotFoundError:
@@ -52,7 +41,8 @@ def software() -> Software:
     commit = commit_of(package.parent)
     if commit is None and (package / COMMIT_NAME).is_file():
         commit = (package / COMMIT_NAME).read_text("utf-8").strip() or None
-    return Software(version, commit, platform.python_version(), packages)
+    python = platform.python_version()
+    return {"granular_walkers": version, "commit": commit, "python": python, "packages": packages}
 
 
 def look_ahead() -> None:
@@ -69,18 +59,11 @@ def commit_of(checkout: Path) -> str | None:
         return None
     # A git hook may set another repository. Nothing is written, because many processes may ask at once.
     ours = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
+    ours["GIT_OPTIONAL_LOCKS"] = "0"
+    how: dict[str, Any] = {"cwd": checkout, "env": ours, "timeout": _PATIENCE_SECONDS, "text": True}
     command = ["git", "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty=+changes"]
     try:
-        done = subprocess.run(
-            command,
-            cwd=checkout,
-            env={**ours, "GIT_OPTIONAL_LOCKS": "0"},
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            check=True,
-            timeout=_PATIENCE_SECONDS,
-        )
+        commit: str = subprocess.check_output(command, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **how)
     except (OSError, subprocess.SubprocessError):  # no git here, or a file system that does not answer
         return None
-    return done.stdout.strip() or None
+    return commit.strip() or None

@@ -24,21 +24,20 @@ from walkers.physics.laws import source_of
 from walkers.postprocess.analysis import tabulate
 from walkers.postprocess.dump import DumpError
 from walkers.rounding import percent
-from walkers.runner.binary import find_engine, plugin_of, run_script
+from walkers.runner.binary import find_engine, plugin_of, write_run_script
 from walkers.runner.directory import (
     CASE_NAME,
     DECK_RECORD_NAME,
     LAW_NAME,
-    SEGMENT_NAME,
-    finished_run,
     layout_of,
     with_recorded_law,
     write_deck,
+    write_segment_record,
 )
 from walkers.runner.failures import EngineFailure, MissingFrames
 from walkers.runner.files import read_json, write_json
 from walkers.runner.launch import EngineReport, judge
-from walkers.runner.manifest import MANIFEST_NAME, write_manifest
+from walkers.runner.manifest import MANIFEST_NAME, read_manifest, write_manifest
 from walkers.templates.deck import (
     DECK_NAME,
     LAYOUT_NAME,
@@ -53,7 +52,7 @@ from walkers.templates.deck import (
 from walkers.templates.parameters import PRINTED, suffixes
 
 _LOGS = (OUTPUT_NAME, "log.liggghts")
-"""Output of the engine by `run_script`, and the default log of LIGGGHTS."""
+"""Output of the engine by `write_run_script`, and the default log of LIGGGHTS."""
 _PRINTED = re.compile(rf"^{PRINTED} (.+)$", re.MULTILINE)
 _GIVEN = re.compile(r"^variable +(\w+) string ([-+.\de]+)(?: |$)", re.MULTILINE)
 _LINE = re.compile(r"^variable +(\w+) string (\S+)", re.MULTILINE)
@@ -90,7 +89,7 @@ def write_folder(case: Case, folder: Path) -> Path:
     try:
         write_deck(deck, folder)
         (folder / SCALE_NAME).write_text(_SCALE, encoding="utf-8")
-        (folder / RUN_NAME).write_text(run_script(engine, plugin, deck.layout.ranks), encoding="utf-8")
+        write_run_script(folder, engine, plugin, deck.layout.ranks)
         if law := source_of(case.liquid.law):
             shutil.copyfile(law, folder / LAW_NAME)
         write_json(folder / DECK_RECORD_NAME, {"case": case.as_dict(), "deck": deck.text})
@@ -103,10 +102,12 @@ def write_folder(case: Case, folder: Path) -> Path:
 
 def as_run(case: Case, directory: Path | None) -> Case:
     """The case with the number of cycles of its finished run, if there is one; `InputError` if it cannot be read."""
-    if not case.run.until_steady or directory is None or (finished := finished_run(directory)) is None:
+    if not case.run.until_steady or directory is None:
         return case
     try:
-        return case.for_cycles(int(finished.manifest["steps"]) // case.run.steps_per_cycle)
+        return case.for_cycles(int(read_manifest(directory)["steps"]) // case.run.steps_per_cycle)
+    except FileNotFoundError:
+        return case
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise refused(directory, f"the run's {MANIFEST_NAME} cannot be read ({error})") from error
 
@@ -114,10 +115,7 @@ def as_run(case: Case, directory: Path | None) -> Case:
 def take_in(folder: Path) -> None:
     """Make a run directory of the folder of a deck that was run by hand, unless it is up to date.
 
-    Raises
-    ------
-    InputError
-        If the deck was not run, is still running, or failed; or its files cannot be read.
+    `InputError` if the deck was not run, is still running, or failed; or its files cannot be read.
     """
     if _is_current(folder):
         return
@@ -171,7 +169,9 @@ def _as_run(case: Case, written: str, now: str, said: str, source: str) -> tuple
     values, case = {**given, **printed}, case.for_cycles(case.run.attempts[0])
     edited = {name: values[name] for name, value in given.items() if values[name] != value}
     changes = [f"{name} {value:g}, was {given[name]:g}" for name, value in edited.items()]
-    before, after, follow = dict(_LINE.findall(written)), dict(_LINE.findall(now)), _derived(case)
+    before, after = dict(_LINE.findall(written)), dict(_LINE.findall(now))
+    follow = {f"amplitude{end}": one.amplitude for end, one in _by_suffix(case.excitation)}  # from other parameters
+    follow |= {"peak_velocity": case.excitation.peak_velocity, "time_step": case.run.time_step}
     changed = [name for name in printed if name in follow and name not in given and after.get(name) != before[name]]
     changes += [f"{name} {printed[name]:g}, was {follow[name]:g}" for name in changed]
     differ = edited or not all(isclose(values.get(name, one), one, rel_tol=_SAME) for name, one in follow.items())
@@ -204,8 +204,8 @@ def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float]
         )
     document = {name: table for name, table in case.document.items() if name != "uncertain"}
     table, other = document.get("run", {}), frequency != case.excitation.frequency
-    changes: dict[str, Any] = {key: edited[name] for name, (key, unit) in _SETTINGS.items() if name in edited}
-    changes |= {key: f"{changes[key]!r} {unit}" for key, unit in _SETTINGS.values() if unit and key in changes}
+    settings = {key: (edited[name], unit) for name, (key, unit) in _SETTINGS.items() if name in edited}
+    changes: dict[str, Any] = {key: f"{value!r} {unit}" if unit else value for key, (value, unit) in settings.items()}
     changes |= {"liquid.viscosity_ratio": 1.0} if "viscosity" in edited else {}
     if {"steps_per_cycle", "time_step"} & edited.keys() or "time_step" in table:
         changes |= {"run.time_step": f"{step!r} s", "run.allow_unstable": True}
@@ -229,12 +229,6 @@ def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float]
 
 def _by_suffix(drive: Excitation) -> list[tuple[str, Sine]]:
     return list(zip(suffixes(len(drive.harmonics)), drive.harmonics, strict=True))
-
-
-def _derived(case: Case) -> dict[str, float]:
-    """Parameters of a deck that follow from others."""
-    amplitudes = {f"amplitude{end}": one.amplitude for end, one in _by_suffix(case.excitation)}
-    return {**amplitudes, "peak_velocity": case.excitation.peak_velocity, "time_step": case.run.time_step}
 
 
 def _sine(one: Sine, end: str, values: Mapping[str, float]) -> Sine:
@@ -277,8 +271,7 @@ def _write(
     (folder / MANIFEST_NAME).unlink(missing_ok=True)
     write_json(folder / CASE_NAME, case.as_dict(), at_once=False)
     write_json(folder / LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
-    of_segment = {**segment._asdict(), "root_mean_square_velocity": None, **vars(report), "by_hand": notes}
-    write_json(folder / SEGMENT_NAME, of_segment, at_once=False)
+    write_segment_record(folder, segment, report, by_hand=notes)
     wanted = before.run
     # Cycles that were enough for the finished run of a case may be too few for an edited deck.
     doubtful = case.run.cycles < wanted.cycles if wanted.until_steady else case.apart and case != before
@@ -286,7 +279,7 @@ def _write(
         reached = f"the velocities are not constant within {percent(CONSTANT)} after {case.run.cycles} cycles"
         further = f"walkers run continues to {wanted.cycles}: set cycles to {wanted.cycles} and run the deck again"
         notes.append(f"{reached}; {further if wanted.until_steady else 'set cycles to more and run the deck again'}")
-        write_json(folder / SEGMENT_NAME, of_segment, at_once=False)
+        write_segment_record(folder, segment, report, by_hand=notes)
     tabulate(folder)
     about: dict[str, Any] = {"drive_from": segment.drive_from, "segments": 1, "by_hand": notes}
     write_manifest(case, folder.name, None, report, started=time.time(), directory=folder, **about)

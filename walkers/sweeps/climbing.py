@@ -23,7 +23,8 @@ from walkers.errors import refused
 from walkers.inputs.keys import dotted
 from walkers.postprocess.analyses.piles import Pile
 from walkers.rounding import percent
-from walkers.runner.directory import CASE_NAME, FinishedRun, finished_places, finished_run
+from walkers.runner.directory import CASE_NAME, case_of, finished_places, is_finished
+from walkers.runner.manifest import read_manifest
 from walkers.sweeps.table import RECORD_NAME, read_record, result_in, states, value_text
 
 FloatArray = npt.NDArray[np.float64]
@@ -106,10 +107,10 @@ def _groups(directory: Path) -> list[tuple[dict[str, str], list[Path]]]:
     else:
         places = [directory] if (directory / CASE_NAME).exists() else finished_places(directory).values()
         varied = {place: {} for place in places}
-    runs = [run for path in varied if (run := finished_run(path)) is not None]
+    runs = filter(is_finished, varied)
     try:
-        piles = {str(run.manifest.get("run", run.directory)): run for run in runs if Pile().applies(run.case)}
-        cases = {run.directory: _determinants(run) for run in piles.values()}
+        piles = {str(read_manifest(run).get("run", run)): run for run in runs if Pile().applies(case_of(run))}
+        cases = {run: _determinants(run) for run in piles.values()}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise refused(directory, f"a case cannot be read ({error})") from error
     if not cases:
@@ -127,11 +128,11 @@ def _groups(directory: Path) -> list[tuple[dict[str, str], list[Path]]]:
     return sorted(sets, key=lambda one: order[one[1][0]])
 
 
-def _determinants(run: FinishedRun) -> dict[str, Any]:
+def _determinants(run: Path) -> dict[str, Any]:
     """Inputs that determine a run, by dotted keys, with deck version and engine."""
-    manifest = run.manifest
+    manifest = read_manifest(run)
     made_by = {"deck version": manifest.get("deck_version"), "engine": manifest["engine"]["sha256"][:8]}
-    return dict(dotted(run.case.determinants())) | made_by
+    return dict(dotted(case_of(run).determinants())) | made_by
 
 
 def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[str, Any]:

@@ -30,10 +30,9 @@ from walkers.runner.directory import (
     FIRST_SEGMENT,
     SEGMENT_NAME,
     SEGMENTS,
-    FinishedRun,
     case_of,
     drive_from,
-    finished_run,
+    is_finished,
     layout_of,
     locked,
     move_into_place,
@@ -94,9 +93,9 @@ def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
 
 @dataclass(frozen=True)
 class Made:
-    """Requested runs: the finished ones by name, which of them existed before, and which another process makes."""
+    """Requested runs: directories of the finished ones by name, which existed before, which another process makes."""
 
-    runs: Mapping[str, FinishedRun]
+    runs: Mapping[str, Path]
     found: frozenset[str]
     busy: frozenset[str]
 
@@ -132,7 +131,7 @@ def make_runs(
     with locked(places) as ours:
         for place in ours:
             recover(place)
-        runs = {} if force else {place.name: run for place in places if (run := finished_run(place))}
+        runs = {} if force else {place.name: place for place in places if is_finished(place)}
         found = frozenset(runs)
         busy = frozenset(place.name for place in places if place not in ours and place.name not in runs)
         missing = {place: case for place, case in places.items() if place in ours and place.name not in runs}
@@ -272,8 +271,8 @@ class OpenRun:
             (folder / f"{number - 2:04d}" / RESTART_NAME).unlink(missing_ok=True)
         self.done.append(record)
 
-    def finish(self) -> FinishedRun:
-        """Write the manifest, and move the directory to its place."""
+    def finish(self) -> Path:
+        """Write the manifest, and move the directory to its place, which is returned."""
         wall_seconds, loop_seconds = (sum(one[name] for one in self.done) for name in ("wall_seconds", "loop_seconds"))
         report = EngineReport(self.done[0]["version"], wall_seconds, loop_seconds, int(self.done[-1]["end"]))
         start = drive_from(self.case, self.done) or 0
@@ -284,7 +283,7 @@ class OpenRun:
         write_manifest(self.case, self.place.name, self.engine, report, **about)
         settle()
         move_into_place(self.directory, self.place)
-        return FinishedRun(self.place)
+        return self.place
 
 
 def _teller(
@@ -355,7 +354,7 @@ def _make_together(
     locks: Sequence[int],
     on_progress: _Tell | None,
     time_limit: float | None,
-) -> dict[str, FinishedRun]:
+) -> dict[str, Path]:
     """Make runs in one deck for a number of cycles; return those with constant velocities or all of their cycles."""
     tried = {name: case.for_cycles(cycles) for name, case in cases.items()}
     deck, started = render_shared_deck(list(tried.values())), time.time()
@@ -390,7 +389,7 @@ def _make_together(
         shutil.rmtree(incomplete, ignore_errors=True)
     for name in done:  # remains of a run that was made alone and killed
         shutil.rmtree(unfinished(out / name), ignore_errors=True)
-    return {name: FinishedRun(out / name) for name in done}
+    return {name: out / name for name in done}
 
 
 def _part(incomplete: Path, cases: Mapping[str, Case], deck: Deck, report: EngineReport) -> None:

@@ -387,7 +387,7 @@ def work(
         if list(runs) != [run_place(case, own, out).name for case in cases]:
             raise ProgramDiffers(f"the program on {node()} has another version than the one that started the sweep")
         made = make_runs(cases, out, own, on_progress=look, time_limit=time_limit)
-        return Report({name: velocity_in(current_result(run.directory)) for name, run in made.runs.items()})
+        return Report({name: velocity_in(current_result(run)) for name, run in made.runs.items()})
     except (OSError, WalkersError) as error:
         if retries and not isinstance(error, Stopped):
             return work(stop, runs, cases, out, engine, time_limit, retries - 1)

@@ -30,7 +30,7 @@ from walkers.postprocess.analysis import Described, analyses, analyses_in, analy
 from walkers.postprocess.sides import differ
 from walkers.rounding import DIGITS, SHOWN_UNITS, counted, rounded
 from walkers.runner.binary import Engine
-from walkers.runner.directory import FAILURE_NAME, finished_run, is_locked, run_place, unfinished
+from walkers.runner.directory import FAILURE_NAME, is_finished, is_locked, run_place, unfinished
 from walkers.runner.files import json_bytes, read_json, write_bytes, write_json
 from walkers.runner.manifest import read_result
 from walkers.sweeps.readable import short_keys
@@ -263,7 +263,7 @@ def worst_status(points: Iterable[str]) -> str:
 
 def state_at(place: Path) -> PointState:
     """State of the run that belongs in a place."""
-    return PointState("finished", place) if finished_run(place) else unfinished_state(place, unfinished(place))
+    return PointState("finished", place) if is_finished(place) else unfinished_state(place, unfinished(place))
 
 
 def unfinished_state(place: Path, directory: Path) -> PointState:

@@ -232,7 +232,7 @@ def _parameters(plan: Plan, surfaces: Sequence[Surface]) -> tuple[list[Parameter
     """The named parameters of a deck, and the values that follow from them."""
     case, (first, last, begin) = plan.case, plan.segment
     drive, of_it = parameters.of_drive(case.excitation, amplitudes=begin is not None)
-    stable = min(limits_of(case).as_dict().values())
+    stable = min(vars(limits_of(case)).values())
     time, of_that = parameters.of_time(case, None if first else begin, last, stable)
     given = [*drive, *time]
     if case.environment.gravity > 0.0:

@@ -31,12 +31,8 @@ class ExecutedLawWarning(UserWarning):
 def by_name(name: str) -> BridgeLaw:
     """Find a law by name: one of `LAWS`, ``file.py:function`` or ``package.module:function``.
 
-    Paths of files are relative to the working directory. A file is executed again only after it has changed.
-
-    Raises
-    ------
-    ValueError
-        If there is no law with this name, or its file or module cannot be executed.
+    Paths of files are relative to the working directory. A file is executed again only after it has changed. Raises
+    `ValueError` if there is no law with this name, or its file or module cannot be executed.
     """
     if name in LAWS:
         law: BridgeLaw = import_module(f"{__name__}.{name.replace('-', '_')}").law
@@ -57,11 +53,10 @@ def source_of(name: str) -> Path | None:
     if place.endswith(".py"):
         return Path(place).resolve()
     try:
-        found = find_spec(place)
+        if (found := find_spec(place)) is None:
+            raise ImportError("no such module")
     except (ImportError, ValueError, AttributeError) as error:
         raise ValueError(f"bridge law {name!r}: {place} cannot be imported: {error}") from error
-    if found is None:
-        raise ValueError(f"bridge law {name!r}: {place} cannot be imported: no such module")
     return Path(found.origin) if found.has_location and found.origin else None
 
 

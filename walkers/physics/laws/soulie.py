@@ -27,20 +27,9 @@ PUBLISHED = "Soulié 2006 (stock engine)"
 
 
 def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
-    """Pull over the surface tension, F/γ.
+    """Pull over the surface tension, F/γ (m), at gaps (m), both of shape (n,), for a volume in m³ and an angle in rad.
 
-    Parameters
-    ----------
-    radius_1, radius_2
-        m; infinity is a plane.
-    volume, contact_angle
-        m³ and rad.
-    gaps
-        m, shape (n,); overlapping surfaces have the pull of touching ones.
-
-    Returns
-    -------
-    ndarray, shape (n,), m.
+    An infinite ``radius_2`` (m) is a plane. Overlapping surfaces have the pull of touching ones.
     """
     (one, other), times = ((radius_1, radius_1), 2.0) if radius_2 == inf else ((radius_1, radius_2), 1.0)
     larger = max(one, other)

@@ -60,7 +60,7 @@ def write_page(path: Path, title: str, body: str, carried: Mapping[str, str]) ->
         style=_text(_PACKAGE, "report.css"),
         carried={**libraries, **carried},
         scripts=_scripts() if carried else [],
-        written_by=f"{PROJECT} {software().version}",
+        written_by=f"{PROJECT} {software()['granular_walkers']}",
     )
     write_text(path, page)
     return path

@@ -24,8 +24,7 @@ from walkers.postprocess.report.page import NAME, check_report, drawn, fill, pac
 from walkers.postprocess.report.player import MOST_PLACES, player_of
 from walkers.postprocess.uncertainty import rests_on, with_bands
 from walkers.runner.directory import case_of
-from walkers.runner.files import read_json
-from walkers.runner.manifest import MANIFEST_NAME
+from walkers.runner.manifest import read_manifest
 
 Origins = tuple[Origin, ...] | None
 """Sources of the values of a case; None: as recorded in the run."""
@@ -44,7 +43,7 @@ class RunReport:
         self.id, self.name, self.title = section, directory.resolve().name, case.title or case.name
         rests = {"rests_on": rests_on(origins)} if origins is not None else {}
         self.shown = shown_of(case, with_bands(directory, current_result(directory) | rests), origins)
-        self.manifest = read_json(directory / MANIFEST_NAME)
+        self.manifest = read_manifest(directory)
         self.player = player_of(run.motion, places=places)
         self.carried = {f"player-{section}": base64.b64encode(self.player.plot.get_binary_snapshot(9)).decode()}
         figures = (one for analysis in analyses_of(case) for one in analysis.panels(run).values())
