@@ -336,6 +336,17 @@ def test_a_bead_rests_on_both_walls_of_a_groove() -> None:
     assert [np.dot(wall.normal, (0.0, 0.0, height)) for wall in groove.walls] == pytest.approx([3e-4, 3e-4])
 
 
+@pytest.mark.parametrize("shape", ["channel", "groove", "box", "octagon"])
+def test_a_flat_wall_is_named_by_the_side_on_which_it_stands(shape: str) -> None:
+    """The wall +x−y of an octagon is seen from the middle where x is positive and y negative."""
+    sizes = {"opening": radians(60.0)} if shape == "groove" else {"width": 4e-3, "height": 4e-3}
+    named = {wall.name: wall.normal for wall in Boundary(shape=shape, material="glass", **sizes).walls}
+    assert len(named) == {"channel": 3, "groove": 2, "box": 5, "octagon": 9}[shape]
+    for name in named.keys() - {"floor"}:
+        outward = [("-", "", "+")[int(np.sign(-along)) + 1] for along in named[name][:2]]
+        assert name == "".join(sign + axis for sign, axis in zip(outward, "xy", strict=True) if sign)
+
+
 @pytest.mark.parametrize("first", ["x", "y"])
 def test_walkers_face_along_the_first_of_equal_harmonics(first: str) -> None:
     axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -402,6 +413,15 @@ def test_a_rest_before_the_drive_is_one(tmp_path: Path, frequency: str) -> None:
     assert done.trajectory["time"].min() == 0.0
     assert np.abs(done.motion.velocity[resting]).max() < 1e-4
     assert speeds[1] == pytest.approx(speeds[0], rel=0.01)
+
+
+def test_a_mixture_is_poured_from_above_the_walkers() -> None:
+    """Their large beads, 1 mm across, are higher than the placed one of 0.8 mm; all poured beads are above both."""
+    case = Case.read(EVERYTHING, name="everything")
+    kinds = {number: one.beads for number, one in standing(case)}
+    tops = [max(bead.z + bead.radius for bead in beads) for beads in (kinds[0], kinds[2])]
+    assert tops == pytest.approx([1e-3, 0.8e-3], rel=1e-3)
+    assert min(bead.z - bead.radius for bead in kinds[1]) > 1e-3
 
 
 def test_walkers_placed_beads_and_a_mixture_share_a_box(tmp_path: Path) -> None:

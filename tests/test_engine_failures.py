@@ -487,6 +487,16 @@ def test_a_step_that_is_printed_twice_is_no_division_by_zero(tmp_path: Path) -> 
         judge(deck, tmp_path, log)
 
 
+def test_what_a_line_of_the_log_shows_is_not_undone_by_the_next(tmp_path: Path) -> None:
+    """A bead at 1 km/s, and a calm line after it, both read in one look."""
+    deck = render_deck(make_case(run=SHORT), whole(make_case(run=SHORT)))
+    speeds = {100: 0.01, 200: 1000.0, 300: 0.01}
+    lines = [f" {step} {deck.layout.atoms} {speed} -1e-3 1e-3 -1e-3 1e-3 0 1e-3" for step, speed in speeds.items()]
+    (tmp_path / "engine.log").write_text("\n".join(["LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0, x)", *lines, ""]))
+    with pytest.raises(failures.BlowUp, match=r"moves at 1e\+03 m/s after step 200"):
+        judge(deck, tmp_path, tmp_path / "engine.log")
+
+
 def test_a_file_can_be_written_by_many_threads_at_once(tmp_path: Path) -> None:
     barrier = threading.Barrier(2)
 

@@ -15,6 +15,7 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.sweep import expand
 from walkers.inputs.units import TEMPERATURE, parse_quantity
 from walkers.physics.mixtures import water_glycerol
+from walkers.show import describe, summarise
 from walkers.sweeps.spread import spread_sweep
 
 SHIPPED = library_of({})
@@ -124,6 +125,16 @@ def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(own: Pat
     assert [point.beads.density for point in spread.cases()] == [2450.0, 2450.0]
     with pytest.raises(InputError, match=r'beads\.material = "my beads": not in the library'):
         load_case("mine.toml")
+
+
+def test_beads_are_as_much_softer_as_their_own_library_says() -> None:
+    """50 MPa instead of the 2.5 GPa of a material of one's own: a factor of 50."""
+    own = {"materials": {"resin": {"density": {"value": "1.2 g/cm^3", "source": "weighed"}}}}
+    own["materials"]["resin"]["youngs_modulus"] = {"value": "2.5 GPa", "source": "its data sheet"}
+    tables = {**document(beads={"material": "resin"}), "library": own}
+    summary = summarise(Case.read(tables, name="soft"))
+    assert summary["beads"]["stiffness_ratio"] == pytest.approx(0.02)
+    assert "Young's modulus of the beads reduced by a factor of 50\n" in describe(summary)
 
 
 def test_a_liquid_of_ones_own_is_described_in_the_case() -> None:

@@ -350,6 +350,23 @@ def test_counts_of_beads_by_fill_height_mass_and_number() -> None:
     assert by_number.counts == (30, 30)
 
 
+@pytest.mark.parametrize(("mixed_by", "counts"), [("mass", (80, 10)), ("volume", (80, 10)), ("number", (45, 45))])
+def test_a_share_is_of_what_a_mixture_is_mixed_by(mixed_by: str, counts: tuple[int, int]) -> None:
+    """Beads of twice the radius have eight times the volume, and the mass; the share is a half, of 90 beads."""
+    case = small(mixture={"small": ["0.25 mm"] * 2, "large": ["0.5 mm"] * 2, "mixed_by": mixed_by, "count": 90})
+    assert case.mixture is not None
+    assert case.mixture.counts == counts
+
+
+def test_the_engine_counts_the_steps_of_a_rest_too() -> None:
+    """2^31 steps of at most 2 us are 4,295 s: a drive of 4,000 s fits after a rest of 100 s, not after one of 300 s."""
+    run = {"duration": "4000 s", "time_step": "2 us", "longest_settling": "100 s"}
+    fits = small(run=run).run
+    assert 3900.0 < fits.steps * fits.time_step < 4001.0
+    with pytest.raises(InputError, match=r"run\.duration.*expected at most \d+ s: the engine counts steps"):
+        small(run={**run, "longest_settling": "300 s"})
+
+
 def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     import imageio_ffmpeg
     import pyvista as pv
