@@ -111,11 +111,14 @@ def test_another_material_loses_what_was_calibrated_and_says_so() -> None:
 @pytest.mark.parametrize(
     ("ranges", "told"),
     [
-        ({"contact.frictio": [0.1, 0.2]}, "uncertain.contact.frictio: unknown key"),
-        ({"contact.restitution": [0.6, 0.2]}, "contact.restitution: expected the smaller value first"),
-        ({"contact.restitution": 0.2}, "contact.restitution: expected [low, high]"),
-        ({"drive.frequency": ["1 Hz", "2 kHz"]}, "drive.frequency: expected one unit"),
-        ({"drive.axis": ["x", "y"]}, "drive.axis: expected a number"),
+        ({"contact.frictio": [0.1, 0.2]}, "uncertain.contact.frictio = [0.1, 0.2]: unknown key"),
+        (
+            {"contact.restitution": [0.6, 0.2]},
+            "uncertain.contact.restitution = [0.6, 0.2]: expected the smaller value first",
+        ),
+        ({"contact.restitution": 0.2}, "uncertain.contact.restitution = 0.2: expected [low, high]"),
+        ({"drive.frequency": ["1 Hz", "2 kHz"]}, 'uncertain.drive.frequency = ["1 Hz", "2 kHz"]: expected one unit'),
+        ({"drive.axis": ["x", "y"]}, 'uncertain.drive.axis = ["x", "y"]: expected a number'),
         ({"liquid.contact_angle": ["1 mm", "2 mm"]}, 'uncertain.liquid.contact_angle = "1 mm": expected an angle'),
         ({"contact.restitution": [0.5, 2.0]}, "uncertain.contact.restitution = 2.0: expected at most 1"),
     ],
@@ -370,3 +373,10 @@ def test_a_band_is_shown_for_its_ranges_alone(tmp_path: Path) -> None:
         done = walkers.run(case(*ranges), tmp_path)
         assert ("5 to 95 %" in done.describe()) == shown
         assert ("5 to 95 %" in done.report(tmp_path / "page.html").read_text()) == shown
+
+
+def test_an_end_of_a_range_may_be_the_value_of_the_case() -> None:
+    tables = document(dimers={"gap": "-0.2 um"}, uncertain={"dimers.gap": ["-0.2 um", "-0.1 um"]})
+    assert origins(load_case(tables))["dimers.gap"].uncertain
+    with pytest.raises(InputError, match=r"holds the case's own value, -0\.3 um"):
+        load_case(tables, {"dimers.gap": "-0.3 um"})

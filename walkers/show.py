@@ -246,7 +246,7 @@ def _whence(one: dict[str, Any]) -> str:
     """Origin of a value as text."""
     origin, source = str(one["origin"]), str(one["source"])
     ends = f", range {one['range'][0]} to {one['range'][1]}" if one["range"] else ""
-    if origin == "default" and ends:
+    if origin == "default" and ends and not one["uncertain"]:
         return f"guessed ({source or 'not measured'}){ends.replace('range', 'general range')}"
     ends = f", uncertain{ends}" if one["uncertain"] else ends
     if origin in ("calibrated", "assumed"):

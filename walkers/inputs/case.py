@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import BeforeValidator, Field, ValidationError
 
-from walkers.errors import InputError, Problem, each, refused
+from walkers.errors import InputError, Problem, each, refused, shown, unusable
 from walkers.inputs import units
 from walkers.inputs.axes import is_axis, ranges_of
 from walkers.inputs.bodies import MOST_BEADS, Cluster, Dimers, Mixture, PlacedBead, Walkers
@@ -26,7 +26,7 @@ from walkers.inputs.keys import MISSING, flatten, parts_of, value_at
 from walkers.inputs.library import library_of
 from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
 from walkers.inputs.origins import Origin, Source, Whence, text_of
-from walkers.inputs.resolving import NAMES, SUPPLIED, resolve, supplied
+from walkers.inputs.resolving import GIVEN_BY, resolve, supplied
 from walkers.inputs.run import Run
 from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, changed, contradictions, key
 from walkers.inputs.units import Coefficient, Number, kind_in
@@ -119,24 +119,29 @@ class Environment(Table):
 
 
 def _ranges(value: object) -> object:
-    """Ranges by dotted keys: each two values of one unit, the smaller first."""
+    """Ranges by dotted keys (`_problems_of_ranges` has checked them)."""
     if not isinstance(value, dict):
         return value
-    try:
-        ranges = {name: one if is_axis(one) else {"uniform": one} for name, one in flatten(value, is_axis).items()}
-        ends = ranges_of(ranges)
-    except InputError as error:
-        (problem,) = error.problems
-        message = problem.expected.replace("{ uniform = [low, high] }", "[low, high]")
-        raise ValueError(f"{problem.key}: {message}") from error
-    for name, one in ends.items():
-        if one.median is not None:
-            raise ValueError(f"{name}: expected [low, high]: the case's own value is the median")
-    return ranges
+    return {name: one if is_axis(one) else {"uniform": one} for name, one in flatten(value, is_axis).items()}
+
+
+def _problems_of_ranges(model: type[Table], ranges: object) -> Iterator[Problem]:
+    """Keys that no case has, and ranges that are not two values of one unit, the smaller first."""
+    if not isinstance(ranges, Mapping):
+        return
+    for name, one in flatten(ranges, lambda table: not {*table} - {*_DISTRIBUTIONS}).items():
+        try:
+            check_key(model, name)
+            if ranges_of({name: one if isinstance(one, Mapping) else {"uniform": one}})[name].median is not None:
+                raise unusable(name, "expected [low, high]: the case's own value is the median", one)
+        except InputError as error:
+            message = error.problems[0].expected.replace("{ uniform = [low, high] }", "[low, high]")
+            yield Problem(f"uncertain.{name}", shown(one), message)
 
 
 Ranges = Annotated[dict[str, Any], BeforeValidator(_ranges)]
 """As a sweep's samplers take them: for each key ``{"uniform": [low, high]}`` or ``{"loguniform": [low, high]}``."""
+_DISTRIBUTIONS = ("uniform", "loguniform")
 _BODIES = ("dimers", "clusters", "mixture", "placed")
 _IN_WORDS = ("run.cycles", "run.samples_per_cycle")
 """Keys whose numbers say less than the words of their sources: ``until constant within 0.2 %, at most 60``."""
@@ -183,6 +188,7 @@ class Case(Table):
         run, loose = given.get("run", {}), given.keys() & {"mixture", "placed"}
         if loose and isinstance(run, Mapping) and not run.keys() & {"duration", "cycles"}:
             yield Problem("run.duration", None, 'missing; expected such as "4 s"')
+        yield from _problems_of_ranges(cls, given.get("uncertain"))
         yield from super().problems(given, place)
 
     @cached_property
@@ -218,9 +224,10 @@ class Case(Table):
             try:
                 case = validated(cls, tables, source, further=[*unknown, *contradictions(cls, tables)])
             except InputError as error:  # what a wrong name would have given is not missing too
-                wrong = {one.key for one in error.problems if one.value} & {*NAMES}
-                problems = [one for one in error.problems if not (wrong and one.key in SUPPLIED and not one.value)]
-                raise InputError(source, problems) from error
+                wrong = {one.key for one in error.problems if one.key in GIVEN_BY}
+                given = tuple(begin for name in wrong for begin in GIVEN_BY[name])
+                told = [one for one in error.problems if one.value or one.key in wrong or not one.key.startswith(given)]
+                raise InputError(source, told) from error
             try:
                 case = resolve(case.but(name=name, document=dict(document), sources=sources))
             except ArithmeticError as error:
@@ -239,7 +246,11 @@ class Case(Table):
                 problems = [replace(one, key=f"uncertain.{one.key}") for one in error.problems]
                 raise InputError(source, problems) from error
             value = self.value_of(name)
-            if around and isinstance(value, (int, float)) and not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9):
+            if (
+                around
+                and isinstance(value, (int, float))
+                and abs(value - (low + high) / 2.0) > 0.500000001 * (high - low)
+            ):
                 text = next((one.text for one in self.origins if one.key == name), str(value))
                 message = f"expected a range that holds the case's own value, {text}"
                 raise InputError(source, [Problem(f"uncertain.{name}", None, message)])
@@ -315,6 +326,8 @@ class Case(Table):
     def __repr__(self) -> str:
         given = ", ".join(f"{one.key} = {one.text}" for one in self.origins if one.origin == "given")
         return f"<Case {self.name}: {given}>"
+
+    __str__ = __repr__
 
     def _repr_html_(self) -> str:
         """All values with their origins, for notebooks."""

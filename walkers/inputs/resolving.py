@@ -34,6 +34,11 @@ _FACING = {"up": "right", "down": "left"}
 """The words for climbers."""
 NAMES = ("beads.material", "boundary.material", "liquid.name")
 """Keys whose values are names of the library."""
+GIVEN_BY: Mapping[str, tuple[str, ...]] = {
+    **{NAMES[0]: ("beads.", "contact."), NAMES[1]: ("contact.",), NAMES[2]: ("liquid.",)},
+    **dict.fromkeys(("liquid.mass_fraction", "liquid.temperature"), ("liquid.",)),
+}
+"""Begins of the keys that the library gives to a case by a key."""
 _FRICTION = ("contact.friction.bead_bead", "contact.friction.bead_wall", "contact.rolling_friction")
 _OF_SURFACES = (
     *("liquid.viscosity_ratio", "liquid.volume_fraction", "liquid.contact_angle"),
@@ -62,7 +67,7 @@ def supplied(document: Mapping[str, Any], library: Library) -> tuple[dict[str, A
     problems = list(_unknown(library, given, bead, wall, liquid))
     mixture, sources, problem = _mixture(document, liquid)
     problems += problem
-    values = _values(library, bead, wall, liquid, mixture) if not problem else {}
+    values = _values(library, bead, wall, None if problem else liquid, mixture)
     # What was calibrated was so with one law of the bridges: with another it is a guess.
     calibrated = liquid if said["liquid.law"] in (MISSING, DEFAULT_LAW) else None
     tables = {name: value for name, value in document.items() if name != "library"}

@@ -160,8 +160,9 @@ def _check_places(case: Case) -> None:
         _check_overlaps(beads)
 
 
-def _standing_walkers(case: Case) -> list[_Held]:
-    keys = [key for key, one in case.walkers_by_key.items() for _ in range(one.replicates)]
+def _standing_walkers(case: Case, number: int | None = None) -> list[_Held]:
+    """The beads of all walkers, or of a number of them alone."""
+    keys = [key for key, one in case.walkers_by_key.items() for _ in range(one.replicates)][:number]
     walkers: list[Standing] = []
     try:
         walkers.extend(one for _, one in islice(standing(case), len(keys)))
@@ -176,15 +177,12 @@ def _standing_walkers(case: Case) -> list[_Held]:
 
 
 def _check_walls(case: Case, beads: list[_Held]) -> None:
-    import numpy as np
-
     boundary, top = case.boundary, case.boundary.height or inf
     largest = max((max(one.radii) for one in case.walkers), default=0.0)
     if boundary.width is not None and boundary.width < 2.0 * (1.0 - OVERLAP) * largest:
         raise unusable("boundary.width", f"expected more than a bead's diameter, {2e3 * largest:.4g} mm")
-    clearances = boundary.side_clearance(np.array([bead.place for bead in beads]))
-    for bead, clearance in zip(beads, clearances, strict=True):
-        out, too_high = clearance < (1.0 - OVERLAP) * bead.radius, bead.place[2] + bead.radius > top
+    for bead, out in zip(beads, _outside(case, beads), strict=True):
+        too_high = bead.place[2] + bead.radius > top
         if bead.walker >= 0 and out:
             most = _most_walkers(case)
             message = f"the walkers do not fit between the walls of the {boundary.shape}; expected {most}"
@@ -196,18 +194,22 @@ def _check_walls(case: Case, beads: list[_Held]) -> None:
             raise unusable(f"{bead.key}.at", "expected a bead within the boundary")
 
 
-def _most_walkers(case: Case) -> str:
-    """How many walkers would fit, of a case with some outside."""
+def _outside(case: Case, beads: list[_Held]) -> list[bool]:
+    """Whether each bead is within a side wall."""
     import numpy as np
 
-    many = sum(one.replicates for one in case.walkers)
-    spacing, radius = max(one.spacing for one in case.walkers), max(max(one.radii) for one in case.walkers)
-    half = max(one.length for one in case.walkers) / 2.0
-    for fewer in range(many - 1, 0, -1):
-        places = np.array([(x, y, radius) for x, y in case.boundary.grid(fewer, spacing)])
-        if (case.boundary.side_clearance(places) >= half).all():
-            return f"at most {fewer} at this spacing"
-    return "a wider boundary"
+    clearances = case.boundary.side_clearance(np.array([bead.place for bead in beads]))
+    return [clear < (1.0 - OVERLAP) * bead.radius for bead, clear in zip(beads, clearances, strict=True)]
+
+
+def _most_walkers(case: Case) -> str:
+    """How many walkers would fit, of a case with some outside."""
+    spacing = max(one.spacing for one in case.walkers)
+    few, many = 0, sum(one.replicates for one in case.walkers)
+    while many - few > 1:
+        number = (few + many) // 2
+        few, many = (few, number) if any(_outside(case, _standing_walkers(case, number))) else (number, many)
+    return f"at most {few} at a spacing of {1e3 * spacing:.4g} mm" if few else "a wider boundary"
 
 
 def _check_overlaps(beads: list[_Held]) -> None:

@@ -109,7 +109,7 @@ class Table(BaseModel):
             if isinstance(part, int):
                 value = value[part] if isinstance(value, tuple) and part < len(value) else None
             else:
-                value = getattr(value, field_name(type(value), part)) if isinstance(value, Table) else None
+                value = getattr(value, field_name(type(value), part), None) if isinstance(value, Table) else None
         return value
 
     def leaves(self, prefix: str = "") -> Iterator[tuple[str, Any, FieldInfo]]:
@@ -168,7 +168,11 @@ def keys_in(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
 
 def field_name(model: type[BaseModel], name: str) -> str:
     """The field of a key of a table."""
-    return name if name in model.model_fields else next(one for one, f in model.model_fields.items() if f.alias == name)
+    return (
+        name
+        if name in model.model_fields
+        else next((one for one, f in model.model_fields.items() if f.alias == name), "")
+    )
 
 
 @cache

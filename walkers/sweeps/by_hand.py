@@ -18,7 +18,7 @@ from typing import Any
 from walkers.errors import refused
 from walkers.inputs.case import Case
 from walkers.inputs.drive import AXES, Excitation, Sine
-from walkers.inputs.run import CONSTANT
+from walkers.inputs.run import CONSTANT, limits_of
 from walkers.inputs.table import changed as table_changed
 from walkers.physics.laws import source_of
 from walkers.postprocess.analysis import tabulate
@@ -208,7 +208,8 @@ def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float]
     changes: dict[str, Any] = {key: f"{value!r} {unit}" if unit else value for key, (value, unit) in settings.items()}
     changes |= {"liquid.viscosity_ratio": 1.0} if "viscosity" in edited else {}
     if {"steps_per_cycle", "time_step"} & edited.keys() or "time_step" in table:
-        changes |= {"run.time_step": f"{step!r} s", "run.allow_unstable": True}
+        changes |= {"run.time_step": f"{step!r} s"}
+        changes |= {"run.allow_unstable": True} if limits_of(case).exceeded_by(step) else {}
     if cycles != run.cycles or (other and "duration" in table):
         changes["run.cycles"] = cycles
     if cycles != run.cycles:
