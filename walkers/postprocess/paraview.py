@@ -77,7 +77,7 @@ def write_vtk(
     place.parent.mkdir(parents=True, exist_ok=True)
     try:
         with TemporaryDirectory(prefix=".vtk-", dir=place.parent, ignore_cleanup_errors=True) as beside:
-            new = Path(beside, place.name)
+            new = Path(beside, "vtk")
             new.mkdir()
             for frame, meshes in _frames(motion, every or motion.case.run.samples_per_cycle):
                 if not len(entries):
