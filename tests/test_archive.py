@@ -135,7 +135,7 @@ def test_what_changed_is_named(run: Path, tmp_path: Path) -> None:
     """Nothing is read from pictures and films; a folder of segments is taken for a part of the run."""
     files = len(read_manifest(run)["files"])
     assert _verified(run) == [f"{run.name}: {files} files are unchanged"]
-    for name in ("film.mp4", "vtk/walkers_0000.vtp", "vtk/walkers_0001.vtp", ".DS_Store", "test.toml"):
+    for name in ("film.mp4", "vtk/beads_000000.vtu", "vtk/walkers.pvd", ".DS_Store", "test.toml"):
         (run / name).parent.mkdir(exist_ok=True)
         (run / name).write_bytes(b"new")
     since = [f"  made since {name}" for name in (".DS_Store", "film.mp4", "test.toml", "vtk/ (2 files)")]

@@ -272,7 +272,7 @@ REFUSED: list[tuple[str, str]] = [
     ("report {run} --to nowhere/a.html", "nowhere: there is no such folder"),
     ("plot {run} --to out.png", "out.png: expected a folder"),
     ("export {run} --to xyz -o walk.dcd", "expected the name of a .xyz or .extxyz file"),
-    ("export {run} --to xyz --vtu", "--vtu: is for --to vtk"),
+    ("export {run} --to vtk --open", "--open: is for --to paraview"),
     ("export {run} --to deck --every 2", "--every: is for --to vtk, paraview, xyz, lammps"),
     ("export {run} --to paraview -o vtk --colour beauty", "expected one of bead, large, omega, radius"),
     *((f"export {{run}} --to archive {words}", told) for words, told in (

@@ -3,14 +3,12 @@
 They become code where one language is put into another without quoting: titles, names, paths, settings.
 """
 
-import ast
 import json
 import os
 import shutil
 import subprocess
 import zipfile
 from collections.abc import Callable
-from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree
@@ -26,8 +24,7 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.analysis import current_result
 from walkers.postprocess.drawing import new_figure, plain_text, save_figure
-from walkers.postprocess.motion import read_motion
-from walkers.postprocess.paraview import _script
+from walkers.postprocess.paraview import write_vtk
 from walkers.postprocess.report.run import result_html
 from walkers.runner.directory import CASE_NAME, case_of
 from walkers.runner.files import write_json
@@ -118,15 +115,12 @@ def test_a_title_is_no_line_of_a_deck(name: str) -> None:
 
 
 @EACH
-def test_a_title_is_no_line_of_a_script_for_paraview(name: str, run_directory: Callable[..., Path]) -> None:
-    motion, folder = read_motion(run_directory(run=SHORT)).driven, Path(f"/{HOSTILE[name]}")
-    plain, odd = (
-        _script(replace(motion, case=motion.case.but(title=title)), "walker", folder)
-        for title in ("plain", HOSTILE[name])
-    )
-    assert ast.dump(ast.parse(odd)) == ast.dump(ast.parse(plain))
-    (folder_line,) = [line for line in odd.splitlines() if line.startswith("folder = ")]
-    assert ast.literal_eval(folder_line.partition(" else ")[2]) == str(folder)
+def test_a_title_is_in_no_file_for_paraview(name: str, stranger: Callable[[str], Path], tmp_path: Path) -> None:
+    texts = {"plain": "plain", "odd": HOSTILE[name]}
+    exported = [write_vtk(stranger(text), tmp_path / folder) for folder, text in texts.items()]
+    listings = {path.read_bytes() for path in exported}
+    scripts = {path.with_name("show.py").read_bytes() for path in exported}
+    assert len(listings) == len(scripts) == 1
 
 
 @EACH
@@ -254,7 +248,7 @@ def test_paths_that_are_no_utf8_are_refused_before_anything_is_done(
 
 
 def test_a_folder_that_is_no_utf8_is_refused_before_anything_is_done(case_file: Path, in_folder: Path) -> None:
-    """The tables' and ParaView's libraries take whole paths, and no others."""
+    """The libraries of the tables take whole paths, and no others."""
     folder = in_folder / NO_UTF8
     folder.mkdir()
     done = subprocess.run([PROGRAM, "run", "../base.toml"], cwd=folder, capture_output=True, text=True, check=False)

@@ -1,14 +1,18 @@
 """Figures, renderings, films, files for ParaView and other programs, read back."""
 
+import json
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 from xml.etree import ElementTree
 
 import imageio_ffmpeg
+import meshio
 import numpy as np
 import pytest
 import pyvista as pv
@@ -25,11 +29,13 @@ from walkers.postprocess.drawing import series_look, styled
 from walkers.postprocess.figures import _leaders
 from walkers.postprocess.films import FilmOptions, film_times, named_direction, parse_time
 from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, read_motion
-from walkers.postprocess.paraview import write_paraview, write_vtk
+from walkers.postprocess.paraview import _walls, write_vtk
 from walkers.postprocess.scene import Scene, Window, camera_axes, mesh_of, walls_of
 from walkers.postprocess.series import _strips, render_series
 from walkers.postprocess.tables import read_table
 from walkers.postprocess.trajectory_files import box_of
+
+KINDS = ("beads", "boundary", "bridges")
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +48,7 @@ def directory(run_directory: Callable[..., Path]) -> Path:
 
 @pytest.fixture(scope="module")
 def collection(directory: Path) -> Path:
-    return write_vtk(directory, every=1, vtu=True, as_placed=True)
+    return write_vtk(directory, every=1, as_placed=True)
 
 
 @pytest.fixture(scope="module")
@@ -52,25 +58,40 @@ def moved(directory: Path) -> Group:
 
 def test_beads_and_floor_are_where_the_engine_put_them(moved: Group, collection: Path) -> None:
     sets = ElementTree.parse(collection).getroot().findall("Collection/DataSet")
-    seconds = [float(entry.get("timestep", "nan")) for entry in sets]
-    np.testing.assert_allclose(seconds, moved.time)
+    seconds = {kind: [float(entry.attrib["timestep"]) for entry in sets if entry.get("name") == kind] for kind in KINDS}
+    for kind, every in {"beads": 1, "boundary": 1, "bridges": 5}.items():
+        np.testing.assert_allclose(seconds[kind], moved.time[::every], atol=1e-15)
+    listed = {entry.attrib["file"] for entry in sets}
+    assert {path.name for path in collection.parent.iterdir()} == {*listed, "walkers.pvd", "show.py"}
     reader = pv.get_reader(collection)
-    reader.set_active_time_value(reader.time_values[-1])
-    assert reader.read()[0].keys() == ["beads", "boundary", "bridges"]
+    for number, blocks in ((80, 3), (79, 2)):
+        reader.set_active_time_value(reader.time_values[number])
+        assert [block.n_cells for block in reader.read()] == [4, 2, 6][:blocks]
     frame = 13
-    beads = pv.read(collection.parent / f"beads_{frame:06d}.vtp")
+    beads = meshio.read(collection.parent / f"beads_{frame:06d}.vtu")
     shift = moved.motion.substrate[frame]
     np.testing.assert_allclose(beads.points, (moved.position[frame] + shift).reshape(-1, 3), rtol=1e-12)
-    for name, values in {"radius (m)": [3e-4, 2e-4] * 2, "walker": [0, 0, 1, 1], "large": [1, 0] * 2}.items():
-        np.testing.assert_array_equal(beads[name], values)
-    np.testing.assert_allclose(beads["velocity (m/s)"], moved.velocity[frame].reshape(-1, 3))
-    np.testing.assert_allclose(beads["omega (rad/s)"], moved.spin[frame].reshape(-1, 3))
-    mesh = pv.read(collection.parent / f"beads_{frame:06d}.vtu")
-    np.testing.assert_allclose(mesh.points, beads.points)
-    np.testing.assert_array_equal(mesh["radius (m)"], beads["radius (m)"])
-    floors = [pv.read(collection.parent / f"boundary_{number:06d}.vtp") for number in (0, frame)]
+    np.testing.assert_array_equal(beads.cells_dict["vertex"], np.arange(4)[:, None])
+    velocity = moved.velocity[frame].reshape(-1, 3)
+    arrays = {
+        **{"bead": range(4), "walker": [0, 0, 1, 1], "large": [1, 0] * 2, "radius (m)": [3e-4, 2e-4] * 2},
+        **{"velocity (m/s)": velocity, "speed (m/s)": np.linalg.norm(velocity, axis=1)},
+        "omega (rad/s)": moved.spin[frame].reshape(-1, 3),
+    }
+    assert beads.point_data.keys() == arrays.keys()
+    read_by_vtk = pv.read(collection.parent / f"beads_{frame:06d}.vtu")
+    for name, values in arrays.items():
+        np.testing.assert_allclose(beads.point_data[name], values)
+        np.testing.assert_array_equal(read_by_vtk.point_data[name], beads.point_data[name])
+    np.testing.assert_array_equal(read_by_vtk.points, beads.points)
+    # What the script for ParaView scales the spheres by.
+    spheres = read_by_vtk.glyph(scale="radius (m)", factor=2.0, orient=False, geom=pv.Sphere(radius=0.5))
+    top = (moved.position[frame, ..., 2] + moved.radii).max() + shift[2]
+    assert spheres.bounds[5] == pytest.approx(top, abs=1e-9)
+    floors = [pv.read(collection.parent / f"boundary_{number:06d}.vtu") for number in (0, frame)]
     np.testing.assert_allclose(floors[1].points - floors[0].points, np.tile(shift, (4, 1)), atol=1e-12)
     assert np.linalg.norm(shift) > 1e-5
+    assert floors[0].cells_dict.keys() == {pv.CellType.TRIANGLE}
     low_x, high_x, low_y, high_y, *heights = floors[0].bounds
     assert (low_x, low_y) < tuple(moved.motion.position[..., :2].min(axis=(0, 1)))
     assert (high_x, high_y) > tuple(moved.motion.position[..., :2].max(axis=(0, 1)))
@@ -78,12 +99,12 @@ def test_beads_and_floor_are_where_the_engine_put_them(moved: Group, collection:
 
 
 def test_bridges_are_lines_with_force_and_gap(directory: Path, moved: Group, collection: Path) -> None:
-    bridges = pv.read(collection.parent / "bridges_000010.vtp")
+    bridges = meshio.read(collection.parent / "bridges_000010.vtu")
     table = read_table(directory, "bridges")
     rows = table[np.isclose(table["time"], moved.time[10])]
-    ends = bridges.points[bridges.lines.reshape(-1, 3)[:, 1:]]
+    ends = bridges.points[bridges.cells_dict["line"]]
     # The table is sorted by walkers and contacts, the lines are not: a line is known by the beads that it joins.
-    centres = pv.read(collection.parent / "beads_000010.vtp").points
+    centres = pv.read(collection.parent / "beads_000010.vtu").points
     apart = np.linalg.norm(ends[:, :, None] - centres, axis=-1)
     joined = np.where(apart.min(axis=-1) < 1e-12, apart.argmin(axis=-1), -1)
     contacts = [(0, -1), (1, -1), (0, 1), (2, -1), (3, -1), (2, 3)]
@@ -91,13 +112,31 @@ def test_bridges_are_lines_with_force_and_gap(directory: Path, moved: Group, col
     lines = [tuple(sorted(line, key=lambda bead: (bead < 0, bead))) for line in joined.tolist()]
     order = [lines.index(contact) for contact in contacts]
     assert sorted(order) == list(range(6))
+    feet = ends[joined < 0]
+    np.testing.assert_allclose(feet[:, 2], moved.motion.substrate[10, 2], atol=1e-12)
     units = {"gap": " (m)", "normal_force": " (N)"}
     for name in ("gap", "normal_force", "walker", "wall", "bead_1", "bead_2"):
-        np.testing.assert_allclose(bridges.cell_data[name + units.get(name, "")][order], rows[name])
+        (values,) = bridges.cell_data[name + units.get(name, "")]
+        np.testing.assert_allclose(values[order], rows[name])
+    np.testing.assert_array_equal(bridges.cell_data["touching"][0][order], rows["gap"] <= 0.0)
     length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
     np.testing.assert_allclose(length[order] - [3e-4, 2e-4, 5e-4] * 2, rows["gap"], atol=1e-10)
     # The engine reported bridges twice a cycle, beads ten times.
-    assert [len(list(collection.parent.glob(f"{kind}_*.vtp"))) for kind in ("bridges", "beads")] == [17, 81]
+    assert [len(list(collection.parent.glob(f"{kind}_*.vtu"))) for kind in ("bridges", "beads")] == [17, 81]
+    necks = pv.read(collection.parent / "bridges_000010.vtu").extract_surface(algorithm=None)
+    assert (necks.n_lines, necks.tube(radius=1e-5, n_sides=16).n_cells > 0) == (6, True)
+
+
+def test_a_frame_without_bridges_has_no_block_of_them(directory: Path, tmp_path: Path) -> None:
+    run = Path(shutil.copytree(directory, tmp_path / "run"))
+    for path in run.rglob("bridges.*s.txt"):  # of pairs, of walls
+        first, *later = path.read_text().split("ITEM: TIMESTEP")[1:]
+        head, entries = first.split("ITEM: ENTRIES")
+        head = re.sub(r"(ENTRIES\n)\d+", r"\g<1>0", head)
+        path.write_text("ITEM: TIMESTEP".join(["", f"{head}ITEM: ENTRIES{entries.splitlines()[0]}\n", *later]))
+    collection = write_vtk(run, tmp_path / "vtk")
+    assert [(collection.parent / f"bridges_0000{frame}.vtu").exists() for frame in ("00", "10")] == [False, True]
+    assert len(pv.get_reader(collection).read()) == 2
 
 
 def test_walkers_are_drawn_side_by_side_once_a_cycle_and_the_camera_sees_them(
@@ -106,33 +145,36 @@ def test_walkers_are_drawn_side_by_side_once_a_cycle_and_the_camera_sees_them(
     """Those of a run in segments too."""
     collection = write_vtk(directory, destination=tmp_path / "gathered")
     np.testing.assert_allclose(pv.get_reader(collection).time_values, np.arange(9) / 80.0)
-    points = [pv.read(collection.parent / f"beads_{frame:06d}.vtp").points for frame in (0, 80)]
+    points = [pv.read(collection.parent / f"beads_{frame:06d}.vtu").points for frame in (0, 80)]
     walked = (points[1] - points[0]).reshape(2, 2, 3)
     np.testing.assert_allclose(walked, moved.position[80] - moved.position[0], atol=1e-12)
     assert np.ptp(points[0][:, 1]) < 4e-3 < np.ptp(moved.position[0, ..., 1])
     run = {"cycles": 8, "settling_cycles": 2, "samples_per_cycle": 10, "segment": "0.05 s"}
-    script = write_paraview(run_directory(dimers={"replicates": 2}, run=run), tmp_path / "vtk")
-    (line,) = re.findall(r"view.CameraFocalPoint = \[(.*)\]", script.read_text())
-    beads = pv.read(script.parent / "beads_000000.vtp").points
-    np.testing.assert_allclose([float(one) for one in line.split(",")][:2], beads[:, :2].mean(axis=0), atol=1e-3)
+    other = write_vtk(run_directory(dimers={"replicates": 2}, run=run), tmp_path / "vtk", colour="omega")
+    beads = pv.read(other.parent / "beads_000000.vtu").points
+    view = json.loads(ElementTree.parse(other).getroot().attrib["view"])
+    np.testing.assert_allclose(view["middle"][:2], beads[:, :2].mean(axis=0), atol=1e-3)
+    assert (view["colour"], view["neck"]) == ("omega (rad/s)", pytest.approx(9e-5))
     assert np.ptp(beads[:, 1]) < 4e-3
+    scripts = [place.with_name("show.py").read_bytes() for place in (collection, other)]
+    assert scripts == 2 * [files("walkers.postprocess").joinpath("paraview_show.py").read_bytes()]
 
 
 _FOREIGN: dict[str, Callable[[Path], object]] = {
     "a text": lambda place: (place / "thesis.txt").write_text("years of work"),
     "VTK files": lambda place: [(place / name).write_text("x") for name in ("turbine_0001.vtu", "turbine.pvd")],
-    "names as ours, without a collection": lambda place: (place / "beads_000000.vtp").write_text("x"),
+    "names as ours, without a collection": lambda place: (place / "beads_000000.vtu").write_text("x"),
+    "a script as ours, without a collection": lambda place: (place / "show.py").write_text("x"),
     "a collection that lists other files": lambda place: (place / "walkers.pvd").write_text("<VTKFile/>"),
+    "a collection of other files": lambda place: (
+        (place / "walkers.pvd").write_text('<DataSet timestep="0.0" file="turbine.vtu" />'),
+        (place / "turbine.vtu").write_text("x"),
+    ),
     "a frame that was not exported": lambda place: (
-        *(_listing(place, name) for name in ("walkers.pvd", "frame_000000.vtm")),
-        (place / "beads_000001.vtp").write_text("x"),
+        (place / "walkers.pvd").write_text('<DataSet timestep="0.0" part="0" file="beads_000000.vtu" />'),
+        *((place / f"beads_00000{number}.vtu").write_text("x") for number in (0, 1)),
     ),
 }
-
-
-def _listing(place: Path, name: str) -> None:
-    """A file of an export of frame 0."""
-    (place / name).write_text('<DataSet timestep="0.0" group="" part="0" file="frame_000000.vtm" />')
 
 
 @pytest.mark.parametrize("name", _FOREIGN)
@@ -148,22 +190,21 @@ def test_an_export_replaces_its_own_files_alone(name: str, directory: Path, tmp_
         path.unlink()
     for every in (4, 40):  # an earlier export is replaced
         write_vtk(directory, destination=place, every=every)
-        assert len(list(place.glob("frame_*.vtm"))) == 80 // every + 1
+        assert len(list(place.glob("beads_*.vtu"))) == 80 // every + 1
     with pytest.raises(InputError, match="it is a file"):
         write_vtk(directory, destination=place / "walkers.pvd")
     (tmp_path / "link").symlink_to(place)
     before = {path: path.read_bytes() for path in place.iterdir()}
     with pytest.raises(InputError, match="it is a symbolic link"):
-        write_paraview(directory, tmp_path / "link")
+        write_vtk(directory, tmp_path / "link")
     assert {path: path.read_bytes() for path in place.iterdir()} == before
+    assert {path.name for path in tmp_path.iterdir()} == {"vtk", "link"}
 
 
 def test_an_export_for_paraview_reads_each_dump_once(directory: Path, tmp_path: Path) -> None:
-    script = (
-        "import sys; from pathlib import Path; from walkers.postprocess.paraview import write_paraview; opened = []\n"
-    )
+    script = "import sys; from pathlib import Path; from walkers.postprocess.paraview import write_vtk; opened = []\n"
     script += "sys.addaudithook(lambda event, given: event == 'open' and opened.append(str(given[0])))\n"
-    script += "write_paraview(Path(sys.argv[1]), Path(sys.argv[2]))\n"
+    script += "write_vtk(Path(sys.argv[1]), Path(sys.argv[2]))\n"
     script += "print(*(sum(one.endswith(name) for one in opened) for name in ('beads.bin', 'bridges.pairs.txt')))"
     command = [sys.executable, "-c", script, str(directory), str(tmp_path / "vtk")]
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.split() == ["1", "1"]
@@ -395,6 +436,9 @@ def test_walls_are_whole_wherever_the_beads_are(motion: Motion, boundary: Bounda
     walls = mesh_of(walls_of(moved)).clean(tolerance=1e-9, absolute=True)
     assert (walls.n_cells, walls.bounds[4]) == (faces, pytest.approx(0.0, abs=1e-12))
     assert walls.n_open_edges == edges
+    triangles = _walls(moved)
+    first, second, third = triangles.points[triangles.cells_dict["triangle"]].swapaxes(0, 1)
+    assert np.linalg.norm(np.cross(second - first, third - first), axis=1).sum() / 2.0 == pytest.approx(walls.area)
 
 
 # --- trajectories for other programs ----------------------------------------------------------------------------------

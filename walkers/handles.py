@@ -243,10 +243,10 @@ class Run:
 
             return write_archive(self.finished_directory, place, ArchiveOptions(**options))
         if form in ("vtk", "paraview"):
-            from walkers.postprocess.paraview import write_paraview, write_vtk
+            from walkers.postprocess.paraview import SCRIPT, write_vtk
 
-            write = write_vtk if form == "vtk" else write_paraview
-            return write(self.finished_directory, destination=place, **options)
+            collection = write_vtk(self.finished_directory, place, **options)
+            return collection if form == "vtk" else collection.with_name(SCRIPT)
         from walkers.postprocess.trajectory_files import SUFFIXES, write_trajectory
 
         place = place or self.finished_directory / f"trajectory{SUFFIXES[form][0]}"

@@ -27,13 +27,14 @@ from walkers.commands.arguments import (
 from walkers.completion import offering
 
 _FORM = (
-    "Format of the export. deck: LIGGGHTS deck of the case. vtk: .vtp and .vtm files with a .pvd. paraview: the same, "
-    "with a ParaView script. xyz, lammps: the trajectory for OVITO, ASE, MDAnalysis. archive: an RO-Crate (.zip) to "
-    "publish."
+    "Format of the export. deck: LIGGGHTS deck of the case. vtk, paraview: .vtu files, their .pvd and a ParaView "
+    "script; prints the .pvd or the script. xyz, lammps: the trajectory for OVITO, ASE, MDAnalysis. archive: an "
+    "RO-Crate (.zip) to publish."
 )
 _OUTPUT = "File or folder to write; default: in the run's folder, archives in the current folder. Decks are printed."
 _EVERY = "vtk, paraview, xyz, lammps: write every Nth sample; default: one per cycle; for xyz, lammps, piles all."
 _AS_PLACED = "vtk, paraview: keep independent walkers at their positions in the deck, not side by side."
+_COLOUR = "vtk, paraview: array that colours the beads in the script; default: walker, for piles speed."
 _WITHOUT_DUMPS = "archive: leave out the engine's dumps; tables and results are included."
 _LICENCE = "archive: CC-BY-4.0 (default), CC0-1.0, CC-BY-SA-4.0 or BSD-3-Clause."
 _ANY = offering("case", "run", "sweep")
@@ -48,8 +49,7 @@ def export(
     out: Out = DEFAULT_OUT,
     every: int | None = Option(None, min=1, help=_EVERY),
     as_placed: bool = Option(False, "--as-placed", help=_AS_PLACED),
-    vtu: bool = Option(False, "--vtu", help="vtk: also write the beads as .vtu."),
-    colour: str | None = Option(None, help="paraview: array that colours the beads; default: walker, for piles speed."),
+    colour: str | None = Option(None, help=_COLOUR),
     start: bool = Option(False, "--open", help="paraview: start ParaView with the script."),
     without_dumps: bool = Option(False, "--without-dumps", help=_WITHOUT_DUMPS),
     author: list[str] | None = Option(None, help="archive: name of an author. Repeatable."),
@@ -59,9 +59,8 @@ def export(
     """Write a run for other programs: LIGGGHTS deck, VTK, ParaView, XYZ, LAMMPS dump, or an archive to publish."""
     given = {
         "--every": (every, ("vtk", "paraview", "xyz", "lammps")),
-        "--as-placed": (as_placed, ("vtk", "paraview")),
-        "--vtu": (vtu, ("vtk",)),
-        **{"--colour": (colour, ("paraview",)), "--open": (start, ("paraview",))},
+        **{"--as-placed": (as_placed, ("vtk", "paraview")), "--colour": (colour, ("vtk", "paraview"))},
+        "--open": (start, ("paraview",)),
         **{"--without-dumps": (without_dumps, ("archive",)), "--licence": (licence, ("archive",))},
         **{"--author": (author, ("archive",)), "--orcid": (orcid, ("archive",))},
     }
@@ -97,19 +96,14 @@ def export(
     found = load_run(what, settings, out)
     wrong = as_placed and not found.case.apart
     refuse("--as-placed", wrong, "is for independent walkers: these stand where they are")
-    print(written := found.export(form, output, **_options(form, every, as_placed, vtu, colour)))
+    options: dict[str, Any] = {"every": every or 1}
+    if form in ("vtk", "paraview"):
+        options = {"every": every, "as_placed": as_placed, "colour": colour}
+    print(written := found.export(form, output, **options))
     if start:
         from walkers.postprocess.paraview import open_paraview
 
         open_paraview(written)
-
-
-def _options(form: str, every: int | None, as_placed: bool, vtu: bool, colour: str | None) -> dict[str, Any]:
-    """Arguments of the function that writes a form."""
-    if form in ("xyz", "lammps"):
-        return {"every": every or 1}
-    own = {"vtu": vtu} if form == "vtk" else {"colour": colour}
-    return {"every": every, "as_placed": as_placed, **own}
 
 
 def clean(
