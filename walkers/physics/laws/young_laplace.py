@@ -36,7 +36,7 @@ _SMALL = 1e-9
 def law(surfaces: Surfaces) -> Curve:
     """Pull and rupture distance of the Young–Laplace equation, and Reynolds resistances.
 
-    Raises `NoBridgeError` if no bridge was found (a contact angle so large that the liquid is not held between them).
+    Raises `walkers.physics.laplace.NoBridgeError` if the liquid is not held between them (a large contact angle).
     """
     radius = surfaces.radius
     farthest, smooth = _solved(_shape(surfaces))
