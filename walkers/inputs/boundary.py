@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 from walkers.errors import Problem
 from walkers.inputs import units
 from walkers.inputs.drive import Vector
-from walkers.inputs.keys import joined, parts_of
-from walkers.inputs.table import SAME_RUN, Filled, Table, example_of, key
+from walkers.inputs.table import SAME_RUN, Filled, Table, key, within
 
 if TYPE_CHECKING:
     import numpy as np
@@ -122,11 +121,10 @@ class Boundary(Table):
         """Sizes that the shape lacks, or that are those of another shape."""
         sizes = SIZES.get(shape := str(given.get("shape", "plane")), ())
         for name in ("opening", "width", "height") if shape in SIZES else ():
-            where = joined([*parts_of(place), name])
             if name in sizes and name not in given:
-                yield Problem(where, None, f"missing; expected {example_of(cls.model_fields[name])}")
+                yield cls.missing(name, place)
             elif name in given and name not in sizes:
-                yield Problem(where, None, f"expected none of a {shape}")
+                yield Problem(within(place, name), None, f"expected none of a {shape}")
 
     @property
     def closed(self) -> bool:

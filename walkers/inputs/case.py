@@ -39,6 +39,10 @@ if TYPE_CHECKING:
     from walkers.physics.bridge import BridgeLaw
 
 
+STIFFEST = 1e9
+"""Largest Young's modulus of the contacts of a case, Pa."""
+
+
 class Beads(Table):
     """``[beads]``: what all beads are made of."""
 
@@ -103,7 +107,7 @@ class Contact(Table):
     friction: Friction = key("")
     rolling_friction: Coefficient = key("Coefficient of rolling friction (constant directional torque).", example=0.01)
     restitution: Number = key("Coefficient of restitution of the dry contact.", example=0.5, gt=0.05, le=1)
-    youngs_modulus: Annotated[float, replace(units.MODULUS, smallest=5e6, largest=1e9)] = key(
+    youngs_modulus: Annotated[float, replace(units.MODULUS, smallest=5e6, largest=STIFFEST)] = key(
         "Young's modulus of beads and boundary: lower than the real one, so that the time step can be longer.", 5e7
     )
     poissons_ratio: Number = key("Poisson's ratio.", 0.3, ge=0, lt=0.5)
@@ -129,7 +133,7 @@ def _problems_of_ranges(model: type[Table], ranges: object) -> Iterator[Problem]
     """Keys that no case has, and ranges that are not two values of one unit, the smaller first."""
     if not isinstance(ranges, Mapping):
         return
-    for name, one in flatten(ranges, lambda table: not {*table} - {*_DISTRIBUTIONS}).items():
+    for name, one in flatten(ranges, is_axis).items():
         try:
             check_key(model, name)
             if ranges_of({name: one if isinstance(one, Mapping) else {"uniform": one}})[name].median is not None:
@@ -141,7 +145,6 @@ def _problems_of_ranges(model: type[Table], ranges: object) -> Iterator[Problem]
 
 Ranges = Annotated[dict[str, Any], BeforeValidator(_ranges)]
 """As a sweep's samplers take them: for each key ``{"uniform": [low, high]}`` or ``{"loguniform": [low, high]}``."""
-_DISTRIBUTIONS = ("uniform", "loguniform")
 _BODIES = ("dimers", "clusters", "mixture", "placed")
 _IN_WORDS = ("run.cycles", "run.samples_per_cycle")
 """Keys whose numbers say less than the words of their sources: ``until constant within 0.2 %, at most 60``."""
@@ -187,7 +190,7 @@ class Case(Table):
             yield Problem("dimers", None, "missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]")
         run, loose = given.get("run", {}), given.keys() & {"mixture", "placed"}
         if loose and isinstance(run, Mapping) and not run.keys() & {"duration", "cycles"}:
-            yield Problem("run.duration", None, 'missing; expected such as "4 s"')
+            yield Run.missing("duration", "run")
         yield from _problems_of_ranges(cls, given.get("uncertain"))
         yield from super().problems(given, place)
 
@@ -240,7 +243,6 @@ class Case(Table):
         for name, given in self.uncertain.items():
             ends = next(iter(given.values()))
             try:
-                check_key(type(self), name)
                 low, high = (validated(Case, changed(Case, tables, {name: end}), source).value_of(name) for end in ends)
             except InputError as error:
                 problems = [replace(one, key=f"uncertain.{one.key}") for one in error.problems]
@@ -281,7 +283,7 @@ class Case(Table):
 
     def as_dict(self) -> dict[str, Any]:
         """The whole case as plain JSON types, SI units, with the tables it was read from and its values' sources."""
-        return self.model_dump(mode="json", by_alias=True)
+        return self.model_dump(mode="json")
 
     def filled(self, name: str, value: Any, why: str = "", origin: Whence = "derived") -> Case:
         """The case with a value of a key that its file does not give."""

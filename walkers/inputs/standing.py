@@ -160,9 +160,9 @@ def _check_places(case: Case) -> None:
         _check_overlaps(beads)
 
 
-def _standing_walkers(case: Case, number: int | None = None) -> list[_Held]:
-    """The beads of all walkers, or of a number of them alone."""
-    keys = [key for key, one in case.walkers_by_key.items() for _ in range(one.replicates)][:number]
+def _standing_walkers(case: Case, most: int | None = None) -> list[_Held]:
+    """The beads of all walkers, or of the first ones alone."""
+    keys = [key for key, one in case.walkers_by_key.items() for _ in range(one.replicates)][:most]
     walkers: list[Standing] = []
     try:
         walkers.extend(one for _, one in islice(standing(case), len(keys)))

@@ -109,13 +109,14 @@ class Table(BaseModel):
             if isinstance(part, int):
                 value = value[part] if isinstance(value, tuple) and part < len(value) else None
             else:
-                value = getattr(value, field_name(type(value), part), None) if isinstance(value, Table) else None
+                known = isinstance(value, Table) and part in type(value).model_fields
+                value = getattr(value, part) if known else None
         return value
 
     def leaves(self, prefix: str = "") -> Iterator[tuple[str, Any, FieldInfo]]:
         """Values of all keys, tables in tables by dotted keys, each with its field; without derived fields."""
         for name, field in keys_in(type(self)).items():
-            value, place = getattr(self, field_name(type(self), name)), f"{prefix}{name}"
+            value, place = getattr(self, name), f"{prefix}{name}"
             if isinstance(value, Table):
                 yield from value.leaves(f"{place}.")
             elif isinstance(value, tuple) and value and isinstance(value[0], Table):
@@ -147,16 +148,23 @@ class Table(BaseModel):
             if len(said) > 1:
                 name = next(name for name in said[1] if name in given)
                 two = Choice(tuple(said[:2])).text
-                yield Problem(joined([*parts_of(place), name]), None, f"expected either {two}, not both")
+                yield Problem(within(place, name), None, f"expected either {two}, not both")
             elif said or choice.required:
                 way = said[0] if said else choice.ways[0]
                 others = [other for other in choice.ways if other is not way] if not said else []
                 others += [(choice.instead,)] if choice.instead else []
                 instead = "".join(f", or {' and '.join(other)}" for other in others)
-                for name in way:
-                    if name not in given:
-                        example = example_of(cls.model_fields[name])
-                        yield Problem(joined([*parts_of(place), name]), None, f"missing; expected {example}{instead}")
+                yield from (cls.missing(name, place, instead) for name in way if name not in given)
+
+    @classmethod
+    def missing(cls, name: str, place: str, instead: str = "") -> Problem:
+        """That a key is missing of a table at a place, with an example, and what may be there instead."""
+        return Problem(within(place, name), None, f"missing; expected {example_of(cls.model_fields[name])}{instead}")
+
+
+def within(place: str, name: str) -> str:
+    """The dotted key of a key of a table at a place."""
+    return f"{place}.{name}".removeprefix(".")
 
 
 @cache
@@ -164,15 +172,6 @@ def keys_in(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
     """The keys of a table, as a file has them, with their fields."""
     fields = model.model_fields.items()
     return {field.alias or name: field for name, field in fields if _DERIVED not in field.metadata}
-
-
-def field_name(model: type[BaseModel], name: str) -> str:
-    """The field of a key of a table."""
-    return (
-        name
-        if name in model.model_fields
-        else next((one for one, f in model.model_fields.items() if f.alias == name), "")
-    )
 
 
 @cache
@@ -205,7 +204,7 @@ def contradictions(model: type[Table], document: Any, place: str = "") -> Iterat
         return
     yield from model.problems({name: value for name, value in document.items() if value != []}, place)
     for name, inner in _tables_in(model).items():
-        below, where = document.get(name), f"{place}.{name}".removeprefix(".")
+        below, where = document.get(name), within(place, name)
         for number, one in enumerate(below if isinstance(below, list) else [below]):
             yield from contradictions(inner, one, f"{where}[{number}]" if isinstance(below, list) else where)
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from walkers.errors import WalkersError
+from walkers.inputs.case import STIFFEST
 from walkers.inputs.library import unmeasured
 from walkers.inputs.numerical import STIFFER
 from walkers.inputs.origins import Origin
@@ -18,12 +19,10 @@ from walkers.rounding import SHOWN_UNITS, rounded
 from walkers.runner.binary import Engine
 from walkers.runner.directory import case_of, run_place
 from walkers.runner.files import read_json
-from walkers.runner.manifest import read_manifest
+from walkers.runner.manifest import read_manifest, read_result
 
 SPREAD = "-spread"
 SPREAD_NAME = "spread.json"
-_STIFFEST = 1e9
-"""Pa; no case may have stiffer contacts."""
 """End of the name of a spread's directory (`spread_of`), and name of the file with the bands in it."""
 LEAST_PER_VALUE = 3
 """Draws per varied value below which the band is approximate and rank correlations are not significant."""
@@ -131,16 +130,14 @@ def _numerical_error(directory: Path, velocity: float) -> dict[str, Any]:
 
     As long as one is missing, the changes of the case that make it, as ``checks``.
     """
-    from walkers.runner.manifest import read_result
-
     case = case_of(directory)
+    if STIFFER * case.contact.youngs_modulus > STIFFEST:
+        return {}
     engine = Engine(directory, read_manifest(directory)["engine"]["sha256"])
     changes = {
         "half_step": ("run.time_step", f"{0.5e6 * case.run.time_step:.4g}us"),
         "stiffer": ("contact.youngs_modulus", f"{1e-6 * STIFFER * case.contact.youngs_modulus:.4g}MPa"),
     }
-    if STIFFER * case.contact.youngs_modulus > _STIFFEST:
-        return {}
     error, runs = {}, {}
     for kind, change in changes.items():
         with suppress(OSError, ValueError, KeyError, TypeError, WalkersError):  # a case that cannot be, or no run

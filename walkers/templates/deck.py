@@ -9,7 +9,7 @@ from math import ceil, inf, pi, prod, sqrt
 from typing import Any, NamedTuple
 
 from walkers.errors import InputError, Problem
-from walkers.inputs.case import Case, Contact
+from walkers.inputs.case import STIFFEST, Case, Contact
 from walkers.inputs.drive import Vector
 from walkers.inputs.loads import bridge_at_rest, hop_height, reach
 from walkers.inputs.run import limits_of
@@ -43,8 +43,6 @@ SETTLING_SECONDS = 0.05
 """Length of the segments in which beads come to rest; at the end of each we check whether they have."""
 RESTING_SEGMENTS = 3
 """Largest number of such segments that piles needed."""
-_STIFFEST = 1e9
-"""Pa; no case has stiffer contacts, but a check may."""
 _MOST_BINS = 3e7
 """Largest number of bins, as large as the radius of the largest bead, into which atoms are sorted every 1,000 steps.
 
@@ -267,7 +265,7 @@ def _contacts(case: Case, contacts: Sequence[Contact], named: Collection[str]) -
     moduli = [*(contact.youngs_modulus for contact in contacts), case.contact.youngs_modulus]
     return {
         "moduli": " ".join(["${youngs_modulus}"] * len(moduli) if "youngs_modulus" in named else map(number, moduli)),
-        "stiff": max(moduli) > _STIFFEST,
+        "stiff": max(moduli) > STIFFEST,
         "friction": _coefficients(contacts, named, "friction.bead_bead", "friction.bead_wall"),
         "rolling_friction": _coefficients(contacts, named, "rolling_friction"),
         "restitution": _coefficients(contacts, named, "restitution"),
