@@ -24,7 +24,7 @@ from walkers.inputs.table import changed
 from walkers.inputs.units import Kind, quantity_text
 from walkers.postprocess.analyses.piles import _bed, _joined
 from walkers.postprocess.analyses.walking import _rows, spread
-from walkers.postprocess.analyses.work import work_of
+from walkers.postprocess.cycles import work_of
 from walkers.postprocess.films import speed_text
 from walkers.postprocess.gait import gait, settled_samples, turned_over_at
 from walkers.postprocess.motion import Bridges, Group, Motion

@@ -100,7 +100,7 @@ def test_contents_of_a_run_directory(tmp_path: Path) -> None:
     assert is_finished(run)
     assert {path.name for path in run.iterdir()} == {
         *("case.json", "manifest.json", "result.json", "segments"),
-        *("trajectory.parquet", "walkers.parquet", "bridges.parquet", "work.parquet"),
+        *("trajectory.parquet", "walkers.parquet", "bridges.parquet", "cycles.parquet"),
     }
     assert {path.name for path in (run / "segments").iterdir()} == {"0000"}
     assert {path.name for path in (run / FIRST_SEGMENT).iterdir()} == {

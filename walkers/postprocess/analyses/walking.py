@@ -22,6 +22,7 @@ from walkers.inputs.numerical import STIFFER, numerical_error
 from walkers.inputs.run import CONSTANT
 from walkers.postprocess.analysis import Analysis, Described, Measured, Quantity
 from walkers.postprocess.caption import radii_text
+from walkers.postprocess.cycles import Cycles, cycles_of
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.gait import (
     POSTURES,
@@ -158,8 +159,13 @@ class Walking(Analysis):
 
     order = 0
     name = "walking"
-    version = 9
-    tables: ClassVar[Mapping[str, type]] = {"trajectory": Trajectory, "walkers": WalkerRows, "bridges": BridgeRows}
+    version = 10
+    tables: ClassVar[Mapping[str, type]] = {
+        "trajectory": Trajectory,
+        "walkers": WalkerRows,
+        "cycles": Cycles,
+        "bridges": BridgeRows,
+    }
     headlines = ("velocity",)
     derived: ClassVar[Described] = {
         "gamma0": ("", "dimensionless peak force Γ0 = a0 M/(4πγR̄) of dimers"),
@@ -181,6 +187,7 @@ class Walking(Analysis):
         tables = {
             "trajectory": _stacked([columns_of(_trajectory(*one)) for one in zip(groups, gaits, strict=True)]),
             "walkers": _stacked(rows),
+            "cycles": _stacked([cycles_of(group) for group in groups]),
             "bridges": _bridges(motion),
         }
         known, makes = self.derived_of(case), [_summary(one, case) for one in rows]
