@@ -7,6 +7,7 @@ from errno import EROFS
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from walkers.inputs.case import Case
@@ -18,8 +19,9 @@ from walkers.postprocess.analysis import RESULT_NAME, Measured, current_result, 
 from walkers.postprocess.figures import gait_panels, walk_panels
 from walkers.postprocess.gait import Averages, averages, fit_slopes, gait, gaps, settled_samples, steady_walkers, walk
 from walkers.postprocess.motion import Group, read_motion
+from walkers.postprocess.quantities import TABLES, declared
 from walkers.postprocess.sides import sides
-from walkers.postprocess.tables import described, read_table
+from walkers.postprocess.tables import read_table, write_table
 from walkers.runner.directory import SEGMENTS
 from walkers.runner.files import write_json
 from walkers.runner.manifest import recomputed
@@ -159,33 +161,41 @@ def test_the_result_follows_the_papers_protocol(directory: Path) -> None:
     assert (result["right_facing"]["n"], result["steady"], result["walkers_met"]) == (3, 6, False)
 
 
-NUMBERED = {
-    "trajectory": {"rotation": 2, "sliding": 2, "sliding_pair": 1, "gap": 2, "gap_pair": 1},
-    "walkers": {"rotation": 2, "sliding": 2, "sliding_pair": 1, "open": 2, "open_pair": 1},
-    "bridges": {},
-}
-"""Columns of the tables of dimers that there are for each bead or contact."""
+def test_tables_have_units_labels_and_meanings(directory: Path) -> None:
+    """Each file has the declared columns in their order, with what is declared of them; nothing else."""
+    for path in directory.glob("*.parquet"):
+        schema, known = pq.read_schema(path), TABLES[path.stem]
+        places = [next(place for place, one in enumerate(known) if one.names(name)) for name in schema.names]
+        assert places == sorted(places)
+        assert set(places) == set(range(len(known)))
+        for field in schema:
+            quantity = declared(field.name, known)
+            unit, label = quantity.si_unit.encode(), quantity.label.encode()
+            expected = {b"unit": unit, b"units": unit, b"long_name": label, b"meaning": quantity.meaning.encode()}
+            assert field.metadata == expected
+            assert "*" not in quantity.label
+        attributes = read_table(directory, path.stem).attrs
+        assert attributes["units"].keys() == attributes["long_name"].keys() == set(schema.names)
+        assert pq.ParquetFile(path).metadata.row_group(0).column(0).compression == "ZSTD"
 
 
-@pytest.mark.parametrize("name", NUMBERED)
-def test_tables_have_units_and_meanings(directory: Path, name: str) -> None:
-    import pyarrow.parquet as pq
-
-    schema = pq.read_schema(directory / f"{name}.parquet")
-    columns = described(Walking.tables[name])
-    for family, number in NUMBERED[name].items():
-        told = columns.pop(f"{family}_*")
-        columns |= {f"{family}_{one}": told for one in range(1, number + 1)}
-    assert schema.names == list(columns)
-    for field in schema:
-        unit, meaning = columns[field.name]
-        assert field.metadata[b"unit"].decode() == unit
-        assert field.metadata[b"meaning"].decode() == meaning
-    assert pq.ParquetFile(directory / f"{name}.parquet").metadata.row_group(0).column(0).compression == "ZSTD"
+def test_dimers_have_columns_of_two_beads_and_a_pair(directory: Path) -> None:
+    families = {"walkers": ("rotation", "sliding", "open"), "trajectory": ("rotation", "sliding", "gap")}
+    for table, names in families.items():
+        columns = {name for name in read_table(directory, table) if name[-1].isdigit()}
+        pairs = {f"{name}_pair_1" for name in names[1:]}
+        assert columns == {f"{name}_{bead}" for name in names for bead in (1, 2)} | pairs
     cycles = read_result(directory)["cycles"]
-    assert len(read_table(directory, name)) == 6 * {"trajectory": 20 * cycles + 1, "bridges": 3 * (cycles + 1)}.get(
-        name, 1
-    )
+    for table, rows in (("trajectory", 20 * cycles + 1), ("walkers", 1), ("bridges", 3 * (cycles + 1))):
+        assert len(read_table(directory, table)) == 6 * rows
+
+
+def test_a_column_that_is_not_declared_is_refused(tmp_path: Path) -> None:
+    columns = dict.fromkeys(("time", "track", "bead", "large", "height"), np.arange(3.0))
+    write_table(tmp_path, "members", columns)
+    for wrong in (columns | {"power": np.arange(3.0)}, {"time": np.arange(3.0)}):
+        with pytest.raises(KeyError, match="missing or not declared"):
+            write_table(tmp_path, "members", wrong)
 
 
 def test_a_single_walker_has_no_scatter(run_directory: Callable[..., Path]) -> None:

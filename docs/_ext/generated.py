@@ -28,7 +28,7 @@ from walkers.inputs.table import Table, example_of, keys_in, table_in
 from walkers.inputs.units import ACCELERATION, AUTO, TEMPERATURE, Kind, kind_in, quantity_text
 from walkers.main import _program
 from walkers.postprocess.analysis import analyses
-from walkers.postprocess.tables import described
+from walkers.postprocess.quantities import TABLES
 from walkers.sweeps.table import STATE, derived_columns, result_columns
 
 if TYPE_CHECKING:
@@ -150,8 +150,9 @@ def _columns() -> str:
         "\n## Columns of the tables of a run\n\nThe parquet files contain the units and meanings too. A name with `*`"
     )
     text += " stands for one column per bead or contact: `rotation_1`, `rotation_2`, …\n\n"
-    tables = {name: described(table) for one in analyses() for name, table in one.tables.items()}
-    text += "".join(f"### {name}\n\n{_described(columns)}\n" for name, columns in tables.items())
+    for name, quantities in TABLES.items():
+        columns = {quantity.name: (quantity.si_unit, quantity.meaning) for quantity in quantities}
+        text += f"### {name}\n\n{_described(columns)}\n"
     text += "## Columns of the table of a sweep\n\nThe first columns are the keys that vary.\n\n"
     for one in analyses():
         columns = {**one.derived, **one.columns}

@@ -158,7 +158,7 @@ class Analysis(ABC):
     version
         Version of the method; results of other versions are recomputed.
     tables
-        Tables that the analysis writes, by name; see `walkers.postprocess.tables.described`.
+        Names of the tables that the analysis writes; `walkers.postprocess.quantities` has their columns.
     derived, headlines
         Columns of a sweep's table that follow from the case; the main columns among `columns`.
     """
@@ -166,7 +166,7 @@ class Analysis(ABC):
     order: ClassVar[int] = 9
     name: ClassVar[str]
     version: ClassVar[int] = 1
-    tables: ClassVar[Mapping[str, type]]
+    tables: ClassVar[tuple[str, ...]]
     derived: ClassVar[Described] = {}
     headlines: ClassVar[tuple[str, ...]] = ()
 
@@ -311,10 +311,9 @@ def _write(directory: Path, result: Mapping[str, Any], tables: Mapping[str, Colu
     from walkers.postprocess.tables import write_table
 
     names = [RESULT_NAME, *(f"{name}.parquet" for name in tables)]
-    declared = {name: table for one in analyses_in(result) for name, table in one.tables.items()}
     with recomputed(directory, names):
         for name, columns in tables.items():
-            write_table(directory, name, declared[name], columns)
+            write_table(directory, name, columns)
         write_json(directory / RESULT_NAME, result)
 
 

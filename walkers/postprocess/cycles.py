@@ -10,36 +10,18 @@ Compared with 200 samples per cycle, the work with 20 samples is within 0.01 %, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from math import pi
-from typing import Annotated
 
 import numpy as np
 
-from walkers.postprocess.dump import FloatArray, IntArray
+from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.gait import distance_walked
 from walkers.postprocess.motion import Group
-from walkers.postprocess.tables import Columns, columns_of
+from walkers.postprocess.tables import Columns
 
 _PARTS = 10
 """Parts of an interval between samples; the force is evaluated in the middle of each part."""
-
-
-@dataclass(frozen=True)
-class Cycles:
-    """``cycles.parquet``: one row per walker and cycle, at the beginning of the cycle; the last row is the end."""
-
-    walker: Annotated[IntArray, "", "index of the walker, from 0"]
-    cycle: Annotated[IntArray, "", "cycles of the drive since its start"]
-    time: Annotated[FloatArray, "s", "time since the start of the drive"]
-    distance: Annotated[FloatArray, "m", "distance along the heading, which follows a walker that turns"]
-    along: Annotated[FloatArray, "m", "displacement of the centre of mass along the drive axis; on a slope uphill"]
-    across: Annotated[FloatArray, "m", "displacement of the centre of mass across the drive axis, to the left"]
-    orientation: Annotated[FloatArray, "rad", "angle by which the walker is turned from the direction given by facing"]
-    work: Annotated[
-        FloatArray, "J", "work of the drive on the walker in this cycle; NaN at the end and below 8 samples per cycle"
-    ]
 
 
 def cycles_of(group: Group) -> Columns:
@@ -53,23 +35,19 @@ def cycles_of(group: Group) -> Columns:
         works = work_of(group)
         work[: len(works)] = works
     count, walkers = distance.shape
-    return columns_of(
-        Cycles(
-            np.repeat([walker.walker for walker in group.walkers], count),
-            np.tile(np.arange(count) * run.cycles_per_sample, walkers),
-            np.tile(time, walkers),
-            *(
-                values.T.reshape(-1)
-                for values in (
-                    distance,
-                    way @ group.drive_axis,
-                    way @ group.across_axis,
-                    group.orientation[::strobe],
-                    work,
-                )
-            ),
-        )
-    )
+    of_walkers = {
+        "distance": distance,
+        "along": way @ group.drive_axis,
+        "across": way @ group.across_axis,
+        "orientation": group.orientation[::strobe],
+        "work": work,
+    }
+    return {
+        "walker": np.repeat([walker.walker for walker in group.walkers], count),
+        "cycle": np.tile(np.arange(count) * run.cycles_per_sample, walkers),
+        "time": np.tile(time, walkers),
+        **{name: values.T.reshape(-1) for name, values in of_walkers.items()},
+    }
 
 
 def mass_of(group: Group) -> float:

@@ -1,4 +1,4 @@
-"""The tables of a run: parquet files whose columns have units and meanings.
+"""The tables of a run: parquet files whose columns have units, labels and meanings.
 
 They are written with pyarrow alone, because pandas takes a third of a second to import.
 """
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, get_type_hints
 import numpy as np
 import numpy.typing as npt
 
+from walkers.postprocess.quantities import TABLES, Quantity, declared
 from walkers.runner.files import beside
 from walkers.runner.manifest import check_unchanged
 
@@ -19,51 +20,35 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Columns: TypeAlias = dict[str, npt.NDArray[Any]]
-NUMBERED = "numbered"
-"""Marks a field with several columns, one per bead or contact: ``rotation_1``, ``rotation_2``, …"""
 
 
-def described(table: type) -> dict[str, tuple[str, str]]:
-    """Units and meanings of the columns of a table.
+def numbered(name: str, values: npt.NDArray[Any]) -> Columns:
+    """Columns ``name_1``, ``name_2``, … of beads or contacts, which are the last axis of the values."""
+    return {f"{name}_{number + 1}": values[..., number] for number in range(values.shape[-1])}
 
-    A table is a dataclass, which contains either the arrays of all columns or a single row. Each field is
-    ``Annotated`` with unit and meaning, and `NUMBERED` if it has several columns: then its name gets ``_*``.
+
+def columns_of_rows(kind: type, rows: Sequence[Any]) -> Columns:
+    """Columns of rows, which are dataclasses of a kind; there may be no rows."""
+    return {name: np.array([getattr(row, name) for row in rows], dtype=of) for name, of in get_type_hints(kind).items()}
+
+
+def write_table(directory: Path, name: str, columns: Columns) -> None:
+    """Write a table into a run directory, beside its final place, and rename it.
+
+    KeyError if a column is missing or is not declared in `walkers.postprocess.quantities.TABLES`.
     """
-    found = {name: hint.__metadata__ for name, hint in get_type_hints(table, include_extras=True).items()}
-    return {f"{name}_*" if one[2:] else name: one[:2] for name, one in found.items()}
-
-
-def columns_of(table: Any) -> Columns:
-    """The columns of a table that contains arrays; the last axis of numbered columns is the number."""
-    columns: Columns = {}
-    for name in described(type(table)):
-        values = getattr(table, name.removesuffix("_*"))
-        if name.endswith("_*"):
-            columns |= {f"{name[:-1]}{number + 1}": values[..., number] for number in range(values.shape[-1])}
-        else:
-            columns[name] = values
-    return columns
-
-
-def columns_of_rows(table: type, rows: Sequence[Any]) -> Columns:
-    """Columns of a table from its rows; there may be no rows."""
-    kinds = get_type_hints(table)
-    return {name: np.array([getattr(row, name) for row in rows], dtype=kinds[name]) for name in described(table)}
-
-
-def write_table(directory: Path, name: str, table: type, columns: Columns) -> None:
-    """Write a table into a run directory, beside its final place, and rename it; KeyError if a column is missing."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    declared = described(table)
-    numbered = {key: f"{key.rpartition('_')[0]}_*" for key in columns}
-    present = {key: one for key, one in declared.items() if not key.endswith("_*")}
-    present |= {key: declared[name] for key, name in numbered.items() if name in declared}
-    arrays = [_arrow(columns[key]) for key in present]
+    known = TABLES[name]
+    order = [column for quantity in known for column in columns if quantity.names(column)]
+    missing = {quantity.name for quantity in known if not quantity.name.endswith("_*")} - columns.keys()
+    if wrong := missing | columns.keys() - set(order):
+        raise KeyError(f"columns of {name} that are missing or not declared: {', '.join(sorted(wrong))}")
+    arrays = [_arrow(columns[column]) for column in order]
     fields = [
-        pa.field(key, array.type, metadata={"unit": unit, "meaning": meaning})
-        for (key, (unit, meaning)), array in zip(present.items(), arrays, strict=True)
+        pa.field(column, array.type, metadata=_metadata(declared(column, known)))
+        for column, array in zip(order, arrays, strict=True)
     ]
     reals = [field.name for field in fields if pa.types.is_floating(field.type)]
     with beside(directory / f"{name}.parquet") as new:
@@ -74,6 +59,12 @@ def write_table(directory: Path, name: str, table: type, columns: Columns) -> No
             use_dictionary=[field.name for field in fields if field.name not in reals],
             use_byte_stream_split=reals,
         )
+
+
+def _metadata(quantity: Quantity) -> dict[str, str]:
+    """Metadata of a field; ``units`` and ``long_name`` are attributes of the CF conventions."""
+    unit = quantity.si_unit
+    return {"unit": unit, "meaning": quantity.meaning, "units": unit, "long_name": quantity.label}
 
 
 def _arrow(values: npt.NDArray[Any]) -> Any:
@@ -116,7 +107,7 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``attrs["units"]`` maps columns to units.
+        ``attrs["units"]`` and ``attrs["long_name"]`` map columns to units and labels.
 
     Raises
     ------
@@ -127,7 +118,8 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
     """
     table = _read(Path(directory), name)
     frame: pd.DataFrame = table.to_pandas()
-    frame.attrs["units"] = {field.name: field.metadata[b"unit"].decode() for field in table.schema}
+    for name_of in ("units", "long_name"):
+        frame.attrs[name_of] = {field.name: field.metadata[name_of.encode()].decode() for field in table.schema}
     return frame
 
 

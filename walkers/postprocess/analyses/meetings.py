@@ -108,7 +108,7 @@ class Meetings(Analysis):
     order = 1
     name = "meetings"
     version = 3
-    tables: ClassVar[Mapping[str, type]] = {"meetings": Meeting}
+    tables = ("meetings",)
     derived: ClassVar[Described] = {
         "coverage": (
             "",

@@ -92,13 +92,7 @@ class Pile(Analysis):
     order = 2
     name = "pile"
     version = 12
-    tables: ClassVar[Mapping[str, type]] = {
-        "bed": Bed,
-        "clusters": Climb,
-        "events": Event,
-        "members": Member,
-        "assembly": Assembly,
-    }
+    tables = ("bed", "clusters", "events", "members", "assembly")
     headlines = ("climbs", "highest", "speed")
     derived: ClassVar[Described] = {
         "beads": ("", "number of beads"),

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import product
 from math import degrees, nan
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -22,8 +21,8 @@ from walkers.inputs.numerical import STIFFER, numerical_error
 from walkers.inputs.run import CONSTANT
 from walkers.postprocess.analysis import Analysis, Described, Measured, Quantity
 from walkers.postprocess.caption import radii_text
-from walkers.postprocess.cycles import Cycles, cycles_of
-from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
+from walkers.postprocess.cycles import cycles_of
+from walkers.postprocess.dump import FloatArray, IntArray
 from walkers.postprocess.gait import (
     POSTURES,
     STEADY_DIFFERENCE,
@@ -53,7 +52,7 @@ from walkers.postprocess.sides import (
     uphill_velocities,
     ways,
 )
-from walkers.postprocess.tables import NUMBERED, Columns, columns_of
+from walkers.postprocess.tables import Columns, numbered
 from walkers.postprocess.uncertainty import (
     LEAST_PER_VALUE,
     band_of,
@@ -82,90 +81,13 @@ _WALL, _PAIR = "a bead and its wall", "a pair of beads that touch at the start"
 _SEPARATED = "fraction of the samples in which two beads are farther apart than the rupture distance of a bridge"
 
 
-@dataclass(frozen=True)
-class Trajectory:
-    """``trajectory.parquet``: one row per sample and walker."""
-
-    walker: Annotated[IntArray, "", "index of the walker, from 0"]
-    time: Annotated[FloatArray, "s", "time since the start of the drive"]
-    cycle: Annotated[FloatArray, "", "time in cycles of the drive"]
-    x: Annotated[FloatArray, "m", "x of the centre of mass relative to the substrate"]
-    y: Annotated[FloatArray, "m", "y of the centre of mass relative to the substrate"]
-    z: Annotated[FloatArray, "m", "height of the centre of mass above the substrate"]
-    orientation: Annotated[FloatArray, "rad", "angle by which the walker is turned from the direction given by facing"]
-    velocity: Annotated[
-        FloatArray,
-        "m/s",
-        "velocity of the centre of mass relative to the substrate, along the heading (from small to large beads)",
-    ]
-    rotation: Annotated[FloatArray, "m/s", _ROTATION, NUMBERED]
-    sliding: Annotated[FloatArray, "m/s", f"{_SLIDING} {_WALL}", NUMBERED]
-    sliding_pair: Annotated[FloatArray, "m/s", f"{_SLIDING} {_PAIR}", NUMBERED]
-    gap: Annotated[FloatArray, "m", f"gap, negative for overlap, of {_WALL}", NUMBERED]
-    gap_pair: Annotated[FloatArray, "m", f"gap, negative for overlap, of {_PAIR}", NUMBERED]
-
-
-@dataclass(frozen=True)
-class WalkerRows:
-    """``walkers.parquet``: one row per walker; means are over the cycles after the settling ones."""
-
-    walker: Annotated[IntArray, "", "index of the walker, from 0"]
-    make: Annotated[IntArray, "", "index of the walker's make (body of the case), from 0: dimers, then clusters"]
-    facing: Annotated[IntArray, "", "1 or -1: start_angle is from the drive axis (right) or opposite (left)"]
-    start_angle: Annotated[FloatArray, "rad", "orientation at the start, from the direction given by facing"]
-    velocity: Annotated[
-        FloatArray,
-        "m/s",
-        "velocity along the heading after the settling cycles, positive toward the large (foremost) beads",
-    ]
-    first_half: Annotated[FloatArray, "m/s", "velocity in the first half of the fitted cycles"]
-    second_half: Annotated[FloatArray, "m/s", "velocity in the second half of the fitted cycles"]
-    steady: Annotated[BoolArray, "", f"whether first_half and second_half agree within {percent(STEADY_DIFFERENCE)}"]
-    axial_velocity: Annotated[FloatArray, "m/s", "velocity of the centre of mass along the drive axis"]
-    lateral_velocity: Annotated[FloatArray, "m/s", "velocity of the centre of mass across the drive axis"]
-    orientation_mean: Annotated[FloatArray, "rad", "mean orientation after the settling cycles"]
-    orientation_end: Annotated[FloatArray, "rad", "orientation at the end, from the direction given by facing"]
-    turned_at: Annotated[
-        FloatArray, "s", "end of the first cycle with the heading more than 90° from that at the start; NaN if none"
-    ]
-    separated_fraction: Annotated[FloatArray, "", _SEPARATED]
-    rotation: Annotated[FloatArray, "m/s", _ROTATION, NUMBERED]
-    sliding: Annotated[FloatArray, "m/s", f"{_SLIDING} {_WALL}", NUMBERED]
-    sliding_pair: Annotated[FloatArray, "m/s", f"{_SLIDING} {_PAIR}", NUMBERED]
-    open: Annotated[FloatArray, "", f"{_OPEN} {_WALL}", NUMBERED]
-    open_pair: Annotated[FloatArray, "", f"{_OPEN} {_PAIR}", NUMBERED]
-
-
-@dataclass(frozen=True)
-class BridgeRows:
-    """``bridges.parquet``: one row per bridge and frame."""
-
-    time: Annotated[FloatArray, "s", "time since the start of the drive"]
-    walker: Annotated[IntArray, "", "index of the walker, from 0"]
-    contact: Annotated[
-        IntArray, "", "index of the contact, from 1: beads with walls, then pairs of beads; 0 for other bridges"
-    ]
-    bead_1: Annotated[IntArray, "", "index of the bead in the run, from 0"]
-    bead_2: Annotated[IntArray, "", "index of the other bead, -1 for a wall"]
-    wall: Annotated[IntArray, "", "index of the wall, 0 for the floor if there is one, -1 for none"]
-    other_walker: Annotated[IntArray, "", "index of the walker at the other end, -1 for none"]
-    gap: Annotated[FloatArray, "m", "gap, negative for overlap"]
-    touching: Annotated[BoolArray, "", "whether the surfaces touch"]
-    normal_force: Annotated[FloatArray, "N", "net normal force (capillary, viscous, elastic), positive for attraction"]
-
-
 class Walking(Analysis):
     """Velocity, rotation, sliding and orientation of walkers."""
 
     order = 0
     name = "walking"
     version = 10
-    tables: ClassVar[Mapping[str, type]] = {
-        "trajectory": Trajectory,
-        "walkers": WalkerRows,
-        "cycles": Cycles,
-        "bridges": BridgeRows,
-    }
+    tables = ("trajectory", "walkers", "cycles", "bridges")
     headlines = ("velocity",)
     derived: ClassVar[Described] = {
         "gamma0": ("", "dimensionless peak force Γ0 = a0 M/(4πγR̄) of dimers"),
@@ -183,9 +105,9 @@ class Walking(Analysis):
         """Tables and result of all walkers and of each make; contacts are those of the first make."""
         case, groups = motion.case, motion.groups
         gaits = [gait(group) for group in groups]
-        rows = [columns_of(_rows(*one)) for one in zip(groups, gaits, strict=True)]
+        rows = [_rows(*one) for one in zip(groups, gaits, strict=True)]
         tables = {
-            "trajectory": _stacked([columns_of(_trajectory(*one)) for one in zip(groups, gaits, strict=True)]),
+            "trajectory": _stacked([_trajectory(*one) for one in zip(groups, gaits, strict=True)]),
             "walkers": _stacked(rows),
             "cycles": _stacked([cycles_of(group) for group in groups]),
             "bridges": _bridges(motion),
@@ -362,43 +284,49 @@ def _stacked(parts: list[Columns]) -> Columns:
     }
 
 
-def _trajectory(group: Group, motion: Gait) -> Trajectory:
+def _trajectory(group: Group, motion: Gait) -> Columns:
+    """Rows of one walker after the other."""
+
     def along(values: FloatArray) -> FloatArray:
-        """One walker after the other."""
         return np.moveaxis(values, 0, 1).reshape(-1, *values.shape[2:])
 
     time = np.tile(group.time, len(group.walkers))
-    return Trajectory(
-        np.repeat([walker.walker for walker in group.walkers], len(group.time)),
-        time,
-        time * group.case.excitation.frequency,
-        *along(group.mass_centre).T,
-        *map(along, (group.orientation, motion.velocity, motion.rotation)),
-        **{name: along(values) for name, values in _by_kind(group, sliding=motion.sliding, gap=motion.gap).items()},
-    )
+    return {
+        "walker": np.repeat([walker.walker for walker in group.walkers], len(group.time)),
+        "time": time,
+        "cycle": time * group.case.excitation.frequency,
+        **dict(zip("xyz", along(group.mass_centre).T, strict=True)),
+        "orientation": along(group.orientation),
+        "velocity": along(motion.velocity),
+        **numbered("rotation", along(motion.rotation)),
+        **_by_kind(group, sliding=along(motion.sliding), gap=along(motion.gap)),
+    }
 
 
-def _by_kind(group: Group, **contacts: FloatArray) -> dict[str, Any]:
-    """Values at contacts (`Gait`) of beads with walls, and as ``…_pair`` of pairs of beads."""
+def _by_kind(group: Group, **contacts: FloatArray) -> Columns:
+    """Columns of values at contacts (`Gait`): of beads with walls, and ``…_pair_…`` of pairs of beads."""
     beads = len(group.radii)
-    walls = {name: values[..., :beads] for name, values in contacts.items()}
-    return walls | {f"{name}_pair": values[..., beads:] for name, values in contacts.items()}
+    columns: Columns = {}
+    for name, values in contacts.items():
+        columns |= numbered(name, values[..., :beads]) | numbered(f"{name}_pair", values[..., beads:])
+    return columns
 
 
-def _rows(group: Group, motion: Gait) -> WalkerRows:
+def _rows(group: Group, motion: Gait) -> Columns:
+    """Rows of the walkers of a group."""
     samples, beads, mean = settled_samples(group), len(group.radii), averages(group)
     reach = np.array(contact_loads(group.case, group.make).rupture[beads:])
     starts = ("walker", "make", "facing", "start_angle")
-    return WalkerRows(
+    return {
         **{name: np.array([getattr(walker, name) for walker in group.walkers]) for name in starts},
         **vars(walk(group)),
-        rotation=mean.rotation,
+        "orientation_mean": group.orientation[samples].mean(axis=0),
+        "orientation_end": group.orientation[-1],
+        "turned_at": turned_over_at(group),
+        "separated_fraction": (motion.gap[samples, :, beads:] > reach).any(axis=-1).mean(axis=0),
+        **numbered("rotation", mean.rotation),
         **_by_kind(group, sliding=mean.sliding, open=mean.open),
-        orientation_mean=group.orientation[samples].mean(axis=0),
-        orientation_end=group.orientation[-1],
-        turned_at=turned_over_at(group),
-        separated_fraction=(motion.gap[samples, :, beads:] > reach).any(axis=-1).mean(axis=0),
-    )
+    }
 
 
 def _bridges(motion: Motion) -> Columns:
@@ -408,26 +336,26 @@ def _bridges(motion: Motion) -> Columns:
         touching = [(bead, -1) for bead in walker.beads]
         touching += [(walker.beads[one], walker.beads[other]) for one, other in motion.case.walkers[walker.make].pairs]
         contact_of |= {ends: number for number, ends in enumerate(touching, 1)}
-    parts = [columns_of(_bridge_rows(motion, bridges, contact_of)) for bridges in read_bridges(motion)]
+    parts = [_bridge_rows(motion, bridges, contact_of) for bridges in read_bridges(motion)]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     order = np.lexsort([columns[name] for name in ("bead_2", "contact", "walker", "time")])
     return {name: values[order] for name, values in columns.items()}
 
 
-def _bridge_rows(motion: Motion, bridges: Bridges, contact_of: Mapping[tuple[int, int], int]) -> BridgeRows:
+def _bridge_rows(motion: Motion, bridges: Bridges, contact_of: Mapping[tuple[int, int], int]) -> Columns:
     """Rows of a frame: bridges between beads, then bridges to walls."""
     rows = bridges.rows()
     first, second = rows["bead_1"], rows["bead_2"]
     owner = motion.walker_of[first]
     joined = np.where(second >= 0, motion.walker_of[second], owner)
     ends = zip(first.tolist(), second.tolist(), strict=True)
-    return BridgeRows(
-        time=np.full(len(first), motion.time[bridges.frame]),
-        walker=owner,
-        contact=np.array([contact_of.get(one, 0) for one in ends], dtype=np.int64),
-        other_walker=np.where(joined == owner, -1, joined),
+    return {
+        "time": np.full(len(first), motion.time[bridges.frame]),
+        "walker": owner,
+        "contact": np.array([contact_of.get(one, 0) for one in ends], dtype=np.int64),
+        "other_walker": np.where(joined == owner, -1, joined),
         **rows,
-    )
+    }
 
 
 def spread(values: FloatArray) -> dict[str, Any]:

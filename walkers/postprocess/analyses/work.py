@@ -7,7 +7,7 @@ f: the power over the power of lifting the walker as fast as it walks.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +28,7 @@ class Working(Analysis):
 
     name = "work"
     version = 4
-    tables: ClassVar[Mapping[str, type]] = {}
+    tables = ()
 
     def applies(self, case: Case) -> bool:
         """Cases of walkers with enough samples per cycle."""
