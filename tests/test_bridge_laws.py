@@ -307,6 +307,16 @@ def test_the_engine_reads_the_law_out_of_its_table(name: str, given: Surfaces) -
     np.testing.assert_array_less(np.abs(interpolated(table.text(), gaps) - expected), 10 * TOLERANCE * scale + 1e-30)
 
 
+@pytest.mark.parametrize("name", LAWS)
+def test_pulls_and_resistances_are_proportional_to_tension_and_viscosity(name: str) -> None:
+    """Decks scale their tables by it."""
+    liquid = AT_WALL.liquid
+    twice = replace(liquid, surface_tension=2.0 * liquid.surface_tension, viscosity=2.0 * liquid.viscosity)
+    once, doubled = (by_name(name)(replace(AT_WALL, liquid=one)) for one in (liquid, twice))
+    gaps = once.rupture * np.array([0.0, 0.01, 0.3, 0.9])
+    np.testing.assert_allclose(doubled.forces(gaps).columns(), 2.0 * once.forces(gaps).columns(), rtol=1e-9)
+
+
 def interpolated(text: str, gaps: FloatArray) -> FloatArray:
     """Pull and resistances, shape (n, 5), at gaps (m), of a table after its first line.
 

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
 from math import ceil, inf, pi, prod, sqrt
 from typing import Any, NamedTuple
 
 from walkers.errors import InputError, Problem
-from walkers.inputs.case import STIFFEST, Case, Contact
+from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
 from walkers.inputs.loads import bridge_at_rest, hop_height, reach
 from walkers.inputs.run import limits_of
-from walkers.templates import parameters
+from walkers.physics.laws import LAWS
 from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, MEAN_SPIN_COLUMNS, Layout, PlacedWalker
-from walkers.templates.parameters import STATUS_LINES_PER_CYCLE, Parameter, along, in_cycles, number, suffixes
+from walkers.templates.parameters import PRINTED, STATUS_LINES_PER_CYCLE, along, in_cycles, softness, suffixes
 from walkers.templates.scene import Scene, Surface, place, surface_of
 from walkers.text import rendered
 
@@ -172,10 +171,12 @@ def compose(plan: Plan) -> Deck:
     """Compose a deck from its blocks; raises `InputError` if the law of the bridges cannot be tabulated."""
     case, scene, layout, gravity = plan.case, plan.scene, _layout(plan), plan.case.environment.gravity
     surfaces = scene.surfaces or (surface_of(case),)
+    liquid, contacts = surfaces[0][1], [contact for contact, _ in surfaces]
+    # Pulls and resistances of built-in laws are proportional to surface tension and viscosity.
+    scalable = len(surfaces) == 1 and liquid.law in LAWS and liquid.surface_tension > 0.0 < liquid.viscosity
     files = {BRIDGES_NAME: tables_of(case, surfaces, {(bead.surface, bead.radius) for bead in scene.beads})}
     files |= {LOADS_NAME: _loads(scene)} if len(scene.loadings) > 1 else {}
-    given, derived = _parameters(plan, surfaces)
-    named = {one.name: one.value for one in (*given, *derived)}
+    limits = limits_of(case)
     text = rendered(
         "walkers.templates",
         "walker.lig.j2",
@@ -185,22 +186,24 @@ def compose(plan: Plan) -> Deck:
         layout=layout,
         names=_NAMES,
         files=files,
-        given=given,
-        derived=derived,
-        printed=parameters.PRINTED,
-        named=named,
+        named={},
+        printed=PRINTED,
         in_cycles=in_cycles,
         along=along,
         types=len(surfaces) + 1,
-        ends_of_harmonics=suffixes(len(case.excitation.harmonics)),
+        ends=suffixes(len(case.excitation.harmonics)),
         down=[component / gravity for component in case.gravity_vector] if gravity else [],
         shaken=plan.segment.drive_from is not None,
+        stable=min(vars(limits).values()),
+        softness=softness(case),
+        contacts=contacts,
+        moduli=[one.youngs_modulus for one in (*contacts, case.contact)],
+        liquid=liquid if scalable else None,
         **layout.bridge_terms(),
-        **_contacts(case, [contact for contact, _ in surfaces], named),
         **_search(plan),
     )
     fastest = plan.fastest or fastest_of(case, scene)
-    beyond = bool(limits_of(case).exceeded_by(case.run.time_step))
+    beyond = bool(limits.exceeded_by(case.run.time_step))
     # The engine writes once a sample, and several times a cycle.
     slowest = min(case.run.steps_per_sample, case.run.steps_per_cycle) * len(scene.beads) * _SLOWEST_STEP
     bounds = (max(_SILENCE, slowest), max(_LOG_BYTES, case.run.cycles * _LOG_BYTES_PER_CYCLE))
@@ -226,23 +229,6 @@ def _loads(scene: Scene) -> str:
     )
 
 
-def _parameters(plan: Plan, surfaces: Sequence[Surface]) -> tuple[list[Parameter], list[Parameter]]:
-    """The named parameters of a deck, and the values that follow from them."""
-    case, (first, last, begin) = plan.case, plan.segment
-    drive, of_it = parameters.of_drive(case.excitation, amplitudes=begin is not None)
-    stable = min(vars(limits_of(case)).values())
-    time, of_that = parameters.of_time(case, None if first else begin, last, stable)
-    given = [*drive, *time]
-    if case.environment.gravity > 0.0:
-        given.append(Parameter("gravity", number(case.environment.gravity), "m/s^2"))
-    if not plan.restart_from:
-        given.append(Parameter("density", number(case.beads.density), "kg/m^3", "of the beads"))
-    given += parameters.of_contacts(case, [contact for contact, _ in surfaces])
-    if len(surfaces) == 1:
-        given += parameters.of_liquid(surfaces[0], min(bead.radius for bead in plan.scene.beads))
-    return given, [*of_it, *of_that]
-
-
 def _search(plan: Plan) -> dict[str, Any]:
     """The search for neighbours: skin and width of the bins (m), neighbours of a bead, whether bins are many."""
     radii = [bead.radius for bead in plan.scene.beads]
@@ -258,34 +244,6 @@ def _search(plan: Plan) -> dict[str, Any]:
         "bin_size": None if plan.skin else max(4.0 * largest, (space / 2e4) ** (1.0 / 3.0)),
         "wide": not plan.skin and space > _MOST_BINS * largest**3,
     }
-
-
-def _contacts(case: Case, contacts: Sequence[Contact], named: Collection[str]) -> dict[str, Any]:
-    """Values or names of the contact parameters of all atom types; the walls come last."""
-    moduli = [*(contact.youngs_modulus for contact in contacts), case.contact.youngs_modulus]
-    return {
-        "moduli": " ".join(["${youngs_modulus}"] * len(moduli) if "youngs_modulus" in named else map(number, moduli)),
-        "stiff": max(moduli) > STIFFEST,
-        "friction": _coefficients(contacts, named, "friction.bead_bead", "friction.bead_wall"),
-        "rolling_friction": _coefficients(contacts, named, "rolling_friction"),
-        "restitution": _coefficients(contacts, named, "restitution"),
-    }
-
-
-def _coefficients(contacts: Sequence[Contact], named: Collection[str], of_beads: str, of_walls: str = "") -> list[str]:
-    """Values or names of a coefficient for all pairs of atom types; the walls come last.
-
-    Beads of different surfaces never meet.
-    """
-    wall, names = len(contacts), (of_beads, of_walls or of_beads)
-
-    def text(contact: Contact, name: str) -> str:
-        parameter = name.replace(".", "_")
-        return f"${{{parameter}}}" if parameter in named else number(contact.value_of(name))
-
-    values = [[text(contact, name) for name in names] for contact in contacts]
-    pairs = product(range(wall + 1), repeat=2)
-    return [values[min(one, other, wall - 1)][int(max(one, other) == wall)] for one, other in pairs]
 
 
 def fastest_of(case: Case, scene: Scene) -> float:
