@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import cos, inf, pi, radians, sin, sqrt
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -282,9 +283,9 @@ def test_a_walker_is_separated_where_any_of_its_pairs_is() -> None:
     position = motion.position.copy()
     position[50:, 2, 0] -= 1e-3
     (group,) = replace(motion, position=position).groups
-    assert _rows(group, gait(group)).separated_fraction == pytest.approx(10.0 / 40.0)
+    assert _rows(group, gait(group))["separated_fraction"] == pytest.approx(10.0 / 40.0)
     (group,) = motion.groups
-    assert _rows(group, gait(group)).separated_fraction == 0.0
+    assert _rows(group, gait(group))["separated_fraction"] == 0.0
 
 
 def test_a_walker_has_turned_over_90_degrees_from_its_start() -> None:
@@ -348,7 +349,8 @@ def test_the_state_of_a_bed() -> None:
     joined, bulk = _joined(bridges, 4), np.array([True, True, False, False])
     assert joined[1].tolist() == [False, False, True, False]
     moved = replace(motion, position=position, velocity=velocity)
-    bed = _bed(moved, bridges, joined, bulk, [(frozenset({2, 3}), frozenset({SIDE}))])
+    state = _bed(moved, bridges, joined, bulk, [(frozenset({2, 3}), frozenset({SIDE}))])
+    bed = SimpleNamespace(**state)
     assert (bed.touching, bed.opened, bed.contacts, bed.bridges) == (1, 1, 0.5, 1.0)
     assert (bed.at_wall, bed.large_at_wall, bed.bulk, bed.clusters) == (1, 0, 2, 1)
     assert bed.mean_square_velocity == pytest.approx((9e-6 + 25e-6) / 4.0)

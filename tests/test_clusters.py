@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,12 +10,11 @@ import pytest
 from walkers.postprocess.analyses.piles import segregation
 from walkers.postprocess.clusters import (
     Beads,
-    Climb,
     ClimbCriteria,
     Track,
     assembly_of,
     bulk_of,
-    classify,
+    climbs_of,
     connected,
     events_of,
     follow,
@@ -22,6 +22,7 @@ from walkers.postprocess.clusters import (
 )
 from walkers.postprocess.dump import BoolArray, FloatArray
 from walkers.postprocess.motion import Bridges
+from walkers.postprocess.tables import Columns
 
 BULK = list(range(20))
 TIME = np.arange(0.0, 4.0, 0.02)
@@ -38,6 +39,11 @@ def bridges_of(pairs: list[tuple[int, int]], walls: dict[int, int]) -> Bridges:
     return Bridges(0, beads, ones, -ones, *ends, held, -held)
 
 
+def rows_of(columns: Columns) -> list[SimpleNamespace]:
+    """The rows of a table."""
+    return [SimpleNamespace(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
+
+
 class Scene:
     """24 beads, 20 of them the bulk; 20 leads 21, held to the wall, and 22 and 23 stay on the bulk, unless changed."""
 
@@ -52,7 +58,7 @@ class Scene:
     def beads(self, height: FloatArray, surface: FloatArray | None = None, bulk: Sequence[BoolArray] = ()) -> Beads:
         return Beads(TIME, height, self.large, np.zeros(FRAMES) if surface is None else surface, bulk, 0, NAMES)
 
-    def climbs(self, definition: ClimbCriteria | None = None) -> tuple[list[Track], list[Climb]]:
+    def climbs(self, definition: ClimbCriteria | None = None) -> tuple[list[Track], list[SimpleNamespace]]:
         rule = definition or ClimbCriteria()
         clusters, bulks = [], []
         for pairs, walls in zip(self.pairs, self.walls, strict=True):
@@ -62,9 +68,10 @@ class Scene:
             clusters.append(list(held_clusters(labels, bridges, bulks[-1])))
         beads = self.seen = self.beads(self.height, bulk=bulks)
         tracks = follow(TIME, clusters, rule)
-        climbs = [classify(number, track, beads, rule) for number, track in enumerate(tracks)]
-        self.events = [(event.event, event.track, event.other) for event in events_of(tracks, climbs, beads, rule)]
-        return tracks, climbs
+        self.table = climbs_of(tracks, beads, rule)
+        events = rows_of(events_of(tracks, self.table, beads, rule))
+        self.events = [(event.event, event.track, event.other) for event in events]
+        return tracks, rows_of(self.table)
 
 
 def test_a_rising_cluster_climbs() -> None:
@@ -87,7 +94,7 @@ def test_a_climber_is_above_the_surface_as_it_is_then() -> None:
     scene.height[:, 20:22] += 3e-3 * TIME[:, None]
     (track,), _ = scene.climbs()
     beads = scene.beads(scene.height, np.linspace(3e-3, 1e-3, FRAMES))
-    climb = classify(0, track, beads, ClimbCriteria())
+    (climb,) = rows_of(climbs_of([track], beads, ClimbCriteria()))
     assert climb.height == pytest.approx(5e-3 + 3e-3 * TIME[-1])
     assert climb.above_surface == pytest.approx(4e-3 + 3e-3 * TIME[-1])
 
@@ -100,7 +107,7 @@ def test_the_error_of_a_speed_is_its_scatter() -> None:
     for _ in range(200):
         height = scene.height.copy()
         height[:, 20:22] += np.cumsum(draw.normal(5e-3, 20e-3, FRAMES) * 0.02)[:, None]
-        climb = classify(0, track, scene.beads(height), ClimbCriteria())
+        (climb,) = rows_of(climbs_of([track], scene.beads(height), ClimbCriteria()))
         speeds.append(climb.speed)
         errors.append(climb.standard_error)
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(speeds), rel=0.25)
@@ -239,7 +246,7 @@ def test_where_the_beads_of_a_climb_came_from() -> None:
     tracks, climbs = scene.climbs()
     at_wall = np.arange(24) == 20
     joined = [(np.array([*pairwise(BULK), *pairs], dtype=np.int32), at_wall) for pairs in scene.pairs]
-    rows = assembly_of(tracks, climbs, scene.seen, joined)
+    rows = rows_of(assembly_of(tracks, scene.table, scene.seen, joined))
     assert max(row.time for row in rows) == climbs[0].qualified > 2.0
     of_third = [row for row in rows if row.bead == 22]
     assert [row.in_bulk for row in of_third] == [number < joins for number in range(len(of_third))]
@@ -259,7 +266,7 @@ def test_what_comes_later_does_not_change_when_a_climb_qualified() -> None:
     assert (whole.onset, whole.begin) == pytest.approx((0.0, 1.6), abs=0.02)
     for frames in range(1, FRAMES):
         shorter = Track(track.frames[:frames], track.members[:frames], track.walls[:frames])
-        climb = classify(0, shorter, scene.beads(scene.height), ClimbCriteria())
+        (climb,) = rows_of(climbs_of([shorter], scene.beads(scene.height), ClimbCriteria()))
         assert climb.climbed == (TIME[frames - 1] >= whole.qualified)
         if climb.climbed:
             assert (climb.onset, climb.qualified) == (whole.onset, whole.qualified)

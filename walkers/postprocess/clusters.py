@@ -19,12 +19,12 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Annotated
 
 import numpy as np
 
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import FLOOR, Bridges
+from walkers.postprocess.tables import Columns
 
 Cluster = tuple[frozenset[int], frozenset[int]]
 """Beads of a cluster in a frame, and side walls that hold it."""
@@ -152,46 +152,35 @@ class Beads:
 
 
 @dataclass(frozen=True)
-class Climb:
-    """``clusters.parquet``: one row per cluster of a pile.
+class Rise:
+    """The largest rise of a track, and the first rise that counts as a climb.
 
-    Unlike ``begin``, ``onset`` and ``qualified`` do not depend on later frames: up to a given time, records of any
-    length contain the same climbs. The standard error of the speed is that of the mean over up to ten equal parts of
-    the rise. It is too small if the speed changes more slowly than over a tenth of the climb. Begin and end maximise
-    the gain, so the speed of a short and unsteady climb is too large.
+    Attributes
+    ----------
+    begin, end : int
+        Frames of the track at which the largest rise begins and ends, counted from its first.
+    gain, speed, standard_error : float
+        Increase of the mean height of the beads, m; gain over duration, m/s, and its standard error: that of the mean
+        over up to ten equal parts of the rise. It is too small if the speed changes more slowly than over a tenth of
+        the climb. Begin and end maximise the gain, so the speed of a short and unsteady climb is too large.
+    onset, qualified : float
+        Time at which the first rise that counts as a climb begins, and at which it is high enough, s; NaN without one.
+        They do not depend on later frames: up to a given time, records of any length contain the same climbs.
+    leader : int
+        The bead that is most often topmost.
     """
 
-    track: Annotated[int, "", "index of the cluster, followed through time"]
-    first: Annotated[float, "s", "first time at which the cluster is free of the bulk and held by a side wall"]
-    last: Annotated[float, "s", "last time at which the cluster is free of the bulk and held by a side wall"]
-    begin: Annotated[float, "s", "start of the largest rise"]
-    end: Annotated[float, "s", "end of the largest rise"]
-    out_of_pile: Annotated[
-        bool,
-        "",
-        "whether most of the cluster's first beads were in the bulk for 0.1 s or longer after the start of the drive",
-    ]
-    onset: Annotated[float, "s", "start of the first rise that counts as a climb; NaN if there is none"]
-    qualified: Annotated[
-        float, "s", "time at which this rise reaches the minimum rise of a climb; NaN if there is none"
-    ]
-    gain: Annotated[float, "m", "largest rise: increase of the mean height of the cluster's beads"]
-    speed: Annotated[float, "m/s", "gain over the duration of the rise"]
-    standard_error: Annotated[float, "m/s", "standard error of the speed, from ten parts of the rise"]
-    climbed: Annotated[bool, "", "whether a rise of the cluster counts as a climb"]
-    leader: Annotated[int, "", "index of the bead that is most often topmost during the rise, from 0"]
-    leader_large: Annotated[bool, "", "whether the leader is large"]
-    height: Annotated[float, "m", "height of the leader at the end of the rise"]
-    above_surface: Annotated[float, "m", "height of the leader above the surface of the bulk at the end of the rise"]
-    size: Annotated[int, "", "number of beads at the end of the rise"]
-    large: Annotated[int, "", "number of large beads at the end of the rise"]
-    walls: Annotated[int, "", "number of side walls that hold the cluster at the end of the rise: two in a corner"]
-    wall_names: Annotated[str, "", "names of these walls: -x, +x, -y, +y; side for a cylinder"]
-    merged_into: Annotated[int, "", "index of the cluster into which this cluster merged, -1 for none"]
+    begin: int
+    end: int
+    gain: float
+    speed: float
+    standard_error: float
+    onset: float
+    qualified: float
+    leader: int
 
 
-def classify(number: int, track: Track, beads: Beads, definition: ClimbCriteria) -> Climb:
-    """The largest rise of a track of `follow`, and whether the track is a climb."""
+def _rise_of(track: Track, beads: Beads, definition: ClimbCriteria) -> Rise:
     time, height = beads.time, beads.height
     gained, seconds = _gained(track, time, height)
     risen = gained - np.minimum.accumulate(gained)
@@ -201,35 +190,55 @@ def classify(number: int, track: Track, beads: Beads, definition: ClimbCriteria)
     begin = int(np.argmin(gained[: end + 1]))
     span = range(begin, end + 1)
     topmost = Counter(max(track.members[place], key=lambda bead: height[track.frames[place], bead]) for place in span)
-    leader = topmost.most_common(1)[0][0]
     speed, error = _speed(seconds[begin : end + 1], gained[begin : end + 1])
-    last, members, walls, first = track.frames[end], track.members[end], sorted(track.walls[end]), track.members[0]
-    # Beads that were hardly in the bulk have hung on a wall since before the drive.
-    bulk = [one[list(first)].mean() >= definition.min_overlap for one in beads.bulk[beads.first : track.frames[0]]]
-    in_bulk = float(np.diff(time[beads.first : track.frames[0] + 1])[bulk].sum())
-    return Climb(
-        track=number,
-        first=float(time[track.frames[0]]),
-        last=float(time[track.frames[-1]]),
-        begin=float(time[track.frames[begin]]),
-        end=float(time[last]),
-        out_of_pile=in_bulk >= definition.max_gap,
-        onset=onset,
-        qualified=qualified,
-        gain=float(risen[end]),
-        speed=speed,
-        standard_error=error,
-        climbed=moments is not None,
-        leader=leader,
-        leader_large=bool(beads.large[leader]),
-        height=float(height[last, leader]),
-        above_surface=float(height[last, leader] - beads.surface[last]),
-        size=len(members),
-        large=int(beads.large[list(members)].sum()),
-        walls=len(walls),
-        wall_names=" ".join(beads.wall_names[wall] for wall in walls),
-        merged_into=-1 if track.merged_into is None else track.merged_into,
+    return Rise(begin, end, float(risen[end]), speed, error, onset, qualified, topmost.most_common(1)[0][0])
+
+
+def _left_bulk(track: Track, beads: Beads, definition: ClimbCriteria) -> bool:
+    """Whether the first beads were in the bulk for some time; others have hung on a wall since before the drive."""
+    before, members = slice(beads.first, track.frames[0]), list(track.members[0])
+    in_bulk = [bulk[members].mean() >= definition.min_overlap for bulk in beads.bulk[before]]
+    seconds = np.diff(beads.time[beads.first : track.frames[0] + 1])[in_bulk].sum()
+    return bool(seconds >= definition.max_gap)
+
+
+def climbs_of(tracks: Sequence[Track], beads: Beads, definition: ClimbCriteria) -> Columns:
+    """Table ``clusters``: the largest rise of each track of `follow`, and whether the track is a climb."""
+    rises = [_rise_of(track, beads, definition) for track in tracks]
+    pairs = list(zip(tracks, rises, strict=True))
+    members, walls = (
+        [track.members[rise.end] for track, rise in pairs],
+        [track.walls[rise.end] for track, rise in pairs],
     )
+    names = [" ".join(beads.wall_names[wall] for wall in sorted(held)) for held in walls]
+    leader = _integers(rise.leader for rise in rises)
+    first, last = (_integers(track.frames[place] for track in tracks) for place in (0, -1))
+    begin, end = (_integers(track.frames[getattr(rise, at)] for track, rise in pairs) for at in ("begin", "end"))
+    numbers = ("onset", "qualified", "gain", "speed", "standard_error")
+    of_rises = {name: np.array([getattr(rise, name) for rise in rises], dtype=np.float64) for name in numbers}
+    return {
+        "track": np.arange(len(tracks)),
+        "first": beads.time[first],
+        "last": beads.time[last],
+        "begin": beads.time[begin],
+        "end": beads.time[end],
+        "out_of_pile": np.array([_left_bulk(track, beads, definition) for track in tracks], dtype=np.bool_),
+        **of_rises,
+        "climbed": np.isfinite(of_rises["qualified"]),
+        "leader": leader,
+        "leader_large": beads.large[leader],
+        "height": beads.height[end, leader],
+        "above_surface": beads.height[end, leader] - beads.surface[end],
+        "size": _integers(map(len, members)),
+        "large": _integers(beads.large[list(own)].sum() for own in members),
+        "walls": _integers(map(len, walls)),
+        "wall_names": np.array(names, dtype=np.str_),
+        "merged_into": _integers(-1 if track.merged_into is None else track.merged_into for track in tracks),
+    }
+
+
+def _integers(values: Iterable[int]) -> IntArray:
+    return np.array(list(values), dtype=np.int64)
 
 
 def _qualified(gained: FloatArray, min_rise: float) -> tuple[int, int] | None:
@@ -277,104 +286,72 @@ def _speed(seconds: FloatArray, gained: FloatArray) -> tuple[float, float]:
     return speed, float(np.sqrt((shares**2 * (speeds - speed) ** 2).sum() * there.sum() / (there.sum() - 1)))
 
 
-@dataclass(frozen=True)
-class Assembly:
-    """``assembly.parquet``: history of the beads of each climb, from rest until the climb qualifies.
-
-    One row per climb, bead and frame, for the beads of the cluster at that time.
-    """
-
-    time: Annotated[float, "s", "time since the start of the drive; the first frame is the last frame before the drive"]
-    track: Annotated[int, "", "index of the cluster that climbed"]
-    bead: Annotated[int, "", "index of the bead, from 0"]
-    large: Annotated[bool, "", "whether the bead is large"]
-    height: Annotated[float, "m", "height of the bead's centre"]
-    in_bulk: Annotated[bool, "", "whether the bead belongs to the bulk"]
-    at_wall: Annotated[bool, "", "whether the bead has a bridge to a side wall"]
-    neighbours: Annotated[int, "", "number of bridges to other beads of the later climbing cluster"]
-    joined: Annotated[
-        bool, "", "whether bridges within the later climbing cluster connect the bead to most of the other beads"
-    ]
+def members_of(tracks: Sequence[Track], beads: Beads) -> Columns:
+    """Table ``members``: by frame, and in a frame in the order in which `held_clusters` gives clusters."""
+    clusters = sorted(
+        (frame, sorted(own), number)
+        for number, track in enumerate(tracks)
+        for frame, own in zip(track.frames, track.members, strict=True)
+    )
+    rows = [(frame, number, bead) for frame, own, number in clusters for bead in own]
+    frame, track_of, bead = np.array(rows, dtype=np.int64).reshape(-1, 3).T
+    return {"time": beads.time[frame], "track": track_of, **_of_beads(beads, frame, bead)}
 
 
-def assembly_of(
-    tracks: Sequence[Track], climbs: Sequence[Climb], beads: Beads, bridges: Sequence[Joined]
-) -> list[Assembly]:
-    """State of the beads of each climb in each frame."""
-    rows = []
-    rest = max(beads.first - 1, 0)
-    for climb in climbs:
-        if not climb.climbed:
-            continue
-        track = tracks[climb.track]
-        until = int(np.searchsorted(beads.time, climb.qualified))
-        own = sorted(track.members[track.frames.index(until)])
-        for frame in range(rest, until + 1):
+def _of_beads(beads: Beads, frame: IntArray, bead: IntArray) -> Columns:
+    return {"bead": bead, "large": beads.large[bead], "height": beads.height[frame, bead]}
+
+
+def assembly_of(tracks: Sequence[Track], climbs: Columns, beads: Beads, bridges: Sequence[Joined]) -> Columns:
+    """Table ``assembly``: state of the beads of each climb in each frame, from rest until it qualifies."""
+    kinds = (np.int64, np.int64, np.int64, np.bool_, np.bool_, np.int64, np.bool_)
+    parts = [tuple(np.empty(0, dtype=kind) for kind in kinds)]
+    for number in np.flatnonzero(climbs["climbed"]).tolist():
+        until = int(np.searchsorted(beads.time, climbs["qualified"][number]))
+        own = _integers(sorted(tracks[number].members[tracks[number].frames.index(until)]))
+        for frame in range(max(beads.first - 1, 0), until + 1):
             pairs, walled = bridges[frame]
             within = np.searchsorted(own, pairs[np.isin(pairs, own).all(axis=1)])
-            labels = connected(len(own), within)
-            most = np.bincount(labels).argmax()
-            neighbours = np.bincount(within.ravel(), minlength=len(own))
-            for place, bead in enumerate(own):
-                rows.append(
-                    Assembly(
-                        time=float(beads.time[frame]),
-                        track=climb.track,
-                        bead=bead,
-                        large=bool(beads.large[bead]),
-                        height=float(beads.height[frame, bead]),
-                        in_bulk=bool(beads.bulk[frame][bead]),
-                        at_wall=bool(walled[bead]),
-                        neighbours=int(neighbours[place]),
-                        joined=bool(labels[place] == most and neighbours[place]),
-                    )
-                )
-    return rows
+            labels, neighbours = connected(len(own), within), np.bincount(within.ravel(), minlength=len(own))
+            joined = (labels == np.bincount(labels).argmax()) & (neighbours > 0)
+            same = (np.full(len(own), value) for value in (frame, number))
+            parts.append((*same, own, beads.bulk[frame][own], walled[own], neighbours, joined))
+    at, track, bead, in_bulk, at_wall, neighbours, joined = map(np.concatenate, zip(*parts, strict=True))
+    states = {"in_bulk": in_bulk, "at_wall": at_wall, "neighbours": neighbours, "joined": joined}
+    return {"time": beads.time[at], "track": track, **_of_beads(beads, at, bead), **states}
 
 
-@dataclass(frozen=True)
-class Event:
-    """``events.parquet``: one row per event of a pile's clusters.
+def events_of(tracks: Sequence[Track], climbs: Columns, beads: Beads, definition: ClimbCriteria) -> Columns:
+    """Table ``events`` in the order of time, without clusters at the start of the drive and those that may still go on.
 
-    Events are ``freed`` (the cluster leaves the pile or reaches a wall), ``split`` (it separates from another cluster),
-    ``merged`` (it merges into another cluster), ``rejoined`` (it returns to the pile) and ``detached`` (it loses the
-    walls, or its beads separate).
+    A cluster is ``freed`` (it leaves the pile or reaches a wall), ``split`` from another cluster, ``merged`` into
+    another cluster, ``rejoined`` (it returns to the pile) or ``detached`` (it loses the walls, or its beads separate).
     """
-
-    time: Annotated[float, "s", "time since the start of the drive"]
-    event: Annotated[str, "", "freed, split, merged, rejoined or detached"]
-    track: Annotated[int, "", "index of the cluster"]
-    other: Annotated[int, "", "index of the cluster from which it split or into which it merged, -1 for none"]
-    height: Annotated[float, "m", "height of the cluster's leader at the event"]
-
-
-def events_of(tracks: Sequence[Track], climbs: Sequence[Climb], beads: Beads, definition: ClimbCriteria) -> list[Event]:
-    """The events of all tracks in the order of time.
-
-    The begin of a track in the first frame of the drive is not an event, nor is the end of a track that may still
-    continue after the last frame.
-    """
-    time, events = beads.time, []
-
-    def add(frame: int, kind: str, number: int, other: int = -1) -> None:
-        height = float(beads.height[frame, climbs[number].leader])
-        events.append(Event(float(time[frame]), kind, number, other, height))
-
+    time = beads.time
+    rows: list[tuple[int, int, int, str]] = []
     for number, track in enumerate(tracks):
         born, last, parent = track.frames[0], track.frames[-1], _parent(tracks, number, time, definition)
         if parent is not None:
-            add(born, "split", number, parent)
+            rows.append((born, number, parent, "split"))
         elif born > beads.first:
-            add(born, "freed", number)
+            rows.append((born, number, -1, "freed"))
         if track.merged_at is not None and track.merged_into is not None:
-            add(track.merged_at, "merged", number, track.merged_into)
+            rows.append((track.merged_at, number, track.merged_into, "merged"))
         elif time[-1] - time[last] > definition.max_gap:
             # It rejoined the pile if most of its beads were in the bulk before the track ended.
             until = min(int(np.searchsorted(time, time[last] + definition.max_gap, side="right")), len(time) - 1)
             members, after = list(track.members[-1]), beads.bulk[last + 1 : until + 1]
             back = any(bulk[members].mean() >= definition.min_overlap for bulk in after)
-            add(last + 1, "rejoined" if back else "detached", number)
-    return sorted(events, key=lambda event: (event.time, event.track))
+            rows.append((last + 1, number, -1, "rejoined" if back else "detached"))
+    rows.sort(key=lambda row: row[:2])
+    frame, track_of, other = np.array([row[:3] for row in rows], dtype=np.int64).reshape(-1, 3).T
+    return {
+        "time": time[frame],
+        "event": np.array([event for *_, event in rows], dtype=np.str_),
+        "track": track_of,
+        "other": other,
+        "height": beads.height[frame, climbs["leader"][track_of]],
+    }
 
 
 def _parent(tracks: Sequence[Track], number: int, time: FloatArray, definition: ClimbCriteria) -> int | None:

@@ -5,9 +5,9 @@ They are written with pyarrow alone, because pandas takes a third of a second to
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, get_type_hints
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -25,11 +25,6 @@ Columns: TypeAlias = dict[str, npt.NDArray[Any]]
 def numbered(name: str, values: npt.NDArray[Any]) -> Columns:
     """Columns ``name_1``, ``name_2``, … of beads or contacts, which are the last axis of the values."""
     return {f"{name}_{number + 1}": values[..., number] for number in range(values.shape[-1])}
-
-
-def columns_of_rows(kind: type, rows: Sequence[Any]) -> Columns:
-    """Columns of rows, which are dataclasses of a kind; there may be no rows."""
-    return {name: np.array([getattr(row, name) for row in rows], dtype=of) for name, of in get_type_hints(kind).items()}
 
 
 def write_table(directory: Path, name: str, columns: Columns) -> None:

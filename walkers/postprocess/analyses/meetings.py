@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, isinf, nan, pi
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from walkers.postprocess.clusters import connected
 from walkers.postprocess.drawing import TWO_COLUMNS, new_figure, plain_text, styled
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import Group, Motion, read_bridges
-from walkers.postprocess.tables import Columns, columns_of_rows
+from walkers.postprocess.tables import Columns
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,18 +76,6 @@ _NUMBERS = {
 
 
 @dataclass(frozen=True)
-class Meeting:
-    """``meetings.parquet``: one row per event between two walkers that may meet."""
-
-    time: Annotated[float, "s", "time since the start of the drive"]
-    event: Annotated[str, "", "merged: the first bridge between two walkers forms; parted: the last one breaks"]
-    walker: Annotated[int, "", "index of one walker"]
-    other: Annotated[int, "", "index of the other walker"]
-    size: Annotated[int, "", "number of walkers in the cluster of `walker` after the event"]
-    angle: Annotated[float, "rad", "angle between the two headings at the event: 0 parallel, pi opposite"]
-
-
-@dataclass(frozen=True)
 class Course:
     """W walkers in K frames, at least one per cycle.
 
@@ -130,7 +118,7 @@ class Meetings(Analysis):
 
     def of(self, motion: Motion) -> tuple[dict[str, Columns], dict[str, Any]]:
         """Events between recorded frames of bridges; walkers that are joined in the first frame merge at that time."""
-        rows: list[Meeting] = []
+        rows: list[tuple[float, str, int, int, int, float]] = []
         before: frozenset[tuple[int, int]] = frozenset()
         centre, heading = _places(motion)
         floored = motion.case.boundary.walls[0].name == FLOOR
@@ -150,10 +138,11 @@ class Meetings(Analysis):
                 for one, other in sorted(pairs):
                     cosine = float(heading[bridges.frame, one] @ heading[bridges.frame, other])
                     angle = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
-                    rows.append(Meeting(seconds, event, one, other, int(size[one]), angle))
+                    rows.append((seconds, event, one, other, int(size[one]), angle))
             before = now
         groups = [np.flatnonzero(labels == label).tolist() for label in np.unique(labels)]
-        events = [row.event for row in rows]
+        table = _table(rows)
+        events = table["event"].tolist()
         run = motion.case.run
         often = max(1, run.samples_per_cycle // run.samples_per_bridge_sample)
         # The same phase of each cycle of the drive.
@@ -163,7 +152,7 @@ class Meetings(Analysis):
         course = Course(
             motion.time[strobed], centre[strobed], heading[strobed], np.array(sizes)[kept], np.array(held)[kept]
         )
-        return {"meetings": columns_of_rows(Meeting, rows)}, {
+        return {"meetings": table}, {
             "merged": events.count("merged"),
             "parted": events.count("parted"),
             "largest_group": int(np.max(sizes)),
@@ -199,6 +188,13 @@ class Meetings(Analysis):
         """Paths of the walkers and their beads at the end, with equal scales on both axes."""
         del name
         return _drawn(panels[0], run.motion)
+
+
+def _table(rows: Sequence[tuple[float, str, int, int, int, float]]) -> Columns:
+    """Table ``meetings``; there may be no rows."""
+    columns = list(zip(*rows, strict=True)) or [()] * 6
+    kinds = {"time": float, "event": str, "walker": int, "other": int, "size": int, "angle": float}
+    return {name: np.array(values, dtype=kind) for (name, kind), values in zip(kinds.items(), columns, strict=True)}
 
 
 def _paths(motion: Motion) -> Panel:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from math import nan
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -14,25 +13,22 @@ from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
 from walkers.postprocess.analysis import Analysis, Described, Measured, Quantity, tables_of
 from walkers.postprocess.clusters import (
-    Assembly,
     Beads,
-    Climb,
     ClimbCriteria,
     Cluster,
-    Event,
     Joined,
-    Track,
     assembly_of,
     bulk_of,
-    classify,
+    climbs_of,
     connected,
     events_of,
     follow,
     held_clusters,
+    members_of,
 )
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import FLOOR, Bridges, Motion, read_bridges
-from walkers.postprocess.tables import Columns, columns_of_rows
+from walkers.postprocess.tables import Columns
 from walkers.postprocess.uncertainty import wrapped
 
 if TYPE_CHECKING:
@@ -40,50 +36,6 @@ if TYPE_CHECKING:
 
 _WHOLE = 1.0 - 1e-6
 """Fraction of the duration below which a run ended early."""
-
-
-@dataclass(frozen=True)
-class Bed:
-    """``bed.parquet``: one row per frame of a pile."""
-
-    time: Annotated[float, "s", "time since the start of the drive; negative while the pile settles"]
-    surface: Annotated[float, "m", "height of the bulk surface: median over x-y cells of the top of the highest bead"]
-    surface_low: Annotated[float, "m", "10th percentile of these heights"]
-    surface_high: Annotated[float, "m", "90th percentile of these heights"]
-    brazil_nut: Annotated[float, "", "Brazil-nut index (z_large - z_small)/(z_large + z_small) of mean heights"]
-    brazil_nut_of_bulk: Annotated[float, "", "Brazil-nut index of the beads of the bulk"]
-    mean_square_velocity: Annotated[
-        float, "m^2/s^2", "mean square velocity of the beads relative to the container, at the drive phase of the frame"
-    ]
-    contacts: Annotated[
-        float,
-        "",
-        "touching beads per bead, without walls: twice the number of touching pairs over the number of beads",
-    ]
-    bridges: Annotated[
-        float, "", "bridges per bead, without walls: twice the number of bridges between beads over the number of beads"
-    ]
-    touching: Annotated[int, "", "number of bridges between touching beads"]
-    opened: Annotated[int, "", "number of open bridges between beads (the beads do not touch)"]
-    mean_force: Annotated[float, "N", "mean normal force of the bridges between beads, positive for attraction"]
-    bulk: Annotated[int, "", "number of beads in the bulk"]
-    at_wall: Annotated[int, "", "number of beads with a bridge to a side wall"]
-    large_at_wall: Annotated[int, "", "number of large beads with a bridge to a side wall"]
-    clusters: Annotated[int, "", "number of clusters free of the bulk and held by a side wall"]
-    highest: Annotated[
-        float, "m", "height of the topmost bead of these clusters; height of the surface if there are none"
-    ]
-
-
-@dataclass(frozen=True)
-class Member:
-    """``members.parquet``: one row per frame and bead of a cluster that is free of the bulk and held by a side wall."""
-
-    time: Annotated[float, "s", "time since the start of the drive"]
-    track: Annotated[int, "", "index of the cluster"]
-    bead: Annotated[int, "", "index of the bead, from 0"]
-    large: Annotated[bool, "", "whether the bead is large"]
-    height: Annotated[float, "m", "height of the bead's centre"]
 
 
 class Pile(Analysis):
@@ -116,23 +68,23 @@ class Pile(Analysis):
             held.append(list(held_clusters(labels, bridges, bulks[-1])) if driven else [])
             joined.append(_joined(bridges, len(motion.radius)))
             rows.append(_bed(motion, bridges, joined[-1], bulks[-1], held[-1]))
-        bed, names = columns_of_rows(Bed, rows), [wall.name for wall in case.boundary.walls]
+        bed = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        names = [wall.name for wall in case.boundary.walls]
         beads = Beads(motion.time, motion.position[..., 2], motion.large, bed["surface"], bulks, first, names)
         tracks = follow(motion.time, held, definition)
-        climbs = [classify(number, track, beads, definition) for number, track in enumerate(tracks)]
-        events = events_of(tracks, climbs, beads, definition)
+        climbs = climbs_of(tracks, beads, definition)
         tables = {
             "bed": bed,
-            "clusters": columns_of_rows(Climb, climbs),
-            "events": columns_of_rows(Event, events),
-            "members": columns_of_rows(Member, _members(tracks, beads)),
-            "assembly": columns_of_rows(Assembly, assembly_of(tracks, climbs, beads, joined)),
+            "clusters": climbs,
+            "events": events_of(tracks, climbs, beads, definition),
+            "members": members_of(tracks, beads),
+            "assembly": assembly_of(tracks, climbs, beads, joined),
         }
         return tables, {
             **_bed_result(motion, bed),
             "clusters": len(tracks),
-            "events": dict(Counter(event.event for event in events)),
-            "climbs": [_climb_row(climb) for climb in climbs if climb.climbed],
+            "events": dict(Counter(tables["events"]["event"].tolist())),
+            "climbs": [_climb_row(climbs, place) for place in np.flatnonzero(climbs["climbed"]).tolist()],
             "rim": case.boundary.height,
             "duration": case.duration,
             "definition": vars(definition),
@@ -266,11 +218,12 @@ def _bed_result(motion: Motion, bed: Columns) -> dict[str, Any]:
     }
 
 
-def _climb_row(climb: Climb) -> dict[str, Any]:
+def _climb_row(climbs: Columns, place: int) -> dict[str, Any]:
     names = ("begin", "end", "onset", "qualified", "gain", "speed", "standard_error", "leader_large", "height")
-    known = {name: getattr(climb, name) for name in (*names, "size", "large")}
+    known = {name: climbs[name][place].item() for name in (*names, "size", "large")}
     finite = {name: value if np.isfinite(value) else None for name, value in known.items()}
-    return {**finite, "leader": climb.leader, "walls": climb.wall_names.split(), "out_of_pile": climb.out_of_pile}
+    last = {"leader": int(climbs["leader"][place]), "walls": str(climbs["wall_names"][place]).split()}
+    return {**finite, **last, "out_of_pile": bool(climbs["out_of_pile"][place])}
 
 
 def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
@@ -282,20 +235,6 @@ def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
     there = motion.time[frame] == members["time"]  # a motion need not have all frames
     track[frame[there], members["bead"][there]] = members["track"][there]
     return track, np.append(climbed, False)[track]
-
-
-def _members(tracks: Sequence[Track], beads: Beads) -> list[Member]:
-    """Rows by frame and, within a frame, in the order in which `held_clusters` finds clusters."""
-    found = [
-        (frame, number, sorted(own))
-        for number, one in enumerate(tracks)
-        for frame, own in zip(one.frames, one.members, strict=True)
-    ]
-    return [
-        Member(float(beads.time[frame]), number, bead, bool(beads.large[bead]), float(beads.height[frame, bead]))
-        for frame, number, members in sorted(found, key=lambda one: (one[0], one[2]))
-        for bead in members
-    ]
 
 
 def _bridges_text(counts: Mapping[str, Any]) -> str:
@@ -313,7 +252,7 @@ def _joined(bridges: Bridges, count: int) -> Joined:
     return bridges.beads.astype(np.int32), at_wall
 
 
-def _bed(motion: Motion, bridges: Bridges, joined: Joined, bulk: BoolArray, held: Sequence[Cluster]) -> Bed:
+def _bed(motion: Motion, bridges: Bridges, joined: Joined, bulk: BoolArray, held: Sequence[Cluster]) -> dict[str, Any]:
     """State of a pile in a frame from its bulk and the held clusters."""
     frame = bridges.frame
     position, radius, large = motion.position[frame], motion.radius, motion.large
@@ -321,25 +260,25 @@ def _bed(motion: Motion, bridges: Bridges, joined: Joined, bulk: BoolArray, held
     tops = _surface_cells(position[bulk], radius[bulk], motion.case.boundary, 4.0 * float(radius.max()))
     low, middle, high = (float(value) for value in np.percentile(tops if len(tops) else [0.0], (10.0, 50.0, 90.0)))
     touching = int((bridges.gap <= 0.0).sum())
-    return Bed(
-        time=float(motion.time[frame]),
-        surface=middle,
-        surface_low=low,
-        surface_high=high,
-        brazil_nut=segregation(position[:, 2], large),
-        brazil_nut_of_bulk=segregation(position[bulk, 2], large[bulk]),
-        mean_square_velocity=float(np.mean(np.sum(motion.velocity[frame] ** 2, axis=1))),
-        contacts=2.0 * touching / len(position),
-        bridges=2.0 * len(bridges.beads) / len(position),
-        touching=touching,
-        opened=len(bridges.gap) - touching,
-        mean_force=float(bridges.force.mean()) if len(bridges.force) else 0.0,
-        bulk=int(bulk.sum()),
-        at_wall=int(joined[1].sum()),
-        large_at_wall=int((joined[1] & large).sum()),
-        clusters=len(held),
-        highest=max([middle, *(float(position[bead, 2]) for members, _ in held for bead in members)]),
-    )
+    return {
+        "time": float(motion.time[frame]),
+        "surface": middle,
+        "surface_low": low,
+        "surface_high": high,
+        "brazil_nut": segregation(position[:, 2], large),
+        "brazil_nut_of_bulk": segregation(position[bulk, 2], large[bulk]),
+        "mean_square_velocity": float(np.mean(np.sum(motion.velocity[frame] ** 2, axis=1))),
+        "contacts": 2.0 * touching / len(position),
+        "bridges": 2.0 * len(bridges.beads) / len(position),
+        "touching": touching,
+        "opened": len(bridges.gap) - touching,
+        "mean_force": float(bridges.force.mean()) if len(bridges.force) else 0.0,
+        "bulk": int(bulk.sum()),
+        "at_wall": int(joined[1].sum()),
+        "large_at_wall": int((joined[1] & large).sum()),
+        "clusters": len(held),
+        "highest": max([middle, *(float(position[bead, 2]) for members, _ in held for bead in members)]),
+    }
 
 
 def _surface_cells(position: FloatArray, radius: FloatArray, container: Boundary, cell: float) -> FloatArray:
