@@ -35,12 +35,13 @@ class NoNumberError(DumpError):
 
 
 class _Frame(NamedTuple):
-    """A frame: offset (bytes) and number of values of the part of each process, and the end of the frame."""
+    """A frame: its bytes from ``start`` to ``end``, and offset (bytes) and number of values of each process."""
 
+    start: int
+    end: int
     step: int
     rows: int
     parts: list[tuple[int, int]]
-    end: int
 
 
 class BinaryDump:
@@ -60,74 +61,38 @@ class BinaryDump:
     """
 
     def __init__(self, path: Path, columns: tuple[str, ...]) -> None:
-        self.path = path
-        self.columns = columns
-        size = path.stat().st_size
-        self._bytes: npt.NDArray[np.uint8] = np.memmap(path, np.uint8, "r") if size else np.empty(0, np.uint8)
-        # Usually all frames are of one process and equally long, and one comparison finds them all.
-        self._starts = self._starts_of_alike(size)
-        self._alike = len(self._starts) > 0
-        offset = int(self._starts[-1]) + self._stride if self._alike else 0
-        starts = []
-        while offset < size and (frame := self._read_header(offset, size)) is not None:
-            starts.append(offset)
+        self.path, self.columns = path, columns
+        self._bytes = np.memmap(path, np.uint8, "r").data if path.stat().st_size else memoryview(b"")
+        self._frames: list[_Frame] = []
+        offset = 0
+        while offset < len(self._bytes) and (frame := self._frame_at(offset)) is not None:
+            self._frames.append(frame)
             offset = frame.end
-            self._alike = False
-        self._starts = np.concatenate([self._starts, np.array(starts, dtype=np.int64)])
-        self.truncated = offset < size
-        self.steps = self._bytes[self._starts[:, None] + np.arange(8)].view(np.int64)[:, 0]
+        self.truncated = offset < len(self._bytes)
+        self.steps = np.array([frame.step for frame in self._frames], dtype=np.int64)
 
     def __len__(self) -> int:
-        return len(self._starts)
+        return len(self._frames)
 
-    def _starts_of_alike(self, size: int) -> npt.NDArray[np.int64]:
-        """Offsets of the leading frames that are equal in form to the first; none if it has several parts."""
-        first = self._read_header(0, size) if size else None
-        if first is None or len(first.parts) > 1:
-            return np.empty(0, dtype=np.int64)
-        self._stride = first.end
-        heads = self._bytes[: size // first.end * first.end].reshape(-1, first.end)[:, 8 : first.parts[0][0]]
-        differs = np.flatnonzero((heads != heads[0]).any(axis=1))
-        return np.arange(differs[0] if len(differs) else len(heads), dtype=np.int64) * first.end
-
-    def _read_header(self, offset: int, size: int) -> _Frame | None:
+    def _frame_at(self, start: int) -> _Frame | None:
         """The frame that begins at an offset; None if the file ends within it."""
-        if offset + _HEADER.size > size:
+        if start + _HEADER.size > len(self._bytes):
             return None
-        step, rows, *_, columns, processes = _HEADER.unpack(self._bytes[offset : offset + _HEADER.size].tobytes())
+        step, rows, *_, columns, processes = _HEADER.unpack_from(self._bytes, start)
         if columns != len(self.columns) or rows < 0 or not 1 <= processes < 1_000_000 or step < 0:
-            raise DumpError(f"{self.path}: no dump of {len(self.columns)} columns (byte {offset})")
-        offset += _HEADER.size
-        parts = []
+            raise DumpError(f"{self.path}: no dump of {len(self.columns)} columns (byte {start})")
+        end, parts = start + _HEADER.size, []
         for _ in range(processes):
-            if offset + _COUNT.size > size:
+            if end + _COUNT.size > len(self._bytes):
                 return None
-            (count,) = _COUNT.unpack(self._bytes[offset : offset + _COUNT.size].tobytes())
-            offset += _COUNT.size
-            if offset + 8 * count > size:
+            (count,) = _COUNT.unpack_from(self._bytes, end)
+            parts.append((end + _COUNT.size, count))
+            end += _COUNT.size + 8 * count
+            if end > len(self._bytes):
                 return None
-            parts.append((offset, count))
-            offset += 8 * count
         if sum(count for _, count in parts) != rows * columns:
             raise DumpError(f"{self.path}: the parts of the frame of step {step} do not add up")
-        return _Frame(step, rows, parts, offset)
-
-    def frame(self, number: int) -> FloatArray:
-        """One frame, shape (rows, columns).
-
-        Raises
-        ------
-        NoNumberError
-            If it holds a NaN or an infinity.
-        """
-        frame = self._read_header(int(self._starts[number]), len(self._bytes))
-        assert frame is not None
-        parts = [self._bytes[start : start + 8 * count].view(np.float64) for start, count in frame.parts]
-        values = np.concatenate(parts).reshape(frame.rows, len(self.columns))
-        if not np.isfinite(values).all():
-            column = self.columns[int(np.flatnonzero(~np.isfinite(values).all(axis=0))[0])]
-            raise NoNumberError(f"{self.path}: {column} is not a number at step {frame.step}")
-        return values
+        return _Frame(start, end, step, rows, parts)
 
     def stack(self) -> FloatArray:
         """All frames, shape (frames, rows, columns).
@@ -135,32 +100,29 @@ class BinaryDump:
         Raises
         ------
         DumpError
-            If the number of rows changes, or a number is none.
+            If the number of rows changes.
+        NoNumberError
+            If there is a NaN or an infinity.
         """
-        if not len(self):
-            return np.empty((0, 0, len(self.columns)))
-        if not self._alike:
-            frames = [self.frame(number) for number in range(len(self))]
-            if len({len(frame) for frame in frames}) > 1:
-                raise DumpError(f"{self.path}: the number of beads changes")
-            return np.stack(frames)
-        whole = self._bytes[: len(self) * self._stride].reshape(len(self), self._stride)
-        data = np.ascontiguousarray(whole[:, _HEADER.size + _COUNT.size :]).view(np.float64)
+        rows = {frame.rows for frame in self._frames} or {0}
+        if len(rows) > 1:
+            raise DumpError(f"{self.path}: the number of beads changes")
+        data = np.empty((len(self), rows.pop() * len(self.columns)))
+        for values, frame in zip(data, self._frames, strict=True):
+            np.concatenate([np.frombuffer(self._bytes, float, count, at) for at, count in frame.parts], out=values)
+        data = data.reshape(len(self), -1, len(self.columns)) if data.size else np.empty((0, 0, len(self.columns)))
         if not np.isfinite(data).all():
-            self.frame(int(np.flatnonzero(~np.isfinite(data).all(axis=1))[0]))  # raises the error
-        return data.reshape(len(self), data.shape[1] // len(self.columns), len(self.columns))
+            frame, _, column = (places[0] for places in np.nonzero(~np.isfinite(data)))
+            raise NoNumberError(f"{self.path}: {self.columns[column]} is not a number at step {self.steps[frame]}")
+        return data
 
     def write_like(self, data: FloatArray, path: Path) -> None:
         """Write a dump of one process: the headers of these frames with other data, shape (frames, rows, columns)."""
-        count = data.shape[1] * data.shape[2]
-        heads = []
-        for start in self._starts:
-            head = list(_HEADER.unpack(self._bytes[start : start + _HEADER.size].tobytes()))
-            head[1], head[-1] = data.shape[1], 1
-            heads.append(np.frombuffer(_HEADER.pack(*head) + _COUNT.pack(count), dtype=np.uint8))
-        body = np.ascontiguousarray(data).reshape(len(data), -1).view(np.uint8)
-        with path.open("wb") as file:  # errors of ndarray.tofile have no reason
-            file.write(np.concatenate([np.stack(heads), body], axis=1).data)
+        with path.open("wb") as file:
+            for frame, values in zip(self._frames, data, strict=True):
+                step, _, *box, columns, _ = _HEADER.unpack_from(self._bytes, frame.start)
+                head = _HEADER.pack(step, len(values), *box, columns, 1) + _COUNT.pack(values.size)
+                file.write(head + values.tobytes())
 
     def column(self, name: str) -> int:
         """Index of a column."""
