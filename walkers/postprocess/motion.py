@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,24 +15,18 @@ from walkers.inputs.bodies import Walkers
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Excitation
 from walkers.postprocess.dump import BinaryDump, BoolArray, DumpError, FloatArray, IntArray, NoNumberError, local_frames
-from walkers.runner.directory import (
-    SEGMENT_NAME,
-    case_of,
-    layout_of,
-    run_of,
-    segment_directories,
-)
+from walkers.runner.directory import SEGMENT_NAME, case_of, layout_of, run_of, segment_directories
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
-from walkers.templates.layout import FILM_COLUMN, MEAN_SPIN_COLUMNS, Layout, PlacedWalker
+from walkers.templates.layout import MEAN_SPIN_COLUMNS, Layout, PlacedWalker
 
 FLOOR = 0
 """Index of the floor among the walls of a container; the others are side walls."""
 LEAST_SAMPLES = 8
 """Smallest number of samples per cycle that resolves the motion within a cycle."""
 _LEFT_OUT = 0.02  # largest part of a run after the last of several evenly spaced times
-_OF_FRAMES = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "frames", "mean_spin", "film")
-_OF_BEADS = ("position", "velocity", "spin", "mean_spin", "film")
+_OF_BEADS = ("position", "velocity", "spin", "mean_spin")
+_OF_FRAMES = (*_OF_BEADS, "time", "substrate", "substrate_velocity", "frames")
 
 
 @dataclass(frozen=True, repr=False)
@@ -58,8 +52,6 @@ class Motion:
         Whether the dump ends within a frame; whether the run ended early because its velocities were constant.
     mean_spin : ndarray, shape (F, N, 3), or None
         Angular velocity averaged over the steps since the previous frame (zero in the first frame), if recorded.
-    film : ndarray, shape (F, N), or None
-        Liquid on each bead, without that in bridges, over its whole liquid, if liquid is conserved.
     """
 
     case: Case
@@ -75,7 +67,6 @@ class Motion:
     truncated: bool
     ended_early: bool = False
     mean_spin: FloatArray | None = None
-    film: FloatArray | None = None
 
     def __repr__(self) -> str:
         return f"<Motion of {self.case.name}: {len(self.time)} frames of {len(self.radius)} beads>"
@@ -103,15 +94,17 @@ class Motion:
     def select(self, frames: slice = slice(None), beads: IntArray | None = None, **changes: Any) -> Motion:
         """The motion of selected frames and beads, with changes; beads are renumbered, walkers are not."""
         parts: dict[str, Any] = {
-            name: None if (one := getattr(self, name)) is None else one[frames] for name in _OF_FRAMES
+            name: None if (part := getattr(self, name)) is None else part[frames] for name in _OF_FRAMES
         }
         parts |= changes
         if beads is not None:
-            parts |= {name: None if (one := parts[name]) is None else one[:, beads] for name in _OF_BEADS}
+            parts |= {name: None if (part := parts[name]) is None else part[:, beads] for name in _OF_BEADS}
             place = {bead: number for number, bead in enumerate(beads.tolist())}
-            kept = (one for one in self.walkers if place.keys() >= set(one.beads))
+            kept = [walker for walker in self.walkers if place.keys() >= set(walker.beads)]
             parts["radius"] = self.radius[beads]
-            parts["walkers"] = tuple(replace(one, beads=tuple(place[bead] for bead in one.beads)) for one in kept)
+            parts["walkers"] = tuple(
+                replace(walker, beads=tuple(place[bead] for bead in walker.beads)) for walker in kept
+            )
         return replace(self, **parts)
 
     def of_walkers(self, walkers: Collection[PlacedWalker]) -> Motion:
@@ -316,93 +309,96 @@ def read_motion(directory: str | Path) -> Motion:
     """
     directory = Path(directory)
     case = case_of(directory)
-    segments = {path: _opened(path) for path in segment_directories(directory)}
+    segments = [_opened(path) for path in segment_directories(directory)]
     if not segments:
         raise DumpError(f"{directory}: no segment of the run is finished yet")
     try:
-        return _motion(case, segments)
+        return _joined(case, segments)
     except NoNumberError as error:
         finished = (directory / MANIFEST_NAME).is_file()  # then its dumps contained no such numbers
         message = "the dump was damaged after the run was finished" if finished else "the simulation blew up"
         raise DumpError(f"{error}: {message}") from error
 
 
-def _opened(segment: Path) -> tuple[dict[str, Any], Layout, BinaryDump]:
-    """Record, layout and bead dump of a segment."""
-    path = segment / SEGMENT_NAME
+class _Segment(NamedTuple):
+    """A segment: its directory; first and last step, and the step at which the drive begins; layout, bead dump."""
+
+    path: Path
+    begin: int
+    end: int
+    drive_from: int | None
+    layout: Layout
+    dump: BinaryDump
+
+
+def _opened(path: Path) -> _Segment:
+    place = path / SEGMENT_NAME
     try:
-        record = read_json(path)
-        record = {name: record[name] for name in ("begin", "end", "drive_from", "root_mean_square_velocity")}
-        path = segment
-        layout = layout_of(segment)
-        return record, layout, BinaryDump(segment / layout.bead_dump, layout.bead_columns)
+        record = read_json(place)
+        begin, end, drive_from = (record[name] for name in ("begin", "end", "drive_from"))
+        place = path
+        layout = layout_of(path)
+        dump = BinaryDump(path / layout.bead_dump, layout.bead_columns)
+        return _Segment(path, begin, end, drive_from, layout, dump)
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise DumpError(f"{path}: cannot be read ({error})") from error
+        raise DumpError(f"{place}: cannot be read ({error})") from error
 
 
-def _motion(case: Case, segments: dict[Path, tuple[dict[str, Any], Layout, BinaryDump]]) -> Motion:
+def _frames_of(case: Case, segments: Sequence[_Segment]) -> tuple[FloatArray, list[int], list[tuple[Path, int]]]:
+    """All frames, shape (frames, beads, columns), the step of each, and its segment and number there."""
     steps: list[int] = []
     stacks: list[FloatArray] = []
     frames: list[tuple[Path, int]] = []
-    for segment, (record, layout, dump) in segments.items():
-        if record["begin"] != (steps[-1] if steps else 0):
-            raise DumpError(f"{segment}: the segment before it is missing")
+    for path, begin, end, _, layout, dump in segments:
+        if begin != (steps[-1] if steps else 0):
+            raise DumpError(f"{path}: the segment before it is missing")
         data = dump.stack()
-        whole = len(data) and not dump.truncated and dump.steps[-1] == record["end"]
+        whole = len(data) and not dump.truncated and dump.steps[-1] == end
         if not whole and (len(segments) > 1 or case.run.rests):
-            raise DumpError(f"{segment}: its dump is incomplete")
+            raise DumpError(f"{path}: its dump is incomplete")
         if len(data) < 2:
             raise DumpError(f"{dump.path}: {len(data)} complete frames, too few for a motion")
         if data.shape[1] != layout.atoms:
-            raise DumpError(f"{segment}: {data.shape[1]} rows, expected {layout.atoms}")
-        begin = 1 if steps else 0  # the first frame repeats the last one of the previous segment
-        stacks.append(data[begin:])
-        steps += dump.steps[begin:].tolist()
-        frames += [(segment, number) for number in range(begin, len(data))]
-    data = np.concatenate(stacks) if len(stacks) > 1 else stacks[0]
-    return _of_frames(case, segments, data, steps, frames)
+            raise DumpError(f"{path}: {data.shape[1]} rows, expected {layout.atoms}")
+        first = 1 if steps else 0  # the first frame repeats the last one of the previous segment
+        stacks.append(data[first:])
+        steps += dump.steps[first:].tolist()
+        frames += [(path, number) for number in range(first, len(data))]
+    return np.concatenate(stacks) if len(stacks) > 1 else stacks[0], steps, frames
 
 
-def _of_frames(
-    case: Case,
-    segments: dict[Path, tuple[dict[str, Any], Layout, BinaryDump]],
-    data: FloatArray,
-    steps: list[int],
-    frames: list[tuple[Path, int]],
-) -> Motion:
-    """The motion of dumped frames, shape (frames, beads, columns), with the step and the segment of each."""
-    record, layout, dump = segments[frames[-1][0]]
-    cycles = record["end"] // case.run.steps_per_cycle if case.run.until_steady else case.run.cycles
+def _joined(case: Case, segments: Sequence[_Segment]) -> Motion:
+    """The motion over all segments."""
+    data, steps, frames = _frames_of(case, segments)
+    _, _, end, _, layout, dump = segments[-1]
+    cycles = end // case.run.steps_per_cycle if case.run.until_steady else case.run.cycles
     # Before the drive, time is measured from the next frame.
-    starts = [one["drive_from"] for one, _, _ in segments.values() if one["drive_from"] is not None]
+    starts = [segment.drive_from for segment in segments if segment.drive_from is not None]
     start = starts[0] if starts else steps[-1] + case.run.steps_per_sample
     time = (np.array(steps, dtype=np.float64) - start) * case.run.time_step
+    shift, speed = prescribed_motion(case.excitation, time)
+    if starts and start:  # in the last frame at rest the walls do not move yet
+        speed[time == 0.0] = 0.0
+    shaken = (shift, speed) if case.drive.frame == "lab" else boundary_motion(case.excitation, time)
 
     def vectors(name: str) -> FloatArray:
         column = dump.column(name)
         return data[:, :, column : column + 3]
 
-    shift, speed = prescribed_motion(case.excitation, time)
-    if starts and start:  # in the last frame at rest the walls do not move yet
-        speed[time == 0.0] = 0.0
-    substrate, substrate_velocity = (
-        (shift, speed) if case.drive.frame == "lab" else boundary_motion(case.excitation, time)
-    )
     return Motion(
         case=case.for_cycles(cycles) if case.run.until_steady else case,
         time=time,
         position=vectors("x") - shift[:, None],
         velocity=vectors("vx") - speed[:, None],
         spin=vectors("omegax"),
-        substrate=substrate,
-        substrate_velocity=substrate_velocity,
+        substrate=shaken[0],
+        substrate_velocity=shaken[1],
         radius=data[0, :, dump.column("radius")],
         walkers=tuple(replace(one, beads=tuple(bead - 1 for bead in one.beads)) for one in layout.walkers),
         frames=frames,
-        truncated=any(dump.truncated for _, _, dump in segments.values()),
+        truncated=any(segment.dump.truncated for segment in segments),
         ended_early=cycles < case.run.cycles,
         mean_spin=vectors(MEAN_SPIN_COLUMNS[0]) if MEAN_SPIN_COLUMNS[0] in layout.bead_columns else None,
-        film=data[:, :, dump.column(FILM_COLUMN)] if FILM_COLUMN in layout.bead_columns else None,
     )
 
 
