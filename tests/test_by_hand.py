@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+import walkers
 from tests.conftest import SHORT, call, document, make_case
-from walkers import load
 from walkers import run as run_case
 from walkers.errors import InputError
 from walkers.inputs.case import Case
@@ -44,9 +44,9 @@ def folder(tmp_path: Path) -> Path:
 
 def test_a_deck_run_by_hand_is_read_and_says_so(folder: Path, run_directory: Callable[..., Path]) -> None:
     with pytest.raises(InputError, match=r"the deck was not run .*; do: cd .* && sh run\.sh"):
-        load(folder)
+        run_case(folder)
     _run(folder)
-    found, same = load(folder), load(run_directory(run=SHORT))
+    found, same = run_case(folder), run_case(run_directory(run=SHORT))
     assert found.result["by_hand"] == ["run by hand"]
     assert {**found.result, "by_hand": 0} == {**same.result, "by_hand": 0}
     assert "warning: run by hand" in found.describe()
@@ -55,7 +55,7 @@ def test_a_deck_run_by_hand_is_read_and_says_so(folder: Path, run_directory: Cal
     for command in ("run", "plot", "report", "export --to vtk", "check files"):
         assert call(*command.split(), str(folder)).returncode == 0, command
     written = (folder / "result.json").stat().st_mtime_ns
-    load(folder)
+    run_case(folder)
     assert (folder / "result.json").stat().st_mtime_ns == written
 
 
@@ -68,7 +68,7 @@ def test_the_law_of_a_deck_is_not_executed_when_it_is_read(tmp_path: Path) -> No
     _run(tmp_path / "hand")
     for file in (law, tmp_path / "hand" / "law.py"):
         file.write_text(f"open({str(tmp_path / 'executed')!r}, 'w')\n{file.read_text()}")
-    found = load(tmp_path / "hand")
+    found = run_case(tmp_path / "hand")
     assert found.result["by_hand"] == ["run by hand"]
     assert not (tmp_path / "executed").exists()
 
@@ -93,7 +93,7 @@ def test_an_edited_parameter_is_another_case(name: str, folder: Path, run_direct
     edits, changes = EDITED[name]
     _edit(folder, **edits)
     _run(folder)
-    found, same = load(folder), load(run_directory(make_case(run=SHORT).changed(changes)))
+    found, same = run_case(folder), run_case(run_directory(make_case(run=SHORT).changed(changes)))
     # Where the walker stands at first and its time step are those of the case as it was.
     assert found.result["velocity"]["mean"] == pytest.approx(same.result["velocity"]["mean"], rel=5e-3)
     assert found.case.run.period == pytest.approx(same.case.run.period)
@@ -237,7 +237,7 @@ def test_an_edited_deck_of_any_case_is_changes_of_its_tables(name: str, tmp_path
     folder = write_folder(case, tmp_path / "hand").parent
     _edit(folder, **edits)
     _run(folder)
-    found = load(folder).case
+    found = run_case(folder).case
     assert _numbers(found) == pytest.approx(_numbers(expected), rel=1e-9)
     assert found.drive.waveform == expected.drive.waveform
     assert found.run.steps_per_cycle == int(edits.get("steps_per_cycle", case.run.steps_per_cycle))
@@ -248,20 +248,20 @@ def test_an_edited_deck_of_any_case_is_changes_of_its_tables(name: str, tmp_path
 
 def test_a_deck_that_is_edited_and_run_again_is_read_again(folder: Path) -> None:
     _run(folder)
-    first = load(folder).result["velocity"]["mean"]
+    first = run_case(folder).result["velocity"]["mean"]
     _edit(folder, peak_acceleration="20.0")
     deck = folder / "walker.lig"
     deck.write_text(deck.read_text().replace("nve/sphere", "nve/sphere  # as ever").replace("delay 0", "delay 1"))
     _run(folder)
-    again = load(folder)
+    again = run_case(folder)
     assert again.result["velocity"]["mean"] < first
     assert "peak_acceleration 20, was 39.2; 1 other line(s)" in again.result["by_hand"][1]
     assert "is newer than" not in again.describe()
     assert " finished: edited and run by hand " in call("list", "--out", str(folder.parent)).stdout
     _edit(folder, restitution="0.5")
-    assert "walker.lig is newer than" in load(folder).result["by_hand"][-1]
+    assert "walker.lig is newer than" in run_case(folder).result["by_hand"][-1]
     with pytest.raises(InputError, match=r"no finished run in .*--set 'drive.frequency=70 Hz'"):
-        load(folder, changes={"drive.frequency": "70 Hz"})
+        walkers.load(folder, changes={"drive.frequency": "70 Hz"})
 
 
 FAILS = {
@@ -336,7 +336,7 @@ def test_edits_that_make_no_case_are_refused(name: str, tmp_path: Path) -> None:
     _edit(folder, **edits)
     _run(folder)
     with pytest.raises(InputError, match=told) as caught:
-        load(folder)
+        run_case(folder)
     assert len(str(caught.value).splitlines()) == 1
 
 
@@ -363,7 +363,7 @@ def test_a_deck_has_the_cycles_of_the_run_that_exists(tmp_path: Path) -> None:
     again = made.export("deck", tmp_path / "again").parent
     for folder in (first, again):
         _run(folder)
-    found, same = load(first), load(again)
+    found, same = run_case(first), run_case(again)
     assert found.result["cycles"] == 12
     assert "not constant within 0.2 % after 12 cycles; walkers run continues to 14" in found.result["by_hand"][-1]
     assert {**same.result, "by_hand": 0} == {**made.result, "by_hand": 0}

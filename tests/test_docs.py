@@ -154,8 +154,8 @@ def test_names_of_the_package_on_pages_and_in_templates_are_there() -> None:
     [
         ("walkers.load", True),
         ("walkers.postprocess.motion.Motion.select", True),
-        ("walkers.handles.Run.cached", True),
-        ("walkers.handles.Run.origin", False),
+        ("walkers.api.Run.cached", True),
+        ("walkers.api.Run.origin", False),
         ("walkers.check.comparisons", False),
         ("walkers.inputs.case.Run.run", False),
     ],
@@ -222,12 +222,10 @@ def test_pages_are_written_anew(tmp_path: Path) -> None:
 # --- examples and keys ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "module", ["walkers.pipeline", "walkers.handles", "walkers.inputs.reading", "walkers.postprocess.motion"]
-)
+@pytest.mark.parametrize("module", ["walkers.api", "walkers.inputs.reading", "walkers.postprocess.motion"])
 def test_examples_give_what_they_say(module: str, runs_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a folder of the tests (``tmp``), with what a user would have imported."""
-    if module == "walkers.pipeline":  # its sweep is there for its table: Fig. 4b would take all of 60 cycles
+    if module == "walkers.api":  # its sweep is there for its table: Fig. 4b would take all of 60 cycles
         monkeypatch.setattr("walkers.inputs.run._MOST_CYCLES", 12)
     failed, tried = doctest.testmod(import_module(module), extraglobs={"tmp": runs_folder, "walkers": walkers})
     assert tried

@@ -231,15 +231,12 @@ def test_a_run_that_was_damaged_is_told_in_a_line_by_all_that_read_it(name: str,
         if command.startswith(("show", "compare")) and done.returncode == 0:
             continue  # they may not need what is damaged
         lines = [line for line in done.stderr.splitlines() if "never audited" not in line]
-        # An archive checks files, and two sides of a comparison have a case though their results are lost.
-        late = "archive" in command or (
-            command.startswith("compare") and name in ("an edited result", "a damaged dump")
-        )
+        # Two sides of a comparison have a case though their results are lost.
+        late = command.startswith("compare") and name in ("an edited result", "a damaged dump")
         assert done.returncode == (1 if late else 2), (command, done)
         assert str(run) in lines[0], (command, lines)
-        if "archive" not in command:  # which tells the files, a line each
-            assert told in lines[0], (command, lines)
-            assert len(lines) == 1, (command, lines)
+        assert told in lines[0], (command, lines)
+        assert len(lines) == 1, (command, lines)
     assert all(path.read_bytes() == contents for path, contents in files.items()), "nothing on disk is lost"
 
 

@@ -48,6 +48,7 @@ from walkers.runner.directory import (
 from walkers.runner.failures import RunBusy
 from walkers.runner.launch import Progress
 from walkers.runner.manifest import read_manifest
+from walkers.sweeps.making import make_runs
 from walkers.templates.deck import render_deck
 
 PATIENCE_OF_LOCKS = "walkers.runner.directory._PATIENCE_SECONDS"
@@ -178,22 +179,16 @@ def test_damaged_tables_are_made_anew(tmp_path: Path) -> None:
 
 def test_a_run_without_its_description_is_told(run_directory: Callable[..., Path], tmp_path: Path) -> None:
     whole = run_directory(run=SHORT)
-    for name in ("manifest.json", "case.json", "layout.json", "beads.bin"):
+    for name in ("manifest.json", "case.json", "layout.json"):
         directory = Path(shutil.copytree(whole, tmp_path / name / whole.name))
         next(directory.rglob(name)).unlink()
         with pytest.raises(InputError, match="not a finished run" if name == "manifest.json" else name):
             walkers.load(directory)
 
 
-def test_a_cut_dump_is_drawn_as_far_as_it_goes(tmp_path: Path) -> None:
+def test_a_cut_dump_is_told_when_the_run_is_measured(tmp_path: Path) -> None:
     directory = run_case(make_case(run={"cycles": 8, "settling_cycles": 2}), tmp_path / "runs").directory
-    dump = directory / FIRST_SEGMENT / "beads.bin"
-    os.truncate(dump, dump.stat().st_size // 2)
-    for command in (("plot",), ("export", "--to", "vtk"), ("run",)):
-        done = call(*command, str(directory), check=True)
-        assert "walkers: warning:" in done.stderr
-        assert "is incomplete" in done.stderr
-    os.truncate(dump, 1000)
+    os.truncate(directory / FIRST_SEGMENT / "beads.bin", 1000)
     (directory / "result.json").unlink()
     done = call("plot", str(directory))
     assert (done.returncode, "Traceback" in done.stderr) == (2, False)
@@ -224,7 +219,7 @@ def test_a_finished_run_is_run_again_by_force_only(tmp_path: Path) -> None:
 
     with dump.open("rb") as before:  # as long as it is open no other file gets its number
         with pytest.raises(KeyboardInterrupt):
-            run_case(case, tmp_path, force=True, progress=interrupt)
+            make_runs([case], tmp_path, find_engine(), force=True, on_progress=interrupt)
         assert run_case(case, tmp_path).cached
         assert os.path.samestat(os.fstat(before.fileno()), dump.stat())
         contents = dump.read_bytes()
@@ -244,7 +239,7 @@ def test_an_interrupted_run_goes_on_after_its_last_whole_segment(tmp_path: Path)
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_case(case, tmp_path, progress=interrupt)
+        make_runs([case], tmp_path, find_engine(), on_progress=interrupt)
     (part,) = tmp_path.glob("*.incomplete")
     *whole, begun = sorted(part.glob("segments/*"))
     assert whole
@@ -270,7 +265,7 @@ def test_a_run_that_somebody_else_finished_meanwhile_is_taken(tmp_path: Path, mo
     stamp = read_manifest(run_case(case, tmp_path).directory)["finished"]
     # It is not there at the first look, but at the second, after the run has been locked.
     answers = iter([False])
-    monkeypatch.setattr("walkers.pipeline.is_finished", lambda place: next(answers, is_finished(place)))
+    monkeypatch.setattr("walkers.api.is_finished", lambda place: next(answers, is_finished(place)))
     outcome = run_case(case, tmp_path)
     assert outcome.cached
     assert not list(answers)  # the first look has been

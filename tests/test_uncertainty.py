@@ -20,7 +20,6 @@ from walkers.inputs.numerical import INFLUENCE, STIFFER, measured, numerical_err
 from walkers.inputs.reading import load_case
 from walkers.inputs.units import parse_quantity
 from walkers.paper.published import outside_of_the_paper
-from walkers.pipeline import find_side
 from walkers.postprocess.analyses.walking import _summary
 from walkers.postprocess.analysis import describe_result, quantities_of
 from walkers.postprocess.motion import read_motion
@@ -29,7 +28,6 @@ from walkers.postprocess.sides import fell, sides_apart, uphill_velocities
 from walkers.postprocess.tables import read_columns
 from walkers.postprocess.uncertainty import band_text
 from walkers.rounding import rounded, with_decimals
-from walkers.sweeps.comparison import compare_runs
 from walkers.sweeps.folder import as_text, inventory
 from walkers.sweeps.readable import kind_of
 from walkers.sweeps.table import default_column, row_of
@@ -85,8 +83,7 @@ def test_runs_beside_a_run_measure_its_numerical_error(tmp_path: Path) -> None:
     said = f"half the time step {parts[0]:+.2g} %, 10 times Young's modulus {parts[1]:+.2g} %"
     assert f"numerical error {np.hypot(*parts):.2g} % (measured by {runs}: {said})" in told
     faster = walkers.run(case.changed({"drive.frequency": "90 Hz"}), tmp_path)
-    sides = (find_side(one.directory) for one in (done, faster))
-    text = compare_runs(*sides).text
+    text = walkers.compare(done.directory, faster.directory).text
     assert f"{done.directory.name}: the numerical error is not measured" not in text
     assert f"{faster.directory.name}: the numerical error is not measured" in text
     assert runs.partition(" ")[0] in " ".join(result_html(done.directory, done.result).split())
@@ -174,8 +171,7 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     assert "plane tilted by 20°" in page
     gentle = Case.read({**tables, "boundary": {"material": "glass", "tilt": "10 deg"}}, name="gentle")
     walkers.run(gentle, tmp_path)
-    first, second = (find_side(walkers.load(one, tmp_path).directory) for one in (case, gentle))
-    text = compare_runs(first, second).text
+    text = walkers.compare(*(walkers.load(one, tmp_path).directory for one in (case, gentle))).text
     assert "along the heading, facing up (mm/s)" in text
     assert "right_facing" not in text
     assert "\nvelocity (mm/s)" not in text  # the mean over both is no walker's

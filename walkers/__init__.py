@@ -11,12 +11,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from walkers.handles import Run, Sweep
+    from walkers.api import Run, Sweep, calibrate, climb, compare, load, predict, run, sweep
+    from walkers.case_file import new
     from walkers.inputs.reading import load_case
-    from walkers.pipeline import load, run, sweep
     from walkers.postprocess.films import FilmOptions
 
-__all__ = ["FilmOptions", "Run", "Sweep", "load", "load_case", "run", "sweep"]
+__all__ = [
+    "FilmOptions",
+    "Run",
+    "Sweep",
+    "calibrate",
+    "climb",
+    "compare",
+    "load",
+    "load_case",
+    "new",
+    "predict",
+    "run",
+    "sweep",
+]
 
 DEFAULT_OUT = Path("runs")
 RECORDS = {"run": "manifest.json", "sweep": "sweep.json", "calibration": "calibration.json"}
@@ -26,8 +39,8 @@ _PACKAGES = (
     *("sweeps", "archive", "check", "theory", "paper", "calibration"),
 )
 _MODULES = {
-    **{"FilmOptions": "postprocess.films", "Run": "handles", "Sweep": "handles", "load_case": "inputs.reading"},
-    **dict.fromkeys(("load", "run", "sweep"), "pipeline"),
+    **dict.fromkeys(__all__, "api"),
+    **{"FilmOptions": "postprocess.films", "load_case": "inputs.reading", "new": "case_file"},
 }
 """Modules of the public names."""
 

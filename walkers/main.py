@@ -23,6 +23,8 @@ from walkers.commands import GROUPS, SECTIONS
 from walkers.completion import offering
 
 _INTERRUPTED = 130
+_OPTIONS = {"changes": "--set", "formats": "--format"}
+"""Options with another name than the argument of the function."""
 _ENGINE_SECONDS = 10.0
 """Longest time, s, for the engine to print its version."""
 
@@ -162,8 +164,10 @@ def describe_version() -> str:
 
 def _report_stop(stop: BaseException) -> int:
     """Print why the program stopped, and return its exit status."""
-    from walkers.errors import InputError, WalkersError
+    from walkers.errors import InputError, WalkersError, WrongArgument
 
+    if isinstance(stop, WrongArgument):
+        return _tell(f"{_OPTIONS.get(stop.source, f'--{stop.source}')}: {stop.problems[0]}", 2)
     known = ((InputError, 2), (WalkersError, 1), (KeyboardInterrupt, _INTERRUPTED), (typer.Abort, _INTERRUPTED))
     status = stop.status if isinstance(stop, _Terminated) else next((s for k, s in known if isinstance(stop, k)), None)
     if status is not None:

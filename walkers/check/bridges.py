@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from walkers.api import run
 from walkers.check.report import Chapter, Line
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
@@ -30,7 +31,6 @@ from walkers.physics.bridge import FloatArray, Surfaces
 from walkers.physics.capillary import derjaguin_radius
 from walkers.physics.laplace import force_curve
 from walkers.physics.laws import rabinovich, soulie, willett, young_laplace
-from walkers.pipeline import run
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, series_look, styled
 from walkers.text import rendered
 

@@ -15,16 +15,15 @@ from typing import Any
 
 import numpy as np
 
+from walkers.api import Run, run
 from walkers.check.engine import TERMS, SecondEngine, close_pairs
 from walkers.check.kernels import FloatArray
 from walkers.check.report import Chapter, Line, Verdict
 from walkers.errors import unusable
-from walkers.handles import Run
 from walkers.inputs.case import Case
 from walkers.inputs.messages import blaming
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.toml import read_toml
-from walkers.pipeline import run
 from walkers.postprocess.gait import averages, walk
 from walkers.postprocess.motion import Group, Motion
 from walkers.text import rendered

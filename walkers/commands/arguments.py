@@ -13,8 +13,8 @@ from typer import Argument, Option
 from walkers.completion import names_of_cases, offering
 
 if TYPE_CHECKING:
-    from walkers.handles import Run as FoundRun
-    from walkers.handles import Sweep
+    from walkers.api import Run as FoundRun
+    from walkers.api import Sweep
     from walkers.inputs.case import Case as ResolvedCase
     from walkers.sweeps.scheduler import Options
 
@@ -61,23 +61,27 @@ def changes_of(settings: list[str] | None) -> dict[str, Any]:
 
 def load_case(case: str, settings: list[str] | None, out: Path) -> ResolvedCase:
     """The named case, with changed values."""
-    from walkers.finding import case_at
+    from walkers.api import case_at
 
     return case_at(case, out, changes_of(settings))[0]
 
 
 def load_run(run: str, settings: list[str] | None, out: Path) -> FoundRun:
-    """The named finished run, or that of its case with changed values."""
-    from walkers.pipeline import load_run
+    """The named run, or that of its case with changed values."""
+    from walkers.api import NOT_A_RUN, Run
+    from walkers.errors import refused
 
-    return load_run(run, out, changes_of(settings))
+    found = load_any(run, settings, out)
+    if not isinstance(found, Run):
+        raise refused(run, NOT_A_RUN["sweep"])
+    return found
 
 
 def load_any(what: str, settings: list[str] | None, out: Path) -> FoundRun | Sweep:
-    """The named sweep or finished run, with changed values."""
-    from walkers.pipeline import load_finished
+    """The named sweep or run, with changed values."""
+    from walkers.api import load
 
-    return load_finished(what, out, changes_of(settings))
+    return load(what, out, changes_of(settings))
 
 
 def on_cores(jobs: int | None) -> Options:

@@ -95,10 +95,10 @@ def _tell_seconds(chapter: Chapter) -> None:
 
 def check_files(what: str = Argument(metavar="PATH", help=_FILES), settings: Set = None, out: Out = DEFAULT_OUT) -> int:
     """Compare the files of a run, a sweep or an archive with their checksums."""
+    from walkers.api import directory_of
     from walkers.archive.verification import verify
-    from walkers.finding import find
 
-    found = verify(find(what, out, changes_of(settings)).path)
+    found = verify(directory_of(what, out, changes_of(settings)))
     print_lines(one.describe() for one in found)
     return 0 if all(one.passed for one in found) else 1
 
@@ -119,7 +119,6 @@ def check_case(
     from walkers.check.engine import TERMS
     from walkers.check.report import as_dict
     from walkers.errors import refused
-    from walkers.progress import progress_of
 
     loaded = load_case(str(context.info_name), settings, out)
     check_folder("--out", out)
@@ -132,8 +131,7 @@ def check_case(
         raise refused("--cycles", str(error)) from error
 
     def make(one: Resolved, folder: Path) -> walkers.Run:
-        with progress_of(one.name) as advance:
-            return walkers.run(one, folder, engine=engine, progress=advance, allow_failed_audit=allow_failed_audit)
+        return walkers.run(one, folder, engine=engine, progress=True, allow_failed_audit=allow_failed_audit)
 
     found = crosscheck(loaded, out, without or (), seeds=seeds, make=make)
     chapter = found.chapter()
@@ -185,17 +183,14 @@ def calibrate(
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
     """Calibrate unknown parameters to published numbers. An interrupted calibration continues."""
-    from walkers.calibration.calibrate import calibrate
     from walkers.calibration.file import load_calibration
     from walkers.calibration.report import write_outcome
-    from walkers.progress import progress_of_sweep
 
-    read = load_calibration(calibration)
+    folder = to or out / load_calibration(calibration).name
     check_folder("--out", out)
-    folder = to or out / read.name
     check_folder("--to", folder)
     how = By(engine=engine, allow_failed_audit=allow_failed_audit)
-    found = calibrate(read, out, on_cores(jobs), progress_of=progress_of_sweep, **how)
+    found = walkers.calibrate(calibration, out, jobs=jobs, progress=True, **how)
     tell(*(f"{name}: {len(failures)} points failed" for name, failures in found.failures.items()))
     print_lines(write_outcome(found, folder))
     return 0  # a set whose run fails is an outcome: it counts as far off

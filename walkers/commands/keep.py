@@ -19,6 +19,7 @@ from walkers.commands.arguments import (
     Set,
     changes_of,
     check_folder,
+    load_any,
     load_run,
     refuse,
     refuse_given,
@@ -68,12 +69,11 @@ def export(
         if form not in forms:
             refuse_given({option: value}, f"is for --to {', '.join(forms)}")
     if form == "deck":
-        from walkers.pipeline import find_side
+        from walkers.api import case_and_run
         from walkers.sweeps.by_hand import as_run, write_folder
         from walkers.templates.deck import RUN_NAME, render_deck, whole
 
-        side = find_side(what, out, changes_of(settings))
-        case = as_run(side.case, side.directory)
+        case = as_run(*case_and_run(what, out, changes_of(settings)))
         if output is None:
             print(render_deck(case, whole(case)).text, end="")
         else:
@@ -83,20 +83,19 @@ def export(
         return
     if form == "archive":
         from walkers.archive.crate import Author
-        from walkers.archive.writing import ArchiveOptions, write_archive
-        from walkers.finding import NOT_A_RUN, find
+
+        options: dict[str, Any]
 
         refuse("-o", output is not None and output.suffix != ".zip", "expected the name of a .zip file")
         refuse("--orcid", len(orcid or ()) > len(author or ()), "expected an --author for each")
         authors = [Author(name, number) for name, number in zip_longest(author or (), orcid or ())]
-        place = find(what, out, changes_of(settings))
-        refuse(what, place.kind not in ("run", "sweep"), NOT_A_RUN.get(place.kind, ""))
-        print(write_archive(place.path, output, ArchiveOptions(not without_dumps, authors, licence or "CC-BY-4.0")))
+        options = {"dumps": not without_dumps, "authors": authors, "licence": licence or "CC-BY-4.0"}
+        print(load_any(what, settings, out).export("archive", output, **options))
         return
     found = load_run(what, settings, out)
     wrong = as_placed and not found.case.apart
     refuse("--as-placed", wrong, "is for independent walkers: these stand where they are")
-    options: dict[str, Any] = {"every": every or 1}
+    options = {"every": every or 1}
     if form in ("vtk", "paraview"):
         options = {"every": every, "as_placed": as_placed, "colour": colour}
     print(written := found.export(form, output, **options))
@@ -117,8 +116,8 @@ def clean(
     yes: bool = Option(False, "--yes", "-y", help="Do not ask for confirmation."),
 ) -> int:
     """Remove interrupted and failed runs, or the given runs and sweeps. Asks first. Runs in progress stay."""
+    from walkers.api import directory_of
     from walkers.errors import each
-    from walkers.finding import find
     from walkers.runner.directory import UNFINISHED
     from walkers.sweeps.folder import clean, plan_cleaning
 
@@ -128,7 +127,7 @@ def clean(
     changes = changes_of(settings)
 
     def place_of(one: str) -> Path:
-        return folder if (folder := out / Path(one).name).suffix == UNFINISHED else find(one, out, changes).path
+        return folder if (folder := out / Path(one).name).suffix == UNFINISHED else directory_of(one, out, changes)
 
     given = each(place_of, runs or ())
     plan = plan_cleaning(out, given, finished=finished, case=case, older_than=older_than)

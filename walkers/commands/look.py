@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from typer import Argument, Option
 
@@ -26,7 +26,6 @@ from walkers.commands.arguments import (
     print_lines,
     refuse,
     refuse_given,
-    tell,
 )
 from walkers.completion import offering
 
@@ -77,10 +76,16 @@ def list_(
 
 
 def _list_points(sweep: str, out: Path, to: Path | None, as_json: bool) -> None:
-    from walkers.pipeline import load_sweep
+    from walkers.api import Sweep, find
+    from walkers.errors import refused
     from walkers.sweeps import table
 
-    found = load_sweep(sweep, out)
+    kind, place = find(sweep, out)
+    refuse(sweep, kind == "run", f"is a run: walkers run {sweep} prints its result")
+    if kind == "case":
+        raise refused(sweep, f"no sweep in {out}; walkers list shows what is there")
+    refuse(sweep, kind != "sweep", f"not a sweep: expected a folder with a sweep.json (walkers list --out {sweep}?)")
+    found = Sweep(place)
     if to is not None:
         table.write_table_file(found.table(), to)
         print(to)
@@ -179,23 +184,8 @@ def compare(
     as_json: Json = False,
 ) -> None:
     """Compare two runs or cases in parameters and results, or two sweeps point by point."""
-    from walkers.errors import each
-    from walkers.finding import placed
-    from walkers.pipeline import find_side
-    from walkers.sweeps.comparison import compare_runs, compare_sweeps
-
     refuse(first, second is None and not settings, "expected a second run or sweep, or --set KEY=VALUE")
-    sides: list[tuple[str, dict[str, Any]]] = [(first, {}), (second or first, changes_of(settings))]
-    there = {one: placed(one, out) for one, _ in sides}
-    sweeps = {one: place.path for one, place in there.items() if place and place.kind == "sweep"}
-    if sweeps.keys() == there.keys():
-        refuse("--set", bool(settings), "is for runs and cases")
-        found = compare_sweeps(sweeps[first], sweeps[sides[1][0]], y)
-    else:
-        for one in sweeps:
-            refuse(one, True, "is a sweep; expected another sweep to compare with")
-        refuse("--y", y is not None, "is for sweeps")
-        found = compare_runs(*each(lambda side: find_side(side[0], out, side[1]), sides))
+    found = walkers.compare(first, second, out, changes_of(settings), y)
     print_as(as_json, lambda: found.contents, lambda: found.text)
 
 
@@ -208,21 +198,9 @@ def climb(
     as_json: Json = False,
 ) -> None:
     """Print probability, rate and speed of climbs in piles for each condition, with confidence intervals."""
-    from walkers.errors import each
-    from walkers.finding import find
-    from walkers.postprocess.drawing import FORMATS, check_place
     from walkers.postprocess.films import parse_time
-    from walkers.sweeps import climbing
-    from walkers.sweeps.climbing_figure import write_climbs
+    from walkers.sweeps.climbing import describe
 
     until = parse_time("--within", within) if within else None
-    if to is not None:
-        check_place(to, *(f".{form}" for form in FORMATS), ".csv")
-    changes = changes_of(settings)
-    places = each(lambda one: find(one, out, changes).path, what)
-    conditions = climbing.conditions_in(places)
-    tell(*(f"warning: {left}" for place in places if (left := climbing.unfinished_points(place))))
-    found = [climbing.summarise(one, until) for one in conditions]
-    if to is not None:
-        write_climbs(conditions, found, to)
-    print_as(as_json, lambda: found, lambda: "\n".join(map(climbing.describe, found)))
+    found = walkers.climb(what, out, changes_of(settings), within=until, to=to)
+    print_as(as_json, lambda: found, lambda: "\n".join(map(describe, found)))

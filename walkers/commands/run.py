@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -48,9 +47,7 @@ def new(
     schema: bool = Option(False, "--schema", help="Also write case.schema.json, which editors use."),
 ) -> None:
     """Write a commented case file as a starting point."""
-    from walkers.new import write_case
-
-    print(*write_case(Path(name), case, schema=schema), sep="\n")
+    print(*walkers.new(name, case, schema=schema), sep="\n")
 
 
 def show(
@@ -70,21 +67,10 @@ def show(
         summary = summarise(loaded)
         print_as(as_json, lambda: summary, lambda: describe(summary))
         return
-    from walkers.errors import InputError, Problem
-    from walkers.paper.published import outside_of_the_paper
-    from walkers.pipeline import load_run
-    from walkers.runner.failures import EngineMissing
-    from walkers.theory import prediction
+    from walkers.theory.prediction import describe as describe_prediction
 
-    try:
-        predicted = {**prediction.predict(loaded), "outside": outside_of_the_paper(loaded)}
-    except ValueError as error:
-        key, _, why = str(error).partition(": ")
-        raise InputError(case, [Problem(key, None, why)]) from error
-    found: dict[str, Any] | None = None
-    with suppress(InputError, EngineMissing):  # no run yet, or no engine
-        found = load_run(loaded, out).result
-    print_as(as_json, lambda: {**predicted, "engine": found}, lambda: prediction.describe(predicted, found))
+    predicted = walkers.predict(loaded, out)
+    print_as(as_json, lambda: predicted, lambda: describe_prediction(predicted, predicted["engine"]))
 
 
 def run(
@@ -100,20 +86,18 @@ def run(
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
     """Run cases and print the results. A finished run is only printed, an interrupted run continues."""
+    from walkers.api import case_at, finished_at
     from walkers.errors import each
-    from walkers.finding import case_at
-    from walkers.pipeline import finished_at
-    from walkers.progress import progress_of, progress_of_sweep
     from walkers.runner.failures import EngineFailure
     from walkers.show import notes
 
     refuse("--points", points is not None and not spread, "is for --spread")
     # Report a mistake in the last file before the first run starts.
+    there = each(lambda case: None if settings or force else finished_at(case, out), cases)
     loaded = each(lambda case: case_at(case, out, changes_of(settings)), cases)
-    there = [None if settings or force else finished_at(case, out) for case in cases]
     check_folder("--out", out)
     if spread:
-        from walkers.sweeps.spread import POINTS, describe, run_spread, spread_sweep
+        from walkers.sweeps.spread import POINTS, describe, spread_sweep
 
         for case, _ in loaded:  # also an unusable range
             list(spread_sweep(case, points or POINTS, engine).cases())
@@ -121,17 +105,14 @@ def run(
     for (case, folder), found in zip(loaded, there, strict=True):
         tell(*(f"{case.name}: {note}" for note in notes(case) if found is None))
         try:
-            with progress_of(case.name) as advance:
-                done = found or walkers.run(case, folder, force=force, progress=advance, time_limit=limit, **how)
+            done = found or walkers.run(case, folder, force=force, progress=True, time_limit=limit, **how)
         except EngineFailure as failure:
             tell(f"{case.name}: {failure}")
             failed = True
             continue
         band = None
         if spread:
-            with progress_of_sweep(f"{case.name}, spread") as advance_sweep:
-                options = on_cores(None)
-                band = run_spread(case, folder, options, points=points or POINTS, on_progress=advance_sweep, **how)
+            band = done.spread(points or POINTS, progress=True, **how)
             failed |= bool(band.failures)
         if as_json:
             ranges = {"spread": band.as_dict()} if band else {}
@@ -158,25 +139,24 @@ def sweep(
 
     from walkers.inputs.sweep import load_sweep
     from walkers.postprocess.uncertainty import lines_of_rest, rests_on
-    from walkers.progress import progress_of_sweep
-    from walkers.sweeps.scheduler import plan_sweep, run_sweep
+    from walkers.sweeps.scheduler import plan_sweep
     from walkers.sweeps.site import load_site
-    from walkers.sweeps.table import describe_status
 
-    loaded = load_sweep(sweep, changes_of(settings))
+    changes = changes_of(settings)
+    loaded = load_sweep(sweep, changes)
     check_folder("--out", out)
     refuse("--jobs", jobs is not None and site is not None, "the site file sets how many decks run at once")
     if len(loaded.rows) > _MANY:
         tell(f"{loaded.name}: resolving {len(loaded.rows)} points, about 2,000 per second")
-    options = replace(on_cores(jobs), site=load_site(site) if site else None, retries=retries, time_limit=limit)
     if dry_run:
+        options = replace(on_cores(jobs), site=load_site(site) if site else None)
         print(plan_sweep(loaded, out, options, engine).as_text())
         return 0
-    with progress_of_sweep(loaded.name) as advance:
-        how = By(engine=engine, allow_failed_audit=allow_failed_audit)
-        record, failures = run_sweep(loaded, out.resolve() if site else out, options, on_progress=advance, **how)
-    tell(*(f"point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
-    print(f"{describe_status(record)}\n  table      walkers list {record.directory}")
+    how: dict[str, Any] = {"retries": retries, "time_limit": limit, "site": site, "jobs": jobs}
+    by = By(engine=engine, allow_failed_audit=allow_failed_audit)
+    done = walkers.sweep(sweep, out, changes=changes, progress=True, **how, **by)
+    tell(*(f"point {failure.point}, {failure.run}: {failure.message}" for failure in done.failures))
+    print(f"{done.summary()}\n  table      walkers list {done.directory}")
     same = [one for one in next(loaded.cases()).origins if one.key not in loaded.keys]  # varied keys are in the table
     print_lines(lines_of_rest(rests_on(same)))
-    return 1 if failures else 0
+    return 1 if done.failures else 0

@@ -11,7 +11,7 @@ from walkers.runner.files import write_json
 _SCHEMA = "case.schema.json"
 
 
-def write_case(path: Path, case: str = "fig1b", *, schema: bool = False) -> list[Path]:
+def new(path: str | Path, case: str = "fig1b", *, schema: bool = False) -> list[Path]:
     """Write a new case file, a copy of a shipped case, whose comments explain its keys.
 
     Parameters
@@ -33,6 +33,7 @@ def write_case(path: Path, case: str = "fig1b", *, schema: bool = False) -> list
     InputError
         If there is such a file already, or no such shipped case.
     """
+    path = Path(path)
     check_utf8(path)
     if path.name in ("", "..") or path.stem in (".", ".."):
         raise refused(path, "expected a name")

@@ -1,0 +1,821 @@
+"""Run cases and sweeps, find their results, and draw, film, report and export them: the commands as functions."""
+
+from __future__ import annotations
+
+import shlex
+import threading
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+from html import escape
+from math import isclose
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
+
+from walkers import DEFAULT_OUT, RECORDS
+from walkers.errors import InputError, Problem, WalkersError, check_utf8, refused, wrong_argument
+from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped
+from walkers.progress import progress_of, progress_of_sweep, shown_if
+from walkers.runner.binary import find_engine
+from walkers.runner.directory import (
+    CASE_NAME,
+    FAILURE_NAME,
+    UNFINISHED,
+    case_of,
+    is_deck_folder,
+    is_finished,
+    is_locked,
+    is_run_name,
+    layout_of,
+    run_place,
+    segment_directories,
+    unfinished,
+)
+from walkers.runner.failures import EngineMissing, RunBusy
+from walkers.runner.files import read_json
+from walkers.runner.manifest import read_manifest
+
+if TYPE_CHECKING:
+    import k3d
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from walkers.calibration.calibrate import Outcome
+    from walkers.inputs.case import Case
+    from walkers.inputs.origins import Origin
+    from walkers.postprocess.films import FilmOptions
+    from walkers.postprocess.motion import Motion
+    from walkers.runner.launch import Progress
+    from walkers.sweeps.comparison import Comparison
+    from walkers.sweeps.scheduler import Failure
+    from walkers.sweeps.spread import Spread
+    from walkers.sweeps.table import SweepRecord
+
+Named: TypeAlias = "Case | str | Path | Mapping[str, Any]"
+Changes: TypeAlias = "Mapping[str, Any] | None"
+Export = Literal["deck", "vtk", "paraview", "xyz", "lammps", "archive"]
+NOT_A_RUN = {
+    "folder": "not a finished run: expected a folder with a manifest.json",
+    "deck": "is a deck that was run by hand; first do: walkers run {}",
+    "calibration": "a calibration's outcome: its report is calibration.md",
+    "sweep": "is a sweep: expected one of its runs; walkers list, plot, report and compare take sweeps",
+    "archive": "an archive: unpack it and give a run or a sweep in it; walkers check files takes it as it is",
+}
+
+
+# --- names ------------------------------------------------------------------------------------------------------------
+
+
+class Found(NamedTuple):
+    """What a name means: a kind (of `RECORDS`, ``archive``, ``deck``, ``folder``, ``case``), and a path.
+
+    The path of an unfinished run is that of its final directory.
+    """
+
+    kind: str
+    path: Path
+
+
+def find(name: str | Path, out: str | Path = DEFAULT_OUT) -> Found:
+    """What a path, a name in a folder of runs, or the name of a case means; nothing but names is read.
+
+    A folder does not hide a shipped case of the same name; the file of a sweep means the sweep if it was run.
+    """
+    with suppress(OSError):  # a name that no file system accepts
+        return next(_meanings(Path(name), Path(out)))
+    return Found("case", Path(name))
+
+
+def _meanings(path: Path, out: Path) -> Iterator[Found]:
+    is_shipped = str(path) in shipped("case")
+    for place in (path, out / path):
+        yield from (Found(kind, place) for kind, file in RECORDS.items() if (place / file).is_file())
+        bare = place.parent / place.name.removesuffix(UNFINISHED)
+        if is_run_name(bare.name) and _is_begun(bare):
+            yield Found("run", bare)
+        if is_deck_folder(place) and not is_shipped:
+            yield Found("deck", place)
+    if (out / path.stem / RECORDS["sweep"]).is_file() and is_sweep_file(path):
+        yield Found("sweep", out / path.stem)
+    if path.suffix == ".zip" and path.is_file():
+        yield Found("archive", path)
+    yield Found("folder" if path.is_dir() and not is_shipped else "case", path)
+
+
+def _is_begun(place: Path) -> bool:
+    """Whether a place belongs to a running or interrupted run."""
+    return (unfinished(place) / CASE_NAME).is_file() or is_locked(place)
+
+
+def case_at(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> tuple[Case, Path]:
+    """The case that a user names, or the case of a run, and the folder in which its run belongs; see `load`."""
+    out = Path(out)
+    if not isinstance(what, (str, Path, Mapping)):
+        return what.changed(changes or {}), out
+    kind, path = Found("case", out) if isinstance(what, Mapping) else find(what, out)
+    if kind == "run":
+        return Run(path).check().case.changed(changes or {}), path.parent
+    if kind in ("sweep", "calibration"):
+        find_input(str(what) if is_sweep_file(Path(str(what))) else path, "case")
+    if kind not in ("case", "archive"):
+        raise refused(what, "is a folder without a run" if kind == "folder" else NOT_A_RUN[kind].format(what))
+    return load_case(what, changes), out
+
+
+def case_and_run(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> tuple[Case, Path | None]:
+    """The case that a user names, and the directory of its finished run, if there is one; see `load`."""
+    case, folder = case_at(what, out, changes)
+    kind, place = find(what, out) if isinstance(what, (str, Path)) and not changes else Found("case", folder)
+    if kind != "run":
+        try:
+            place = run_place(case, find_engine(), folder)
+        except EngineMissing:
+            return case, None
+    return case, place if is_finished(place) else None
+
+
+def load(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Run | Sweep:
+    """Find a sweep, or a run, finished or not.
+
+    Parameters
+    ----------
+    what
+        The directory of a run or a sweep, its name in ``out``, or a case (resolved, tables, file or shipped name). The
+        run of a case is the one with the installed engine.
+    out
+        Folder of the run directories.
+    changes
+        Values that replace those of the case, by dotted keys.
+
+    Raises
+    ------
+    InputError
+        If it does not exist or cannot be read.
+    runner.EngineFailure
+        If a case is given and no engine is installed.
+
+    Examples
+    --------
+    >>> walkers.run("fig1b", tmp).directory == walkers.load("fig1b", tmp).directory
+    True
+    """
+    kind, path = find(what, out) if isinstance(what, (str, Path)) and not changes else Found("case", Path())
+    if kind == "sweep":
+        return Sweep(path)
+    if kind == "run":
+        return _checked(Run(path))
+    if kind != "case":
+        raise refused(what, NOT_A_RUN[kind].format(what))
+    case, folder = case_at(what, out, changes)
+    run = Run(run_place(case, find_engine(), folder), asked=case)
+    if is_finished(run.directory) or _is_begun(run.directory):
+        return _checked(run)
+    settings = [f"--set {shlex.quote(f'{key}={value}')}" for key, value in (changes or {}).items()]
+    name = str(what) if isinstance(what, (str, Path)) else case.name
+    raise refused(name, f"no finished run in {folder}; first do: walkers run {' '.join([name, *settings])}")
+
+
+def directory_of(what: str | Path, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Path:
+    """The directory that a user names, whatever it contains; for a case, the directory of its run."""
+    found = find(what, out)
+    return load(what, out, changes).directory if changes or found.kind == "case" else found.path
+
+
+# --- runs -------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run: finished, running, interrupted or failed. Its results raise `InputError` until it is finished.
+
+    Attributes
+    ----------
+    directory
+        The run directory. A run that is not finished is in the folder of this name with ``.incomplete`` appended.
+    cached
+        Whether the run existed before.
+    asked
+        The requested case; None: the case that made the run. A number may be given in the first and come from the
+        library in the second.
+    """
+
+    directory: Path
+    cached: bool = True
+    asked: Case | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        """Make a path of the name of a directory."""
+        object.__setattr__(self, "directory", Path(self.directory))
+
+    def __repr__(self) -> str:
+        """Directory, status and result in a line."""
+        from walkers.sweeps.folder import run_text
+
+        return f"Run({self.directory}: {run_text(self._files)})"
+
+    def check(self) -> Run:
+        """The run itself; `InputError` if a file that describes it cannot be read."""
+        done = is_finished(self.directory)
+        with _refusing(self.directory, "the run's manifest.json"):
+            _ = done and read_manifest(self.directory)
+        with _refusing(self.directory, "the run's case.json"):
+            _ = self.case
+        with _refusing(self.directory, "the run's layout.json"):
+            _ = done and layout_of(segment_directories(self.directory)[0])
+        return self
+
+    @property
+    def status(self) -> str:
+        """``finished``, ``running``, ``interrupted`` or ``failed``."""
+        from walkers.sweeps.table import state_at, worst_status
+
+        return worst_status([state_at(self.directory).status])
+
+    @property
+    def progress(self) -> Progress | None:
+        """Progress of a running run, in any process; None between segments, and if it is not running."""
+        from walkers.sweeps.making import progress_at
+
+        return progress_at(self.directory) if is_locked(self.directory) else None
+
+    @property
+    def finished_directory(self) -> Path:
+        """The directory of a finished run; otherwise `InputError`."""
+        if not is_finished(self.directory):
+            raise refused(self.directory, f"the run is {self._state}")
+        return self.directory
+
+    @property
+    def _files(self) -> Path:
+        """The directory that holds the files now."""
+        return self.directory if is_finished(self.directory) else unfinished(self.directory)
+
+    @property
+    def _state(self) -> str:
+        """The status of an unfinished run, and what to do."""
+        if (status := self.status) == "running":
+            return f"running{f': {progress}' if (progress := self.progress) else ''}"
+        failure = self._files / FAILURE_NAME
+        text = f": {read_json(failure).get('message')}" if failure.is_file() else ""
+        return f"{status}{text}; continue it with: walkers run {self.directory}"
+
+    @cached_property
+    def case(self) -> Case:
+        """The resolved case."""
+        return case_of(self._files)
+
+    @property
+    def origins(self) -> tuple[Origin, ...] | None:
+        """Sources of the values of the requested case; None: of the case that made the run."""
+        return None if self.asked is None else self.asked.origins
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """The result in SI units."""
+        from walkers.postprocess.uncertainty import rests_on
+
+        result = _result_of(self.finished_directory)
+        return result if self.origins is None else {**result, "rests_on": rests_on(self.origins)}
+
+    @property
+    def motion(self) -> Motion:
+        """Positions, velocities and spins of all beads as arrays; also of an unfinished run."""
+        from walkers.postprocess.motion import read_motion
+
+        return read_motion(self._files)
+
+    @property
+    def trajectory(self) -> pd.DataFrame:
+        """One row per sample and walker, in SI units."""
+        return self.table("trajectory")
+
+    @property
+    def walkers(self) -> pd.DataFrame:
+        """One row per walker, in SI units."""
+        return self.table("walkers")
+
+    def table(self, name: str) -> pd.DataFrame:
+        """A table of the run, see `walkers.postprocess.tables.read_table`."""
+        from walkers.postprocess.tables import read_table
+
+        return read_table(self.finished_directory, name)
+
+    def describe(self) -> str:
+        """The result as text in mm, mm/s and degrees; of an unfinished run, its progress."""
+        from walkers.postprocess.analysis import describe_result
+
+        if not is_finished(self.directory):
+            return f"{self.directory.name}: {self._state}"
+        return describe_result(self.directory, self.result, cached=self.cached)
+
+    def _repr_html_(self) -> str:
+        """The result in a notebook: a table with errors, units and warnings, and the parameters."""
+        from walkers.postprocess.report.run import result_html
+
+        if not is_finished(self.directory):
+            return f"<p>{escape(self.describe())}</p>"
+        return result_html(self.directory, self.result, self.origins)
+
+    def plot(self, to: str | Path | None = None, formats: str | Sequence[str] = ("png",)) -> list[Path]:
+        """Draw the figures and return their paths; see `walkers.postprocess.analysis.plot_run`."""
+        from walkers.postprocess.analysis import plot_run
+
+        return plot_run(self.finished_directory, _path(to), formats)
+
+    def render(self, to: str | Path | None = None, *, images: int = 6, walker: int | None = None) -> list[Path]:
+        """Render the first of independent walkers, all beads, or the walker with a number.
+
+        See `walkers.postprocess.series.render_series`.
+        """
+        from walkers.postprocess.series import render_series
+
+        walker = 0 if walker is None and self.case.apart else walker
+        return render_series(self.finished_directory, _path(to), images=images, walker=walker)
+
+    def film(
+        self,
+        to: str | Path | None = None,
+        options: FilmOptions | None = None,
+        *,
+        on_progress: Callable[[int, int], None] | None = None,
+    ) -> Path:
+        """Render a film; see `walkers.postprocess.films.render_film`."""
+        from walkers.postprocess.films import render_film
+
+        return render_film(self.finished_directory, _path(to), options, on_progress=on_progress)
+
+    def view(self, *, height: int = 480) -> k3d.Plot:
+        """An interactive 3-D view of the beads for a notebook, ``height`` pixels high.
+
+        Examples
+        --------
+        >>> len(walkers.run("fig1b", tmp).view().objects)  # two beads, the floor, the lines on it
+        4
+        """
+        from walkers.postprocess.report.player import player_of
+
+        return player_of(self.finished_directory, height=height).plot
+
+    def report(self, to: str | Path | None = None) -> Path:
+        """Write a self-contained HTML report; see `walkers.postprocess.report.run.report_run`.
+
+        Examples
+        --------
+        >>> walkers.run("fig1b", tmp).report(tmp / "fig1b.html").name
+        'fig1b.html'
+        """
+        from walkers.postprocess.report.run import report_run
+
+        return report_run(self.finished_directory, _path(to), self.origins)
+
+    def spread(self, points: int = 32, *, progress: bool | None = None, **how: Any) -> Spread:
+        """Run the case with uncertain values drawn from their ranges; see `walkers.sweeps.spread.run_spread`."""
+        from walkers.runner.launch import cores_here
+        from walkers.sweeps.scheduler import Options
+        from walkers.sweeps.spread import run_spread
+
+        case, options = self.asked or self.case, Options(cores_here())
+        with shown_if(progress, progress_of_sweep(f"{case.name}, spread")) as advance:
+            return run_spread(case, self.directory.parent, options, points=points, on_progress=advance, **how)
+
+    def export(self, form: Export, to: str | Path | None = None, **options: Any) -> Path:
+        """Write the run for other programs.
+
+        Parameters
+        ----------
+        form
+            ``vtk`` or ``paraview`` (`walkers.postprocess.paraview`), ``xyz`` or ``lammps``
+            (`walkers.postprocess.trajectory_files`), ``archive`` (`walkers.archive.writing`), ``deck``
+            (`walkers.sweeps.by_hand.write_folder`).
+        to
+            The file, or the folder for ``vtk``, ``paraview`` and ``deck``. None: in the run directory, for ``archive``
+            and ``deck`` in the current folder.
+        options
+            Arguments of these functions, such as ``every``; for an archive, the fields of its ``ArchiveOptions``.
+
+        Examples
+        --------
+        >>> walkers.run("fig1b", tmp).export("xyz", tmp / "walk.xyz", every=20).name
+        'walk.xyz'
+        """
+        place = _path(to)
+        if form == "deck":
+            from walkers.sweeps.by_hand import as_run, write_folder
+
+            return write_folder(as_run(self.case, self.directory), place or Path(f"{self.directory.name}-deck"))
+        if form == "archive":
+            from walkers.archive.writing import ArchiveOptions, write_archive
+
+            return write_archive(self.finished_directory, place, ArchiveOptions(**options))
+        if form in ("vtk", "paraview"):
+            from walkers.postprocess.paraview import SCRIPT, write_vtk
+
+            collection = write_vtk(self.finished_directory, place, **options)
+            return collection if form == "vtk" else collection.with_name(SCRIPT)
+        from walkers.postprocess.trajectory_files import SUFFIXES, write_trajectory
+
+        place = place or self.finished_directory / f"trajectory{SUFFIXES[form][0]}"
+        return write_trajectory(self.finished_directory, place, form, **options)
+
+
+@contextmanager
+def _refusing(directory: Path, what: str) -> Iterator[None]:
+    """Turn the errors of a damaged file into one `InputError`."""
+    try:
+        yield
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError, WalkersError) as error:
+        raise refused(directory, f"{what} cannot be read ({error})") from error
+
+
+def _result_of(directory: Path) -> dict[str, Any]:
+    """The result of a finished run, measured anew if it is of another version of the program."""
+    from walkers.postprocess.analysis import current_result
+
+    with _refusing(directory, "the run"):
+        return current_result(directory)
+
+
+def _path(to: str | Path | None) -> Path | None:
+    return None if to is None else Path(to)
+
+
+def run(
+    case: Case | str | Path,
+    out: str | Path = DEFAULT_OUT,
+    *,
+    engine: str | None = None,
+    force: bool = False,
+    progress: bool | None = None,
+    time_limit: float | None = None,
+    allow_failed_audit: bool = False,
+) -> Run:
+    """Run a case unless a finished run exists. An interrupted run continues; a deck run by hand becomes a run.
+
+    Parameters
+    ----------
+    case
+        A resolved case, a case file, the name of a shipped case, a run, by its name or directory, or the folder of a
+        deck that was run by hand.
+    out
+        Folder of the run directories.
+    engine
+        Name or path of the binary; see `walkers.runner.binary.find_engine`.
+    force
+        Run again. The old run is replaced when the new one is finished.
+    progress
+        Show the progress; None: only in notebooks.
+    time_limit
+        Limit of the wall time in s for each segment of the run.
+    allow_failed_audit
+        Use an engine that failed ``walkers check engine``.
+
+    Raises
+    ------
+    InputError
+        If the case cannot be used.
+    runner.EngineFailure
+        If the engine fails.
+
+    Examples
+    --------
+    >>> import walkers
+    >>> one = walkers.run("fig1b", tmp)
+    >>> round(1e3 * one.result["velocity"]["mean"], 3)  # mm/s
+    1.08
+    >>> one.walkers[["facing", "steady"]].drop_duplicates("facing").to_dict("list")
+    {'facing': [1, -1], 'steady': [True, True]}
+    """
+    from walkers.inputs.run import limits_of
+    from walkers.sweeps.making import check_audit, make_runs
+
+    if isinstance(case, (str, Path)) and not force and (finished := finished_at(case, Path(out))):
+        return finished
+    case, out = case_at(case, out)
+    for text in (out.absolute(), case.name):
+        check_utf8(text)
+    if exceeded := [] if case.run.allow_unstable else limits_of(case).exceeded_by(case.run.time_step):
+        message = f"beyond the {' and the '.join(exceeded)} limit of the case as changed: use case.changed(changes)"
+        raise InputError(case.name, [Problem("run.time_step", f"{case.run.time_step:.3g} s", message)])
+    if not isclose(case.run.period * case.excitation.frequency, 1.0, rel_tol=1e-9):
+        message = f"time step and sampling are of {1.0 / case.run.period:g} Hz: use case.changed(changes)"
+        raise InputError(case.name, [Problem("drive.frequency", f"{case.excitation.frequency:g} Hz", message)])
+    binary = find_engine(engine)
+    place = run_place(case, binary, out)
+    if is_finished(place) and not force:
+        return _checked(Run(place, asked=case))
+    check_audit(binary, allow_failed_audit)
+    # Numpy and pyarrow are loaded while the engine works and the interpreter is idle.
+    threading.Thread(target=_load_postprocess, daemon=True).start()
+    with shown_if(progress, progress_of(case.name)) as advance:
+        made = make_runs([case], out, binary, force=force, on_progress=advance, time_limit=time_limit)
+    if made.busy:
+        raise RunBusy("another process is still running this case", unfinished(place))
+    return Run(made.runs[place.name], cached=place.name in made.found, asked=case)
+
+
+def finished_at(name: str | Path, out: Path) -> Run | None:
+    """The finished run with a name or a directory, also of a deck that was run by hand; None for a case."""
+    kind, path = find(name, out)
+    if is_deck_folder(path) and kind in ("run", "deck"):
+        from walkers.sweeps.by_hand import take_in
+
+        take_in(path)
+    return _checked(Run(path)) if kind in ("run", "deck") and is_finished(path) else None
+
+
+def _checked(run: Run) -> Run:
+    """The run; `InputError` if it cannot be read. The result of a finished run is read or made."""
+    if is_finished(run.check().directory):
+        _result_of(run.directory)
+    return run
+
+
+def _load_postprocess() -> None:
+    import pyarrow.parquet  # noqa: F401
+
+    import walkers.postprocess.analyses.walking  # noqa: F401
+
+
+# --- sweeps -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sweep: its points, their runs, and the table of results.
+
+    Attributes
+    ----------
+    directory
+        The sweep directory; the runs are in the same folder.
+    failures
+        Points that failed in this call of `sweep`.
+    """
+
+    directory: Path
+    failures: tuple[Failure, ...] = field(default=(), repr=False, compare=False)
+    _record: SweepRecord = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Read the record of the sweep; `InputError` if the directory is none of a sweep."""
+        from walkers.sweeps.table import read_record
+
+        object.__setattr__(self, "directory", Path(self.directory))
+        object.__setattr__(self, "_record", read_record(self.directory))
+
+    def __repr__(self) -> str:
+        """Name and numbers of points by status in a line."""
+        return f"Sweep({self.summary().splitlines()[0]})"
+
+    def summary(self) -> str:
+        """The status of the points and their failures."""
+        from walkers.sweeps.table import describe_status
+
+        return describe_status(self._record)
+
+    @property
+    def status(self) -> str:
+        """``finished``, ``running``, ``failed`` (some points) or ``interrupted`` (points are missing)."""
+        from walkers.sweeps.table import checked_states, worst_status
+
+        return worst_status(state.status for state in checked_states(self._record))
+
+    @property
+    def runs(self) -> list[Run]:
+        """The runs of all points, finished or not."""
+        return [Run(self._record.out / name) for name in self._record.runs]
+
+    def table(self) -> pd.DataFrame:
+        """One row per point; see `walkers.sweeps.table.load`."""
+        from walkers.sweeps.table import load
+
+        return load(self.directory)
+
+    def describe(self) -> str:
+        """The status of the points, their failures, and the table in mm, mm/s, nJ and degrees."""
+        from walkers.sweeps.table import short_text
+
+        return f"{self.summary()}\n\n{short_text(self.table().drop(columns='run'))}"
+
+    def _repr_html_(self) -> str:
+        """The table in a notebook."""
+        return str(self.table()._repr_html_())  # type: ignore[operator]
+
+    def figure(self, **choices: Any) -> Figure:
+        """A matplotlib figure of the table; see `walkers.plotting.sweep_figure`."""
+        from walkers.plotting import sweep_figure
+
+        return sweep_figure(self.directory, **choices)
+
+    def plot(self, to: str | Path | None = None, **choices: Any) -> list[Path]:
+        """Plot the table to a file; see `walkers.plotting.plot_sweep`."""
+        from walkers.plotting import plot_sweep
+
+        return [plot_sweep(self.directory, to, **choices)]
+
+    def report(self, to: str | Path | None = None) -> Path:
+        """Write a self-contained HTML report; see `walkers.sweeps.report.report_sweep`."""
+        from walkers.sweeps.report import report_sweep
+
+        return report_sweep(self.directory, _path(to))
+
+    def export(self, form: Export = "archive", to: str | Path | None = None, **options: Any) -> Path:
+        """Write the sweep and its runs as an ``archive``, the only form; see `Run.export`."""
+        from walkers.archive.writing import ArchiveOptions, write_archive
+
+        if form != "archive":
+            raise refused(self.directory, f"is a sweep: expected one of its runs for {form}, or archive")
+        return write_archive(self.directory, _path(to), ArchiveOptions(**options))
+
+
+def sweep(
+    sweep: str | Path | Mapping[str, Any],
+    out: str | Path = DEFAULT_OUT,
+    *,
+    jobs: int | None = None,
+    changes: Mapping[str, Any] | None = None,
+    progress: bool | None = None,
+    site: str | Path | None = None,
+    retries: int = 0,
+    time_limit: float | None = None,
+    **how: Any,
+) -> Sweep:
+    """Run the missing points of a sweep on this machine or a cluster.
+
+    Parameters
+    ----------
+    sweep
+        A sweep file, the name of a shipped sweep, or the tables of a sweep file.
+    out
+        Folder of the run directories.
+    jobs
+        Number of parallel decks; default: one per core.
+    changes
+        Values that replace those in ``[set]``, by dotted keys.
+    progress
+        Show the progress; None: only in notebooks.
+    site
+        The site file of a cluster; see `walkers.sweeps.site.load_site`.
+    retries
+        Number of retries for a failed point.
+    time_limit
+        Limit of the wall time in s for each deck.
+    how
+        ``engine`` and ``allow_failed_audit`` of `run`.
+
+    Returns
+    -------
+    Sweep
+        The column ``status`` of its table marks failed points.
+
+    Raises
+    ------
+    InputError
+        If the sweep or one of its points cannot be used.
+
+    Examples
+    --------
+    >>> walkers.sweep("fig4", tmp).table()[["liquid.name", "status"]].to_dict("list")
+    {'liquid.name': ['Si AK5', 'Si AK10'], 'status': ['finished', 'finished']}
+    """
+    from walkers.inputs.sweep import load_sweep
+    from walkers.runner.launch import cores_here
+    from walkers.sweeps.scheduler import Options, run_sweep
+    from walkers.sweeps.site import load_site
+
+    points = load_sweep(sweep, changes)
+    options = Options(jobs or cores_here(), load_site(Path(site)) if site else None, retries, time_limit)
+    folder = Path(out).resolve() if site else Path(out)
+    with shown_if(progress, progress_of_sweep(points.name)) as advance:
+        record, failures = run_sweep(points, folder, options, on_progress=advance, **how)
+    return Sweep(record.directory, tuple(failures))
+
+
+# --- several runs -----------------------------------------------------------------------------------------------------
+
+
+def compare(
+    first: str | Path,
+    second: str | Path | None = None,
+    out: str | Path = DEFAULT_OUT,
+    changes: Mapping[str, Any] | None = None,
+    y: str | None = None,
+) -> Comparison:
+    """Compare two runs or cases in parameters and results, or two sweeps point by point.
+
+    Parameters
+    ----------
+    first, second
+        Runs, cases or sweeps, named as for `load`; ``second`` None: the first.
+    out
+        Folder of the run directories.
+    changes
+        Values that replace those of the second case, by dotted keys.
+    y
+        Column of two sweeps; None: ``velocity``, or ``climbs`` for piles.
+    """
+    from walkers.errors import each
+    from walkers.sweeps.comparison import Side, compare_runs, compare_sweeps
+
+    if second is None and not changes:
+        raise refused(first, "expected a second run or sweep, or changes")
+    names = (first, first if second is None else second)
+    sweeps = {name: path for name in names for kind, path in [find(name, out)] if kind == "sweep"}
+    if len(sweeps) == len(set(names)):
+        if changes:
+            raise wrong_argument("changes", "is for runs and cases")
+        return compare_sweeps(sweeps[names[0]], sweeps[names[1]], y)
+    for name in sweeps:
+        raise refused(name, "is a sweep; expected another sweep to compare with")
+    if y is not None:
+        raise wrong_argument("y", "is for sweeps")
+
+    def side(number: int) -> Side:
+        name, given = names[number], (changes or {}) if number else {}
+        case, directory = case_and_run(name, out, given)
+        label = directory.name if directory and not given and find(name, out).kind == "run" else str(name)
+        return Side(" ".join([label, *(f"{key}={value}" for key, value in given.items())]), case, directory)
+
+    return compare_runs(*each(side, range(2)))
+
+
+def climb(
+    what: Sequence[str | Path],
+    out: str | Path = DEFAULT_OUT,
+    changes: Changes = None,
+    *,
+    within: float | None = None,
+    to: str | Path | None = None,
+) -> list[dict[str, Any]]:
+    """Probability, rate and speed of climbs in piles for each condition, with confidence intervals.
+
+    Parameters
+    ----------
+    what
+        Sweeps, folders of runs, runs or cases of piles.
+    out, changes
+        See `load`.
+    within
+        Count climbs up to this time of the drive, s; None: the end of the shortest run without a climb.
+    to
+        Also write the figure (.png, .svg, .pdf) or the table (.csv) to this file.
+    """
+    from walkers.errors import each
+    from walkers.postprocess.drawing import FORMATS, check_place
+    from walkers.sweeps import climbing
+    from walkers.sweeps.climbing_figure import write_climbs
+
+    if to is not None:
+        check_place(Path(to), *(f".{form}" for form in FORMATS), ".csv")
+    places = each(lambda name: directory_of(name, out, changes), what)
+    conditions = climbing.conditions_in(places)
+    for left in filter(None, map(climbing.unfinished_points, places)):
+        warnings.warn(left, stacklevel=2)
+    climbs = [climbing.summarise(condition, within) for condition in conditions]
+    if to is not None:
+        write_climbs(conditions, climbs, Path(to))
+    return climbs
+
+
+def calibrate(
+    calibration: str | Path,
+    out: str | Path = DEFAULT_OUT,
+    *,
+    jobs: int | None = None,
+    progress: bool | None = None,
+    **how: Any,
+) -> Outcome:
+    """Calibrate unknown parameters to published numbers; an interrupted calibration continues. Arguments: see `sweep`.
+
+    `walkers.calibration.report.write_outcome` writes tables and figures of the outcome.
+    """
+    from walkers.calibration import calibrate
+    from walkers.calibration.file import load_calibration
+    from walkers.runner.launch import cores_here
+    from walkers.sweeps.scheduler import Options
+
+    def shown(name: str) -> Any:
+        return shown_if(progress, progress_of_sweep(name))
+
+    options = Options(jobs or cores_here())
+    return calibrate.calibrate(load_calibration(calibration), Path(out), options, progress_of=shown, **how)
+
+
+def predict(case: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> dict[str, Any]:
+    """The prediction of the theory for a case, SI units, under ``engine`` with the result of its run if there is one.
+
+    See `walkers.theory.prediction.predict`.
+    """
+    from walkers.paper.published import outside_of_the_paper
+    from walkers.theory import prediction
+
+    named, directory = case_and_run(case, out, changes)
+    try:
+        predicted = {**prediction.predict(named), "outside": outside_of_the_paper(named), "engine": None}
+    except ValueError as error:
+        key, _, why = str(error).partition(": ")
+        raise InputError(named.name, [Problem(key, None, why)]) from error
+    with suppress(InputError):  # a result that cannot be read
+        predicted["engine"] = directory and Run(directory, asked=named).result
+    return predicted
