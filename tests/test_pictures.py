@@ -24,13 +24,15 @@ from tests.conftest import call
 from tests.printed import letters, spoilt
 from walkers.errors import InputError
 from walkers.inputs.boundary import Boundary
+from walkers.inputs.loads import bridge_at_rest
 from walkers.postprocess.analysis import figures_of, plot_run
 from walkers.postprocess.drawing import series_look, styled
 from walkers.postprocess.figures import _leaders
 from walkers.postprocess.films import FilmOptions, film_times, named_direction, parse_time
-from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, read_motion
+from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, read_bridges, read_motion
+from walkers.postprocess.necks import bridges_at, ends_of, necks_of
 from walkers.postprocess.paraview import _walls, write_vtk
-from walkers.postprocess.scene import Scene, Window, camera_axes, mesh_of, walls_of
+from walkers.postprocess.scene import Scene, Window, axes_toward, camera_axes, mesh_of, walls_of
 from walkers.postprocess.series import _strips, render_series
 from walkers.postprocess.tables import read_table
 from walkers.postprocess.trajectory_files import box_of
@@ -286,6 +288,52 @@ def test_rendering_shows_ruby_beads_on_a_grey_floor_and_cuts_nothing(
     assert 0.02 < np.mean((pixels[..., 0] > 1.8 * pixels[..., 1]) & (pixels[..., 0] > 60)) < 0.5
     assert np.mean(np.ptp(pixels, axis=-1) < 25) > 0.4
     assert all((edge == 255).all() for edge in (pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]))
+
+
+@pytest.fixture(scope="module")
+def ruptured(pile_run: Path) -> tuple[Motion, int]:
+    """Two beads of a pile and the last frame before their bridge ruptures."""
+    motion = read_motion(pile_run).driven
+    held = [{tuple(pair) for pair in np.sort(bridges.beads).tolist()} for bridges in read_bridges(motion)]
+    frame, pair = next((frame, min(gone)) for frame in range(len(held)) if (gone := held[frame] - held[frame + 1]))
+    return motion.select(beads=np.array(pair)), frame
+
+
+def test_a_neck_is_where_a_bridge_is_and_gone_when_it_ruptured(ruptured: tuple[Motion, int]) -> None:
+    """Of some beads of a run, whose numbers there are others; a picture between two frames shows the nearest ones."""
+    motion, frame = ruptured
+    before, between, after = bridges_at(motion, [frame, frame + 0.4, frame + 1])
+    assert [0, 1, -1] in before.tolist() and [0, 1, -1] not in after.tolist()
+    np.testing.assert_array_equal(before, between)
+    axes = axes_toward(np.cross(np.diff(motion.position[frame], axis=0)[0], [0.0, 0.0, 1.0]), np.array([0.0, 0.0, 1.0]))
+    seen = 1e3 * motion.position[frame : frame + 2] @ axes.T
+    window = Window(Scene(motion, axes, seen.min(axis=(0, 1)) - 0.3, seen.max(axis=(0, 1)) + 0.3, False), (300, 300))
+    pictures = [
+        window.picture(number, bridges) for number, bridges in ((frame, before), (frame + 1, after), (frame, after))
+    ]
+    window.close()
+    blue = [np.count_nonzero(each[..., 2] > 1.5 * each[..., 0].astype(float)) for each in pictures]
+    assert blue[0] > 20 + max(blue[1:])
+
+
+@pytest.mark.parametrize("gap", [0.0, 5e-6, 2e-5])
+def test_a_neck_has_the_volume_of_its_bridge(gap: float, motion: Motion) -> None:
+    """Within what spheres differ from parabolas; a neck at a plane too."""
+    for contact in ([0, 1, -1], [0, -1, 0]):
+        radius, other = motion.radius[0], motion.radius[1] if contact[1] > 0 else 0.0
+        place = np.array([[0.0, 0.0, radius + gap], [radius + gap + motion.radius[1], 0.0, radius + gap]])
+        points, _ = necks_of(motion, place, np.array([contact]), 65, 64)
+        begins, ends = ends_of(motion, place, np.array([contact]))
+        length = np.linalg.norm(ends - begins)
+        assert length == pytest.approx(radius + gap + other)
+        height = (1e-3 * points[0] - begins[0]) @ (ends - begins)[0] / length
+        width = np.linalg.norm(1e-3 * points[0] - begins - np.outer(height, (ends - begins)[0] / length), axis=1)
+        step, wide = height.reshape(65, 64)[:, 0], width.reshape(65, 64)[:, 0]
+        assert step[0] == pytest.approx(np.sqrt(radius**2 - wide[0] ** 2))  # on the surface of the bead
+        inside = np.maximum(radius**2 - step**2, 0.0) + np.maximum(other**2 - (length - step) ** 2, 0.0)
+        liquid = np.pi * np.trapezoid(wide**2 - inside, step)
+        volume = bridge_at_rest(motion.case, radius, other or np.inf).volume
+        assert liquid == pytest.approx(volume, rel=0.3)
 
 
 # --- films ------------------------------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ import re
 import zlib
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from math import nan, pi
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from walkers.inputs.sweep import expand
 from walkers.postprocess.analysis import current_result, number_of
 from walkers.postprocess.caption import caption
 from walkers.postprocess.figures import Line, Panel
-from walkers.postprocess.motion import gathered, read_motion
+from walkers.postprocess.motion import gathered, read_bridges, read_motion
 from walkers.postprocess.report.page import LARGEST, drawn, overhead, packed_plots
 from walkers.postprocess.report.player import cameras_of, player_of
 from walkers.postprocess.report.run import report_run, shown_of
@@ -196,6 +197,25 @@ def test_the_player_shows_the_motion(walked_run: Path) -> None:
     weightless = replace(motion, case=motion.case.put("environment.gravity", 0.0))  # is seen as the floor lies
     assert cameras_of(weightless) == cameras_of(motion)
     np.testing.assert_allclose(camera_axes(weightless), camera_axes(motion))
+
+
+def test_necks_of_the_player_are_as_wide_as_bridges_at_their_times(walked_run: Path, pile_run: Path) -> None:
+    """Those of the first walker; of a pile those that rupture, which have no width then."""
+    for run, count in ((walked_run, 3), (pile_run, None)):
+        motion = read_motion(run).driven
+        motion = motion if count is None else motion.of_walkers(motion.walkers[:1])
+        player = player_of(run)
+        (necks,) = (one for one in player.plot.objects if one.name == "bridges")
+        assert any("Blue: liquid bridges" in caption for caption in player.captions)
+        held = {bridges.frame: len(bridges.contacts) for bridges in read_bridges(motion)}
+        wide = []
+        for frame in held:
+            points = necks.vertices[f"{motion.time[frame]:.6f}"].reshape(-1, 80, 3)
+            wide.append(np.ptp(points[:, :16], axis=1).max(axis=1) > 0.01)
+            assert count is None or len(points) == count
+        assert [int(each.sum()) for each in wide] == [*held.values()]
+        if count is None:
+            assert any((one & ~other).any() for one, other in pairwise(wide))
 
 
 def test_long_runs_are_thinned_out_and_say_so(walked_run: Path, pile_run: Path) -> None:

@@ -351,8 +351,8 @@ class Run:
 
         Examples
         --------
-        >>> len(walkers.run("fig1b", tmp).view().objects)  # two beads, the floor, the lines on it
-        4
+        >>> len(walkers.run("fig1b", tmp).view().objects)  # two beads, their necks, the floor, the lines on it
+        5
         """
         from walkers.postprocess.report.player import player_of
 

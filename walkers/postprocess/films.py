@@ -22,6 +22,7 @@ from walkers.inputs.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_place
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, read_motion
+from walkers.postprocess.necks import bridges_at, bridges_text
 from walkers.postprocess.scene import (
     Picture,
     Scene,
@@ -116,10 +117,11 @@ def render_film(
     whole = Scene.around(motion, camera_axes(motion), around, frames, rolling=True)
     scene = whole.following(wide / tall, _AROUND, frames)
     window = Window(scene, options.size)
+    bridges = bridges_at(motion, times.frame)
     write = _captions(scene, times, window.pixels_per_mm, options.size)
 
     def picture(number: int) -> Picture:
-        return write(window.picture(times.frame[number]), number)
+        return write(window.picture(times.frame[number], bridges[number]), number)
 
     def pictures() -> Iterator[Picture]:
         for number in range(count):
@@ -239,6 +241,7 @@ def _captions(
             said.append(f"{scene.moved(times.frame[number]) @ toward:z.1f} mm {direction} from the start")
         said += [case.boundary.tilted] if case.boundary.tilted else []
         said += ["red: climbers"] if case.loose else []
+        said += [bridges_text(case)]
         draw.text((edge, edge), clock, "black", large, anchor="lt")
         if tray:  # above it
             draw.text((2 * edge + large.getlength(clock), 1.2 * edge), ", ".join(said), "#333333", small, anchor="lt")

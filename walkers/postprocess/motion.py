@@ -35,23 +35,30 @@ class Motion:
 
     Attributes
     ----------
-    case
-        The case; if the run ended at constant velocities, with the cycles that it took.
-    time : ndarray, shape (F,)
-        Time since the start of the drive, s; negative while the beads come to rest.
-    position, velocity, spin : ndarray, shape (F, N, 3)
-        Position and velocity of the centres; angular velocity, rad/s.
-    substrate, substrate_velocity : ndarray, shape (F, 3)
-        Displacement and velocity of the boundary in the laboratory, for both frames of the drive, m and m/s.
-    radius : ndarray, shape (N,)
-    walkers
-        The walkers with the indices of their beads, from 0.
-    frames : list of (Path, int)
-        Segment of each frame and its number there, for the bridges.
-    truncated, ended_early
-        Whether the dump ends within a frame; whether the run ended early because its velocities were constant.
-    mean_spin : ndarray, shape (F, N, 3), or None
-        Angular velocity averaged over the steps since the previous frame (zero in the first frame), if recorded.
+        case
+            The case; if the run ended at constant velocities, with the cycles that it took.
+        time : ndarray, shape (F,)
+            Time since the start of the drive, s; negative while the beads come to rest.
+        position, velocity, spin : ndarray, shape (F, N, 3)
+            Position and velocity of the centres; angular velocity, rad/s.
+        substrate, substrate_velocity : ndarray, shape (F, 3)
+            Displacement and velocity of the boundary in the laboratory, for both frames of the drive, m and m/s.
+        radius : ndarray, shape (N,)
+        walkers
+            The walkers with the indices of their beads, from 0.
+        frames : list of (Path, int)
+            Segment of each frame and its number there, for the bridges.
+        truncated, ended_early
+            Whether the dump ends within a frame; whether the run ended early because its velocities were constant.
+        mean_spin : ndarray, shape (F, N, 3), or None
+            Angular velocity averaged over the steps since the previous frame (zero in the first frame), if recorded.
+    <<<<<<< HEAD
+    =======
+        film : ndarray, shape (F, N), or None
+            Liquid on each bead, without that in bridges, over its whole liquid, if liquid is conserved.
+        numbers : ndarray of int, shape (N,), or None
+            Indices of the beads in the run; None: all beads of the run.
+    >>>>>>> 5615fa4 (Liquid necks in pictures, films and the 3-D view: as wide as the liquid of a bridge fills them)
     """
 
     case: Case
@@ -67,6 +74,7 @@ class Motion:
     truncated: bool
     ended_early: bool = False
     mean_spin: FloatArray | None = None
+    numbers: IntArray | None = None
 
     def __repr__(self) -> str:
         return f"<Motion of {self.case.name}: {len(self.time)} frames of {len(self.radius)} beads>"
@@ -102,6 +110,7 @@ class Motion:
             place = {bead: number for number, bead in enumerate(beads.tolist())}
             kept = [walker for walker in self.walkers if place.keys() >= set(walker.beads)]
             parts["radius"] = self.radius[beads]
+            parts["numbers"] = beads if self.numbers is None else self.numbers[beads]
             parts["walkers"] = tuple(
                 replace(walker, beads=tuple(place[bead] for bead in walker.beads)) for walker in kept
             )
@@ -447,6 +456,12 @@ class Bridges:
     wall_force: FloatArray
     wall_gap: FloatArray
 
+    @property
+    def contacts(self) -> IntArray:
+        """Both beads and the wall of each bridge, those between beads first; -1 for none; shape (K + M, 3)."""
+        rows = self.rows()
+        return np.stack([rows[name] for name in ("bead_1", "bead_2", "wall")], axis=1)
+
     def rows(self) -> dict[str, npt.NDArray[Any]]:
         """Columns of all bridges, those between beads first; ``bead_2`` of a wall and ``wall`` of none are -1."""
         pairs, gap = np.sort(self.beads, axis=1), np.concatenate([self.gap, self.wall_gap])
@@ -460,10 +475,20 @@ class Bridges:
         }
 
 
-def read_bridges(motion: Motion) -> Iterator[Bridges]:
-    """The bridges of each frame of a motion that recorded them; `DumpError` if a dump cannot be read or ends early."""
+def frames_with_bridges(motion: Motion) -> IntArray:
+    """Indices of the frames of a motion that recorded its bridges."""
     stride = motion.case.run.samples_per_bridge_sample
-    wanted = {place: frame for frame, place in enumerate(motion.frames)}
+    recorded = (frame for frame, (_, number) in enumerate(motion.frames) if number % stride == 0)
+    return np.fromiter(recorded, dtype=np.int64)
+
+
+def read_bridges(motion: Motion, frames: Collection[int] | None = None) -> Iterator[Bridges]:
+    """The bridges between the beads of a motion in each frame that recorded them, or in some of these frames.
+
+    Raises a `DumpError` if a dump cannot be read or ends early.
+    """
+    stride = motion.case.run.samples_per_bridge_sample
+    wanted = {place: frame for frame, place in enumerate(motion.frames) if frames is None or frame in frames}
     for segment in dict.fromkeys(segment for segment, _ in motion.frames):
         layout = layout_of(segment)
         pairs = local_frames(segment / layout.pair_bridge_dump, layout.pair_bridge_columns)
@@ -480,13 +505,18 @@ def read_bridges(motion: Motion) -> Iterator[Bridges]:
 def _bridges(motion: Motion, frame: int, between: FloatArray, against: FloatArray, layout: Layout) -> Bridges:
     """The bridges of a frame from the rows of its dumps."""
     place, pair, wall = motion.position[frame], layout.pair_bridge_columns.index, layout.wall_bridge_columns.index
+    index = np.full(layout.atoms, -1)  # in the motion, which may hold some of the beads
+    index[slice(None) if motion.numbers is None else motion.numbers] = np.arange(len(place))
     # The dumps also contain neighbours without a bridge; their force is zero.
     between = between[np.any(between[:, pair("fx") : pair("fx") + 3] != 0.0, axis=1)]
     against = against[np.any(against[:, wall("fx") : wall("fx") + 3] != 0.0, axis=1)]
-    ids = between[:, [pair("id1"), pair("id2")]].astype(np.int64) - 1
+    ids = index[between[:, [pair("id1"), pair("id2")]].astype(np.int64) - 1]
+    beads = index[against[:, wall("id")].astype(np.int64) - 1]
+    held, kept = np.all(ids >= 0, axis=1), beads >= 0
+    between, against, ids, beads = between[held], against[kept], ids[held], beads[kept]
     arm = place[ids[:, 1]] - place[ids[:, 0]]
     pull = np.einsum("kx,kx->k", between[:, pair("fx") : pair("fx") + 3], arm) / np.linalg.norm(arm, axis=1)
-    beads, walls = against[:, wall("id")].astype(np.int64) - 1, against[:, wall("wall")].astype(np.int64)
+    walls = against[:, wall("wall")].astype(np.int64)
     normals = np.stack([one.normals(place[beads]) for one in motion.case.boundary.walls])[walls, np.arange(len(walls))]
     wall_pull = -np.einsum("mx,mx->m", against[:, wall("fx") : wall("fx") + 3], normals)
     gap, wall_gap = -between[:, pair("overlap")], -against[:, wall("overlap")]

@@ -22,6 +22,7 @@ from walkers.errors import refused
 from walkers.postprocess.analysis import analyses_of
 from walkers.postprocess.drawing import check_every
 from walkers.postprocess.motion import Bridges, Motion, gathered, read_bridges, read_motion
+from walkers.postprocess.necks import ends_of
 from walkers.postprocess.scene import Scene, camera_axes, walls_of
 
 if TYPE_CHECKING:
@@ -168,11 +169,8 @@ def _bridges(motion: Motion, bridges: Bridges) -> meshio.Mesh:
     """
     import meshio
 
-    centres, rows = motion.position[bridges.frame], bridges.rows()
-    begins, ends = centres[rows["bead_1"]], centres[rows["bead_2"]]
-    for number, wall in enumerate(motion.case.boundary.walls):
-        held = rows["wall"] == number
-        ends[held] = begins[held] - wall.distances(begins[held])[:, None] * wall.normals(begins[held])
+    rows = bridges.rows()
+    begins, ends = ends_of(motion, motion.position[bridges.frame], bridges.contacts)
     arrays = {
         **{name: rows[name] for name in ("bead_1", "bead_2", "wall")},
         **{"gap (m)": rows["gap"], "normal_force (N)": rows["normal_force"]},

@@ -20,8 +20,9 @@ from walkers.errors import refused
 from walkers.inputs.boundary import Flat
 from walkers.inputs.case import Case
 from walkers.postprocess.analyses.piles import Pile, tracks_of
-from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.dump import FloatArray, IntArray
 from walkers.postprocess.motion import Motion, boundary_motion
+from walkers.postprocess.necks import BLUE, OPACITY, ends_of, necks_of, triangles_of
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -35,6 +36,7 @@ _GROUND, _LINES, _WALL, _EDGE = "#e3e8eb", "#bcc6cd", "#eef1f3", "#5a6670"
 _SHADOW = 0.4  # opacity of a shadow below the centre of a bead
 _PALE, _BRIGHTEST = 0.72, 150.0  # share of white in the pale lunes; largest mean of red, green, blue in the dark ones
 _LUNES = 6
+_NECKS = ((10, (9, 36)), (100, (7, 24)), (500, (5, 12)))  # rings and sides of a neck for fewer beads; else 3, 8
 _ROUNDS = ((10, 72), (100, 30), (500, 18))  # number of cells around a ball for fewer beads than the first; else 12
 _SIDES = 64  # sides of the prism that is drawn for a cylinder
 _BEYOND = 6.0  # extent of the floor over that of the picture
@@ -365,9 +367,14 @@ class Window:
         rounds = next((cells for fewer, cells in _ROUNDS if len(radius) < fewer), 12)
         points, triangles, self._pale = beach_ball(rounds, scene.motion)
         self._beads = _Copies(self._plotter, points, triangles, radius, specular=0.4)
+        self._round = next((fine for fewer, fine in _NECKS if len(radius) < fewer), (3, 8))
+        self._necks: pv.Actor | None = None
 
-    def picture(self, frame: float) -> Picture:
-        """Picture of a frame, or of a time between two frames (a fraction) by cubic interpolation."""
+    def picture(self, frame: float, bridges: IntArray | None = None) -> Picture:
+        """Picture of a frame, or of a time between two frames (a fraction) by cubic interpolation.
+
+        Bridges are contacts as in `walkers.postprocess.motion.Bridges`.
+        """
         motion, shift, number = self._scene.motion, np.zeros(3), int(frame)
         place, time, share = motion.position[number], motion.time[number], frame - number
         if share:
@@ -380,6 +387,7 @@ class Window:
         self._beads.move(1e3 * place + shift, None if turns is None else turns.at(number, share))
         if self._bare:
             self._shadows.move(1e3 * place * [1.0, 1.0, 0.0] + shift)
+        self._wet(place, bridges, shift)
         for actor in self._around:
             actor.position = tuple(shift)
         moved = self._scene.moved(frame)
@@ -390,6 +398,36 @@ class Window:
     def close(self) -> None:
         """Close the window."""
         self._plotter.close()
+
+    def _wet(self, place: FloatArray, bridges: IntArray | None, shift: FloatArray) -> None:
+        """Replace the liquid necks."""
+        import pyvista as pv
+
+        if self._necks is not None:
+            self._plotter.remove_actor(self._necks, render=False)
+            self._necks = None
+        if bridges is None or not len(bridges):
+            return
+        motion = self._scene.motion
+        begins, ends = ends_of(motion, place, bridges)
+        # Walls before the beads are not drawn, nor are the necks to them.
+        before = (bridges[:, 2] >= 0) & ((ends - begins) @ self._scene.axes[2] > 0.5 * motion.radius[bridges[:, 0]])
+        points, normals = necks_of(motion, place, bridges := bridges[~before], *self._round)
+        faces = triangles_of(len(bridges), *self._round)
+        necks = pv.PolyData.from_regular_faces((points + shift).reshape(-1, 3), faces)
+        necks.point_data["Normals"] = normals.reshape(-1, 3)
+        necks.point_data.active_normals_name = "Normals"
+        self._necks = self._plotter.add_mesh(
+            necks,
+            color=f"#{BLUE:06x}",
+            opacity=OPACITY,
+            ambient=0.45,
+            diffuse=0.75,
+            specular=0.4,
+            render=False,
+            reset_camera=False,
+        )
+        self._necks.prop.culling, self._necks.prop.interpolation = "back", "Phong"
 
     def _floor(self, wide: float) -> list[pv.Actor]:
         """A floor with lines that make its motion visible."""

@@ -19,6 +19,7 @@ from walkers.inputs.case import Case
 from walkers.postprocess.drawing import check_place, new_figure, plain_text, save_figure, styled
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, gathered, read_motion
+from walkers.postprocess.necks import EXPLAINED, bridges_at
 from walkers.postprocess.scene import Picture, Scene, Window, axes_toward, from_the_side, one_walker, plan_axes
 
 if TYPE_CHECKING:
@@ -103,11 +104,15 @@ def _views(motion: Motion, frames: Sequence[int]) -> Figure:
     high += 0.05 * (high - low) if sideways else 0.0
     scene = replace(scene, high=np.array([right, high, scene.high[2]]))
     window = Window(scene, _pixels(right - left, high - low))
-    said = [motion.case.title or motion.case.name, *(["red: climbers"] if motion.case.loose else [])]
+    said = [
+        motion.case.title or motion.case.name,
+        ", ".join([*(["red: climbers"] if motion.case.loose else []), EXPLAINED]),
+    ]
     figure, panels = _panels(len(frames), right - left, high - low, said)
     names = ("x", "height") if sideways else ("across the slope", "uphill") if boundary.tilt else ("x", "y")
-    for panel, frame, time in zip(panels, frames, even_labels(motion.time[frames]), strict=True):
-        panel.imshow(window.picture(frame), extent=(left, right, low, high), interpolation="antialiased")
+    seen = zip(panels, frames, bridges_at(motion, frames), even_labels(motion.time[frames]), strict=True)
+    for panel, frame, bridges, time in seen:
+        panel.imshow(window.picture(frame, bridges), extent=(left, right, low, high), interpolation="antialiased")
         panel.set_title(time)
         panel.set_xlabel(f"{names[0]} (mm)")
         panel.locator_params(axis="x", nbins=4, steps=[1, 2, 5, 10])
@@ -143,13 +148,16 @@ def _strips(motion: Motion, frames: Sequence[int]) -> Figure:
     camera = np.zeros((len(motion.time), 3))
     camera[frames] = path @ axes
     window = Window(Scene(motion, axes, low, high, shaken=False, path=camera), _pixels(*(high - low)[:2].tolist()))
-    pictures = [window.picture(frame) for frame in frames]
+    pictures = [
+        window.picture(frame, bridges) for frame, bridges in zip(frames, bridges_at(motion, frames), strict=True)
+    ]
     window.close()
     bounds = np.stack([low, high], axis=1)[:2] - middle[0, :2, None]
     tilted = motion.case.boundary.tilted
     said = [motion.case.title or motion.case.name]
     said += [f"{tilted}, seen along its normal"] if tilted else []
     direction = (("along the drive axis", "across the drive axis"), ("across the slope", "uphill"))[bool(tilted)][along]
+    said += [EXPLAINED]
     said += [f"centred on the beads; time and displacement {direction}"] if long else []
     figure, panels = _strip_panels(pictures, bounds, inches, along, said)
     _describe_strips(figure, panels, motion.case, times, along, f"{direction} (mm)")

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.extras import require
-from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.dump import FloatArray, IntArray
 from walkers.postprocess.motion import Motion, gathered, read_motion
+from walkers.postprocess.necks import BLUE, OPACITY, bridges_at, bridges_text, necks_of, triangles_of
 from walkers.postprocess.scene import (
     Scene,
     against_gravity,
@@ -39,6 +40,7 @@ _FLOOR, _LINES = 0xDFE5E8, 0x9AA6AE
 _AROUND = 1.15  # extent of the view over that of the beads
 _VIEW, _ASPECT = 30.0, 1.5  # angle of view, degrees; smallest ratio of width to height
 _MOST_LINES = 200.0  # largest number of lines on a floor
+_FEW_NECKS = 2000  # contacts times frames of necks that are drawn finely
 _LANE = 1.25  # distance of the lanes of independent walkers, in lengths of a walker
 _GRID = 2.0**-13
 """Positions are rounded to this (mm, about 0.1 µm); multiples of a power of two can be packed."""
@@ -71,6 +73,8 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
     motion = gathered(motion, lane=_LANE)
     scene = Scene.around(motion, camera_axes(motion), _AROUND, shaken=False, rolling=True).following(_ASPECT, _AROUND)
     shown, path = motion.select(slice(None, None, stride)), scene.path
+    bridges = bridges_at(motion, np.arange(0, len(motion.time), stride))
+    captions.append(f"{bridges_text(motion.case).capitalize()}.")
     if path is not None:
         path = path[::stride]
         shown = replace(shown, position=shown.position - 1e-3 * path[:, None])
@@ -93,7 +97,7 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
     if motion.case.boundary.tilted and motion.case.environment.gravity:
         boundary.append(_gravity(scene))
         captions.append(f"{motion.case.boundary.tilted.capitalize()}; the arrow shows the direction of gravity.")
-    for part in [*boundary, *beads]:
+    for part in [*boundary, *beads, *_necks(shown, motion.position[::stride], bridges, path)]:
         plot += part
     plot.fps_meter, plot.camera = False, next(iter(cameras.values()))
     # K3D's own player plays the run in 12 s.
@@ -181,6 +185,31 @@ def _balls(motion: Motion, turned: FloatArray, colours: FloatArray) -> list[Any]
         ball.model_matrix = _series(motion, matrices)
         balls.append(ball)
     return balls
+
+
+def _necks(motion: Motion, place: FloatArray, bridges: list[IntArray], path: FloatArray | None) -> list[Any]:
+    """The necks of all bridges as one mesh with a time series of its points.
+
+    A bridge that is not there has no width; its neck grows and vanishes in place.
+    """
+    import k3d
+
+    contacts, held = np.unique(np.concatenate(bridges), axis=0, return_inverse=True)
+    if not len(contacts):
+        return []
+    there = np.zeros((len(bridges), len(contacts)), dtype=bool)
+    there[np.repeat(np.arange(len(bridges)), [len(each) for each in bridges]), held.ravel()] = True
+    fine = (5, 16) if there.size < _FEW_NECKS else (2, 6)
+    points = np.zeros((len(bridges), len(contacts) * fine[0] * fine[1], 3))
+    for frame, present in enumerate(there):
+        near = np.flatnonzero(there[max(frame - 1, 0) : frame + 2].any(axis=0))
+        width = present[near].astype(float)
+        necks = necks_of(motion, place[frame], contacts[near], *fine, width)[0]
+        points[frame].reshape(len(contacts), -1, 3)[near] = necks - (0.0 if path is None else path[frame])
+    look = {"color": BLUE, "opacity": OPACITY, "flat_shading": True, "name": "bridges"}
+    mesh = k3d.mesh(points[0].astype(np.float32), triangles_of(len(contacts), *fine).astype(np.uint32), **look)
+    mesh.vertices = _series(motion, np.round(points / _GRID) * _GRID)
+    return [mesh]
 
 
 def _points(motion: Motion, colours: FloatArray) -> Any:
