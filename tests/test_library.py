@@ -9,6 +9,7 @@ import pytest
 
 from tests.conftest import call, document, origins, to_toml
 from walkers.errors import InputError
+from walkers.inputs.axes import number_of
 from walkers.inputs.case import Case
 from walkers.inputs.library import library_of
 from walkers.inputs.reading import load_case
@@ -37,8 +38,8 @@ def test_every_number_of_the_library_has_a_source_and_defaults_lie_within_their_
     known = [number for name in materials for number in SHIPPED.numbers("materials", name).values()]
     known += [number for name in liquids for number in SHIPPED.numbers("liquids", name).values()]
     assert len(known) >= 90
-    assert all(number.value > 0 and len(number.source) > 8 for number in known)
-    densities = {name: SHIPPED.numbers("materials", name)["density"].value for name in materials}
+    assert all(number_of("", number.written) > 0 and len(number.source) > 8 for number in known)
+    densities = {name: number_of("", SHIPPED.numbers("materials", name)["density"].written) for name in materials}
     assert sorted(densities, key=lambda name: densities[name])[:: len(densities) - 1] == ["polystyrene", "brass"]
 
 

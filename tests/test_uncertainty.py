@@ -101,8 +101,8 @@ def test_what_is_usual_lies_within_its_range() -> None:
         assert known is not None
         assert ends is not None
         kind = kind_of(key) if key == "liquid.contact_angle" else None
-        low, high = (parse_quantity(one, kind) if kind else one for one in ends)
-        assert low < known.value < high or (key == "liquid.contact_angle" and known.value == low == 0.0), key
+        value, low, high = (parse_quantity(one, kind) if kind else one for one in (known.written, *ends))
+        assert low < value < high or (key == "liquid.contact_angle" and value == low == 0.0), key
 
 
 @pytest.mark.parametrize(

@@ -13,11 +13,11 @@ from typing import Any
 
 from walkers.inputs.bodies import Walkers
 from walkers.inputs.case import Case
-from walkers.inputs.library import Known, library_of
+from walkers.inputs.library import library_of
 from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.numerical import numerical_error
 from walkers.inputs.run import CONSTANT, limits_of
-from walkers.inputs.units import ACCELERATION_OF_ONE_G
+from walkers.inputs.units import ACCELERATION_OF_ONE_G, MODULUS, parse_quantity
 from walkers.physics.capillary import bead_volume, capillary_force_limit_at_wall
 from walkers.physics.time_step import auto_fractions
 from walkers.rounding import counted, percent
@@ -120,9 +120,10 @@ def _volume(case: Case) -> float:
     return sum(map(bead_volume, case.all_radii))
 
 
-def _youngs_modulus(case: Case) -> Known | None:
-    """Young's modulus of the material of the beads, if the library has it."""
-    return library_of(case.document).numbers("materials", case.beads.material or "").get("youngs_modulus")
+def _youngs_modulus(case: Case) -> float | None:
+    """Young's modulus of the material of the beads, Pa, if the library has it."""
+    known = library_of(case.document).numbers("materials", case.beads.material or "").get("youngs_modulus")
+    return parse_quantity(known.written, MODULUS) if known else None
 
 
 def summarise(case: Case) -> dict[str, Any]:
@@ -138,7 +139,7 @@ def summarise(case: Case) -> dict[str, Any]:
     """
     run, drive, limits = case.run, case.excitation, vars(limits_of(case))
     volume = _volume(case)
-    known = _youngs_modulus(case)
+    modulus = _youngs_modulus(case)
     summary: dict[str, Any] = {
         "case": {**case.as_dict(), "origins": [asdict(one) for one in case.origins]},
         "drive": {name: getattr(drive, name) for name in ("peak_acceleration", "amplitude", "peak_velocity")},
@@ -148,7 +149,7 @@ def summarise(case: Case) -> dict[str, Any]:
             "mass": volume * case.beads.density,
             "volume": volume,
             "liquid": volume * case.liquid.volume_fraction,
-            "stiffness_ratio": case.contact.youngs_modulus / known.value if known else None,
+            "stiffness_ratio": case.contact.youngs_modulus / modulus if modulus else None,
         },
         "notes": notes(case),
         "contacts": [contact for walkers in case.walkers for contact in _contacts(case, walkers)],

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -24,36 +24,26 @@ from walkers.physics.mixtures import MIXTURES
 
 FILE_NAME = "library.toml"
 HALF = (0.5, 293.15)
-PAIR_KEYS = (
-    *("friction", "rolling_friction", "viscosity_ratio", "minimum_separation_ratio", "volume_fraction"),
-    *("contact_angle", "restitution"),
-)
-
-_KINDS = {
+_OF_MIXTURES = {
     "density": units.DENSITY,
-    "youngs_modulus": units.MODULUS,
     "surface_tension": units.SURFACE_TENSION,
-    "kinematic_viscosity": units.KINEMATIC_VISCOSITY,
     "dynamic_viscosity": units.DYNAMIC_VISCOSITY,
-    "contact_angle": units.ANGLE,
 }
 
 
-@dataclass(frozen=True)
-class Known:
-    """A number of the library.
+class Known(NamedTuple):
+    """A number of the library, as a case would write it.
 
     The ``range`` of an unmeasured number has the ends between which it may lie, that of a calibrated one 5 to 95 % of
-    the posterior, as a case would write them.
+    the posterior; a ``logarithmic`` one is of magnitudes.
     """
 
-    value: float  # SI
-    written: Any  # as the library has it, with its unit
+    written: Any
     source: str = ""
     range: tuple[Any, Any] | None = None
     calibrated_with: tuple[str, ...] = ()  # names of the liquids of the experiments; empty: not calibrated
     origin: Whence = "library"
-    logarithmic: bool = False  # whether the range is of magnitudes
+    logarithmic: bool = False
 
 
 class Collection(NamedTuple):
@@ -87,8 +77,8 @@ class Library:
         for one in self.collections:
             if found := one.tables.get(kind, {}).get(name):
                 computed = MIXTURES[name](*mixture or HALF) if name in MIXTURES else {}
-                texts = {key: quantity_text(float(f"{value:.4g}"), _KINDS[key]) for key, value in computed.items()}
-                return {key: _known(key, {"value": texts.get(key), **entry}, one) for key, entry in found.items()}
+                texts = {key: quantity_text(float(f"{computed[key]:.4g}"), _OF_MIXTURES[key]) for key in computed}
+                return {key: _known({"value": texts.get(key), **entry}, one) for key, entry in found.items()}
         return {}
 
     def surface_pair(self, first: str | None, second: str | None) -> Mapping[str, Known]:
@@ -101,7 +91,8 @@ class Library:
             for pair in one.tables.get("surface_pairs", ()):
                 if sorted(pair["materials"]) == sorted([first or "", second or ""]):
                     liquids = tuple(pair.get("calibrated_with", ()))
-                    return {key: _known(key, entry, one, liquids) for key, entry in pair.items() if key in PAIR_KEYS}
+                    numbers = {key: entry for key, entry in pair.items() if isinstance(entry, Mapping)}
+                    return {key: _known(entry, one, liquids) for key, entry in numbers.items()}
         return {}
 
 
@@ -110,13 +101,10 @@ def _contents() -> dict[str, Any]:
     return tomllib.loads(resources.files("walkers.inputs").joinpath("library.toml").read_text("utf-8"))
 
 
-def _known(key: str, entry: Mapping[str, Any], of: Collection, liquids: tuple[str, ...] = ()) -> Known:
-    kind, value = _KINDS.get(key.rpartition(".")[2]), entry["value"]
-    number = units.parse_quantity(value, kind) if kind else float(value)
+def _known(entry: Mapping[str, Any], of: Collection, liquids: tuple[str, ...] = ()) -> Known:
     source = entry.get("source", f"calibrated with {' and '.join(liquids)}" if liquids else "")
-    ends = (entry["range"][0], entry["range"][1]) if "range" in entry else None
-    place = ", ".join(filter(None, (of.place, source)))
-    return Known(number, value, place, ends, liquids, of.origin, entry.get("log", False))
+    place, ends = ", ".join(filter(None, (of.place, source))), entry.get("range")
+    return Known(entry["value"], place, ends and (ends[0], ends[1]), liquids, of.origin, entry.get("log", False))
 
 
 def check_library(tables: object, source: str) -> None:
@@ -182,4 +170,4 @@ def read_library(folder: Path) -> dict[str, Any]:
 def unmeasured() -> Mapping[str, Known]:
     """Defaults and ranges of the unmeasured values that a case may leave out, by keys of a case."""
     program = Collection("library", "", {})
-    return {key: _known(key, entry, program) for key, entry in _contents()["unmeasured"].items()}
+    return {key: _known(entry, program) for key, entry in _contents()["unmeasured"].items()}
