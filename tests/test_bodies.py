@@ -17,7 +17,7 @@ from tests.conftest import REFERENCE, document, make_case
 from walkers.errors import InputError
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
-from walkers.inputs.drive import Excitation, Sine, common_frequency
+from walkers.inputs.drive import Excitation, Harmonic, common_frequency
 from walkers.inputs.loads import contact_loads
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.standing import standing
@@ -470,7 +470,13 @@ def test_frequencies_without_a_cycle_are_refused() -> None:
 
 
 def test_a_drive_is_its_largest_harmonic_where_one_number_is_asked_for() -> None:
-    drive = Excitation((Sine((1.0, 0.0, 0.0), 160.0, 10.0), Sine((0.0, 0.0, 1.0), 80.0, 30.0, 1.0)), "container")
+    drive = Excitation(
+        (
+            Harmonic(axis="x", frequency=160.0, peak_acceleration=10.0),
+            Harmonic(axis="z", frequency=80.0, peak_acceleration=30.0, phase=1.0),
+        ),
+        "container",
+    )
     assert (drive.direction, drive.peak_acceleration, drive.frequency) == ((0.0, 0.0, 1.0), 30.0, 80.0)
     two = [{"frequency": "160 Hz", "peak_acceleration": "10 m/s^2"}]
     two += [{"frequency": "80 Hz", "peak_acceleration": "30 m/s^2", "axis": "z", "phase": "1 rad"}]

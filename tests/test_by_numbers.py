@@ -19,7 +19,7 @@ from walkers.inputs import units
 from walkers.inputs.axes import Range
 from walkers.inputs.boundary import Boundary, Round
 from walkers.inputs.case import Case
-from walkers.inputs.drive import Sine, waveform
+from walkers.inputs.drive import Harmonic, waveform
 from walkers.inputs.loads import bridge_at_rest, contact_loads
 from walkers.inputs.table import changed
 from walkers.inputs.units import Kind, quantity_text
@@ -132,11 +132,11 @@ def test_a_key_within_a_list_puts_what_says_the_same_out_of_force() -> None:
 def test_a_phase_of_a_waveform_is_an_earlier_begin_of_the_whole(name: str) -> None:
     time, frequency, phase = np.linspace(0.0, 0.1, 200), 20.0, radians(50.0)
 
-    def acceleration(first: Sine, time: Any) -> Any:
+    def acceleration(first: Harmonic, time: Any) -> Any:
         waves = waveform(name, first)
         return sum(one.peak_acceleration * np.sin(one.angular_frequency * time + one.phase) for one in waves)
 
-    plain = Sine((1.0, 0.0, 0.0), frequency, 10.0)
+    plain = Harmonic(axis="x", frequency=frequency, peak_acceleration=10.0)
     earlier = acceleration(plain, time + phase / (2.0 * pi * frequency))
     np.testing.assert_allclose(acceleration(replace(plain, phase=phase), time), earlier, atol=1e-9)
     assert np.abs(earlier).max() > 9.0

@@ -6,7 +6,7 @@ The cycle of a drive is the common period of its sines; its peak acceleration, a
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from math import degrees, gcd, hypot, isclose, isfinite, lcm, pi
@@ -50,7 +50,7 @@ _AXIS = {"anyOf": [{"enum": list(AXES)}, {"type": "array", "items": {"type": "nu
 
 
 class Harmonic(Table):
-    """One of ``[[drive.harmonics]]``; exactly one of ``peak_acceleration`` and ``gamma0``."""
+    """One of ``[[drive.harmonics]]``: A sin(2π f t + φ) along a direction, frequency f, peak acceleration A (2πf)²."""
 
     choices: ClassVar[tuple[Choice, ...]] = (Choice((("peak_acceleration",), ("gamma0",))),)
     axis: Filled[Annotated[Any, BeforeValidator(_axis), WithJsonSchema(_AXIS)]] = key(
@@ -64,10 +64,24 @@ class Harmonic(Table):
     phase: Angle = key("Phase of the sine.", 0.0)
 
     @property
-    def sine(self) -> Sine:
-        """The oscillation that the resolved keys describe."""
-        direction = AXES[self.axis] if isinstance(self.axis, str) else unit_vector(self.axis)
-        return Sine(direction, self.frequency, self.peak_acceleration, self.phase)
+    def direction(self) -> Vector:
+        """Direction of the shaking, a unit vector."""
+        return AXES[self.axis] if isinstance(self.axis, str) else unit_vector(self.axis)
+
+    @property
+    def angular_frequency(self) -> float:
+        """2πf, rad/s."""
+        return 2.0 * pi * self.frequency
+
+    @property
+    def amplitude(self) -> float:
+        """A, m."""
+        return self.peak_acceleration / self.angular_frequency**2
+
+    @property
+    def peak_velocity(self) -> float:
+        """A 2πf, m/s."""
+        return self.peak_acceleration / self.angular_frequency
 
 
 class Drive(Harmonic):
@@ -104,44 +118,20 @@ class Drive(Harmonic):
     @cached_property
     def excitation(self) -> Excitation:
         """The sum of sines that the resolved keys describe."""
-        sines = tuple(one.sine for one in self.harmonics) or waveform(self.waveform, self.sine)
-        return Excitation(sines, self.frame)
-
-
-@dataclass(frozen=True)
-class Sine:
-    """A sin(2π f t + φ) along a unit vector: frequency f (Hz), peak acceleration A (2πf)² (m/s²), phase φ (rad)."""
-
-    direction: Vector
-    frequency: float
-    peak_acceleration: float
-    phase: float = 0.0
-
-    @property
-    def angular_frequency(self) -> float:
-        """2πf, rad/s."""
-        return 2.0 * pi * self.frequency
-
-    @property
-    def amplitude(self) -> float:
-        """A, m."""
-        return self.peak_acceleration / self.angular_frequency**2
-
-    @property
-    def peak_velocity(self) -> float:
-        """A 2πf, m/s."""
-        return self.peak_acceleration / self.angular_frequency
+        names = ("axis", "frequency", "peak_acceleration", "phase")
+        sines = [Harmonic(**{name: getattr(one, name) for name in names}) for one in self.harmonics or (self,)]
+        return Excitation(tuple(sines) if self.harmonics else waveform(self.waveform, sines[0]), self.frame)
 
 
 @dataclass(frozen=True)
 class Excitation:
     """A sum of sines, and the frame: moving walls, or an inertial force on the beads."""
 
-    harmonics: tuple[Sine, ...]
+    harmonics: tuple[Harmonic, ...]
     frame: Frame
 
     @property
-    def largest(self) -> Sine:
+    def largest(self) -> Harmonic:
         """The harmonic of the largest peak acceleration, the first of equal ones."""
         return max(self.harmonics, key=lambda one: one.peak_acceleration)
 
@@ -209,11 +199,10 @@ def common_frequency(frequencies: list[float]) -> float:
     return first * common / below
 
 
-def waveform(name: str, first: Sine) -> tuple[Sine, ...]:
+def waveform(name: str, first: Harmonic) -> tuple[Harmonic, ...]:
     """The harmonics of a periodic acceleration of `WAVEFORMS`, given its frequency, peak, direction and phase."""
     return tuple(
-        replace(
-            first,
+        first.but(
             frequency=multiple * first.frequency,
             peak_acceleration=abs(share) * first.peak_acceleration,
             phase=multiple * first.phase + (pi if share < 0.0 else 0.0),

@@ -17,7 +17,7 @@ from typing import Any
 
 from walkers.errors import refused
 from walkers.inputs.case import Case
-from walkers.inputs.drive import AXES, Excitation, Sine
+from walkers.inputs.drive import Excitation, Harmonic
 from walkers.inputs.run import CONSTANT, limits_of
 from walkers.inputs.table import changed as table_changed
 from walkers.physics.laws import source_of
@@ -228,22 +228,22 @@ def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float]
     return ran.but(run=ran.run.but(time_step=step, steps_per_cycle=steps, cycles=cycles))
 
 
-def _by_suffix(drive: Excitation) -> list[tuple[str, Sine]]:
+def _by_suffix(drive: Excitation) -> list[tuple[str, Harmonic]]:
     return list(zip(suffixes(len(drive.harmonics)), drive.harmonics, strict=True))
 
 
-def _sine(one: Sine, end: str, values: Mapping[str, float]) -> Sine:
+def _sine(one: Harmonic, end: str, values: Mapping[str, float]) -> Harmonic:
     """A sine from its parameters; an amplitude that contradicts the acceleration was edited and replaces it."""
     names = ("frequency", "peak_acceleration", "phase")
-    one = replace(one, **{name: values.get(f"{name}{end}", getattr(one, name)) for name in names})
+    one = one.but(**{name: values.get(f"{name}{end}", getattr(one, name)) for name in names})
     implied = values.get(f"amplitude{end}", nan) * one.angular_frequency**2
     same = not isfinite(implied) or isclose(implied, one.peak_acceleration, rel_tol=_SAME)
-    return one if same else replace(one, peak_acceleration=implied)
+    return one if same else one.but(peak_acceleration=implied)
 
 
-def _table(one: Sine) -> dict[str, Any]:
+def _table(one: Harmonic) -> dict[str, Any]:
     """A sine as a case file has it."""
-    axis = next((name for name, direction in AXES.items() if direction == one.direction), [*one.direction])
+    axis = one.axis if isinstance(one.axis, str) else [*one.axis]
     units = {"frequency": "Hz", "peak_acceleration": "m/s^2", "phase": "rad"}
     return {"axis": axis, **{name: f"{getattr(one, name)!r} {unit}" for name, unit in units.items()}}
 
