@@ -9,12 +9,12 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from itertools import product
-from math import isfinite, prod
+from math import prod
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.errors import unusable
 from walkers.inputs.keys import Value, flatten
-from walkers.inputs.units import split_quantity
+from walkers.inputs.units import as_quantity
 
 if TYPE_CHECKING:
     import numpy as np
@@ -41,11 +41,9 @@ class Range(NamedTuple):
         """Quantiles of the range."""
         import numpy as np
 
-        quantiles = np.array([self.low, self.high] if self.median is None else [self.low, self.median, self.high])
-        known = np.linspace(0.0, 1.0, len(quantiles))
-        if self.logarithmic:
-            return np.asarray(np.exp(np.interp(shares, known, np.log(quantiles))))
-        return np.asarray(np.interp(shares, known, quantiles))
+        ends = np.array([self.low, self.high] if self.median is None else [self.low, self.median, self.high])
+        numbers = np.interp(shares, np.linspace(0.0, 1.0, len(ends)), np.log(ends) if self.logarithmic else ends)
+        return np.asarray(np.exp(numbers) if self.logarithmic else numbers)
 
 
 class Axis(NamedTuple):
@@ -80,54 +78,41 @@ def values_of(key: str, axis: object) -> list[Value]:
             raise unusable(key, "expected at least one value", axis)
         unit_of(key, axis)
         return axis
-    if not (isinstance(axis, Mapping) and len(axis) == 1 and (kind := next(iter(axis))) in _SPACINGS):
+    kind, given = next(iter(axis.items())) if isinstance(axis, Mapping) and len(axis) == 1 else ("", None)
+    if kind not in _SPACINGS:
         message = "expected a list of values, { linspace = [first, last, number] } or { geomspace = [...] }"
         raise unusable(key, message, axis)
     import numpy as np
 
-    given = axis[kind]
     if not (isinstance(given, list) and len(given) == 3 and type(given[2]) is int and 1 <= given[2] <= MOST_POINTS):
         message = f'expected first value, last value and number, such as {{ {kind} = ["0.5 g", "10 g", 20] }}'
         raise unusable(key, message, axis)
     (first, last), unit = _numbers(key, given[:2], positive=kind == "geomspace")
     numbers = [written(float(one), unit) for one in getattr(np, kind)(first, last, given[2])]
     # Between whole numbers whole ones stay whole: seeds, cycles, replicates.
-    if type(given[0]) is type(given[1]) is int:
-        return [int(number) if number.is_integer() else number for number in numbers]
-    return numbers
+    whole = type(given[0]) is type(given[1]) is int
+    return [int(one) if whole and one.is_integer() else one for one in numbers]
 
 
 def _numbers(key: str, given: list[Value], *, positive: bool) -> tuple[list[float], str | None]:
     """The numbers of a range and their unit."""
-    unit = unit_of(key, given)
-    numbers = [number_of(key, one) for one in given]
+    unit, numbers = unit_of(key, given), [number_of(key, one) for one in given]
     if positive and min(numbers) <= 0:
         raise unusable(key, "expected values above zero", given)
     return numbers, unit
 
 
-def _quantity(value: Value) -> tuple[float, str | None] | None:
-    """A value as number and unit (None: a plain number), or None if it is not a finite number."""
-    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
-        return None
-    try:
-        number, unit = split_quantity(value) if isinstance(value, str) else (float(value), None)
-    except (ValueError, OverflowError):
-        return None
-    return (number, unit) if isfinite(number) else None
-
-
 def number_of(key: str, value: Value) -> float:
     """The number of a value, without its unit; raises `InputError` if it is not a finite number."""
-    if (found := _quantity(value)) is None:
+    if (quantity := as_quantity(value)) is None:
         raise unusable(key, "expected a number, or a number with its unit in quotes", value)
-    return found[0]
+    return quantity[0]
 
 
 def plain(value: Value) -> Any:
     """A value without its unit: a number where it is a quantity, else as it is."""
-    found = _quantity(value) if isinstance(value, str) else None
-    return value if found is None else found[0]
+    quantity = as_quantity(value) if isinstance(value, str) else None
+    return quantity[0] if quantity else value
 
 
 def written(number: float, unit: str | None) -> Value:
@@ -142,7 +127,7 @@ def unit_of(key: str, values: Sequence[Value]) -> str | None:
     Raises `InputError` if they are in several units.
     """
     parts = [part for value in values for part in (value if isinstance(value, list) else [value])]
-    units = {found[1] for found in map(_quantity, parts) if found is not None}
+    units = {quantity[1] for quantity in map(as_quantity, parts) if quantity}
     if len(units) > 1:
         raise unusable(key, "expected one unit throughout", list(values))
     return units.pop() if units else None
@@ -153,7 +138,7 @@ def listed(key: str, given: object) -> Axis:
     values = values_of(key, given)
     known: set[str] = set()
     for value in values:
-        same = repr([_quantity(part) or part for part in (value if isinstance(value, list) else [value])])
+        same = repr([as_quantity(part) or part for part in (value if isinstance(value, list) else [value])])
         if same in known:
             raise unusable(key, "expected different values: this one occurs twice", value)
         known.add(same)
@@ -194,11 +179,10 @@ def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> A
     ends = ranges_of(ranges)
     if not ends:
         raise unusable("sample.ranges", "expected keys and their ranges", dict(ranges))
-    columns = {}
-    shares = unit_cube(method, len(ends), points, seed).T
-    for share, (key, one) in zip(shares, ends.items(), strict=True):
-        columns[key] = [written(float(number), one.unit) for number in one.at(share)]
-    return Axis.of(columns)
+    shares = zip(unit_cube(method, len(ends), points, seed).T, ends.items(), strict=True)
+    return Axis.of(
+        {key: [written(float(number), one.unit) for number in one.at(share)] for share, (key, one) in shares}
+    )
 
 
 def descending(key: str, ends: Mapping[str, Value]) -> Axis:
@@ -219,10 +203,10 @@ def ranges_of(ranges: Mapping[str, Any]) -> dict[str, Range]:
     """
     found = {}
     for key, given in flatten(ranges, is_axis).items():
-        kind = next(iter(given)) if isinstance(given, Mapping) and len(given) == 1 else ""
-        if kind not in _DISTRIBUTIONS or not (isinstance(given[kind], list) and len(given[kind]) in (2, 3)):
+        kind, ends = next(iter(given.items())) if isinstance(given, Mapping) and len(given) == 1 else ("", None)
+        if kind not in _DISTRIBUTIONS or not (isinstance(ends, list) and len(ends) in (2, 3)):
             raise unusable(key, "expected { uniform = [low, high] } or { loguniform = [low, high] }", given)
-        (low, *median, high), unit = _numbers(key, given[kind], positive=kind == "loguniform")
+        (low, *median, high), unit = _numbers(key, ends, positive=kind == "loguniform")
         if low >= high or not all(low <= one <= high for one in median):
             raise unusable(key, "expected the smaller value first", given)
         found[key] = Range(low, high, unit, kind == "loguniform", *median)

@@ -37,17 +37,12 @@ _TOO_SMALL = "a bead is too small to touch two beads that touch each other; expe
 
 
 class Arrangement(NamedTuple):
-    """Arrangement of ``fewest`` to ``most`` beads: touching pairs, and positions from radii and `Apart`."""
+    """Arrangement of ``fewest`` to ``most`` beads: positions from radii and `Apart`."""
 
-    pairs: Callable[[int], Pairs]
     places: Callable[[Sequence[float], Apart], Places]
     fewest: int
     meaning: str
     most: int = 100
-
-
-def _row(number: int) -> Pairs:
-    return tuple((bead, bead + 1) for bead in range(number - 1))
 
 
 def _chain(radii: Sequence[float], apart: Apart) -> Places:
@@ -55,10 +50,6 @@ def _chain(radii: Sequence[float], apart: Apart) -> Places:
     for bead in range(len(radii) - 1):
         along.append(along[-1] - apart(bead, bead + 1))
     return [(place, 0.0) for place in along]
-
-
-def _spokes(number: int) -> Pairs:
-    return (*((0, bead) for bead in range(1, number)), *((bead, bead + 1) for bead in range(1, number - 1)))
 
 
 def _fan(radii: Sequence[float], apart: Apart) -> Places:
@@ -77,11 +68,6 @@ def _fan(radii: Sequence[float], apart: Apart) -> Places:
     return [(front, 0.0), *((front + away * cos(turn), away * sin(turn)) for away, turn in behind)]
 
 
-def _crossed(number: int) -> Pairs:
-    del number
-    return ((0, 1), (0, 2), (1, 2), (1, 3), (2, 3))
-
-
 def _diamond(radii: Sequence[float], apart: Apart) -> Places:
     """One in front, two side by side behind it, one at the back that touches these two."""
     front, left, right = _fan(radii[:3], apart)
@@ -93,10 +79,6 @@ def _diamond(radii: Sequence[float], apart: Apart) -> Places:
     height = sqrt(reach**2 - (share * width) ** 2) / width
     back = (left[0] + share * along + height * across, left[1] + share * across - height * along)
     return [front, left, right, back]
-
-
-def _closed(number: int) -> Pairs:
-    return (*_row(number), (0, number - 1)) if number > 2 else _row(number)
 
 
 def _ring(radii: Sequence[float], apart: Apart) -> Places:
@@ -137,10 +119,6 @@ def _sites(number: int) -> Places:
     return sorted(sites, key=lambda at: (round(hypot(*at), 6), round(atan2(-at[1], -at[0]) % (2.0 * pi), 6)))[:number]
 
 
-def _neighbours(number: int) -> Pairs:
-    return touching(_sites(number), [0.5] * number, _TOUCHING)
-
-
 def _raft(radii: Sequence[float], apart: Apart) -> Places:
     if len(set(radii)) > 1:
         raise ValueError("expected the same radius for all beads of a raft")
@@ -149,11 +127,11 @@ def _raft(radii: Sequence[float], apart: Apart) -> Places:
 
 
 ARRANGEMENTS: Mapping[str, Arrangement] = {
-    "chain": Arrangement(_row, _chain, 2, "one behind the other, the first in front"),
-    "fan": Arrangement(_spokes, _fan, 2, "the first in front, the others side by side behind it"),
-    "diamond": Arrangement(_crossed, _diamond, 4, "one in front, two side by side behind it, one at the back", most=4),
-    "ring": Arrangement(_closed, _ring, 3, "in a ring, the first in front"),
-    "raft": Arrangement(_neighbours, _raft, 3, "of one radius, on a hexagonal lattice, the first in the middle"),
+    "chain": Arrangement(_chain, 2, "one behind the other, the first in front"),
+    "fan": Arrangement(_fan, 2, "the first in front, the others side by side behind it"),
+    "diamond": Arrangement(_diamond, 4, "one in front, two side by side behind it, one at the back", most=4),
+    "ring": Arrangement(_ring, 3, "in a ring, the first in front"),
+    "raft": Arrangement(_raft, 3, "of one radius, on a hexagonal lattice, the first in the middle"),
 }
 """Arrangements by their names in case files."""
 
@@ -198,9 +176,7 @@ class Walkers(Table):
     @cached_property
     def pairs(self) -> Pairs:
         """The beads of a walker that touch at the start, numbered from 0."""
-        if self.at:
-            return touching(self.at, self.radii, _TOUCHING)
-        return ARRANGEMENTS[self.arrangement].pairs(len(self.radii))
+        return touching(self.design, self.radii, _TOUCHING)
 
     @property
     def bridged(self) -> list[tuple[float, list[float]]]:

@@ -9,9 +9,10 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
-from math import pi
+from math import isfinite, pi
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
@@ -144,12 +145,15 @@ def _by_pint(symbol: str, kind: Kind) -> float:
     return factor
 
 
-def split_quantity(text: str) -> tuple[float, str]:
-    """Number and unit of a quantity; raises `ValueError` if the text is not a quantity."""
-    match = _NUMBER_AND_UNIT.fullmatch(text.strip())
-    if match is None:
-        raise ValueError(f"no quantity: {text!r}")
-    return float(match["number"]), match["unit"].strip()
+def as_quantity(value: Any) -> tuple[float, str | None] | None:
+    """A value as number and unit (None: a plain number); None if it is not a finite number."""
+    match = _NUMBER_AND_UNIT.fullmatch(value.strip()) if isinstance(value, str) else None
+    if not match and (isinstance(value, bool) or not isinstance(value, (int, float))):
+        return None
+    with suppress(OverflowError):  # an integer of hundreds of digits
+        number, unit = (float(match["number"]), match["unit"].strip()) if match else (float(value), None)
+        return (number, unit) if isfinite(number) else None
+    return None
 
 
 def quantity_text(value: float, kind: Kind) -> str:
