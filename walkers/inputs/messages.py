@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cache
-from typing import Any, TypeVar, get_origin
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
@@ -15,7 +14,7 @@ from pydantic_core import ErrorDetails
 
 from walkers.errors import InputError, Problem, shown, suggestion, unusable
 from walkers.inputs.keys import MISSING, joined, parts_of, value_at
-from walkers.inputs.table import Table, example_of, keys_in, table_in
+from walkers.inputs.table import Table, example_of, keys_in, keys_of, table_in
 from walkers.inputs.units import AUTO, WRITTEN
 
 File = TypeVar("File", bound=BaseModel)
@@ -102,7 +101,7 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
     location = tuple(part for part in details["loc"] if part != "[key]")  # of a name of the user's
     of_list = kind == "missing" and isinstance(location[-1], int)
     parts: tuple[str | int, ...] = location[:-1] if of_list else location
-    key, field = joined(parts), _field_at(file, parts)
+    key, field = joined(parts), keys_of(file).get(_place(parts, keys_of(file)))
     example = example_of(field) if field else "a value"
     such = f", {example}" if example.startswith("such as") else ""
     if kind == "extra_forbidden":
@@ -144,34 +143,13 @@ def _in_a_table(parts: Sequence[str | int], field: FieldInfo | None) -> str:
     return f"a table [{joined(parts)}]{such}" if table else ""
 
 
-def _field_at(file: type[BaseModel], parts: Sequence[str | int]) -> FieldInfo | None:
-    """The field of a key of a file; None if it has none."""
-    model: type[BaseModel] | None = file
-    field, named = None, False
-    for part in (part for part in parts if isinstance(part, str)):
-        if named:  # a name of the user's
-            named = False
-            continue
-        field = keys_in(model).get(part) if model else None
-        model, named = (table_in(field.annotation), _by_names(field)) if field else (None, False)
-    return field
-
-
-def _by_names(field: FieldInfo) -> bool:
-    """Whether a key holds tables by names of the user's."""
-    return get_origin(field.annotation) is dict and table_in(field.annotation) is not None
-
-
-@cache
-def keys_of(file: type[BaseModel]) -> Mapping[str, type[BaseModel] | None]:
-    """All dotted keys of a kind of file; those of tables with the table's model."""
-    keys: dict[str, type[BaseModel] | None] = {"": file}
-    for name, field in keys_in(file).items():
-        table, named = table_in(field.annotation), ".*" if _by_names(field) else ""
-        keys[name] = None if named else table
-        below = keys_of(table) if table else {}
-        keys |= {f"{name}{named}.{key}".rstrip("."): one for key, one in below.items()}
-    return keys
+def _place(location: Sequence[str | int], known: Collection[str]) -> str:
+    """The key of a kind of file for a key of a file, with an asterisk for a name of the user's."""
+    place = ""
+    for part in (part for part in location if isinstance(part, str)):
+        below = f"{place}.{part}".lstrip(".")
+        place = below if below in known else f"{place}.*"
+    return place
 
 
 def check_key(model: type[Table], key: str) -> None:
@@ -179,9 +157,9 @@ def check_key(model: type[Table], key: str) -> None:
     parts, known = re.sub(r"\[\d+\]", "", key).split("."), keys_of(model)
     if "" in parts:
         raise unusable(key, "is not a key of a case; expected one such as drive.frequency")
-    if ".".join(parts) not in known:
+    if (field := known.get(".".join(parts))) is None:
         raise unusable(key, _unknown_key(parts, model, "a case"))
-    if known[".".join(parts)]:
+    if table_in(field.annotation):
         raise unusable(key, "is a table of a case; expected one of its keys")
 
 
@@ -189,15 +167,14 @@ def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
     *tables, word = location
     if ".".join(location) in _ENDED:
         return "expected none: this key has ended; the program limits the engine itself"
-    known, place = keys_of(file), ""
-    for part in tables:
-        below = f"{place}.{part}".lstrip(".")
-        place = below if below in known or f"{below}.*" in known else f"{place}.*"
-    table = known.get(place)
+    known = keys_of(file)
+    field = known.get(_place(tables, known))
+    table = table_in(field.annotation) if field else None if tables else file
     siblings = list(keys_in(table)) if table else []
-    keys = {re.sub(r"^(clusters|placed|drive\.harmonics)\.", r"\1[0].", key): inner for key, inner in known.items()}
+    keys = {re.sub(r"^(clusters|placed|drive\.harmonics)\.", r"\1[0].", key): one for key, one in known.items()}
     hint = suggestion(word, siblings) if siblings else suggestion(".".join(location), keys)
-    elsewhere = [key for key, inner in keys.items() if inner is None and "*" not in key and key.split(".")[-1] == word]
+    plain = [key for key, one in keys.items() if "*" not in key and not table_in(one.annotation)]
+    elsewhere = [key for key in plain if key.split(".")[-1] == word]
     if not hint and elsewhere:
         hint = f'; did you mean "{elsewhere[0]}"?'
     within = f"[{'.'.join(tables)}]" if tables else whole

@@ -175,6 +175,17 @@ def keys_in(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
 
 
 @cache
+def keys_of(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
+    """All dotted keys of a kind of file with their fields; ``.*`` stands for names of the user's."""
+    keys: dict[str, FieldInfo] = {}
+    for name, field in keys_in(model).items():
+        table, names = table_in(field.annotation), f"{name}.*" if get_origin(field.annotation) is dict else name
+        keys |= {name: field, names: field} if table else {name: field}
+        keys |= {f"{names}.{key}": one for key, one in keys_of(table).items()} if table else {}
+    return keys
+
+
+@cache
 def _tables_in(model: type[Table]) -> Mapping[str, type[Table]]:
     """The keys of a table that hold tables, alone or in a list."""
     tables = {name: table_in(field.annotation) for name, field in keys_in(model).items()}
@@ -212,8 +223,8 @@ def contradictions(model: type[Table], document: Any, place: str = "") -> Iterat
 def alternatives(model: type[Table], name: str) -> set[str]:
     """Dotted keys that say in other words what a key says."""
     *path, last = parts_of(name)
-    for part in (part for part in path if isinstance(part, str)):
-        field = keys_in(model).get(part)
+    if path:
+        field = keys_of(model).get(".".join(part for part in path if isinstance(part, str)))
         if (table := table_in(field.annotation) if field else None) is None:
             return set()
         model = table

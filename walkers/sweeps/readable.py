@@ -12,8 +12,7 @@ from pydantic_core import to_jsonable_python
 
 from walkers.inputs import units
 from walkers.inputs.case import Case
-from walkers.inputs.messages import keys_of
-from walkers.inputs.table import keys_in
+from walkers.inputs.table import keys_of
 from walkers.inputs.units import Kind
 
 READABLE_UNITS: Mapping[str, tuple[str, float]] = {
@@ -71,8 +70,7 @@ def kind_of(key: str) -> Kind | None:
 @cache
 def _kinds() -> Mapping[str, Kind]:
     """What the numbers of a case are, by the last part of their keys; the others are pure numbers."""
-    tables = filter(None, keys_of(Case).values())
-    fields = [(name, field) for table in tables for name, field in keys_in(table).items()]
+    fields = [(key.rpartition(".")[2], field) for key, field in keys_of(Case).items()]
     kinds = {name: units.kind_in([*field.metadata, field.annotation]) for name, field in fields}
     return {name: kind for name, kind in kinds.items() if kind is not None}
 
