@@ -20,19 +20,22 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from walkers import load_case, run, sweep
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.file import load_calibration
 from walkers.calibration.report import write_outcome
-from walkers.check.report import validate
+from walkers.check.benchmarks import curve_of, published
+from walkers.check.lines import as_dict, failures
+from walkers.check.literature import LITERATURE, literature
 from walkers.errors import InputError, Problem
 from walkers.inputs.case import Case
 from walkers.inputs.keys import flatten
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.make import COMPARED, FIGURES, make_figures
 from walkers.postprocess.analysis import analyses
+from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, save_figure, styled
 from walkers.postprocess.films import FilmOptions
 from walkers.runner.files import read_json, write_json, write_text
 from walkers.runner.launch import cores_here
@@ -41,7 +44,12 @@ from walkers.sweeps.climbing_figure import write_climbs
 from walkers.sweeps.scheduler import Options
 from walkers.templates.deck import CONTENT_VERSION
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 RECORD = Path("figures") / "made-from.json"
+CHECKED = Path("figures") / "validation.json"
+"""Lines of ``walkers check literature``, of which pages quote numbers."""
 _BLOCK = re.compile(r"(?ms)(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n)(?P<text>.*?)(?=^```)")
 _FACT = re.compile(r"<!--fact (?P<name>\S+)-->(?P<text>[^<]*)<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
@@ -106,9 +114,27 @@ def _of_climbs(name: str, *others: str, assembly: Mapping[str, Any] | None = Non
 
 
 def _make_validation(out: Path, docs: Path) -> None:
-    made = validate(out, docs / "explanation", jobs=cores_here())
-    for statement in made.failed:
-        print(f"walkers: not as expected: {statement}", file=sys.stderr)
+    lines = literature(out)
+    write_json(docs / CHECKED, as_dict(lines))
+    save_figure(_benchmarks(), docs / "figures" / "benchmarks.png", (), title="Published benchmarks of impacts")
+    for line in failures(lines):
+        print(f"walkers: not as expected: {line.check}: {line.what}", file=sys.stderr)
+
+
+@styled
+def _benchmarks() -> Figure:
+    """Published points and the curves of the second engine, without those of the second material of test 4."""
+    panels = {key: panel for key, panel in published().items() if not key.startswith("alloy-")}
+    figure, grid = new_figure(TWO_COLUMNS, 11.0, nrows=4, ncols=2)
+    for axes, (key, panel) in zip(grid.flat, panels.items(), strict=True):
+        for series, marker in zip(panel["series"], "osD^"[: len(panel["series"])], strict=True):
+            axes.plot(*series["points"].T, marker, mfc="none", ms=4.0, label=series["name"])
+        axes.plot(*curve_of(key), color="k", lw=1.0, label="second engine")
+        axes.set(xlabel=panel["x"], ylabel=panel["y"], title=panel["title"])
+        axes.set_xscale("log" if key == "spin" else "linear")
+        legend_below(axes, ncols=2)
+    letter_panels(grid.flat)
+    return figure
 
 
 def _make_calibration(out: Path, docs: Path) -> None:
@@ -161,7 +187,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     **{name: _of_figure(name, f"figures/{name}.png", sweeps=one.sweeps) for name, one in FIGURES.items()},
     "comparison": _of_figure("comparison", "figures/comparison.md", "figures/comparison.json", sweeps=COMPARED),
     "validation": Illustration(
-        ("explanation/validation.md",),
+        (CHECKED.as_posix(), "figures/benchmarks.png"),
         _shipped("fig1b", "fig4a", "fig4b", "climber", "climber-dimer", "pile-ci"),
         _make_validation,
     ),
@@ -226,10 +252,36 @@ def pages_of(docs: Path) -> list[Path]:
 
 
 def facts(docs: Path) -> dict[str, str]:
-    """Numbers that sentences may quote: the values of the engine in the comparison, and how many agree."""
+    """Numbers that sentences may quote: of the comparison with the paper, and of `CHECKED`."""
     compared: dict[str, Any] = read_json(docs / "figures" / "comparison.json")
     numbers = {one["key"]: f"{one['engine']:.3g}" for one in compared["numbers"] if one["engine"] is not None}
-    return {**numbers, "agree": f"{compared['agree']} of {compared['of']}"}
+    checked = read_json(docs / CHECKED)["lines"]
+    return {**numbers, "agree": f"{compared['agree']} of {compared['of']}", **_of_checks(checked)}
+
+
+def _of_checks(lines: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """The measured and the expected number of each line by check and words, and some numbers of many lines."""
+    numbers: dict[str, str] = {}
+    for line in lines:
+        name = "_".join(re.findall(r"\w+", f"{line['check']} {line['what']}".lower()))
+        numbers |= {name: f"{line['measured']:.4g}", f"{name}_expected": f"{line['expected']:.4g}"}
+    for check in LITERATURE:
+        judged = [line for line in lines if line["check"] == check and line["tolerance"] is not None]
+        passed = sum(line["verdict"] == "pass" for line in judged)
+        numbers[f"{check}_pass"] = f"{passed} of {len(judged)}"
+        for test in sorted({line["what"][0] for line in judged} if check == "benchmarks" else ()):
+            shares = [line["error"] / line["tolerance"] for line in judged if line["what"].startswith(test)]
+            numbers[f"benchmarks_{test}"] = f"{100.0 * max(shares):.0f}"
+    crossed = [line for line in lines if line["check"] == "crosscheck"]
+    walked = [line["error"] for line in crossed if line["what"].endswith(": velocity")]
+    apart = [line["measured"] for line in crossed if line["what"].endswith(": largest distance of a bead")]
+    cycles = [line["measured"] for line in crossed if re.search("start .*: cycles", line["what"])]
+    return {
+        **numbers,
+        "crosscheck_velocity": f"{max(walked):.1g}",
+        "crosscheck_distance": f"{max(apart[: -len(cycles)]):.1g}",
+        "crosscheck_cycles": f"{min(cycles):.0f} to {max(cycles):.0f}",
+    }
 
 
 def refresh_pages(pages: Iterable[Path], known: Mapping[str, str], out: Path) -> list[Path]:

@@ -8,10 +8,9 @@ from math import asin, atan2, cos, cosh, inf, pi, radians, sin, sinh
 import numpy as np
 import pytest
 
-from walkers.check.bridges import FITS
 from walkers.physics.capillary import rupture_distance as rupture_of_lian
 from walkers.physics.laplace import force_curve, rupture_distance
-from walkers.physics.laws.willett import rupture as rupture_of_willett
+from walkers.physics.laws import willett
 
 # Radii, volume, contact angle: the paper's bridges between beads and at walls in units of a bead's radius, and others.
 BRIDGES = [
@@ -100,12 +99,11 @@ def test_published_fits_between_equal_spheres(volume: float, degrees: float, tol
     """
     given = (1.0, 1.0, volume, radians(degrees))
     rupture = rupture_distance(*given)
-    assert rupture == pytest.approx(rupture_of_willett(*given), rel=tolerance)
+    assert rupture == pytest.approx(willett.rupture(*given), rel=tolerance)
     assert rupture == pytest.approx(rupture_of_lian(*given[2:]), rel=0.08)
-    gaps = np.linspace(0.0, 0.9 * min(rupture, rupture_of_willett(*given)), 40)
+    gaps = np.linspace(0.0, 0.9 * min(rupture, willett.rupture(*given)), 40)
     forces = force_curve(*given, gaps).forces
-    (willett,) = (law.pull(*given, gaps) for law in FITS)
-    assert willett == pytest.approx(forces, abs=0.03 * forces[0])
+    assert willett.pull(*given, gaps) == pytest.approx(forces, abs=0.03 * forces[0])
 
 
 @pytest.mark.parametrize("given", [BRIDGES[1], BRIDGES[4]])

@@ -3,26 +3,44 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from walkers.check.benchmarks import largest
-from walkers.check.crosscheck import Comparison, Start
-from walkers.check.report import Chapter, Line, Verdict, as_dict, outcome
+from walkers.check.crosscheck import Start
+from walkers.check.lines import Line, Verdict, as_dict, as_text, failures, outcome
 from walkers.inputs.reading import load_case
 from walkers.postprocess.motion import Motion
 
-GOOD, BAD = Line("good", 1.0, 1.05, 0.1), Line("bad", 1.0, 1.2, 0.1)
-CHAPTERS = (Chapter("one", "One", (GOOD,)), Chapter("two", "Two", (GOOD, BAD, GOOD)))
+GOOD, BAD = Line("good", 1.0, 1.05, 0.1), Line("bad", 1.0, 1.2, 0.1, check="second")
+
+
+@pytest.mark.parametrize(
+    ("line", "verdict"),
+    [
+        (GOOD, Verdict.PASS),
+        (BAD, Verdict.FAIL),
+        (replace(GOOD, measured=float("nan")), Verdict.FAIL),
+        (replace(GOOD, expected=0.0, measured=0.2), Verdict.FAIL),
+        (replace(BAD, scale=10.0), Verdict.PASS),
+        (replace(BAD, tolerance=inf), Verdict.NOT_JUDGED),
+        (replace(GOOD, given=Verdict.FAIL), Verdict.FAIL),
+    ],
+)
+def test_a_line_is_judged_by_its_tolerance(line: Line, verdict: Verdict) -> None:
+    assert line.verdict is verdict
 
 
 def test_one_failed_line_fails_all_checks() -> None:
-    assert [line.verdict for line in (GOOD, BAD)] == [Verdict.PASS, Verdict.FAIL]
-    assert not as_dict(CHAPTERS)["passed"]
-    assert as_dict(CHAPTERS[:1])["passed"]
-    assert (outcome(CHAPTERS), outcome(CHAPTERS[:1])) == ("1 of 4 lines fail", "all 1 lines pass")
+    lines = (GOOD, replace(GOOD, check="second"), BAD)
+    assert not as_dict(lines)["passed"]
+    assert as_dict(lines[:1])["passed"]
+    assert failures(lines) == [BAD]
+    assert (outcome(lines), outcome(lines[:1])) == ("1 of 3 lines fail", "all 1 lines pass")
+    assert [line.split()[0] for line in as_text(lines[1:]).splitlines()] == ["second", "pass", "FAIL"]
 
 
 def _pile(cycles: list[float]) -> Motion:
@@ -38,17 +56,17 @@ def _pile(cycles: list[float]) -> Motion:
     )
 
 
-@pytest.mark.parametrize(("away", "cycle"), [(2, 0.5), (3, 1.5), (4, None)])
-def test_a_pile_fails_if_a_bead_leaves_its_motion_in_the_first_cycle(away: int, cycle: float | None) -> None:
+@pytest.mark.parametrize(("away", "cycle"), [(2, 0.5), (3, 1.5), (4, 1.5)])
+def test_a_pile_fails_if_a_bead_leaves_its_motion_in_the_first_cycle(away: int, cycle: float) -> None:
     """By 1.1 % of the smallest radius, one bead of three."""
     first = _pile([0.0, 0.25, 0.5, 1.5])
     moved = first.position.copy()
     moved[away:, 1, 0] += 0.011 * 0.3e-3
-    start = Start(first, replace(first, position=moved))
-    assert start.together == (cycle if cycle is None else pytest.approx(cycle))
-    assert start.line().measured == pytest.approx(0.0 if cycle is None else 3.3)
-    failures = Comparison(first.case, (), (GOOD,), (start,)).chapter().failures
-    assert len(failures) == (cycle == 0.5)
+    together, farthest = Start(first, replace(first, position=moved)).lines()
+    assert (together.expected, together.measured) == pytest.approx((1.5, cycle))
+    assert farthest.measured == pytest.approx(0.0 if away == 4 else 3.3)
+    assert together.failed == (cycle == 0.5)
+    assert not farthest.failed
 
 
 def test_the_largest_difference_has_either_sign() -> None:

@@ -6,39 +6,40 @@ import tempfile
 import time
 from collections.abc import Callable, Collection
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from walkers.check.report import Chapter, Line, Verdict, as_dict, count, outcome
+from walkers.check.lines import Line, Verdict, as_dict, as_text, count, failures, outcome
 from walkers.check.scenes import CHECKS, LONG, Bench
 from walkers.errors import expected_of, refused
 from walkers.runner.binary import AuditRecord, Engine, find_engine, model_sha256, write_audit
 
 
 @dataclass(frozen=True)
-class AuditReport:
-    """Results of an audit; ``contact_model`` is its SHA-256, empty without one."""
+class Audit:
+    """Lines of an audit; ``contact_model`` is the SHA-256 of the contact model, empty without one."""
 
     engine: Engine
     contact_model: str
     version: str
-    chapters: tuple[Chapter, ...]
+    lines: tuple[Line, ...]
 
     @property
     def failures(self) -> list[Line]:
         """The lines that fail, or could not be measured."""
-        return [line for chapter in self.chapters for line in chapter.failures]
+        return failures(self.lines)
 
     def as_text(self) -> str:
         """A table for each check, and the outcome."""
-        text = f"{self.version}, binary and contact model {self.engine.sha256[:12]}: {outcome(self.chapters)}"
-        return "\n\n".join([*(chapter.as_text() for chapter in self.chapters), text])
+        text = f"{self.version}, binary and contact model {self.engine.sha256[:12]}: {outcome(self.lines)}"
+        return f"{as_text(self.lines)}\n\n{text}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types."""
         engine = {"path": str(self.engine.path), "sha256": self.engine.sha256, "version": self.version}
-        return as_dict(self.chapters, engine=engine)
+        return as_dict(self.lines, engine=engine)
 
 
 def selected(only: Collection[str] = (), *, quick: bool = False) -> tuple[str, ...]:
@@ -53,50 +54,48 @@ def run_audit(
     names: Collection[str] = tuple(CHECKS),
     *,
     engine: Engine | None = None,
-    on_done: Callable[[Chapter], None] | None = None,
-) -> AuditReport:
-    """Run some of the `CHECKS` on an engine, the installed one if None is given; ``on_done`` is called after each."""
+    on_done: Callable[[str], None] | None = None,
+) -> Audit:
+    """Run some of the `CHECKS` on an engine, the installed one if None is given; ``on_done`` is told each name."""
     binary = engine or find_engine()
     model = model_sha256(binary) or ""
     with tempfile.TemporaryDirectory(prefix="walkers-audit-") as folder:
         bench = Bench(binary, Path(folder))
 
-        def measure(name: str) -> Chapter:
-            begin, title = time.perf_counter(), (CHECKS[name].__doc__ or "").rstrip(".")
+        def measure(name: str) -> list[Line]:
             try:
-                lines = tuple(CHECKS[name](bench))
+                lines = list(CHECKS[name](bench))
             except Exception as failure:  # another build of the engine may fail in any way
                 reason = str(failure).split(" (see ", 1)[0] or type(failure).__name__
-                lines = (Line.without_number(f"{title}: {reason}", Verdict.ERROR),)
-            chapter = Chapter(name, title, lines, seconds=time.perf_counter() - begin)
+                lines = [Line.without_number(reason, Verdict.ERROR)]
             if on_done:
-                on_done(chapter)
-            return chapter
+                on_done(name)
+            return [replace(line, check=name) for line in lines]
 
         pool = ThreadPoolExecutor(2)
         try:
-            chapters = tuple(pool.map(measure, names))
+            lines = tuple(chain.from_iterable(pool.map(measure, names)))
         finally:
             bench.stop.set()
             pool.shutdown(cancel_futures=True)
-        return AuditReport(binary, model, bench.version, chapters)
+        return Audit(binary, model, bench.version, lines)
 
 
-def record(report: AuditReport, *, quick: bool) -> AuditRecord | None:
-    """Keep a report for the user: runs with this binary name it, and are refused if it failed.
+def record(audit: Audit, *, quick: bool) -> AuditRecord | None:
+    """Keep an audit for the user: runs with this binary name it, and are refused if it failed.
 
-    A report with lines that could not be measured is not kept, because the reason is the machine, not the binary.
+    An audit with lines that could not be measured is not kept, because the reason is the machine, not the binary.
     """
-    if count(report.chapters, Verdict.ERROR):
+    if count(audit.lines, Verdict.ERROR):
         return None
     kept = AuditRecord(
-        engine=report.engine.sha256,
-        contact_model=report.contact_model,
-        version=report.version,
+        engine=audit.engine.sha256,
+        contact_model=audit.contact_model,
+        version=audit.version,
         scope="quick" if quick else "full",
-        lines=sum(len(chapter.lines) for chapter in report.chapters),
-        failures=tuple(line.what for line in report.failures),
-        skipped=count(report.chapters, Verdict.SKIPPED),
+        lines=len(audit.lines),
+        failures=tuple(line.what for line in audit.failures),
+        skipped=count(audit.lines, Verdict.SKIPPED),
         date=time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
     )
     write_audit(kept)

@@ -1,6 +1,6 @@
 """Compare a finished run of LIGGGHTS with the second engine: the same start, samples and analysis.
 
-`crosscheck` compares a case, `chapter` cases of all kinds for docs/explanation/validation.md.
+`crosscheck` compares a case, `crosschecks` cases of all kinds.
 """
 
 from __future__ import annotations
@@ -15,10 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from walkers.api import Run, run
-from walkers.check.engine import TERMS, SecondEngine, close_pairs
+from walkers.check.engine import SecondEngine, close_pairs
 from walkers.check.kernels import FloatArray
-from walkers.check.report import Chapter, Line, Verdict
+from walkers.check.lines import Line, Verdict
 from walkers.errors import unusable
 from walkers.inputs.case import Case
 from walkers.inputs.messages import blaming
@@ -26,7 +25,6 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.gait import averages, walk
 from walkers.postprocess.motion import Group, Motion
-from walkers.text import rendered
 
 SPEED, GAIT, ORIENTATION = 1e-4, 1e-3, 0.1
 """Tolerances: velocities of walkers (relative); rotation and sliding, relative to the fastest of them; final
@@ -52,42 +50,25 @@ class Start:
         return np.asarray(np.linalg.norm(self.first.position - self.second.position, axis=-1).max(axis=1))
 
     @property
-    def together(self) -> float | None:
-        """Cycles of the drive during which both motions agree; None if they agree to the end."""
+    def together(self) -> float:
+        """Cycles of the drive during which both motions agree."""
         over = np.flatnonzero(self.apart > ONE * float(self.first.radius.min()))
-        return float(self.first.time[over[0]]) * self.first.case.excitation.frequency if len(over) else None
+        return self.first.case.excitation.frequency * float(self.first.time[over[0] if len(over) else -1])
 
-    def line(self) -> Line:
-        """When the motions diverge; piles, which are chaotic, fail if they diverge in the first cycle."""
-        case, cycles = self.first.case, self.together
-        agreement = "same motion to the end" if cycles is None else f"same motion until cycle {cycles:.1f}"
-        name = f"start {case.run.seed}, " if case.mixture is not None else ""
-        early = case.mixture is not None and cycles is not None and cycles < 1.0
-        farthest = 1e6 * float(self.apart.max())
-        given = Verdict.FAIL if early else None
-        return Line(f"{name}{agreement}; largest distance of a bead", 0.0, farthest, unit="µm", given=given)
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """A case in both engines: lines (for a pile, means over the starts first) and the runs."""
-
-    case: Case
-    without: tuple[str, ...]
-    lines: tuple[Line, ...]
-    starts: tuple[Start, ...]
-
-    def chapter(self) -> Chapter:
-        """The comparison as a chapter."""
-        case = self.case
-        laws = f"without {', '.join(self.without)}" if self.without else "with the same laws"
-        title = f"{case.excitation.described()}, {case.run.cycles} cycles; LIGGGHTS and the second engine {laws}"
-        return Chapter(case.name, title, (*self.lines, *(start.line() for start in self.starts)))
+    def lines(self) -> Iterator[Line]:
+        """When and how far the motions diverge; piles, which are chaotic, fail if they diverge in the first cycle."""
+        case = self.first.case
+        pile = case.mixture is not None
+        name = f"start {case.run.seed}: " if pile else ""
+        cycles = case.excitation.frequency * float(self.first.time[-1])
+        early = Verdict.FAIL if pile and self.together < min(1.0, cycles) else None
+        yield Line(f"{name}cycles of the same motion", cycles, self.together, given=early)
+        yield Line(f"{name}largest distance of a bead", 0.0, 1e6 * float(self.apart.max()), unit="µm")
 
 
 def crosscheck(
     case: Case, out: Path, without: Sequence[str] = (), *, seeds: int = 1, make: Callable[[Case, Path], Run] = run
-) -> Comparison:
+) -> list[Line]:
     """Compare the run of a case with the second engine; for a pile, runs with a number of ``seeds``.
 
     ``out`` is the folder of the run directories, ``without`` are terms that the second engine leaves out
@@ -96,7 +77,7 @@ def crosscheck(
 
     Examples
     --------
-    >>> crosscheck(load_case("fig1b"), tmp).chapter().failures
+    >>> [line for line in crosscheck(load_case("fig1b"), tmp) if line.failed]
     []
     """
     if case.liquid.conserved:
@@ -106,17 +87,18 @@ def crosscheck(
     return compare([make(one, out).motion for one in cases], without)
 
 
-def compare(motions: Sequence[Motion], without: Sequence[str] = ()) -> Comparison:
+def compare(motions: Sequence[Motion], without: Collection[str] = ()) -> list[Line]:
     """Compare finished runs of a case, one per start, with the second engine without some terms."""
-    starts = tuple(Start(motion, simulate(motion, without)) for motion in motions)
-    case, first, second = motions[0].case, starts[0].first, starts[0].second
-    if case.mixture is not None:
+    starts = [Start(motion, simulate(motion, without)) for motion in motions]
+    first, second = starts[0].first, starts[0].second
+    if first.case.mixture is not None:
         lines = list(_pile_lines(starts))
     else:
         lines = [] if first.groups else list(_drift(first, second))
         for number, groups in enumerate(zip(first.groups, second.groups, strict=True)):
             lines += _walker_lines(*groups, f" ({number + 1})" if len(first.groups) > 1 else "")
-    return Comparison(case, tuple(term for term in TERMS if term in without), tuple(lines), starts)
+    check = " without ".join([first.case.name, *([", ".join(without)] if without else [])])
+    return [replace(line, check=check) for line in [*lines, *(line for start in starts for line in start.lines())]]
 
 
 def shortened(case: Case, cycles: int) -> Case:
@@ -219,13 +201,11 @@ def _touching(motion: Motion) -> float:
     return found / len(motion.position) / len(motion.radius)
 
 
-def chapter(out: Path, *, quick: bool = False) -> Chapter:
+def crosschecks(out: Path, *, quick: bool = False) -> Iterator[Line]:
     """Run cases of all kinds in both engines, or only a short run of one walker; errors as of `crosscheck`."""
-    cases = {"fig1b": shortened(load_case("fig1b"), 6)} if quick else full_cases()
-    found = {name: crosscheck(case, out, seeds=STARTS if case.mixture else 1) for name, case in cases.items()}
-    lines = [replace(line, what=f"{name}: {line.what}") for name, one in found.items() for line in one.chapter().lines]
-    text = rendered("walkers.check", "crosscheck.md.j2", found=found)
-    return Chapter("crosscheck", "A second engine", tuple(lines), text)
+    for name, case in ({"fig1b": shortened(load_case("fig1b"), 6)} if quick else full_cases()).items():
+        for line in crosscheck(case, out, seeds=STARTS if case.mixture else 1):
+            yield replace(line, what=f"{name}: {line.what}")
 
 
 def full_cases() -> dict[str, Case]:

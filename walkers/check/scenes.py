@@ -21,7 +21,7 @@ import numpy as np
 
 from walkers.check.engine import SecondEngine
 from walkers.check.kernels import FloatArray
-from walkers.check.report import Line, Verdict
+from walkers.check.lines import Line, Verdict
 from walkers.errors import Stopped
 from walkers.inputs.boundary import BOTTOM, Flat, Round, Wall
 from walkers.inputs.case import Case

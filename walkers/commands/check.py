@@ -31,12 +31,11 @@ from walkers.commands.arguments import (
 )
 
 if TYPE_CHECKING:
-    from walkers.check.report import Chapter
     from walkers.inputs.case import Case as Resolved
 
 _FILES = "An unpacked archive, or a run or a sweep (folder, name in --out, or case)."
 _NAME = "A material, a liquid, a bridge law, a case, a sweep or a calibration."
-_CHAPTER = "benchmarks, bridges or crosscheck; default: all."
+_LITERATURE = "benchmarks, bridges or crosscheck; default: all."
 _CALIBRATION = "A calibration file, or the name of a shipped calibration such as ruby."
 
 
@@ -59,38 +58,30 @@ def check_engine(
         if engine is None:
             raise
         raise refused("--engine", str(missing)) from missing
-    report = run_audit(checks, engine=binary, on_done=_tell_seconds)
-    print_as(as_json, report.as_dict, report.as_text)
+    audit = run_audit(checks, engine=binary, on_done=tell)
+    print_as(as_json, audit.as_dict, audit.as_text)
     if not only:
         try:
-            record(report, quick=quick)
+            record(audit, quick=quick)
         except OSError as error:
             warnings.warn(f"the outcome cannot be kept: {error}", stacklevel=1)
-    return 1 if report.failures else 0
+    return 1 if audit.failures else 0
 
 
 def check_literature(
-    chapters: list[str] | None = Argument(None, metavar="CHAPTER", help=_CHAPTER),
-    quick: bool = Option(False, "--quick", help="Run only the fast part of each chapter."),
+    only: list[str] | None = Argument(None, metavar="CHECK", help=_LITERATURE),
+    quick: bool = Option(False, "--quick", help="Run only the fast part of each check."),
     out: Out = DEFAULT_OUT,
-    to: Path | None = Option(None, help="Folder to write the page to; default: OUT/validation."),
-    jobs: int | None = Option(None, "-j", "--jobs", min=1, help="Number of parallel chapters; default: one per core."),
     as_json: Json = False,
 ) -> int:
-    """Compare engine and bridge laws with published benchmarks and exact solutions, and write a page of results."""
-    from walkers.check.report import as_dict, validate
+    """Compare engine and bridge laws with published benchmarks, exact solutions and a second engine."""
+    from walkers.check.lines import as_dict, as_text, failures, outcome
+    from walkers.check.literature import literature
 
     check_folder("--out", out)
-    folder, cores = to or out / "validation", on_cores(jobs).workers
-    check_folder("--to", folder)
-    made = validate(out, folder, only=chapters or (), quick=quick, jobs=cores, on_done=_tell_seconds)
-    print_as(as_json, lambda: as_dict(made.chapters), lambda: "\n".join(map(str, made.files)))
-    tell(*(f"not as expected: {statement}" for statement in made.failed))
-    return 1 if made.failed else 0
-
-
-def _tell_seconds(chapter: Chapter) -> None:
-    tell(f"{chapter.name} ({chapter.seconds:.1f} s)")
+    lines = literature(out, only or (), quick=quick, on_done=tell)
+    print_as(as_json, lambda: as_dict(lines), lambda: f"{as_text(lines)}\n\n{outcome(lines)}")
+    return 1 if failures(lines) else 0
 
 
 def check_files(what: str = Argument(metavar="PATH", help=_FILES), settings: Set = None, out: Out = DEFAULT_OUT) -> int:
@@ -117,7 +108,7 @@ def check_case(
     """Run CASE with LIGGGHTS and with an independent second engine in Python, and compare the motion."""
     from walkers.check.crosscheck import crosscheck, shortened
     from walkers.check.engine import TERMS
-    from walkers.check.report import as_dict
+    from walkers.check.lines import as_dict, as_text, failures
     from walkers.errors import refused
 
     loaded = load_case(str(context.info_name), settings, out)
@@ -133,12 +124,11 @@ def check_case(
     def make(one: Resolved, folder: Path) -> walkers.Run:
         return walkers.run(one, folder, engine=engine, progress=True, allow_failed_audit=allow_failed_audit)
 
-    found = crosscheck(loaded, out, without or (), seeds=seeds, make=make)
-    chapter = found.chapter()
-    print_as(as_json, lambda: as_dict([chapter], case=loaded.name, without=list(found.without)), chapter.as_text)
+    lines = crosscheck(loaded, out, without or (), seeds=seeds, make=make)
+    print_as(as_json, lambda: as_dict(lines, case=loaded.name, without=without or []), lambda: as_text(lines))
     if not as_json:
-        tell(*(f"{loaded.name}: differs: {line.what}" for line in chapter.failures))
-    return 1 if chapter.failures else 0
+        tell(*(f"{loaded.name}: differs: {line.what}" for line in failures(lines)))
+    return 1 if failures(lines) else 0
 
 
 def library(name: str | None = Argument(None, metavar="NAME", help=_NAME)) -> None:

@@ -22,8 +22,6 @@ from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Surfaces
 from walkers.physics.capillary import derjaguin_radius, rupture_distance
 
-PUBLISHED = "Rabinovich 2005"
-
 
 def lambert(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
     """Pull without the second term, as corrected by Lambert et al. (2008): 2πRγ cos θ / (1 + h / 2d).

@@ -23,8 +23,6 @@ import numpy as np
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
 from walkers.physics.capillary import rupture_distance
 
-PUBLISHED = "Soulié 2006 (stock engine)"
-
 
 def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
     """Pull over the surface tension, F/γ (m), at gaps (m), both of shape (n,), for a volume in m³ and an angle in rad.

@@ -19,10 +19,6 @@ from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Surfaces
 from walkers.physics.capillary import derjaguin_radius
 
-PUBLISHED = "Willett 2000"
-ERROR = 0.04
-"""Relative error of the pull at contact against Young–Laplace."""
-
 
 def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
     """Willett et al. (2000), appendix: ln(F / 2πRγ) = f1 - f2 exp(f3 ln s + f4 ln² s), s half the gap over √(V/R).

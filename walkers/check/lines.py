@@ -1,0 +1,110 @@
+"""Checks are lines: what is compared, the expected and the measured value, and the tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import groupby
+from math import inf, isfinite, nan
+from typing import Any
+
+
+class Verdict(StrEnum):
+    """Outcome of a line: ``ERROR`` if it could not be measured, ``NOT_JUDGED`` without a tolerance."""
+
+    PASS = "pass"
+    FAIL = "FAIL"
+    ERROR = "ERROR"
+    SKIPPED = "skipped"
+    NOT_JUDGED = "-"
+
+
+@dataclass(frozen=True)
+class Line:
+    """One comparison, part of the ``check`` of that name.
+
+    ``expected`` and ``measured`` are in ``unit`` (of two engines: LIGGGHTS and the second engine). ``tolerance`` is the
+    largest error that passes, infinite without a judgement. Errors are relative to ``scale``; default: the expected
+    number, or 1 if that is 0. ``given`` is a verdict that does not follow from the error.
+    """
+
+    what: str
+    expected: float
+    measured: float
+    tolerance: float = inf
+    unit: str = ""
+    scale: float | None = None
+    given: Verdict | None = None
+    check: str = ""
+
+    @classmethod
+    def without_number(cls, what: str, verdict: Verdict) -> Line:
+        """A line without a measured value."""
+        return cls(what, nan, nan, given=verdict)
+
+    @property
+    def error(self) -> float:
+        """The error that is judged."""
+        return abs(self.measured - self.expected) / (self.scale or abs(self.expected) or 1.0)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Pass or fail by the tolerance; an error that is no number fails."""
+        if self.given or self.tolerance == inf:
+            return self.given or Verdict.NOT_JUDGED
+        return Verdict.PASS if self.error <= self.tolerance else Verdict.FAIL
+
+    @property
+    def failed(self) -> bool:
+        """Whether the line fails or could not be measured."""
+        return self.verdict in (Verdict.FAIL, Verdict.ERROR)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON types; numbers that are none become null."""
+        numbers = {name: getattr(self, name) for name in ("expected", "measured", "error", "tolerance")}
+        finite = {name: value if isfinite(value) else None for name, value in numbers.items()}
+        return {"check": self.check, "what": self.what, "unit": self.unit, **finite, "verdict": str(self.verdict)}
+
+
+def failures(lines: Iterable[Line]) -> list[Line]:
+    """Lines that fail or could not be measured."""
+    return [line for line in lines if line.failed]
+
+
+def count(lines: Iterable[Line], verdict: Verdict) -> int:
+    """Number of lines with a verdict."""
+    return sum(line.verdict is verdict for line in lines)
+
+
+def outcome(lines: Sequence[Line]) -> str:
+    """Number of lines that pass, as text."""
+    passed, failed = count(lines, Verdict.PASS), count(lines, Verdict.FAIL)
+    sentence = f"{failed} of {passed + failed} lines fail" if failed else f"all {passed} lines pass"
+    for verdict, words in ((Verdict.ERROR, "could not be measured"), (Verdict.SKIPPED, "skipped")):
+        sentence += f", {number} {words}" if (number := count(lines, verdict)) else ""
+    return sentence
+
+
+def as_text(lines: Iterable[Line]) -> str:
+    """A table below the name of each check."""
+    return "\n\n".join(
+        "\n".join([check, *_rows(list(rows))]) for check, rows in groupby(lines, lambda line: line.check)
+    )
+
+
+def _rows(lines: Sequence[Line]) -> Iterable[str]:
+    width = max(len(line.what) for line in lines)
+    for line in lines:
+        judged = f"error {line.error:.1e} of {line.tolerance:.0e}" if isfinite(line.error + line.tolerance) else ""
+        numbers = f"{_number(line.expected):>11} {_number(line.measured):>11} {line.unit:4} {judged}"
+        yield f"{line.verdict:7} {line.what:{width}} {numbers}".rstrip()
+
+
+def _number(value: float) -> str:
+    return f"{value:.6g}" if isfinite(value) else "-"
+
+
+def as_dict(lines: Sequence[Line], **more: Any) -> dict[str, Any]:
+    """Plain JSON types of all lines and of further values."""
+    return {**more, "passed": not failures(lines), "lines": [line.as_dict() for line in lines]}
