@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from walkers.api import Run, run
 from walkers.check.engine import SecondEngine, close_pairs
 from walkers.check.kernels import FloatArray
 from walkers.check.lines import Line, Verdict
