@@ -18,6 +18,7 @@ from scipy.stats import spearmanr
 from tests.conftest import call, document, make_case, to_toml
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.sweep import Descent, expand
+from walkers.postprocess.uncertainty import ACCURACY_NAME
 from walkers.runner.directory import case_of
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import MANIFEST_NAME, checksums
@@ -143,10 +144,10 @@ def _changed(run: Path, to: Path, name: str, speed: float, error: float) -> Side
     shutil.copytree(run, to / name)
     result = read_json(to / name / "result.json")
     result["velocity"]["mean"] = speed
-    result["numerical_error"] = {"half_step": 0.0, "stiffer": error, "total": error}
     write_json(to / name / "result.json", result)
+    write_json(to / name / ACCURACY_NAME, {"errors": {"velocity": {"total": error}}})
     manifest = read_json(to / name / MANIFEST_NAME)
-    manifest["sha256"] |= checksums(to / name, ["result.json"])
+    manifest["sha256"] |= checksums(to / name, ["result.json", ACCURACY_NAME])
     write_json(to / name / MANIFEST_NAME, manifest)
     return Side(name, case_of(run), to / name)
 

@@ -1,4 +1,4 @@
-"""What a velocity is uncertain by: numerical errors as measured, ranges about what is guessed; and what is printed."""
+"""What a velocity is uncertain by: ranges about what is guessed, scatter of copies; and what is printed."""
 
 from __future__ import annotations
 
@@ -16,14 +16,12 @@ from walkers.errors import InputError
 from walkers.inputs import library
 from walkers.inputs.axes import ranges_of
 from walkers.inputs.case import Case
-from walkers.inputs.numerical import INFLUENCE, STIFFER, measured, numerical_error
 from walkers.inputs.reading import load_case
 from walkers.inputs.units import parse_quantity
 from walkers.paper.published import outside_of_the_paper
 from walkers.postprocess.analyses.walking import _summary
 from walkers.postprocess.analysis import describe_result, quantities_of
 from walkers.postprocess.motion import read_motion
-from walkers.postprocess.report.run import result_html
 from walkers.postprocess.sides import fell, sides_apart, uphill_velocities
 from walkers.postprocess.tables import read_columns
 from walkers.postprocess.uncertainty import band_text
@@ -31,62 +29,7 @@ from walkers.rounding import rounded, with_decimals
 from walkers.sweeps.folder import as_text, inventory
 from walkers.sweeps.readable import kind_of
 from walkers.sweeps.table import default_column, row_of
-from walkers.templates.deck import render_deck
 from walkers.theory.prediction import describe, predict
-
-
-def test_numerical_errors_are_those_of_the_shipped_cases_alone() -> None:
-    for name, of_case in measured().items():
-        found = numerical_error(load_case(name))
-        assert found is not None
-        assert found["total"] == pytest.approx(np.hypot(of_case["half_step"], of_case["stiffer"]))
-    changes = [abs(one["stiffer"] / one["velocity"]) for one in measured().values() if one["velocity"] > 1e-6]
-    assert f"{min(changes):.1%} to {max(changes):.0%}" == INFLUENCE.replace(" %", "%").replace(" to", "% to")
-    for changes_of, told in (({}, "the velocity of this case by 0.024 mm/s"), ({"run.time_step": "1 us"}, INFLUENCE)):
-        assert told in render_deck(load_case("fig1b", changes_of)).text
-    longer = load_case("fig1b", {"run.cycles": 30})
-    assert numerical_error(longer.but(name="other")) == numerical_error(load_case("fig1b"))
-    assert numerical_error(load_case("fig1b", {"contact.friction.bead_wall": 0.2})) is None
-    assert numerical_error(load_case("fig1b", {"run.time_step": "1 us"})) is None
-
-
-def test_the_numerical_error_is_what_a_shorter_step_and_harder_beads_change(runs_folder: Path) -> None:
-    case, known = load_case("fig1b"), measured()["fig1b"]
-    step, modulus = case.run.time_step, case.contact.youngs_modulus
-    harder = {
-        "run.time_step": f"{0.5e6 * step / STIFFER**0.5:.9g} us",
-        "contact.youngs_modulus": f"{STIFFER * modulus * 1e-6:g} MPa",
-    }
-    changes = [{}, {"run.time_step": f"{0.5e6 * step:.9g} us"}, harder]
-    own, half, stiff = (walkers.run(load_case("fig1b", one), runs_folder).result["velocity"]["mean"] for one in changes)
-    assert own == pytest.approx(known["velocity"], rel=1e-3)
-    assert half - own == pytest.approx(known["half_step"], abs=1e-6)
-    assert stiff - half == pytest.approx(known["stiffer"], rel=0.02)
-
-
-def test_runs_beside_a_run_measure_its_numerical_error(tmp_path: Path) -> None:
-    """Those that its text asks for: at half the time step, and with harder beads."""
-    case = make_case(run={"cycles": 8, "settling_cycles": 4, "samples_per_cycle": 10})
-    done = walkers.run(case, tmp_path)
-    asked = re.search(r"run and compare with (run\S+), +(contact\S+)", " ".join(done.describe().split()))
-    assert asked is not None
-    changes = [dict([one.split("=")]) for one in asked.groups()]
-    half = walkers.run(case.changed(changes[0]), tmp_path)
-    told = " ".join(done.describe().split())
-    assert f"numerical error not measured: run and compare with {asked[2]}" in told
-    assert asked[1] not in told
-    harder = walkers.run(case.changed(changes[1]), tmp_path)
-    own, *others = (one.result["velocity"]["mean"] for one in (done, half, harder))
-    parts = [100.0 * (one / own - 1.0) for one in others]
-    told = " ".join(done.describe().split())
-    runs = f"{half.directory.name} and {harder.directory.name}"
-    said = f"half the time step {parts[0]:+.2g} %, 10 times Young's modulus {parts[1]:+.2g} %"
-    assert f"numerical error {np.hypot(*parts):.2g} % (measured by {runs}: {said})" in told
-    faster = walkers.run(case.changed({"drive.frequency": "90 Hz"}), tmp_path)
-    text = walkers.compare(done.directory, faster.directory).text
-    assert f"{done.directory.name}: the numerical error is not measured" not in text
-    assert f"{faster.directory.name}: the numerical error is not measured" in text
-    assert runs.partition(" ")[0] in " ".join(result_html(done.directory, done.result).split())
 
 
 def test_what_is_usual_lies_within_its_range() -> None:
@@ -133,7 +76,6 @@ def test_people_read_four_digits_and_each_number_by_its_name(runs_folder: Path) 
     numbers = re.findall(r"(?<![\w.])\d+\.?\d*(?:e-?\d+)?", "\n".join(lines))
     assert len(numbers) > 30
     assert not [one for one in numbers if len(one.partition("e")[0].replace(".", "").strip("0")) > 4]
-    assert "numerical error 2.2 % (measured for this case: half the time step -0.03 %" in told
     assert "scatter of the 6 copies 0.001 mm/s (standard deviation; 1.079 to 1.082 mm/s)" in told
 
 

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from walkers.postprocess.films import FilmOptions
     from walkers.postprocess.motion import Motion
     from walkers.runner.launch import Progress
+    from walkers.sweeps.accuracy import Accuracy
     from walkers.sweeps.comparison import Comparison
     from walkers.sweeps.scheduler import Failure
     from walkers.sweeps.spread import Spread
@@ -274,9 +275,9 @@ class Run:
     @property
     def result(self) -> dict[str, Any]:
         """The result in SI units."""
-        from walkers.postprocess.uncertainty import rests_on
+        from walkers.postprocess.uncertainty import rests_on, with_bands
 
-        result = _result_of(self.finished_directory)
+        result = with_bands(self.directory, _result_of(self.finished_directory))
         return result if self.origins is None else {**result, "rests_on": rests_on(self.origins)}
 
     @property
@@ -379,6 +380,32 @@ class Run:
         case, options = self.asked or self.case, Options(cores_here())
         with shown_if(progress, progress_of_sweep(f"{case.name}, spread")) as advance:
             return run_spread(case, self.directory.parent, options, points=points, on_progress=advance, **how)
+
+    def accuracy(self, share: float = 0.01, *, progress: bool | None = None, **how: Any) -> Accuracy:
+        """Measure the numerical errors of a run of walkers, which are part of its result from then on.
+
+        Parameters
+        ----------
+        share
+            Share of a velocity that the last increase of Young's modulus may change.
+        progress
+            Show the progress; None: only in notebooks.
+        how
+            ``engine`` and ``allow_failed_audit``, see `run`.
+
+        Examples
+        --------
+        >>> error = walkers.run("fig1b", tmp).accuracy().errors["velocity"]["total"]
+        >>> round(1e3 * error, 3)  # mm/s
+        0.024
+        """
+        from walkers.runner.launch import cores_here
+        from walkers.sweeps.accuracy import measure_accuracy
+        from walkers.sweeps.scheduler import Options
+
+        with shown_if(progress, progress_of_sweep(f"{self.case.name}, accuracy")) as advance:
+            options = Options(cores_here())
+            return measure_accuracy(self.finished_directory, options, share=share, on_progress=advance, **how)
 
     def export(self, form: Export, to: str | Path | None = None, **options: Any) -> Path:
         """Write the run for other programs.

@@ -15,7 +15,6 @@ from walkers.inputs.bodies import Walkers
 from walkers.inputs.case import Case
 from walkers.inputs.library import library_of
 from walkers.inputs.loads import contact_loads, dimer_of
-from walkers.inputs.numerical import numerical_error
 from walkers.inputs.run import CONSTANT, limits_of
 from walkers.inputs.units import ACCELERATION_OF_ONE_G, MODULUS, parse_quantity
 from walkers.physics.capillary import bead_volume, capillary_force_limit_at_wall
@@ -94,7 +93,7 @@ def notes(case: Case) -> list[str]:
     times, lines = case.run.time_step / largest, []
     if times < 1e-2:
         lines = [f"the time step is {_two_digits(1.0 / times)} times smaller than needed ({reason})"]
-    elif times > 1.01 and numerical_error(case) is None:
+    elif times > 1.01:
         lines = [f"the time step is {times:.2g} times the largest of auto ({reason})"]
     if case.run.ranks > (cores := cores_here()):
         share = f"{case.run.ranks} MPI processes (run.ranks) share {counted(cores, 'core')} of this machine"

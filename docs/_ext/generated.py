@@ -11,7 +11,6 @@ import json
 import re
 import types
 from collections.abc import Iterator, Mapping, Sequence
-from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -22,7 +21,6 @@ from typer.main import get_command
 from walkers.commands.catalogue import COMMANDS, NOT_KNOWN, catalogue
 from walkers.inputs.case import Case
 from walkers.inputs.library import Known
-from walkers.inputs.numerical import measured
 from walkers.inputs.resolving import SUPPLIED
 from walkers.inputs.table import Table, example_of, keys_in, table_in
 from walkers.inputs.units import ACCELERATION, AUTO, TEMPERATURE, Kind, kind_in, quantity_text
@@ -192,19 +190,9 @@ def _shipped() -> str:
     text = "# Shipped cases, sweeps and calibrations\n\nEvery command accepts these names instead of a file.\n"
     for kind, command in COMMANDS.items():
         names = [(one.name, one.text) for one in catalogue(of_others=False) if one.kind == kind]
-        rows = [(f"`walkers {command} {name}`", title, _numerical_error(name)) for name, title in names]
-        columns = 3 if kind == "cases" else 2
-        heads = ["", "title", "numerical error"][:columns]
-        text += f"\n## {kind.capitalize()}\n\n{_table(heads, (row[:columns] for row in rows))}"
+        rows = [(f"`walkers {command} {name}`", title) for name, title in names]
+        text += f"\n## {kind.capitalize()}\n\n{_table(['', 'title'], rows)}"
     return text
-
-
-def _numerical_error(case: str) -> str:
-    """The numerical error of the velocity of a shipped case, as a share of it; nothing if it was not measured."""
-    if (one := measured().get(case)) is None:
-        return ""
-    share = hypot(one["half_step"], one["stiffer"]) / abs(one["velocity"])
-    return f"{100.0 * share:.2g} %" if abs(one["velocity"]) > _AT_REST else "below 0.001 mm/s"
 
 
 _COMMANDS = """# Commands

@@ -38,6 +38,8 @@ _OFFERED = offering("case", "run")
 _CASES = "Case files, names of shipped cases, or runs (name or folder)."
 _LIMIT = "Time limit in s for each run; for piles, for each segment."
 _SPREAD = "Also run with uncertain values drawn from their ranges, and print the band of the result."
+_ACCURACY = "Also run with smaller time steps and harder beads, and print the numerical error of the result."
+_SHARE = "For --accuracy: share of the velocity that the last increase of Young's modulus may change; default: 0.01."
 _SWEEP_FILE = "A sweep file, or the name of a shipped sweep such as fig2."
 
 
@@ -82,6 +84,8 @@ def run(
     limit: float | None = Option(None, min=0.0, help=_LIMIT),
     spread: bool = Option(False, "--spread", help=_SPREAD),
     points: int | None = Option(None, min=2, max=4096, help="Number of runs for --spread; default: 32."),
+    accuracy: bool = Option(False, "--accuracy", help=_ACCURACY),
+    share: float | None = Option(None, min=1e-6, max=1.0, help=_SHARE),
     engine: EngineName = None,
     allow_failed_audit: AllowFailedAudit = False,
 ) -> int:
@@ -92,10 +96,15 @@ def run(
     from walkers.show import notes
 
     refuse("--points", points is not None and not spread, "is for --spread")
+    refuse("--share", share is not None and not accuracy, "is for --accuracy")
     # Report a mistake in the last file before the first run starts.
     there = each(lambda case: None if settings or force else finished_at(case, out), cases)
     loaded = each(lambda case: case_at(case, out, changes_of(settings)), cases)
     check_folder("--out", out)
+    if accuracy:
+        from walkers.sweeps.accuracy import SHARE, times_of
+
+        each(lambda one: times_of(one[0]), loaded)
     if spread:
         from walkers.sweeps.spread import POINTS, describe, spread_sweep
 
@@ -110,6 +119,8 @@ def run(
             tell(f"{case.name}: {failure}")
             failed = True
             continue
+        if accuracy:
+            done.accuracy(share or SHARE, progress=True, **how)
         band = None
         if spread:
             band = done.spread(points or POINTS, progress=True, **how)

@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from walkers.inputs import numerical
 from walkers.inputs.loads import dimer_of
-from walkers.inputs.reading import load_case
 from walkers.paper.maps import paper_drives
 from walkers.paper.published import (
     GRAVITY,
@@ -37,8 +35,6 @@ if TYPE_CHECKING:
 
 AGREES = 0.15
 """Relative difference up to which a number agrees with the published one, if the paper gives no spread."""
-_CASES = ("fig1b", "fig4a", "fig4b")
-"""Cases of the paper's figures, whose numerical error is known."""
 _SMALL = 0.05
 """mm/s; difference up to which a number agrees with a published zero."""
 
@@ -204,10 +200,5 @@ def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
         if not row["agrees"]:
             reasons.setdefault(row["why"], []).append(row["what"])
     engine, others = (count(rows, measured=measured) for measured in (True, False))
-    errors = {name: numerical.numerical_error(load_case(name)) for name in _CASES}
-    shares = {
-        name: 100.0 * one["total"] / numerical.measured()[name]["velocity"] for name, one in errors.items() if one
-    }
     shown = {"engine": engine, "others": others, "tolerance": AGREES, "rows": rows, "reasons": reasons}
-    shown |= {"numerical": shares, "stiffer": numerical.STIFFER}
     return rendered("walkers.paper", "comparison.md.j2", **shown)

@@ -6,24 +6,24 @@ import re
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from math import hypot, isfinite
+from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
-from walkers.errors import WalkersError
-from walkers.inputs.case import STIFFEST
+from walkers.errors import refused
 from walkers.inputs.library import unmeasured
-from walkers.inputs.numerical import STIFFER
 from walkers.inputs.origins import Origin
+from walkers.postprocess.sides import STEADY_SPEED
 from walkers.rounding import SHOWN_UNITS, rounded
-from walkers.runner.binary import Engine
-from walkers.runner.directory import case_of, run_place
 from walkers.runner.files import read_json
-from walkers.runner.manifest import read_manifest, read_result
+from walkers.runner.manifest import check_unchanged
 
 SPREAD = "-spread"
 SPREAD_NAME = "spread.json"
 """End of the name of a spread's directory (`spread_of`), and name of the file with the bands in it."""
+ACCURACY = "-accuracy"
+ACCURACY_NAME = "accuracy.json"
+"""End of the name of the sweep that measures numerical errors, and name of the file with them in the run."""
 LEAST_PER_VALUE = 3
 """Draws per varied value below which the band is approximate and rank correlations are not significant."""
 BANDS_ON_SLOPES = {"right_facing": "velocity, facing up,", "axial_velocity": "velocity up the slope"}
@@ -106,51 +106,52 @@ def spread_of(directory: Path) -> Path:
 
 
 def with_bands(directory: Path, result: Mapping[str, Any]) -> dict[str, Any]:
-    """A result with the ``bands`` of its quantities, if a spread of the run over the same ranges is beside it.
-
-    If its numerical error is not measured for its case, it also has the numerical error by the runs beside it, or
-    ``checks`` (`_numerical_error`).
+    """A result with what was measured beside it: the ``bands`` of a spread of the run over the same ranges, and the
+    ``accuracy`` of `walkers.sweeps.accuracy`.
     """
-    known, unknown = dict(result), (OSError, ValueError, KeyError, TypeError)
-    with suppress(*unknown):
+    known = dict(result)
+    with suppress(OSError, ValueError, KeyError, TypeError):
         spread = read_json(spread_of(directory.resolve()) / SPREAD_NAME)
         drawn, ranges = (
             {one["key"]: one["range"] for one in origins if one["range"]}
             for origins in (spread["varied"], result["rests_on"])
         )
         known |= {"bands": spread["bands"]} if drawn == ranges else {}
-    if result.get("numerical_error", 0) is None and not result.get("by_hand"):  # piles have no such error
-        with suppress(*unknown):  # a result that is not shown where its case is
-            known |= _numerical_error(directory.resolve(), result["velocity"]["mean"])
+    if (directory / ACCURACY_NAME).is_file():
+        known["accuracy"] = _accuracy(directory)
     return known
 
 
-def _numerical_error(directory: Path, velocity: float) -> dict[str, Any]:
-    """Numerical error of a velocity (m/s) by the two finished runs beside its run that measure it, and their names.
-
-    As long as one is missing, the changes of the case that make it, as ``checks``.
-    """
-    case = case_of(directory)
-    if STIFFER * case.contact.youngs_modulus > STIFFEST:
-        return {}
-    engine = Engine(directory, read_manifest(directory)["engine"]["sha256"])
-    changes = {
-        "half_step": ("run.time_step", f"{0.5e6 * case.run.time_step:.4g}us"),
-        "stiffer": ("contact.youngs_modulus", f"{1e-6 * STIFFER * case.contact.youngs_modulus:.4g}MPa"),
-    }
-    error, runs = {}, {}
-    for kind, change in changes.items():
-        with suppress(OSError, ValueError, KeyError, TypeError, WalkersError):  # a case that cannot be, or no run
-            run = run_place(case.changed(dict([change])), engine, directory.parent)
-            error[kind], runs[kind] = read_result(run)["velocity"]["mean"] - velocity, run.name
-    if missing := [f"{key}={value}" for kind, (key, value) in changes.items() if kind not in runs]:
-        return {"checks": missing}
-    return {"numerical_error": {**error, "total": hypot(*error.values())}, "measured_by": list(runs.values())}
+def _accuracy(directory: Path) -> dict[str, Any]:
+    """The numerical errors of a run; `InputError` if their file was edited or is damaged."""
+    try:
+        contents = read_json(directory / ACCURACY_NAME)
+        check_unchanged(directory, [ACCURACY_NAME])
+    except (OSError, ValueError) as error:
+        text = "was edited or is damaged; measure it again with"
+        raise refused(directory / ACCURACY_NAME, f"{text}: walkers run {directory} --accuracy") from error
+    return contents
 
 
-def has_error(result: Mapping[str, Any]) -> bool:
-    """Whether the mean velocity of walkers has a numerical error: not on a tray where none is steady."""
-    return bool(result["steady"] or not result["meet"])
+def numerical_error(result: Mapping[str, Any], name: str = "velocity") -> float:
+    """Numerical error of a number, m/s; NaN if it was not measured."""
+    return float(result.get("accuracy", {}).get("errors", {}).get(name, {}).get("total", nan))
+
+
+def accuracy_text(result: Mapping[str, Any], name: str, own: float) -> str:
+    """The numerical error of a velocity (m/s) in per cent, or in mm/s if it is below `STEADY_SPEED`."""
+    accuracy = result.get("accuracy")
+    if accuracy is None:
+        return "numerical error not measured; run with --accuracy to measure it"
+    error, size, unit = accuracy["errors"][name], 1e3, "mm/s"
+    if abs(own) > STEADY_SPEED:
+        size, unit = 100.0 / abs(own), "%"
+    half, stiffer, total = (size * error[part] for part in ("half_step", "stiffer", "total"))
+    harder = f"{accuracy['times']:g} times Young's modulus {stiffer:+.2g} {unit}"
+    text = f"numerical error {total:.2g} {unit} (half the time step {half:+.2g} {unit}, {harder})"
+    if accuracy["reached"]:
+        return text
+    return f"{text}; not converged: the last increase of the modulus changes {100.0 * accuracy['change']:.2g} %"
 
 
 def band_of(result: Mapping[str, Any], name: str, own: float | None) -> tuple[float, float] | None:

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import refused
-from walkers.postprocess.sides import STEADY_SPEED, alike, fell, sides, sides_apart, ways
-from walkers.postprocess.uncertainty import band_of, band_text, has_error, not_known, with_bands
+from walkers.postprocess.sides import alike, fell, sides, sides_apart, ways
+from walkers.postprocess.uncertainty import band_of, band_text, not_known, numerical_error, with_bands
 from walkers.rounding import percent, rounded
 from walkers.runner.directory import case_of
 from walkers.sweeps.folder import aligned
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 _SIDES = ("first", "second")
 _SPREADS = ("smallest", "largest", "scatter")  # columns of a sweep's table that are not compared
 _VELOCITIES = ("velocity", "right_facing", "left_facing")
-"""Columns whose scatter is in the result, and whose numerical error is that of the velocity."""
+"""Columns whose scatter is in the result."""
 _UPHILL = {
     "right_facing": "along the heading, facing up",
     "left_facing": "along the heading, facing down",
@@ -49,8 +49,6 @@ _UPHILL = {
 _FIRST_MAKE = ("rotation", "sliding", "sliding_pair", "open", "open_pair")
 _OF_ALL = ("orientation_end", "separated_fraction")
 """Columns that are means over walkers of the first make, and over all walkers."""
-_NUMERICAL = {"run.time_step": ("time step", max), "contact.youngs_modulus": ("softened beads", min)}
-"""Keys whose change alone measures a numerical error: of what, and which of two values has the larger one."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,7 @@ def compare_runs(first: Side, second: Side) -> Comparison:
     text = [differences or same_cases]
     if apart := [cells for one, cells in pairs if one["first"] != one["second"]]:
         text.append(aligned([["result", *names, "difference", "scatter of copies", "numerical error"], *apart]))
-        text += _errors_text(runs, names, parameters)
+        text += _errors_text(runs, names)
     if same := [one["quantity"] for one, _ in pairs if one["first"] == one["second"]]:
         text.append(f"the same in both: {', '.join(same)}" if apart else "all results are the same")
     text += [f"{name}: no finished run; only the parameters are compared" for name in not_run]
@@ -136,7 +134,6 @@ def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
     results = [with_bands(run, result_in(run)) for run in runs]
     rows = [row_of(result) for result in results]
     scatters = [_scatters(run, result) for run, result in zip(runs, results, strict=True)]
-    numerical = hypot(*map(_numerical_error, results))
     units = result_columns([name for result in results for name in result["analyses"]])
     meant = _VELOCITIES if any(map(fell, results)) else ("velocity",) if any(map(_up_and_down, results)) else ()
     units = {name: entry for name, entry in units.items() if name not in meant}  # these are no walker's way
@@ -144,7 +141,7 @@ def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
     for name, (unit, _) in units.items():
         values = [_number_of(row.get(name)) for row in rows]
         if name not in _SPREADS and any(map(isfinite, values)):
-            error = numerical if name in _VELOCITIES else nan
+            error = hypot(*(numerical_error(result, name) for result in results))
             one, cells = _pair(name, unit, values, [known.get(name, nan) for known in scatters], error)
             if uphill and name in _UPHILL:
                 cells[0] = cells[0].replace(name, _UPHILL[name])
@@ -174,24 +171,7 @@ def _scatters(run: Path, result: Mapping[str, Any]) -> dict[str, float]:
     return scatters
 
 
-def _numerical_error(result: Mapping[str, Any]) -> float:
-    """Numerical error of the velocity, m/s; NaN if it is not known."""
-    return float((result.get("numerical_error") or {}).get("total", nan))
-
-
-def _measured(parameters: Mapping[str, Sequence[Any]], own: Sequence[float]) -> list[str]:
-    """The difference of two velocities (m/s) as the numerical error, if the parameters differ in nothing else."""
-    key = next(iter(parameters), "")
-    if len(parameters) != 1 or key not in _NUMERICAL or not all(map(isfinite, own)):
-        return []
-    what, worse = _NUMERICAL[key]
-    value, difference = own[parameters[key].index(worse(parameters[key]))], abs(own[1] - own[0])
-    share = f" ({percent(float(f'{difference / abs(value):.2g}'))})" if abs(value) > STEADY_SPEED else ""
-    text = "less than 0.001" if (told := _two_digits(1e3 * difference, "mm/s")) == "0" else told
-    return [f"the difference of the velocities, {text} mm/s{share}, is the numerical error of the {what}"]
-
-
-def _errors_text(runs: Sequence[Path], names: Sequence[str], parameters: Mapping[str, Sequence[Any]]) -> list[str]:
+def _errors_text(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
     """Sentences that compare the difference of two velocities with numerical errors and bands."""
     results = [with_bands(run, result_in(run)) for run in runs]
     if not all("velocity" in result for result in results):
@@ -199,11 +179,11 @@ def _errors_text(runs: Sequence[Path], names: Sequence[str], parameters: Mapping
     if any(map(fell, results)):  # errors and bands are those of velocities along the heading
         return []
     name_of = "right_facing" if any(map(_up_and_down, results)) else "velocity"
-    errors, own = [_numerical_error(one) for one in results], [_number_of(one[name_of]["mean"]) for one in results]
+    errors = [numerical_error(one, name_of) for one in results]
+    own = [_number_of(one[name_of]["mean"]) for one in results]
     total = hypot(*errors)
-    measured = _measured(parameters, own) if all(map(has_error, results)) else []
-    lines = list(measured)
-    if not measured and isfinite(total + own[0] + own[1]) and total > 0.0:
+    lines = []
+    if isfinite(total + own[0] + own[1]) and total > 0.0:
         times = abs(own[1] - own[0]) / total
         words = "less than" if times < 1.0 else f"{_two_digits(times, '')} times"
         shares = " and ".join(
@@ -215,9 +195,9 @@ def _errors_text(runs: Sequence[Path], names: Sequence[str], parameters: Mapping
         whose = "" if name_of == "velocity" else f" of those facing {facing}"
         lines.append(f"the velocities{whose} differ by {words} their numerical error ({shares})")
     lines += [
-        f"{name}: the numerical error is not measured for this case"
-        for name, one, error in zip(names, results, errors, strict=True)
-        if not (measured or isfinite(error)) and has_error(one)
+        f"{name}: the numerical error is not measured: walkers run {run.name} --accuracy"
+        for name, run, error in zip(names, runs, errors, strict=True)
+        if not isfinite(error)
     ]
     for name, one, value in zip(names, results, own, strict=True):
         if band := band_of(one, name_of, value):

@@ -24,7 +24,7 @@ from walkers.errors import InputError, Problem, refused
 from walkers.inputs.case import Case
 from walkers.inputs.units import Kind, parse_quantity
 from walkers.postprocess.sides import REST, came_apart, of_tray, sides_apart, uphill_velocities
-from walkers.postprocess.uncertainty import SPREAD, SPREAD_NAME
+from walkers.postprocess.uncertainty import ACCURACY, SPREAD, SPREAD_NAME
 from walkers.rounding import counted, duration_text, rounded
 from walkers.runner.directory import (
     CASE_NAME,
@@ -286,9 +286,9 @@ def as_json(entries: Sequence[Entry]) -> list[dict[str, Any]]:
 
 
 def members(entries: Sequence[Entry]) -> list[Entry]:
-    """The runs of sweeps, without those that have a spread of their own."""
+    """The runs of sweeps, without those that have a spread or an accuracy of their own."""
     named = {run for entry in entries for run in entry.runs}
-    named -= {entry.name.removesuffix(SPREAD) for entry in entries if entry.is_sweep}
+    named -= {entry.name.removesuffix(SPREAD).removesuffix(ACCURACY) for entry in entries if entry.is_sweep}
     return [entry for entry in entries if entry.name in named]
 
 

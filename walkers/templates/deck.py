@@ -14,7 +14,7 @@ from walkers.inputs.loads import bridge_at_rest, hop_height, reach
 from walkers.inputs.run import limits_of
 from walkers.physics.laws import LAWS
 from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, MEAN_SPIN_COLUMNS, Layout, PlacedWalker
-from walkers.templates.parameters import PRINTED, STATUS_LINES_PER_CYCLE, along, in_cycles, softness, suffixes
+from walkers.templates.parameters import PRINTED, STATUS_LINES_PER_CYCLE, along, in_cycles, suffixes
 from walkers.templates.scene import Scene, Surface, place, surface_of
 from walkers.text import rendered
 
@@ -195,7 +195,6 @@ def compose(plan: Plan) -> Deck:
         down=[component / gravity for component in case.gravity_vector] if gravity else [],
         shaken=plan.segment.drive_from is not None,
         stable=min(vars(limits).values()),
-        softness=softness(case),
         contacts=contacts,
         moduli=[one.youngs_modulus for one in (*contacts, case.contact)],
         liquid=liquid if scalable else None,

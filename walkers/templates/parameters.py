@@ -9,9 +9,7 @@ from __future__ import annotations
 
 from math import ceil
 
-from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
-from walkers.inputs.numerical import INFLUENCE, STIFFER, numerical_error
 
 STATUS_LINES_PER_CYCLE = 4
 PRINTED = "parameters:"
@@ -38,11 +36,3 @@ def along(name: str, direction: Vector) -> str:
     """A parameter times a unit vector."""
     parts = {1.0: f"${{{name}}}", 0.0: "0.0"}
     return " ".join(parts.get(part, f"$(v_{name}*({float(part)!r}))") for part in direction)
-
-
-def softness(case: Case) -> str:
-    """What a larger Young's modulus would change."""
-    change = f"velocities of the shipped walkers by {INFLUENCE}"
-    if (error := numerical_error(case)) is not None:
-        change = f"the velocity of this case by {abs(error['stiffer']) * 1e3:.2g} mm/s"
-    return f"{STIFFER:g} times as much changes {change}"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite, isinf, nan, pi
+from math import isfinite, nan, pi
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -112,7 +112,7 @@ class Meetings(Analysis):
     def derived_of(self, case: Case) -> dict[str, float]:
         """Coverage, rounded to three digits so that equal trays form one group in figures."""
         boundary, spacing = case.boundary, max(one.spacing for one in case.walkers)
-        cell = spacing * (spacing if isinf(boundary.width) else boundary.width)
+        cell = spacing * (boundary.width or spacing)
         floor = boundary.cross_section if boundary.closed else cell * sum(one.replicates for one in case.walkers)
         return {"coverage": float(f"{pi * sum(radius**2 for radius in case.all_radii) / floor:.3g}")}
 

@@ -17,7 +17,6 @@ import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of
-from walkers.inputs.numerical import STIFFER, numerical_error
 from walkers.inputs.run import CONSTANT
 from walkers.postprocess.analysis import Analysis, Described, Measured, Quantity
 from walkers.postprocess.caption import radii_text
@@ -41,7 +40,6 @@ from walkers.postprocess.sides import (
     REST,
     SAME,
     SEPARATED,
-    STEADY_SPEED,
     alike,
     came_apart,
     differ,
@@ -55,10 +53,10 @@ from walkers.postprocess.sides import (
 from walkers.postprocess.tables import Columns, numbered
 from walkers.postprocess.uncertainty import (
     LEAST_PER_VALUE,
+    accuracy_text,
     band_of,
     band_text,
     bands_text,
-    has_error,
     not_known,
     wrapped,
 )
@@ -124,7 +122,6 @@ class Walking(Analysis):
             "cycles": case.run.cycles,
             "settling_cycles": case.run.settling_cycles,
             "ended_early": motion.ended_early,
-            "numerical_error": numerical_error(case),
             "posture": _posture(groups, tables["walkers"]) if case.goes_uphill else None,
             **{name: known.get(name) for name in ("gamma0", "sin_delta")},
         }
@@ -241,7 +238,7 @@ class Walking(Analysis):
             return known
         if fell(result):
             told = bands_text(result, {"axial_velocity": "m/s"}, {"axial_velocity": result["axial_velocity"]["mean"]})
-            return [told] if told else not_known(result["rests_on"])
+            return [*([told] if told else not_known(result["rests_on"])), *_numerical(result, "axial_velocity")]
         if result.get("bands") and (apart := sides_apart(result)):
             told = bands_text(result, {"right_facing": "m/s"}, {"right_facing": next(iter(apart.values()))})
             known = [told or "no band: the spread has that of the mean over both ways, which is no walker's velocity"]
@@ -503,20 +500,10 @@ def _band(result: Mapping[str, Any]) -> str:
     return f" ({band_text(band, 'm/s')}, 5 to 95 %{draws} over the uncertain values)"
 
 
-def _numerical(result: Mapping[str, Any]) -> list[str]:
-    """Numerical error of the velocity in per cent, or in mm/s if it does not walk; if unknown, what measures it."""
-    error, own = result["numerical_error"], abs(result["velocity"]["mean"] or 0.0)
-    harder = f"{STIFFER:g} times Young's modulus"
-    if error is None:
-        changes = ", ".join(result.get("checks", ()))
-        told = f"numerical error not measured{': run and compare with ' * bool(changes)}{changes}"
-        return [told] if has_error(result) else []
-    source = f"measured {f'by {runs}' if (runs := ' and '.join(result.get('measured_by', ()))) else 'for this case'}"
-    if own < STEADY_SPEED:
-        return [f"numerical error {_error(error['total'])} ({source}: half the time step, {harder})"]
-    half_step, stiffer, total = (100.0 * error[name] / own for name in ("half_step", "stiffer", "total"))
-    parts = f"half the time step {half_step:+.2g} %, {harder} {stiffer:+.2g} %"
-    return [f"numerical error {total:.2g} % ({source}: {parts})"]
+def _numerical(result: Mapping[str, Any], name: str = "velocity") -> list[str]:
+    """Numerical error of a velocity; on slopes ``velocity`` is that of the walkers that started facing up."""
+    own = result[name]["mean"]
+    return [] if own is None or result.get("by_hand") else [accuracy_text(result, name, own)]
 
 
 def _scatter(result: Mapping[str, Any]) -> list[str]:

@@ -1,0 +1,143 @@
+"""Numerical errors by smaller time steps and harder beads: what they are worth, when none is given, how they last."""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+from math import hypot
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+
+import walkers
+from tests.conftest import call, make_case
+from walkers.errors import InputError
+from walkers.inputs.case import Case
+from walkers.inputs.reading import load_case
+from walkers.sweeps.accuracy import measure_accuracy, times_of
+from walkers.sweeps.scheduler import Options
+from walkers.sweeps.table import derived_of
+
+QUICK = {"time_step": "4 us", "cycles": 6, "settling_cycles": 2, "samples_per_cycle": 5}
+PAIR = {"radii": ["0.3 mm", "0.2 mm"], "replicates": 2}
+
+
+def changed(case: Case, shorter: float, harder: float) -> Case:
+    """A case with a part of its time step and a multiple of its modulus."""
+    step, modulus = 1e6 * case.run.time_step * shorter, 1e-6 * case.contact.youngs_modulus * harder
+    return case.changed({"run.time_step": f"{step!r} us", "contact.youngs_modulus": f"{modulus!r} MPa"})
+
+
+def test_the_error_is_the_distance_from_far_harder_beads_at_a_far_smaller_step(tmp_path: Path) -> None:
+    """100 times as hard, at half the step that the modulus allows: within the share that was asked for."""
+    case = load_case("fig1b")
+    done, reference = (walkers.run(one, tmp_path) for one in (case, changed(case, 0.05, 100.0)))
+    own, limit = (run.result["velocity"]["mean"] for run in (done, reference))
+    assert "accuracy" not in done.result
+    assert "numerical error not measured; run with --accuracy" in done.describe()
+    found = done.accuracy()
+    error = found.errors["velocity"]
+    assert found.reached
+    assert abs(own + error["stiffer"] - limit) < found.share * limit
+    assert error["stiffer"] > 0.01 * own  # the limit is faster …
+    half = walkers.run(changed(case, 0.5, 1.0), tmp_path)
+    assert half.cached  # it is one of the runs
+    assert error["half_step"] == pytest.approx(half.result["velocity"]["mean"] - own)
+    assert error["total"] == pytest.approx(hypot(error["half_step"], error["stiffer"]))
+    # … as what rolls: the large bead.
+    assert found.errors["rotation_1"]["stiffer"] == pytest.approx(error["stiffer"], rel=0.05)
+    assert done.result["accuracy"]["errors"]["velocity"] == error
+    told = f"numerical error {100.0 * error['total'] / own:.2g} % (half the time step "
+    assert told in done.describe()
+    assert told in " ".join(done.report(tmp_path / "report.html").read_text("utf-8").split())
+    listed = call("list", "--out", str(tmp_path), check=True).stdout
+    assert f"\n{done.directory.name} " in listed  # beside the sweep, not hidden as its member
+    assert found.sweep in listed
+    packed = done.export("archive", tmp_path / "run.zip")
+    assert any(name.endswith("/accuracy.json") for name in ZipFile(packed).namelist())
+    call("check", "files", str(done.directory), check=True)
+
+
+def test_errors_add_up_in_a_comparison_and_a_changed_case_has_none(tmp_path: Path) -> None:
+    case = make_case(run=QUICK)
+    done, faster = (walkers.run(one, tmp_path) for one in (case, case.changed({"drive.frequency": "90 Hz"})))
+    done.accuracy(0.2)
+    assert "accuracy" not in faster.result
+    sides = [one.directory for one in (done, faster)]
+    assert f"walkers run {faster.directory.name} --accuracy" in walkers.compare(*sides).text
+    faster.accuracy(0.2)
+    found = {one["quantity"]: one for one in walkers.compare(*sides).contents["results"]}
+    for name in ("velocity", "rotation_2"):
+        errors = [run.result["accuracy"]["errors"][name]["total"] for run in (done, faster)]
+        assert found[name]["numerical_error"] == pytest.approx(hypot(*errors))
+
+
+def test_what_is_not_reached_is_said(tmp_path: Path) -> None:
+    """Up to 100 GPa: of 1000 MPa there are two larger moduli … and the last one changes more than the share."""
+    done = walkers.run(make_case(run={**QUICK, "time_step": "0.8 us"}, contact={"youngs_modulus": "1 GPa"}), tmp_path)
+    found = done.accuracy(1e-6)
+    assert (found.reached, found.times) == (False, 64.0)
+    change = 100.0 * done.result["accuracy"]["change"]
+    assert f"not converged: the last increase of the modulus changes {change:.2g} %" in " ".join(
+        done.describe().split()
+    )
+    with pytest.raises(InputError, match=r"youngs_modulus.*at most 6250 MPa"):
+        times_of(make_case(contact={"youngs_modulus": "10 GPa"}))
+
+
+def test_walkers_up_and_down_a_slope_both_converge(tmp_path: Path) -> None:
+    case = make_case(run=QUICK, boundary={"material": "glass", "tilt": "20 deg"}, dimers=PAIR)
+    done = walkers.run(case, tmp_path)
+    found = done.accuracy()
+    speeds = [
+        [run[f"{way}_facing"]["mean"] for way in ("right", "left")]
+        for run in (walkers.run(changed(case, times**-0.5, times), tmp_path).result for times in (4.0, 16.0, 64.0))
+    ]
+    changes = [max(abs(after / before - 1.0) for before, after in zip(*pair, strict=True)) for pair in pairwise(speeds)]
+    times, change = next((16.0 * 4.0**place, one) for place, one in enumerate(changes) if one < 0.01)
+    assert found.times == times
+    assert found.change == pytest.approx(change, rel=0.02)
+
+
+def test_an_interrupted_accuracy_continues(tmp_path: Path) -> None:
+    done = walkers.run(make_case(run=QUICK), tmp_path)
+
+    def stop(progress: object) -> None:
+        if getattr(progress, "done", 0) >= 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        measure_accuracy(done.directory, Options(1), on_progress=stop)
+    assert "accuracy" not in done.result
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*/manifest.json")}
+    assert len(before) >= 2
+    done.accuracy()
+    del before[done.directory / "manifest.json"]  # it lists the new file
+    assert before == {path: path.stat().st_mtime_ns for path in before}
+    assert "numerical error" in done.describe()
+
+
+@pytest.mark.parametrize("edit", ["", '{"errors": {}}'])
+def test_an_edited_accuracy_gives_one_message_and_can_be_measured_again(tmp_path: Path, edit: str) -> None:
+    done = walkers.run(make_case(run=QUICK), tmp_path)
+    kept = done.accuracy(0.2)
+    (done.directory / "accuracy.json").write_text(edit)
+    told = call("run", str(done.directory))
+    assert told.returncode == 2
+    (line,) = told.stderr.splitlines()
+    assert line.endswith(f"was edited or is damaged; measure it again with: walkers run {done.directory} --accuracy")
+    again = call("run", str(done.directory), "--accuracy", "--share", "0.2", "--json", check=True)
+    assert json.loads(again.stdout.splitlines()[-1])["accuracy"]["errors"] == kept.errors
+
+
+def test_a_pile_is_refused_before_it_runs(tmp_path: Path) -> None:
+    told = call("run", "pile-ci", "--accuracy", "--out", str(tmp_path))
+    assert told.returncode == 2
+    assert "pile-ci: no numerical error: loose beads are chaotic" in told.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_points_of_an_open_tray_have_their_coverage() -> None:
+    """On the squares on which the walkers start: two beads of 0.3 and 0.2 mm on 1.6 mm."""
+    assert derived_of(load_case("tray"))["coverage"] == pytest.approx(0.16, rel=0.01)
