@@ -22,7 +22,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from matplotlib.figure import Figure
+
 from walkers import load_case, run, sweep
+from walkers.api import Run
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.file import load_calibration
 from walkers.calibration.report import write_outcome
@@ -107,10 +110,39 @@ def _of_climbs(name: str, *others: str, assembly: Mapping[str, Any] | None = Non
             "\n".join([f"# {name}", "", "```console", command, *map(climbing.describe, found), "```", ""]),
         )
         if assembly:
-            (drawn,) = (path for path in run(load_case("pile-small", assembly), out).plot() if path.stem == "assembly")
-            shutil.copy(drawn, docs / files[2])
+            done = run(load_case("pile-small", assembly), out)
+            save_figure(_assembly(done), docs / files[2], [done.directory.name])
 
     return Illustration(tuple(files), lambda: [one for each in names for one in load_sweep(each).cases()], make)
+
+
+@styled
+def _assembly(done: Run) -> Figure:
+    """Heights of the beads of the first climb out of a pile, thick while joined, and numbers of joined beads."""
+    clusters, past, bed = (done.table(name) for name in ("clusters", "assembly", "bed"))
+    climb = clusters[clusters["climbed"] & clusters["out_of_pile"]].sort_values("qualified").iloc[0]
+    past = past[past["track"] == climb["track"]]
+    figure, (heights, numbers) = new_figure(TWO_COLUMNS, 4.8, nrows=2, height_ratios=(2.0, 1.0), sharex=True)
+    seen = bed[bed["time"].between(past["time"].min(), past["time"].max())]
+    heights.plot(seen["time"], 1e3 * seen["surface"], color="0.5", label="surface of the pile")
+    for number, (bead, rows) in enumerate(past.groupby("bead")):
+        size = "large" if rows["large"].iloc[0] else "small"
+        text = f"{size} bead {bead}{', leads' if bead == climb['leader'] else ''}"
+        heights.plot(rows["time"], 1e3 * rows["height"], color=f"C{number}", lw=0.6)
+        joined = rows["height"].where(rows["joined"])
+        heights.plot(rows["time"], 1e3 * joined, color=f"C{number}", lw=2.0, label=text)
+    counts = {"joined": "joined to most of them", "in_bulk": "in the pile's bulk", "at_wall": "at a side wall"}
+    for number, (name, text) in enumerate(counts.items()):
+        past.groupby("time")[name].sum().plot(
+            ax=numbers, color=f"C{2 * number}", ls="--" if number else "-", label=text
+        )
+    heights.set(title="Beads of the first climb; thick: joined to most of the others", ylabel="height (mm)")
+    numbers.set(title="Number of these beads that are", xlabel="time since the start of the drive (s)", ylabel="beads")
+    for axes in (heights, numbers):
+        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), borderaxespad=0.0)
+    letter_panels((heights, numbers))
+    figure.suptitle(done.case.title)
+    return figure
 
 
 def _make_validation(out: Path, docs: Path) -> None:

@@ -23,7 +23,8 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.standing import standing
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.analyses.meetings import Course, collective
-from walkers.postprocess.analysis import describe_result, figures_of, read_result
+from walkers.postprocess.analysis import describe_result, read_result
+from walkers.postprocess.figures import figures_of
 from walkers.postprocess.gait import postures, turned_over_at
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.sides import of_tray

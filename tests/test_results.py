@@ -15,8 +15,8 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.analyses.walking import Walking, walkers_met
 from walkers.postprocess.analyses.work import Working
-from walkers.postprocess.analysis import RESULT_NAME, Measured, current_result, describe_result, read_result
-from walkers.postprocess.figures import gait_panels, walk_panels
+from walkers.postprocess.analysis import RESULT_NAME, current_result, describe_result, read_result
+from walkers.postprocess.figures import figures_of
 from walkers.postprocess.gait import Averages, averages, fit_slopes, gait, gaps, settled_samples, steady_walkers, walk
 from walkers.postprocess.motion import Group, read_motion
 from walkers.postprocess.quantities import TABLES, declared
@@ -92,16 +92,6 @@ def test_an_error_in_a_text_is_no_reason_to_measure_again(
     assert {path: path.stat().st_mtime_ns for path in copy.glob("*.parquet")} == tables
     with pytest.raises(TypeError, match="a number of text"):
         describe_result(copy, known)
-
-
-def test_the_gait_that_is_drawn_is_measured_of_the_walker_that_is_drawn(directory: Path, moved: Group) -> None:
-    """Of that walker alone, because the gaits of hundreds take a gigabyte."""
-    drawn = Walking().panels(Measured(directory))["gait"]
-    assert drawn
-    for panel, expected in zip(drawn, gait_panels(moved), strict=True):
-        for line, other in zip(panel.lines, expected.lines, strict=True):
-            assert line.label == other.label
-            np.testing.assert_allclose(line.y, other.y, rtol=1e-12, atol=1e-12)
 
 
 def test_symmetric_dimers_need_not_be_on_the_axis_to_be_kept(run_directory: Callable[..., Path]) -> None:
@@ -212,31 +202,21 @@ def test_a_single_walker_has_no_scatter(run_directory: Callable[..., Path]) -> N
 
 
 def test_walkers_are_named_by_the_direction_in_which_they_face(run_directory: Callable[..., Path]) -> None:
+    """Their orientations are from this direction, on trays from the drive."""
     degrees = np.array([0.0, 91.0, 150.0, 20.0, -175.0])
     assert sides([1, 1, 1, -1, -1], np.radians(degrees)).tolist() == [1, 1, -1, -1, 1]
-    turned = run_directory(dimers={"angle": "150 deg"}, run={"cycles": 6, "settling_cycles": 2})
-    result, [walked, *_] = read_result(turned), walk_panels(read_motion(turned).groups)
+    short = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 20}
+    turned = run_directory(dimers={"angle": "150 deg"}, run=short)
+    result, (_, orientation, _) = read_result(turned), figures_of(turned)["walk"].axes
     assert (result["right_facing"]["n"], result["left_facing"]["n"]) == (0, 1)
-    assert walked.lines[0].label.startswith("0: left at -30°, ")
-
-
-def test_panels_have_one_named_direction(run_directory: Callable[..., Path]) -> None:
-    """The substrate has that of the walker; orientations that of the legend, on trays that of the drive."""
-    group = read_motion(run_directory(dimers={"angle": "150 deg"}, run={"cycles": 6, "settling_cycles": 2})).groups[0]
-    *_, substrate = gait_panels(group)
-    last = slice(-len(substrate.lines[0].y), None)
-    along = 1e3 * np.einsum("fx,fx->f", group.motion.substrate_velocity[last], group.heading[last, 0])
-    assert "along the same heading" in substrate.title
-    np.testing.assert_allclose(substrate.lines[0].y, along)
-    _, turned, _ = walk_panels([group])
-    assert turned.lines[0].y[0] == pytest.approx(-30.0)
-    assert "from\nleft" in turned.y
-    tray = group.case.put("dimers.meet", True).put("dimers.facing", "left")
-    left = [replace(one, facing=-1) for one in group.walkers]
-    (walked, turned, _) = walk_panels([replace(group, motion=replace(group.motion, case=tray), walkers=left)])
-    assert turned.lines[0].y[0] == pytest.approx(150.0)
-    assert "from\nthe drive axis" in turned.y
-    assert walked.lines[0].label.startswith("0: 150°, ")
+    assert str(orientation.lines[0].get_label()).startswith("0: left at -30°, ")
+    assert orientation.lines[0].get_ydata()[0] == pytest.approx(-30.0)  # type: ignore[index]
+    meeting = {"replicates": 2, "angle": "150 deg", "facing": "left", "meet": True}
+    tray = {"shape": "box", "width": "12 mm", "height": "4 mm"}
+    (_, orientation, _) = figures_of(run_directory(dimers=meeting, boundary=tray, run=short))["walk"].axes
+    assert "from the drive axis" in orientation.get_title(loc="left")
+    assert str(orientation.lines[0].get_label()).startswith("0: -30°, ")
+    assert orientation.lines[0].get_ydata()[0] == pytest.approx(-30.0)  # type: ignore[index]
 
 
 def test_walkers_that_come_close_are_reported(moved: Group, directory: Path) -> None:

@@ -320,8 +320,8 @@ class Run:
         return result_html(self.directory, self.result, self.origins)
 
     def plot(self, to: str | Path | None = None, formats: str | Sequence[str] = ("png",)) -> list[Path]:
-        """Draw the figures and return their paths; see `walkers.postprocess.analysis.plot_run`."""
-        from walkers.postprocess.analysis import plot_run
+        """Draw the figures and return their paths; see `walkers.postprocess.figures.plot_run`."""
+        from walkers.postprocess.figures import plot_run
 
         return plot_run(self.finished_directory, _path(to), formats)
 
@@ -629,17 +629,36 @@ class Sweep:
         """The table in a notebook."""
         return str(self.table()._repr_html_())  # type: ignore[operator]
 
-    def figure(self, **choices: Any) -> Figure:
+    def figure(
+        self,
+        *,
+        x: str | None = None,
+        y: str | None = None,
+        hue: str | None = None,
+        panels: str | None = None,
+        log: str = "",
+        theory: bool = False,
+    ) -> Figure:
         """A matplotlib figure of the table; see `walkers.plotting.sweep_figure`."""
         from walkers.plotting import sweep_figure
 
-        return sweep_figure(self.directory, **choices)
+        return sweep_figure(self.directory, x=x, y=y, hue=hue, panels=panels, log=log, theory=theory)
 
-    def plot(self, to: str | Path | None = None, **choices: Any) -> list[Path]:
+    def plot(
+        self,
+        to: str | Path | None = None,
+        *,
+        x: str | None = None,
+        y: str | None = None,
+        hue: str | None = None,
+        panels: str | None = None,
+        log: str = "",
+        theory: bool = False,
+    ) -> list[Path]:
         """Plot the table to a file; see `walkers.plotting.plot_sweep`."""
         from walkers.plotting import plot_sweep
 
-        return [plot_sweep(self.directory, to, **choices)]
+        return [plot_sweep(self.directory, to, x=x, y=y, hue=hue, panels=panels, log=log, theory=theory)]
 
     def report(self, to: str | Path | None = None) -> Path:
         """Write a self-contained HTML report; see `walkers.sweeps.report.report_sweep`."""

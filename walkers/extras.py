@@ -15,7 +15,7 @@ EXTRAS = {
     "check": ("a check of the engine", ("joblib", "numba")),
     "cluster": ("a sweep on a cluster", ("parsl",)),
     "film": ("an MP4", ("imageio-ffmpeg",)),
-    "report": ("a report or an interactive view", ("bokeh", "k3d")),
+    "report": ("a report or an interactive view", ("k3d",)),
     "theory": ("the theory", ("joblib", "numba")),
     "xyz": ("extended XYZ", ("ase",)),
 }

@@ -2,43 +2,44 @@
 
 from __future__ import annotations
 
-import warnings
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from walkers.errors import InputError, refused
+from walkers.errors import InputError
 from walkers.inputs.case import Case
 from walkers.postprocess.drawing import FORMATS, check_place, save_figure
 from walkers.runner.directory import case_of
-from walkers.sweeps.figure import Factor, draw, drawn_column, layout_of
+from walkers.sweeps.figure import Curves, Factor, LeftOutWarning, column_of, figure_of, tell
 from walkers.sweeps.readable import readable_unit
-from walkers.sweeps.table import FACING_DOWN, default_column, derived_of, find_name, load, varied_columns
+from walkers.sweeps.table import derived_of, load, varied_columns
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from walkers.inputs.case import Case
     from walkers.theory.quasistatic import FloatArray
 
-
+__all__ = ["LeftOutWarning", "plot_sweep", "sweep_figure"]
 _OF_SHAPE = ("radii", "volume_fraction", "contact_angle")
-"""Ends of the keys that change the shape of bridges."""
+"""Ends of the keys that change the shape of bridges, each of which takes a quarter of a second to solve."""
 
 
-class LeftOutWarning(UserWarning):
-    """Something is not in a figure: points without a result, keys that are not distinguished, a theory's prediction."""
-
-
-def plot_sweep(directory: str | Path, to: str | Path | None = None, **choices: Any) -> Path:
+def plot_sweep(  # noqa: PLR0913 (choices of a plot)
+    directory: str | Path,
+    to: str | Path | None = None,
+    *,
+    x: str | None = None,
+    y: str | None = None,
+    hue: str | None = None,
+    panels: str | None = None,
+    log: str = "",
+    theory: bool = False,
+) -> Path:
     """Plot a sweep's table to a file.
 
     Parameters
@@ -48,8 +49,8 @@ def plot_sweep(directory: str | Path, to: str | Path | None = None, **choices: A
     to
         The file, with a suffix of `walkers.postprocess.drawing.FORMATS`; None: in the sweep's directory, named after
         ``y``.
-    choices
-        ``x``, ``y``, ``hue``, ``panels``, ``log``, ``theory`` of `sweep_figure`.
+    x, y, hue, panels, log, theory
+        See `sweep_figure`.
 
     Raises
     ------
@@ -57,9 +58,9 @@ def plot_sweep(directory: str | Path, to: str | Path | None = None, **choices: A
         As `sweep_figure`, or if the suffix of the file is unknown.
     """
     table = load(directory)
-    place = Path(to) if to is not None else Path(directory) / f"{_column(table, choices.get('y'))}.png"
+    place = Path(to) if to is not None else Path(directory) / f"{column_of(table, y)}.png"
     check_place(place, *(f".{form}" for form in FORMATS))
-    figure = _figure_of(table, directory, **choices)
+    figure = figure_of(table, x=x, y=y, hue=hue, panels=panels, log=log, models=_models if theory else None)
     runs = [Path(run).name for run in table.loc[table["status"] == "finished", "run"]]
     return save_figure(figure, place, runs, place.suffix.lower()[1:], str(table.attrs["sweep"]))[0]
 
@@ -102,101 +103,52 @@ def sweep_figure(
     InputError
         If it is no sweep's directory, no point is finished, or there is no such column.
     """
-    return _figure_of(load(directory), directory, x=x, y=y, hue=hue, panels=panels, log=log, theory=theory)
+    models = _models if theory else None
+    return figure_of(load(directory), x=x, y=y, hue=hue, panels=panels, log=log, models=models)
 
 
-def _figure_of(
-    table: pd.DataFrame, source: str | Path, *, y: str | None = None, log: str = "", theory: bool = False, **layout: Any
-) -> Figure:
-    """The figure of the table of a sweep; ``layout`` contains the arguments of `layout_of`."""
-    column = _column(table, y)
-    done = table[table["status"] == "finished"]
-    counts = Counter(table["status"][table["status"] != "finished"])
-    others = ", ".join(f"{number} {status}" for status, number in counts.items())
-    if done.empty:
-        raise refused(source, f"no point is finished ({others or 'there is none'})")
-    if counts:
-        _tell(f"{sum(counts.values())} of {len(table)} points left out: {others}")
-    if empty := int(done[column].isna().sum()):
-        _tell(f"{empty} of {len(done)} finished points have no {column}")
-    laid_out = layout_of(table, done, **layout)
-    if laid_out.undistinguished:
-        _tell(f"not distinguished: {'; '.join(laid_out.undistinguished)}")
-    predicted: dict[str, FloatArray] = {}
-    reasons: dict[str, int] = {}
-    gaps: dict[str, int] = {}
-    cases: list[Case] = []
-    if theory:
-        from walkers.paper.published import outside_of_the_paper
-        from walkers.theory.prediction import predicted_column
-
-        cases = [case_of(Path(run)) for run in done["run"]]
-        predicted, reasons = predicted_column(cases, column)
-        for reason, number in reasons.items():
-            _tell(f"not drawn at {number} of {len(done)} points: {reason}")
-        if predicted and (beyond := [sentence for case in cases if (sentence := outside_of_the_paper(case))]):
-            _tell(f"{len(beyond)} of {len(done)} points are {beyond[0]}" + (", …" if len(beyond) > 1 else ""))
-    drawn = drawn_column(done, column, predicted, None if y else FACING_DOWN.get(column))
-    if predicted:
-        drawn = replace(drawn, curves=partial(_curves, done, cases, column, gaps))
-    figure = draw(laid_out, drawn, title=table.attrs["title"], log=log)
-    for reason in gaps.keys() - reasons.keys():
-        _tell(f"the theory's curve has gaps: {reason}")
-    return figure
-
-
-def _curves(
-    table: pd.DataFrame,
-    cases: Sequence[Case],
-    column: str,
-    gaps: dict[str, int],
-    rows: npt.NDArray[np.int64],
-    x: Factor,
-    places: FloatArray,
-) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Predictions of the theory between points, and their x; empty if they take too long. Adds reasons for ``gaps``.
-
-    If x is no key, such as Γ0, the key that varies is changed. Each new shape of bridges takes a quarter of a second to
-    solve.
-    """
-    from pandas.api.types import is_numeric_dtype
-
+def _models(done: pd.DataFrame, column: str) -> tuple[Mapping[str, FloatArray], Curves | None]:
+    """Predictions of the theory for the points (SI units), and a function that gives them between the points."""
+    from walkers.paper.published import outside_of_the_paper
     from walkers.theory.prediction import predicted_column
 
-    name, case, units = x.keys[0], cases[rows[0]], table.attrs["units"]
-    varied, key, unit = varied_columns(table), name, x.unit
-    if name not in varied:
-        keys = [one for one in varied if table[one].iloc[rows].nunique() > 1]
-        if len(keys) != 1 or name not in derived_of(case) or not is_numeric_dtype(table[keys[0]]):
-            return places, {}
-        key, unit = keys[0], units[keys[0]]
-        low, high = (float(end) for end in table[key].iloc[rows].agg(["min", "max"]))
-        places = np.linspace(low, high, len(places))
-    if len(x.keys) > 1 or not case.document or key.endswith(_OF_SHAPE):
-        return places, {}
-    at: list[int] = []
-    between: list[Case] = []
-    for number, place in enumerate(places.tolist()):
+    cases = [case_of(Path(run)) for run in done["run"]]
+    predicted, reasons = predicted_column(cases, column)
+    for reason, number in reasons.items():
+        tell(f"not drawn at {number} of {len(done)} points: {reason}")
+    if predicted and (beyond := [sentence for case in cases if (sentence := outside_of_the_paper(case))]):
+        tell(f"{len(beyond)} of {len(done)} points are {beyond[0]}" + (", …" if len(beyond) > 1 else ""))
+
+    def curves(rows: npt.NDArray[np.int64], x: Factor, places: FloatArray) -> tuple[FloatArray, dict[str, FloatArray]]:
+        along, between = _between(done.iloc[rows], cases[rows[0]], x, places)
+        found, gaps = predicted_column(between, column) if between else ({}, {})
+        for reason in gaps.keys() - reasons.keys():
+            tell(f"the theory's curve has gaps: {reason}")
+        size = readable_unit(done.attrs["units"][column])[1]
+        return along, {model: values / size for model, values in found.items()}
+
+    return predicted, curves if predicted else None
+
+
+def _between(rows: pd.DataFrame, case: Case, x: Factor, places: FloatArray) -> tuple[FloatArray, Sequence[Case]]:
+    """Cases at places between points that differ in one key, and their x; none if they take too long.
+
+    If x is no key, such as Γ0, the key that varies is changed.
+    """
+    (key, *further), units, known = x.keys, rows.attrs["units"], varied_columns(rows)
+    if key not in known:
+        moving = [name for name in known if rows[name].nunique() > 1]
+        if len(moving) != 1 or key not in derived_of(case) or rows[moving[0]].dtype.kind not in "if":
+            return places, []
+        (key,) = moving
+        places = np.linspace(rows[key].min(), rows[key].max(), len(places))
+    if further or not case.document or key.endswith(_OF_SHAPE):
+        return places, []
+    cases: dict[float, Case] = {}
+    for place in places.tolist():
         with suppress(InputError, ValueError):  # a value that no case may have
-            value = f"{place!r} {unit}" if unit else place
-            between.append(case.changed({key: value}))
-            at.append(number)
-    found: dict[str, FloatArray] = {}
-    predicted, reasons = predicted_column(between, column) if between else ({}, {})
-    gaps.update(reasons)
-    for model, values in predicted.items():
-        found[model] = np.full(len(places), np.nan)
-        found[model][at] = values / readable_unit(units[column])[1]
-    if key != name:
-        size = readable_unit(units[name])[1]
-        places = np.full(len(places), np.nan)
-        places[at] = [derived_of(one)[name] / size for one in between]
-    return places, found
-
-
-def _column(table: pd.DataFrame, wanted: str | None) -> str:
-    return find_name("y", wanted, table.columns) if wanted else default_column(table)
-
-
-def _tell(message: str) -> None:
-    warnings.warn(message, LeftOutWarning, stacklevel=4)
+            cases[place] = case.changed({key: f"{place!r} {units[key]}" if units[key] else place})
+    along = list(cases)
+    if key != x.keys[0]:
+        along = [derived_of(one)[x.keys[0]] / readable_unit(units[x.keys[0]])[1] for one in cases.values()]
+    return np.array(along), list(cases.values())

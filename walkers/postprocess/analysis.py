@@ -11,18 +11,16 @@ import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from importlib import import_module
 from math import nan
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from walkers.errors import refused
 from walkers.inputs.case import Case
 from walkers.inputs.run import limits_of
 from walkers.postprocess.caption import conditions
-from walkers.postprocess.drawing import FORMATS, check_formats, save_figure
 from walkers.postprocess.uncertainty import bands_text, lines_of_rest, not_known, rests_on, with_bands, wrapped_line
 from walkers.rounding import SHOWN_UNITS, rounded
 from walkers.runner.directory import SEGMENT_NAME, case_of, files_of_segments, segment_directories
@@ -30,9 +28,6 @@ from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import MANIFEST_NAME, RESULT_NAME, FileChanged, check_unchanged, read_result, recomputed
 
 if TYPE_CHECKING:  # the progress of a sweep needs no numpy
-    from matplotlib.figure import Figure
-
-    from walkers.postprocess.figures import Panel
     from walkers.postprocess.motion import Bridges, Motion
     from walkers.postprocess.tables import Columns
 
@@ -129,25 +124,6 @@ def number_of(result: Mapping[str, Any], key: str, unit: str = "") -> Number | N
     return Number(key, value, shown, 1 if factor == 1.0 else factor)  # a whole number stays one
 
 
-class Measured:
-    """A run whose motion and tables (`tables_of`) are read once, on first use."""
-
-    def __init__(self, directory: Path) -> None:
-        self.directory, self.case = directory, case_of(directory)
-
-    @cached_property
-    def motion(self) -> Motion:
-        """The motion of the beads."""
-        from walkers.postprocess.motion import read_motion
-
-        return read_motion(self.directory)
-
-    @cached_property
-    def tables(self) -> dict[str, Columns]:
-        """The tables by name."""
-        return tables_of(self.directory)
-
-
 class Analysis(ABC):
     """An analysis of runs.
 
@@ -226,18 +202,6 @@ class Analysis(ABC):
         """A function that returns further arrays of the beads in a frame for ParaView; None if there are none."""
         del motion
         return lambda _: {}
-
-    def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
-        """Panels by the names of figure files; reports contain all panels."""
-        del run
-        return {}
-
-    def draw(self, name: str, panels: Sequence[Panel], run: Measured) -> Figure:
-        """A figure of panels; by default one below the other."""
-        from walkers.postprocess.figures import stacked
-
-        del name
-        return stacked(panels, run.case)
 
 
 @cache
@@ -423,28 +387,3 @@ def quantities_of(result: Mapping[str, Any]) -> list[Row]:
     """The numbers of a result as rows of a table."""
     rows = (one.row(result) for found in analyses_in(result) for one in found.quantities(result) if one.label)
     return [row for row in rows if row.value is not None]
-
-
-def figures_of(directory: Path) -> dict[str, Figure]:
-    """The figures of a run, by the names of their files."""
-    run = Measured(directory)
-    found = {(name, one): panels for one in analyses_of(run.case) for name, panels in one.panels(run).items()}
-    return {name: one.draw(name, panels, run) for (name, one), panels in found.items() if panels}
-
-
-def plot_run(directory: Path, destination: Path | None = None, formats: str | Sequence[str] = ("png",)) -> list[Path]:
-    """Draw the figures of a run, such as ``walk`` for walkers and ``climb`` for piles.
-
-    The files are written into ``destination``, by default the run directory. A format that is not in
-    `walkers.postprocess.drawing.FORMATS` raises ``InputError``, as does the name of a picture for the folder.
-    """
-    formats = check_formats(formats)
-    destination = destination or directory
-    if destination.suffix.lower()[1:] in FORMATS and not destination.is_dir():
-        raise refused(destination, "expected a folder, because a run may have several figures")
-    destination.mkdir(parents=True, exist_ok=True)
-    return [
-        path
-        for name, figure in figures_of(directory).items()
-        for path in save_figure(figure, destination / name, [directory.name], formats)
-    ]

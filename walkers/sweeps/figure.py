@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil, prod
@@ -22,7 +24,7 @@ from walkers.postprocess.drawing import (
     styled,
 )
 from walkers.sweeps.readable import readable_unit
-from walkers.sweeps.table import ERRORS, find_name, value_text, varied_columns, with_unit
+from walkers.sweeps.table import ERRORS, FACING_DOWN, default_column, find_name, value_text, varied_columns, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -119,6 +121,53 @@ class Drawn:
     """Predictions of models between and beyond the points."""
     down: FloatArray | None = None
     """Values of walkers that started facing down a slope; the others are then of those facing up."""
+
+
+Models = Callable[["pd.DataFrame", str], tuple[Mapping[str, FloatArray], Curves | None]]
+"""Function of the rows of a table and a column: predictions of models for each row (SI units), and between them."""
+
+
+class LeftOutWarning(UserWarning):
+    """Something is not in a figure: points without a result, keys that are not distinguished, a theory's prediction."""
+
+
+def figure_of(
+    table: pd.DataFrame,
+    *,
+    x: str | None = None,
+    y: str | None = None,
+    hue: str | None = None,
+    panels: str | None = None,
+    log: str = "",
+    models: Models | None = None,
+) -> Figure:
+    """Figure of the table of a sweep (`walkers.plotting.sweep_figure`), with the predictions of models."""
+    column = column_of(table, y)
+    done = table[table["status"] == "finished"]
+    counts = Counter(table["status"][table["status"] != "finished"])
+    others = ", ".join(f"{number} {status}" for status, number in counts.items())
+    if done.empty:
+        raise refused(str(table.attrs["sweep"]), f"no point is finished ({others or 'there is none'})")
+    if counts:
+        tell(f"{sum(counts.values())} of {len(table)} points left out: {others}")
+    if empty := int(done[column].isna().sum()):
+        tell(f"{empty} of {len(done)} finished points have no {column}")
+    layout = layout_of(table, done, x=x, hue=hue, panels=panels)
+    if layout.undistinguished:
+        tell(f"not distinguished: {'; '.join(layout.undistinguished)}")
+    predicted, curves = models(done, column) if models else ({}, None)
+    drawn = drawn_column(done, column, predicted, None if y else FACING_DOWN.get(column))
+    return draw(layout, replace(drawn, curves=curves), title=table.attrs["title"], log=log)
+
+
+def column_of(table: pd.DataFrame, wanted: str | None) -> str:
+    """The column of a name, by default the main result; `InputError` if there is none."""
+    return find_name("y", wanted, table.columns) if wanted else default_column(table)
+
+
+def tell(message: str) -> None:
+    """Warn that something is left out of a figure."""
+    warnings.warn(message, LeftOutWarning, stacklevel=3)
 
 
 def factors_of(table: pd.DataFrame) -> list[Factor]:

@@ -17,17 +17,14 @@ import numpy as np
 
 from walkers.inputs.boundary import FLOOR
 from walkers.inputs.case import Case
-from walkers.postprocess.analysis import Analysis, Described, Measured, Quantity
+from walkers.postprocess.analysis import Analysis, Described, Quantity
 from walkers.postprocess.clusters import connected
-from walkers.postprocess.drawing import TWO_COLUMNS, new_figure, plain_text, styled
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import Group, Motion, read_bridges
 from walkers.postprocess.tables import Columns
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from walkers.postprocess.figures import Panel
+    pass
 
 _GREY = "#5b6770"
 _SLOW = 0.1
@@ -180,71 +177,12 @@ class Meetings(Analysis):
             f"             nematic order {result['nematic_order']:.2f}, polar order {result['polar_order']:.2f}",
         ]
 
-    def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
-        """Paths of all walkers."""
-        return {"paths": [_paths(run.motion)]}
-
-    def draw(self, name: str, panels: Sequence[Panel], run: Measured) -> Figure:
-        """Paths of the walkers and their beads at the end, with equal scales on both axes."""
-        del name
-        return _drawn(panels[0], run.motion)
-
 
 def _table(rows: Sequence[tuple[float, str, int, int, int, float]]) -> Columns:
     """Table ``meetings``; there may be no rows."""
     columns = list(zip(*rows, strict=True)) or [()] * 6
     kinds = {"time": float, "event": str, "walker": int, "other": int, "size": int, "angle": float}
     return {name: np.array(values, dtype=kind) for (name, kind), values in zip(kinds.items(), columns, strict=True)}
-
-
-def _paths(motion: Motion) -> Panel:
-    """Paths of the centres of mass during the drive, once per cycle, and the edge of the floor."""
-    from walkers.postprocess.figures import MOST_NAMED, Line, Panel, named_of
-    from walkers.postprocess.scene import walls_of
-
-    centre = 1e3 * _places(motion.driven)[0][:: motion.case.run.samples_per_cycle]
-    colours, lines = _colours(centre.shape[1]), []
-    if not motion.case.boundary.bare and motion.case.boundary.walls[0].name == FLOOR:
-        floor = 1e3 * walls_of(motion)[0]
-        x, y, _ = np.vstack([floor, floor[:1]]).T
-        lines.append(Line(x, y, colour=_GREY))
-    for number in range(centre.shape[1]):
-        x, y = centre[:, number].T
-        lines.append(Line(x, y, f"walker {number}" if number < MOST_NAMED else "", colours[number]))
-    x, y = centre[0].T
-    lines.append(Line(x, y, "start", _GREY, "o", width=0.0))
-    return Panel(f"Paths of the walkers, seen from above{named_of(centre.shape[1])}", "x (mm)", "y (mm)", lines)
-
-
-def _colours(count: int) -> list[str]:
-    """Distinct colours of walkers."""
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
-
-    return [to_hex(shade) for shade in colormaps["turbo"](np.linspace(0.05, 0.95, count))]
-
-
-@styled
-def _drawn(panel: Panel, motion: Motion) -> Figure:
-    """A figure of paths with the beads at the end."""
-    from matplotlib.patches import Circle
-
-    from walkers.postprocess.figures import draw_panel
-
-    reach = [np.concatenate([one.x for one in panel.lines]), np.concatenate([one.y for one in panel.lines])]
-    wide, high = (float(np.ptp(one)) + 2e3 * motion.case.walkers[0].length for one in reach)
-    figure, axes = new_figure(TWO_COLUMNS, 0.9 + 0.75 * TWO_COLUMNS * min(1.2, max(0.3, high / wide)))
-    draw_panel(axes, panel)
-    owner, colours = motion.walker_of, _colours(len(motion.walkers))
-    for bead in np.flatnonzero(owner >= 0):
-        x, y, _ = 1e3 * motion.position[-1, bead]
-        look = {"fc": colours[owner[bead]], "ec": "none", "alpha": 0.4}
-        axes.add_patch(Circle((x, y), 1e3 * motion.radius[bead], **look))
-    axes.set(xlabel=panel.x, aspect="equal", title=f"{panel.title}; beads at the end, to scale")
-    axes.margins(0.08)
-    figure.suptitle(plain_text(motion.case.title or motion.case.name))
-    figure.legend(loc="outside right upper")
-    return figure
 
 
 def _places(motion: Motion) -> tuple[FloatArray, FloatArray]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import nan
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
-from walkers.postprocess.analysis import Analysis, Described, Measured, Quantity, tables_of
+from walkers.postprocess.analysis import Analysis, Described, Quantity, tables_of
 from walkers.postprocess.clusters import (
     Beads,
     ClimbCriteria,
@@ -30,9 +30,6 @@ from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import FLOOR, Bridges, Motion, read_bridges
 from walkers.postprocess.tables import Columns
 from walkers.postprocess.uncertainty import wrapped
-
-if TYPE_CHECKING:
-    from walkers.postprocess.figures import Panel
 
 _WHOLE = 1.0 - 1e-6
 """Fraction of the duration below which a run ended early."""
@@ -183,13 +180,6 @@ class Pile(Analysis):
             return {"component": component, **own}
 
         return of_frame
-
-    def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
-        """Heights and events of clusters, segregation, agitation; history of the beads of the first climb."""
-        from walkers.postprocess.figures import assembly_panels, pile_panels
-
-        assembly = assembly_panels(run.tables)
-        return {"climb": pile_panels(run.tables)} | ({"assembly": assembly} if assembly else {})
 
 
 def _late(motion: Motion) -> BoolArray:

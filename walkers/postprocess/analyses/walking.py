@@ -8,17 +8,17 @@ start: their scatter is not an uncertainty of the velocity.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import product
 from math import degrees, nan
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.run import CONSTANT
-from walkers.postprocess.analysis import Analysis, Described, Measured, Quantity
+from walkers.postprocess.analysis import Analysis, Described, Quantity
 from walkers.postprocess.caption import radii_text
 from walkers.postprocess.cycles import cycles_of
 from walkers.postprocess.dump import FloatArray, IntArray
@@ -61,11 +61,6 @@ from walkers.postprocess.uncertainty import (
     wrapped,
 )
 from walkers.rounding import percent, with_decimals
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from walkers.postprocess.figures import Panel
 
 NEAR = 1.5
 """Walkers whose centres of mass come closer than this multiple of their length have met."""
@@ -255,20 +250,6 @@ class Walking(Analysis):
         if result["walkers_met"] and not result["meet"]:
             warnings.append("walkers came close to each other and are not independent: increase the spacing")
         return warnings
-
-    def panels(self, run: Measured) -> Mapping[str, Sequence[Panel]]:
-        """Panels of distance, orientation and path; also of the gait if there are enough samples per cycle."""
-        from walkers.postprocess.figures import gait_panels, walk_panels
-
-        groups = run.motion.groups
-        shown = run.motion.of_walkers(groups[0].walkers[:1]).groups[0]  # gaits of hundreds need a gigabyte
-        return {"walk": walk_panels(groups), "gait": gait_panels(shown)}
-
-    def draw(self, name: str, panels: Sequence[Panel], run: Measured) -> Figure:
-        """Figure of the walk."""
-        from walkers.postprocess.figures import walk_figure
-
-        return walk_figure(run.case, panels) if name == "walk" else super().draw(name, panels, run)
 
 
 def _stacked(parts: list[Columns]) -> Columns:

@@ -1,15 +1,13 @@
-// Unpacks what the page carries, shows the run that the address names, and plays its scene.
+// Unpacks what the page carries, and plays its scene.
 (() => {
   const text = (id) => document.getElementById(id)?.textContent;
   const bytes = (id) => Uint8Array.from(atob(text(id)), (one) => one.charCodeAt(0));
   const unpacked = (id) => fflate.strFromU8(fflate.unzlibSync(bytes(id)));
 
-  let k3d = null;
   const library = () => {
-    if (k3d === null) {
-      // K3D is an AMD module; this is all of AMD that it needs.
-      new Function("define", unpacked("library-k3d"))((name, needs, make) => { k3d = make(); });
-    }
+    // K3D is an AMD module; this is all of AMD that it needs.
+    let k3d = null;
+    new Function("define", unpacked("library-k3d"))((name, needs, make) => { k3d = make(); });
     return k3d;
   };
 
@@ -40,7 +38,6 @@
     }
 
     async open() {
-      if (this.instance) return;
       try {
         this.find(".scene").replaceChildren();
         this.instance = await library().CreateK3DAndLoadBinarySnapshot(bytes(this.scene), this.find(".scene"));
@@ -51,15 +48,6 @@
       } catch (error) {
         this.find(".scene").textContent = `This browser shows no 3-D picture (it needs WebGL 2): ${error.message ?? error}`;
       }
-    }
-
-    close() {
-      this.play(false);
-      this.instance?.disable();
-      this.instance = null;
-      this.find(".play").disabled = true;
-      this.find(".scene").replaceChildren();
-      delete this.find(".scene").dataset.ready;
     }
 
     async show(time) {
@@ -87,41 +75,9 @@
     }
   }
 
-  const sections = [...document.querySelectorAll("section[data-run]")];
-  const bokeh = () => {
-    if (!window.Bokeh) (0, eval)(unpacked("library-bokeh"));
-    return window.Bokeh;
-  };
-  const players = new Map();
-  const plotted = new Set();
-
-  const open = (section) => {
-    for (const plots of section.querySelectorAll("[data-plots]")) {
-      if (plotted.has(plots)) continue;
-      plotted.add(plots);
-      bokeh().embed.embed_item(JSON.parse(unpacked(plots.dataset.plots)), plots);
-    }
-    for (const element of section.querySelectorAll(".player")) {
-      if (!players.has(element)) players.set(element, new Player(element));
-      players.get(element).open();
-    }
-  };
-
-  const route = () => {
-    const wanted = location.hash.slice(1) || sections[0]?.id;
-    const chosen = sections.find((one) => one.id === wanted) ?? sections[0];
-    for (const section of sections) {
-      section.hidden = section !== chosen;
-      if (section.hidden) section.querySelectorAll(".player").forEach((one) => players.get(one)?.close());
-    }
-    for (const link of document.querySelectorAll("nav a")) {
-      if (link.hash === `#${chosen?.id}`) link.setAttribute("aria-current", "page"); else link.removeAttribute("aria-current");
-    }
-    // The page shows its tables first.
-    if (chosen) setTimeout(() => { open(chosen); document.body.dataset.ready = "yes"; });
-  };
-  addEventListener("hashchange", () => { route(); scrollTo(0, 0); });
-  addEventListener("beforeprint", () => sections.forEach((one) => { one.hidden = false; }));
-  addEventListener("afterprint", route);
-  route();
+  // The page shows its tables first.
+  setTimeout(() => {
+    for (const element of document.querySelectorAll(".player")) new Player(element).open();
+    document.body.dataset.ready = "yes";
+  });
 })();

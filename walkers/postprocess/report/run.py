@@ -1,4 +1,4 @@
-"""Report of a run: parameters with sources, results, plots, and a 3-D player."""
+"""Report of a run: parameters with sources, results, figures, and a 3-D player."""
 
 from __future__ import annotations
 
@@ -11,56 +11,44 @@ from walkers.inputs.case import Case
 from walkers.inputs.keys import dotted
 from walkers.inputs.origins import Origin, text_of
 from walkers.postprocess.analysis import (
-    Measured,
     analyses_in,
-    analyses_of,
     current_result,
     quantities_of,
     uncertainty_of,
     warnings_of,
 )
 from walkers.postprocess.caption import caption
-from walkers.postprocess.report.page import NAME, check_report, drawn, fill, packed_plots, write_page
+from walkers.postprocess.figures import figures_of
+from walkers.postprocess.motion import read_motion
+from walkers.postprocess.report.page import LARGEST, NAME, check_report, fill, page_of, svg_of
 from walkers.postprocess.report.player import MOST_PLACES, player_of
 from walkers.postprocess.uncertainty import rests_on, with_bands
 from walkers.runner.directory import case_of
+from walkers.runner.files import write_text
 from walkers.runner.manifest import read_manifest
 
 Origins = tuple[Origin, ...] | None
 """Sources of the values of a case; None: as recorded in the run."""
 
 
-class RunReport:
-    """Contents of a section of a page; ``carried`` are the packed data, ``places`` limits the player (`player_of`)."""
-
-    def __init__(
-        self, directory: Path, section: str = "run", places: int = MOST_PLACES, origins: Origins = None
-    ) -> None:
-        from bokeh.layouts import column
-
-        run = Measured(directory)
-        case = run.motion.case
-        self.id, self.name, self.title = section, directory.resolve().name, case.title or case.name
-        rests = {"rests_on": rests_on(origins)} if origins is not None else {}
-        self.shown = shown_of(case, with_bands(directory, current_result(directory) | rests), origins)
-        self.manifest = read_manifest(directory)
-        self.player = player_of(run.motion, places=places)
-        self.carried = {f"player-{section}": base64.b64encode(self.player.plot.get_binary_snapshot(9)).decode()}
-        figures = (one for analysis in analyses_of(case) for one in analysis.panels(run).values())
-        if panels := [panel for figure in figures for panel in figure]:
-            plots = column(*map(drawn, panels), sizing_mode="stretch_width")
-            self.carried[f"plots-{section}"] = packed_plots(plots)
-
-
-def report_run(directory: Path, to: Path | None = None, origins: Origins = None) -> Path:
+def report_run(
+    directory: Path,
+    to: Path | None = None,
+    origins: Origins = None,
+    *,
+    places: int = MOST_PLACES,
+    largest: int = LARGEST,
+) -> Path:
     """Write the report of a run as a self-contained HTML file.
 
     Parameters
     ----------
     directory, origins
-        See `RunReport`.
+        The run directory; the sources of the values of its case.
     to
-        The file, smaller than 5 MB; None: ``report.html`` in the run directory.
+        The file; None: ``report.html`` in the run directory.
+    largest
+        Size in bytes that the file must not reach: the player shows fewer frames of runs of many beads.
 
     Raises
     ------
@@ -70,8 +58,26 @@ def report_run(directory: Path, to: Path | None = None, origins: Origins = None)
     require("report")
     path = to or directory / NAME
     check_report(path)
-    run = RunReport(directory, origins=origins)
-    return write_page(path, run.title, fill("run.html.j2", run=run), run.carried)
+    case, motion = case_of(directory), read_motion(directory)
+    rests = {"rests_on": rests_on(origins)} if origins is not None else {}
+    title = case.title or case.name
+    run = {
+        "name": directory.resolve().name,
+        "title": title,
+        "shown": shown_of(case, with_bands(directory, current_result(directory) | rests), origins),
+        "manifest": read_manifest(directory),
+        "figures": {name: svg_of(figure) for name, figure in figures_of(directory).items()},
+    }
+    places = MOST_PLACES
+    while True:
+        player = player_of(motion, places=places)
+        carried = {"player": base64.b64encode(player.plot.get_binary_snapshot(9)).decode()}
+        page = page_of(title, fill("run.html.j2", run=run, player=player), carried)
+        if len(page.encode()) < largest or places <= len(motion.radius):
+            break
+        places //= 2
+    write_text(path, page)
+    return path
 
 
 def shown_of(case: Case, result: dict[str, Any], origins: Origins = None) -> dict[str, Any]:
