@@ -19,6 +19,7 @@ from walkers.sweeps.accuracy import measure_accuracy, times_of
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.table import derived_of
 
+ROOT = Path(__file__).parent.parent
 QUICK = {"time_step": "4 us", "cycles": 6, "settling_cycles": 2, "samples_per_cycle": 5}
 PAIR = {"radii": ["0.3 mm", "0.2 mm"], "replicates": 2}
 
@@ -48,6 +49,9 @@ def test_the_error_is_the_distance_from_far_harder_beads_at_a_far_smaller_step(t
     # … as what rolls: the large bead.
     assert found.errors["rotation_1"]["stiffer"] == pytest.approx(error["stiffer"], rel=0.05)
     assert done.result["accuracy"]["errors"]["velocity"] == error
+    speeds = walkers.load(tmp_path / found.sweep).table()["velocity"]
+    cells = " | ".join(f"{100.0 * (one / own - 1.0):+.2f}".replace("-", "−") for one in speeds[1:])
+    assert f"| `fig1b`, 4 g | {1e3 * own:.3f} | {cells} |" in (ROOT / "docs/explanation/physics.md").read_text("utf-8")
     told = f"numerical error {100.0 * error['total'] / own:.2g} % (half the time step "
     assert told in done.describe()
     assert told in " ".join(done.report(tmp_path / "report.html").read_text("utf-8").split())

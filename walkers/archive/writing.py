@@ -34,6 +34,7 @@ _MEANINGS = {
     MANIFEST_NAME: ("record", "provenance: versions, machine, times, and checksums of all files"),
     RECORD_NAME: ("record", "the points of the sweep: varied keys, derived quantities, names of the runs"),
     "result.json": ("result", "the result of the run, SI units"),
+    "accuracy.json": ("result", "numerical errors of the result, SI units"),
     "walker.lig": ("deck", "the deck: input script of the engine"),
     "law.py": ("deck", "the file of the user's bridge law"),
     "bridges.txt": ("deck", "forces of each bridge against its gap, which the engine reads"),
