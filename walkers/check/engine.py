@@ -33,7 +33,8 @@ class SecondEngine:
     radius : ndarray, shape (N,)
         Radii of the beads, m.
     start : ndarray, shape (N, 9)
-        Position (m), velocity (m/s) and spin (rad/s). Touching beads have a bridge; springs are unstretched.
+        Position (m), velocity (m/s) and spin (rad/s). Touching beads have a bridge; where liquid is conserved, bridges
+        between beads form from the next step on, as in LIGGGHTS. Springs are unstretched, films full.
     walls
         Other walls than those of the case.
     clock
@@ -57,11 +58,12 @@ class SecondEngine:
         self.clock, self.radius = clock, np.ascontiguousarray(radius, dtype=np.float64)
         self.constants = _constants(case, self.radius, walls or case.boundary.walls, without)
         place, velocity, spin = (np.array(start[:, one : one + 3], dtype=np.float64, order="C") for one in (0, 3, 6))
-        self.state = State(place, velocity, spin, np.zeros_like(place), np.zeros_like(place))
+        films = np.ones(len(radius)), np.zeros(len(radius))
+        self.state = State(place, velocity, spin, np.zeros_like(place), np.zeros_like(place), *films)
         self._skin = _SKIN * float(self.radius.min())
         self._reach = self.radius + (self.constants.bridges.spans[:, kernels.RUPTURE].max() + self._skin) / 2.0
         none = np.zeros(0, dtype=np.int64)
-        self.pairs = Pairs(none, none, np.zeros((0, 3)), np.zeros(0, dtype=np.bool_))
+        self.pairs = Pairs(none, none, np.zeros((0, 3)), none)
         self._list()
         self.evaluate()
 
@@ -94,8 +96,13 @@ class SecondEngine:
 
     def bridges(self) -> list[tuple[int, int]]:
         """Indices of the surfaces of each bridge: two beads, or a bead and a wall (numbered after the beads)."""
-        held = self.pairs.bridged
+        held = self.pairs.bridge >= 0
         return list(zip(self.pairs.first[held].tolist(), self.pairs.second[held].tolist(), strict=True))
+
+    def liquid(self) -> float:
+        """Liquid on all beads and in all bridges, m³."""
+        bridges, held = self.constants.bridges, self.pairs.bridge
+        return float(bridges.own @ self.state.film + bridges.volume[held[held >= 0]].sum())
 
     def _list(self) -> None:
         """List the neighbours, and keep contacts and bridges."""
@@ -105,10 +112,10 @@ class SecondEngine:
         bodies = beads + len(self.constants.point)
         at_walls = bodies * np.arange(beads)[:, None] + np.arange(beads, bodies)
         keys = np.sort(np.concatenate([near.min(axis=1) * bodies + near.max(axis=1), at_walls.ravel()]))
-        pairs = Pairs(keys // bodies, keys % bodies, np.zeros((len(keys), 3)), np.zeros(len(keys), dtype=np.bool_))
+        pairs = Pairs(keys // bodies, keys % bodies, np.zeros((len(keys), 3)), np.full(len(keys), -1))
         known = before.first * bodies + before.second
         _, new, old = np.intersect1d(keys, known, assume_unique=True, return_indices=True)
-        pairs.spring[new], pairs.bridged[new] = before.spring[old], before.bridged[old]
+        pairs.spring[new], pairs.bridge[new] = before.spring[old], before.bridge[old]
         self.pairs = pairs
 
 
@@ -135,17 +142,19 @@ def _splined(law: BridgeLaw, surfaces: Surfaces) -> tuple[FloatArray, FloatArray
 
 def _bridges(case: Case, radius: FloatArray, without: Collection[str]) -> Bridges:
     sizes, kind = np.unique(radius, return_inverse=True)
-    between = np.empty((len(sizes), len(sizes) + 1), dtype=np.int64)
-    made: list[tuple[FloatArray, FloatArray]] = []
-    for row, one in enumerate(sizes.tolist()):
-        between[row, :row] = between[:row, row]
-        for column, other in list(enumerate([*sizes.tolist(), inf]))[row:]:
-            between[row, column] = len(made)
-            surfaces = Surfaces.of(one, other, case.liquid.of_bridges, case.contact.minimum_separation_ratio)
-            made.append(_splined(case.law, surfaces))
+    between, full = np.empty((len(sizes), len(sizes) + 1), dtype=np.int64), np.zeros((len(sizes), len(sizes) + 1, 2))
+    made: list[tuple[FloatArray, FloatArray, float]] = []
+    for row, small in enumerate(sizes.tolist()):
+        between[row, :row], full[row, :row] = between[:row, row], full[:row, row, ::-1]
+        for column, large in list(enumerate([*sizes.tolist(), inf]))[row:]:
+            surfaces = Surfaces.of(small, large, case.liquid.of_bridges, case.contact.minimum_separation_ratio)
+            between[row, column], full[row, column] = len(made), surfaces.films[0]
+            made += [(*_splined(case.law, meeting), meeting.volume) for meeting in surfaces.volumes]
     acts = np.array(["capillary" not in without, *["lubrication" not in without] * 4], dtype=np.float64)
-    spans, splines = np.stack([one for one, _ in made]), np.stack([one for _, one in made]) * acts
-    return Bridges(spans, splines, kind.astype(np.int64), between)
+    spans, splines, volumes = map(np.stack, zip(*made, strict=True))
+    own = 4.0 / 3.0 * pi * radius**3 * case.liquid.volume_fraction
+    steps = 8 if case.liquid.conserved else 0
+    return Bridges(spans, splines * acts, kind.astype(np.int64), between, volumes, steps, full, own)
 
 
 def _constants(case: Case, radius: FloatArray, walls: Sequence[Wall], without: Collection[str]) -> Constants:

@@ -17,7 +17,7 @@ J. Ai, J.-F. Chen, J. M. Rotter, J. Y. Ooi, Powder Technology 206 (2011) 269, do
 
 from __future__ import annotations
 
-from math import log, sin, sqrt
+from math import log, log2, sin, sqrt
 from typing import NamedTuple
 
 import numba
@@ -27,7 +27,6 @@ import numpy.typing as npt
 compiled = numba.njit(cache=True, error_model="numpy")
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
-FlagArray = npt.NDArray[np.bool_]
 Vector = tuple[float, float, float]
 
 CELLS = 512
@@ -42,12 +41,20 @@ class Bridges(NamedTuple):
     ``spans`` (T, 4): gaps at which a bridge forms, pieces end, and it breaks, m; ``splines`` (T, 3, CELLS, 4, 5):
     coefficients of each cell, highest power first, of pull (N) and resistances; ``kind`` (N,): index of each bead's
     radius; ``between`` (K, K + 1): index of the bridge between two kinds, and in the last column to walls.
+
+    ``volume`` (T,), m³. Where liquid is conserved, two kinds have bridges of several volumes, in steps of √2 from the
+    index on; full films give the volume after a number of ``steps``, else 0. ``full`` (K, K + 1, 2): what full films of
+    the first and second kind contribute to their bridge, m³; ``own`` (N,): the liquid of each bead, m³.
     """
 
     spans: FloatArray
     splines: FloatArray
     kind: IntArray
     between: IntArray
+    volume: FloatArray
+    steps: int
+    full: FloatArray
+    own: FloatArray
 
 
 class Constants(NamedTuple):
@@ -75,29 +82,35 @@ class Constants(NamedTuple):
 
 
 class State(NamedTuple):
-    """State of N beads, arrays of shape (N, 3)."""
+    """State of N beads, arrays of shape (N, 3).
+
+    ``film`` (N,): liquid on a bead, not in bridges, over its whole liquid; ``offered`` (N,): the same at the end of the
+    step before, which all bridges between beads form from.
+    """
 
     position: FloatArray
     velocity: FloatArray
     spin: FloatArray
     force: FloatArray
     torque: FloatArray
+    film: FloatArray
+    offered: FloatArray
 
 
 class Pairs(NamedTuple):
     """P pairs, sorted: neighbouring beads, and each bead with each wall (numbered after the beads).
 
-    ``spring`` (P, 3) has tangential displacements, m.
+    ``spring`` (P, 3) has tangential displacements, m; ``bridge`` (P,) the index of the bridge, or -1.
     """
 
     first: IntArray
     second: IntArray
     spring: FloatArray
-    bridged: FlagArray
+    bridge: IntArray
 
 
 class Meeting(NamedTuple):
-    """State of a pair: index of the bridge, gap, reduced radius and mass, friction, normal, and velocities.
+    """State of a pair: index of the bridge or -1, gap, reduced radius and mass, friction, normal, and velocities.
 
     ``order`` is -1 if the first bead is the larger one, which changes the sign of the coupling; ``apart`` is the normal
     velocity of the centres, ``slide`` the sliding velocity of the surfaces (m/s), ``turn`` the difference of the spins
@@ -193,10 +206,10 @@ def touch(c: Constants, m: Meeting, spring: FloatArray, moves: bool) -> tuple[fl
 
 
 @compiled
-def meet(c: Constants, m: Meeting, spring: FloatArray, bridged: bool, moves: bool) -> tuple[Vector, Vector]:
+def meet(c: Constants, m: Meeting, spring: FloatArray, moves: bool) -> tuple[Vector, Vector]:
     """Force (N) and couple (N m) on the first of two surfaces that touch or have a bridge."""
     normal, tangential, couple = touch(c, m, spring, moves) if m.gap < 0.0 else (0.0, NONE, NONE)
-    if bridged:
+    if m.bridge >= 0:
         pull, resists, slides, couples, rolls = bridge_forces(c.bridges, m.bridge, m.gap)
         q, couples = cross(m.n, m.turn), m.order * couples
         normal -= pull + resists * m.apart
@@ -231,6 +244,41 @@ def separation(c: Constants, state: State, i: int, j: int) -> tuple[Vector, floa
 
 
 @compiled
+def bridge_of(b: Bridges, state: State, i: int, j: int, held: int, gap: float) -> int:
+    """Index of the bridge of a pair, or -1; a bridge that forms takes its volume from films, and later returns it.
+
+    It takes in proportion to what the films offer, and returns in proportion to what full ones would. Bridges to walls
+    form after those between beads, from what these have left.
+    """
+    beads = b.kind.shape[0]
+    wall = j >= beads
+    kinds = b.kind[i], -1 if wall else b.kind[j]
+    if held < 0:
+        held = b.between[kinds]
+        first, second = b.full[kinds]
+        offers = (first * state.film[i], 0.0) if wall else (first * state.offered[i], second * state.offered[j])
+        if b.steps:
+            part = (offers[0] + offers[1]) / (first + second)
+            level = round(2.0 * log2(part)) if part > 0.0 else -b.steps - 1
+            if level < -b.steps and 1.2 * part < 2.0 ** (-0.5 * b.steps):
+                return -1
+            held += b.steps + min(max(level, -b.steps), 1)
+        if gap > b.spans[held, FORMATION] or gap >= b.spans[held, RUPTURE]:
+            return -1
+        sign = -1.0
+    elif gap < b.spans[held, RUPTURE]:
+        return held
+    else:
+        offers, sign = (b.full[kinds][0], b.full[kinds][1]), 1.0
+    if b.steps:
+        part = sign * b.volume[held] / (offers[0] + offers[1])
+        state.film[i] += part * offers[0] / b.own[i]
+        if not wall:
+            state.film[j] += part * offers[1] / b.own[j]
+    return held if sign < 0.0 else -1
+
+
+@compiled
 def forces(c: Constants, state: State, pairs: Pairs, clock: int, moves: bool) -> None:
     """All forces and torques at the places and velocities of the state: weight, inertia, contacts and bridges."""
     beads, total = c.radius.shape[0], vector(c.gravity)
@@ -245,12 +293,10 @@ def forces(c: Constants, state: State, pairs: Pairs, clock: int, moves: bool) ->
     for at in range(pairs.first.shape[0]):
         i, j = pairs.first[at], pairs.second[at]
         n, gap = separation(c, state, i, j)
-        bridge = c.bridges.between[c.bridges.kind[i], c.bridges.kind[j] if j < beads else -1]
-        forms, breaks = c.bridges.spans[bridge, FORMATION], c.bridges.spans[bridge, RUPTURE]
-        pairs.bridged[at] = gap < breaks and (pairs.bridged[at] or gap <= forms)
+        bridge = pairs.bridge[at] = bridge_of(c.bridges, state, i, j, pairs.bridge[at], gap)
         if gap >= 0.0:
             pairs.spring[at, :] = 0.0
-            if not pairs.bridged[at]:
+            if bridge < 0:
                 continue
         arm, spin = c.radius[i] + 0.5 * gap, vector(state.spin[i])
         between, turn, turning = vector(state.velocity[i]), spin, plus(NONE, arm, spin)
@@ -265,10 +311,11 @@ def forces(c: Constants, state: State, pairs: Pairs, clock: int, moves: bool) ->
         apart = dot(between, n)
         slide = plus(plus(between, -apart, n), 1.0, cross(n, turning))
         m = Meeting(bridge, order, gap, radius, mass, friction, n, apart, slide, turn)
-        acting = meet(c, m, pairs.spring[at], pairs.bridged[at], moves)
+        acting = meet(c, m, pairs.spring[at], moves)
         push(state, i, 1.0, arm, n, acting)
         if j < beads:
             push(state, j, -1.0, other_arm, n, acting)
+    state.offered[:] = state.film
 
 
 @compiled

@@ -36,7 +36,7 @@ from walkers.runner.directory import write_deck
 from walkers.runner.launch import launch
 from walkers.templates.bridge_tables import tabulated
 from walkers.templates.deck import BRIDGES_NAME, Deck, Plan, Segment, compose, plan_of
-from walkers.templates.layout import BEAD_COLUMNS, FORCE_COLUMNS
+from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, FORCE_COLUMNS
 from walkers.templates.scene import Bead, Scene
 from walkers.text import rendered
 
@@ -383,6 +383,32 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
     yield Line("two beads separate: force, Debian's own bridge model", 0.0, error, 1e-9)
 
 
+def liquid_lines(bench: Bench, ranks: int = 1) -> Iterator[Line]:
+    """Beads that fly through each other along a floor and share their liquid, in both engines."""
+    draw = np.random.default_rng(3)
+    case = bench_case(liquid={"volume_fraction": 0.02, "law": "willett"})  # whose tables take no time
+    case = case.put("liquid.conserved", True)
+    radii = draw.choice([2e-4, 2.5e-4, 3e-4], 16)
+    start = np.column_stack([draw.uniform(-8e-4, 8e-4, (16, 2)), radii + draw.uniform(-3e-5, 8e-5, 16)])
+    velocity = np.column_stack([draw.uniform(-0.3, 0.3, (16, 2)), draw.uniform(-0.03, 0.03, 16)])
+    places, speeds = map(tuple, start.tolist()), map(tuple, velocity.tolist())
+    beads = [Bead(0, *bead) for bead in zip(places, radii.tolist(), speeds, strict=True)]
+    plan = prescribed(case, standing(beads), 4000, ranks=ranks)
+    plan = replace(plan, bead_columns=(*BEAD_COLUMNS, *FORCE_COLUMNS, FILM_COLUMN))
+    series, engine = bench.run(plan), second_engine(case, plan.scene)
+    films, everything = [engine.state.film.copy()], engine.liquid()
+    for frame in series.frames[1:]:
+        engine.follow(frame)
+        films.append(engine.state.film.copy())
+    dump = BinaryDump(series.directory / "beads.bin", plan.bead_columns).stack()
+    yield Line(
+        "films of beads that meet and part, both engines", 0.0, float(np.abs(dump[:, :, -1] - films).max()), 1e-9
+    )
+    yield Line("liquid at the end over that at the start", 1.0, engine.liquid() / everything, 1e-9)
+    yield Line("smallest film", 0.0, float(np.min(films)))
+    yield Line("largest film", 1.0, float(np.max(films)))
+
+
 def _walker(cycles: int) -> Case:
     """A single walker of Fig. 1b for a number of cycles."""
     case = load_case("fig1b", {"dimers.replicates": 1})
@@ -427,6 +453,7 @@ CHECKS: Mapping[str, Callable[[Bench], Iterable[Line]]] = {
     "restart": restart_lines,
     "ranks": rank_lines,
     "stock": stock_lines,
+    "liquid": liquid_lines,
     "company": company_lines,
     "step": step_lines,
 }
