@@ -30,8 +30,8 @@ from walkers.inputs.reading import load_case
 from walkers.postprocess.dump import BinaryDump
 from walkers.runner.binary import find_engine, plugin_of
 from walkers.runner.directory import write_deck
+from walkers.runner.launch import ALONE
 from walkers.templates.deck import DECK_NAME, Deck, Segment, compose, plan_of
-from walkers.templates.engine import ALONE
 from walkers.theory.motion import Friction, Walker, walk
 
 _PROGRAM = str(Path(sys.executable).with_name("walkers"))

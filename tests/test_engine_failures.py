@@ -46,9 +46,8 @@ from walkers.runner.binary import find_engine, plugin_of
 from walkers.runner.directory import write_deck
 from walkers.runner.failures import EngineNeverStarted
 from walkers.runner.files import beside
-from walkers.runner.launch import _off_the_network, judge, launch, postponed_interrupts
+from walkers.runner.launch import ALONE, _off_the_network, judge, launch, postponed_interrupts
 from walkers.templates.deck import Deck, Segment, render_deck, whole
-from walkers.templates.engine import ALONE
 
 Front = Callable[[str], str]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from walkers.templates.engine import ALONE
+from walkers.runner.launch import ALONE
 
 REPORTS = Path(__file__).resolve().parents[1] / "docs" / "engine-reports"
 DEFAULT_PAGE = ("-var", "page", "100000", "-var", "one", "2000")

@@ -26,10 +26,9 @@ from pathlib import Path
 from typing import Any
 
 from walkers.cache import cache_folder, make_cache_folder
-from walkers.runner.failures import ContactModelMissing, EngineFailure, EngineMissing, OtherEngine
+from walkers.runner.failures import AUDITED_VERSION, ContactModelMissing, EngineFailure, EngineMissing, OtherEngine
 from walkers.runner.files import checksum, read_json, write_json
 from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, RUN_NAME
-from walkers.templates.engine import AUDITED_VERSION
 
 ENGINE_VARIABLE = "WALKERS_ENGINE"
 SOURCES = Path(str(files("walkers.engine")))

@@ -131,7 +131,7 @@ def write_case(directory: Path, case: Case) -> None:
 
 def layout_of(segment: Path) -> Layout:
     """Layout of the dumps of a segment; raises `OSError`, `ValueError`, `KeyError` or `TypeError` if unreadable."""
-    return Layout.from_dict(read_json(segment / LAYOUT_NAME))
+    return Layout(**read_json(segment / LAYOUT_NAME))
 
 
 def segment_directories(directory: Path) -> list[Path]:

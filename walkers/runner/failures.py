@@ -9,7 +9,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from walkers.errors import WalkersError
-from walkers.templates.engine import AUDITED_VERSION
+
+AUDITED_VERSION = "LIGGGHTS-PUBLIC 3.8.0"
+"""The audited version of the engine, for which the contact model is written."""
 
 
 class EngineFailure(WalkersError):

@@ -258,16 +258,12 @@ def fastest_of(case: Case, scene: Scene) -> float:
 
 def _layout(plan: Plan) -> Layout:
     steps = plan.segment.end - plan.segment.begin
+    same = ("bead_columns", "sample_every", "wall_bridge_columns", "bridge_every", "walkers", "ranks")
     return Layout(
-        bead_columns=plan.bead_columns,
-        sample_every=plan.sample_every,
+        **{name: getattr(plan, name) for name in same},
         frames=steps // plan.sample_every + 1,
-        wall_bridge_columns=plan.wall_bridge_columns,
-        bridge_every=plan.bridge_every,
         bridge_frames=steps // plan.bridge_every + 1,
         atoms=len(plan.scene.beads),
         steps=plan.segment.end,
         time_step=plan.case.run.time_step,
-        walkers=plan.walkers,
-        ranks=plan.ranks,
     )

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from functools import cache
+from dataclasses import asdict
 from typing import Any
 
-from pydantic import TypeAdapter
+from pydantic.dataclasses import dataclass
 
 BEAD_COLUMNS = ("id", "type", "radius", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz")
 """Columns of the bead dump, in the engine's names (m, m/s, rad/s)."""
@@ -81,13 +80,3 @@ class Layout:
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types."""
         return asdict(self)
-
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> Layout:
-        """Rebuild from `as_dict`; raises `ValueError` if it is none."""
-        return _adapter().validate_python(values)
-
-
-@cache
-def _adapter() -> TypeAdapter[Layout]:
-    return TypeAdapter(Layout)
