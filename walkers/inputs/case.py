@@ -27,7 +27,7 @@ from walkers.inputs.library import library_of
 from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
 from walkers.inputs.origins import Origin, Source, Whence, text_of
 from walkers.inputs.resolving import GIVEN_BY, resolve, supplied
-from walkers.inputs.run import Run
+from walkers.inputs.run import Run, settling_of
 from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, changed, contradictions, key
 from walkers.inputs.units import Coefficient, Number, kind_in
 from walkers.physics.laws import by_name
@@ -296,7 +296,10 @@ class Case(Table):
 
     def for_cycles(self, cycles: int) -> Case:
         """The same case with a fixed number of cycles in one segment."""
-        return self.but(run=self.run.for_cycles(cycles))
+        if not self.run.until_steady:
+            return self
+        fixed = {"until_steady": False, "settling_cycles": settling_of(cycles), "cycles_per_segment": cycles}
+        return self.but(run=self.run.but(cycles=cycles, **fixed))
 
     @cached_property
     def origins(self) -> tuple[Origin, ...]:

@@ -132,13 +132,6 @@ class Run(Table):
         """Steps of the attempts up to the one for so many cycles."""
         return self.steps_per_cycle * sum(one for one in self.attempts if one <= cycles)
 
-    def for_cycles(self, cycles: int) -> Run:
-        """The same run with a fixed number of cycles in one segment."""
-        if not self.until_steady:
-            return self
-        settling = settling_of(cycles)
-        return self.but(cycles=cycles, settling_cycles=settling, until_steady=False, cycles_per_segment=cycles)
-
     @property
     def rests(self) -> bool:
         """Whether the beads rest before the drive."""
@@ -171,17 +164,22 @@ def with_run(case: Case) -> Case:
 
     Raises `InputError` if they contradict each other, or the time step is beyond its limits.
     """
-    table, frequency, loose = case.run, case.excitation.frequency, case.loose
+    table, frequency, loose, limits = case.run, case.excitation.frequency, case.loose, limits_of(case)
     samples, cycles_per_sample, samples_per_bridge_sample = _sampling(case)
-    largest, reason = _largest_time_step(case)
+    largest, reason = limits.recommended(loose=loose) if table.time_step is None else (table.time_step, "given")
+    if (exceeded := limits.exceeded_by(largest)) and not table.allow_unstable:
+        allowed = f"{min(vars(limits).values()) * 1e6:.3g} us"
+        message = f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed}, "
+        raise unusable("run.time_step", f'{message}"auto", or allow_unstable = true')
     time_step, steps = fit_into_cycle(largest, frequency, samples)
-    cycles, until_steady = _cycles(case, cycles_per_sample), _until_steady(case, cycles_per_sample)
+    wanted: float = table.cycles or table.most_cycles or _MOST_CYCLES
+    if table.duration is not None:
+        wanted = table.duration * case.excitation.frequency * (1.0 - 1e-12)
+    cycles, until_steady = ceil(wanted / cycles_per_sample) * cycles_per_sample, _until_steady(case, cycles_per_sample)
     settling = table.settling_cycles
     if settling is None:
         settling = settling_of(cycles) if case.walkers else 0
-    rest = table.longest_settling
-    if rest is None:
-        rest = _LONGEST_SETTLING if loose else 0.0
+    rest = table.longest_settling if table.longest_settling is not None else _LONGEST_SETTLING * loose
     _check_length(case, cycles, settling, cycles_per_sample)
     most = MOST_STEPS // steps - (ceil((rest + 1.0) * frequency) if rest else 0)
     if cycles > most:
@@ -208,17 +206,21 @@ def with_run(case: Case) -> Case:
 
 def _sources(run: Run, case: Case, reason: str) -> dict[str, Source]:
     """Where the values of a run are from that its table does not give."""
-    cycles = f"until constant within {percent(CONSTANT)}, at most {run.cycles}" if run.until_steady else ""
-    checked = "checked after 12 and 24 cycles" if run.until_steady else "not checked earlier"
-    whence = "from the duration" if run.duration else checked
+    whence, cycles, settling = "from the duration" if run.duration else "not checked earlier", "", ""
+    if run.until_steady:
+        whence, cycles = (
+            "checked after 12 and 24 cycles",
+            f"until constant within {percent(CONSTANT)}, at most {run.cycles}",
+        )
+        settling = ", ".join(f"{settling_of(cycles)} of {cycles}" for cycles in run.attempts)
     often = "" if run.cycles_per_sample == 1 else f"1 in {run.cycles_per_sample} cycles"
     if often:
         whence += f", rounded up to a multiple of {run.cycles_per_sample} cycles (one sample)"
-    settling = ", ".join(f"{settling_of(cycles)} of {cycles}" for cycles in run.attempts) if run.until_steady else ""
-    by_time = case.loose or run.frames_per_second
-    sampled = Source("derived", "from frames_per_second", often) if by_time else Source("default", text=often)
+    by_time = case.loose or bool(run.frames_per_second)
     sources = {
-        "run.samples_per_cycle": sampled,
+        "run.samples_per_cycle": Source(
+            *("derived", "from frames_per_second") if by_time else ("default",), text=often
+        ),
         "run.time_step": Source("derived", f"auto: {reason}, a whole number of steps per cycle"),
         "run.cycles": Source("derived", whence, cycles),
         "run.settling_cycles": Source("derived", "a third of the cycles, at most 20", settling),
@@ -245,18 +247,6 @@ def _check_length(case: Case, cycles: int, settling: int, cycles_per_sample: int
         raise unusable("run.frames_per_second", message)
 
 
-def _largest_time_step(case: Case) -> tuple[float, str]:
-    """The largest step, s, and its reason: given (within the limits unless the case insists), or ``"auto"``."""
-    limits, given = limits_of(case), case.run.time_step
-    if given is None:
-        return limits.recommended(loose=case.loose)
-    if (exceeded := limits.exceeded_by(given)) and not case.run.allow_unstable:
-        allowed = f"{min(vars(limits).values()) * 1e6:.3g} us"
-        message = f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed}, "
-        raise unusable("run.time_step", f'{message}"auto", or allow_unstable = true')
-    return given, "given"
-
-
 def _sampling(case: Case) -> tuple[int, int, int]:
     """Samples a cycle and cycles a sample, one of which is 1, and samples a sample of bridges."""
     table = case.run
@@ -272,14 +262,6 @@ def _sampling(case: Case) -> tuple[int, int, int]:
     if samples % bridges:
         raise unusable(name, f"expected a divisor of samples_per_cycle = {samples}")
     return samples, cycles_per_sample, samples // bridges
-
-
-def _cycles(case: Case, cycles_per_sample: int) -> int:
-    """Cycles of a run, whole samples of them."""
-    cycles: float = case.run.cycles or case.run.most_cycles or _MOST_CYCLES
-    if case.run.duration is not None:
-        cycles = case.run.duration * case.excitation.frequency * (1.0 - 1e-12)
-    return ceil(cycles / cycles_per_sample) * cycles_per_sample
 
 
 def _until_steady(case: Case, cycles_per_sample: int) -> bool:

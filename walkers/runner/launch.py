@@ -264,8 +264,8 @@ class _Watch:
 
     def run(self, command: Sequence[str], on_step: Callable[[int], None], keep_open: Sequence[int]) -> EngineReport:
         """Start an engine and watch it to its end."""
-        # A user's Open MPI settings for a cluster, such as the network, may not work on one machine. The system's loader
-        # would report the user's LD_PRELOAD as an ERROR before.
+        # A user's Open MPI settings for a cluster, such as the network, may not work on one machine. The loader
+        # would report the LD_PRELOAD of the user as an ERROR before.
         ours = {name: value for name, value in os.environ.items() if not name.startswith(_HIDDEN)}
         environment = ours | (_RANKS if self.layout.ranks > 1 else ALONE)
         process = None
