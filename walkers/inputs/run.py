@@ -208,19 +208,15 @@ def _sources(run: Run, case: Case, reason: str) -> dict[str, Source]:
     """Where the values of a run are from that its table does not give."""
     whence, cycles, settling = "from the duration" if run.duration else "not checked earlier", "", ""
     if run.until_steady:
-        whence, cycles = (
-            "checked after 12 and 24 cycles",
-            f"until constant within {percent(CONSTANT)}, at most {run.cycles}",
-        )
-        settling = ", ".join(f"{settling_of(cycles)} of {cycles}" for cycles in run.attempts)
+        whence = "checked after 12 and 24 cycles"
+        cycles = f"until constant within {percent(CONSTANT)}, at most {run.cycles}"
+        settling = ", ".join(f"{settling_of(number)} of {number}" for number in run.attempts)
     often = "" if run.cycles_per_sample == 1 else f"1 in {run.cycles_per_sample} cycles"
     if often:
         whence += f", rounded up to a multiple of {run.cycles_per_sample} cycles (one sample)"
     by_time = case.loose or bool(run.frames_per_second)
     sources = {
-        "run.samples_per_cycle": Source(
-            *("derived", "from frames_per_second") if by_time else ("default",), text=often
-        ),
+        "run.samples_per_cycle": Source("derived" if by_time else "default", "from frames_per_second" * by_time, often),
         "run.time_step": Source("derived", f"auto: {reason}, a whole number of steps per cycle"),
         "run.cycles": Source("derived", whence, cycles),
         "run.settling_cycles": Source("derived", "a third of the cycles, at most 20", settling),
