@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import sys
+import runpy
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -22,12 +20,13 @@ def loaded(name: str, place: str) -> Sequence[BridgeLaw]:
 
     Raises `ValueError` if there is none, or if its file raises an error or exits.
     """
-    function = name.rpartition(":")[2]
-    modules = [_executed(place), _executed(place)] if place.endswith(".py") else [_called(import_module, place)]
-    laws = [getattr(module, function, None) for module in modules]
+    function, is_file = name.rpartition(":")[2], place.endswith(".py")
+    # Not as Python imports a file, which takes an edited one of the same length and second for the former one.
+    read = runpy.run_path if is_file else lambda module: vars(import_module(module))
+    laws = [_called(read, place).get(function) for _ in range(2 if is_file else 1)]
     if not all(map(callable, laws)):
         raise ValueError(f"bridge law {name!r}: {place} has no function {function}")
-    return laws  # type: ignore[return-value]
+    return laws
 
 
 def checked(laws: Sequence[BridgeLaw]) -> BridgeLaw:
@@ -72,15 +71,3 @@ def _called(function: Callable[..., Any], *arguments: object) -> Any:
         raise
     except BaseException as error:
         raise UnusableLawError(f"raises {type(error).__name__}: {error}") from error
-
-
-def _executed(place: str) -> ModuleType:
-    """A file as a module; it is in `sys.modules` while it runs, where its dataclasses look for it."""
-    key = f"walkers_law_{place}"
-    module = sys.modules[key] = ModuleType(key)
-    module.__file__ = place
-    try:  # not as Python imports it, which takes an edited file of the same length and second for the former one
-        _called(lambda: exec(compile(Path(place).read_bytes(), place, "exec"), vars(module)))
-    finally:
-        del sys.modules[key]
-    return module
