@@ -52,13 +52,8 @@ class Motion:
             Whether the dump ends within a frame; whether the run ended early because its velocities were constant.
         mean_spin : ndarray, shape (F, N, 3), or None
             Angular velocity averaged over the steps since the previous frame (zero in the first frame), if recorded.
-    <<<<<<< HEAD
-    =======
-        film : ndarray, shape (F, N), or None
-            Liquid on each bead, without that in bridges, over its whole liquid, if liquid is conserved.
-        numbers : ndarray of int, shape (N,), or None
-            Indices of the beads in the run; None: all beads of the run.
-    >>>>>>> 5615fa4 (Liquid necks in pictures, films and the 3-D view: as wide as the liquid of a bridge fills them)
+    numbers : ndarray of int, shape (N,), or None
+        Indices of the beads in the run; None: all beads of the run.
     """
 
     case: Case
