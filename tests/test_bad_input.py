@@ -190,7 +190,13 @@ def test_bad_values(changes: dict[str, Any], told: str) -> None:
     assert "expected" in message or "unknown key" in message
 
 
-READING = ("plot", "render", "render --film", "report", *(f"export --to {form}" for form in ("vtk", "xyz", "archive")))
+READING = (
+    "plot",
+    "render",
+    "render --film",
+    "report",
+    *(f"export --to {form}" for form in ("vtk", "lammps", "archive")),
+)
 REFUSED: list[tuple[str, str]] = [
     # What is of another kind, with the command for it
     ("run fig2", "fig2: is a sweep: walkers sweep fig2"),
@@ -271,9 +277,9 @@ REFUSED: list[tuple[str, str]] = [
     *((f"report {{run}} --to {place}", "expected the name of a .html or .htm file") for place in ("a.txt", "{folder}")),
     ("report {run} --to nowhere/a.html", "nowhere: there is no such folder"),
     ("plot {run} --to out.png", "out.png: expected a folder"),
-    ("export {run} --to xyz -o walk.dcd", "expected the name of a .xyz or .extxyz file"),
+    ("export {run} --to lammps -o walk.dcd", "expected the name of a .lammpstrj file"),
     ("export {run} --to vtk --open", "--open: is for --to paraview"),
-    ("export {run} --to deck --every 2", "--every: is for --to vtk, paraview, xyz, lammps"),
+    ("export {run} --to deck --every 2", "--every: is for --to vtk, paraview, lammps"),
     ("export {run} --to paraview -o vtk --colour beauty", "expected one of bead, large, omega, radius"),
     *((f"export {{run}} --to archive {words}", told) for words, told in (
         ("-o run.tar", "-o: expected the name of a .zip file"),

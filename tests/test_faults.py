@@ -209,7 +209,10 @@ DAMAGES: dict[str, tuple[Callable[[Path], object], str]] = {
 }
 READERS = (
     *("run short.toml", "run {run}", "plot {run}", "report {run} --to out.html"),
-    *(f"export {{run}} --to {form} -o {to}" for form, to in (("vtk", "vtk"), ("paraview", "vtk"), ("xyz", "out.xyz"))),
+    *(
+        f"export {{run}} --to {form} -o {to}"
+        for form, to in (("vtk", "vtk"), ("paraview", "vtk"), ("lammps", "out.lammpstrj"))
+    ),
     *("export {run} --to archive -o out.zip", "run short.toml --json"),
     *("compare {run} {run}", "compare short.toml fig1b", "show short.toml --theory"),
 )

@@ -161,7 +161,6 @@ NEEDING: dict[str, list[Callable[[walkers.Run, Path], object]]] = {
         lambda *_: predict(walkers.load_case("fig1b")),
         lambda _, out: make_figures(out / "runs", out / "figures", Options(1)),
     ],
-    "xyz": [lambda run, out: run.export("xyz", out / "run.xyz")],
 }
 
 

@@ -17,7 +17,6 @@ import meshio
 import numpy as np
 import pytest
 import pyvista as pv
-from ase.io import read
 from matplotlib.colors import to_hex, to_rgba
 from matplotlib.figure import Figure
 from PIL import Image
@@ -37,7 +36,6 @@ from walkers.postprocess.paraview import _walls, write_vtk
 from walkers.postprocess.scene import Scene, Window, axes_toward, camera_axes, mesh_of, walls_of
 from walkers.postprocess.series import _strips, render_series
 from walkers.postprocess.tables import read_table
-from walkers.postprocess.trajectory_files import box_of
 from walkers.runner.directory import case_of
 
 KINDS = ("beads", "boundary", "bridges")
@@ -222,7 +220,7 @@ _WRONG: list[tuple[Callable[[walkers.Run, Path], object], str]] = [
     (lambda run, to: run.film(to / "a.gif", FilmOptions(walker=-1)), "^walker: -1: expected 0 to 1$"),
     (lambda run, to: run.film(to / "a.gif", FilmOptions(begin=1.0)), "^begin, end: nothing to show"),
     (lambda run, to: run.render(to / "a.png", walker=2), "^walker: 2: expected 0 to 1$"),
-    (lambda run, to: run.export("xyz", to / "a.xyz", every=0), "^every: 0: expected a whole number from 1$"),
+    (lambda run, to: run.export("lammps", to / "a.lammpstrj", every=0), "^every: 0: expected a whole number from 1$"),
     (lambda run, to: run.export("vtk", to / "vtk", every=0), "^every: 0: expected a whole number from 1$"),
     (lambda run, to: run.export("paraview", to / "vtk", colour="beauty"), "^colour: 'beauty': expected one of bead, "),
     (lambda run, to: run.plot(to / "a.png"), r"a\.png: expected a folder"),
@@ -525,46 +523,28 @@ def test_walls_are_whole_wherever_the_beads_are(motion: Motion, boundary: Bounda
 # --- trajectories for other programs ----------------------------------------------------------------------------------
 
 
-def test_ase_reads_the_extended_xyz(filmed: Path, motion: Motion, tmp_path: Path) -> None:
-    path = tmp_path / "here" / "walk.xyz"
-    done = call("export", str(filmed), "--to", "xyz", "-o", str(path), "--every", "4", check=True)
+def test_a_lammps_dump_holds_the_motion(filmed: Path, motion: Motion, tmp_path: Path) -> None:
+    path = tmp_path / "here" / "walk.lammpstrj"
+    done = call("export", str(filmed), "--to", "lammps", "-o", str(path), "--every", "4", check=True)
     assert done.stdout.strip() == str(path)
-    frames = read(path, ":")
-    assert len(frames) == 41
-    for number, one in enumerate(frames):
-        frame = 4 * number
-        np.testing.assert_allclose(one.positions, 1e3 * motion.position[frame], rtol=0.0, atol=6e-9)
-        np.testing.assert_allclose(one.arrays["velo"], 1e3 * motion.velocity[frame], rtol=0.0, atol=6e-9)
-        np.testing.assert_allclose(one.arrays["omega"], motion.spin[frame], rtol=0.0, atol=6e-9)
-        assert one.info["Time"] == pytest.approx(motion.time[frame], abs=1e-12)
-        assert not one.pbc.any()
-    np.testing.assert_array_equal(frames[0].arrays["radius"], [0.3, 0.2, 0.3, 0.2])
-    np.testing.assert_array_equal(frames[0].arrays["walker"], [0, 0, 1, 1])
-    np.testing.assert_array_equal(frames[0].arrays["large"], [1, 0, 1, 0])
-    np.testing.assert_array_equal(frames[0].arrays["id"], [1, 2, 3, 4])
-    low, high = box_of(motion.select(slice(None, None, 4)))
-    np.testing.assert_allclose(frames[0].cell.lengths(), high - low)
-    np.testing.assert_allclose(frames[0].info["Origin"], low)
+    written = motion.select(slice(None, None, 4))
+    steps, counts, boxes, tables = zip(*(text.split("ITEM: ")[1:] for text in _frames_of(path)), strict=True)
+    times = np.array([int(text.split()[-1]) for text in steps]) * motion.case.run.time_step
+    np.testing.assert_allclose(times, written.time, atol=1e-12)
+    assert {text.split()[-1] for text in counts} == {"4"}
+    low, high = np.array(boxes[0].split()[-6:], dtype=float).reshape(3, 2).T
+    assert np.all(low <= 1e3 * (written.position - written.radius[:, None]).min(axis=(0, 1)) + 1e-9)
+    assert np.all(high >= 1e3 * (written.position + written.radius[:, None]).max(axis=(0, 1)) - 1e-9)
+    columns = tables[0].split()[1:14]
+    assert columns == ["id", "type", "mol", "radius", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz"]
+    rows = np.array([text.split("\n", 1)[1].split() for text in tables], dtype=float).reshape(len(times), 4, 13)
+    np.testing.assert_array_equal(rows[0, :, :4], [[1, 1, 1, 0.3], [2, 2, 1, 0.2], [3, 1, 2, 0.3], [4, 2, 2, 0.2]])
+    for first, values in ((4, 1e3 * written.position), (7, 1e3 * written.velocity), (10, written.spin)):
+        np.testing.assert_allclose(rows[..., first : first + 3], values, rtol=1e-9, atol=1e-12)
 
 
-def test_ase_reads_the_lammps_dump(filmed: Path, motion: Motion, tmp_path: Path) -> None:
-    path = tmp_path / "walk.lammpstrj"
-    call("export", str(filmed), "--to", "lammps", "-o", str(path), check=True)
-    frames = read(path, ":", format="lammps-dump-text", units="si")  # ASE makes Å of m, and of the numbers as well
-    assert len(frames) == len(motion.time)
-    for frame in (0, 7, 160):
-        np.testing.assert_allclose(1e-10 * frames[frame].positions, 1e3 * motion.position[frame], rtol=1e-9, atol=1e-12)
-    header, *rows = path.read_text().split("ITEM: ATOMS ")[8].splitlines()
-    columns = header.split()
-    table = np.array([row.split() for row in rows[: len(motion.radius)]], dtype=np.float64)
-    for first, values in (("radius", 1e3 * motion.radius[:, None]), ("vx", 1e3 * motion.velocity[7])):
-        begin = columns.index(first)
-        np.testing.assert_allclose(table[:, begin : begin + values.shape[1]], values, rtol=1e-9)
-    begin = columns.index("omegax")
-    np.testing.assert_allclose(table[:, begin : begin + 3], motion.spin[7], rtol=1e-9)
-    np.testing.assert_array_equal(table[:, :3], [[1, 1, 1], [2, 2, 1], [3, 1, 2], [4, 2, 2]])
-    steps = [int(text.split()[0]) for text in path.read_text().split("ITEM: TIMESTEP\n")[1:]]
-    np.testing.assert_allclose(np.array(steps) * motion.case.run.time_step, motion.time, atol=1e-12)
+def _frames_of(path: Path) -> list[str]:
+    return [f"ITEM: TIMESTEP{text}" for text in path.read_text().split("ITEM: TIMESTEP")[1:]]
 
 
 def test_the_script_for_paraview_is_beside_its_files(filmed: Path, tmp_path: Path) -> None:

@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
 Named: TypeAlias = "Case | str | Path | Mapping[str, Any]"
 Changes: TypeAlias = "Mapping[str, Any] | None"
-Export = Literal["deck", "vtk", "paraview", "xyz", "lammps", "archive"]
+Export = Literal["deck", "vtk", "paraview", "lammps", "archive"]
 NOT_A_RUN = {
     "folder": "not a finished run: expected a folder with a manifest.json",
     "deck": "is a deck that was run by hand; first do: walkers run {}",
@@ -413,7 +413,7 @@ class Run:
         Parameters
         ----------
         form
-            ``vtk`` or ``paraview`` (`walkers.postprocess.paraview`), ``xyz`` or ``lammps``
+            ``vtk`` or ``paraview`` (`walkers.postprocess.paraview`), ``lammps``
             (`walkers.postprocess.trajectory_files`), ``archive`` (`walkers.archive.writing`), ``deck``
             (`walkers.sweeps.by_hand.write_folder`).
         to
@@ -424,8 +424,8 @@ class Run:
 
         Examples
         --------
-        >>> walkers.run("fig1b", tmp).export("xyz", tmp / "walk.xyz", every=20).name
-        'walk.xyz'
+        >>> walkers.run("fig1b", tmp).export("lammps", tmp / "walk.lammpstrj", every=20).name
+        'walk.lammpstrj'
         """
         place = _path(to)
         if form == "deck":
@@ -441,10 +441,9 @@ class Run:
 
             collection = write_vtk(self.finished_directory, place, **options)
             return collection if form == "vtk" else collection.with_name(SCRIPT)
-        from walkers.postprocess.trajectory_files import SUFFIXES, write_trajectory
+        from walkers.postprocess.trajectory_files import write_trajectory
 
-        place = place or self.finished_directory / f"trajectory{SUFFIXES[form][0]}"
-        return write_trajectory(self.finished_directory, place, form, **options)
+        return write_trajectory(self.finished_directory, place, **options)
 
 
 @contextmanager

@@ -17,7 +17,6 @@ EXTRAS = {
     "film": ("an MP4", ("imageio-ffmpeg",)),
     "report": ("a report or an interactive view", ("k3d",)),
     "theory": ("the theory", ("joblib", "numba")),
-    "xyz": ("extended XYZ", ("ase",)),
 }
 """For each extra: what needs it, and its packages as PyPI names them."""
 

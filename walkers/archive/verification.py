@@ -20,7 +20,7 @@ SUMS_NAME = "sha256sums.txt"
 """List of checksums in an archive, in the format of ``sha256sum -c``."""
 _SHOWN = (
     *(".png", ".pdf", ".svg", ".gif", ".mp4", ".html", ".htm"),
-    *(".vtu", ".pvd", ".py", ".xyz", ".lammpstrj", ".csv"),
+    *(".vtu", ".pvd", ".py", ".lammpstrj", ".csv"),
 )
 """Suffixes of pictures, films, pages, files for ParaView and exports, which the program writes and never reads."""
 _LONGEST_SHOWN = 300

@@ -29,11 +29,11 @@ from walkers.completion import offering
 
 _FORM = (
     "Format of the export. deck: LIGGGHTS deck of the case. vtk, paraview: .vtu files, their .pvd and a ParaView "
-    "script; prints the .pvd or the script. xyz, lammps: the trajectory for OVITO, ASE, MDAnalysis. archive: an "
-    "RO-Crate (.zip) to publish."
+    "script; prints the .pvd or the script. lammps: the trajectory as a LAMMPS dump, for OVITO, ASE, MDAnalysis. "
+    "archive: an RO-Crate (.zip) to publish."
 )
 _OUTPUT = "File or folder to write; default: in the run's folder, archives in the current folder. Decks are printed."
-_EVERY = "vtk, paraview, xyz, lammps: write every Nth sample; default: one per cycle; for xyz, lammps, piles all."
+_EVERY = "vtk, paraview, lammps: write every Nth sample; default: one per cycle; for lammps and piles all."
 _AS_PLACED = "vtk, paraview: keep independent walkers at their positions in the deck, not side by side."
 _COLOUR = "vtk, paraview: array that colours the beads in the script; default: walker, for piles speed."
 _WITHOUT_DUMPS = "archive: leave out the engine's dumps; tables and results are included."
@@ -44,7 +44,7 @@ _RUNS = "Runs and sweeps: folder, name in --out, or case."
 
 def export(
     what: RunOrSweep,
-    form: Literal["deck", "vtk", "paraview", "xyz", "lammps", "archive"] = Option(..., "--to", help=_FORM),
+    form: Literal["deck", "vtk", "paraview", "lammps", "archive"] = Option(..., "--to", help=_FORM),
     output: Path | None = Option(None, "-o", help=_OUTPUT),
     settings: Set = None,
     out: Out = DEFAULT_OUT,
@@ -57,9 +57,9 @@ def export(
     orcid: list[str] | None = Option(None, help="archive: ORCID of an author, in the order of --author. Repeatable."),
     licence: str | None = Option(None, help=_LICENCE),
 ) -> None:
-    """Write a run for other programs: LIGGGHTS deck, VTK, ParaView, XYZ, LAMMPS dump, or an archive to publish."""
+    """Write a run for other programs: LIGGGHTS deck, VTK, ParaView, LAMMPS dump, or an archive to publish."""
     given = {
-        "--every": (every, ("vtk", "paraview", "xyz", "lammps")),
+        "--every": (every, ("vtk", "paraview", "lammps")),
         **{"--as-placed": (as_placed, ("vtk", "paraview")), "--colour": (colour, ("vtk", "paraview"))},
         "--open": (start, ("paraview",)),
         **{"--without-dumps": (without_dumps, ("archive",)), "--licence": (licence, ("archive",))},
@@ -95,9 +95,9 @@ def export(
     found = load_run(what, settings, out)
     wrong = as_placed and not found.case.apart
     refuse("--as-placed", wrong, "is for independent walkers: these stand where they are")
-    options = {"every": every or 1}
+    options = {"every": every}
     if form in ("vtk", "paraview"):
-        options = {"every": every, "as_placed": as_placed, "colour": colour}
+        options |= {"as_placed": as_placed, "colour": colour}
     print(written := found.export(form, output, **options))
     if start:
         from walkers.postprocess.paraview import open_paraview

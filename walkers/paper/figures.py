@@ -20,7 +20,8 @@ from walkers.postprocess.drawing import (
     styled,
 )
 from walkers.postprocess.gait import gait
-from walkers.postprocess.series import top_view
+from walkers.postprocess.necks import bridges_at
+from walkers.postprocess.scene import Scene, Window, axes_toward
 from walkers.sweeps.table import thresholds
 from walkers.theory.prediction import motion_of, threshold
 from walkers.theory.quasistatic import FloatArray, detachment, mean_velocity, translation
@@ -64,8 +65,16 @@ def fig1b(sources: Sources) -> Figure:
     half, origin = 1.15 * largest, float(centre[0, 0])
     row = 0.97 * ONE_COLUMN * 2.0 * half / (along[1] - along[0]) + 0.22
     figure, axes = new_figure(ONE_COLUMN, len(frames) * row + 0.75, nrows=len(frames), sharex=True)
-    for panel, frame, (_, middle) in zip(axes, frames, centre, strict=True):
-        picture = top_view(trajectory, 0, int(frame), along, (float(middle) - half, float(middle) + half))
+    motion = trajectory.motion.of_walkers(trajectory.walkers[:1])
+    view = axes_toward(np.array([0.0, 0.0, 1.0]), trajectory.across_axis)
+    pixels = 120.0 / float(trajectory.radii.min())
+    bridges = bridges_at(motion, frames)
+    for panel, frame, (_, middle), contacts in zip(axes, frames, centre, bridges, strict=True):
+        bounds = np.array([along, (middle - half, middle + half), (0.0, 2.0 * largest)])
+        scene = Scene(motion, view, 1e3 * bounds[:, 0], 1e3 * bounds[:, 1], shaken=False)
+        window = Window(scene, [round(pixels * extent) for extent in np.ptp(bounds[:2], axis=1).tolist()])
+        picture = window.picture(int(frame), contacts)
+        window.close()
         edges = [(along[0] - origin) * 1e3, (along[1] - origin) * 1e3, -half * 1e3, half * 1e3]
         panel.imshow(picture, extent=edges, interpolation="bilinear")
         panel.set(yticks=[], title=f"{trajectory.time[frame]:.1f} s")

@@ -18,9 +18,9 @@ import numpy as np
 from walkers.inputs.case import Case
 from walkers.postprocess.drawing import check_place, new_figure, plain_text, save_figure, styled
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, gathered, read_motion
+from walkers.postprocess.motion import Motion, even_frames, even_labels, gathered, read_motion
 from walkers.postprocess.necks import EXPLAINED, bridges_at
-from walkers.postprocess.scene import Picture, Scene, Window, axes_toward, from_the_side, one_walker, plan_axes
+from walkers.postprocess.scene import Picture, Scene, Window, from_the_side, one_walker, plan_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -216,31 +216,6 @@ def _pixels(wide: float, tall: float) -> list[int]:
     """Width and height in pixels of a view whose width and height are in mm."""
     pixels = min(max(_TALL / tall, min(_PIXELS, _TALLEST / tall)), _WIDEST / wide)
     return [max(1, round(extent * pixels)) for extent in (wide, tall)]
-
-
-def top_view(group: Group, walker: int, frame: int, along: tuple[float, float], across: tuple[float, float]) -> Picture:
-    """One walker of a group in a frame, seen from above.
-
-    Parameters
-    ----------
-    group, walker, frame
-        The group, index of the walker in it, and of the frame.
-    along, across
-        Bounds of the picture along and across the drive axis, m, relative to the substrate.
-
-    Returns
-    -------
-    ndarray, shape (height, width, 3)
-        Red, green, blue; the first row is on the left of the drive axis; 120 pixels per smaller radius.
-    """
-    motion = group.motion.of_walkers(group.walkers[walker : walker + 1])
-    bounds = 1e3 * np.array([along, across, (0.0, 2.0 * group.radii.max())])
-    scene = Scene(motion, axes_toward(np.array([0.0, 0.0, 1.0]), group.across_axis), bounds[:, 0], bounds[:, 1], False)
-    pixels = 120.0 / (1e3 * float(group.radii.min()))
-    window = Window(scene, [round(float(high - low) * pixels) for low, high in bounds[:2]])
-    picture = window.picture(frame)
-    window.close()
-    return picture
 
 
 def _panels(count: int, wide: float, tall: float, said: Sequence[str]) -> tuple[Figure, list[Axes]]:
