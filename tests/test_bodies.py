@@ -112,13 +112,15 @@ def test_beads_of_a_cluster_touch_as_its_arrangement_says(arrangement: str, size
     make, loads = case.walkers[0], contact_loads(case, case.walkers[0])
     scene, (first, _) = place((case,))
     beads = [next(bead for bead in scene.beads if bead.id == number) for number in first.beads]
-    assert [bead.radius - bead.centre[2] for bead in beads] == pytest.approx(loads.overlaps[: len(sizes)], rel=1e-6)
+    assert [bead.radius - bead.centre[2] for bead in beads] == pytest.approx(
+        [load.overlap for load in loads[: len(sizes)]], rel=1e-6
+    )
     extents = []
     for one, other in combinations(range(len(sizes)), 2):
         between, both = np.subtract(beads[one].centre, beads[other].centre), beads[one].radius + beads[other].radius
         overlap = both - np.linalg.norm(between)
         if (one, other) in make.pairs:
-            expected = loads.overlaps[len(sizes) + make.pairs.index((one, other))]
+            expected = loads[len(sizes) + make.pairs.index((one, other))].overlap
             assert overlap == pytest.approx(expected, rel=1e-4)
         else:
             assert overlap < 0.0

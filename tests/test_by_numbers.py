@@ -155,10 +155,10 @@ def test_a_bead_on_a_slope_presses_with_a_part_of_its_weight() -> None:
     loads, modulus = contact_loads(case), 5e7 / (2.0 * (1.0 - 0.09))
     for number, radius in enumerate((LARGE, SMALL)):
         weight = 4.0 / 3.0 * pi * radius**3 * case.beads.density * case.environment.gravity
-        pressed = 4.0 / 3.0 * modulus * sqrt(radius) * loads.overlaps[number] ** 1.5
+        pressed = 4.0 / 3.0 * modulus * sqrt(radius) * loads[number].overlap ** 1.5
         assert pressed - bridge_at_rest(case, radius, inf).pull == pytest.approx(0.5 * weight, rel=1e-6)
     reduced = LARGE * SMALL / (LARGE + SMALL)
-    assert 4.0 / 3.0 * modulus * sqrt(reduced) * loads.overlaps[2] ** 1.5 == pytest.approx(loads.capillary[2])
+    assert 4.0 / 3.0 * modulus * sqrt(reduced) * loads[2].overlap ** 1.5 == pytest.approx(loads[2].pull)
 
 
 def test_inside_a_cylinder_normals_point_to_its_axis() -> None:
@@ -221,7 +221,7 @@ def test_what_show_prints_of_a_case_is_in_its_units() -> None:
     assert f" {1e6 * 4.0 * pi * case.liquid.surface_tension * LARGE:.4g} µN" in wall
     assert f" {1e12 * 0.5 * 0.01 * 4.0 / 3.0 * pi * LARGE**3:.3g} nL" in wall  # half of the bead's liquid
     assert f" {1e6 * bridge_at_rest(case, LARGE, inf).rupture:.3g} µm " in wall
-    assert wall.endswith(f" {1e9 * contact_loads(case).overlaps[0]:.4g} nm")
+    assert wall.endswith(f" {1e9 * contact_loads(case)[0].overlap:.4g} nm")
     large, small = LARGE**3, SMALL**3
     assert f"sin δ = 0.2, mass asymmetry (m1 - m2)/M = {(large - small) / (large + small):.4g}" in text
 

@@ -20,7 +20,7 @@ def test_the_drive_pays_for_what_slides(run_directory: Callable[..., Path]) -> N
         run={"cycles": 60, "settling_cycles": 50, "samples_per_cycle": 20},
     )
     case, result = case_of(directory), current_result(directory)
-    pressed = sum(contact_loads(case).capillary[:2]) + dimer_of(case).total_mass * case.pressing_gravity
+    pressed = sum(load.pull for load in contact_loads(case)[:2]) + dimer_of(case).total_mass * case.pressing_gravity
     assert result["work"]["mean"] == pytest.approx(4.0 * case.excitation.amplitude * 0.01 * pressed, rel=0.02)
     assert result["cost_of_transport"]["n"] == 0
     works = read_table(directory, "cycles").set_index("cycle")["work"]

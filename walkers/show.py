@@ -184,11 +184,11 @@ def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
     planes = [capillary_force_limit_at_wall(tension, radius) for radius in walkers.radii]
     columns = {
         "contact": contacts,
-        "bridge_volume": loads.bridge_volumes,
-        "capillary_force": loads.capillary,
+        "bridge_volume": [one.volume for one in loads],
+        "capillary_force": [one.pull for one in loads],
         "capillary_force_limit": [*planes, *(None for _ in walkers.pairs)],
-        "rupture_distance": loads.rupture,
-        "overlap_at_rest": loads.overlaps,
+        "rupture_distance": [one.rupture for one in loads],
+        "overlap_at_rest": [one.overlap for one in loads],
     }
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 

@@ -23,27 +23,16 @@ def dimer_of(case: Case) -> Dimer:
     return Dimer((radii[0], radii[1]), case.beads.density, case.liquid.surface_tension)
 
 
-class ContactLoads(NamedTuple):
-    """Forces and overlaps at the contacts of a walker at rest: its beads on the floor, then its pairs of beads.
-
-    ``capillary`` in N, ``bridge_volumes`` in m³, ``rupture`` and ``overlaps`` in m, each in that order.
-    """
-
-    bridge_volumes: tuple[float, ...]
-    capillary: tuple[float, ...]
-    rupture: tuple[float, ...]
-    overlaps: tuple[float, ...]
-
-
-class BridgeAtRest(NamedTuple):
-    """Liquid (m³), pull (N) and rupture distance (m) of a bridge between surfaces that touch."""
+class Load(NamedTuple):
+    """A contact at rest: liquid (m³), pull (N) and rupture distance (m) of its bridge; the overlap (m) that carries it."""
 
     volume: float
     pull: float
     rupture: float
+    overlap: float = 0.0
 
 
-def bridge_at_rest(case: Case, radius: float, other_radius: float) -> BridgeAtRest:
+def bridge_at_rest(case: Case, radius: float, other_radius: float) -> Load:
     """The bridge of a bead to another, or to a plane (a radius of infinity), by the case's law; radii in m."""
     return _at_rest(case.law, _surfaces(case, radius, other_radius))
 
@@ -55,13 +44,13 @@ def _surfaces(case: Case, radius: float, other_radius: float) -> Surfaces:
 
 
 @lru_cache(maxsize=1024)  # points of a sweep have the same few bridges
-def _at_rest(law: BridgeLaw, surfaces: Surfaces) -> BridgeAtRest:
+def _at_rest(law: BridgeLaw, surfaces: Surfaces) -> Load:
     import numpy as np
 
     curve = law(surfaces)
     touching = np.zeros(1)
     pull = curve.pull(touching) if curve.pull else curve.forces(touching).pull
-    return BridgeAtRest(surfaces.volume, float(pull[0]), curve.rupture)
+    return Load(surfaces.volume, float(pull[0]), curve.rupture)
 
 
 def resistances_at_rest(case: Case, radius: float, other_radius: float) -> tuple[float, float, float]:
@@ -73,21 +62,22 @@ def resistances_at_rest(case: Case, radius: float, other_radius: float) -> tuple
     return sliding, coupling, rolling
 
 
-def contact_loads(case: Case, walkers: Walkers | None = None) -> ContactLoads:
-    """Capillary load of each contact of a case's first (or other) walkers, and the overlap at which it is carried."""
-    make, contact = walkers or case.walkers[0], case.contact
-    radii, modulus = make.radii, reduced_modulus(contact.youngs_modulus, contact.poissons_ratio)
-    bridges, overlaps = [], []
-    for radius in radii:
-        bridges.append(bridge_at_rest(case, radius, inf))
+def contact_loads(case: Case, walkers: Walkers | None = None) -> list[Load]:
+    """The contacts of a case's first (or other) walkers at rest: each bead on the floor, then each pair of beads."""
+    make, modulus = (
+        walkers or case.walkers[0],
+        reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio),
+    )
+    loads = []
+    for radius in make.radii:
+        bridge = bridge_at_rest(case, radius, inf)
         weight = 4.0 / 3.0 * pi * radius**3 * case.beads.density * case.pressing_gravity
-        overlaps.append(hertz_overlap(bridges[-1].pull + weight, radius, modulus))
+        loads.append(bridge._replace(overlap=hertz_overlap(bridge.pull + weight, radius, modulus)))
     for one, other in make.pairs:
-        pair = (radii[one], radii[other])
-        bridges.append(bridge_at_rest(case, *pair))
-        overlaps.append(hertz_overlap(bridges[-1].pull, pair[0] * pair[1] / sum(pair), modulus))
-    volumes, pulls, ruptures = zip(*bridges, strict=True)
-    return ContactLoads(volumes, pulls, ruptures, tuple(overlaps))
+        pair = (make.radii[one], make.radii[other])
+        bridge = bridge_at_rest(case, *pair)
+        loads.append(bridge._replace(overlap=hertz_overlap(bridge.pull, pair[0] * pair[1] / sum(pair), modulus)))
+    return loads
 
 
 def reach(case: Case) -> float:

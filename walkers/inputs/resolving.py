@@ -316,8 +316,8 @@ def _spacing(case: Case) -> Case:
             message = "expected zero or less: a bridge forms on contact, so beads with a gap have none"
             raise unusable(f"{key}.gap", message)
         _check_held(case, walkers)
-        overlaps = contact_loads(case, walkers).overlaps if gap is None else (-gap,)
-        if max(overlaps) * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):
+        overlap = max(load.overlap for load in contact_loads(case, walkers)) if gap is None else -gap
+        if overlap * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):
             blamed, other = "contact.youngs_modulus", f"a larger modulus, or {key}.gap"
             if gap is not None:
                 least = -0.02e6 * min(walkers.radii) / (1.0 + walkers.gap_spread)
@@ -340,14 +340,13 @@ def _spacing(case: Case) -> Case:
 
 def _check_held(case: Case, walkers: Walkers) -> None:
     """Refuse walkers that would not stay in contact at rest, because bridges push by more than weights press."""
-    loads = contact_loads(case, walkers)
     names = [f"bead {bead} and the boundary" for bead in range(1, len(walkers.radii) + 1)]
     names += [f"beads {one + 1} and {other + 1}" for one, other in walkers.pairs]
-    for name, pull, overlap in zip(names, loads.capillary, loads.overlaps, strict=True):
-        if pull < 0.0 == overlap:  # no overlap: the load is tensile
+    for name, load in zip(names, contact_loads(case, walkers), strict=True):
+        if load.pull < 0.0 == load.overlap:  # no overlap: the load is tensile
             angle = case.liquid.contact_angle
             key, other = ("contact_angle", "a smaller angle or less liquid") if angle else ("law", "a law that pulls")
-            pushed = f"at rest, the bridge pushes {name} apart ({-1e6 * pull:.3g} uN)"
+            pushed = f"at rest, the bridge pushes {name} apart ({-1e6 * load.pull:.3g} uN)"
             raise unusable(f"liquid.{key}", f"expected {other}: {pushed}")
 
 

@@ -64,7 +64,7 @@ def _walkers(case: Case, walkers: Walkers, first: int) -> Iterator[Standing]:
     Its angle and contacts are drawn from a stream of its own, whoever shares the deck.
     """
     x, y, _ = case.drive_axis
-    resting = contact_loads(case, walkers).overlaps
+    resting = [load.overlap for load in contact_loads(case, walkers)]
     for number in range(first, first + walkers.replicates):
         row = number // case.shifted_rows if case.shifted_rows else 0
         facing = {"right": 1, "left": -1}.get(walkers.facing, 1 if (number + row) % 2 == 0 else -1)

@@ -194,7 +194,7 @@ def walk_figure(case: Case, tables: Tables) -> Figure:
     figure, (distance, orientation, path) = _panels(
         "slope" if uphill else "walk", case, {"cycles": cycles}, *[looks_of(labels)] * 3, heights=[_HEIGHT] * 3
     )
-    run = case.run.for_cycles(int(cycles["cycle"].max()))
+    run = case.for_cycles(int(cycles["cycle"].max())).run
     for axes in (distance, orientation):
         axes.axvspan(0.0, cycles["time"][run.settled_strobes], color="0.93", zorder=0)
     distance.set_title(f"Distance {'uphill' if uphill else 'along the heading'}; grey: settling")

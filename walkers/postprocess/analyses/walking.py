@@ -293,7 +293,7 @@ def _by_kind(group: Group, **contacts: FloatArray) -> Columns:
 def _rows(group: Group, motion: Gait) -> Columns:
     """Rows of the walkers of a group."""
     samples, beads, mean = settled_samples(group), len(group.radii), averages(group)
-    reach = np.array(contact_loads(group.case, group.make).rupture[beads:])
+    reach = np.array([load.rupture for load in contact_loads(group.case, group.make)[beads:]])
     starts = ("walker", "make", "facing", "start_angle")
     return {
         **{name: np.array([getattr(walker, name) for walker in group.walkers]) for name in starts},
