@@ -23,7 +23,7 @@ from walkers.runner.directory import case_of, run_place
 from walkers.runner.files import write_json
 from walkers.runner.manifest import recomputed
 from walkers.sweeps.scheduler import Options, SweepStopped, run_sweep
-from walkers.sweeps.table import load, main_columns
+from walkers.sweeps.table import load, main_columns, result_in, row_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -75,7 +75,9 @@ def measure_accuracy(
         table = load(record.directory)
         if (change := _change(table, case)) < share:
             break
-    accuracy = Accuracy(record.name, share, change < share, change, possible[last], _errors(table))
+    accuracy = Accuracy(
+        record.name, share, change < share, change, possible[last], _errors(row_of(result_in(directory)), table)
+    )
     with recomputed(directory, [ACCURACY_NAME]):
         write_json(directory / ACCURACY_NAME, asdict(accuracy))
     return accuracy
@@ -94,9 +96,9 @@ def times_of(case: Case) -> Sequence[float]:
 
 
 def _sweep(case: Case, name: str, possible: Sequence[float]) -> Sweep:
-    """The case itself, at half its time step, and with harder beads at steps as much smaller as the Rayleigh limit."""
+    """The case at half its time step, and with harder beads at steps as much smaller as the Rayleigh limit."""
     step, modulus = 1e6 * case.run.time_step, 1e-6 * case.contact.youngs_modulus
-    factors = [(1.0, 1.0), (0.5, 1.0), *((times**-0.5, times) for times in possible[1:])]
+    factors = [(0.5, 1.0), *((times**-0.5, times) for times in possible[1:])]
     rows = [(f"{shorter * step!r} us", f"{harder * modulus!r} MPa") for shorter, harder in factors]
     points = {key: list(values) for key, values in zip(_KEYS, zip(*rows, strict=True), strict=True)}
     file = {"case": case.name, "set": settings_in(case.document), "zip": [points]}
@@ -111,11 +113,11 @@ def _change(table: pd.DataFrame, case: Case) -> float:
     return float(max(abs(after - before) / abs(after).clip(STEADY_SPEED)))
 
 
-def _errors(table: pd.DataFrame) -> dict[str, dict[str, float]]:
-    """Numerical errors of the first point: the second has half its step, the last one has the hardest beads."""
+def _errors(row: Mapping[str, Any], table: pd.DataFrame) -> dict[str, dict[str, float]]:
+    """Numerical errors of a row: the first of the table has half its step, the last one has the hardest beads."""
     errors = {}
-    for name in table.columns:
-        if name.startswith(_FAMILIES) and all(map(isfinite, values := table[name].astype(float).tolist())):
-            half, stiffer = values[1] - values[0], values[-1] - values[0]
+    for name in row:
+        if name.startswith(_FAMILIES) and row[name] is not None and isfinite(row[name]):
+            half, stiffer = (float(table[name].iloc[place]) - row[name] for place in (0, -1))
             errors[name] = {"half_step": half, "stiffer": stiffer, "total": hypot(half, stiffer)}
     return errors
