@@ -24,7 +24,7 @@ def dimer_of(case: Case) -> Dimer:
 
 
 class Load(NamedTuple):
-    """A contact at rest: liquid (m³), pull (N) and rupture distance (m) of its bridge; the overlap (m) that carries it."""
+    """A contact at rest: liquid (m³), pull (N) and rupture distance (m) of its bridge, and the overlap (m)."""
 
     volume: float
     pull: float

@@ -95,9 +95,8 @@ class Walker:
     def of_case(cls, case: Case, *, viscous: bool = True) -> Walker:
         """The walker of a case: weight, and pulls and (if viscous) resistances of its bridges as in the engine."""
         dimer = dimer_of(case)
-        forces = (
-            np.array([one.pull for one in contact_loads(case)]) + np.array([*dimer.masses, 0.0]) * case.pressing_gravity
-        )
+        pulls = np.array([load.pull for load in contact_loads(case)])
+        forces = pulls + np.array([*dimer.masses, 0.0]) * case.pressing_gravity
         first, second = dimer.radii
         meeting = ((first, inf), (second, inf), (first, second))
         resistances = np.array([resistances_at_rest(case, *pair) for pair in meeting]).T
