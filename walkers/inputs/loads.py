@@ -64,10 +64,8 @@ def resistances_at_rest(case: Case, radius: float, other_radius: float) -> tuple
 
 def contact_loads(case: Case, walkers: Walkers | None = None) -> list[Load]:
     """The contacts of a case's first (or other) walkers at rest: each bead on the floor, then each pair of beads."""
-    make, modulus = (
-        walkers or case.walkers[0],
-        reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio),
-    )
+    make, contact = walkers or case.walkers[0], case.contact
+    modulus = reduced_modulus(contact.youngs_modulus, contact.poissons_ratio)
     loads = []
     for radius in make.radii:
         bridge = bridge_at_rest(case, radius, inf)
