@@ -23,8 +23,6 @@ ONE_COLUMN, TWO_COLUMNS = 3.4, 7.0
 FORMATS = ("png", "svg", "pdf")
 """Formats of figures."""
 _STYLE = Path(__file__).parent / "style.mplstyle"
-_DASHES = ("-", (0, (5, 1.5)), (0, (1, 1.2)))
-_MARKERS = "os^Dv"
 _MAKER = "granular-walkers"
 _LEAST_ERROR = 0.02  # about half of the height of a symbol, over the range of values
 SCATTER = "bars: standard deviation of the copies (uncertain parameters not varied)"
@@ -69,19 +67,6 @@ def letter_panels(panels: Iterable[Axes]) -> None:
         title, size = panel.get_title(), panel.title.get_fontsize()
         panel.set_title("")
         panel.set_title(f"({letter}) {title}".rstrip(), loc="left", fontsize=size)
-
-
-def series_look(number: int) -> dict[str, Any]:
-    """Colour, dashes and marker of a series of many, as options of `matplotlib.axes.Axes.plot`.
-
-    The first 120 differ; the first 15 differ in dashes or marker, so that they can be distinguished without colours.
-    """
-    return {
-        "color": f"C{number}",
-        "linestyle": _DASHES[number % len(_DASHES)],
-        "marker": _MARKERS[number % len(_MARKERS)],
-        "markerfacecolor": "none",
-    }
 
 
 def errors_seen(errors: Any, values: Any) -> bool:

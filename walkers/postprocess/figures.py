@@ -22,7 +22,6 @@ from walkers.postprocess.drawing import (
     new_figure,
     plain_text,
     save_figure,
-    series_look,
     styled,
 )
 from walkers.postprocess.motion import LEAST_SAMPLES
@@ -63,6 +62,7 @@ _LETTERS, _LETTERS_OF_AN_INCH = 90, 13  # letters of a line of a title; of a y l
 _ASIDE = 10.0  # smallest angle at the start (°) in a legend
 _BETWEEN, _BEFORE = 10, 3  # points of a smooth curve between samples; samples before it, which give its slope
 _GREY, _PALE, _OTHERS = "#5b6770", "#b4bec5", "#c78a2c"
+_DASHES, _MARKERS = ("-", (0, (5, 1.5)), (0, (1, 1.2))), "os^Dv"
 _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
 """Markers of the events of clusters."""
 Tables = Callable[[str], Columns]
@@ -136,17 +136,28 @@ def _numbered(pattern: str, name: str) -> bool:
 
 
 def looks_of(labels: Sequence[str]) -> list[dict[str, Any]]:
-    """Looks of named lines; those beyond `MOST_NAMED` are grey, and the first of them says how many they are."""
-    looks = [{**series_look(number), "label": text} for number, text in enumerate(labels[:MOST_NAMED])]
-    for number, look in enumerate(looks):  # markers of coinciding lines are beside each other
-        look |= {"markevery": (0.02 * (number % 6), 0.12), "linewidth": 0.9}
+    """Looks of lines, told apart with and without colours; those beyond `MOST_NAMED` are grey, and say how many.
+
+    Markers of lines that coincide are beside each other.
+    """
+    looks: list[dict[str, Any]] = [
+        {
+            **{"label": label, "color": f"C{number}", "linestyle": _DASHES[number % len(_DASHES)], "linewidth": 0.9},
+            **{"marker": _MARKERS[number % len(_MARKERS)], "mfc": "none", "markevery": (0.02 * (number % 6), 0.12)},
+        }
+        for number, label in enumerate(labels[:MOST_NAMED])
+    ]
     more = len(labels) - len(looks)
     grey = {"color": _PALE, "linewidth": 0.5, "zorder": 1.5, "rasterized": True}
     return looks + [grey | ({} if number else {"label": f"and {more} more"}) for number in range(more)]
 
 
 def _panels(
-    name: str, case: Case, tables: Mapping[str, Columns], *looks: Sequence[Mapping[str, Any]], heights: Sequence[float]
+    name: str,
+    case: Case,
+    tables: Mapping[str, Columns],
+    looks: Sequence[Sequence[Mapping[str, Any]]],
+    heights: Sequence[float],
 ) -> tuple[Figure, list[Axes]]:
     """A figure of `FIGURES` with its panels (heights in inches) one below the other, without titles and legends."""
     figure, grid = new_figure(TWO_COLUMNS, sum(heights), nrows=len(heights), height_ratios=heights, squeeze=False)
@@ -178,40 +189,34 @@ def walk_figure(case: Case, tables: Tables) -> Figure:
 
     Orientations are from the direction that the legend names; those of walkers that may meet are from the drive axis.
     """
-    cycles, walkers, uphill = dict(tables("cycles")), tables("walkers"), case.goes_uphill
-    facing, start = walkers["facing"], walkers["start_angle"]
-    side = np.ones_like(facing) if case.meets else sides(facing, start)
-    turned = np.where(side == facing, 0.0, np.copysign(np.pi, start))
-    order = np.argsort(walkers["walker"])
-    cycles["orientation"] = cycles["orientation"] - turned[order][cycles["walker"]]
-    velocity = walkers["axial_velocity" if uphill else "velocity"]
-    labels, names = [], ways(uphill=uphill)
-    for number in order:
-        angle, way = np.degrees(start[number] - turned[number]), names[int(side[number] < 0)]
-        aside = f"{way} at {angle:.0f}°" if abs(angle) > _ASIDE else way
-        text = f"{angle:.0f}°" if case.meets else aside
-        labels.append(f"{walkers['walker'][number]}: {text}, {velocity_text(velocity[number] * 1e3)} mm/s")
-    figure, (distance, orientation, path) = _panels(
-        "slope" if uphill else "walk", case, {"cycles": cycles}, *[looks_of(labels)] * 3, heights=[_HEIGHT] * 3
-    )
-    run = case.for_cycles(int(cycles["cycle"].max())).run
+    cycles, walkers, uphill = tables("cycles"), tables("walkers"), case.goes_uphill
+    start = cycles["orientation"][cycles["cycle"] == 0]
+    side = np.ones_like(walkers["facing"]) if case.meets else sides(walkers["facing"], start)
+    turned = np.where(side == walkers["facing"], 0.0, np.copysign(np.pi, start))
+    cycles = cycles | {"orientation": cycles["orientation"] - np.repeat(turned, len(cycles["cycle"]) // len(turned))}
+    labels = []
+    for row in np.argsort(walkers["walker"]):
+        angle, way = f"{np.degrees(start - turned)[row]:.0f}°", ways(uphill=uphill)[int(side[row] < 0)]
+        aside = f"{way} at {angle}" if abs(np.degrees(start - turned)[row]) > _ASIDE else way
+        velocity = velocity_text(1e3 * walkers["axial_velocity" if uphill else "velocity"][row])
+        labels.append(f"{walkers['walker'][row]}: {angle if case.meets else aside}, {velocity} mm/s")
+    name, looks = "slope" if uphill else "walk", [looks_of(labels)] * 3
+    figure, panels = _panels(name, case, {"cycles": cycles}, looks, [_HEIGHT] * 3)
+    distance, orientation, path = panels
+    settled = cycles["time"][case.for_cycles(int(cycles["cycle"].max())).run.settled_strobes]
     for axes in (distance, orientation):
-        axes.axvspan(0.0, cycles["time"][run.settled_strobes], color="0.93", zorder=0)
-    distance.set_title(f"Distance {'uphill' if uphill else 'along the heading'}; grey: settling")
-    orientation.set_title(
-        f"Orientation from {'the drive axis' if case.meets else 'the direction that the legend names'}"
-    )
+        axes.axvspan(0.0, float(settled), color="0.93", zorder=0)
+    way = "uphill" if uphill else "along the heading"
+    distance.set_title(f"Distance {way}; grey: settling")
+    reference = "the drive axis" if case.meets else "the direction that the legend names"
+    orientation.set_title(f"Orientation from {reference}")
     seen = f"{case.boundary.tilted}, seen along its normal" if case.boundary.tilted else "seen from above"
     path.set_title(f"Paths of the centres of mass, {seen}")
     if uphill:
         path.invert_xaxis()  # what is on the left is on the left of who goes up
         path.set(xlabel="across the slope, to the left (mm)", ylabel="uphill (mm)")
         distance.set_ylabel("uphill (mm)")
-    start_text = "angle" if case.meets else "facing"
-    velocity_of = "uphill" if uphill else "along the heading"
-    return _explained(
-        figure, [distance, orientation, path], f"walker: {start_text} at the start,\nvelocity {velocity_of}"
-    )
+    return _explained(figure, panels, f"walker: {'angle' if case.meets else 'facing'} at the start,\nvelocity {way}")
 
 
 @styled
@@ -230,7 +235,7 @@ def gait_figure(case: Case, tables: Tables) -> Figure:
         {"label": f"{text}\n(mean of the run {mean} mm/s)", "color": colour, "linewidth": width}
         for text, mean, colour, width in zip(texts, means, colours, widths, strict=False)
     ]
-    figure, (axes,) = _panels("gait", case, {"trajectory": smooth}, looks, heights=[2.0 * _HEIGHT])
+    figure, (axes,) = _panels("gait", case, {"trajectory": smooth}, [looks], [2.0 * _HEIGHT])
     axes.axhline(0.0, color="0.4", lw=0.6)
     axes.set_title(f"Walker {number}; a bead rolls without sliding where its curve coincides with the walker's")
     axes.set_ylabel("velocity relative to the substrate (mm/s)")
@@ -254,41 +259,31 @@ def paths_figure(case: Case, tables: Tables) -> Figure:
     from matplotlib.patches import Circle
 
     trajectory, walkers = tables("trajectory"), tables("walkers")
-    length = np.sum(trajectory["walker"] == walkers["walker"][0])
-    strobe = np.arange(len(trajectory["time"])) % length % case.run.samples_per_cycle == 0
-    columns = {name: trajectory[name][strobe] for name in ("walker", "x", "y")}
-    looks = looks_of([f"walker {number}" for number in np.sort(walkers["walker"])])
-    for look in looks:
-        look |= {"marker": "", "linestyle": "-"}
-    reach = max(make.length for make in case.walkers)
-    wide, high = (float(np.ptp(columns[name])) + 2.0 * reach for name in ("x", "y"))
-    figure, (axes,) = _panels(
-        "paths",
-        case,
-        {"trajectory": columns},
-        looks,
-        heights=[0.9 + 0.7 * TWO_COLUMNS * min(1.2, max(0.3, high / wide))],
-    )
-    for row, number in enumerate(walkers["walker"]):
-        end = np.flatnonzero(trajectory["walker"] == number)[[0, -1]]
-        axes.plot(
-            *(1e3 * trajectory[name][end[:1]] for name in ("x", "y")), "o", color=_GREY, mfc="none", ms=2.5, mew=0.6
+    x, y, angle = (trajectory[name].reshape(len(walkers["walker"]), -1) for name in ("x", "y", "orientation"))
+    strobe = slice(None, None, case.run.samples_per_cycle)
+    columns = {"walker": np.repeat(walkers["walker"], x[:, strobe].shape[1])}
+    columns |= {"x": x[:, strobe].ravel(), "y": y[:, strobe].ravel()}
+    looks = [look | {"marker": "", "linestyle": "-"} for look in looks_of([f"walker {n}" for n in range(len(x))])]
+    reach = 2.0 * max(make.length for make in case.walkers)
+    height = 0.7 * TWO_COLUMNS * min(1.2, max(0.3, (np.ptp(y) + reach) / (np.ptp(x) + reach)))
+    figure, (axes,) = _panels("paths", case, {"trajectory": columns}, [looks], [0.9 + height])
+    axes.plot(1e3 * x[:, 0], 1e3 * y[:, 0], "o", color=_GREY, mfc="none", ms=2.5, mew=0.6)
+    drive, across = np.array(case.drive_axis), np.cross([0.0, 0.0, 1.0], case.drive_axis)
+    for row, make in enumerate(case.walkers[number] for number in walkers["make"]):
+        place, weights = np.array(make.design), np.array(make.radii) ** 3
+        place = walkers["facing"][row] * (place - weights @ place / weights.sum())
+        turn = np.array(
+            [[np.cos(angle[row, -1]), np.sin(angle[row, -1])], [-np.sin(angle[row, -1]), np.cos(angle[row, -1])]]
         )
-        make = case.walkers[walkers["make"][row]]
-        shape, weights = np.array(make.design), np.array(make.radii) ** 3
-        across = np.cross([0.0, 0.0, 1.0], case.drive_axis)[:2]
-        angle = trajectory["orientation"][end[1]]
-        ahead = walkers["facing"][row] * (np.cos(angle) * np.array(case.drive_axis[:2]) + np.sin(angle) * across)
-        for (along, aside), radius in zip(shape - weights @ shape / weights.sum(), make.radii, strict=True):
-            x, y = (1e3 * trajectory[name][end[1]] for name in ("x", "y"))
-            place = np.array([x, y]) + 1e3 * (along * ahead + aside * np.array([-ahead[1], ahead[0]]))
-            axes.add_patch(Circle(place, 1e3 * radius, fc=looks[number]["color"], ec="none", alpha=0.5))
+        beads = place @ turn @ np.array([drive, across])[:, :2] + [x[row, -1], y[row, -1]]
+        for bead, radius in zip(beads, make.radii, strict=True):
+            colour = looks[walkers["walker"][row]]["color"]
+            axes.add_patch(Circle(1e3 * bead, 1e3 * radius, fc=colour, ec="none", alpha=0.5))
     if case.boundary.closed:
         edge = np.linspace(-0.55, 0.55, 221) * case.boundary.width
-        x, y = np.meshgrid(edge, edge)
-        places = np.stack([x, y, np.full_like(x, case.boundary.height / 2.0)], axis=-1)
+        places = np.stack(np.meshgrid(edge, edge, case.boundary.height / 2.0), axis=-1)[:, :, 0]
         inside = np.min([wall.distances(places) for wall in case.boundary.walls], axis=0)
-        axes.contour(1e3 * x, 1e3 * y, inside, levels=[0.0], colors=[_GREY], linewidths=1.0)
+        axes.contour(1e3 * edge, 1e3 * edge, inside, levels=[0.0], colors=[_GREY], linewidths=1.0)
     axes.set(aspect="equal", title="Paths seen from above; circles: start; beads at the end, to scale")
     axes.margins(0.08)
     return _explained(figure, [axes])
@@ -312,23 +307,16 @@ def climb_figure(case: Case, tables: Tables) -> Figure:
         looks.append(look)
     if others := [look for look in looks if "label" not in look]:
         others[0]["label"] = "clusters that\ndid not climb"
-    two = [{"color": "C0"}, {"color": "C2", "linestyle": "--"}]
-    of_beads = [look | {"label": label} for look, label in zip(two, ("all beads", "bulk alone"), strict=True)]
-    of_pairs = [look | {"label": label} for look, label in zip(two, ("bridges", "contacts"), strict=True)]
-    figure, panels = _panels(
-        "climb",
-        case,
-        {"members": lines, "bed": bed},
-        looks,
-        of_beads,
-        of_pairs,
-        heights=[2.0 * _HEIGHT, _HEIGHT, _HEIGHT],
-    )
+    two = [
+        [{"color": "C0", "label": first}, {"color": "C2", "linestyle": "--", "label": second}]
+        for first, second in (("all beads", "bulk alone"), ("bridges", "contacts"))
+    ]
+    heights = [2.0 * _HEIGHT, _HEIGHT, _HEIGHT]
+    figure, panels = _panels("climb", case, {"members": lines, "bed": bed}, [looks, *two], heights)
     (leaders, segregation, joined), height = panels, axis("bed", "surface")[1]
     low, middle, high = (height * bed[name] for name in ("surface_low", "surface", "surface_high"))
-    leaders.fill_between(
-        bed["time"], low, high, color="0.85", lw=0, label="surface, 10th to\n90th percentile", zorder=0
-    )
+    band = "surface, 10th to\n90th percentile"
+    leaders.fill_between(bed["time"], low, high, color="0.85", lw=0, label=band, zorder=0)
     leaders.plot(bed["time"], middle, color=_GREY, label="surface, median", zorder=1)
     events = tables("events")
     for kind, marker in _MARKS.items():
