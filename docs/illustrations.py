@@ -39,7 +39,7 @@ from walkers.inputs.sweep import load_sweep
 from walkers.paper.make import COMPARED, FIGURES, make_figures
 from walkers.postprocess.analysis import analyses
 from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, save_figure, styled
-from walkers.postprocess.films import FilmOptions
+from walkers.postprocess.film_options import FilmOptions
 from walkers.runner.files import read_json, write_json, write_text
 from walkers.runner.launch import cores_here
 from walkers.sweeps import climbing

@@ -255,7 +255,7 @@ REFUSED: list[tuple[str, str]] = [
     ("paper figures --only fig4 --format jpeg", "jpeg"),
     ("paper figures --only fig4 --to {case}", "base.toml"),
     # Mistyped names
-    ("shw fig1b", 'no such command; did you mean "show"?'),
+    ("shw fig1b", 'Unknown command "shw". Did you mean "show"?'),
     ("new {case}", "exists already"),
     ("new mine fig1", 'did you mean "fig1b"?'),
     *((f"new '{name}'", f"{name or '.'}: expected a name") for name in ("", ".", "/", "..")),

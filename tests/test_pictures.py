@@ -29,7 +29,8 @@ from walkers.inputs.boundary import Boundary
 from walkers.inputs.loads import bridge_at_rest
 from walkers.postprocess.drawing import styled
 from walkers.postprocess.figures import LEAST, MOST_NAMED, climb_figure, draw, figures_of, looks_of, plot_run
-from walkers.postprocess.films import FilmOptions, film_times, named_direction, parse_time
+from walkers.postprocess.film_options import FilmOptions, parse_time
+from walkers.postprocess.films import film_times, named_direction
 from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, read_bridges, read_motion
 from walkers.postprocess.necks import bridges_at, ends_of, necks_of
 from walkers.postprocess.paraview import _walls, write_vtk

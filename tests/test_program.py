@@ -12,7 +12,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from typer.main import get_command
 
 import walkers
 from tests.conftest import PROGRAM, SHORT, call, document, to_toml
@@ -20,7 +19,7 @@ from walkers import load_case
 from walkers import run as run_case
 from walkers.commands import GROUPS
 from walkers.inputs.reading import shipped
-from walkers.main import _program
+from walkers.main import program
 from walkers.physics.time_step import WALKER_FRACTIONS
 from walkers.postprocess.analysis import read_result
 from walkers.postprocess.tables import read_table
@@ -147,12 +146,13 @@ def test_a_new_case_is_a_copy_of_a_shipped_one_and_replaces_no_file(in_folder: P
 def test_help_names_every_command() -> None:
     shown = call("--help", check=True).stdout
     assert not set(shown) & set("╭│╰─"), "boxes are for terminals"
-    program = get_command(_program())
-    assert len(program.commands) == 16
-    for command, one in program.commands.items():
-        assert f"\n  {command} " in shown
-        assert call(command, "-h", check=True).stdout == call(command, "--help", check=True).stdout
-        assert all(call(command, part, "-h", check=True).stdout for part in getattr(one, "commands", ()))
+    app = program()
+    names = [name for name in app if name[0] != "-"]
+    assert len(names) == 16
+    for name in names:
+        assert f"\n  {name} " in shown
+        assert call(name, "-h", check=True).stdout == call(name, "--help", check=True).stdout
+        assert all(f"walkers {name} {part} " in call(name, part, "-h", check=True).stdout for part in app[name])
     headings = [line for line in shown.splitlines() if line.endswith(":") and not line.startswith(" ")]
     assert headings == ["Options:", *(f"{heading}:" for heading in GROUPS.values())]
     for module in ("walkers", "walkers.main"):
@@ -190,33 +190,24 @@ def test_version_names_package_commit_and_engine(monkeypatch: pytest.MonkeyPatch
     assert "no engine: no-such-engine" in call("--version", check=True).stdout
 
 
-def test_shells_complete_commands_names_runs_and_sweeps(
-    looked_through: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def completed(line: str) -> list[str]:
-        """What bash is offered for the last word of a line."""
-        words = {"COMP_WORDS": line, "COMP_CWORD": str(len(line.split(" ")) - 1)}
-        with monkeypatch.context() as environment:
-            environment.setattr(sys, "argv", ["walkers"])
-            for name, value in {"_WALKERS_COMPLETE": "complete_bash", **words}.items():
-                environment.setenv(name, value)
-            return call(check=True).stdout.split()
-
+def test_bash_completes_commands_options_and_names_of_runs(looked_through: Path, tmp_path: Path) -> None:
     (tmp_path / "runs").symlink_to(looked_through)
-    shutil.copy(looked_through.parent / "base.toml", tmp_path / "figure.toml")
-    monkeypatch.chdir(tmp_path)
-    runs = {Path(run).name for run in walkers.load("runs/three").table()["run"]}
-    assert completed("walkers comp") == ["compare"]
-    assert completed("walkers run fig") == [*(name for name in shipped("case") if name[:3] == "fig"), "figure.toml"]
-    assert "fig2" in completed("walkers sweep fi")
-    assert runs <= set(completed("walkers run base-"))
-    assert {"engine", "fig1b"} <= set(completed("walkers check "))
-    assert set(completed("walkers plot ")) >= runs | {"grid", "fig1b"}
-    assert completed("walkers plot runs/th") == ["runs/three"]
-    assert completed("walkers list runs/g") == ["runs/grid"]
-    assert completed("walkers list --case ") == ["base"]
-    assert completed("walkers list --status fa") == ["failed"]
-    assert completed("walkers run --out elsewhere base-") == []
+    (tmp_path / "walkers.bash").write_text(program().generate_completion(shell="bash"))
+    path = {"PATH": f"{Path(PROGRAM).parent}:{os.environ['PATH']}"}
+
+    def completed(*words: str) -> list[str]:
+        """What bash offers for the last word of a line."""
+        script = f'. ./walkers.bash; COMP_WORDS=("$@"); COMP_CWORD={len(words)}; _walkers; echo "${{COMPREPLY[@]}}"'
+        command = ["bash", "-c", script, "bash", "walkers", *words]
+        done = subprocess.run(command, cwd=tmp_path, env=os.environ | path, capture_output=True, text=True, check=True)
+        return done.stdout.split()
+
+    runs = {Path(run).name for run in walkers.load(looked_through / "three").table()["run"]}
+    assert completed("comp") == ["compare"]
+    assert completed("list", "--status", "fa") == ["failed"]
+    assert completed("run", "fig") == [name for name in shipped("case") if name[:3] == "fig"]
+    assert set(completed("plot", "")) >= runs | {"grid", "fig1b"}
+    assert completed("run", "--out", "elsewhere", "base-") == []
 
 
 # --- what a word names ------------------------------------------------------------------------------------------------

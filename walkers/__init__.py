@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from walkers.api import Run, Sweep, calibrate, climb, compare, load, predict, run, sweep
     from walkers.case_file import new
     from walkers.inputs.reading import load_case
-    from walkers.postprocess.films import FilmOptions
+    from walkers.postprocess.film_options import FilmOptions
 
 __all__ = [
     "FilmOptions",
@@ -40,7 +40,7 @@ _PACKAGES = (
 )
 _MODULES = {
     **dict.fromkeys(__all__, "api"),
-    **{"FilmOptions": "postprocess.films", "load_case": "inputs.reading", "new": "case_file"},
+    **{"FilmOptions": "postprocess.film_options", "load_case": "inputs.reading", "new": "case_file"},
 }
 """Modules of the public names."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import threading
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 from walkers import DEFAULT_OUT, RECORDS
-from walkers.errors import InputError, Problem, WalkersError, check_utf8, refused, wrong_argument
+from walkers.errors import InputError, Problem, WalkersError, check_utf8, refused
 from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped
-from walkers.progress import progress_of, progress_of_sweep, shown_if
+from walkers.progress import progress_of, progress_of_film, progress_of_sweep, shown_if
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import (
     CASE_NAME,
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from walkers.calibration.calibrate import Outcome
     from walkers.inputs.case import Case
     from walkers.inputs.origins import Origin
-    from walkers.postprocess.films import FilmOptions
+    from walkers.postprocess.film_options import FilmOptions
     from walkers.postprocess.motion import Motion
     from walkers.runner.launch import Progress
     from walkers.sweeps.accuracy import Accuracy
@@ -340,12 +340,13 @@ class Run:
         to: str | Path | None = None,
         options: FilmOptions | None = None,
         *,
-        on_progress: Callable[[int, int], None] | None = None,
+        progress: bool | None = None,
     ) -> Path:
         """Render a film; see `walkers.postprocess.films.render_film`."""
         from walkers.postprocess.films import render_film
 
-        return render_film(self.finished_directory, _path(to), options, on_progress=on_progress)
+        with shown_if(progress, progress_of_film(self.case.name)) as advance:
+            return render_film(self.finished_directory, _path(to), options, on_progress=advance)
 
     def view(self, *, height: int = 480) -> k3d.Plot:
         """An interactive 3-D view of the beads for a notebook, ``height`` pixels high.
@@ -769,12 +770,12 @@ def compare(
     sweeps = {name: path for name in names for kind, path in [find(name, out)] if kind == "sweep"}
     if len(sweeps) == len(set(names)):
         if changes:
-            raise wrong_argument("changes", "is for runs and cases")
+            raise refused("changes", "is for runs and cases")
         return compare_sweeps(sweeps[names[0]], sweeps[names[1]], y)
     for name in sweeps:
         raise refused(name, "is a sweep; expected another sweep to compare with")
     if y is not None:
-        raise wrong_argument("y", "is for sweeps")
+        raise refused("y", "is for sweeps")
 
     def side(number: int) -> Side:
         name, given = names[number], (changes or {}) if number else {}

@@ -64,15 +64,6 @@ def refused(source: object, expected: str) -> InputError:
     return InputError(str(source), [Problem("", None, expected)])
 
 
-class WrongArgument(InputError):
-    """An unusable argument of a function of the package; the program names its option instead (``changes``: --set)."""
-
-
-def wrong_argument(name: str, expected: str) -> WrongArgument:
-    """An error for an unusable argument of a function, with the expectation."""
-    return WrongArgument(name, [Problem("", None, expected)])
-
-
 def unusable(key: str, expected: str, value: object = None) -> InputError:
     """An error for an unusable value of a key; the reader adds file name and value (`walkers.inputs.messages`)."""
     return InputError("", [Problem(key, None if value is None else shown(value), expected)])

@@ -2,29 +2,42 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import signal
 import subprocess
 import sys
+import textwrap
 import warnings
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from importlib import import_module
-from inspect import isfunction
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import FrameType
-from typing import Annotated, Any, NoReturn
-
-import typer
-from typer.core import TyperGroup
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import walkers.inputs
-from walkers.commands import GROUPS, SECTIONS
-from walkers.completion import offering
+from walkers.commands import SECTIONS, commands
 
+if TYPE_CHECKING:
+    from cyclopts import App
+    from cyclopts.argument import Argument
+
+_SUMMARY = "Wet granular walkers, simulated with LIGGGHTS."
+_HELP = ("-h", "--help")
+_HELP_ROW = ("-h, --help", "Show this message and exit.")
+_OPTIONS = {
+    "--library PATH": "Your own library file, before the command; default: library.toml beside the case.",
+    "--version": "Show the versions and exit.",
+    "--install-completion": "Install the completion of commands, options, cases, runs and sweeps for your shell.",
+    **dict([_HELP_ROW]),
+}
+_VALUES = {"bool": "", "float": "NUMBER", "int": "INTEGER", "Path": "PATH", "str": "TEXT"}
+"""For types of options, what the help calls their values."""
+_LEFT, _WIDE = 24, 80
+"""Largest width of the first column of the help, and width of the help."""
+_LONGEST_MESSAGE = 1000
 _INTERRUPTED = 130
-_OPTIONS = {"changes": "--set", "formats": "--format"}
-"""Options with another name than the argument of the function."""
 _ENGINE_SECONDS = 10.0
 """Longest time, s, for the engine to print its version."""
 
@@ -47,100 +60,103 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
         signal.signal(signal.SIGHUP, _on_signal)
     warnings.showwarning = lambda message, *_, **__: print(f"walkers: warning: {message}", file=sys.stderr)
-    sys.exit(_status(arguments))
+    sys.exit(_status(sys.argv[1:] if arguments is None else arguments))
 
 
-def _status(arguments: list[str] | None) -> int:
+def _status(tokens: list[str]) -> int:
     """Run the program and return its exit status. Unexpected errors are raised."""
     try:
-        outcome: Any = _program()(arguments, standalone_mode=False, prog_name="walkers")
+        if not tokens or tokens[0] in _HELP:
+            print(overview())
+            outcome: Any = 0
+        elif tokens[0] == "--version":
+            outcome = print(describe_version())
+        else:
+            outcome = _call(tokens)
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt, SystemExit, _Terminated) as stop:
-        return _report_stop(stop)
-    if outcome == _INTERRUPTED:  # typer turns Ctrl-C into a status
-        return _tell("interrupted", _INTERRUPTED)
+        return _report_stop(stop, tokens)
     return outcome if isinstance(outcome, int) else 0
 
 
-class _Grouped(TyperGroup):
-    """The commands under the headings of `GROUPS`. An unknown command is refused with a suggestion."""
-
-    def format_commands(self, _ctx: Any, formatter: Any) -> None:
-        """Write the commands below their headings."""
-        for heading in dict.fromkeys(GROUPS.values()):
-            names = sorted(self.commands, key=lambda name: name not in SECTIONS)
-            there = [name for name in names if getattr(self.commands[name], "rich_help_panel", "") == heading]
-            with formatter.section(heading):
-                formatter.write_dl([(name, self.commands[name].get_short_help_str(1000)) for name in there])
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """The command that the first argument names."""
-        if args[0] not in self.commands and not ctx.resilient_parsing:
-            from walkers.errors import refused, suggestion
-
-            other = suggestion(args[0], self.commands) or "; walkers --help lists them"
-            raise refused(args[0], f"no such command{other}")
-        return super().resolve_command(ctx, args)
+def overview() -> str:
+    """The help of the program: its commands below their headings."""
+    rows: dict[str, list[tuple[str, str]]] = {"Options": list(_OPTIONS.items())}
+    for command in commands():
+        rows.setdefault(command.heading, []).append((command.name, command.summary))
+    parts = ["Usage: walkers [OPTIONS] COMMAND [ARGS]...", _SUMMARY, *(_table(*item) for item in rows.items())]
+    return "\n\n".join(parts)
 
 
-class _OrCase(TyperGroup):
-    """Sub-commands of a command; any other word is CASE."""
-
-    def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """The sub-command with a name."""
-        return super().get_command(ctx, cmd_name) or self.commands.get("CASE")
-
-    def list_commands(self, ctx: Any) -> list[str]:
-        """Names of the sub-commands; for the completion of a shell, also of cases."""
-        case = "CASE" in self.commands
-        return [*self.commands, *(offering("case")(ctx, "") if case and ctx.resilient_parsing else ())]
-
-
-def _program() -> typer.Typer:
-    """The program, whose commands are the public functions of the modules of `GROUPS`."""
-    # Rich takes longer to load than everything else that most commands need.
-    plain: dict[str, Any] = {"no_args_is_help": True, "pretty_exceptions_enable": False, "rich_markup_mode": None}
-    plain["context_settings"] = {"help_option_names": ["-h", "--help"]}
-    program = typer.Typer(name="walkers", cls=_Grouped, help="Wet granular walkers, simulated with LIGGGHTS.", **plain)
-    program.callback()(_options)
-    parts: dict[str, typer.Typer] = {}
-    for module, heading in GROUPS.items():
-        place = f"walkers.commands.{module}"
-        for name, function in vars(import_module(place)).items():
-            if not isfunction(function) or function.__module__ != place or name.startswith("_"):
-                continue
-            section, _, command = name.strip("_").rpartition("_")
-            if section and section not in parts:
-                either = "CASE|COMMAND" if section == "check" else "COMMAND"
-                how: dict[str, Any] = {"help": SECTIONS[section], "subcommand_metavar": f"{either} [ARGS]..."}
-                parts[section] = typer.Typer(cls=_OrCase, **how, **plain)
-                program.add_typer(parts[section], name=section, rich_help_panel=heading)
-            command = "CASE" if command == "case" else command
-            home = parts.get(section, program)
-            home.command(command, short_help=function.__doc__, rich_help_panel=heading)(function)
-    return program
+def _table(heading: str, rows: Iterable[tuple[str, str]]) -> str:
+    """Names and their meanings in two columns."""
+    rows = list(rows)
+    left = min(_LEFT, max(len(name) for name, _ in rows))
+    lines = [f"{heading}:"]
+    for name, text in rows:
+        first, *more = textwrap.wrap(text, _WIDE - left - 4) or [""]
+        lines += [f"  {name:{left}}  {first}"] if len(name) <= left else [f"  {name}", f"{'':{left + 4}}{first}"]
+        lines += [f"{'':{left + 4}}{line}" for line in more]
+    return "\n".join(lines)
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
-        print(describe_version())
-        raise typer.Exit
+def program() -> App:
+    """The program. A command is imported when it is called."""
+    from cyclopts import App, Parameter
+
+    quiet: dict[str, Any] = {"print_error": False, "exit_on_error": False, "suppress_keyboard_interrupt": False}
+    flags: dict[str, Any] = {"help_flags": (), "version_flags": ()}
+    usual = Parameter(negative=())
+    app = App("walkers", _SUMMARY, default_parameter=usual, result_action="return_value", **quiet, **flags)
+    for command in commands():
+        app.command(command.place, name=command.name, **({} if command.name in SECTIONS else flags))
+    app.register_install_completion_command()
+    return app
 
 
-def _use_library(file: Path | None) -> None:
-    walkers.inputs.chosen_library = file
+def _call(tokens: list[str]) -> Any:
+    """What the command returns that the words name; with ``--help`` its help is printed."""
+    app = program()
+    if tokens[0] == "--library" and len(tokens) > 1:
+        walkers.inputs.chosen_library, tokens = Path(tokens[1]), tokens[2:]
+    names, apps, words = app.parse_commands(tokens)
+    if names and (not {*words}.isdisjoint(_HELP) or (not words and names[-1] in SECTIONS)):
+        return print(help_of(names, apps))
+    return app(tokens)
 
 
-def _options(
-    library: Annotated[
-        Path | None,
-        typer.Option(callback=_use_library, help="Your own library file; default: library.toml beside the case."),
-    ] = None,
-    version: Annotated[
-        bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Show the versions and exit.")
-    ] = False,
-) -> None:
-    """Options of the program."""
+def help_of(names: Sequence[str], apps: Sequence[App]) -> str:
+    """The help of a command, from the signature and the docstring of its function."""
+    app = apps[-1]
+    inner = [(name, app[name].help.partition("\n")[0]) for name in app if name not in _HELP and name[0] != "-"]
+    words = " COMMAND [ARGS]..." if inner else ""
+    tables, usage, text = [_table("Commands", inner)] if inner else [], "", app.help
+    if function := app.default_command:
+        text = (inspect.getdoc(function) or "") if not inner else text
+        with app.app_stack(apps):
+            arguments = [one for one in app.assemble_argument_collection(parse_docstring=True) if one.show]
+        placed = [_described(one) for one in arguments if one.field_info.is_positional]
+        chosen = [_described(one) for one in arguments if not one.field_info.is_positional]
+        usage = "".join(f" {name}" for name, _ in placed)
+        usage = f"{usage} |{words}" if inner else usage
+        tables = [*([_table("Arguments", placed)] if placed else []), *tables, _table("Options", [*chosen, _HELP_ROW])]
+    head = f"Usage: {' '.join(['walkers', *names])} [OPTIONS]{usage or words}"
+    return "\n\n".join([head, textwrap.fill(text.partition("\n\nParameters\n")[0], _WIDE), *tables])
+
+
+def _described(argument: Argument) -> tuple[str, str]:
+    """Names and values of an argument or an option, and its meaning."""
+    kind, default = str(argument.hint), argument.field_info.default
+    values = argument.parameter.metavar or "|".join(argument.get_choices() or ())
+    values = values or next((word for name, word in _VALUES.items() if name in kind), "")
+    names = sorted({*argument.names} - {*argument.negatives}, key=len)
+    text = argument.parameter.help or ""
+    if default not in (None, False, (), argument.field_info.empty) and not hasattr(default, "__dataclass_fields__"):
+        text += f" [default: {'x'.join(map(str, default)) if isinstance(default, tuple) else default}]" * bool(default)
+    if argument.field_info.is_positional:
+        many = argument.field_info.kind is argument.field_info.VAR_POSITIONAL
+        return f"{names[0]}{'...' * many}" if argument.required or many else f"[{names[0]}]", text
+    return f"{', '.join(names)} {values}".strip(), text
 
 
 def describe_version() -> str:
@@ -162,13 +178,16 @@ def describe_version() -> str:
     return f"{package}\n{version or 'an engine that does not name its version'}, {path}"
 
 
-def _report_stop(stop: BaseException) -> int:
+def _report_stop(stop: BaseException, tokens: list[str]) -> int:
     """Print why the program stopped, and return its exit status."""
-    from walkers.errors import InputError, WalkersError, WrongArgument
+    from walkers.errors import InputError, WalkersError, shortened
+    from walkers.text import printable
 
-    if isinstance(stop, WrongArgument):
-        return _tell(f"{_OPTIONS.get(stop.source, f'--{stop.source}')}: {stop.problems[0]}", 2)
-    known = ((InputError, 2), (WalkersError, 1), (KeyboardInterrupt, _INTERRUPTED), (typer.Abort, _INTERRUPTED))
+    if isinstance(stop, SystemExit):
+        return stop.code if isinstance(stop.code, int) else 0
+    if isinstance(stop, InputError) and stop.source not in tokens:
+        stop.args = (str(stop).replace(stop.source, _options_of(stop.source, tokens), 1),)
+    known = ((InputError, 2), (WalkersError, 1), (KeyboardInterrupt, _INTERRUPTED))
     status = stop.status if isinstance(stop, _Terminated) else next((s for k, s in known if isinstance(stop, k)), None)
     if status is not None:
         return _tell(str(stop) or "interrupted", status)
@@ -178,11 +197,19 @@ def _report_stop(stop: BaseException) -> int:
         return 0
     if isinstance(stop, OSError):  # a given path cannot be read or written
         return _tell(f"{stop.filename}: {stop.strerror}" if stop.filename else str(stop), 2)
-    # Typer's usage errors print themselves and have their own exit status.
-    if hasattr(stop, "show") and hasattr(stop, "exit_code"):
-        stop.show()
-        return int(stop.exit_code)
+    from cyclopts import CycloptsError
+
+    if isinstance(stop, CycloptsError):
+        return _tell(shortened(printable(str(stop)), _LONGEST_MESSAGE), 2)
     raise stop
+
+
+def _options_of(names: str, tokens: list[str]) -> str:
+    """The options of the command for arguments of a function of the package, such as ``begin, end``."""
+    _, apps, _ = program().parse_commands(tokens)
+    arguments = apps[-1].assemble_argument_collection()
+    options = {one.name[2:]: one.name for one in arguments} | {one.field_info.name: one.name for one in arguments}
+    return ", ".join(options.get(name, name) for name in names.split(", "))
 
 
 def _tell(message: str, status: int) -> int:

@@ -16,15 +16,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_
 
 from pydantic import BeforeValidator
 from pydantic.fields import FieldInfo
-from typer.main import get_command
 
+from walkers.commands import commands
 from walkers.commands.catalogue import COMMANDS, NOT_KNOWN, catalogue
 from walkers.inputs.case import Case
 from walkers.inputs.library import Known
 from walkers.inputs.resolving import SUPPLIED
 from walkers.inputs.table import Table, example_of, keys_in, table_in
 from walkers.inputs.units import ACCELERATION, AUTO, TEMPERATURE, Kind, kind_in, quantity_text
-from walkers.main import _program
+from walkers.main import help_of, overview, program
 from walkers.postprocess.analysis import analyses
 from walkers.postprocess.quantities import TABLES
 from walkers.sweeps.table import STATE, derived_columns, result_columns
@@ -197,8 +197,8 @@ def _shipped() -> str:
 
 _COMMANDS = """# Commands
 
-The output of `walkers --help` and of `walkers COMMAND --help`. `walkers --install-completion` installs the
-completion of commands, options, cases, sweeps and runs for your shell.
+The output of `walkers --help` and of `walkers COMMAND --help`. `walkers --install-completion` installs the completion
+of commands, options, cases, sweeps and runs for bash, zsh and fish; call it again after an update of the program.
 
 | exit status | meaning |
 | --- | --- |
@@ -213,13 +213,13 @@ completion of commands, options, cases, sweeps and runs for your shell.
 
 
 def _commands() -> str:
-    """Help texts as a terminal of 80 columns shows them."""
-    program = get_command(_program())
-    context = program.make_context("walkers", [], resilient_parsing=True, terminal_width=80)
-    text = f"{_COMMANDS}```text\n$ walkers --help\n{program.get_help(context)}\n```\n"
-    for name, command in program.commands.items():
-        inner = type(context)(command, context, name, terminal_width=80)  # a context for completion would offer cases
-        text += f"\n## walkers {name}\n\n```text\n$ walkers {name} --help\n{command.get_help(inner)}\n```\n"
+    """Help texts of the program, its commands, and theirs."""
+    text, app = f"{_COMMANDS}```text\n$ walkers --help\n{overview()}\n```\n", program()
+    for command in commands():
+        for part in ((), *((name,) for name in app[command.name])):
+            names, apps, _ = app.parse_commands([command.name, *part])
+            words = " ".join(names)
+            text += f"\n## walkers {words}\n\n```text\n$ walkers {words} --help\n{help_of(names, apps)}\n```\n"
     return text
 
 

@@ -1,7 +1,15 @@
 """The commands: the public functions of the modules of `GROUPS`, in the order of ``walkers --help``.
 
-A function named ``check_engine`` is the command ``walkers check engine``.
+``check`` and ``paper`` have commands of their own. A module is imported when one of its commands is called: for
+``walkers --help`` its text is read instead.
 """
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
 
 GROUPS = {"run": "Run", "look": "Look at results", "keep": "Keep and share", "check": "Check and calibrate"}
 """The modules, with their headings in the help."""
@@ -9,4 +17,26 @@ SECTIONS = {
     "check": "Check the engine, the contact model, one case, or files. Exit status 1 if something differs.",
     "paper": "Compare with the published results: figures and numbers.",
 }
-"""Commands with sub-commands, and their help."""
+"""Commands with commands of their own, in the module ``check``."""
+
+
+class Command(NamedTuple):
+    """A command: its name, its heading in the help, where it is, and its summary."""
+
+    name: str
+    heading: str
+    place: str
+    summary: str
+
+
+def commands() -> Iterator[Command]:
+    """All commands, in the order of the help."""
+    for module, heading in GROUPS.items():
+        place = f"{__name__}.{module}"
+        if module == "check":
+            yield from (Command(name, heading, f"{place}:{name}", text) for name, text in SECTIONS.items())
+        text = Path(__file__).with_name(f"{module}.py").read_text("utf-8")
+        for node in ast.parse(text).body:
+            if isinstance(node, ast.FunctionDef) and node.name[0] != "_" and not node.decorator_list:
+                summary = (ast.get_docstring(node) or "").partition("\n")[0]
+                yield Command(node.name.strip("_"), heading, f"{place}:{node.name}", summary)

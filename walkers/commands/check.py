@@ -4,50 +4,55 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Annotated
 
-import typer
-from typer import Argument, Option
+from cyclopts import App, Parameter
+from cyclopts.validators import Number
 
 import walkers
 from walkers import DEFAULT_OUT
-from walkers.commands.arguments import (
-    AllowFailedAudit,
+from walkers.commands import SECTIONS
+from walkers.commands.options import (
+    At,
     By,
-    EngineName,
+    Case,
     Formats,
     Jobs,
     Json,
     Out,
-    Set,
-    changes_of,
+    RunOrSweep,
     check_folder,
-    load_case,
-    on_cores,
     print_as,
     print_lines,
     refuse,
     tell,
 )
+from walkers.errors import refused
 
-if TYPE_CHECKING:
-    from walkers.inputs.case import Case as Resolved
-
-_FILES = "An unpacked archive, or a run or a sweep (folder, name in --out, or case)."
-_NAME = "A material, a liquid, a bridge law, a case, a sweep or a calibration."
-_LITERATURE = "benchmarks, bridges or crosscheck; default: all."
-_CALIBRATION = "A calibration file, or the name of a shipped calibration such as ruby."
+check = App(name="check", help=SECTIONS["check"], help_flags=(), version_flags=())
+paper = App(name="paper", help=SECTIONS["paper"], help_flags=(), version_flags=())
 
 
-def check_engine(
-    only: list[str] | None = Option(None, help="Run only the check with this name. Repeatable."),
-    quick: bool = Option(False, "--quick", help="Skip the slowest checks."),
+@check.command
+def engine(
+    *,
+    only: list[str] | None = None,
+    quick: bool = False,
     as_json: Json = False,
-    engine: EngineName = None,
+    engine: str | None = None,
 ) -> int:
-    """Compare the forces of the engine and its contact model with a second engine and exact formulas."""
+    """Compare the forces of the engine and its contact model with a second engine and exact formulas.
+
+    Parameters
+    ----------
+    only
+        Run only the check with this name. Repeatable.
+    quick
+        Skip the slowest checks.
+    engine
+        Name or path of the liggghts binary.
+    """
     from walkers.check.audit import record, run_audit, selected
-    from walkers.errors import refused
     from walkers.runner.binary import find_engine
     from walkers.runner.failures import EngineMissing
 
@@ -68,51 +73,80 @@ def check_engine(
     return 1 if audit.failures else 0
 
 
-def check_literature(
-    only: list[str] | None = Argument(None, metavar="CHECK", help=_LITERATURE),
-    quick: bool = Option(False, "--quick", help="Run only the fast part of each check."),
+@check.command
+def literature(
+    *only: Annotated[str, Parameter(name="CHECK")],
+    quick: bool = False,
     out: Out = DEFAULT_OUT,
     as_json: Json = False,
 ) -> int:
-    """Compare engine and bridge laws with published benchmarks, exact solutions and a second engine."""
+    """Compare engine and bridge laws with published benchmarks, exact solutions and a second engine.
+
+    Parameters
+    ----------
+    only
+        benchmarks, bridges or crosscheck; default: all.
+    quick
+        Run only the fast part of each check.
+    """
     from walkers.check.lines import as_dict, as_text, failures, outcome
     from walkers.check.literature import literature
 
     check_folder("--out", out)
-    lines = literature(out, only or (), quick=quick, on_done=tell)
+    lines = literature(out, only, quick=quick, on_done=tell)
     print_as(as_json, lambda: as_dict(lines), lambda: f"{as_text(lines)}\n\n{outcome(lines)}")
     return 1 if failures(lines) else 0
 
 
-def check_files(what: str = Argument(metavar="PATH", help=_FILES), settings: Set = None, out: Out = DEFAULT_OUT) -> int:
-    """Compare the files of a run, a sweep or an archive with their checksums."""
+@check.command
+def files(what: Annotated[RunOrSweep, Parameter(name="PATH")], /, *, at: At = At()) -> int:
+    """Compare the files of a run, a sweep or an archive with their checksums.
+
+    Parameters
+    ----------
+    what
+        An unpacked archive, or a run or a sweep (folder, name in --out, or case).
+    """
     from walkers.api import directory_of
     from walkers.archive.verification import verify
 
-    found = verify(directory_of(what, out, changes_of(settings)))
-    print_lines(one.describe() for one in found)
-    return 0 if all(one.passed for one in found) else 1
+    parts = verify(directory_of(what, at.out, at.values))
+    print_lines(part.describe() for part in parts)
+    return 0 if all(part.passed for part in parts) else 1
 
 
-def check_case(
-    context: typer.Context,
-    settings: Set = None,
-    out: Out = DEFAULT_OUT,
-    cycles: int | None = Option(None, help="Number of drive cycles; default: as in the case."),
-    without: list[str] | None = Option(None, metavar="TERM", help="Leave out a force, such as friction. Repeatable."),
-    seeds: int = Option(1, min=1, help="Piles: number of random starts."),
+@check.default
+def case(
+    case: Case,
+    /,
+    *,
+    at: At = At(),
+    cycles: int | None = None,
+    without: Annotated[list[str] | None, Parameter(metavar="TERM")] = None,
+    seeds: Annotated[int, Parameter(validator=Number(gte=1))] = 1,
     as_json: Json = False,
-    engine: EngineName = None,
-    allow_failed_audit: AllowFailedAudit = False,
+    by: By = By(),
 ) -> int:
-    """Run CASE with LIGGGHTS and with an independent second engine in Python, and compare the motion."""
+    """Run CASE with LIGGGHTS and with an independent second engine in Python, and compare the motion.
+
+    Parameters
+    ----------
+    case
+        A case file, the name of a shipped case such as fig1b, or a run (name or folder).
+    cycles
+        Number of drive cycles; default: as in the case.
+    without
+        Leave out a force, such as friction. Repeatable.
+    seeds
+        Piles: number of random starts.
+    """
+    from walkers.api import case_at
     from walkers.check.crosscheck import crosscheck, shortened
     from walkers.check.engine import TERMS
     from walkers.check.lines import as_dict, as_text, failures
-    from walkers.errors import refused
 
-    loaded = load_case(str(context.info_name), settings, out)
-    check_folder("--out", out)
+    loaded = case_at(case, at.out, at.values)[0]
+    check_folder("--out", at.out)
     refuse("--seeds", seeds > 1 and loaded.mixture is None, "is for piles: walkers and placed beads have one start")
     for term in without or ():
         refuse(f"--without {term}", term not in TERMS, f"expected one of {', '.join(TERMS)}")
@@ -120,41 +154,59 @@ def check_case(
         loaded = loaded if cycles is None else shortened(loaded, cycles)
     except ValueError as error:
         raise refused("--cycles", str(error)) from error
-
-    def make(one: Resolved, folder: Path) -> walkers.Run:
-        return walkers.run(one, folder, engine=engine, progress=True, allow_failed_audit=allow_failed_audit)
-
-    lines = crosscheck(loaded, out, without or (), seeds=seeds, make=make)
+    lines = crosscheck(
+        loaded,
+        at.out,
+        without or (),
+        seeds=seeds,
+        make=lambda one, folder: walkers.run(one, folder, progress=True, **vars(by)),
+    )
     print_as(as_json, lambda: as_dict(lines, case=loaded.name, without=without or []), lambda: as_text(lines))
     if not as_json:
         tell(*(f"{loaded.name}: differs: {line.what}" for line in failures(lines)))
     return 1 if failures(lines) else 0
 
 
-def library(name: str | None = Argument(None, metavar="NAME", help=_NAME)) -> None:
-    """List materials, liquids, friction, bridge laws, cases, sweeps and calibrations, or print one with its sources."""
+def library(name: Annotated[str | None, Parameter(name="NAME")] = None, /) -> None:
+    """List materials, liquids, friction, bridge laws, cases, sweeps and calibrations, or print one with its sources.
+
+    Parameters
+    ----------
+    name
+        A material, a liquid, a bridge law, a case, a sweep or a calibration.
+    """
     from walkers.commands.catalogue import catalogue, describe, describe_one
 
-    found = catalogue()
-    print(describe_one(found, name) if name else describe(found))
+    entries = catalogue()
+    print(describe_one(entries, name) if name else describe(entries))
 
 
-def paper_figures(
+@paper.command
+def figures(
+    *,
     out: Out = DEFAULT_OUT,
-    to: Path = Option(Path("figures"), help="Folder to write the figures to."),
-    only: list[str] | None = Option(None, help="Draw only the figure with this name, or comparison. Repeatable."),
+    to: Path = Path("figures"),
+    only: list[str] | None = None,
     formats: Formats = None,
     jobs: Jobs = None,
-    engine: EngineName = None,
-    allow_failed_audit: AllowFailedAudit = False,
+    by: By = By(),
 ) -> int:
-    """Draw the paper's figures with simulation, theory and published values. Missing runs are made first."""
+    """Draw the paper's figures with simulation, theory and published values. Missing runs are made first.
+
+    Parameters
+    ----------
+    to
+        Folder to write the figures to.
+    only
+        Draw only the figure with this name, or comparison. Repeatable.
+    """
     from walkers.paper.make import FORMATS, make_figures
     from walkers.progress import progress_of_sweep
+    from walkers.runner.launch import cores_here
+    from walkers.sweeps.scheduler import Options
 
-    how = By(engine=engine, allow_failed_audit=allow_failed_audit)
-    wanted, shown = only or (), formats or FORMATS
-    made = make_figures(out, to, on_cores(jobs), only=wanted, formats=shown, progress_of=progress_of_sweep, **how)
+    options, wanted = Options(jobs or cores_here()), formats or FORMATS
+    made = make_figures(out, to, options, only=only or (), formats=wanted, progress_of=progress_of_sweep, **vars(by))
     for name, failures in made.failures.items():
         tell(*(f"{name}: point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
     tell(*(f"{figure} is left out: {reason}" for figure, reason in made.left_out.items()))
@@ -165,22 +217,30 @@ def paper_figures(
 
 
 def calibrate(
-    calibration: str = Argument(metavar="CALIBRATION", help=_CALIBRATION),
+    calibration: Annotated[str, Parameter(name="CALIBRATION")],
+    /,
+    *,
     out: Out = DEFAULT_OUT,
-    to: Path | None = Option(None, help="Folder to write tables and figures to; default: OUT/NAME."),
+    to: Path | None = None,
     jobs: Jobs = None,
-    engine: EngineName = None,
-    allow_failed_audit: AllowFailedAudit = False,
+    by: By = By(),
 ) -> int:
-    """Calibrate unknown parameters to published numbers. An interrupted calibration continues."""
+    """Calibrate unknown parameters to published numbers. An interrupted calibration continues.
+
+    Parameters
+    ----------
+    calibration
+        A calibration file, or the name of a shipped calibration such as ruby.
+    to
+        Folder to write tables and figures to; default: OUT/NAME.
+    """
     from walkers.calibration.file import load_calibration
     from walkers.calibration.report import write_outcome
 
     folder = to or out / load_calibration(calibration).name
     check_folder("--out", out)
     check_folder("--to", folder)
-    how = By(engine=engine, allow_failed_audit=allow_failed_audit)
-    found = walkers.calibrate(calibration, out, jobs=jobs, progress=True, **how)
-    tell(*(f"{name}: {len(failures)} points failed" for name, failures in found.failures.items()))
-    print_lines(write_outcome(found, folder))
+    outcome = walkers.calibrate(calibration, out, jobs=jobs, progress=True, **vars(by))
+    tell(*(f"{name}: {len(failures)} points failed" for name, failures in outcome.failures.items()))
+    print_lines(write_outcome(outcome, folder))
     return 0  # a set whose run fails is an outcome: it counts as far off

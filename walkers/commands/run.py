@@ -4,103 +4,118 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
-from typer import Argument, Option
+from cyclopts import Parameter
+from cyclopts.validators import Number
 
 import walkers
-from walkers import DEFAULT_OUT
-from walkers.commands.arguments import (
-    AllowFailedAudit,
+from walkers.commands.options import (
+    NOT_NEGATIVE,
+    At,
     By,
     Case,
-    EngineName,
     Jobs,
     Json,
-    Out,
-    Set,
-    changes_of,
     check_folder,
-    load_case,
-    on_cores,
     print_as,
     print_lines,
     refuse,
     tell,
 )
-from walkers.completion import offering
+from walkers.errors import each, refused
 
 _MANY = 10_000
 """Number of points that take seconds to resolve."""
-_NAME = "Name of the case; the file is NAME.toml."
-_COPIED = "Shipped case to copy: fig1b (a walker), climber, cluster, tray, pile-small, ... (list: walkers library)."
-_OFFERED = offering("case", "run")
-_CASES = "Case files, names of shipped cases, or runs (name or folder)."
-_LIMIT = "Time limit in s for each run; for piles, for each segment."
-_SPREAD = "Also run with uncertain values drawn from their ranges, and print the band of the result."
-_ACCURACY = "Also run with smaller time steps and harder beads, and print the numerical error of the result."
-_SHARE = "For --accuracy: share of the velocity that the last increase of Young's modulus may change; default: 0.01."
-_SWEEP_FILE = "A sweep file, or the name of a shipped sweep such as fig2."
 
 
 def new(
-    name: str = Argument(metavar="NAME", help=_NAME),
-    case: str = Argument("fig1b", metavar="CASE", help=_COPIED, autocompletion=offering("case")),
-    schema: bool = Option(False, "--schema", help="Also write case.schema.json, which editors use."),
+    name: Annotated[str, Parameter(name="NAME")],
+    case: Annotated[str, Parameter(name="CASE")] = "fig1b",
+    /,
+    *,
+    schema: bool = False,
 ) -> None:
-    """Write a commented case file as a starting point."""
-    print(*walkers.new(name, case, schema=schema), sep="\n")
+    """Write a commented case file as a starting point.
+
+    Parameters
+    ----------
+    name
+        Name of the case; the file is NAME.toml.
+    case
+        Shipped case to copy: fig1b (a walker), climber, cluster, tray, pile-small, ... (list: walkers library).
+    schema
+        Also write case.schema.json, which editors use.
+    """
+    print_lines(walkers.new(name, case, schema=schema))
 
 
-def show(
-    case: Case,
-    settings: Set = None,
-    out: Out = DEFAULT_OUT,
-    theory: bool = Option(
-        False, "--theory", help="Print the theory's prediction, with the result of the run if it exists."
-    ),
-    as_json: Json = False,
-) -> None:
-    """Show all values of a case with their sources, the forces, the time step and the predicted run time."""
-    loaded = load_case(case, settings, out)
-    if not theory:
-        from walkers.show import describe, summarise
+def show(case: Case, /, *, at: At = At(), theory: bool = False, as_json: Json = False) -> None:
+    """Show all values of a case with their sources, the forces, the time step and the predicted run time.
 
-        summary = summarise(loaded)
-        print_as(as_json, lambda: summary, lambda: describe(summary))
+    Parameters
+    ----------
+    case
+        A case file, the name of a shipped case such as fig1b, or a run (name or folder).
+    theory
+        Print the theory's prediction, with the result of the run if it exists.
+    """
+    if theory:
+        from walkers.theory.prediction import describe as describe_prediction
+
+        predicted = walkers.predict(case, at.out, at.values)
+        print_as(as_json, lambda: predicted, lambda: describe_prediction(predicted, predicted["engine"]))
         return
-    from walkers.theory.prediction import describe as describe_prediction
+    from walkers.api import case_at
+    from walkers.show import describe, summarise
 
-    predicted = walkers.predict(loaded, out)
-    print_as(as_json, lambda: predicted, lambda: describe_prediction(predicted, predicted["engine"]))
+    summary = summarise(case_at(case, at.out, at.values)[0])
+    print_as(as_json, lambda: summary, lambda: describe(summary))
 
 
 def run(
-    cases: list[str] = Argument(metavar="CASE", help=_CASES, autocompletion=_OFFERED),
-    settings: Set = None,
-    out: Out = DEFAULT_OUT,
-    force: bool = Option(False, "--force", help="Run again if the run exists."),
+    *cases: Case,
+    at: At = At(),
+    force: bool = False,
     as_json: Json = False,
-    limit: float | None = Option(None, min=0.0, help=_LIMIT),
-    spread: bool = Option(False, "--spread", help=_SPREAD),
-    points: int | None = Option(None, min=2, max=4096, help="Number of runs for --spread; default: 32."),
-    accuracy: bool = Option(False, "--accuracy", help=_ACCURACY),
-    share: float | None = Option(None, min=1e-6, max=1.0, help=_SHARE),
-    engine: EngineName = None,
-    allow_failed_audit: AllowFailedAudit = False,
+    limit: Annotated[float | None, Parameter(validator=NOT_NEGATIVE)] = None,
+    spread: bool = False,
+    points: Annotated[int | None, Parameter(validator=Number(gte=2, lte=4096))] = None,
+    accuracy: bool = False,
+    share: Annotated[float | None, Parameter(validator=Number(gte=1e-6, lte=1.0))] = None,
+    by: By = By(),
 ) -> int:
-    """Run cases and print the results. A finished run is only printed, an interrupted run continues."""
+    """Run cases and print the results. A finished run is only printed, an interrupted run continues.
+
+    Parameters
+    ----------
+    cases
+        Case files, names of shipped cases, or runs (name or folder).
+    force
+        Run again if the run exists.
+    limit
+        Time limit in s for each run; for piles, for each segment.
+    spread
+        Also run with uncertain values drawn from their ranges, and print the band of the result.
+    points
+        Number of runs for --spread; default: 32.
+    accuracy
+        Also run with smaller time steps and harder beads, and print the numerical error of the result.
+    share
+        For --accuracy: share of the velocity that the last increase of Young's modulus may change; default: 0.01.
+    """
     from walkers.api import case_at, finished_at
-    from walkers.errors import each
     from walkers.runner.failures import EngineFailure
     from walkers.show import notes
 
+    if not cases:
+        raise refused("CASE", "expected a case, such as fig1b")
     refuse("--points", points is not None and not spread, "is for --spread")
     refuse("--share", share is not None and not accuracy, "is for --accuracy")
     # Report a mistake in the last file before the first run starts.
-    there = each(lambda case: None if settings or force else finished_at(case, out), cases)
-    loaded = each(lambda case: case_at(case, out, changes_of(settings)), cases)
-    check_folder("--out", out)
+    finished = each(lambda case: None if at.changes or force else finished_at(case, at.out), cases)
+    loaded = each(lambda case: case_at(case, at.out, at.values), cases)
+    check_folder("--out", at.out)
     if accuracy:
         from walkers.sweeps.accuracy import SHARE, times_of
 
@@ -109,22 +124,20 @@ def run(
         from walkers.sweeps.spread import POINTS, describe, spread_sweep
 
         for case, _ in loaded:  # also an unusable range
-            list(spread_sweep(case, points or POINTS, engine).cases())
-    failed, how = False, By(engine=engine, allow_failed_audit=allow_failed_audit)
-    for (case, folder), found in zip(loaded, there, strict=True):
+            list(spread_sweep(case, points or POINTS, by.engine).cases())
+    failed = False
+    for (case, folder), found in zip(loaded, finished, strict=True):
         tell(*(f"{case.name}: {note}" for note in notes(case) if found is None))
         try:
-            done = found or walkers.run(case, folder, force=force, progress=True, time_limit=limit, **how)
+            done = found or walkers.run(case, folder, force=force, progress=True, time_limit=limit, **vars(by))
         except EngineFailure as failure:
             tell(f"{case.name}: {failure}")
             failed = True
             continue
         if accuracy:
-            done.accuracy(share or SHARE, progress=True, **how)
-        band = None
-        if spread:
-            band = done.spread(points or POINTS, progress=True, **how)
-            failed |= bool(band.failures)
+            done.accuracy(share or SHARE, progress=True, **vars(by))
+        band = done.spread(points or POINTS, progress=True, **vars(by)) if spread else None
+        failed |= bool(band and band.failures)
         if as_json:
             ranges = {"spread": band.as_dict()} if band else {}
             print(json.dumps({**done.result, **ranges, "run": str(done.directory), "cached": done.cached}))
@@ -134,38 +147,49 @@ def run(
 
 
 def sweep(
-    sweep: str = Argument(metavar="SWEEP", help=_SWEEP_FILE, autocompletion=offering("sweep file")),
-    settings: Set = None,
-    out: Out = DEFAULT_OUT,
+    sweep: Annotated[str, Parameter(name="SWEEP")],
+    /,
+    *,
+    at: At = At(),
     jobs: Jobs = None,
-    site: Path | None = Option(None, help="Site file of a cluster to run on."),
-    dry_run: bool = Option(False, "--dry-run", help="Print the plan and its predicted cost, and run nothing."),
-    retries: int = Option(0, min=0, help="Number of retries for a failed point."),
-    limit: float | None = Option(None, min=0.0, help="Time limit in s for each deck."),
-    engine: EngineName = None,
-    allow_failed_audit: AllowFailedAudit = False,
+    site: Path | None = None,
+    dry_run: bool = False,
+    retries: Annotated[int, Parameter(validator=NOT_NEGATIVE)] = 0,
+    limit: Annotated[float | None, Parameter(validator=NOT_NEGATIVE)] = None,
+    by: By = By(),
 ) -> int:
-    """Run the missing points of a sweep on all cores or on a cluster. Exit status 1 if a point fails."""
-    from dataclasses import replace
+    """Run the missing points of a sweep on all cores or on a cluster. Exit status 1 if a point fails.
 
+    Parameters
+    ----------
+    sweep
+        A sweep file, or the name of a shipped sweep such as fig2.
+    site
+        Site file of a cluster to run on.
+    dry_run
+        Print the plan and its predicted cost, and run nothing.
+    retries
+        Number of retries for a failed point.
+    limit
+        Time limit in s for each deck.
+    """
     from walkers.inputs.sweep import load_sweep
     from walkers.postprocess.uncertainty import lines_of_rest, rests_on
-    from walkers.sweeps.scheduler import plan_sweep
+    from walkers.runner.launch import cores_here
+    from walkers.sweeps.scheduler import Options, plan_sweep
     from walkers.sweeps.site import load_site
 
-    changes = changes_of(settings)
-    loaded = load_sweep(sweep, changes)
-    check_folder("--out", out)
+    loaded = load_sweep(sweep, at.values)
+    check_folder("--out", at.out)
     refuse("--jobs", jobs is not None and site is not None, "the site file sets how many decks run at once")
     if len(loaded.rows) > _MANY:
         tell(f"{loaded.name}: resolving {len(loaded.rows)} points, about 2,000 per second")
     if dry_run:
-        options = replace(on_cores(jobs), site=load_site(site) if site else None)
-        print(plan_sweep(loaded, out, options, engine).as_text())
+        options = Options(jobs or cores_here(), load_site(site) if site else None)
+        print(plan_sweep(loaded, at.out, options, by.engine).as_text())
         return 0
-    how: dict[str, Any] = {"retries": retries, "time_limit": limit, "site": site, "jobs": jobs}
-    by = By(engine=engine, allow_failed_audit=allow_failed_audit)
-    done = walkers.sweep(sweep, out, changes=changes, progress=True, **how, **by)
+    how = {"jobs": jobs, "site": site, "retries": retries, "time_limit": limit, **vars(by)}
+    done = walkers.sweep(sweep, at.out, changes=at.values, progress=True, **how)
     tell(*(f"point {failure.point}, {failure.run}: {failure.message}" for failure in done.failures))
     print(f"{done.summary()}\n  table      walkers list {done.directory}")
     same = [one for one in next(loaded.cases()).origins if one.key not in loaded.keys]  # varied keys are in the table

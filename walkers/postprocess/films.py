@@ -7,9 +7,7 @@ boundary an arrow shows the direction of gravity.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from math import ceil, log10
 from pathlib import Path
 from typing import NamedTuple
@@ -18,9 +16,9 @@ import numpy as np
 
 from walkers.errors import WalkersError, refused
 from walkers.extras import require
-from walkers.inputs.units import DURATION, parse_quantity
 from walkers.postprocess.drawing import check_place
 from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.film_options import FilmOptions
 from walkers.postprocess.motion import Motion, read_motion
 from walkers.postprocess.necks import bridges_at, bridges_text
 from walkers.postprocess.scene import (
@@ -37,48 +35,11 @@ from walkers.postprocess.scene import (
 )
 from walkers.runner.files import beside
 
-_NUMBER = re.compile(r"[\d.]+(e[-+]?\d+)?", re.IGNORECASE)
-_SIZES = {"360p": (640, 360), "480p": (854, 480), "720p": (1280, 720), "1080p": (1920, 1080)}
 _AROUND, _AROUND_TRAY = 1.2, 1.3  # extent of the picture over that of the paths of the beads, or of the tray
 _LETTERS, _WIDE, _LEAST_LETTERS = 24, 42, 15  # lines and heights of a line per picture; smallest height, pixels
 _SECONDS = 10.0  # largest duration of a film without a given slowdown, s
 _LEAST_SEEN = 10.0  # smallest number of recorded frames per second of such a film, if they do not resolve the cycle
 _COLOURS, _SAMPLES = 40, 6  # colours of a GIF; pictures from which they are chosen
-
-
-@dataclass(frozen=True)
-class FilmOptions:
-    """Options of a film.
-
-    Attributes
-    ----------
-    size, fps
-        Width and height in pixels; frames per second.
-    slowdown
-        Slow motion factor; None: 1, 2, 5, 10, …, chosen so that the film lasts 5 to 10 s.
-    walker
-        Number of a walker to show by itself; None: the first of independent walkers, otherwise all beads.
-    begin, end
-        Physical times of the first and the last frame, s; ``end`` None: the end of the run.
-
-    Raises
-    ------
-    InputError
-        If ``size``, ``fps`` or ``slowdown`` is not positive.
-    """
-
-    size: tuple[int, int] = _SIZES["720p"]
-    fps: int = 25
-    slowdown: float | None = None
-    walker: int | None = None
-    begin: float = 0.0
-    end: float | None = None
-
-    def __post_init__(self) -> None:
-        """Check the numbers that do not depend on a run."""
-        for name, value in (("size", min(self.size)), ("fps", self.fps), ("slowdown", self.slowdown)):
-            if value is not None and not value > 0:
-                raise refused(name, f"{value:g}: expected more than 0")
 
 
 def render_film(
@@ -140,25 +101,6 @@ def render_film(
     finally:
         window.close()
     return path
-
-
-def parse_size(text: str) -> tuple[int, int]:
-    """Read a size such as ``720p`` or ``1280x720`` as width and height in pixels; otherwise `InputError`."""
-    numbers = re.fullmatch(r"(\d{2,4})x(\d{2,4})", text.strip().lower())
-    if numbers and min(map(int, numbers.groups())) >= 64:
-        return int(numbers[1]), int(numbers[2])
-    if text in _SIZES:
-        return _SIZES[text]
-    expected = f"expected {', '.join(_SIZES)}, or width and height such as 1280x720, at least 64"
-    raise refused("size", f"{text!r}: {expected}")
-
-
-def parse_time(option: str, text: str) -> float:
-    """Read the physical time of an option, such as ``0.1 s`` or a number, in s; otherwise `InputError`."""
-    try:
-        return parse_quantity(f"{text} s" if _NUMBER.fullmatch(text) else text, DURATION)
-    except ValueError as error:
-        raise refused(option, f'{text!r}: expected a time such as "0.1 s"') from error
 
 
 def _check_format(path: Path, options: FilmOptions) -> None:

@@ -1,0 +1,153 @@
+"""Options that several commands share, and functions that print."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+from cyclopts.validators import Number
+
+from walkers import DEFAULT_OUT, RECORDS
+from walkers.errors import refused
+
+if TYPE_CHECKING:
+    from cyclopts.completion import CompletionContext
+
+    from walkers.api import Run as FoundRun
+    from walkers.api import Sweep
+
+
+def _names(context: CompletionContext) -> list[str]:
+    """For the completion of a shell: case files, shipped cases, and what is in the folder of runs."""
+    from walkers.inputs.reading import shipped
+
+    out = Path(context["out"].raw or DEFAULT_OUT)
+    made = sorted(path.parent.name for file in RECORDS.values() for path in out.glob(f"*/{file}"))
+    return [*(path.name for path in Path().glob("*.toml")), *shipped("case"), *made]
+
+
+AT_LEAST_1 = Number(gte=1)
+NOT_NEGATIVE = Number(gte=0)
+Case = Annotated[str, Parameter(name="CASE", completer=_names)]
+Run = Annotated[str, Parameter(name="RUN", completer=_names)]
+RunOrSweep = Annotated[str, Parameter(name="RUN|SWEEP", completer=_names)]
+Out = Annotated[Path, Parameter(help="Folder that contains the runs.")]
+Jobs = Annotated[
+    int | None,
+    Parameter(("--jobs", "-j"), validator=AT_LEAST_1, help="Number of parallel decks; default: one per core."),
+]
+Json = Annotated[bool, Parameter("--json", help="Print JSON in SI units.")]
+Formats = Annotated[list[str] | None, Parameter("--format", help="Format of the figures: png, svg or pdf. Repeatable.")]
+Y = Annotated[str | None, Parameter(help="Sweeps: column of the table; default: velocity, or climbs for piles.")]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class At:
+    """Where a case, a run or a sweep is looked up, and the values that replace those of its case.
+
+    Parameters
+    ----------
+    changes
+        Replace a value of the case, such as drive.frequency=70Hz. Repeatable.
+    out
+        Folder that contains the runs.
+    """
+
+    changes: Annotated[list[str] | None, Parameter("--set", metavar="KEY=VALUE")] = None
+    out: Path = DEFAULT_OUT
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The values given by ``--set``, by their keys."""
+        from walkers.inputs.keys import settings_of
+
+        return settings_of(self.changes or ())
+
+    def load(self, what: str) -> FoundRun | Sweep:
+        """The named sweep or run."""
+        from walkers.api import load
+
+        return load(what, self.out, self.values)
+
+    def run(self, what: str) -> FoundRun:
+        """The named run."""
+        from walkers.api import NOT_A_RUN, Run
+
+        found = self.load(what)
+        if not isinstance(found, Run):
+            raise refused(what, NOT_A_RUN["sweep"])
+        return found
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class By:
+    """The engine that runs cases.
+
+    Parameters
+    ----------
+    engine
+        Name or path of the liggghts binary.
+    allow_failed_audit
+        Use an engine that failed walkers check engine.
+    """
+
+    engine: str | None = None
+    allow_failed_audit: bool = False
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Chosen:
+    """Which of the runs in a folder.
+
+    Parameters
+    ----------
+    case
+        Only runs of the case with this name.
+    older_than
+        Only runs and sweeps older than this, such as 7d or 12h.
+    """
+
+    case: Annotated[str | None, Parameter(metavar="NAME")] = None
+    older_than: Annotated[str | None, Parameter(metavar="AGE")] = None
+
+
+def refuse(option: str, wrong: bool, why: str) -> None:
+    """Raise an `InputError` with the reason if an option is ``wrong``."""
+    if wrong:
+        raise refused(option, why)
+
+
+def refuse_any(given: dict[str, Any], why: str) -> None:
+    """Raise an `InputError` with the reason if one of these options is given."""
+    if option := next((name for name, value in given.items() if value), None):
+        raise refused(f"--{option.replace('_', '-')}", why)
+
+
+def check_folder(option: str, folder: Path) -> None:
+    """Refuse a folder that is a file."""
+    refuse(option, folder.exists() and not folder.is_dir(), f"expected a folder, {folder} is a file")
+
+
+def print_as(as_json: bool, value: Callable[[], Any], text: Callable[[], str]) -> None:
+    """Print a value as JSON, or its text."""
+    print(json.dumps(value(), indent=2, ensure_ascii=False) if as_json else text())
+
+
+def print_lines(lines: Iterable[object]) -> None:
+    """Print one item per line, such as the paths of written files."""
+    for line in lines:
+        print(line)
+
+
+def tell(*messages: str) -> None:
+    """Print messages on standard error."""
+    for message in messages:
+        print(f"walkers: {message}", file=sys.stderr, flush=True)

@@ -1,0 +1,92 @@
+"""Options of films, for Python and for the program; nothing that takes long is imported."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+from cyclopts.validators import Number
+
+from walkers.errors import refused
+from walkers.inputs.units import DURATION, parse_quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cyclopts import Token
+
+_NUMBER = re.compile(r"[\d.]+(e[-+]?\d+)?", re.IGNORECASE)
+_SIZES = {"360p": (640, 360), "480p": (854, 480), "720p": (1280, 720), "1080p": (1920, 1080)}
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Read a size such as ``720p`` or ``1280x720`` as width and height in pixels; otherwise `InputError`."""
+    numbers = re.fullmatch(r"(\d{2,4})x(\d{2,4})", text.strip().lower())
+    if numbers and min(map(int, numbers.groups())) >= 64:
+        return int(numbers[1]), int(numbers[2])
+    if text in _SIZES:
+        return _SIZES[text]
+    expected = f"expected {', '.join(_SIZES)}, or width and height such as 1280x720, at least 64"
+    raise refused("size", f"{text!r}: {expected}")
+
+
+def parse_time(option: str, text: str) -> float:
+    """Read the physical time of an option, such as ``0.1 s`` or a number, in s; otherwise `InputError`."""
+    try:
+        return parse_quantity(f"{text} s" if _NUMBER.fullmatch(text) else text, DURATION)
+    except ValueError as error:
+        raise refused(option, f'{text!r}: expected a time such as "0.1 s"') from error
+
+
+def _size(_type: Any, tokens: Sequence[Token]) -> tuple[int, int]:
+    return parse_size(tokens[0].value)
+
+
+def _seconds(_type: Any, tokens: Sequence[Token]) -> float:
+    return parse_time(str(tokens[0].keyword), tokens[0].value)
+
+
+Seconds = Annotated[float, Parameter(converter=_seconds, metavar="TIME")]
+"""A time, s; the program reads it with its unit."""
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class FilmOptions:
+    """Options of a film.
+
+    Parameters
+    ----------
+    size
+        Film: width and height in pixels; as an option 360p, 480p, 720p, 1080p, or pixels such as 1280x720.
+    fps
+        Film: frames per second.
+    slowdown
+        Film: slow motion factor; default: 1, 2, 5, 10, ..., chosen so that the film lasts 5 to 10 s.
+    walker
+        Walker to show by itself, counted from 0; default: the first of independent walkers, otherwise all beads.
+    begin
+        Film: physical time of the first frame, s; as an option with its unit, such as '0.1 s'.
+    end
+        Film: physical time of the last frame; default: the end of the run.
+
+    Raises
+    ------
+    InputError
+        If ``size``, ``fps`` or ``slowdown`` is not positive.
+    """
+
+    size: Annotated[tuple[int, int], Parameter(converter=_size, n_tokens=1, metavar="SIZE")] = _SIZES["720p"]
+    fps: Annotated[int, Parameter(validator=Number(gte=1, lte=60))] = 25
+    slowdown: Annotated[float | None, Parameter(validator=Number(gte=0.05, lte=10000.0))] = None
+    walker: Annotated[int | None, Parameter(validator=Number(gte=0))] = None
+    begin: Seconds = 0.0
+    end: Seconds | None = None
+
+    def __post_init__(self) -> None:
+        """Check the numbers that do not depend on a run."""
+        for name, value in (("size", min(self.size)), ("fps", self.fps), ("slowdown", self.slowdown)):
+            if value is not None and not value > 0:
+                raise refused(name, f"{value:g}: expected more than 0")
