@@ -24,8 +24,9 @@ speeds.plot(cycles["cycle"], 1e3 * cycles["rotation_1"], "C0", label="rotation o
 speeds.plot(cycles["cycle"], 1e3 * cycles["rotation_2"], "C1", label="rotation of the small bead")
 speeds.set(ylabel="velocity (mm/s)")
 speeds.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize="small", frameon=False)
-for number, name in ((1, "large bead on the substrate"), (2, "small bead on the substrate"), (3, "bead on bead")):
-    gaps.plot(cycles["cycle"], 1e6 * cycles[f"gap_{number}"], label=name)
+contacts = {"gap_1": "large bead on substrate", "gap_2": "small bead on substrate", "gap_pair_1": "bead on bead"}
+for column, name in contacts.items():
+    gaps.plot(cycles["cycle"], 1e6 * cycles[column], label=name)
 gaps.axhline(0.0, color="0.5", lw=0.8)
 gaps.set(xlabel="cycle", ylabel="gap (µm)")
 gaps.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize="small", frameon=False)

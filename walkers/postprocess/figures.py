@@ -12,8 +12,7 @@ import numpy as np
 
 from walkers.errors import refused
 from walkers.inputs.case import Case
-from walkers.inputs.loads import dimer_of
-from walkers.postprocess.caption import radii_text
+from walkers.postprocess.caption import caption
 from walkers.postprocess.drawing import (
     FORMATS,
     TWO_COLUMNS,
@@ -28,6 +27,7 @@ from walkers.postprocess.motion import LEAST_SAMPLES
 from walkers.postprocess.quantities import TABLES, axis, declared
 from walkers.postprocess.sides import sides, ways
 from walkers.postprocess.tables import Columns
+from walkers.rounding import rounded
 from walkers.runner.directory import case_of
 
 if TYPE_CHECKING:
@@ -170,7 +170,8 @@ def _panels(
             upper.sharex(lower)
             upper.set_xlabel("")
             upper.tick_params(labelbottom=False)
-    figure.suptitle(_title(case))
+    title = [line for part in (case.title or case.name, *caption(case).split("; ")) for line in wrap(part, _LETTERS)]
+    figure.suptitle(plain_text("\n".join(title)))
     return figure, panels
 
 
@@ -198,7 +199,7 @@ def walk_figure(case: Case, tables: Tables) -> Figure:
     for row in np.argsort(walkers["walker"]):
         angle, way = f"{np.degrees(start - turned)[row]:.0f}°", ways(uphill=uphill)[int(side[row] < 0)]
         aside = f"{way} at {angle}" if abs(np.degrees(start - turned)[row]) > _ASIDE else way
-        velocity = velocity_text(1e3 * walkers["axial_velocity" if uphill else "velocity"][row])
+        velocity = rounded(1e3 * walkers["axial_velocity" if uphill else "velocity"][row], "mm/s")
         labels.append(f"{walkers['walker'][row]}: {angle if case.meets else aside}, {velocity} mm/s")
     name, looks = "slope" if uphill else "walk", [looks_of(labels)] * 3
     figure, panels = _panels(name, case, {"cycles": cycles}, looks, [_HEIGHT] * 3)
@@ -229,7 +230,7 @@ def gait_figure(case: Case, tables: Tables) -> Figure:
     names = [name for name in names if np.isfinite(trajectory[name][last]).all()]
     smooth = _smooth({name: trajectory[name][last] for name in ("cycle", *names)}, "cycle")
     texts = ["walker, along its heading", *(f"bead {name.partition('_')[2]}, −R dφ/dt" for name in names[1:])]
-    means = [velocity_text(1e3 * walkers[name][0]) for name in names]
+    means = [rounded(1e3 * walkers[name][0], "mm/s") for name in names]
     widths, colours = np.linspace(1.1 + 1.6 * len(names), 1.1, len(names)), [_PALE, *(f"C{n}" for n in range(1, 99))]
     looks = [
         {"label": f"{text}\n(mean of the run {mean} mm/s)", "color": colour, "linewidth": width}
@@ -333,19 +334,3 @@ def climb_figure(case: Case, tables: Tables) -> Figure:
     letter_panels(panels)
     figure.align_ylabels()
     return figure
-
-
-def velocity_text(value: float) -> str:
-    """A velocity (mm/s) as text with three digits and at most three decimals."""
-    return "0" if round(value, 3) == 0.0 else f"{value:.3g}" if abs(value) >= 0.1 else f"{value:.3f}"
-
-
-def _title(case: Case) -> str:
-    shown, gamma0 = f"{case.count} beads", ""
-    if case.walkers and not case.loose:
-        shown = f"R = {'; '.join(radii_text(make.radii) for make in case.walkers)} mm"
-        if len(case.walkers[0].radii) == 2:
-            gamma0 = f" ($\\Gamma_0$ = {dimer_of(case).gamma0(case.excitation.peak_acceleration):.3g})"
-    tilted = f", {case.boundary.tilted}" if case.boundary.tilted else ""
-    title = "\n".join(wrap(plain_text(case.title or case.name), _LETTERS))
-    return f"{title}\n{shown}{tilted}, {case.excitation.described()}{gamma0}"
