@@ -8,15 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from jsonschema import Draft202012Validator
 
 from tests.conftest import SHORT, call, document, make_case, to_toml
 from walkers.errors import InputError
 from walkers.inputs import units
 from walkers.inputs.case import Case
-from walkers.inputs.reading import load_case, shipped
-from walkers.inputs.schema import case_schema
-from walkers.inputs.toml import read_toml
+from walkers.inputs.reading import load_case
 from walkers.inputs.units import parse_quantity
 from walkers.postprocess.analysis import read_result
 from walkers.templates.deck import render_deck
@@ -455,42 +452,6 @@ def test_long_values_and_those_of_several_lines_are_quoted_on_one(in_folder: Pat
         assert message.rstrip("\n").isprintable()
         assert any(part in message for part in ("xxx", "one two", "no finished run"))
         assert len(message) < 1500
-
-
-# --- the schema for editors -------------------------------------------------------------------------------------------
-
-
-SCHEMA = Draft202012Validator(case_schema())
-
-
-@pytest.mark.parametrize("name", sorted(shipped("case")))
-def test_shipped_cases_are_what_the_schema_says(name: str) -> None:
-    SCHEMA.validate(read_toml(shipped("case")[name]))
-
-
-@pytest.mark.parametrize(
-    ("changes", "path"),
-    [
-        ({"drive": {"frequency": 80}}, "drive.frequency"),
-        ({"drive": {"frequency": "80"}}, "drive.frequency"),
-        ({"dimers": {"radii": ["0.3 mm"]}}, "dimers.radii"),
-        ({"dimers": {"radii": ["0.3 mm", 0.2]}}, "dimers.radii.1"),
-        ({"dimers": {"spacing": 3}}, "dimers.spacing"),
-        ({"dimers": {"meet": "yes"}}, "dimers.meet"),
-        ({"dimers": {"facing": "north"}}, "dimers.facing"),
-        ({"contact": {"restitution": 1.2}}, "contact.restitution"),
-        ({"drive": {"frequenzy": "80 Hz"}}, "drive"),
-        ({"run": {"steps_per_cycle": 3}}, "run"),
-        ({"name": "x"}, ""),
-        ({"drive": None}, ""),
-    ],
-)
-def test_a_case_that_is_refused_is_not_what_the_schema_says(changes: dict[str, Any], path: str) -> None:
-    SCHEMA.validate(document())
-    (error,) = SCHEMA.iter_errors(_said(document(**changes)))
-    assert ".".join(map(str, error.absolute_path)) == path
-    with pytest.raises(InputError):
-        Case.read(_said(document(**changes)))
 
 
 # --- quantities, in the units of the field ----------------------------------------------------------------------------
