@@ -216,7 +216,7 @@ def test_a_case_is_kept_as_json(name: str) -> None:
     again = Case.from_dict(json.loads(json.dumps(case.as_dict())))
     assert (again, again.name, again.document) == (case, case.name, case.document)
     assert again.determinants() == case.determinants()
-    assert again.origins == case.origins
+    assert (again.origins, again.sources) == (case.origins, case.sources)
     assert [one.value for one in again.origins] == [one.value for one in case.origins]
 
 
