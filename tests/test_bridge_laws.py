@@ -33,7 +33,7 @@ from walkers.physics.laws import LAWS, by_name, rabinovich, willett, young_lapla
 from walkers.physics.laws import soulie as soulie_law
 from walkers.physics.liquid import BridgeLiquid
 from walkers.physics.time_step import AUTO_FRACTIONS, WALKER_FRACTIONS
-from walkers.templates.bridge_tables import TOLERANCE, tabulated
+from walkers.templates.bridge_tables import TOLERANCE, RecordedLaw, tabulated
 
 pytestmark = pytest.mark.filterwarnings("ignore::walkers.physics.laws.ExecutedLawWarning")
 
@@ -300,7 +300,8 @@ def test_the_engine_reads_the_law_out_of_its_table(name: str, given: Surfaces) -
     gaps = table.curve.rupture * np.random.default_rng(1).random(200) ** 3
     expected = law(given).forces(gaps).columns()
     scale = np.maximum(np.abs(expected), 1e-3 * np.abs(expected).max(axis=0))
-    np.testing.assert_array_less(np.abs(interpolated(table.text(), gaps) - expected), 10 * TOLERANCE * scale + 1e-30)
+    read = RecordedLaw(f"\nbridge 1 1 {given.radius!r} {given.other_radius!r}\n{table.text()}", None)(given)
+    np.testing.assert_array_less(np.abs(read.forces(gaps).columns() - expected), 10 * TOLERANCE * scale + 1e-30)
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -311,26 +312,6 @@ def test_pulls_and_resistances_are_proportional_to_tension_and_viscosity(name: s
     once, doubled = (by_name(name)(replace(AT_WALL, liquid=one)) for one in (liquid, twice))
     gaps = once.rupture * np.array([0.0, 0.01, 0.3, 0.9])
     np.testing.assert_allclose(doubled.forces(gaps).columns(), 2.0 * once.forces(gaps).columns(), rtol=1e-9)
-
-
-def interpolated(text: str, gaps: FloatArray) -> FloatArray:
-    """Pull and resistances, shape (n, 5), at gaps (m), of a table after its first line.
-
-    It is what walkers/engine/table.h makes of it, written down once more from the format alone.
-    """
-    head, *lines = text.splitlines()
-    rupture, scale = (float(word) for word in head.split()[2:4])
-    octaves, cells = (int(word) for word in head.split()[4:])
-    rows = np.array([[float(word) for word in line.split()] for line in lines])
-    middle = scale * (2.0**octaves - 1.0)
-    mantissa, exponent = np.frexp(1.0 + gaps / scale)
-    near = cells * ((exponent - 1) + 2.0 * mantissa - 1.0)
-    far = cells * (octaves + 2.0 * (1.0 - np.sqrt((rupture - gaps) / (rupture - middle))))
-    place = np.where(gaps < middle, near, far)
-    cell = np.minimum(place.astype(int), (len(rows) - 1) // 3 - 1)
-    fours = [rows[3 * number : 3 * number + 4, 1:] for number in cell]
-    cubics = [np.polynomial.polynomial.polyfit(np.arange(4) / 3.0, four, 3) for four in fours]
-    return np.array([(at ** np.arange(4)) @ cubic for at, cubic in zip(place - cell, cubics, strict=True)])
 
 
 def _law(**changes: object) -> Curve:
