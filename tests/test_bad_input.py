@@ -281,10 +281,10 @@ REFUSED: list[tuple[str, str]] = [
     *((f"export {{run}} --to archive {words}", told) for words, told in (
         ("-o run.tar", "-o: expected the name of a .zip file"),
         ("-o nowhere/run.zip", "No such file"),
-        ("--licence MINE", "licence: expected one of CC-BY-4.0"),
+        ("--licence 'the public'", "licence: expected an SPDX identifier such as CC-BY-4.0"),
         ("--author=", "author: expected a name"),
         ("--orcid 0000-0002-1825-0097", "--orcid: expected an --author for each"),
-        ("--author N --orcid 0000-0002-1825-0098", "orcid: expected an ORCID"),
+        ("--author N --orcid 0000-0002-1825-009", "orcid: expected an ORCID"),
     )),
     ("climb {pile} --within 5mm", "--within: '5mm': expected a time"),
     ("render {run} --fps 10", "--fps: is for --film"),

@@ -130,24 +130,21 @@ def test_a_result_in_a_notebook_has_the_tags_of_any_other(name: str, stranger: C
 
 
 @pytest.mark.parametrize("name", ["script", "newline", "shell", "quotes", "no ASCII", "variable of a shell"])
-def test_an_archive_of_a_stranger_is_a_page_and_json_and_holds_what_it_lists(
+def test_an_archive_of_a_stranger_has_json_and_holds_what_it_lists(
     name: str, stranger: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    pages = []
-    for text in ("plain", HOSTILE[name]):
-        place = stranger(text)
-        manifest = json.loads((place / "manifest.json").read_text())
-        manifest |= {"platform": text, "engine": {**manifest["engine"], "sha256": text}}
-        write_json(place / "manifest.json", manifest)
-        path = write_archive(place, tmp_path / "archive.zip")
-        with zipfile.ZipFile(path) as archive:
-            pages.append(archive.read("ro-crate-preview.html").decode())
-            json.loads(archive.read("ro-crate-metadata.json"))
-            listed = archive.read("sha256sums.txt").decode().split("\n")[:-1]
-            assert {line.partition("  ")[2] for line in listed} <= set(archive.namelist())
-        shutil.unpack_archive(path, tmp_path / f"unpacked-{len(pages)}")
-        call("check", "files", str(tmp_path / f"unpacked-{len(pages)}"), check=True)
-    assert _tags(pages[1]) == _tags(pages[0])
+    text = HOSTILE[name]
+    place = stranger(text)
+    manifest = json.loads((place / "manifest.json").read_text())
+    manifest |= {"platform": text, "engine": {**manifest["engine"], "sha256": text}}
+    write_json(place / "manifest.json", manifest)
+    path = write_archive(place, tmp_path / "archive.zip")
+    with zipfile.ZipFile(path) as archive:
+        json.loads(archive.read("ro-crate-metadata.json"))
+        listed = archive.read("sha256sums.txt").decode().split("\n")[:-1]
+        assert {line.partition("  ")[2] for line in listed} <= set(archive.namelist())
+    shutil.unpack_archive(path, tmp_path / "unpacked")
+    call("check", "files", str(tmp_path / "unpacked"), check=True)
 
 
 @EACH

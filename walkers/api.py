@@ -62,7 +62,7 @@ NOT_A_RUN = {
     "deck": "is a deck that was run by hand; first do: walkers run {}",
     "calibration": "a calibration's outcome: its report is calibration.md",
     "sweep": "is a sweep: expected one of its runs; walkers list, plot, report and compare take sweeps",
-    "archive": "an archive: unpack it and give a run or a sweep in it; walkers check files takes it as it is",
+    "archive": "an archive: unpack it and give a run or a sweep in it",
 }
 
 
@@ -421,7 +421,7 @@ class Run:
             The file, or the folder for ``vtk``, ``paraview`` and ``deck``. None: in the run directory, for ``archive``
             and ``deck`` in the current folder.
         options
-            Arguments of these functions, such as ``every``; for an archive, the fields of its ``ArchiveOptions``.
+            Arguments of these functions, such as ``every``; for an archive, those of its function.
 
         Examples
         --------
@@ -434,9 +434,9 @@ class Run:
 
             return write_folder(as_run(self.case, self.directory), place or Path(f"{self.directory.name}-deck"))
         if form == "archive":
-            from walkers.archive.writing import ArchiveOptions, write_archive
+            from walkers.archive.writing import write_archive
 
-            return write_archive(self.finished_directory, place, ArchiveOptions(**options))
+            return write_archive(self.finished_directory, place, **options)
         if form in ("vtk", "paraview"):
             from walkers.postprocess.paraview import SCRIPT, write_vtk
 
@@ -668,11 +668,11 @@ class Sweep:
 
     def export(self, form: Export = "archive", to: str | Path | None = None, **options: Any) -> Path:
         """Write the sweep and its runs as an ``archive``, the only form; see `Run.export`."""
-        from walkers.archive.writing import ArchiveOptions, write_archive
+        from walkers.archive.writing import write_archive
 
         if form != "archive":
             raise refused(self.directory, f"is a sweep: expected one of its runs for {form}, or archive")
-        return write_archive(self.directory, _path(to), ArchiveOptions(**options))
+        return write_archive(self.directory, _path(to), **options)
 
 
 def sweep(

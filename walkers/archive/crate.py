@@ -1,17 +1,13 @@
 """The description of an archive: an RO-Crate (researchobject.org) by the Process Run Crate profile, with rocrate.
 
-Each run has three actions with program, input and output: from the case to the deck (this program), from the deck to
-the dumps (the engine), from the dumps to tables and result (this program).
+Each run is an action of the engine, from case and deck to the dumps; one action of this program makes the tables.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import quote
 
 from walkers.runner.provenance import PROJECT
@@ -19,10 +15,10 @@ from walkers.runner.provenance import PROJECT
 if TYPE_CHECKING:
     from rocrate.model.entity import Entity
 
-    from walkers.archive.writing import Contents, Item, PackedRun
+    from walkers.archive.writing import Contents, File
 
 METADATA_NAME = "ro-crate-metadata.json"
-PREVIEW_NAME = "ro-crate-preview.html"
+README_NAME = "README.md"
 VERSION = "1.1"
 """Version of RO-Crate that the profile extends."""
 PROFILE = "https://w3id.org/ro/wfrun/process/0.5"
@@ -35,28 +31,17 @@ _PAPER_PROPERTIES = {
     "identifier": PAPER,
     "url": "https://arxiv.org/abs/1003.1623",
 }
-LICENCES = {
-    "CC-BY-4.0": ("https://creativecommons.org/licenses/by/4.0/", "Creative Commons Attribution 4.0 International"),
-    "CC0-1.0": ("https://creativecommons.org/publicdomain/zero/1.0/", "Creative Commons Zero 1.0 Universal"),
-    "CC-BY-SA-4.0": (
-        "https://creativecommons.org/licenses/by-sa/4.0/",
-        "Creative Commons Attribution Share Alike 4.0 International",
-    ),
-    "BSD-3-Clause": ("https://opensource.org/license/bsd-3-clause", 'BSD 3-Clause "New" or "Revised" License'),
-}
-"""Addresses and names of licences, by SPDX identifier."""
 _MEDIA = {
     ".json": "application/json",
     ".toml": "application/toml",
     ".parquet": "application/vnd.apache.parquet",
     ".csv": "text/csv",
-    ".html": "text/html",
+    ".md": "text/markdown",
     **dict.fromkeys((".lig", ".txt", ".log"), "text/plain"),
 }
 
 
-@dataclass(frozen=True)
-class Author:
+class Author(NamedTuple):
     """Author of the runs: name, and ORCID (``0000-0002-1825-0097``) or None."""
 
     name: str
@@ -64,194 +49,129 @@ class Author:
 
 
 def describe_crate(contents: Contents, authors: Sequence[Author], licence: str) -> dict[str, Any]:
-    """The metadata of an archive, JSON-LD, under one of `LICENCES`; the date is the end of the last run."""
-    made = _Crate(authors)
-    for one in contents.sweep:
-        made.file(one)
-    for run in contents.runs:
-        text = f"Run directory of the case {run.manifest['name']}, finished {run.manifest['finished']}"
-        folder = made.crate.add_dataset(None, f"{run.place}/", properties={"name": run.name, "description": text})
-        folder["hasPart"] = [made.file(one) for one in run.items]
-    actions = [action for run in contents.runs for action in made.actions(run)]
-    if contents.record is not None:
-        results = [one for run in contents.runs for one in run.with_role("result")]
-        table = made.action(
-            f"#{contents.name}-table",
-            f"Table of the sweep {contents.name}",
-            "The results of the runs in one table, one row per point.",
-            made.program(contents.runs[-1].manifest),
-            [*(one for one in contents.sweep if one.role != "table"), *results],
-            [one for one in contents.sweep if one.role == "table"],
-            (None, contents.finished),
-        )
-        actions.append(table)
-    made.describe_root(contents, licence)
-    made.crate.root_dataset["mentions"] = actions
+    """The metadata of an archive, JSON-LD; the licence is an SPDX identifier, the date is the end of the last run."""
+    made = _Crate(contents, authors)
+    root, profile = made.crate.root_dataset, {"name": "Process Run Crate", "version": PROFILE.rpartition("/")[2]}
+    about = {"name": licence, "description": f"The licence {licence} of the SPDX list", "identifier": licence}
+    root["name"] = f"{contents.name}: {contents.title}".rstrip(": ")
+    root["description"] = contents.describe()
+    root["datePublished"] = _moment(contents.finished)
+    root["license"] = made.entity(f"https://spdx.org/licenses/{licence}", "CreativeWork", **about)
+    root["conformsTo"] = made.entity(PROFILE, "CreativeWork", **profile)
+    root["citation"] = made.entity(PAPER, "ScholarlyArticle", **_PAPER_PROPERTIES)
+    root["mentions"] = [*(made.simulation(place) for place in contents.manifests), made.analysis()]
+    if made.people:
+        root["author"] = list(made.people)
     metadata: dict[str, Any] = made.crate.metadata.generate()
     for entity in metadata["@graph"]:  # by the specification, lists have more than one item
-        entity.update({key: one[0] for key, one in entity.items() if isinstance(one, list) and len(one) == 1})
+        entity.update({key: value[0] for key, value in entity.items() if isinstance(value, list) and len(value) == 1})
     return metadata
+
+
+class _Crate:
+    """A crate under construction, with files and people, to which other entities refer."""
+
+    def __init__(self, contents: Contents, authors: Sequence[Author]) -> None:
+        from rocrate.rocrate import ROCrate
+
+        self.contents, self.crate = contents, ROCrate(version=VERSION)
+        self.crate.metadata.extra_terms["sha256"] = "http://schema.org/sha256"  # not in the context of that version
+        identifiers = [f"https://orcid.org/{one.orcid}" if one.orcid else f"#{quote(one.name)}" for one in authors]
+        self.people = [
+            self.entity(identifier, "Person", name=author.name)
+            for identifier, author in zip(identifiers, authors, strict=True)
+        ]
+        self.files = {place: self.file(place, file) for place, file in contents.files.items()}
+
+    def entity(self, identifier: str, kind: str, /, **properties: Any) -> Entity:
+        """A contextual entity, added once."""
+        from rocrate.model.contextentity import ContextEntity
+
+        added = ContextEntity(self.crate, identifier, properties={"@type": kind, **properties})
+        return self.crate.get(identifier) or self.crate.add(added)
+
+    def file(self, place: str, file: File) -> Entity:
+        """A file of the archive, a table with its columns; without a source, because rocrate only describes it."""
+        properties: dict[str, Any] = {
+            "name": Path(place).name,
+            "description": file.meaning,
+            "encodingFormat": _MEDIA.get(Path(place).suffix, "application/octet-stream"),
+            "contentSize": str(file.size),
+            "sha256": file.sha256,
+        }
+        if place.endswith(".parquet"):
+            columns = _columns(Path(place).stem, file)
+            described = [self.entity(f"#{quote(column['name'])}", "PropertyValue", **column) for column in columns]
+            properties["variableMeasured"] = described
+        return self.crate.add_file(None, place, properties=properties)
+
+    def with_role(self, *roles: str, folder: str = "") -> list[Entity]:
+        """The files below a folder that have one of the roles."""
+        files = self.contents.files
+        return [self.files[place] for place in files if files[place].role in roles and place.startswith(folder)]
+
+    def simulation(self, place: str) -> Entity:
+        """The action of the engine in the folder of a run."""
+        manifest, name, folder = self.contents.manifests[place], Path(place).name, f"{place}/"
+        text = f"Run directory of the case {manifest['name']}, finished {manifest['finished']}"
+        run = self.crate.add_dataset(None, folder, properties={"name": name, "description": text})
+        run["hasPart"] = [file for path, file in self.files.items() if path.startswith(folder)]
+        engine, others = manifest["engine"], int(manifest.get("shared_deck", {}).get("runs", 1)) - 1
+        text = "Discrete element method. The SHA-256 combines those of the executable and libliggghts."
+        more = {"url": ENGINE_HOME, "sha256": engine["sha256"], "description": text}
+        binary = self.software(f"{ENGINE_HOME}#{engine['sha256'][:12]}", "LIGGGHTS", engine["version"], **more)
+        text = f"The engine runs the deck{f', together with {others} other cases' if others else ''}."
+        read, written = self.with_role("case", "deck", folder=folder), self.with_role("dump", "output", folder=folder)
+        action = self.action(f"Simulation of {name}", text, binary, read, written, manifest["finished"])
+        action["startTime"] = _moment(manifest["started"])
+        return action
+
+    def analysis(self) -> Entity:
+        """The action of this program, which makes the tables of all runs."""
+        manifests = [manifest.get("tabulated", manifest) for manifest in self.contents.manifests.values()]
+        ends = [str(manifest.get("date", manifest.get("finished"))) for manifest in manifests]
+        program = self.program(manifests[ends.index(max(ends))])
+        read, written = self.with_role("case", "dump", "record"), self.with_role("table", "result")
+        name, text = f"Tables of {self.contents.name}", "Analysis of the dumps: tables and results."
+        return self.action(name, text, program, read, written, max(ends))
+
+    def action(
+        self, name: str, text: str, instrument: Entity, read: list[Entity], written: list[Entity], ended: str
+    ) -> Entity:
+        """Input and output files of a program."""
+        action = self.entity(f"#{quote(name)}", "CreateAction", name=name, description=text, instrument=instrument)
+        action["object"], action["result"], action["endTime"] = read, written, _moment(ended)
+        action["actionStatus"] = "http://schema.org/CompletedActionStatus"
+        if self.people:
+            action["agent"] = list(self.people)
+        return action
+
+    def program(self, manifest: Mapping[str, Any]) -> Entity:
+        """The program with Python and the packages, as listed in a manifest."""
+        python, home = manifest["python"], "https://www.python.org/"
+        pages = {name: f"https://pypi.org/project/{name}/{version}/" for name, version in manifest["packages"].items()}
+        needed = [self.software(page, name, manifest["packages"][name], url=page) for name, page in pages.items()]
+        needed.append(self.software(f"{home}#{python}", "Python", python, url=home))
+        version = ", commit ".join(filter(None, (manifest["granular_walkers"], manifest["commit"])))
+        text = "Cases, decks, runs and analyses of wet granular walkers."
+        return self.software(f"#{PROJECT}", PROJECT, version, description=text, softwareRequirements=needed)
+
+    def software(self, identifier: str, name: str, version: str, /, **more: Any) -> Entity:
+        return self.entity(identifier, "SoftwareApplication", name=name, softwareVersion=version, **more)
 
 
 def _moment(iso: str) -> str:
     return iso.removesuffix("Z") + "+00:00"
 
 
-class _Crate:
-    """A crate under construction, with files and people, to which other entities refer."""
+def _columns(table: str, file: File) -> list[dict[str, str]]:
+    """Name, meaning and unit of each column of a table."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
 
-    def __init__(self, authors: Sequence[Author]) -> None:
-        from rocrate.rocrate import ROCrate
-
-        self.crate = ROCrate(version=VERSION)
-        self.crate.metadata.extra_terms["sha256"] = "http://schema.org/sha256"  # not in the context of that version
-        self.files: dict[str, Entity] = {}
-        self.people = []
-        for author in authors:
-            identifier = f"https://orcid.org/{author.orcid}" if author.orcid else f"#{quote(author.name)}"
-            self.people.append(self.entity(identifier, "Person", name=author.name))
-
-    def entity(self, identifier: str, kind: str, /, **properties: Any) -> Entity:
-        """A contextual entity, added once."""
-        from rocrate.model.contextentity import ContextEntity
-
-        made = ContextEntity(self.crate, identifier, properties={"@type": kind, **properties})
-        return self.crate.get(identifier) or self.crate.add(made)
-
-    def describe_root(self, contents: Contents, licence: str) -> None:
-        """Describe the archive: title, licence, authors and the cited paper."""
-        runs = "A run" if contents.record is None else f"The {len(contents.runs)} runs of a sweep"
-        left_out = any("left_out" in run.manifest for run in contents.runs)
-        address, name = LICENCES[licence]
-        profile = {"name": "Process Run Crate", "version": PROFILE.rpartition("/")[2]}
-        root = self.crate.root_dataset
-        root["datePublished"] = _moment(contents.finished)
-        root["name"] = f"{contents.name}: {contents.title}".rstrip(": ")
-        root["description"] = (
-            f"{runs} of wet granular walkers, simulated by the discrete element method with LIGGGHTS through {PROJECT}"
-            ": cases, decks, output of the engine, and the tables and results computed from it."
-            + (" The dumps, from which the tables were computed, are left out." if left_out else "")
-        )
-        root["license"] = self.entity(address, "CreativeWork", name=name, identifier=licence)
-        root["conformsTo"] = self.entity(PROFILE, "CreativeWork", **profile)
-        root["citation"] = self.entity(PAPER, "ScholarlyArticle", **_PAPER_PROPERTIES)
-        if self.people:
-            root["author"] = list(self.people)
-        about = {"name": "Description for readers", "encodingFormat": "text/html", "about": {"@id": "./"}}
-        self.entity(PREVIEW_NAME, "CreativeWork", **about)
-
-    def file(self, item: Item) -> Entity:
-        """A file of the archive, a table with its columns."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        properties: dict[str, Any] = {
-            "name": item.name,
-            "description": item.meaning,
-            "encodingFormat": _MEDIA.get(Path(item.name).suffix, "application/octet-stream"),
-            "contentSize": str(item.size),
-            "sha256": item.sha256,
-        }
-        if item.name.endswith(".parquet"):
-            columns = properties["variableMeasured"] = []
-            table, source = item.name.removesuffix(".parquet"), item.source
-            for field in pq.read_schema(pa.BufferReader(source) if isinstance(source, bytes) else source):
-                metadata = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
-                column = {"name": field.name, "description": metadata.get("meaning", "")}
-                if metadata.get("unit"):
-                    column["unitText"] = metadata["unit"]
-                columns.append(self.entity(f"#{quote(f'{table}.{field.name}')}", "PropertyValue", **column))
-        # Without a source, because rocrate only describes the archive.
-        entity = self.files[item.place] = self.crate.add_file(None, item.place, properties=properties)
-        return entity
-
-    def actions(self, run: PackedRun) -> list[Entity]:
-        """The actions that produced the files of a run."""
-        manifest, name = run.manifest, run.name
-        began, ended, again = manifest["started"], manifest["finished"], manifest.get("tabulated")
-        cases, decks = run.with_role("case"), run.with_role("deck")
-        layouts = [one for one in run.items if one.name == "layout.json"]
-        others = int(manifest.get("shared_deck", {}).get("runs", 1)) - 1
-        company = f", together with {others} other cases" if others else ""
-        return [
-            self.action(
-                f"#{name}-deck",
-                f"Deck of {name}",
-                f"Resolving the case and writing its deck{company}.",
-                self.program(manifest),
-                cases,
-                decks,
-                (None, began),
-            ),
-            self.action(
-                f"#{name}-engine",
-                f"Simulation of {name}",
-                "The engine runs the deck and integrates the motion of the beads.",
-                self.engine(manifest["engine"]),
-                decks,
-                run.with_role("dump", "output"),
-                (began, ended),
-            ),
-            self.action(
-                f"#{name}-tables",
-                f"Tables of {name}",
-                "Analysis of the dumps: tables and result.",
-                self.program(again or manifest),
-                [*cases, *run.with_role("dump"), *layouts],
-                run.with_role("table", "result"),
-                (None, again["date"] if again else ended),
-            ),
-        ]
-
-    def action(
-        self,
-        identifier: str,
-        name: str,
-        description: str,
-        instrument: Entity,
-        read: Sequence[Item],
-        gave: Sequence[Item],
-        times: tuple[str | None, str],
-    ) -> Entity:
-        """An action: input and output files of a program, begin (if known) and end."""
-        began, ended = times
-        properties: dict[str, Any] = {
-            "name": name,
-            "description": description,
-            "instrument": instrument,
-            "object": [self.files[item.place] for item in read],
-            "result": [self.files[item.place] for item in gave],
-            "endTime": _moment(ended),
-            "actionStatus": "http://schema.org/CompletedActionStatus",
-        }
-        if began:
-            properties["startTime"] = _moment(began)
-        if self.people:
-            properties["agent"] = list(self.people)
-        return self.entity(identifier, "CreateAction", **properties)
-
-    def engine(self, engine: Mapping[str, Any]) -> Entity:
-        """LIGGGHTS, by its binary."""
-        text = "Discrete element method. The SHA-256 combines those of the executable and libliggghts."
-        more = {"url": ENGINE_HOME, "sha256": engine["sha256"], "description": text}
-        return self._software(f"{ENGINE_HOME}#{engine['sha256'][:12]}", "LIGGGHTS", engine["version"], **more)
-
-    def program(self, made_by: Mapping[str, Any]) -> Entity:
-        """The program, Python and the packages, as listed in a manifest."""
-        version, commit, python = (made_by[key] for key in ("granular_walkers", "commit", "python"))
-        home, needed = "https://www.python.org/", []
-        for name, one in made_by["packages"].items():
-            page = f"https://pypi.org/project/{name}/{one}/"
-            needed.append(self._software(page, name, one, url=page))
-        needed.append(self._software(f"{home}#{python}", "Python", python, url=home))
-        identity = json.dumps([version, commit, python, made_by["packages"]], sort_keys=True)
-        return self._software(
-            f"#{PROJECT}-{hashlib.sha256(identity.encode()).hexdigest()[:8]}",
-            PROJECT,
-            f"{version}, commit {commit}" if commit else version,
-            description="Cases, decks, runs and analyses of wet granular walkers.",
-            softwareRequirements=needed,
-        )
-
-    def _software(self, identifier: str, name: str, version: str, /, **more: Any) -> Entity:
-        return self.entity(identifier, "SoftwareApplication", name=name, softwareVersion=version, **more)
+    columns = []
+    for field in pq.read_schema(pa.BufferReader(file.source) if isinstance(file.source, bytes) else file.source):
+        metadata = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
+        column = {"name": f"{table}.{field.name}", "description": metadata.get("meaning", "")}
+        columns.append(column | ({"unitText": metadata["unit"]} if metadata.get("unit") else {}))
+    return columns

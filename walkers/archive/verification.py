@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
@@ -48,8 +46,8 @@ class Verification:
 
     def describe(self) -> str:
         """The outcome, and one line for each file that has changed or is not listed."""
-        told = f"{self.name}: {self.intact} {'points have a run' if self.of_points else 'files are unchanged'}"
-        lines = [f"{told}, {self.left_out} left out of the archive" if self.left_out else told]
+        head = f"{self.name}: {self.intact} {'points have a run' if self.of_points else 'files are unchanged'}"
+        lines = [f"{head}, {self.left_out} left out of the archive" if self.left_out else head]
         for kind, names in self.findings.items():  # names in archives may contain escape sequences
             lines += [f"  {kind:<10} {printable(shortened(name, _LONGEST_SHOWN))}" for name in names]
         return "\n".join(lines)
@@ -73,87 +71,81 @@ def verify(path: Path) -> list[Verification]:
         return [_verify_run(path)]
     if path.is_file():
         raise refused(path, "not a folder; unpack an archive, then: walkers check files FOLDER")
-    told = f"expected a run directory (with a {MANIFEST_NAME}), a sweep's ({RECORD_NAME}), or an archive ({SUMS_NAME})"
-    raise refused(path, told)
+    kinds = f"a run directory (with a {MANIFEST_NAME}), a sweep's ({RECORD_NAME}), or an archive ({SUMS_NAME})"
+    raise refused(path, f"expected {kinds}")
 
 
 def _verify_run(directory: Path) -> Verification:
     """Compare a run with its manifest; a run without a readable manifest does not pass."""
     name = directory.resolve().name
     try:
-        contents = read_manifest(directory)
-        listed = {CASE_NAME: "", **contents["sha256"]}  # every run has a case
-        beside, left_out = f"{contents['name']}.toml", set(contents.get("left_out", ()))  # in archives
-        there = _files_below(directory)
-        now = checksums(directory, [one for one in there if one in listed and (directory / one).is_file()])
+        manifest = read_manifest(directory)
+        listed = {CASE_NAME: "", **manifest["sha256"]}  # every run has a case
+        beside, left_out = f"{manifest['name']}.toml", set(manifest.get("left_out", ()))  # in archives
+        return _compared(directory, listed, {MANIFEST_NAME}, lambda path: path == beside, left_out)
     except FileNotFoundError:
         return Verification(name, 0, {"missing": [MANIFEST_NAME]})
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         return Verification(name, 0, {"doubtful": [f"{MANIFEST_NAME} (it, or what it names, cannot be read: {error})"]})
-    there.remove(MANIFEST_NAME)
-    return _compared(name, listed, now, there, lambda one: _made_since(one) or one == beside, left_out)
 
 
 def _verify_sweep(directory: Path) -> list[Verification]:
     record = read_record(directory)
-    found = states(record)
-    lacking = [
+    points = states(record)
+    missing = [
         f"{run} ({state.status}: point {number})"
-        for number, (run, state) in enumerate(zip(record.runs, found, strict=True))
+        for number, (run, state) in enumerate(zip(record.runs, points, strict=True))
         if state.status not in ("finished", "not needed")
     ]
-    runs = [state.directory for state in found if state.directory and state.status == "finished"]
-    there = [name for name in _files_below(directory) if name != RECORD_NAME and not name.startswith(f"{PARSL}/")]
+    runs = [state.directory for state in points if state.directory and state.status == "finished"]
     # Bands are only printed, and the other files are those of an archive: no result depends on them.
     beside = (SPREAD_NAME, f"{record.name}.toml", "table.parquet")
-    files = _compared(record.name, {}, {}, there, lambda name: _made_since(name) or name in beside)
-    points = replace(files, intact=len(runs), findings={**files.findings, "missing": lacking}, of_points=True)
-    return [points, *map(_verify_run, dict.fromkeys(runs))]
+    files = _compared(directory, {}, {RECORD_NAME}, lambda path: path in beside or path.startswith(f"{PARSL}/"))
+    findings = {**files.findings, "missing": missing}
+    whole = replace(files, name=record.name, intact=len(runs), findings=findings, of_points=True)
+    return [whole, *map(_verify_run, dict.fromkeys(runs))]
 
 
 def _verify_archive(path: Path) -> Verification:
-    there = _files_below(path)
-    text = (path / SUMS_NAME).read_bytes().decode("utf-8", "replace")
     listed: dict[str, str] = {}
-    for line in text.removesuffix("\n").split("\n"):
+    for line in (path / SUMS_NAME).read_bytes().decode("utf-8", "replace").removesuffix("\n").split("\n"):
         checksum, _, place = line.partition("  ")
-        if len(checksum) != hashlib.sha256().digest_size * 2 or not place or place in listed:
+        if len(checksum) != 64 or not place or place in listed:
             raise refused(path, f"{SUMS_NAME}: expected a checksum and a path, each path once, found {line[:80]!r}")
         listed[place] = checksum
-    has_run = any(place.count("/") == 2 and place.endswith(f"/{MANIFEST_NAME}") for place in listed)
-    doubtful = [] if has_run else [f"{SUMS_NAME} (it lists no run)"]
-    now = checksums(path, [place for place in there if place in listed and (path / place).is_file()])
     listed.setdefault(METADATA_NAME, "")  # every archive has metadata
-    return _compared(path.name, listed, now, set(there) - {SUMS_NAME}, _made_since, doubtful=doubtful)
+    compared = _compared(path, listed, {SUMS_NAME})
+    if any(place.count("/") == 2 and place.endswith(f"/{MANIFEST_NAME}") for place in listed):
+        return compared
+    return replace(compared, findings={**compared.findings, "doubtful": [f"{SUMS_NAME} (it lists no run)"]})
 
 
 def _compared(
-    name: str,
+    folder: Path,
     listed: Mapping[str, str],
-    now: Mapping[str, str],
-    there: Iterable[str],
-    added: Callable[[str], bool],
+    lists: Collection[str],
+    beside: Callable[[str], bool] = lambda _: False,
     left_out: Collection[str] = (),
-    doubtful: Sequence[str] = (),
 ) -> Verification:
-    """Compare the listed SHA-256 of files with those ``now``; files ``there`` that are not listed may be ``added``."""
-    changed = [one for one, checksum in now.items() if checksum != listed[one]]
-    others = sorted(set(there).difference(listed))
-    since = {one: one.rpartition("/")[0] for one in others if added(one)}
-    count = Counter(since.values())
-    # Files of a subfolder count as one: ``vtk`` has one per frame.
-    made = (
-        f"{folder}/ ({count[folder]} files)" if folder and count[folder] > 1 else one for one, folder in since.items()
-    )
+    """Compare the files of a folder with their listed checksums, by relative path.
+
+    ``lists`` are the files that list them; ``beside`` tells which other files are no failure.
+    """
+    there = [name for name in _files_below(folder) if name not in lists]
+    now = checksums(folder, [name for name in there if name in listed and (folder / name).is_file()])
+    changed = [name for name, checksum in now.items() if checksum != listed[name]]
+    others = [name for name in there if name not in listed]
+    since = [name for name in others if _made_since(name) or beside(name)]
+    folders = {"", *(name.rpartition("/")[0] for name in listed)}
+    made = [(name, name.rpartition("/")[0]) for name in since]
     findings = {
         "changed": changed,
-        "missing": [one for one in listed if one not in now and one not in left_out],
-        "not listed": [one for one in others if one not in since],
-        "doubtful": doubtful,
-        "made since": list(dict.fromkeys(made)),
+        "missing": [name for name in listed if name not in now and name not in left_out],
+        "not listed": [name for name in others if name not in since],
+        "made since": list(dict.fromkeys(name if parent in folders else f"{parent}/" for name, parent in made)),
     }
-    absent = sum(one in listed and one not in now for one in left_out)
-    return Verification(name, len(now) - len(changed), findings, left_out=absent)
+    absent = sum(name in listed and name not in now for name in left_out)
+    return Verification(folder.resolve().name, len(now) - len(changed), findings, left_out=absent)
 
 
 def _made_since(name: str) -> bool:
@@ -166,11 +158,11 @@ def _made_since(name: str) -> bool:
 
 def _files_below(folder: Path) -> list[str]:
     """Relative paths of all files, empty folders (with a slash) and links to folders in a folder."""
-    found = []
+    names = []
     for path in folder.rglob("*"):
         name = path.relative_to(folder).as_posix()
         if path.is_symlink() or not path.is_dir():
-            found.append(name)
+            names.append(name)
         elif not any(path.iterdir()):
-            found.append(f"{name}/")
-    return sorted(found)
+            names.append(f"{name}/")
+    return sorted(names)

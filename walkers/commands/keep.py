@@ -51,7 +51,7 @@ class OfArchives:
     orcid
         archive: ORCID of an author, in the order of --author. Repeatable.
     licence
-        archive: CC-BY-4.0 (default), CC0-1.0, CC-BY-SA-4.0 or BSD-3-Clause.
+        archive: an SPDX identifier; default: CC-BY-4.0.
     """
 
     without_dumps: bool = False
