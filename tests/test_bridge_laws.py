@@ -24,14 +24,14 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.run import limits_of
 from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces, UnusableLawError
-from walkers.physics.capillary import rupture_distance as rupture_of_lian
 from walkers.physics.capillary import (
+    BridgeLiquid,
     share_of_bead,
 )
+from walkers.physics.capillary import rupture_distance as rupture_of_lian
 from walkers.physics.laplace import force_curve, rupture_distance
 from walkers.physics.laws import LAWS, by_name, rabinovich, willett, young_laplace
 from walkers.physics.laws import soulie as soulie_law
-from walkers.physics.liquid import BridgeLiquid
 from walkers.physics.time_step import AUTO_FRACTIONS, WALKER_FRACTIONS
 from walkers.templates.bridge_tables import TOLERANCE, RecordedLaw, tabulated
 

@@ -30,8 +30,8 @@ from walkers.inputs.resolving import GIVEN_BY, resolve, supplied
 from walkers.inputs.run import Run, settling_of
 from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, changed, contradictions, key
 from walkers.inputs.units import Coefficient, Number, kind_in
+from walkers.physics.capillary import DEFAULT_LAW, BridgeLiquid
 from walkers.physics.laws import by_name
-from walkers.physics.liquid import DEFAULT_LAW, BridgeLiquid
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -21,8 +21,8 @@ from walkers.inputs.origins import Source
 from walkers.inputs.run import with_run
 from walkers.inputs.standing import OVERLAP, check_bodies, overlaps
 from walkers.inputs.units import TEMPERATURE, parse_quantity
+from walkers.physics.capillary import DEFAULT_LAW
 from walkers.physics.laws import LAWS
-from walkers.physics.liquid import DEFAULT_LAW
 from walkers.physics.mixtures import MIXTURES
 
 if TYPE_CHECKING:

@@ -29,8 +29,7 @@ from math import inf
 import numpy as np
 import numpy.typing as npt
 
-from walkers.physics.capillary import film_volume, share_of_bead
-from walkers.physics.liquid import BridgeLiquid
+from walkers.physics.capillary import BridgeLiquid, film_volume, share_of_bead
 
 FloatArray = npt.NDArray[np.float64]
 _COLUMNS = ("pull", "normal resistance", "sliding resistance", "coupling", "rolling resistance")

@@ -1,4 +1,4 @@
-"""Capillary bridges independent of the law: volumes, rupture distance, limits.
+"""Capillary bridges independent of the law: their liquid, volumes, rupture distance, limits.
 
 References
 ----------
@@ -8,7 +8,26 @@ G. Lian, C. Thornton, M. J. Adams, J. Colloid Interface Sci. 161 (1993) 138–14
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import cbrt, inf, pi, sqrt
+
+DEFAULT_LAW = "young-laplace"
+
+
+@dataclass(frozen=True, kw_only=True)
+class BridgeLiquid:
+    """Numbers of the liquid of bridges, SI units; ``law`` is the name of their law (`walkers.physics.laws`).
+
+    ``viscosity`` is that of the bridges, ``volume_fraction`` the volume of the liquid on a bead over that of the bead.
+    Bridges take ``conserved`` liquid from the films of their beads.
+    """
+
+    surface_tension: float
+    viscosity: float
+    contact_angle: float
+    volume_fraction: float
+    conserved: bool = False
+    law: str = DEFAULT_LAW
 
 
 def derjaguin_radius(radius_1: float, radius_2: float) -> float:

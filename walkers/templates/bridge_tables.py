@@ -53,6 +53,19 @@ class Table:
         far = middle + (self.curve.rupture - middle) * (1.0 - (1.0 - even) ** 2)
         return np.concatenate([near, far])
 
+    def interpolated(self, gaps: FloatArray) -> FloatArray:
+        """Forces at gaps (m), shape (n, 5), as the engine interpolates them: by a cubic through the rows of a cell."""
+        rupture, middle, powers = self.curve.rupture, self.scale * (2.0**self.octaves - 1.0), np.arange(4)
+        fours = np.lib.stride_tricks.sliding_window_view(self.rows, 4, axis=0)[::3]
+        cubics = fours @ np.linalg.inv((powers[:, None] / 3.0) ** powers).T
+        gaps = np.clip(gaps, 0.0, rupture)
+        mantissa, exponent = np.frexp(1.0 + gaps / self.scale)
+        near = self.cells * ((exponent - 1) + 2.0 * mantissa - 1.0)
+        far = self.cells * (self.octaves + 2.0 * (1.0 - np.sqrt((rupture - gaps) / (rupture - middle))))
+        place = np.where(gaps < middle, near, far)
+        cell = np.minimum(place.astype(int), len(cubics) - 1)
+        return np.asarray(np.einsum("nck,nk->nc", cubics[cell], (place - cell)[:, None] ** powers))
+
     def text(self) -> str:
         """The text of the table in the engine's file; twelve digits, far more accurate than `TOLERANCE`."""
         head = f"range {self.curve.formation!r} {self.curve.rupture!r} {self.scale!r} {self.octaves} {self.cells}"
@@ -85,14 +98,9 @@ def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) 
 
 def _error(table: Table) -> tuple[float, float]:
     """The largest relative error of the engine's interpolation between rows, and its gap (m)."""
-    parts = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])
-    gaps = table.within(parts)
+    gaps = table.within(np.array([1.0 / 6.0, 0.5, 5.0 / 6.0]))
     exact = columns_at(table.curve, gaps)
-    # Lagrange's polynomials through the four rows of a cell, at these parts of it.
-    powers = np.arange(4)
-    shares = parts[:, None] ** powers @ np.linalg.inv((powers[:, None] / 3.0) ** powers)
-    fours = np.lib.stride_tricks.sliding_window_view(table.rows, 4, axis=0)[::3]
-    error = np.abs(np.swapaxes(fours @ shares.T, 1, 2).reshape(exact.shape) - exact)
+    error = np.abs(table.interpolated(gaps) - exact)
     # Errors are relative to forces nearby: forces fall by orders of magnitude, and some end at zero.
     nearer = np.abs(exact[np.searchsorted(gaps, 0.5 * gaps)])
     size = np.maximum(np.maximum(nearer, np.abs(exact)), 1e-3 * np.abs(table.rows[:1]))
@@ -153,17 +161,6 @@ def _recorded(text: str) -> Curve:
     head, *lines = text.partition("\n#")[0].splitlines()
     formation, rupture, scale, octaves, cells = map(float, head.split())
     rows = np.array([[float(word) for word in line.split()] for line in lines])
-    fours = np.lib.stride_tricks.sliding_window_view(rows[:, 1:], 4, axis=0)[::3]
-    cubics = fours @ np.linalg.inv((np.arange(4)[:, None] / 3.0) ** np.arange(4)).T
-    middle = scale * (2.0**octaves - 1.0)
-
-    def forces(gaps: FloatArray) -> Forces:
-        gaps = np.clip(gaps, 0.0, rupture)
-        mantissa, exponent = np.frexp(1.0 + gaps / scale)
-        near = cells * ((exponent - 1) + 2.0 * mantissa - 1.0)
-        far = cells * (octaves + 2.0 * (1.0 - np.sqrt((rupture - gaps) / (rupture - middle))))
-        place = np.where(gaps < middle, near, far)
-        cell = np.minimum(place.astype(int), len(cubics) - 1)
-        return Forces(*np.einsum("nck,nk->cn", cubics[cell], (place - cell)[:, None] ** np.arange(4)))
-
-    return Curve(forces, rupture, formation, scale)
+    curve = Curve(lambda gaps: Forces(*table.interpolated(gaps).T), rupture, formation, scale)
+    table = Table(curve, scale, int(octaves), int(cells), rows[:, 1:])
+    return curve

@@ -17,7 +17,7 @@ from walkers.inputs.case import Case, Contact
 from walkers.inputs.drive import Vector
 from walkers.inputs.loads import hop_height, reach
 from walkers.inputs.standing import standing
-from walkers.physics.liquid import BridgeLiquid
+from walkers.physics.capillary import BridgeLiquid
 from walkers.templates.layout import PlacedWalker
 
 Surface = tuple[Contact, BridgeLiquid]
