@@ -97,7 +97,9 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     sides = sides_apart(done.result)
     up, down = (rounded(1e3 * speed, "mm/s") for speed in uphill_velocities(done.result).values())
     assert list(sides) == ["up", "down"]
-    assert " mm/s, facing up\n" in describe(predict(case), done.result)
+    (engine,) = (line for line in describe(predict(case), done.result).splitlines() if line.startswith("engine"))
+    assert engine.split()[:3] == ["engine,", "facing", "up"]
+    assert float(engine.split()[3]) == pytest.approx(1e3 * sides["up"], abs=1e-3)
     assert f"facing up {up}, facing down {down} mm/s, positive up the slope" in told
     assert f"started up {up}, started down {down} mm/s" in as_text(inventory(tmp_path))
     # The band of a spread is that of one side, or is left out.
@@ -151,7 +153,7 @@ def test_theory_says_where_the_paper_measured_nothing(changes: dict[str, str], t
 def test_theory_says_nothing_of_the_papers_fit_to_other_beads() -> None:
     case = make_case(liquid={"name": "ethylene glycol"})
     told = describe(predict(case), None)
-    assert re.search(r"paper's fit, κ = 0.033 s/mm\s+none: the fit is to ruby on level", told)
+    assert re.search(r"paper's fit, κ = 0.033 s/mm\s+-\s+the fit is to ruby on level", told)
 
 
 FOUR_BEADS = {

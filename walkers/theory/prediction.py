@@ -178,74 +178,72 @@ def alignment_of(case: Case) -> dict[str, Any]:
 
 
 def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
-    """A prediction as text, with the result of the engine if it exists; velocities in mm/s."""
-    paper, end, mathieu = prediction["paper"], prediction["detachment"], prediction["alignment"]
-    lines = [
-        f"Γ0 = {prediction['gamma0']:.3g}, sin δ = {prediction['sin_delta']:.3g}",
-        *([f"  {outside}"] if (outside := prediction.get("outside")) else []),
-        f"  paper's fit, κ = {paper['friction'] * 1e-3:g} s/mm        {_speed(paper)}",
-        f"  Coulomb friction               {_speed(prediction['coulomb'])}{_details(prediction['coulomb'])}",
-        f"  Coulomb friction and drag      {_speed(prediction['viscous'])}{_details(prediction['viscous'])}",
+    """A prediction as a table, with the result of the engine if it exists."""
+    end = prediction["detachment"]
+    models = {
+        f"paper's fit, κ = {prediction['paper']['friction'] * 1e-3:g} s/mm": prediction["paper"],
+        "Coulomb friction": prediction["coulomb"],
+        "Coulomb friction and drag": prediction["viscous"],
+        **(_of_engine(result) if result else {"engine": {"velocity": None, "reason": "run it: walkers run CASE"}}),
+    }
+    head = ["mm/s", "velocity", "rotation 1", "rotation 2", "sliding 1", "Γc", ""]
+    rows = [head, *([name, *_cells(model)] for name, model in models.items())]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    aligned = [
+        "  ".join([f"{row[0]:{widths[0]}}", *map(str.rjust, row[1:-1], widths[1:]), row[-1]]).rstrip() for row in rows
     ]
-    if result is not None:
-        rotation, sliding = result["rotation"], result["sliding"]
-        # On a slope, the theory is that of walkers that face uphill.
-        side = "right_facing" if result["goes_uphill"] and result["right_facing"]["n"] else "velocity"
-        found = {
-            "velocity": result[side]["mean"],
-            "rotation": [rotation["bead_1"], rotation["bead_2"]],
-            "sliding": list(sliding.values()),
-        }
-        # The result has rotation and sliding of all walkers together.
-        mixed = side == "right_facing" and result["left_facing"]["n"] > 0
-        lines.append(f"  engine                         {_speed(found)}{', facing up' if mixed else _details(found)}")
-    else:
-        lines.append("  engine                         no run yet; do: walkers run CASE")
-    lines += [
-        f"  detachment  {end['contact']} opens first, at Γ = {end['gamma']:.3g} of a steady pull "
+    notes = {
+        "detachment": f"{end['contact']} opens first, at Γ = {end['gamma']:.3g} of a steady pull "
         "(the peak of an oscillating one may exceed it)",
-        *describe_alignment(mathieu),
-    ]
-    return "\n".join(lines)
+        **describe_alignment(prediction["alignment"]),
+    }
+    outside = prediction.get("outside")
+    return "\n".join(
+        [
+            f"Γ0 = {prediction['gamma0']:.3g}, sin δ = {prediction['sin_delta']:.3g}",
+            *([outside] if outside else []),
+            *aligned,
+            *(f"{name:12}{text}" for name, text in notes.items()),
+        ]
+    )
 
 
-def describe_alignment(found: dict[str, Any]) -> list[str]:
-    """`alignment_of` as lines of text; with a second line if a force acts along the axis."""
-    stays = "small angles stay small if the beads roll" if found["stable"] else "small angles grow if the beads roll"
-    if found["v"] == found["u"] == 0.0:
-        stays = "no torque toward the axis"
-    level = f"Mathieu V = {found['v']:.3g}, stable up to {found['largest_stable_v']:.3g}: {stays}"
-    if found["u"] == 0.0:
-        return [f"  alignment   {level}"]
-    steep = f"Mathieu U = {found['u']:.3g}, V = {found['v']:.3g}, β = {found['damping']:.3g}: {stays}"
-    rate = found["rate"]
-    if rate is None:
-        text = "not known: the axial motion is not periodic"
-    elif not found["stands"]:
-        after = f"turns over after about {found['turns_over_after']:.2g} s"
-        text = f"{after} (from 1° to 90°; small angles grow by {rate:.3g}/s)"
-    elif rate < -GROWS:
-        text = f"stands: small angles decay by {-rate:.3g}/s"
-    else:
-        text = "stands: small angles stay small"
-    return [f"  alignment   {steep}", f"  with slip   {text}"]
+def _of_engine(result: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """The result of a run as a model; on a slope of the walkers that face uphill, whom the theory describes."""
+    uphill = result["goes_uphill"] and result["right_facing"]["n"]
+    model = {
+        "velocity": result["right_facing" if uphill else "velocity"]["mean"],
+        "rotation": [result["rotation"]["bead_1"], result["rotation"]["bead_2"]],
+        "sliding": [*result["sliding"].values()],
+    }
+    if uphill and result["left_facing"]["n"]:  # the result has rotation and sliding of all walkers together
+        return {"engine, facing up": {"velocity": model["velocity"]}}
+    return {"engine": model}
 
 
-def _speed(model: dict[str, Any]) -> str:
+def _cells(model: dict[str, Any]) -> list[str]:
+    """Cells of the row of a model, and the reason why it has no velocity."""
     if model["velocity"] is None:
-        return f"    none: {model['reason']}"
-    return f"{with_decimals(model['velocity'] * 1e3, 3):>8} mm/s"
-
-
-def _details(model: dict[str, Any]) -> str:
-    text = ""
-    if model["velocity"] is not None:
-        rotation = ", ".join(with_decimals(value * 1e3, 2) for value in model["rotation"])
-        text = (
-            f"; bead rotation {rotation}, sliding of the large bead {with_decimals(model['sliding'][0] * 1e3, 2)} mm/s"
-        )
+        speeds = ["-", "", "", ""]
+    else:
+        numbers = [*model.get("rotation", []), *model.get("sliding", [])[:1]]
+        speeds = [with_decimals(model["velocity"] * 1e3, 3), *(with_decimals(speed * 1e3, 2) for speed in numbers)]
     gamma = model.get("threshold")
-    return text + (f"; threshold Γc = {gamma:.3f}" if gamma is not None else "")
+    return [*speeds, *[""] * (4 - len(speeds)), "" if gamma is None else f"{gamma:.3f}", model.get("reason") or ""]
+
+
+def describe_alignment(found: dict[str, Any]) -> dict[str, str]:
+    """`alignment_of` as texts by name; with a second text if a force acts along the axis."""
+    equation = ", ".join(f"{name} = {found[key]:.3g}" for name, key in (("U", "u"), ("V", "v"), ("β", "damping")))
+    rolling = f"small angles {'stay small' if found['stable'] else 'grow'} if the beads roll"
+    if found["u"] == 0.0:
+        torque = rolling if found["v"] else "no torque toward the axis"
+        return {"alignment": f"Mathieu {equation}, stable up to V = {found['largest_stable_v']:.3g}: {torque}"}
+    slip = "unknown: the axial motion is not periodic"
+    if found["rate"] is not None:
+        falls = f"turns over after about {found['turns_over_after'] or 0.0:.2g} s (from 1° to 90°)"
+        slip = f"{'stands' if found['stands'] else falls}; small angles grow by {found['rate']:.3g}/s"
+    return {"alignment": f"Mathieu {equation}: {rolling}", "with slip": slip}
 
 
 def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, FloatArray], dict[str, int]]:
