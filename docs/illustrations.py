@@ -37,9 +37,9 @@ from walkers.inputs.case import Case
 from walkers.inputs.keys import flatten
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.make import COMPARED, FIGURES, make_figures
-from walkers.postprocess.analysis import analyses
 from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, save_figure, styled
 from walkers.postprocess.film_options import FilmOptions
+from walkers.postprocess.results import VERSION
 from walkers.runner.files import read_json, write_json, write_text
 from walkers.runner.launch import cores_here
 from walkers.sweeps import climbing
@@ -229,17 +229,13 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
 }
 
 
-_SHOWN = ("walking", "meetings", "pile")  # analyses of what they show
-
-
 def digest(cases: Iterable[Case]) -> str:
-    """Twelve hex digits over cases, deck version and versions of analyses; the engine binary does not count."""
+    """Twelve hex digits over cases, deck version and version of the results; the engine binary does not count."""
     cases = list(cases)
-    shown = [one for one in analyses() if one.name in _SHOWN and any(map(one.applies, cases))]
     contents = {
         "cases": [case.determinants() for case in cases],
         "decks": CONTENT_VERSION,
-        "analyses": {one.name: one.version for one in shown},
+        "results": VERSION,
     }
     return hashlib.sha256(json.dumps(contents, sort_keys=True).encode()).hexdigest()[:12]
 

@@ -15,7 +15,7 @@ from walkers.inputs import units
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
 from walkers.inputs.units import parse_quantity
-from walkers.postprocess.analysis import read_result
+from walkers.postprocess.results import read
 from walkers.templates.deck import render_deck
 
 GLASS = {"material": "glass"}
@@ -385,7 +385,7 @@ def test_bridges_may_push_loose_beads_but_hold_walkers(run_directory: Callable[.
     assert pile.liquid.contact_angle == pytest.approx(1.5707963)
     assert render_deck(pile).fastest > render_deck(load_case("pile-ci", {"liquid.contact_angle": "84 deg"})).fastest
     run = run_directory(liquid={"contact_angle": "82.5 deg"}, run=SHORT)
-    assert abs(read_result(run)["velocity"]["mean"]) > 0.0
+    assert abs(read(run)["velocity"]) > 0.0
 
 
 def test_a_liquid_may_have_no_viscosity() -> None:

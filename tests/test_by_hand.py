@@ -47,7 +47,7 @@ def test_a_deck_run_by_hand_is_read_and_says_so(folder: Path, run_directory: Cal
         run_case(folder)
     _run(folder)
     found, same = run_case(folder), run_case(run_directory(run=SHORT))
-    assert found.result["by_hand"] == ["run by hand"]
+    assert found.result.about["by_hand"] == ["run by hand"]
     assert {**found.result, "by_hand": 0} == {**same.result, "by_hand": 0}
     assert "warning: run by hand" in found.describe()
     assert "(already run)" not in found.describe()
@@ -69,7 +69,7 @@ def test_the_law_of_a_deck_is_not_executed_when_it_is_read(tmp_path: Path) -> No
     for file in (law, tmp_path / "hand" / "law.py"):
         file.write_text(f"open({str(tmp_path / 'executed')!r}, 'w')\n{file.read_text()}")
     found = run_case(tmp_path / "hand")
-    assert found.result["by_hand"] == ["run by hand"]
+    assert found.result.about["by_hand"] == ["run by hand"]
     assert not (tmp_path / "executed").exists()
 
 
@@ -95,9 +95,9 @@ def test_an_edited_parameter_is_another_case(name: str, folder: Path, run_direct
     _run(folder)
     found, same = run_case(folder), run_case(run_directory(make_case(run=SHORT).changed(changes)))
     # Where the walker stands at first and its time step are those of the case as it was.
-    assert found.result["velocity"]["mean"] == pytest.approx(same.result["velocity"]["mean"], rel=5e-3)
+    assert found.result["velocity"] == pytest.approx(same.result["velocity"], rel=5e-3)
     assert found.case.run.period == pytest.approx(same.case.run.period)
-    told, *constant = found.result["by_hand"][1:]
+    told, *constant = found.result.about["by_hand"][1:]
     assert told.startswith("the deck was edited: ")
     assert len(constant) == (name != "tension")  # the others need more cycles
     assert all("are not constant within 0.2 %" in one for one in constant)
@@ -248,18 +248,18 @@ def test_an_edited_deck_of_any_case_is_changes_of_its_tables(name: str, tmp_path
 
 def test_a_deck_that_is_edited_and_run_again_is_read_again(folder: Path) -> None:
     _run(folder)
-    first = run_case(folder).result["velocity"]["mean"]
+    first = run_case(folder).result["velocity"]
     _edit(folder, peak_acceleration="20.0")
     deck = folder / "walker.lig"
     deck.write_text(deck.read_text().replace("nve/sphere", "nve/sphere  # as ever").replace("delay 0", "delay 1"))
     _run(folder)
     again = run_case(folder)
-    assert again.result["velocity"]["mean"] < first
-    assert "peak_acceleration 20, was 39.2; 1 other line(s)" in again.result["by_hand"][1]
+    assert again.result["velocity"] < first
+    assert "peak_acceleration 20, was 39.2; 1 other line(s)" in again.result.about["by_hand"][1]
     assert "is newer than" not in again.describe()
     assert " finished: edited and run by hand " in call("list", "--out", str(folder.parent)).stdout
     _edit(folder, restitution="0.5")
-    assert "walker.lig is newer than" in run_case(folder).result["by_hand"][-1]
+    assert "walker.lig is newer than" in run_case(folder).result.about["by_hand"][-1]
     with pytest.raises(InputError, match=r"no finished run in .*--set 'drive.frequency=70 Hz'"):
         walkers.load(folder, changes={"drive.frequency": "70 Hz"})
 
@@ -365,7 +365,7 @@ def test_a_deck_has_the_cycles_of_the_run_that_exists(tmp_path: Path) -> None:
         _run(folder)
     found, same = run_case(first), run_case(again)
     assert found.result["cycles"] == 12
-    assert "not constant within 0.2 % after 12 cycles; walkers run continues to 14" in found.result["by_hand"][-1]
+    assert "not constant within 0.2 % after 12 cycles; walkers run continues to 14" in found.result.about["by_hand"][-1]
     assert {**same.result, "by_hand": 0} == {**made.result, "by_hand": 0}
     compared = call("compare", str(made.directory), str(first)).stdout
     assert compared.startswith("the cases are the same, but ran 14 and 12 cycles\n")

@@ -24,14 +24,15 @@ from walkers.inputs.loads import bridge_at_rest, contact_loads
 from walkers.inputs.table import changed
 from walkers.inputs.units import Kind, quantity_text
 from walkers.postprocess.analyses.piles import _bed, _joined
-from walkers.postprocess.analyses.walking import _rows, spread
 from walkers.postprocess.cycles import work_of
 from walkers.postprocess.films import speed_text
 from walkers.postprocess.gait import gait, settled_samples, turned_over_at
 from walkers.postprocess.motion import Bridges, Group, Motion
 from walkers.postprocess.report.player import _points
 from walkers.postprocess.scene import Scene, turns_of
-from walkers.postprocess.uncertainty import band_of
+from walkers.postprocess.uncertainty import SPREAD_NAME, bands_of, spread_of
+from walkers.postprocess.walking import _rows, _scatter
+from walkers.runner.files import write_json
 from walkers.runner.launch import Progress
 from walkers.runner.manifest import _iso
 from walkers.show import describe, summarise
@@ -260,7 +261,7 @@ def test_a_result_rests_on_the_values_of_the_case_that_is_asked_for(
     run_directory(plain)
     found = []
     for case in (plain, said):
-        rests = walkers.load(case, runs_folder).result["rests_on"]
+        rests = walkers.load(case, runs_folder).result.about["rests_on"]
         found += [one["origin"] for one in rests if one["key"] == "contact.rolling_friction"]
     assert found == [next(one.origin for one in plain.origins if one.key == "contact.rolling_friction"), "given"]
     assert found[0] != "given"
@@ -270,10 +271,8 @@ def test_a_result_rests_on_the_values_of_the_case_that_is_asked_for(
 
 
 def test_scatter_is_the_deviation_of_a_sample() -> None:
-    found = spread(np.array([1.0, 2.0, 4.0]))
-    assert (found["mean"], found["scatter"]) == pytest.approx((7.0 / 3.0, sqrt(7.0 / 3.0)))
-    assert (found["n"], found["smallest"], found["largest"]) == (3, 1.0, 4.0)
-    assert spread(np.array([1.0]))["scatter"] is None
+    assert _scatter(np.array([1.0, 2.0, 4.0])) == pytest.approx(sqrt(7.0 / 3.0))
+    assert np.isnan(_scatter(np.array([1.0])))
 
 
 def test_a_walker_is_separated_where_any_of_its_pairs_is() -> None:
@@ -322,9 +321,14 @@ def test_the_work_of_two_harmonics_with_phases() -> None:
 @pytest.mark.parametrize(
     ("own", "ends"), [(1.5, (1.0, 2.0)), (2.5, (1.0, 2.5)), (0.5, (0.5, 2.0)), (None, (1.0, 2.0)), (inf, (1.0, 2.0))]
 )
-def test_a_band_holds_the_result(own: float | None, ends: tuple[float, float]) -> None:
-    assert band_of({"bands": {"velocity": {"low": 1.0, "high": 2.0}}}, "velocity", own) == ends
-    assert band_of({"bands": {}}, "velocity", own) is None
+def test_a_band_holds_the_result(own: float | None, ends: tuple[float, float], tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    assert bands_of(run, [], {"velocity": own}) == {}
+    spread_of(run).mkdir()
+    write_json(spread_of(run) / SPREAD_NAME, {"varied": [], "bands": {"velocity": {"low": 1.0, "high": 2.0}}})
+    low, high = ends
+    assert bands_of(run, [], {"velocity": own}) == {"velocity_low": low, "velocity_high": high}
+    assert bands_of(run, [{"key": "liquid.volume_fraction", "range": [0.0, 1.0]}], {"velocity": own}) == {}
 
 
 # --- piles ------------------------------------------------------------------------------------------------------------

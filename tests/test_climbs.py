@@ -37,7 +37,7 @@ def pile(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
         Path(str(number)): {"beads": BEADS, "large": LARGE, "driven": LENGTH, "climbs": climbs}
         for number, climbs in enumerate(RUNS)
     }
-    monkeypatch.setattr("walkers.sweeps.climbing.result_in", results.__getitem__)
+    monkeypatch.setattr("walkers.sweeps.climbing._result_of", results.__getitem__)
     return list(results)
 
 

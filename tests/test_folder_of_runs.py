@@ -336,4 +336,4 @@ def test_a_sweep_of_another_format_is_refused(out: Path) -> None:
     write_json(out / "rough" / "sweep.json", {**record, "format": 99})
     done = call("list", "rough")
     assert (done.returncode, "Traceback" in done.stderr) == (2, False)
-    assert "format 99, expected 2" in done.stderr
+    assert "format 99, expected 3" in done.stderr

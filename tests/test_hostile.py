@@ -22,10 +22,10 @@ from walkers.errors import InputError
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
 from walkers.inputs.sweep import load_sweep
-from walkers.postprocess.analysis import current_result
 from walkers.postprocess.drawing import new_figure, plain_text, save_figure
 from walkers.postprocess.paraview import write_vtk
 from walkers.postprocess.report.run import result_html
+from walkers.postprocess.results import read
 from walkers.runner.directory import CASE_NAME, case_of
 from walkers.runner.files import write_json
 from walkers.runner.manifest import recomputed
@@ -125,7 +125,7 @@ def test_a_title_is_in_no_file_for_paraview(name: str, stranger: Callable[[str],
 
 @EACH
 def test_a_result_in_a_notebook_has_the_tags_of_any_other(name: str, stranger: Callable[[str], Path]) -> None:
-    pages = [result_html(place, current_result(place)) for place in map(stranger, ("plain", HOSTILE[name]))]
+    pages = [result_html(read(place)) for place in map(stranger, ("plain", HOSTILE[name]))]
     assert _tags(pages[1]) == _tags(pages[0])
 
 
@@ -265,9 +265,9 @@ def test_files_without_a_name_are_refused(case_file: Path, in_folder: Path) -> N
     before = sorted(in_folder.rglob("*"))
     for name in ("...toml", "..toml"):
         (in_folder / name).write_text('case = "base.toml"\n')
-        for read in (load_sweep, load_case):
+        for reader in (load_sweep, load_case):
             with pytest.raises(InputError, match=r"expected a name before \.toml"):
-                read(name)
+                reader(name)
         assert call("sweep", name).returncode == 2
         (in_folder / name).unlink()
     assert sorted(in_folder.rglob("*")) == before

@@ -21,7 +21,8 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.sweep import load_sweep
 from walkers.inputs.table import changed
 from walkers.postprocess.gait import SEPARATED
-from walkers.postprocess.uncertainty import SPREAD_NAME, band_of, band_text, lines_of_rest, rests_on
+from walkers.postprocess.numbers import band_text
+from walkers.postprocess.uncertainty import lines_of_rest, rests_on
 from walkers.runner.files import read_json
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.spread import describe, run_spread, spread_sweep
@@ -305,7 +306,7 @@ def test_a_result_says_what_it_rests_on(run_directory: Callable[..., Path], tmp_
     """The reference's case gives all of it: nobody measured them, so they are told all the same."""
     case = make_case(run={"cycles": 2, "settling_cycles": 0})
     done = walkers.load(run_directory(case))
-    told = {one["key"]: one for one in done.result["rests_on"]}
+    told = {one["key"]: one for one in done.result.about["rests_on"]}
     assert told["contact.friction.bead_wall"]["origin"] == "given"
     assert told.keys() == library.unmeasured().keys()
     assert "  given      " in done.describe()
@@ -335,15 +336,11 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     assert (speeds > 2e-5).sum() == spread.counts["forward"]
     # The headline has the band from now on, which holds it; before it was said what is not known.
     done = walkers.run(case, runs_folder)
-    low, high = band_of({"bands": read_json(spread.directory / SPREAD_NAME)["bands"]}, "velocity", None) or (0.0, 0.0)
-    assert (low, high) == (band.low, band.high)
-    own = done.result["velocity"]["mean"]
-    assert f"({band_text((min(low, own), max(high, own)), 'm/s')}, 5 to 95 % of {band.points} draws" in done.describe()
-    assert "uncertain parameters:" not in done.describe()
+    own, ends = done.result["velocity"], (done.result["velocity_low"], done.result["velocity_high"])
+    assert ends == (min(band.low, own), max(band.high, own))
+    assert f"band {band_text(*ends, 'm/s')}" in done.describe()
     unspread = walkers.run(Case.read({**GLASS, "run": {"cycles": 5}}, name="guessed"), runs_folder)
-    assert "uncertain parameters: volume fraction, viscosity ratio, contact angle, friction, restitution" in " ".join(
-        unspread.describe().split()
-    )
+    assert "velocity_low" not in unspread.result
     with pytest.raises(InputError, match=r"uncertain.contact.restitution.*: expected a range that holds"):
         spread_sweep(Case.read({**GLASS, "uncertain": {"contact.restitution": [0.4, 0.8]}}, name="beside"))
     # A case of which all is given has none.
@@ -371,8 +368,8 @@ def test_a_band_is_shown_for_its_ranges_alone(tmp_path: Path) -> None:
     run_spread(case(0.05, 0.6), tmp_path, Options(2), points=2)
     for ranges, shown in (((0.05, 0.6), True), ((0.1, 0.3), False)):
         done = walkers.run(case(*ranges), tmp_path)
-        assert ("5 to 95 %" in done.describe()) == shown
-        assert ("5 to 95 %" in done.report(tmp_path / "page.html").read_text()) == shown
+        assert ("velocity_low" in done.result) == shown
+        assert (", band " in done.describe() or "  band " in done.describe()) == shown
 
 
 def test_an_end_of_a_range_may_be_the_value_of_the_case() -> None:

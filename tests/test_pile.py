@@ -30,10 +30,10 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.sweep import expand
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.analyses.piles import Pile
-from walkers.postprocess.analysis import current_result, tables_of, tabulate
 from walkers.postprocess.figures import figures_of
 from walkers.postprocess.motion import FLOOR, read_bridges, read_motion
 from walkers.postprocess.quantities import TABLES
+from walkers.postprocess.results import measure, read
 from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place, segment_directories
@@ -193,18 +193,20 @@ def test_tables_of_a_pile(run: Path) -> None:
 
 def test_contacts_and_bridges_are_counted_at_rest_and_while_shaken(run: Path) -> None:
     """Bridges to walls and the floor count for none."""
-    motion, bed, found = read_motion(run), read_table(run, "bed"), current_result(run)["coordination"]
+    motion, bed, found = read_motion(run), read_table(run, "bed"), read(run)
     rest = bed[bed["time"] <= 0.0].iloc[-1]
-    assert found["rest"] == pytest.approx({"contacts": rest["contacts"], "bridges": rest["bridges"]})
+    assert found["contacts_at_rest"] == pytest.approx(rest["contacts"])
     bridges = list(read_bridges(motion))[rest.name]
     ends = [bead for pair in bridges.beads.tolist() for bead in pair]
-    assert found["rest"]["bridges"] == pytest.approx(len(ends) / len(motion.radius))
+    assert found["bridges_at_rest"] == pytest.approx(rest["bridges"]) == pytest.approx(len(ends) / len(motion.radius))
     late = bed[bed["time"] >= bed["time"][bed["time"] >= 0.0].mean()]
-    assert found["shaken"] == pytest.approx({"contacts": late["contacts"].mean(), "bridges": late["bridges"].mean()})
+    shaken = [found["contacts_shaken"], found["bridges_shaken"]]
+    assert shaken == pytest.approx([late["contacts"].mean(), late["bridges"].mean()])
     # A sweep's onset is that by which a cluster first counted, not where its greatest gain began.
     told = as_results(np.array([0.5]), np.array([8.0]), 1.0)[Path("0")]["climbs"][0]
     climbs = [{**told, "begin": 3.0, "height": 5e-3}]
-    assert Pile().row({**current_result(run), "climbs": climbs})["onset"] == 0.5
+    empty = {"surface": {"end": 0.0}, "brazil_nut": {"end": 0.0}, "clusters": 1, "settling": 0.0}
+    assert Pile().row({**empty, "climbs": climbs})["onset"] == 0.5
 
 
 def test_an_interrupted_pile_goes_on_bit_for_bit(killed: Killed, tmp_path: Path) -> None:
@@ -286,8 +288,8 @@ def test_damaged_piles_are_told_in_a_line(run: Path, tmp_path: Path) -> None:
 def test_looking_before_the_end_leaves_nothing_stale(killed: Killed, tmp_path: Path) -> None:
     begun = killed.copied(tmp_path / "out")
     (begun.unfinished / "failure.json").write_text("{}")
-    assert tabulate(begun.unfinished)["driven"] == 0.0
-    assert (tables_of(begun.unfinished)["bed"]["time"] <= 0.0).all()
+    assert measure(begun.unfinished)["driven"] == 0.0
+    assert (read_table(begun.unfinished, "bed")["time"] <= 0.0).all()
     finished = walkers.run(brief(), begun.out, engine=begun.engine)
     assert finished.result["driven"] > 0.04
     assert not (finished.directory / "failure.json").exists()
@@ -377,7 +379,7 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
         return call(*command, check=True).stdout.strip()
 
     motion = read_motion(run)
-    assert "between beads, at rest" in told("run", str(run))
+    assert "bridges per bead, at rest" in told("run", str(run))
     assert told("plot", str(run), "--to", "here") == "here/climb.png"
     assert spoilt(figures_of(run)["climb"]) == []
     assert told("render", str(run), "--to", "here/box.png", "--images", "2") == "here/box.png"
@@ -465,7 +467,7 @@ def as_results(first: FloatArray, driven: FloatArray, takes: float) -> dict[Path
 
 
 def summed_up(monkeypatch: pytest.MonkeyPatch, results: dict[Path, dict[str, Any]], **options: Any) -> dict[str, Any]:
-    monkeypatch.setattr("walkers.sweeps.climbing.result_in", results.__getitem__)
+    monkeypatch.setattr("walkers.sweeps.climbing._result_of", results.__getitem__)
     return summarise_climbs(list(results), **options)
 
 
@@ -585,9 +587,11 @@ def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(tm
     ]
     tables["run"]["duration"] = "0.5 s"
     finished = walkers.run(Case.read(tables, name="cluster"), tmp_path)
-    (climb,) = finished.result["climbs"]
+    assert finished.result["climbs"] == 1
+    clusters = finished.table("clusters")
+    (climb,) = clusters[clusters["climbed"]].to_dict("records")
     assert climb["speed"] * 1e3 == pytest.approx(4.79, rel=0.03)
-    assert (climb["size"], climb["large"], climb["leader_large"], climb["walls"]) == (2, 1, True, ["+x"])
+    assert (climb["size"], climb["large"], climb["leader_large"], climb["wall_names"]) == (2, 1, True, "+x")
     assert climb["begin"] == pytest.approx(0.0, abs=0.05)
     assert finished.motion.position[-1, 2:, 2].max() < 7e-3
 

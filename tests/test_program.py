@@ -21,7 +21,7 @@ from walkers.commands import GROUPS
 from walkers.inputs.reading import shipped
 from walkers.main import program
 from walkers.physics.time_step import WALKER_FRACTIONS
-from walkers.postprocess.analysis import read_result
+from walkers.postprocess.results import read
 from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import is_finished, run_place
@@ -44,7 +44,7 @@ def test_two_beads_walk_toward_the_large_one(run_directory: Callable[..., Path])
     directory = run_directory(run=SHORT)
     assert is_finished(directory)
     assert read_manifest(directory)["engine"]["version"] == "LIGGGHTS-PUBLIC 3.8.0"
-    assert 1e-3 < read_result(directory)["velocity"]["mean"] < 1e-2
+    assert 1e-3 < read(directory)["velocity"] < 1e-2
     assert len(read_table(directory, "trajectory")) == 61
 
 

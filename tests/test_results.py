@@ -1,30 +1,32 @@
 """Velocities, rotation, orientation and the aggregates over replicates."""
 
+import json
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
-from errno import EROFS
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+import walkers
+from walkers.errors import InputError
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.toml import read_toml
-from walkers.postprocess.analyses.walking import Walking, walkers_met
-from walkers.postprocess.analyses.work import Working
-from walkers.postprocess.analysis import RESULT_NAME, current_result, describe_result, read_result
 from walkers.postprocess.figures import figures_of
 from walkers.postprocess.gait import Averages, averages, fit_slopes, gait, gaps, settled_samples, steady_walkers, walk
 from walkers.postprocess.motion import Group, read_motion
+from walkers.postprocess.numbers import declared as declared_number
+from walkers.postprocess.numbers import rows
 from walkers.postprocess.quantities import TABLES, declared
+from walkers.postprocess.results import read
 from walkers.postprocess.sides import sides
 from walkers.postprocess.tables import read_table, write_table
-from walkers.runner.directory import SEGMENTS
-from walkers.runner.files import write_json
-from walkers.runner.manifest import recomputed
+from walkers.postprocess.walking import measure, walkers_met
+from walkers.runner.files import read_json, write_json
+from walkers.runner.manifest import RESULT_NAME
 
 
 @pytest.fixture(scope="module")
@@ -51,54 +53,52 @@ def test_slopes_are_those_of_least_squares() -> None:
     assert fit_slopes(np.array([0.0, 2.0]), np.array([[1.0], [5.0]])) == 2.0
 
 
-def test_a_result_of_before_is_made_anew_if_it_can_be(
-    directory: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """One of an earlier method, and one of before methods had versions, lack what is told of walkers today."""
-    copy = tmp_path / directory.name
-    shutil.copytree(directory, copy)
-    known = read_result(copy)
-    assert known["analyses"] == {"walking": Walking.version, "work": Working.version}
-    lacking = {key: value for key, value in known.items() if key not in ("separated_fraction", "analyses")}
-    for old in ({**lacking, "analyses": {"walking": Walking.version - 1}}, lacking):
-        with recomputed(copy, [RESULT_NAME]):
-            write_json(copy / RESULT_NAME, old)
-        assert current_result(copy) == known
-        assert read_result(copy) == known
-    with recomputed(copy, [RESULT_NAME]):
-        write_json(copy / RESULT_NAME, {**known, "analyses": {"walking": Walking.version - 1}})
-
-    def refuse(*_: object) -> None:
-        raise OSError(EROFS, "Read-only file system")
-
-    with monkeypatch.context() as patch:  # what cannot be written is told all the same
-        patch.setattr("walkers.postprocess.analysis.recomputed", refuse)
-        assert current_result(copy) == known
-    shutil.rmtree(copy / SEGMENTS)  # as in an archive without dumps
-    assert current_result(copy) == {**known, "analyses": {"walking": Walking.version - 1}}
-
-
-def test_an_error_in_a_text_is_no_reason_to_measure_again(
-    directory: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_result_is_measured_again_by_walkers_run_alone(directory: Path, tmp_path: Path) -> None:
+    """One that was edited, that another version measured, and one whose table is damaged; the engine does not run."""
     copy = Path(shutil.copytree(directory, tmp_path / directory.name))
-    known, tables = current_result(copy), {path: path.stat().st_mtime_ns for path in copy.glob("*.parquet")}
+    right, manifest = read(copy).as_dict(), read_json(copy / "manifest.json")
+    contents = read_json(copy / RESULT_NAME)
+    edited = {**contents, "numbers": {**contents["numbers"], "velocity": 99.0}}
+    for wrong in ({**contents, "version": 0}, {"version": 1}, edited):
+        write_json(copy / RESULT_NAME, wrong)
+        if wrong is edited:
+            assert read(copy)["velocity"] == 99.0
+        else:
+            with pytest.raises(InputError, match=f"walkers run {copy} measures it again"):
+                read(copy)
+        assert walkers.run(copy).result.as_dict() == right
+    (copy / "walkers.parquet").write_bytes(b"")
+    (copy / "bridges.parquet").unlink()
+    assert walkers.run(copy).result.as_dict() == right
+    assert len(read(copy).table("walkers")) == 6
+    assert {**manifest, "tabulated": None} == {**read_json(copy / "manifest.json"), "tabulated": None}
+    (copy / RESULT_NAME).unlink()
+    with pytest.raises(InputError, match="measures it again"):
+        walkers.load(copy).result  # noqa: B018
+    for dump in copy.rglob("*.bin"):  # as in an archive without dumps
+        dump.unlink()
+    with pytest.raises(InputError, match="cannot be read"):
+        walkers.run(copy)
 
-    def wrong(*_: object) -> list[str]:
-        raise TypeError("a number of text")
 
-    monkeypatch.setattr(Working, "lines", wrong)
-    assert current_result(copy) == known
-    assert {path: path.stat().st_mtime_ns for path in copy.glob("*.parquet")} == tables
-    with pytest.raises(TypeError, match="a number of text"):
-        describe_result(copy, known)
+def test_reading_writes_nothing(directory: Path) -> None:
+    before = {path: path.stat().st_mtime_ns for path in directory.rglob("*")}
+    results = read(directory)
+    assert [len(results.table(name)) for name in results.about["tables"]]
+    assert {path: path.stat().st_mtime_ns for path in directory.rglob("*")} == before
+
+
+def test_every_number_of_a_result_is_declared_and_plain(directory: Path) -> None:
+    results = read(directory)
+    assert set(map(declared_number, results)) and all(isinstance(one, (bool, int, float)) for one in results.values())
+    assert json.loads(json.dumps(results.as_dict())) == results.as_dict()
 
 
 def test_symmetric_dimers_need_not_be_on_the_axis_to_be_kept(run_directory: Callable[..., Path]) -> None:
     short = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
     aside = {"angle": "80 deg", "facing": "right"}
     kept = {
-        radius: len(steady_walkers(run_directory(dimers={"radii": [radius, "0.25 mm"], **aside}, run=short)))
+        radius: len(steady_walkers(read(run_directory(dimers={"radii": [radius, "0.25 mm"], **aside}, run=short))))
         for radius in ("0.25 mm", "0.26 mm")
     }
     assert kept == {"0.25 mm": 1, "0.26 mm": 0}
@@ -141,14 +141,13 @@ def test_sliding_is_velocity_less_rotation(moved: Group) -> None:
 
 
 def test_the_result_follows_the_papers_protocol(directory: Path) -> None:
-    result, walkers = read_result(directory), read_table(directory, "walkers")
-    for name, of in (("velocity", walkers), ("right_facing", walkers[walkers["facing"] == 1])):
-        velocity = of["velocity"]
-        expected = [len(velocity), velocity.mean(), velocity.min(), velocity.max(), velocity.std()]
-        found = [result[name][what] for what in ("n", "mean", "smallest", "largest", "scatter")]
-        assert found == pytest.approx(expected)
-    assert result["axial_velocity"]["left_facing"] < 0 < result["axial_velocity"]["right_facing"]
-    assert (result["right_facing"]["n"], result["steady"], result["walkers_met"]) == (3, 6, False)
+    result, walkers = read(directory), read_table(directory, "walkers")
+    velocity, right = walkers["velocity"], walkers["velocity"][walkers["facing"] == 1]
+    expected = [velocity.mean(), velocity.min(), velocity.max(), velocity.std(), right.mean(), right.std()]
+    names = ("velocity", "smallest", "largest", "scatter", "right_facing", "right_scatter")
+    assert [result[name] for name in names] == pytest.approx(expected)
+    assert result["axial_left_facing"] < 0 < result["axial_velocity"]
+    assert (result["facing_right"], result["steady"], result["walkers_met"]) == (3, 6, False)
 
 
 def test_tables_have_units_labels_and_meanings(directory: Path) -> None:
@@ -175,9 +174,9 @@ def test_dimers_have_columns_of_two_beads_and_a_pair(directory: Path) -> None:
         columns = {name for name in read_table(directory, table) if name[-1].isdigit()}
         pairs = {f"{name}_pair_1" for name in names[1:]}
         assert columns == {f"{name}_{bead}" for name in names for bead in (1, 2)} | pairs
-    cycles = read_result(directory)["cycles"]
-    for table, rows in (("trajectory", 20 * cycles + 1), ("walkers", 1), ("bridges", 3 * (cycles + 1))):
-        assert len(read_table(directory, table)) == 6 * rows
+    cycles = read(directory)["cycles"]
+    for table, count in (("trajectory", 20 * cycles + 1), ("walkers", 1), ("bridges", 3 * (cycles + 1))):
+        assert len(read_table(directory, table)) == 6 * count
 
 
 def test_a_column_that_is_not_declared_is_refused(tmp_path: Path) -> None:
@@ -190,15 +189,14 @@ def test_a_column_that_is_not_declared_is_refused(tmp_path: Path) -> None:
 
 def test_a_single_walker_has_no_scatter(run_directory: Callable[..., Path]) -> None:
     directory = run_directory()
-    result = read_result(directory)
-    assert result["velocity"]["scatter"] is None
-    assert result["left_facing"] == {"n": 0, "mean": None, "smallest": None, "largest": None, "scatter": None}
-    assert "left none" in describe_result(directory, result)
-    assert "scatter" not in describe_result(directory, result)
+    result = read(directory)
+    assert np.isnan([result[name] for name in ("scatter", "left_facing", "left_scatter")]).all()
+    assert not [row for row in rows(result) if "scatter" in row.error or row.name == "left_facing"]
+    assert result.as_dict()["scatter"] is None
     unsettled = run_directory(run={"cycles": 6, "settling_cycles": 0})
-    result = read_result(unsettled)
+    result = read(unsettled)
     assert result["steady"] == 0
-    assert "not steady" in describe_result(unsettled, result)
+    assert any("not steady" in warning for warning in result.warnings)
 
 
 def test_walkers_are_named_by_the_direction_in_which_they_face(run_directory: Callable[..., Path]) -> None:
@@ -207,8 +205,8 @@ def test_walkers_are_named_by_the_direction_in_which_they_face(run_directory: Ca
     assert sides([1, 1, 1, -1, -1], np.radians(degrees)).tolist() == [1, 1, -1, -1, 1]
     short = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 20}
     turned = run_directory(dimers={"angle": "150 deg"}, run=short)
-    result, (_, orientation, _) = read_result(turned), figures_of(turned)["walk"].axes
-    assert (result["right_facing"]["n"], result["left_facing"]["n"]) == (0, 1)
+    result, (_, orientation, _) = read(turned), figures_of(turned)["walk"].axes
+    assert (result["facing_right"], result["facing_left"]) == (0, 1)
     assert str(orientation.lines[0].get_label()).startswith("0: left at -30°, ")
     assert orientation.lines[0].get_ydata()[0] == pytest.approx(-30.0)  # type: ignore[index]
     meeting = {"replicates": 2, "angle": "150 deg", "facing": "left", "meet": True}
@@ -219,7 +217,7 @@ def test_walkers_are_named_by_the_direction_in_which_they_face(run_directory: Ca
     assert orientation.lines[0].get_ydata()[0] == pytest.approx(-30.0)  # type: ignore[index]
 
 
-def test_walkers_that_come_close_are_reported(moved: Group, directory: Path) -> None:
+def test_walkers_that_come_close_are_reported(moved: Group) -> None:
     assert not walkers_met([moved])
     position = moved.position.copy()
     late = position[len(position) // 2 :]
@@ -227,8 +225,9 @@ def test_walkers_that_come_close_are_reported(moved: Group, directory: Path) -> 
     late[:, 1, :, 1] += 1.2e-3  # beside walker 0, a fifth of a millimetre between them
     places = moved.motion.position.copy()
     places[:, moved.rows] = position
-    assert walkers_met([replace(moved, motion=replace(moved.motion, position=places))])
-    assert "not independent" in describe_result(directory, {**read_result(directory), "walkers_met": True})
+    met = measure(replace(moved.motion, position=places))
+    assert met.numbers["walkers_met"]
+    assert any("not independent" in warning for warning in met.warnings)
 
 
 # --- means of rotation, sliding and open contacts ---------------------------------------------------------------------

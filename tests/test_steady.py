@@ -56,10 +56,7 @@ def test_a_steady_walker_ends_early_at_the_speed_of_a_long_run(runs_folder: Path
     long = run_case(full, runs_folder)
     assert (short.result["cycles"], short.result["settling_cycles"], short.result["ended_early"]) == (12, 4, True)
     assert (long.result["cycles"], long.result["settling_cycles"], long.result["ended_early"]) == (60, 20, False)
-    assert "(both halves agree within 5 %); ended after 12 cycles (constant within 0.2 %)" in " ".join(
-        short.describe().split()
-    )
-    speeds = [one.result["velocity"]["mean"] for one in (short, long)]
+    speeds = [one.result["velocity"] for one in (short, long)]
     assert speeds[0] == pytest.approx(speeds[1], rel=0.005)
     # Until then the two are the same run.
     ways = [one.motion.position[:241] for one in (short, long)]

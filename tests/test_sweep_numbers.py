@@ -143,7 +143,7 @@ def _changed(run: Path, to: Path, name: str, speed: float, error: float) -> Side
     """A copy of a run whose result has another velocity and numerical error (m/s), as if measured so."""
     shutil.copytree(run, to / name)
     result = read_json(to / name / "result.json")
-    result["velocity"]["mean"] = speed
+    result["numbers"]["velocity"] = speed
     write_json(to / name / "result.json", result)
     write_json(to / name / ACCURACY_NAME, {"errors": {"velocity": {"total": error}}})
     manifest = read_json(to / name / MANIFEST_NAME)

@@ -153,8 +153,8 @@ def test_the_table_of_a_sweep(sweep_file: Callable[..., str], monkeypatch: pytes
     assert (units["drive.peak_acceleration"], units["dimers.radii[1]"], units["velocity"]) == ("g", "mm", "m/s")
     for row in frame.itertuples():
         run, case = Path(row.run), case_of(Path(row.run))
-        velocity = json.loads((run / "result.json").read_text())["velocity"]
-        assert [row.velocity, row.smallest] == [velocity["mean"], velocity["smallest"]]
+        numbers = json.loads((run / "result.json").read_text())["numbers"]
+        assert [row.velocity, row.smallest] == [numbers["velocity"], numbers["smallest"]]
         assert row.gamma0 == pytest.approx(dimer_of(case).gamma0(case.excitation.peak_acceleration))
     call("list", directory, "--to", "table.csv", check=True)
     read = pd.read_csv("table.csv")
@@ -383,7 +383,7 @@ def test_a_run_that_was_cut_since_is_told_and_stops_nothing(sweep_file: Callable
     os.truncate(run / FIRST_SEGMENT / "beads.bin", 100)
     frame = load("runs/test")
     assert list(frame["status"]) == ["finished", "failed", "finished"]
-    assert frame["reason"][1] == "DamagedRunError"
+    assert frame["reason"][1] == "ResultUnreadable"
     assert _sweep(name).returncode == 1
     (run / "manifest.json").unlink()
     assert _sweep(name).returncode == 0

@@ -16,9 +16,9 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.sweep import expand
 from walkers.inputs.toml import read_toml
 from walkers.physics.dimer import Dimer
-from walkers.postprocess.analysis import read_result
 from walkers.postprocess.gait import gait
 from walkers.postprocess.motion import Group
+from walkers.postprocess.results import read
 from walkers.postprocess.tables import read_table
 from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import thresholds
@@ -64,10 +64,9 @@ def test_bridges_slow_the_theorys_walker_as_they_do_the_engines(
         contact={"friction": {"bead_bead": 0.1, "bead_wall": 0.2}, "youngs_modulus": modulus},
         run={"cycles": 16, "settling_cycles": 8},
     )
-    result, motion = read_result(run_directory(case)), motion_of(case)
-    rotation, sliding = result["rotation"], result["sliding"]
-    found = [result["velocity"]["mean"], rotation["bead_1"], rotation["bead_2"]]
-    found += sliding.values()
+    result, motion = read(run_directory(case)), motion_of(case)
+    found = [result["velocity"], result["rotation_1"], result["rotation_2"]]
+    found += [result["sliding_1"], result["sliding_2"], result["sliding_pair_1"]]
     expected = [motion.velocity[0], *motion.rotation[:, 0], *motion.sliding[:, 0]]
     np.testing.assert_allclose(found, expected, rtol=5e-3, atol=5e-3 * float(motion.velocity[0]))
 
@@ -245,7 +244,7 @@ def test_the_program_prints_theory_beside_the_engine(in_folder: Path) -> None:
     call("run", "test.toml", check=True)
     told = call("show", "test.toml", "--theory", "--json", check=True).stdout
     contents = json.loads(told)
-    assert contents["engine"]["velocity"]["mean"] == pytest.approx(contents["viscous"]["velocity"], rel=0.08)
+    assert contents["engine"]["velocity"] == pytest.approx(contents["viscous"]["velocity"], rel=0.08)
     sideways = document(boundary={"tilt": "10 deg", "uphill": "90 deg"})
     (in_folder / "sideways.toml").write_text(to_toml(sideways))
     assert "boundary.uphill: the theory is for planes" in call("show", "sideways.toml", "--theory").stderr

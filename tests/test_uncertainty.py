@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,16 +20,17 @@ from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
 from walkers.inputs.units import parse_quantity
 from walkers.paper.published import outside_of_the_paper
-from walkers.postprocess.analyses.walking import _summary
-from walkers.postprocess.analysis import describe_result, quantities_of
 from walkers.postprocess.motion import read_motion
-from walkers.postprocess.sides import fell, sides_apart, uphill_velocities
+from walkers.postprocess.numbers import fell, headline, rows
+from walkers.postprocess.results import headlines, text
 from walkers.postprocess.tables import read_columns
-from walkers.postprocess.uncertainty import band_text
+from walkers.postprocess.uncertainty import SPREAD_NAME, spread_of
+from walkers.postprocess.walking import _velocities
 from walkers.rounding import rounded, with_decimals
+from walkers.runner.files import write_json
 from walkers.sweeps.folder import as_text, inventory
 from walkers.sweeps.readable import kind_of
-from walkers.sweeps.table import default_column, row_of
+from walkers.sweeps.table import default_column
 from walkers.theory.prediction import describe, predict
 
 
@@ -70,13 +72,11 @@ def test_a_median_is_between_the_ends(given: list[float]) -> None:
 
 def test_people_read_four_digits_and_each_number_by_its_name(runs_folder: Path) -> None:
     told = walkers.run(load_case("fig1b"), runs_folder).describe()
-    assert "±" not in told
-    assert "standard error" not in told
     lines = [line for line in told.splitlines() if not line.startswith("  run ")]
     numbers = re.findall(r"(?<![\w.])\d+\.?\d*(?:e-?\d+)?", "\n".join(lines))
     assert len(numbers) > 30
     assert not [one for one in numbers if len(one.partition("e")[0].replace(".", "").strip("0")) > 4]
-    assert "scatter of the 6 copies 0.001 mm/s (standard deviation; 1.079 to 1.082 mm/s)" in told
+    assert re.search(r"  velocity +1.080 mm/s  scatter 0.001\n", told)
 
 
 def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> None:
@@ -91,25 +91,34 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     }
     case = Case.read(tables, name="steep")
     done = walkers.run(case, tmp_path)
-    told = done.describe()
-    assert "plane tilted by 20°, right is up" in told
-    assert "scatter of" not in told  # of one walker a side there is none
-    sides = sides_apart(done.result)
-    up, down = (rounded(1e3 * speed, "mm/s") for speed in uphill_velocities(done.result).values())
-    assert list(sides) == ["up", "down"]
-    (engine,) = (line for line in describe(predict(case), done.result).splitlines() if line.startswith("engine"))
+    assert "plane tilted by 20°, right is up" in done.describe()
+    result = done.result
+    assert np.isnan([result["right_scatter"], result["left_scatter"]]).all()  # one walker a side
+    assert result["facings_differ"]
+    assert headline(result) == "right_facing"
+    up, down = (rounded(1e3 * result[name], "mm/s") for name in ("axial_velocity", "axial_left_facing"))
+    (engine,) = (line for line in describe(predict(case), result).splitlines() if line.startswith("engine"))
     assert engine.split()[:3] == ["engine,", "facing", "up"]
-    assert float(engine.split()[3]) == pytest.approx(1e3 * sides["up"], abs=1e-3)
-    assert f"facing up {up}, facing down {down} mm/s, positive up the slope" in told
+    assert float(engine.split()[3]) == pytest.approx(1e3 * result["right_facing"], abs=1e-3)
+    shown = {row.name: row.text for row in rows(result)}
+    assert "velocity" not in shown
+    assert [float(shown[name]) for name in ("axial_velocity", "axial_left_facing")] == [float(up), float(down)]
     assert f"started up {up}, started down {down} mm/s" in as_text(inventory(tmp_path))
-    # The band of a spread is that of one side, or is left out.
-    band = {"low": sides["up"] - 1e-3, "high": sides["up"] + 1e-3, "points": 64}
-    of_up, of_mean = (
-        describe_result(done.directory, {**done.result, "bands": {name: band}}) for name in ("right_facing", "velocity")
-    )
-    assert f" mm/s ({band_text((band['low'], band['high']), 'm/s')}, 5 to 95 % over" in of_up
-    assert "5 to 95 %" not in of_mean
-    assert "no band: the spread has that of the mean over both ways" in of_mean
+    # The band of a spread is that of one side.
+    own = result["right_facing"]
+    spread = spread_of(done.directory.resolve())
+    spread.mkdir()
+    for name, low in (("right_facing", own - 1e-3), ("velocity", own - 2e-3)):
+        bands = {name: {"low": low, "high": own - 1e-4, "points": 64}}
+        write_json(spread / SPREAD_NAME, {"varied": result.about["rests_on"], "bands": bands})
+        assert done.result[f"{name}_low"] == low
+        assert done.result[f"{name}_high"] == own  # extended to the result of the case
+        errors = {row.name: row.error for row in rows(done.result)}
+        assert ("band" in errors["right_facing"]) == (name == "right_facing")
+    write_json(spread / SPREAD_NAME, {"varied": [], "bands": bands})
+    assert "velocity_low" not in done.result
+    spread.joinpath(SPREAD_NAME).unlink()
+    spread.rmdir()
     page = done.report(tmp_path / "report.html").read_text("utf-8")
     assert "liquid of 20 mN/m; 80 Hz" in page
     assert "plane tilted by 20°" in page
@@ -119,19 +128,13 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     assert "along the heading, facing up (mm/s)" in text
     assert "right_facing" not in text
     assert "\nvelocity (mm/s)" not in text  # the mean over both is no walker's
-    frame = pd.DataFrame([row_of(done.result)])
+    frame = pd.DataFrame([dict(result)])
     assert default_column(frame) == "right_facing"
     assert default_column(frame.drop(columns="upright")) == "velocity"
     # Of walkers that turned over it is the velocity up the slope that counts.
-    result = {**done.result, "turned_round": 1, "posture": {**done.result["posture"], "upright": 1, "turned over": 1}}
-    up, down = (done.result["axial_velocity"][f"{way}_facing"] for way in ("right", "left"))
-    assert uphill_velocities(result) == {"axial, started up": up, "started down": down}
-    assert default_column(pd.DataFrame([row_of(result)])) == "axial_velocity"
-    assert not fell({"goes_uphill": True, "climbs": []})  # a pile
-    band = {"low": -1e-2, "high": 1e-2, "points": 64}
-    text = describe_result(done.directory, {**result, "bands": {"axial_velocity": band, "right_facing": band}})
-    assert "velocity up the slope -10 to 10 mm/s over the ranges" in text
-    assert "mm/s, positive toward" not in text
+    turned = {**result, "turned_round": 1, "upright": 1, "turned_over": 1}
+    assert headline(turned) == default_column(pd.DataFrame([turned])) == "axial_velocity"
+    assert not fell({"goes_uphill": True, "climbs": 0})  # a pile
 
 
 @pytest.mark.parametrize(
@@ -185,19 +188,17 @@ def test_no_mean_over_clusters_that_face_up_and_down_a_slope(tmp_path: Path) -> 
     up, down = (each[each["facing"] == way] for way in (1, -1))
     climbing = int((each["axial_velocity"] > 2e-6).sum())
     assert climbing == 1
-    assert told.startswith("four: 1 climbs, 1 goes down; ")
-    posture = {**result["posture"], "climb": 0, "down": 2}
-    assert describe_result(done.directory, {**result, "posture": posture}).startswith("four: all 2 go down; ")
-    assert result["velocity"]["mean"] == pytest.approx(up["velocity"].mean())
-    assert result["axial_velocity"]["mean"] == pytest.approx(up["axial_velocity"].mean())
-    assert result["axial_velocity"]["left_facing"] == pytest.approx(down["axial_velocity"].mean())
-    speeds = [rounded(1e3 * one["axial_velocity"].mean(), "mm/s") for one in (up, down)]
-    assert re.search("velocity +facing up {}0*, facing down {}0* mm/s, positive up the slope".format(*speeds), told)
-    assert "along the heading" not in told
+    assert (result["climbing"], result["descending"]) == (1, 1)
+    assert told.startswith("four: 1 climbs, 1 goes down")
+    changed = replace(result, numbers={**result.numbers, "climbing": 0, "descending": 2})
+    assert headlines(changed)[0].startswith("four: all 2 go down")
+    assert result["velocity"] == pytest.approx(up["velocity"].mean())
+    assert result["axial_velocity"] == pytest.approx(up["axial_velocity"].mean())
+    assert result["axial_left_facing"] == pytest.approx(down["axial_velocity"].mean())
     # A sweep that begins on a level floor is drawn by the same walkers.
     level = walkers.run(Case.read({**FOUR_BEADS, "boundary": {"material": "glass"}}, name="level"), tmp_path)
     rightward = level.walkers[level.walkers["facing"] == 1]["axial_velocity"].mean()
-    assert row_of(level.result)["axial_velocity"] == pytest.approx(rightward) != 0.0
+    assert level.result["axial_velocity"] == pytest.approx(rightward) != 0.0
 
 
 def test_a_cluster_leans_by_how_far_it_turned(tmp_path: Path) -> None:
@@ -208,18 +209,18 @@ def test_a_cluster_leans_by_how_far_it_turned(tmp_path: Path) -> None:
     np.testing.assert_allclose(begin, done.walkers["start_angle"], atol=2e-3)
     heading = read_motion(done.directory).groups[0].heading[[0, -1]]
     turned = np.abs(np.diff(np.unwrap(np.arctan2(heading[..., 1], heading[..., 0]), axis=0), axis=0))
-    assert done.result["posture"]["ends_within"] == pytest.approx(turned.max(), abs=np.radians(2.0))
+    assert done.result["ends_within"] == pytest.approx(turned.max(), abs=np.radians(2.0))
 
 
 def test_walkers_that_came_apart_have_no_velocity_anywhere_in_the_text(runs_folder: Path) -> None:
     done = walkers.run(load_case("fig1b"), runs_folder)
-    told = describe_result(done.directory, {**done.result, "separated_fraction": 0.5})
-    assert "velocity   none: walkers came apart: beads beyond the rupture distance for 50 % of the time" in told
-    for words in ("started facing", "steady (", "scatter", "numerical error"):
-        assert words in done.describe()
-        assert words not in told
-    names = [row.name for row in quantities_of({**done.result, "separated_fraction": 0.5})]
-    assert not [name for name in names if name.startswith("velocity")]
+    columns = read_columns(done.directory, "walkers")
+    columns["separated_fraction"] = columns["separated_fraction"] + 0.5
+    apart = replace(done.result, numbers={**done.result.numbers, **_velocities(columns, done.case)})
+    assert apart["came_apart"]
+    assert "came apart: beads beyond the rupture distance for 50 % of the time" in headlines(apart)[0]
+    assert "velocity" in [row.name for row in rows(done.result)]
+    assert not [row.name for row in rows(apart) if "velocity" in row.name or "facing" in row.name]
 
 
 @pytest.mark.parametrize(
@@ -239,32 +240,15 @@ def test_a_result_that_depends_on_the_start_says_so(runs_folder: Path) -> None:
     left = columns["facing"] < 0
     for faster in (left, np.arange(len(left)) == 0):
         changed = {**columns, "velocity": np.where(faster, 1.4, 1.0) * columns["velocity"]}
-        found = {**done.result, **_summary(changed, done.case)}
-        assert found["depends_on_start"]
-        told = describe_result(done.directory, found)
-        assert "; depends on the start\n" in told
-        assert "warning: steady copies differ by more than 5 %: the velocity depends on the start" in told
-        assert not _summary({**changed, "steady": ~columns["steady"]}, done.case)["depends_on_start"]
-
-
-def test_the_velocity_says_how_many_walkers_turned(runs_folder: Path) -> None:
-    done = walkers.run(load_case("fig1b"), runs_folder)
-    assert "turned by" not in done.describe()
-    told = describe_result(done.directory, {**done.result, "turned_round": 2})
-    assert "1.080 mm/s, positive toward the large bead; 2 of 6 turned by more than 90°" in told
-
-
-def test_shares_of_open_contacts_say_their_resolution_and_work_whose_it_is(runs_folder: Path) -> None:
-    done = walkers.run(load_case("fig1b"), runs_folder)
-    open_ones = dict.fromkeys(done.result["open"], 0.229)
-    told = describe_result(done.directory, {**done.result, "open": open_ones})
-    assert "22.9 % of the time, in steps of 0.5 %" in told
-    assert "inertial work of the drive per cycle" in told
+        numbers = _velocities(changed, done.case)
+        assert numbers["depends_on_start"]
+        found = replace(done.result, numbers={**done.result.numbers, **numbers})
+        assert headlines(found)[0].endswith("depends on the start")
+        assert not _velocities({**changed, "steady": ~columns["steady"]}, done.case)["depends_on_start"]
 
 
 def test_texts_of_results_are_as_wide_as_a_page(runs_folder: Path) -> None:
     done = walkers.run(load_case("fig1b"), runs_folder)
-    long = {**done.result, "goes_uphill": True, "drive": "plane tilted by 20°, right is up, " * 5}
-    told = describe_result(done.directory, long, cached=True).splitlines()
-    assert "(already run)" in "".join(told[:3])
-    assert not [line for line in told if len(line) > 110 and str(done.directory) not in line]
+    lines = text(done.result, cached=True).splitlines()
+    assert lines[0].endswith("(already run)")
+    assert not [line for line in lines if len(line) > 110 and str(done.directory) not in line]

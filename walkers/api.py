@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from walkers.inputs.origins import Origin
     from walkers.postprocess.film_options import FilmOptions
     from walkers.postprocess.motion import Motion
+    from walkers.postprocess.results import Results
     from walkers.runner.launch import Progress
     from walkers.sweeps.accuracy import Accuracy
     from walkers.sweeps.comparison import Comparison
@@ -273,12 +274,11 @@ class Run:
         return None if self.asked is None else self.asked.origins
 
     @property
-    def result(self) -> dict[str, Any]:
-        """The result in SI units."""
-        from walkers.postprocess.uncertainty import rests_on, with_bands
+    def result(self) -> Results:
+        """The result: numbers in SI units by name, with bands and numerical errors where these are measured."""
+        from walkers.postprocess.results import read
 
-        result = with_bands(self.directory, _result_of(self.finished_directory))
-        return result if self.origins is None else {**result, "rests_on": rests_on(self.origins)}
+        return read(self.finished_directory, self.origins)
 
     @property
     def motion(self) -> Motion:
@@ -305,11 +305,11 @@ class Run:
 
     def describe(self) -> str:
         """The result as text in mm, mm/s and degrees; of an unfinished run, its progress."""
-        from walkers.postprocess.analysis import describe_result
+        from walkers.postprocess.results import text
 
         if not is_finished(self.directory):
             return f"{self.directory.name}: {self._state}"
-        return describe_result(self.directory, self.result, cached=self.cached)
+        return text(self.result, cached=self.cached)
 
     def _repr_html_(self) -> str:
         """The result in a notebook: a table with errors, units and warnings, and the parameters."""
@@ -317,7 +317,7 @@ class Run:
 
         if not is_finished(self.directory):
             return f"<p>{escape(self.describe())}</p>"
-        return result_html(self.directory, self.result, self.origins)
+        return result_html(self.result, self.origins)
 
     def plot(self, to: str | Path | None = None, formats: str | Sequence[str] = ("png",)) -> list[Path]:
         """Draw the figures and return their paths; see `walkers.postprocess.figures.plot_run`."""
@@ -456,14 +456,6 @@ def _refusing(directory: Path, what: str) -> Iterator[None]:
         raise refused(directory, f"{what} cannot be read ({error})") from error
 
 
-def _result_of(directory: Path) -> dict[str, Any]:
-    """The result of a finished run, measured anew if it is of another version of the program."""
-    from walkers.postprocess.analysis import current_result
-
-    with _refusing(directory, "the run"):
-        return current_result(directory)
-
-
 def _path(to: str | Path | None) -> Path | None:
     return None if to is None else Path(to)
 
@@ -509,7 +501,7 @@ def run(
     --------
     >>> import walkers
     >>> one = walkers.run("fig1b", tmp)
-    >>> round(1e3 * one.result["velocity"]["mean"], 3)  # mm/s
+    >>> round(1e3 * one.result["velocity"], 3)  # mm/s
     1.08
     >>> one.walkers[["facing", "steady"]].drop_duplicates("facing").to_dict("list")
     {'facing': [1, -1], 'steady': [True, True]}
@@ -531,7 +523,7 @@ def run(
     binary = find_engine(engine)
     place = run_place(case, binary, out)
     if is_finished(place) and not force:
-        return _checked(Run(place, asked=case))
+        return _measured(Run(place, asked=case))
     check_audit(binary, allow_failed_audit)
     # Numpy and pyarrow are loaded while the engine works and the interpreter is idle.
     threading.Thread(target=_load_postprocess, daemon=True).start()
@@ -549,20 +541,30 @@ def finished_at(name: str | Path, out: Path) -> Run | None:
         from walkers.sweeps.by_hand import take_in
 
         take_in(path)
-    return _checked(Run(path)) if kind in ("run", "deck") and is_finished(path) else None
+    return _measured(Run(path)) if kind in ("run", "deck") and is_finished(path) else None
+
+
+def _measured(run: Run) -> Run:
+    """The run; that of a finished run is measured again if its result or a table cannot be read."""
+    from walkers.postprocess.results import ensure_measured
+
+    if is_finished(run.check().directory):
+        with _refusing(run.directory, "the run"):
+            ensure_measured(run.directory)
+    return run
 
 
 def _checked(run: Run) -> Run:
-    """The run; `InputError` if it cannot be read. The result of a finished run is read or made."""
+    """The run; `InputError` if it cannot be read."""
     if is_finished(run.check().directory):
-        _result_of(run.directory)
+        _ = run.result
     return run
 
 
 def _load_postprocess() -> None:
     import pyarrow.parquet  # noqa: F401
 
-    import walkers.postprocess.analyses.walking  # noqa: F401
+    import walkers.postprocess.walking  # noqa: F401
 
 
 # --- sweeps -----------------------------------------------------------------------------------------------------------
@@ -863,5 +865,5 @@ def predict(case: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None)
         key, _, why = str(error).partition(": ")
         raise InputError(named.name, [Problem(key, None, why)]) from error
     with suppress(InputError):  # a result that cannot be read
-        predicted["engine"] = directory and Run(directory, asked=named).result
+        predicted["engine"] = directory and Run(directory, asked=named).result.as_dict()
     return predicted

@@ -12,10 +12,11 @@ import numpy as np
 from walkers.errors import InputError
 from walkers.inputs.case import Case
 from walkers.postprocess.drawing import FORMATS, check_place, save_figure
+from walkers.postprocess.results import derived
 from walkers.runner.directory import case_of
 from walkers.sweeps.figure import Curves, Factor, LeftOutWarning, column_of, figure_of, tell
 from walkers.sweeps.readable import readable_unit
-from walkers.sweeps.table import derived_of, load, varied_columns
+from walkers.sweeps.table import load, varied_columns
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -138,7 +139,7 @@ def _between(rows: pd.DataFrame, case: Case, x: Factor, places: FloatArray) -> t
     (key, *further), units, known = x.keys, rows.attrs["units"], varied_columns(rows)
     if key not in known:
         moving = [name for name in known if rows[name].nunique() > 1]
-        if len(moving) != 1 or key not in derived_of(case) or rows[moving[0]].dtype.kind not in "if":
+        if len(moving) != 1 or key not in derived(case) or rows[moving[0]].dtype.kind not in "if":
             return places, []
         (key,) = moving
         places = np.linspace(rows[key].min(), rows[key].max(), len(places))
@@ -150,5 +151,5 @@ def _between(rows: pd.DataFrame, case: Case, x: Factor, places: FloatArray) -> t
             cases[place] = case.changed({key: f"{place!r} {units[key]}" if units[key] else place})
     along = list(cases)
     if key != x.keys[0]:
-        along = [derived_of(one)[x.keys[0]] / readable_unit(units[x.keys[0]])[1] for one in cases.values()]
+        along = [derived(one)[x.keys[0]] / readable_unit(units[x.keys[0]])[1] for one in cases.values()]
     return np.array(along), list(cases.values())

@@ -25,9 +25,9 @@ from walkers.inputs.resolving import SUPPLIED
 from walkers.inputs.table import Table, example_of, keys_in, table_in
 from walkers.inputs.units import ACCELERATION, AUTO, TEMPERATURE, Kind, kind_in, quantity_text
 from walkers.main import help_of, overview, program
-from walkers.postprocess.analysis import analyses
+from walkers.postprocess.numbers import GROUPS
 from walkers.postprocess.quantities import TABLES
-from walkers.sweeps.table import STATE, derived_columns, result_columns
+from walkers.sweeps.table import STATE
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -152,13 +152,11 @@ def _columns() -> str:
         columns = {quantity.name: (quantity.si_unit, quantity.meaning) for quantity in quantities}
         text += f"### {name}\n\n{_described(columns)}\n"
     text += "## Columns of the table of a sweep\n\nThe first columns are the keys that vary.\n\n"
-    for one in analyses():
-        columns = {**one.derived, **one.columns}
-        text += f"### Analysis {one.name}\n\n{_described(columns)}\n" if columns else ""
-    names = [one.name for one in analyses()]
-    known = {key for one in analyses() for key in one.derived} | set(result_columns(names))
-    common = {key: column for key, column in derived_columns(names).items() if key not in known}
-    return text + f"### All sweeps\n\n{_described({**common, **STATE})}"
+    names = {"walking": "Walkers", "meetings": "Walkers that may meet", "piles": "Piles", "drive": "All sweeps"}
+    for group, head in names.items():
+        columns = {one.name: (one.si_unit, one.meaning) for one in GROUPS[group]}
+        text += f"### {head}\n\n{_described(columns | (STATE if group == 'drive' else {}))}\n"
+    return text
 
 
 def _library() -> str:

@@ -51,4 +51,4 @@ picture = run.render("runs/steel.png", images=3)[0]
 # Change a value without editing the file:
 
 smoother = walkers.run(walkers.load_case(file, {"contact.friction.bead_wall": 0.15}))
-print(f"{1e3 * smoother.result['velocity']['mean']:.2f} mm/s with half of the friction")
+print(f"{1e3 * smoother.result['velocity']:.2f} mm/s with half of the friction")

@@ -42,7 +42,7 @@ case = "fig1b"
 liquid.law = ["young-laplace", "willett", "rabinovich", "soulie"]
 """)
 sweep = walkers.sweep("runs/laws.toml")
-print(f"constant: {1e3 * run.result['velocity']['mean']:.2f} mm/s")
+print(f"constant: {1e3 * run.result['velocity']:.2f} mm/s")
 print((sweep.table().set_index("liquid.law")["velocity"] * 1e3).round(2).to_string())
 
 # %%

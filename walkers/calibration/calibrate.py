@@ -25,6 +25,7 @@ from walkers.inputs.table import alternatives
 from walkers.paper.comparison import misalignment
 from walkers.paper.published import ProgressOf
 from walkers.postprocess.gait import steady_walkers, together
+from walkers.postprocess.results import read
 from walkers.postprocess.tables import read_table
 from walkers.runner.failures import BeadsLost, BlowUp
 from walkers.runner.files import read_json, write_json
@@ -120,7 +121,7 @@ def _seen(table: pd.DataFrame, experiments: int) -> dict[str, FloatArray]:
     for run, status in zip(table["run"], table["status"], strict=True):
         rows.append(dict.fromkeys(QUANTITIES, np.nan))
         if status == "finished":
-            kept = steady_walkers(run)
+            kept = steady_walkers(read(run))
             rows[-1] |= {name: float(kept[name].mean()) for name in get_args(Speed)}
             if together(read_table(run, "walkers")).all():
                 rows[-1]["misalignment"] = float(misalignment(run).max())

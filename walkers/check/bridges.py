@@ -78,7 +78,7 @@ def bridges(out: Path, *, quick: bool = False) -> Iterator[Line]:
                 yield Line(f"{what}: work over Young–Laplace", 1.0, work)
                 yield Line(f"{what}: rupture distance over Young–Laplace", 1.0, float(gaps[-1] / exact.rupture))
     for case in () if quick else WALKED:
-        speeds = [1e3 * run(load_case(case, {"liquid.law": law}), out).result["velocity"]["mean"] for law in WALKED_BY]
+        speeds = [1e3 * run(load_case(case, {"liquid.law": law}), out).result["velocity"] for law in WALKED_BY]
         for walked_by, speed in zip(WALKED_BY[1:], speeds[1:], strict=True):
             yield Line(f"velocity of {case}: {WALKED_BY[0]}, {walked_by}", speeds[0], speed, unit="mm/s")
 

@@ -140,7 +140,7 @@ def run(
         failed |= bool(band and band.failures)
         if as_json:
             ranges = {"spread": band.as_dict()} if band else {}
-            print(json.dumps({**done.result, **ranges, "run": str(done.directory), "cached": done.cached}))
+            print(json.dumps({**done.result.as_dict(), **ranges, "run": str(done.directory), "cached": done.cached}))
         else:
             print_lines([done.describe(), *([describe(band)] if band else [])])
     return 1 if failed else 0

@@ -23,6 +23,7 @@ from walkers.paper.published import (
     shipped,
 )
 from walkers.postprocess.gait import on_axis, steady_walkers
+from walkers.postprocess.results import read
 from walkers.postprocess.tables import read_table
 from walkers.sweeps.table import thresholds
 from walkers.text import rendered
@@ -103,7 +104,7 @@ def _of_walkers(point: Point, quantity: str, table: pd.DataFrame) -> Value | Non
     run = rows["run"].iloc[0]
     if quantity == "astray":
         return Value(100.0 * float((~on_axis(read_table(run, "walkers"))).mean()))
-    speeds = steady_walkers(run)[quantity].to_numpy() * 1e3
+    speeds = steady_walkers(read(run))[quantity].to_numpy() * 1e3
     theory, left_out = _theory(point, quantity), int(rows["walkers"].iloc[0]) - len(speeds)
     if not len(speeds):
         return Value(theory=theory, left_out=left_out)

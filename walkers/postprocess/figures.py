@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from textwrap import wrap
@@ -70,9 +71,9 @@ Tables = Callable[[str], Columns]
 
 def figures_of(directory: Path) -> dict[str, Figure]:
     """The figures of a run by the names of their files, drawn from its tables."""
-    from walkers.postprocess.analysis import tables_of
+    from walkers.postprocess.tables import read_columns
 
-    case, tables = case_of(directory), tables_of(directory).__getitem__
+    case, tables = case_of(directory), partial(read_columns, directory)
     figures = {}
     if case.walkers:
         figures["walk"] = walk_figure(case, tables)

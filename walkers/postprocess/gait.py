@@ -18,21 +18,19 @@ import numpy as np
 from walkers.inputs.run import CONSTANT
 from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
 from walkers.postprocess.motion import Group, Motion, read_motion
+from walkers.postprocess.numbers import STEADY_DIFFERENCE
 from walkers.postprocess.sides import REST, SEPARATED, STEADY_SPEED
-from walkers.postprocess.tables import read_table
-from walkers.runner.manifest import read_result
 
 if TYPE_CHECKING:
     import pandas as pd
 
-STEADY_DIFFERENCE = 0.05
-"""A walker is steady if the velocities of the two halves of the fitted cycles differ by less than this share, or by
-`STEADY_SPEED`."""
+    from walkers.postprocess.results import Results
+
 UPRIGHT = np.radians(15.0)
 """Largest final angle of an upright walker, rad."""
 _NO_MORE = np.radians(0.5)
 """Largest increase of its angle in the second half of a run, rad."""
-POSTURES = ("upright", "leaning", "turned over")
+POSTURES = ("upright", "leaning", "turned_over")
 ASTRAY = np.pi / 4.0
 """Largest final angle of a walker that is on the axis, rad."""
 _LITTLE, _FADING, _NO_FASTER = 0.005, 0.9, 1e-4
@@ -277,14 +275,14 @@ def together(walkers: pd.DataFrame) -> pd.Series[bool]:
     return walkers["separated_fraction"] < SEPARATED
 
 
-def steady_walkers(run: str | Path) -> pd.DataFrame:
-    """Rows of a finished run's table ``walkers`` that are steady, on the axis and whose beads stay together.
+def steady_walkers(results: Results) -> pd.DataFrame:
+    """Rows of a run's table ``walkers`` that are steady, on the axis and whose beads stay together.
 
     Symmetric dimers, which do not walk and turn across the axis, need only stay together.
     """
-    walkers = read_table(run, "walkers")
+    walkers = results.table("walkers")
     kept = together(walkers)
-    if read_result(run)["sin_delta"] != 0.0:
+    if results.get("sin_delta") != 0.0:
         kept &= walkers["steady"] & on_axis(walkers)
     chosen: pd.DataFrame = walkers[kept]
     return chosen

@@ -1,7 +1,7 @@
-"""What runs give: name, unit, label and meaning of each column of a table and of each number of a result, once.
+"""What tables contain: name, unit, label and meaning of each column, once.
 
-They stand in ``quantities.toml``. Files, axes, reports, printed results, columns of sweeps and the reference take them
-from here.
+They stand in ``quantities.toml``. Files, axes and the reference take them from here; `walkers.postprocess.numbers` has
+those of results.
 """
 
 from __future__ import annotations

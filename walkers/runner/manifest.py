@@ -114,16 +114,6 @@ def check_unchanged(directory: Path, names: Collection[str]) -> bool:
     return len(wanted) == len(names)
 
 
-def read_result(directory: str | Path) -> dict[str, Any]:
-    """The result of a run, of any version of its analyses.
-
-    Raises `OSError` or `ValueError` if it cannot be read, `FileChanged` if it has changed since the run was finished.
-    """
-    result = read_json(Path(directory) / RESULT_NAME)
-    check_unchanged(Path(directory), [RESULT_NAME])
-    return result
-
-
 def _sums(contents: dict[str, Any], directory: Path) -> dict[str, str]:
     if not isinstance(sums := contents.get("sha256"), dict):
         raise ValueError(f"{directory / MANIFEST_NAME}: expected a table sha256")

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from walkers.errors import InputError, Problem, refused
 from walkers.inputs.case import STIFFEST, Case
 from walkers.inputs.sweep import Sweep, settings_in
+from walkers.postprocess.results import recorded
 from walkers.postprocess.sides import STEADY_SPEED
 from walkers.postprocess.uncertainty import ACCURACY, ACCURACY_NAME
 from walkers.runner.binary import find_engine
@@ -23,7 +24,7 @@ from walkers.runner.directory import case_of, run_place
 from walkers.runner.files import write_json
 from walkers.runner.manifest import recomputed
 from walkers.sweeps.scheduler import Options, SweepStopped, run_sweep
-from walkers.sweeps.table import load, main_columns, result_in, row_of
+from walkers.sweeps.table import load, main_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -76,7 +77,7 @@ def measure_accuracy(
         if (change := _change(table, case)) < share:
             break
     accuracy = Accuracy(
-        record.name, share, change < share, change, possible[last], _errors(row_of(result_in(directory)), table)
+        record.name, share, change < share, change, possible[last], _errors(recorded(directory)["numbers"], table)
     )
     with recomputed(directory, [ACCURACY_NAME]):
         write_json(directory / ACCURACY_NAME, asdict(accuracy))

@@ -21,8 +21,8 @@ from walkers.inputs.drive import Excitation, Harmonic
 from walkers.inputs.run import CONSTANT, limits_of
 from walkers.inputs.table import changed as table_changed
 from walkers.physics.laws import source_of
-from walkers.postprocess.analysis import tabulate
 from walkers.postprocess.dump import DumpError
+from walkers.postprocess.results import measure
 from walkers.rounding import percent
 from walkers.runner.binary import find_engine, plugin_of, write_run_script
 from walkers.runner.directory import (
@@ -281,6 +281,6 @@ def _write(
         further = f"walkers run continues to {wanted.cycles}: set cycles to {wanted.cycles} and run the deck again"
         notes.append(f"{reached}; {further if wanted.until_steady else 'set cycles to more and run the deck again'}")
         write_segment_record(folder, segment, report, by_hand=notes)
-    tabulate(folder)
+    measure(folder)
     about: dict[str, Any] = {"drive_from": segment.drive_from, "segments": 1, "by_hand": notes}
     write_manifest(case, folder.name, None, report, started=time.time(), directory=folder, **about)

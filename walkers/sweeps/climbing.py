@@ -22,10 +22,11 @@ import numpy.typing as npt
 from walkers.errors import refused
 from walkers.inputs.keys import dotted
 from walkers.postprocess.analyses.piles import Pile
+from walkers.postprocess.results import plain, read
 from walkers.rounding import percent
 from walkers.runner.directory import CASE_NAME, case_of, finished_places, is_finished
 from walkers.runner.manifest import read_manifest
-from walkers.sweeps.table import RECORD_NAME, read_record, result_in, states, value_text
+from walkers.sweeps.table import RECORD_NAME, read_record, states, value_text
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -164,7 +165,7 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
         ``on_plain_walls``, ``in_corners`` and ``out_of_pile`` (without those on a wall since before the drive)
         have all of these items for a part of the climbs, by the same time.
     """
-    results = [result_in(run) for run in runs]
+    results = [_result_of(run) for run in runs]
     found = _summary(results, within)
     found["each"] = [
         {"run": run.name, **climb} for run, one in zip(runs, results, strict=True) for climb in one["climbs"]
@@ -173,6 +174,18 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
         some = [{**result, "climbs": list(filter(belongs, result["climbs"]))} for result in results]
         found[name] = _summary(some, within, found["within"])
     return found
+
+
+def _result_of(run: Path) -> dict[str, Any]:
+    """Numbers of a pile, and its ``climbs`` as rows of the table ``clusters``; None for numbers that are not finite."""
+    results = read(run)
+    columns = results.columns("clusters")
+    names = [str(names).split() for names in columns["wall_names"]]
+    climbs = [
+        {**plain({name: values[number] for name, values in columns.items()}), "walls": names[number]}
+        for number in np.flatnonzero(columns["climbed"])
+    ]
+    return {**{name: results[name] for name in ("beads", "large", "driven")}, "climbs": climbs}
 
 
 def _summary(results: Sequence[Mapping[str, Any]], within: float | None, at: float | None = None) -> dict[str, Any]:

@@ -9,21 +9,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import refused
-from walkers.postprocess.sides import alike, fell, sides, sides_apart, ways
-from walkers.postprocess.uncertainty import band_of, band_text, not_known, numerical_error, with_bands
+from walkers.postprocess.numbers import GROUPS, band_text, declared, fell
+from walkers.postprocess.results import Results, read
+from walkers.postprocess.sides import alike, sides
+from walkers.postprocess.uncertainty import not_known
 from walkers.rounding import percent, rounded
 from walkers.runner.directory import case_of
 from walkers.sweeps.folder import aligned
 from walkers.sweeps.readable import differing, flattened, readable, readable_unit
 from walkers.sweeps.table import (
     ERRORS,
+    columns_of,
     default_column,
     find_name,
     load,
     read_record,
-    result_columns,
-    result_in,
-    row_of,
     sides_differ,
     value_text,
     varied_columns,
@@ -36,7 +36,14 @@ if TYPE_CHECKING:
     from walkers.inputs.case import Case
 
 _SIDES = ("first", "second")
-_SPREADS = ("smallest", "largest", "scatter")  # columns of a sweep's table that are not compared
+_LEFT_OUT = {
+    *("smallest", "largest", "scatter", "right_scatter", "left_scatter", "numerical_error", "truncated", "coverage"),
+    *("gamma0", "sin_delta", "mass_asymmetry", "radius_1", "radius_2", "orientation_smallest", "orientation_largest"),
+    *("meets", "came_apart", "facings_differ", "depends_on_start", "facing_right", "facing_left"),
+    *(one.name for one in GROUPS["drive"]),
+}
+_ERRORS = ("_low", "_high", "_error")
+"""Numbers of results, and ends of their names, that are not compared: errors, values of the case, conditions."""
 _VELOCITIES = ("velocity", "right_facing", "left_facing")
 """Columns whose scatter is in the result."""
 _UPHILL = {
@@ -97,7 +104,7 @@ def _two_digits(value: float, unit: str) -> str:
 
 
 def compare_runs(first: Side, second: Side) -> Comparison:
-    """Compare two runs, or cases not yet run; `walkers.sweeps.table.DamagedRunError` if a result is lost."""
+    """Compare two runs, or cases not yet run."""
     names = [side.name for side in (first, second)]
     parameters, differences = _different([first.case, second.case], names)
     not_run = [side.name for side in (first, second) if side.directory is None]
@@ -130,18 +137,17 @@ def _number_of(value: Any) -> float:
 
 
 def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
-    """All numbers that the analyses give for two runs."""
-    results = [with_bands(run, result_in(run)) for run in runs]
-    rows = [row_of(result) for result in results]
-    scatters = [_scatters(run, result) for run, result in zip(runs, results, strict=True)]
-    units = result_columns([name for result in results for name in result["analyses"]])
+    """The numbers of the results of two runs."""
+    results = [read(run) for run in runs]
+    scatters = [_scatters(result) for result in results]
+    units = columns_of({name for result in results for name in result if name not in _LEFT_OUT})
     meant = _VELOCITIES if any(map(fell, results)) else ("velocity",) if any(map(_up_and_down, results)) else ()
     units = {name: entry for name, entry in units.items() if name not in meant}  # these are no walker's way
     uphill, pairs = all(result.get("goes_uphill") for result in results), []
     for name, (unit, _) in units.items():
-        values = [_number_of(row.get(name)) for row in rows]
-        if name not in _SPREADS and any(map(isfinite, values)):
-            error = hypot(*(numerical_error(result, name) for result in results))
+        values = [_number_of(result.get(name)) for result in results]
+        if any(map(isfinite, values)) and not name.endswith(_ERRORS):
+            error = hypot(*(_number_of(result.get(f"{name}_error")) for result in results))
             one, cells = _pair(name, unit, values, [known.get(name, nan) for known in scatters], error)
             if uphill and name in _UPHILL:
                 cells[0] = cells[0].replace(name, _UPHILL[name])
@@ -151,18 +157,16 @@ def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
 
 def _up_and_down(result: Mapping[str, Any]) -> bool:
     """Whether walkers facing up and down a slope differ."""
-    return bool(result.get("goes_uphill") and sides_apart(result))
+    return bool(result.get("goes_uphill") and result.get("facings_differ"))
 
 
-def _scatters(run: Path, result: Mapping[str, Any]) -> dict[str, float]:
+def _scatters(result: Results) -> dict[str, float]:
     """Standard deviations of columns over copies, from the result or from the table of the walkers."""
     if "velocity" not in result:
         return {}
-    from walkers.postprocess.tables import read_table
-
-    scatters = {name: _number_of(result[name]["scatter"]) for name in _VELOCITIES}
-    walkers = read_table(run, "walkers")
-    walkers = walkers[alike(sides(walkers["facing"], walkers["start_angle"]), uphill=bool(result.get("goes_uphill")))]
+    scatters = {name: float(result[declared(name).error]) for name in _VELOCITIES}
+    walkers = result.table("walkers")
+    walkers = walkers[alike(sides(walkers["facing"], walkers["start_angle"]), uphill=result["goes_uphill"])]
     for name in walkers.columns:
         of_first = name.rpartition("_")[0] in _FIRST_MAKE
         rows = walkers[walkers["make"] == 0] if of_first else walkers
@@ -173,14 +177,14 @@ def _scatters(run: Path, result: Mapping[str, Any]) -> dict[str, float]:
 
 def _errors_text(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
     """Sentences that compare the difference of two velocities with numerical errors and bands."""
-    results = [with_bands(run, result_in(run)) for run in runs]
+    results = [read(run) for run in runs]
     if not all("velocity" in result for result in results):
         return []
     if any(map(fell, results)):  # errors and bands are those of velocities along the heading
         return []
     name_of = "right_facing" if any(map(_up_and_down, results)) else "velocity"
-    errors = [numerical_error(one, name_of) for one in results]
-    own = [_number_of(one[name_of]["mean"]) for one in results]
+    errors = [_number_of(one.get(f"{name_of}_error")) for one in results]
+    own = [_number_of(one[name_of]) for one in results]
     total = hypot(*errors)
     lines = []
     if isfinite(total + own[0] + own[1]) and total > 0.0:
@@ -191,7 +195,7 @@ def _errors_text(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
             for name, error, value in zip(names, errors, own, strict=True)
             if value
         )
-        facing = ways(uphill=all(one.get("goes_uphill") for one in results))[0]
+        facing = "up" if all(one["goes_uphill"] for one in results) else "right"
         whose = "" if name_of == "velocity" else f" of those facing {facing}"
         lines.append(f"the velocities{whose} differ by {words} their numerical error ({shares})")
     lines += [
@@ -199,11 +203,12 @@ def _errors_text(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
         for name, run, error in zip(names, runs, errors, strict=True)
         if not isfinite(error)
     ]
-    for name, one, value in zip(names, results, own, strict=True):
-        if band := band_of(one, name_of, value):
-            lines.append(f"{name}: {band_text(band, 'm/s')} over the ranges of uncertain values (5 to 95 %)")
-        elif not one.get("bands"):
-            lines += [f"{name}: {sentence}" for sentence in not_known(one["rests_on"])]
+    for name, one in zip(names, results, strict=True):
+        if f"{name_of}_low" in one:
+            band = band_text(one[f"{name_of}_low"], one[f"{name_of}_high"], "m/s")
+            lines.append(f"{name}: {band} mm/s over the ranges of uncertain values (5 to 95 %)")
+        else:
+            lines += [f"{name}: {sentence}" for sentence in not_known(one.about["rests_on"])]
     return ["\n".join(lines)] if lines else []
 
 

@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from math import inf
+from math import inf, isfinite, nan
 from operator import attrgetter
 from pathlib import Path
 from stat import S_ISDIR
@@ -23,9 +23,11 @@ from typing import Any, Literal
 from walkers.errors import InputError, Problem, refused
 from walkers.inputs.case import Case
 from walkers.inputs.units import Kind, parse_quantity
-from walkers.postprocess.sides import REST, came_apart, of_tray, sides_apart, uphill_velocities
+from walkers.postprocess.numbers import is_declared, shown
+from walkers.postprocess.results import Results, plain, read
+from walkers.postprocess.sides import REST
 from walkers.postprocess.uncertainty import ACCURACY, SPREAD, SPREAD_NAME
-from walkers.rounding import counted, duration_text, rounded
+from walkers.rounding import counted, duration_text
 from walkers.runner.directory import (
     CASE_NAME,
     REPLACED,
@@ -37,7 +39,7 @@ from walkers.runner.directory import (
     recover,
 )
 from walkers.runner.files import read_json
-from walkers.runner.manifest import MANIFEST_NAME, RESULT_NAME, FileChanged, read_result
+from walkers.runner.manifest import MANIFEST_NAME
 from walkers.sweeps.making import progress_at
 from walkers.sweeps.readable import (
     FlatCase,
@@ -53,9 +55,7 @@ from walkers.sweeps.readable import (
 from walkers.sweeps.table import (
     PARSL,
     RECORD_NAME,
-    derived_columns,
     read_record,
-    result_columns,
     states,
     unfinished_state,
     worst_status,
@@ -77,9 +77,9 @@ class Entry:
     The status is finished, running, failed, or interrupted (a run can be continued, or points of a sweep are missing).
     ``age`` (s) counts from the end of the run or from the last change, ``size`` (bytes) is that of the files, for a
     sweep of its runs. ``parameters`` are those of `walkers.sweeps.readable.flattened`, for a sweep the number of values
-    of each varied key. A run has a velocity (m/s, mean over the walkers; if ``sides`` has velocities of walkers on a
-    slope, the first of them; ``words`` say what walkers on a tray do, or that they came apart) or a number of climbs; a
-    sweep has numbers of points by status.
+    of each varied key. A finished run has the ``numbers`` of its result, the main ones as text in ``result``, and for
+    walkers the ``velocity`` (m/s; on a slope up); a sweep has numbers of points by
+    status.
     """
 
     name: str
@@ -92,9 +92,8 @@ class Entry:
     reason: str | None = None
     message: str | None = None
     velocity: float | None = None
-    sides: Mapping[str, float] = field(default_factory=dict)
-    words: Sequence[str] = ()
-    climbs: int | None = None
+    result: str = "-"
+    numbers: Mapping[str, Any] = field(default_factory=dict)
     points: Mapping[str, int] | None = None
     runs: Sequence[str] = ()
 
@@ -153,17 +152,13 @@ def _run(path: Path, now: float) -> Entry | None:
         return Entry(name, case_name, status, path, age, size, parameters, reason, state.message)
     given: dict[str, Any] = {}
     try:
-        result = read_result(path)
-        velocity, climbs = result.get("velocity") or {}, result.get("climbs")
-        sides = uphill_velocities(result)
-        own = next(iter(sides.values()), velocity.get("mean"))
-        words = [told.partition(":")[0]] if (told := came_apart(result)) else of_tray(result)[1:]
-        given = {"velocity": own, "sides": sides or sides_apart(result), "words": words}
-        given["climbs"] = None if climbs is None else len(climbs)
-        if notes := result.get("by_hand"):
+        results = read(path)
+        given = {"numbers": plain(results.numbers), "result": _result_text(results)}
+        given["velocity"] = given["numbers"].get("axial_velocity" if results["goes_uphill"] else "velocity")
+        if notes := results.about["by_hand"]:
             given["reason"] = "edited and run by hand" if "edited" in " ".join(notes) else notes[0]
-    except (OSError, ValueError, AttributeError, TypeError) as error:
-        given["reason"] = f"its {RESULT_NAME} {'has changed' if isinstance(error, FileChanged) else 'cannot be read'}"
+    except InputError as error:
+        given["reason"] = error.problems[0].expected
     return Entry(name, case_name, "finished", path, _age(path / MANIFEST_NAME, now), size, parameters, **given)
 
 
@@ -274,7 +269,7 @@ def as_json(entries: Sequence[Entry]) -> list[dict[str, Any]]:
     """Entries as JSON objects, SI units; for a run, ``varies`` has the values by which runs of its case differ."""
     keys = {case: keys for case, _, keys in _varied([entry for entry in entries if not entry.is_sweep])}
     common = ("name", "case", "status", "age", "size")
-    of_runs = ("reason", "message", "velocity", "sides", "climbs")
+    of_runs = ("reason", "message", "velocity", "numbers")
     rows = []
     for entry in entries:
         shown = entry.parameters if entry.is_sweep else keys[entry.case]
@@ -310,7 +305,7 @@ def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
         for run in of_case:
             status = f"{run.status}: {run.reason}" if run.reason else run.status
             values = [readable(key, run.parameters.get(key)) for key in varied]
-            rows.append([run.name, status, _result_text(run), duration_text(run.age), bytes_text(run.size), *values])
+            rows.append([run.name, status, run.result, duration_text(run.age), bytes_text(run.size), *values])
         blocks.append(aligned(rows))
     total = [counted(len(sweeps), "sweep")] * bool(sweeps) + [counted(len(runs), "run")]
     size = bytes_text(sum(entry.size for entry in entries))
@@ -318,21 +313,32 @@ def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
     return "\n\n".join([*blocks, f"{', '.join(total)}, {size}{more}"])
 
 
-def _result_text(run: Entry) -> str:
+def _result_text(results: Results) -> str:
     """Climbs of a pile, what walkers on a tray do, or velocities; a dash if there is no result."""
-    if run.velocity is None:
-        return "-" if run.climbs is None else counted(run.climbs, "climb")
-    if run.words:
-        return ", ".join(run.words[:2])
-    sides = run.sides or {"": run.velocity}
-    told = (f"{way} {rounded(1e3 * speed, 'mm/s')}".strip() for way, speed in sides.items())
-    return "at rest" if max(map(abs, sides.values())) < REST else f"{', '.join(told)} mm/s"
+    if "velocity" not in results:
+        return counted(results["climbs"], "climb") if "climbs" in results else "-"
+    if results["came_apart"]:
+        return "came apart"
+    if isfinite(results.get("slow_share", nan)):
+        shares = {"slow": results["slow_share"], "connected": results["clustered_share"]}
+        count = results["walkers"]
+        return ", ".join(f"{round(count * share)} of {count} {state}" for state, share in shares.items())
+    names = {"velocity": ""}
+    if results["facings_differ"]:
+        names = {"right_facing": "right", "left_facing": "left"}
+        if results["goes_uphill"]:
+            names = {"axial_velocity": "started up", "axial_left_facing": "started down"}
+    elif results["goes_uphill"]:
+        names = {"axial_velocity": "uphill"}
+    if all(abs(results[name]) < REST for name in names):
+        return "at rest"
+    return ", ".join(f"{way} {shown(results[name], 'm/s')[0]}".strip() for name, way in names.items()) + " mm/s"
 
 
 def run_text(directory: Path) -> str:
     """Status and result of the run in a directory, such as ``finished, 1.08 mm/s``."""
     run = _run(directory, time.time())
-    return "missing" if run is None else f"{run.status}, {_result_text(run)}".removesuffix(", -")
+    return "missing" if run is None else f"{run.status}, {run.result}".removesuffix(", -")
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> str:
@@ -382,9 +388,12 @@ class Cleaning:
 def _own_files(directory: Path) -> list[Path]:
     """Files of the project in a sweep's directory: record, logs, bands, report and figures with default names."""
     record = read_record(directory)
-    columns = {*record.units, *derived_columns(record.analyses), *result_columns(record.analyses)}
-    names = {"report.html", *(f"{column}.png" for column in columns)}
-    pages = [path for path in directory.iterdir() if path.name in names and path.is_file() and not path.is_symlink()]
+
+    def is_page(path: Path) -> bool:
+        is_figure = path.suffix == ".png" and (path.stem in record.units or is_declared(path.stem))
+        return (is_figure or path.name == "report.html") and path.is_file() and not path.is_symlink()
+
+    pages = [path for path in directory.iterdir() if is_page(path)]
     known = [path for path in (directory / RECORD_NAME, directory / PARSL, directory / SPREAD_NAME) if path.exists()]
     return [*known, *(path for path in pages if _MARK in path.read_bytes())]
 

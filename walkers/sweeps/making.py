@@ -23,7 +23,7 @@ from typing import Any
 from walkers.errors import Stopped, WalkersError
 from walkers.inputs.case import Case
 from walkers.inputs.run import Run
-from walkers.postprocess.analysis import tabulate
+from walkers.postprocess.results import measure
 from walkers.runner.binary import Engine, is_new, model_sha256, read_audit
 from walkers.runner.directory import (
     FAILURE_NAME,
@@ -109,7 +109,7 @@ def make_runs(
     on_progress: _Tell | None = None,
     time_limit: float | None = None,
 ) -> Made:
-    """Make the missing runs in one deck, and tabulate them. A single run continues where it was interrupted.
+    """Make the missing runs in one deck, and measure them. A single run continues where it was interrupted.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def make_runs(
             ((place, case),) = missing.items()
             with open_locked(case, engine, place, locks, anew=force) as opened:
                 opened.make(on_progress=on_progress, time_limit=time_limit)
-                tabulate(opened.directory)
+                measure(opened.directory)
                 runs[place.name] = opened.finish()
         elif missing:
             left = {place.name: case for place, case in missing.items()}
@@ -380,7 +380,7 @@ def _make_together(
             shared = {"first": first, "runs": len(done), "walkers": len(deck.layout.walkers)}
             own: dict[str, Any] = {"started": started, "drive_from": 0, "segments": 1, "shared_deck": shared}
             for name in done:
-                tabulate(incomplete / name)
+                measure(incomplete / name)
                 write_manifest(cases[name], name, engine, report, directory=incomplete / name, **own)
             settle()
             for name in done:

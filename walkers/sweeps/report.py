@@ -12,12 +12,13 @@ import numpy as np
 
 from walkers.errors import InputError
 from walkers.postprocess.report.page import NAME, check_report, fill, page_of, svg_of
+from walkers.postprocess.results import read
 from walkers.postprocess.uncertainty import not_known
 from walkers.rounding import rounded
 from walkers.runner.files import write_text
 from walkers.sweeps.figure import LeftOutWarning, figure_of, readable_key
 from walkers.sweeps.readable import readable_unit
-from walkers.sweeps.table import SIDES, load, result_in, sides_differ, varied_columns, with_unit
+from walkers.sweeps.table import SIDES, load, sides_differ, varied_columns, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,8 +70,8 @@ def _figure(frame: pd.DataFrame) -> tuple[str, list[str]]:
 
 def _uncertain(frame: pd.DataFrame) -> list[str]:
     """A sentence about uncertain parameters that the sweep does not vary."""
-    results = [result_in(Path(run)) for run in frame.loc[frame["status"] == "finished", "run"]]
-    rests = [one for result in results for one in result.get("rests_on", ()) if one["key"] not in frame.columns]
+    results = [read(run) for run in frame.loc[frame["status"] == "finished", "run"]]
+    rests = [one for result in results for one in result.about["rests_on"] if one["key"] not in frame.columns]
     return [one.replace("run with", "run a point with") for one in not_known(rests)]
 
 

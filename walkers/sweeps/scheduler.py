@@ -34,10 +34,10 @@ from typing import TYPE_CHECKING
 from walkers.errors import InputError, Stopped, WalkersError, check_utf8, refused
 from walkers.inputs.case import Case
 from walkers.inputs.sweep import Sweep
-from walkers.postprocess.analysis import current_result
+from walkers.postprocess.results import ensure_measured
 from walkers.rounding import counted, duration_text
 from walkers.runner.binary import Engine, find_engine
-from walkers.runner.directory import is_locked, run_place, unfinished
+from walkers.runner.directory import is_finished, is_locked, run_place, unfinished
 from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, OutputGone, ProgramDiffers
 from walkers.show import PROGRAM_SECONDS, pairs_of_beads, predicted_overhead, predicted_seconds
 from walkers.sweeps.making import check_audit, make_runs
@@ -45,14 +45,13 @@ from walkers.sweeps.site import Site, check_path, pilots
 from walkers.sweeps.table import (
     PARSL,
     RECORD_NAME,
-    DamagedRunError,
+    UNREADABLE,
     PointState,
     SweepRecord,
     checked_states,
     describe_sweep,
     read_record,
     states,
-    velocity_in,
     velocity_of,
     with_unit,
     write_record,
@@ -347,7 +346,11 @@ def run_sweep(
         raise OutputGone(record.directory)
     if list(read_record(record.directory).runs) != list(record.runs):
         raise SweepStopped(f"{record.directory} was replaced by another sweep of the same name; the runs are kept")
-    return record, [*failures, *_failures(record, checked_states(record), [DamagedRunError.__name__])]
+    for run in dict.fromkeys(record.runs):
+        if is_finished(record.out / run):
+            with suppress(WalkersError, OSError, ValueError):  # it is among the failures
+                ensure_measured(record.out / run)
+    return record, [*failures, *_failures(record, checked_states(record), [UNREADABLE])]
 
 
 # --- workers ----------------------------------------------------------------------------------------------------------
@@ -387,7 +390,7 @@ def work(
         if list(runs) != [run_place(case, own, out).name for case in cases]:
             raise ProgramDiffers(f"the program on {node()} has another version than the one that started the sweep")
         made = make_runs(cases, out, own, on_progress=look, time_limit=time_limit)
-        return Report({name: velocity_in(current_result(run)) for name, run in made.runs.items()})
+        return Report({name: velocity_of(run) for name, run in made.runs.items()})
     except (OSError, WalkersError) as error:
         if retries and not isinstance(error, Stopped):
             return work(stop, runs, cases, out, engine, time_limit, retries - 1)

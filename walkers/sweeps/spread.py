@@ -16,9 +16,9 @@ from walkers.inputs.messages import blaming
 from walkers.inputs.origins import Origin
 from walkers.inputs.sweep import Sweep, settings_in
 from walkers.inputs.units import parse_quantity
-from walkers.postprocess.analysis import analyses, analyses_of
+from walkers.postprocess.numbers import MAIN, declared
 from walkers.postprocess.sides import REST, SEPARATED
-from walkers.postprocess.uncertainty import BANDS_ON_SLOPES, LEAST_PER_VALUE, SPREAD_NAME, spread_of
+from walkers.postprocess.uncertainty import LEAST_PER_VALUE, SPREAD_NAME, spread_of
 from walkers.rounding import SHOWN_UNITS, rounded
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
@@ -164,8 +164,7 @@ def run_spread(
         speeds = together[main_columns(together)[0]]
         counts = {"forward": int((speeds > REST).sum()), "backward": int((speeds < -REST).sum())}
         counts |= {"at_rest": int((speeds.abs() <= REST).sum()), "separated": len(table) - len(together)}
-    shown = [name for one in analyses_of(case) for name in one.headlines if name in one.columns]
-    shown = [main_columns(together)[0] if name == "velocity" else name for name in shown]
+    shown = [main_columns(together)[0]] if "velocity" in table else [name for name in MAIN if name in table]
     spread = Spread(
         directory=record.directory,
         varied=tuple(one for one in case.origins if one.range is not None),
@@ -195,7 +194,6 @@ def _ranks(table: pd.DataFrame, name: str, keys: tuple[str, ...]) -> dict[str, f
 
 def describe(spread: Spread) -> str:
     """A spread in a few lines: mm, mm/s."""
-    units = {key: unit for one in analyses() for key, (unit, _) in one.columns.items()}
     points = max((band.points for band in spread.bands.values()), default=0)
     lines = [f"  spread     {points} draws; values drawn independently from their ranges, median: value of the case"]
     lines += [
@@ -207,18 +205,22 @@ def describe(spread: Spread) -> str:
         text = ", ".join(f"{one.key} {one.text}" for one in spread.held)
         lines.append(f"    fixed    {text}; to vary these values, add ranges in [uncertain]")
     for name, band in spread.bands.items():
-        unit, factor = SHOWN_UNITS.get(units[name], (units[name], 1.0))
+        unit, factor = SHOWN_UNITS.get(declared(name).unit, (declared(name).unit, 1.0))
         low, middle, high, smallest, largest = (
             rounded(float(f"{one * factor:.3g}"), unit) for one in astuple(band)[:5]
         )
         ends = f"{low} to {high} {unit} (5 to 95 %), median {middle}; smallest {smallest}, largest {largest}"
-        lines.append(f"    {BANDS_ON_SLOPES.get(name, name):8} {ends}")
+        lines.append(f"    {declared(name).label:8} {ends}")
         ranks = ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items())
         text = f"strongest dependence: {ranks} (rank correlation)" if ranks else "no clear dependence on any of them"
         if band.points < LEAST_PER_VALUE * len(spread.varied):
             text = "too few draws for rank correlations; the band is approximate"
         lines.append(f"{'':13}{text}")
-    slope = {"forward": "go up the slope", "backward": "go down"} if BANDS_ON_SLOPES.keys() & spread.bands else {}
+    slope = (
+        {"forward": "go up the slope", "backward": "go down"}
+        if {"right_facing", "axial_velocity"} & spread.bands.keys()
+        else {}
+    )
     words = _WORDS | slope
     found = [f"{count} {words[name]}" for name, count in spread.counts.items() if count]
     found += [f"{len(spread.failures)} failed, not in the band"] if spread.failures else []

@@ -16,23 +16,23 @@ import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.errors import InputError, Problem, WalkersError, refused, suggestion
+from walkers.errors import InputError, Problem, refused, suggestion
 from walkers.inputs.axes import is_axis, plain
 from walkers.inputs.case import Case
 from walkers.inputs.keys import flatten
-from walkers.postprocess.analysis import Described, analyses, analyses_in, analyses_of, current_result
+from walkers.postprocess.numbers import GROUPS, declared, is_declared, ordered
+from walkers.postprocess.results import Results, derived, modules_of, read
 from walkers.postprocess.sides import differ
 from walkers.rounding import DIGITS, SHOWN_UNITS, counted, rounded
 from walkers.runner.binary import Engine
 from walkers.runner.directory import FAILURE_NAME, is_finished, is_locked, run_place, unfinished
 from walkers.runner.files import json_bytes, read_json, write_bytes, write_json
-from walkers.runner.manifest import read_result
 from walkers.sweeps.readable import short_keys
 
 if TYPE_CHECKING:
@@ -43,14 +43,7 @@ if TYPE_CHECKING:
 RECORD_NAME = "sweep.json"
 PARSL = "parsl"
 """Folder in a sweep's directory for Parsl's scripts and logs."""
-_FORMAT = 2
-_DRIVE = {
-    "frequency": ("Hz", "frequency of the drive"),
-    "peak_acceleration": ("m/s^2", "peak acceleration of the boundary"),
-    "peak_velocity": ("m/s", "peak velocity of the boundary"),
-    "amplitude": ("m", "amplitude of the boundary's displacement"),
-}
-"""Columns of every sweep."""
+_FORMAT = 3
 STATE = {
     "status": ("", "finished, failed, running or missing"),
     "lost": ("", "number of beads that left the simulation box; a run that loses beads has no result"),
@@ -65,14 +58,15 @@ FACING_DOWN = {"right_facing": "left_facing", "axial_velocity": "axial_left_faci
 ERRORS = {"velocity": "scatter"}
 """Columns that contain the scatter of other columns over copies."""
 FORMATS = ("csv", "parquet", "json")
-_LEFT_OUT = {
-    *("mass_asymmetry", "frequency", "peak_acceleration", "peak_velocity", "amplitude", "radius_1", "radius_2"),
-    *("scatter", "axial_velocity", "right_facing", "left_facing", "sliding_2", "sliding_pair_1", "open_1", "open_2"),
-    *("open_pair_1", "separated_fraction", "orientation_end", "turned_round", "walkers_met", "lost", "reason"),
-    *("smallest", "largest", "rotation_2", "cycles", "ended_early", "parted", "largest_group", "meeting_rate"),
-    *("largest_cluster", "nematic_order", "polar_order", "joined_speed", "speed_ratio", "axial_left_facing"),
+_SHOWN = {
+    *("gamma0", "sin_delta", "rotation_1", "sliding_1", "steady", "walkers", "upright", "work", "cost_of_transport"),
+    *("merged", "clustered_share", "held_share", "free_speed", "slow_share", "coverage"),
+    *("beads", "large", "duration", "climbs", "onset", "speed", "highest", "led_by_large", "clusters"),
+    *("surface_end", "brazil_nut_end", "settling"),
 }
-"""Columns that the printed table leaves out."""
+"""Numbers of results in the printed table, beside the main one."""
+UNREADABLE = "ResultUnreadable"
+"""Reason of points whose run is finished and whose result cannot be read."""
 _VARIED = "varied"
 """Meaning of the columns of varied keys."""
 _STATUSES = ("finished", "running", "failed", "missing", "not needed")
@@ -86,9 +80,9 @@ _MOST_FAILURES = 10
 class SweepRecord:
     """A sweep as recorded in its directory.
 
-    ``units`` has the varied keys. For each point, ``values`` has the values of these keys, ``derived`` the columns
-    `derived_columns`, ``runs`` the name of the run. ``analyses`` are those that apply to its cases; ``file`` has the
-    tables of the sweep file, if they were recorded.
+    ``units`` has the varied keys. For each point, ``values`` has the values of these keys, ``derived`` the numbers that
+    follow from the case, ``runs`` the name of the run. ``measured`` are the groups of numbers of its results
+    (`walkers.postprocess.quantities.GROUPS`); ``file`` has the tables of the sweep file, if they were recorded.
     """
 
     directory: Path
@@ -99,7 +93,7 @@ class SweepRecord:
     derived: Sequence[Mapping[str, float]]
     runs: Sequence[str]
     descent: Descent | None
-    analyses: Sequence[str]
+    measured: Sequence[str]
     file: Mapping[str, Any]
 
     @property
@@ -123,44 +117,34 @@ class SweepRecord:
         return [list(range(start, start + steps)) for start in range(0, len(self.runs), steps or 1)]
 
 
-def derived_columns(names: Sequence[str]) -> Described:
-    """Unit and meaning of the columns that the analyses of these names derive from a case."""
-    return {**{key: column for one in analyses() if one.name in names for key, column in one.derived.items()}, **_DRIVE}
+def columns_of(names: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of numbers of results, in the order of their declarations."""
+    quantities = map(declared, ordered(names))
+    return {one.name: ("" if one.unit == "share" else one.unit, one.meaning) for one in quantities}
 
 
-def result_columns(names: Sequence[str]) -> Described:
-    """Unit and meaning of the columns that the analyses of these names give for a run."""
-    return {key: column for one in analyses() if one.name in names for key, column in one.columns.items()}
-
-
-def row_of(result: Mapping[str, Any]) -> dict[str, Any]:
-    """The columns `result_columns` of a result."""
-    return {key: value for one in analyses_in(result) for key, value in one.row(result).items()}
-
-
-def derived_of(case: Case) -> dict[str, float]:
-    """The columns `derived_columns` of a case, SI units."""
-    known = {key: value for one in analyses_of(case) for key, value in one.derived_of(case).items()}
-    return known | {key: getattr(case.excitation, key) for key in _DRIVE}
+def numbers_of(groups: Iterable[str]) -> list[str]:
+    """Names of the numbers that the modules of results measure, without those of single beads."""
+    return [one.name for group in groups for one in GROUPS[group] if not one.name.endswith("*")]
 
 
 def describe_sweep(sweep: Sweep, cases: Sequence[Case], engine: Engine, out: Path) -> SweepRecord:
     """The record of a sweep with resolved points; `InputError` for descents of piles, which have no velocity."""
-    found = {one.name for case in cases for one in analyses_of(case)}
-    names = [one.name for one in analyses() if one.name in found]
-    if sweep.descent is not None and "velocity" not in result_columns(names):
+    names = list(dict.fromkeys(module.NAME for case in cases for module in modules_of(case)))
+    if sweep.descent is not None and "walking" not in names:
         raise InputError(sweep.source, [Problem("descend", None, "expected walkers: a pile has no velocity")])
-    columns, derived = derived_columns(names), [derived_of(case) for case in cases]
+    following = [derived(case) for case in cases]
+    columns = ordered({name for numbers in following for name in numbers})
     return SweepRecord(
         directory=out / sweep.name,
         name=sweep.name,
         title=sweep.title,
         units=dict(zip(sweep.keys, sweep.units, strict=True)),
         values=[[list(map(plain, one)) if isinstance(one, list) else plain(one) for one in row] for row in sweep.rows],
-        derived=[{key: known.get(key, nan) for key in columns} for known in derived],
+        derived=[{name: numbers.get(name, nan) for name in columns} for numbers in following],
         runs=[run_place(case, engine, out).name for case in cases],
         descent=sweep.descent,
-        analyses=names,
+        measured=names,
         file=sweep.file,
     )
 
@@ -179,7 +163,7 @@ def write_record(record: SweepRecord) -> None:
         "file": dict(record.file),
         "units": dict(record.units),
         "descent": vars(record.descent) if record.descent else None,
-        "analyses": list(record.analyses),
+        "measured": list(record.measured),
         "derived": list(record.derived[0]) if record.derived else [],
         "points": points,
     }
@@ -198,7 +182,7 @@ def read_record(directory: str | Path) -> SweepRecord:
             raise ValueError(f"format {contents['format']!r}, expected {_FORMAT}; run the sweep again")
         return SweepRecord(
             directory=directory,
-            **{key: contents[key] for key in ("name", "title", "units", "analyses")},
+            **{key: contents[key] for key in ("name", "title", "units", "measured")},
             values=[point["values"] for point in points],
             derived=[dict(zip(contents["derived"], point["derived"], strict=True)) for point in points],
             runs=[point["run"] for point in points],
@@ -223,7 +207,7 @@ class PointState:
     reason: str | None = None
     message: str | None = None
     lost: int = 0
-    result: Mapping[str, Any] = field(default_factory=dict)
+    result: Results | None = None
 
 
 def states(record: SweepRecord) -> list[PointState]:
@@ -243,14 +227,14 @@ def states(record: SweepRecord) -> list[PointState]:
 
 
 def checked_states(record: SweepRecord) -> list[PointState]:
-    """State of each point as from `states`, with its result; finished runs that are damaged have failed."""
+    """State of each point as from `states`, with its result; finished runs whose result cannot be read have failed."""
     found = states(record)
     for number, state in enumerate(found):
         if state.status == "finished" and state.directory is not None:
             try:
-                found[number] = replace(state, result=result_in(state.directory))
-            except DamagedRunError as error:
-                found[number] = PointState("failed", state.directory, type(error).__name__, str(error))
+                found[number] = replace(state, result=read(state.directory))
+            except InputError as error:
+                found[number] = PointState("failed", state.directory, UNREADABLE, str(error))
     return found
 
 
@@ -278,30 +262,11 @@ def unfinished_state(place: Path, directory: Path) -> PointState:
         return PointState("missing")
 
 
-def velocity_in(result: Mapping[str, Any]) -> float:
-    """Mean velocity of walkers, m/s; NaN where there are none."""
-    return float(result["velocity"]["mean"]) if "velocity" in result else nan
-
-
 def velocity_of(directory: Path) -> float:
-    """Mean velocity in the recorded result of a finished run, m/s; NaN if the files are damaged."""
-    with suppress(OSError, ValueError, KeyError, TypeError):
-        return velocity_in(read_result(directory))
-    with suppress(DamagedRunError):
-        return velocity_in(result_in(directory))
+    """Mean velocity of the walkers of a finished run, m/s; NaN if its result cannot be read."""
+    with suppress(InputError):
+        return float(read(directory).get("velocity", nan))
     return nan
-
-
-class DamagedRunError(WalkersError):
-    """A finished run whose files were changed, so that its result cannot be computed again from its dumps."""
-
-
-def result_in(directory: Path) -> dict[str, Any]:
-    """The current result of a finished run; `DamagedRunError` if it cannot be computed."""
-    try:
-        return current_result(directory)
-    except (OSError, ValueError, KeyError, TypeError, IndexError, WalkersError) as error:
-        raise DamagedRunError(f"{directory} is damaged ({error}): delete it and repeat the run") from error
 
 
 # --- the table --------------------------------------------------------------------------------------------------------
@@ -314,8 +279,8 @@ def load(directory: str | Path) -> pd.DataFrame:
     -------
     DataFrame
         One row per point, in the order of the sweep; a descent's points below its end are left out. Columns are
-        ``point``, the keys that vary (in the unit of the sweep file), and (SI units)
-        `derived_columns`, `result_columns` and `STATE`.
+        ``point``, the keys that vary (in the unit of the sweep file), and (SI units) the numbers of results
+        (`walkers.postprocess.quantities.NUMBERS`) and `STATE`.
         ``attrs["units"]`` maps columns to units, ``attrs["meanings"]`` to their meanings. Unfinished points have NaN.
     """
     import pandas as pd
@@ -326,13 +291,11 @@ def load(directory: str | Path) -> pd.DataFrame:
         # A key with several numbers, such as the radii, has a column for each.
         parts = max((len(values[place]) for values in record.values if isinstance(values[place], list)), default=0)
         varied |= dict.fromkeys([f"{key}[{part}]" for part in range(parts)] or [key], (unit or "", _VARIED))
-    found = {**derived_columns(record.analyses), **result_columns(record.analyses)}
+    points = [(number, one) for number, one in enumerate(checked_states(record)) if one.status != "not needed"]
+    names = {*numbers_of([*record.measured, "drive"]), *(name for _, one in points for name in one.result or ())}
+    found = columns_of(names)
     described = {"point": ("", "number of the point"), **varied, **found, **STATE}
-    rows = [
-        dict.fromkeys(found, nan) | _row(record, number, state)
-        for number, state in enumerate(checked_states(record))
-        if state.status != "not needed"
-    ]
+    rows = [dict.fromkeys(found, nan) | _row(record, number, state) for number, state in points]
     frame = _with_units(pd.DataFrame(rows, columns=list(described)), described)
     frame.attrs |= {"sweep": record.name, "title": record.title or record.name, "axes": record.axes}
     return frame
@@ -351,7 +314,7 @@ def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
     row |= record.derived[number]
     row |= {"status": state.status, "lost": state.lost, "reason": state.reason or ""}
     row["run"] = os.path.relpath(state.directory) if state.directory else ""
-    return row | row_of(state.result) if state.result else row
+    return row | dict(state.result or {})
 
 
 def varied_columns(frame: pd.DataFrame) -> list[str]:
@@ -442,8 +405,8 @@ def short_text(frame: pd.DataFrame) -> str:
     """
     import pandas as pd
 
-    left_out = (_LEFT_OUT - set(SIDES)) | {"velocity"} if sides_differ(frame) else _LEFT_OUT - {default_column(frame)}
-    names = [name for name in frame.columns if name not in left_out]
+    wanted = _SHOWN | (set(SIDES) if sides_differ(frame) else {"velocity", default_column(frame)})
+    names = [name for name in frame.columns if name in wanted or not (is_declared(name) or name in ("lost", "reason"))]
     shown = frame[names].copy()
     units = dict(frame.attrs.get("units", {}))
     varied = varied_columns(frame)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import hypot, nan, pi
 from typing import Any
 
@@ -177,7 +177,7 @@ def alignment_of(case: Case) -> dict[str, Any]:
     }
 
 
-def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
+def describe(prediction: dict[str, Any], result: Mapping[str, Any] | None) -> str:
     """A prediction as a table, with the result of the engine if it exists."""
     end = prediction["detachment"]
     models = {
@@ -208,17 +208,15 @@ def describe(prediction: dict[str, Any], result: dict[str, Any] | None) -> str:
     )
 
 
-def _of_engine(result: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """The result of a run as a model; on a slope of the walkers that face uphill, whom the theory describes."""
-    uphill = result["goes_uphill"] and result["right_facing"]["n"]
+def _of_engine(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """The result of a run as a model; on a slope that of the walkers that face uphill, whom the theory describes."""
+    both = result["goes_uphill"] and result["facing_right"] and result["facing_left"]
     model = {
-        "velocity": result["right_facing" if uphill else "velocity"]["mean"],
-        "rotation": [result["rotation"]["bead_1"], result["rotation"]["bead_2"]],
-        "sliding": [*result["sliding"].values()],
+        "velocity": result["velocity"],
+        "rotation": [result["rotation_1"], result["rotation_2"]],
+        "sliding": [result["sliding_1"]],
     }
-    if uphill and result["left_facing"]["n"]:  # the result has rotation and sliding of all walkers together
-        return {"engine, facing up": {"velocity": model["velocity"]}}
-    return {"engine": model}
+    return {"engine, facing up" if both else "engine": model}
 
 
 def _cells(model: dict[str, Any]) -> list[str]:

@@ -92,7 +92,6 @@ class Meetings(Analysis):
 
     order = 1
     name = "meetings"
-    version = 3
     tables = ("meetings",)
     derived: ClassVar[Described] = {
         "coverage": (
@@ -167,15 +166,6 @@ class Meetings(Analysis):
         yield Quantity("largest_group", "largest group of walkers", "", "largest_group", text)
         for name, (label, unit, text) in _NUMBERS.items():
             yield Quantity(name, label, unit, name, text)
-
-    def lines(self, result: Mapping[str, Any]) -> list[str]:
-        """Numbers of meetings, and the groups at the end."""
-        together = "; ".join(", ".join(map(str, group)) for group in result["groups_at_end"])
-        return [
-            f"  meetings   {result['merged']} merged, {result['parted']} parted, largest group "
-            f"{result['largest_group']}; at the end {f'connected: {together}' if together else 'none are connected'}",
-            f"             nematic order {result['nematic_order']:.2f}, polar order {result['polar_order']:.2f}",
-        ]
 
 
 def _table(rows: Sequence[tuple[float, str, int, int, int, float]]) -> Columns:

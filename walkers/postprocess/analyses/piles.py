@@ -11,7 +11,7 @@ import numpy as np
 
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
-from walkers.postprocess.analysis import Analysis, Described, Quantity, tables_of
+from walkers.postprocess.analysis import Analysis, Described, Quantity
 from walkers.postprocess.clusters import (
     Beads,
     ClimbCriteria,
@@ -28,11 +28,7 @@ from walkers.postprocess.clusters import (
 )
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import FLOOR, Bridges, Motion, read_bridges
-from walkers.postprocess.tables import Columns
-from walkers.postprocess.uncertainty import wrapped
-
-_WHOLE = 1.0 - 1e-6
-"""Fraction of the duration below which a run ended early."""
+from walkers.postprocess.tables import Columns, read_columns
 
 
 class Pile(Analysis):
@@ -40,9 +36,7 @@ class Pile(Analysis):
 
     order = 2
     name = "pile"
-    version = 12
     tables = ("bed", "clusters", "events", "members", "assembly")
-    headlines = ("climbs", "highest", "speed")
     derived: ClassVar[Described] = {
         "beads": ("", "number of beads"),
         "large": ("", "number of large beads"),
@@ -137,39 +131,6 @@ class Pile(Analysis):
             yield Quantity(f"{place}.speed", f"{name}: speed", "m/s")
             yield Quantity(f"{place}.size", f"{name}: beads")
 
-    def lines(self, result: Mapping[str, Any]) -> list[str]:
-        """The bed, and the climbs with their times, speeds and leaders."""
-        surface, nuts, bridges = result["surface"], result["brazil_nut"], result["coordination"]
-        rest, shaken = bridges["rest"], bridges["shaken"]
-        early = result["driven"] < _WHOLE * result["duration"]
-        lines = [
-            f"{result['case']}: {result['beads']} beads ({result['large']} large), {result['drive']}",
-            f"  time       {result['driven']:.3g} s shaken, after {result['settling']:.3g} s of settling"
-            + (f"; ended before {result['duration']:.3g} s: climbers left the container" if early else ""),
-            f"  surface    {surface['start'] * 1e3:.2f} mm at the start, {surface['end'] * 1e3:.2f} mm at the end",
-            f"  segregation (z_large - z_small)/(z_large + z_small): {nuts['start']:.3f} at the start, "
-            f"{nuts['end']:.3f} at the end",
-            f"  bridges    between beads, at rest: {_bridges_text(rest)}",
-        ]
-        if shaken:
-            lines.append(f"             while shaken: {_bridges_text(shaken)}")
-        lines += [
-            f"  clusters   {result['clusters']} came free of the pile, held by a wall"
-            + "".join(f", {count} {kind}" for kind, count in result["events"].items()),
-            f"  climbs     {len(result['climbs']) or 'none'}",
-        ]
-        for climb in result["climbs"]:
-            speed = "-" if climb["speed"] is None else f"{climb['speed'] * 1e3:.2f}"
-            where = "in the corner" if len(climb["walls"]) > 1 else "on the wall"
-            lines.append(
-                f"    {climb['begin']:.2f} to {climb['end']:.2f} s: {climb['gain'] * 1e3:.2f} mm up to "
-                f"{climb['height'] * 1e3:.2f} mm {where} {' '.join(climb['walls'])} at {speed} mm/s, led by a "
-                f"{_leader(climb)} bead, {climb['size']} beads ({climb['large']} large)"
-                + (f"; over the rim, at {result['rim'] * 1e3:g} mm" if climb["height"] > result["rim"] else "")
-                + ("" if climb["out_of_pile"] else "; on the wall since the start of the drive")
-            )
-        return lines + wrapped(self.uncertainty(result))
-
     def point_data(self, motion: Motion) -> Callable[[Bridges], Columns]:
         """Cluster and track of each bead, and whether it climbs."""
         track, climber = tracks_of(motion)
@@ -218,17 +179,13 @@ def _climb_row(climbs: Columns, place: int) -> dict[str, Any]:
 
 def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
     """Track of each bead of a pile, -1 for none, and whether it climbs; shape (F, N)."""
-    tables = tables_of(motion.directory)
-    members, climbed = tables["members"], tables["clusters"]["climbed"]
+    members = read_columns(motion.directory, "members")
+    climbed = read_columns(motion.directory, "clusters")["climbed"]
     track = np.full(motion.position.shape[:2], -1, dtype=np.int64)
     frame = np.searchsorted(motion.time, members["time"]).clip(max=len(motion.time) - 1)
     there = motion.time[frame] == members["time"]  # a motion need not have all frames
     track[frame[there], members["bead"][there]] = members["track"][there]
     return track, np.append(climbed, False)[track]
-
-
-def _bridges_text(counts: Mapping[str, Any]) -> str:
-    return f"{counts['bridges']:.2f} per bead, {counts['contacts']:.2f} of them in contact"
 
 
 def _leader(climb: Mapping[str, Any]) -> str:

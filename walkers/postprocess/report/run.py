@@ -10,19 +10,13 @@ from walkers.extras import require
 from walkers.inputs.case import Case
 from walkers.inputs.keys import dotted
 from walkers.inputs.origins import Origin, text_of
-from walkers.postprocess.analysis import (
-    analyses_in,
-    current_result,
-    quantities_of,
-    uncertainty_of,
-    warnings_of,
-)
 from walkers.postprocess.caption import caption
 from walkers.postprocess.figures import figures_of
 from walkers.postprocess.motion import read_motion
+from walkers.postprocess.numbers import rows
 from walkers.postprocess.report.page import LARGEST, NAME, check_report, fill, page_of, svg_of
 from walkers.postprocess.report.player import MOST_PLACES, player_of
-from walkers.postprocess.uncertainty import rests_on, with_bands
+from walkers.postprocess.results import Results, headlines, read
 from walkers.runner.directory import case_of
 from walkers.runner.files import write_text
 from walkers.runner.manifest import read_manifest
@@ -59,12 +53,11 @@ def report_run(
     path = to or directory / NAME
     check_report(path)
     case, motion = case_of(directory), read_motion(directory)
-    rests = {"rests_on": rests_on(origins)} if origins is not None else {}
     title = case.title or case.name
     run = {
         "name": directory.resolve().name,
         "title": title,
-        "shown": shown_of(case, with_bands(directory, current_result(directory) | rests), origins),
+        "shown": shown_of(case, read(directory, origins), origins),
         "manifest": read_manifest(directory),
         "figures": {name: svg_of(figure) for name, figure in figures_of(directory).items()},
     }
@@ -80,13 +73,11 @@ def report_run(
     return path
 
 
-def shown_of(case: Case, result: dict[str, Any], origins: Origins = None) -> dict[str, Any]:
-    """Warnings, quantities and uncertainties of a result; summary and parameters of a case.
+def shown_of(case: Case, results: Results, origins: Origins = None) -> dict[str, Any]:
+    """Warnings and rows of a result; summary and parameters of a case.
 
-    Parameters without recorded origins are in SI units. Given ``origins`` are also the source of what is uncertain.
+    Parameters without recorded origins are in SI units.
     """
-    if origins is not None:
-        result = {**result, "rests_on": rests_on(origins)}
     parameters = [
         vars(one) | {"range": " … ".join(map(text_of, one.range or ())), "origin": one.word}
         for one in (case.origins if origins is None else origins)
@@ -95,18 +86,15 @@ def shown_of(case: Case, result: dict[str, Any], origins: Origins = None) -> dic
     as_run = [{"key": key, "text": text_of(value)} for key, value in said]
     return {
         "summary": f"{caption(case)}.",
-        "uncertainty": uncertainty_of(result),
-        "warnings": warnings_of(result),
-        "quantities": quantities_of(result),
+        "warnings": results.warnings,
+        "rows": rows(results),
         "guessed": [one for one in parameters if one["origin"] == "guessed"],
         "uncertain": [one for one in parameters if one["origin"].endswith("uncertain")],
         "parameters": parameters or as_run,
     }
 
 
-def result_html(directory: Path, result: dict[str, Any], origins: Origins = None) -> str:
+def result_html(results: Results, origins: Origins = None) -> str:
     """A result as an HTML fragment: table with errors and units, warnings, collapsed parameters."""
-    result = with_bands(directory, result)
-    headline = next((line for one in analyses_in(result) for line in one.lines(result)), result["case"])
-    shown = shown_of(case_of(directory), result, origins)
-    return fill("result.html.j2", headline=headline, shown=shown, run=directory.name)
+    shown = shown_of(case_of(results.directory), results, origins)
+    return fill("result.html.j2", headlines=headlines(results), shown=shown, run=results.directory.name)

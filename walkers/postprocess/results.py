@@ -1,0 +1,279 @@
+"""Results of runs: measured and written once, read by all.
+
+A result is flat: a number of each name of `walkers.postprocess.numbers.NUMBERS`. Each module of `modules` has three
+functions: ``applies(case)``; ``derived(case)``, the numbers that follow from the case alone; and ``measure(motion)``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import isfinite, nan
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from walkers.errors import InputError, refused
+from walkers.inputs.run import limits_of
+from walkers.postprocess.caption import conditions
+from walkers.postprocess.numbers import headline, rows
+from walkers.postprocess.sides import REST
+from walkers.postprocess.uncertainty import accuracy_of, bands_of, lines_of_rest, rests_on
+from walkers.rounding import percent
+from walkers.runner.directory import SEGMENT_NAME, files_of_segments, segment_directories
+from walkers.runner.files import read_json, write_json
+from walkers.runner.manifest import RESULT_NAME, check_unchanged, recomputed
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from walkers.inputs.case import Case
+    from walkers.inputs.origins import Origin
+    from walkers.postprocess.tables import Columns
+
+VERSION = 1
+"""Of all methods together: a result of another version is measured again."""
+_DRIVE = ("frequency", "peak_acceleration", "peak_velocity", "amplitude")
+
+
+@dataclass(frozen=True)
+class Results(Mapping[str, Any]):
+    """The result of a run: numbers in SI units by name; NaN if one is not defined.
+
+    Attributes
+    ----------
+    directory
+        The run directory.
+    numbers
+        The numbers, with both ends of bands (``velocity_low``, ``velocity_high``) and numerical errors if these exist.
+    warnings
+        Reasons to doubt the numbers.
+    about
+        ``case``, ``drive``, ``rests_on`` (`walkers.postprocess.uncertainty.rests_on`), ``by_hand`` (notes on a deck
+        that was run by hand), ``tables`` (their names).
+    """
+
+    directory: Path = field(compare=False)
+    numbers: Mapping[str, Any]
+    warnings: Sequence[str]
+    about: Mapping[str, Any]
+
+    def __getitem__(self, name: str) -> Any:
+        """A number."""
+        return self.numbers[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """The names of the numbers."""
+        return iter(self.numbers)
+
+    def __len__(self) -> int:
+        """How many numbers there are."""
+        return len(self.numbers)
+
+    def columns(self, table: str) -> Columns:
+        """A table as arrays."""
+        from walkers.postprocess.tables import read_columns
+
+        return read_columns(self.directory, table)
+
+    def table(self, table: str) -> pd.DataFrame:
+        """A table as a data frame."""
+        from walkers.postprocess.tables import read_table
+
+        return read_table(self.directory, table)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON types: the numbers, None for NaN, and what stands beside them."""
+        return {**self.about, **plain(self.numbers), "warnings": list(self.warnings)}
+
+
+def modules() -> tuple[Any, ...]:
+    """The modules that measure, in the order of results."""
+    from walkers.postprocess import walking
+    from walkers.postprocess.former import meetings, piles
+
+    return walking, meetings, piles
+
+
+def modules_of(case: Case) -> list[Any]:
+    """The modules that measure a case."""
+    return [module for module in modules() if module.applies(case)]
+
+
+def derived(case: Case) -> dict[str, Any]:
+    """Numbers of a result that follow from the case alone."""
+    numbers = {name: getattr(case.excitation, name) for name in _DRIVE}
+    for module in modules_of(case):
+        numbers |= module.derived(case)
+    return numbers
+
+
+def measure(directory: str | Path) -> Results:
+    """Measure a run, finished or not; write its tables and, last, ``result.json``.
+
+    Raises
+    ------
+    postprocess.dump.DumpError
+        If a dump cannot be read.
+    runner.manifest.FileChanged
+        If a dump of a finished run is not what it was.
+    """
+    _measure(Path(directory))
+    return read(directory)
+
+
+def _measure(directory: Path) -> None:
+    """Write tables and result of a run."""
+    from walkers.postprocess.motion import read_motion
+    from walkers.postprocess.tables import write_table
+
+    check_unchanged(directory, files_of_segments(directory))
+    motion = read_motion(directory)
+    case = motion.case
+    parts = [module.measure(motion) for module in modules_of(case)]
+    tables = {name: columns for part in parts for name, columns in part.tables.items()}
+    numbers = derived(case) | {"goes_uphill": case.goes_uphill, "truncated": motion.truncated}
+    for part in parts:
+        numbers |= part.numbers
+    notes = read_json(segment_directories(directory)[-1] / SEGMENT_NAME).get("by_hand") or []
+    warnings = [*notes, *(warning for part in parts for warning in part.warnings)]
+    if names := limits_of(case).exceeded_by(case.run.time_step):
+        warnings.append(f"the time step is beyond a limit of stability ({', '.join(names)}): the results are wrong")
+    if motion.truncated:
+        warnings.append("the dump ends within a frame")
+    contents = {
+        "version": VERSION,
+        "case": case.name,
+        "drive": conditions(case),
+        "rests_on": rests_on(case.origins),
+        "by_hand": notes,
+        "tables": list(tables),
+        "numbers": plain(numbers),
+        "warnings": warnings,
+    }
+    with recomputed(directory, [*(f"{name}.parquet" for name in tables), RESULT_NAME]):
+        for name, columns in tables.items():
+            write_table(directory, name, columns)
+        write_json(directory / RESULT_NAME, contents)
+
+
+def read(directory: str | Path, origins: Sequence[Origin] | None = None) -> Results:
+    """The result of a run, with the bands of a spread beside it and its numerical errors; nothing is written.
+
+    ``origins`` are the sources of the values of the case, if they are not those of the case that made the run.
+    `InputError` if the result is missing, damaged or of another version.
+    """
+    directory = Path(directory)
+    about = recorded(directory)
+    numbers, warnings = about.pop("numbers"), about.pop("warnings")
+    if origins is not None:
+        about["rests_on"] = rests_on(origins)
+    numbers |= bands_of(directory, about["rests_on"], numbers)
+    accuracy = accuracy_of(directory)
+    numbers |= {f"{name}_error": error["total"] for name, error in accuracy.get("errors", {}).items()}
+    if (main := f"{headline(numbers)}_error") in numbers:
+        numbers["numerical_error"] = numbers[main]
+    if not accuracy.get("reached", True):
+        change = percent(float(f"{accuracy['change']:.2g}"))
+        warnings = [*warnings, f"the numerical error is not converged: the hardest beads still change {change}"]
+    return Results(directory, numbers, warnings, about)
+
+
+def recorded(directory: Path) -> dict[str, Any]:
+    """What ``result.json`` contains, without bands and numerical errors; `InputError` as from `read`."""
+    again = f"walkers run {directory} measures it again"
+    try:
+        contents = read_json(directory / RESULT_NAME)
+        version, _ = contents.pop("version"), (contents["warnings"], contents["rests_on"], contents["tables"])
+        contents["numbers"] = {name: nan if one is None else one for name, one in contents["numbers"].items()}
+    except FileNotFoundError as error:
+        raise refused(directory, f"has no {RESULT_NAME}; {again}") from error
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise refused(directory, f"its {RESULT_NAME} cannot be read ({error}); {again}") from error
+    if version != VERSION:
+        raise refused(directory, f"was measured by another version of the program; {again}")
+    return contents
+
+
+def ensure_measured(directory: Path) -> None:
+    """Measure a finished run again if a file of its result is missing, damaged, edited or of another version.
+
+    Its errors are those of `measure`.
+    """
+    try:
+        names = [RESULT_NAME, *(f"{name}.parquet" for name in recorded(directory)["tables"])]
+        if check_unchanged(directory, names):
+            return
+    except (InputError, OSError, ValueError):
+        pass
+    _measure(directory)
+
+
+def plain(numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """Numbers as JSON types: None for those that are not finite."""
+    plain = {name: one.item() if hasattr(one, "item") else one for name, one in numbers.items()}
+    return {name: None if isinstance(one, float) and not isfinite(one) else one for name, one in plain.items()}
+
+
+def text(results: Results, *, cached: bool = False) -> str:
+    """A result in lines: what happens, the numbers with their errors, warnings, sources of values, directory.
+
+    ``cached`` results are marked as already run.
+    """
+    first, *rest = headlines(results)
+    if cached and not results.about["by_hand"]:  # it was never made by a command
+        first += " (already run)"
+    table = [(one.label, one.text, one.unit, one.error) for one in rows(results)]
+    wide = [max((len(row[place]) for row in table), default=0) for place in range(3)]
+    return "\n".join(
+        [
+            first,
+            *(f"  {line}" for line in rest),
+            *(
+                f"  {label:{wide[0]}}  {value:>{wide[1]}} {unit:{wide[2]}}  {error}".rstrip()
+                for label, value, unit, error in table
+            ),
+            *(f"  warning: {warning}" for warning in results.warnings),
+            *lines_of_rest(results.about["rests_on"]),
+            f"  run        {results.directory}",
+        ]
+    )
+
+
+def headlines(results: Results) -> list[str]:
+    """The case and its drive; what walkers on a slope do; why the numbers may say little."""
+    drive, numbers = results.about["drive"], results.numbers
+    if all(isfinite(numbers.get(name, nan)) for name in ("gamma0", "sin_delta")):
+        drive += f", Γ0 = {numbers['gamma0']:.3g}, sin δ = {numbers['sin_delta']:.3g}"
+    states = [one for one in (_ways(numbers), _postures(numbers), *_doubts(numbers)) if one]
+    if not states:
+        return [f"{results.about['case']}: {drive}"]
+    return [f"{results.about['case']}: {'; '.join(states)}", drive]
+
+
+def _ways(numbers: Mapping[str, Any]) -> str:
+    """Numbers of walkers by their way on a slope: "all 6 go down", or "3 climb, 3 rest"."""
+    if "climbing" not in numbers or numbers["came_apart"]:
+        return ""
+    count, ways = numbers["walkers"], [numbers["climbing"], numbers["descending"]]
+    words = (("climbs", "climb"), ("goes down", "go down"), ("rests", "rest"))
+    return ", ".join(
+        f"{'all ' * (1 < number == count)}{number} {said[number > 1]}"
+        for number, said in zip([*ways, count - sum(ways)], words, strict=True)
+        if number
+    )
+
+
+def _postures(numbers: Mapping[str, Any]) -> str:
+    """Numbers of walkers by posture, of those that do not stay upright."""
+    names = ("leaning", "turned_over")
+    return ", ".join(f"{numbers[name]} {name.replace('_', ' ')}" for name in names if numbers.get(name))
+
+
+def _doubts(numbers: Mapping[str, Any]) -> Iterator[str]:
+    if numbers.get("came_apart"):
+        share = percent(round(numbers["separated_fraction"], 2))
+        yield f"came apart: beads beyond the rupture distance for {share} of the time"
+    elif abs(numbers.get(headline(numbers), nan)) < REST and "velocity" in numbers and "climbing" not in numbers:
+        yield f"at rest (below {1e3 * REST:g} mm/s)"
+    if numbers.get("depends_on_start"):
+        yield "depends on the start"
