@@ -9,9 +9,8 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from math import degrees
+from math import degrees, inf, sqrt
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.gait import averages, walk
-from walkers.postprocess.motion import Group, Motion
+from walkers.postprocess.motion import Motion
 
 SPEED, GAIT, ORIENTATION = 1e-4, 1e-3, 0.1
 """Tolerances: velocities of walkers (relative); rotation and sliding, relative to the fastest of them; final
@@ -85,15 +84,51 @@ def crosscheck(
 def compare(motions: Sequence[Motion], without: Collection[str] = ()) -> list[Line]:
     """Compare finished runs of a case, one per start, with the second engine without some terms."""
     starts = [Start(motion, simulate(motion, without)) for motion in motions]
-    first, second = starts[0].first, starts[0].second
-    if first.case.mixture is not None:
-        lines = list(_pile_lines(starts))
-    else:
-        lines = [] if first.groups else list(_drift(first, second))
-        for number, groups in enumerate(zip(first.groups, second.groups, strict=True)):
-            lines += _walker_lines(*groups, f" ({number + 1})" if len(first.groups) > 1 else "")
-    check = " without ".join([first.case.name, *([", ".join(without)] if without else [])])
+    pile = motions[0].case.mixture is not None
+    sides, names = ([start.first for start in starts], [start.second for start in starts]), [*measured(motions[0])]
+    numbers = [np.mean([[*measured(motion).values()] for motion in side], axis=0).tolist() for side in sides]
+    speeds = [abs(speed) for (_, unit), speed in zip(names, numbers[0], strict=True) if unit == "mm/s"]
+    lines = []
+    for (what, unit), one, two in zip(names, *numbers, strict=True):
+        allowed = {"mm/s": max(GAIT * max(speeds), SPEED_FLOOR), "°": ORIENTATION}.get(unit, inf)
+        if what.startswith("velocity"):
+            allowed = max(SPEED * abs(one), SPEED_FLOOR)
+        if unit != "%" or one or two:
+            lines.append(Line(what, one, two, inf if pile else allowed, unit, scale=None if pile else 1.0))
+    check = " without ".join([motions[0].case.name, *([", ".join(without)] if without else [])])
     return [replace(line, check=check) for line in [*lines, *(line for start in starts for line in start.lines())]]
+
+
+def measured(motion: Motion) -> dict[tuple[str, str], float]:
+    """Numbers of a motion by name and unit: means over the walkers of each make, of loose beads, or of a pile.
+
+    Those of a pile are means over the second half of the drive.
+    """
+    if motion.case.mixture is not None:
+        late = motion.select(slice(int(np.searchsorted(motion.time, motion.time[-1] / 2.0)), None))
+        touching = sum(len(close_pairs(position, late.radius)) for position in late.position)
+        return {
+            ("height of the beads", "mm"): 1e3 * float(late.position[..., 2].mean()),
+            ("root mean square velocity", "mm/s"): 1e3 * sqrt(float(np.sum(late.velocity**2, axis=-1).mean())),
+            ("touching pairs per bead", ""): touching / late.position[..., 0].size,
+        }
+    if not motion.groups:
+        way = motion.radius**3 / np.sum(motion.radius**3) @ (motion.position[-1] - motion.position[0])
+        speeds = (1e3 * way / np.ptp(motion.time)).tolist()
+        return {(f"centre of mass along {axis}", "mm/s"): speeds["xyz".index(axis)] for axis in "zyx"}
+    numbers: dict[tuple[str, str], float] = {}
+    for number, group in enumerate(motion.groups, 1):
+        label = f" ({number})" if len(motion.groups) > 1 else ""
+        beads = [f"bead {bead + 1}" for bead in range(len(group.radii))]
+        contacts = [*beads, *(f"beads {first + 1}-{second + 1}" for first, second in group.make.pairs)]
+        numbers[f"velocity{label}", "mm/s"] = 1e3 * float(walk(group).velocity.mean())
+        gait, kinds = averages(group), (("rotation", beads), ("sliding", contacts), ("open", contacts))
+        for what, places in kinds:
+            factor, unit = (100.0, "%") if what == "open" else (1e3, "mm/s")
+            means = (factor * getattr(gait, what).mean(axis=0)).tolist()
+            numbers |= {(f"{what} {place}{label}", unit): mean for place, mean in zip(places, means, strict=True)}
+        numbers[f"orientation at the end{label}", "°"] = degrees(float(group.orientation[-1].mean()))
+    return numbers
 
 
 def shortened(case: Case, cycles: int) -> Case:
@@ -137,63 +172,6 @@ def _advanced(engine: SecondEngine, motion: Motion) -> Iterator[tuple[FloatArray
         dense = engine.run(length, 1 if motion.groups else every)
         frames = dense[every - 1 :: every].copy() if motion.groups else dense
         yield frames, dense[..., 6:].reshape(end - begin, -1, dense.shape[1], 3).mean(axis=1)
-
-
-def _drift(first: Motion, second: Motion) -> Iterator[Line]:
-    """Mean velocity of the centre of mass of loose beads."""
-    weights = first.radius**3 / np.sum(first.radius**3)
-    speeds = [1e3 * weights @ (one.position[-1] - one.position[0]) / np.ptp(one.time) for one in (first, second)]
-    allowed = max(GAIT * float(np.linalg.norm(speeds[0])), SPEED_FLOOR)
-    for axis, one, two in reversed(list(zip("xyz", *speeds, strict=True))):
-        yield Line(f"centre of mass along {axis}", float(one), float(two), allowed, "mm/s", scale=1.0)
-
-
-def _walker_lines(first: Group, second: Group, label: str) -> Iterator[Line]:
-    """Velocity, rotation, sliding and open shares of a make's walkers, means over them."""
-    speed, other = (1e3 * float(walk(one).velocity.mean()) for one in (first, second))
-    yield Line(f"velocity{label}", speed, other, max(SPEED * abs(speed), SPEED_FLOOR), "mm/s", scale=1.0)
-    beads = [f"bead {bead + 1}" for bead in range(len(first.radii))]
-    contacts = [*beads, *(f"beads {one + 1}-{two + 1}" for one, two in first.make.pairs)]
-    both = averages(first), averages(second)
-
-    def means(what: str, names: list[str], factor: float) -> list[tuple[str, float, float]]:
-        one, two = ((factor * getattr(found, what).mean(axis=0)).tolist() for found in both)
-        return [(f"{what} {name}{label}", *of) for name, *of in zip(names, one, two, strict=True)]
-
-    found = [*means("rotation", beads, 1e3), *means("sliding", contacts, 1e3)]
-    allowed = max(GAIT * max(abs(speed), *(abs(one) for _, one, _ in found)), SPEED_FLOOR)
-    for name, one, two in found:
-        yield Line(name, one, two, allowed, "mm/s", scale=1.0)
-    for name, one, two in means("open", contacts, 100.0):
-        if one or two:
-            yield Line(name, one, two, unit="%")
-    end, other = (degrees(float(one.orientation[-1].mean())) for one in (first, second))
-    yield Line(f"orientation at the end{label}", end, other, ORIENTATION, "°", scale=1.0)
-
-
-def _pile_lines(starts: Sequence[Start]) -> Iterator[Line]:
-    """Means of piles over the second half of the drive and over the starts."""
-    measures: dict[str, tuple[str, Callable[[Motion], Any]]] = {
-        "height of the beads": ("mm", lambda motion: 1e3 * motion.position[..., 2].mean()),
-        "root mean square velocity": (
-            "mm/s", lambda motion: 1e3 * np.sqrt(np.mean(np.sum(motion.velocity**2, axis=-1))),
-        ),
-        "touching pairs per bead": ("", _touching),
-    }  # fmt: skip
-
-    def later(motion: Motion) -> Motion:
-        return motion.select(slice(int(np.searchsorted(motion.time, motion.time[-1] / 2.0)), None))
-
-    halves = [(later(start.first), later(start.second)) for start in starts]
-    for name, (unit, of) in measures.items():
-        values = np.array([[of(motion) for motion in both] for both in halves], dtype=np.float64)
-        one, two = values.mean(axis=0).tolist()
-        yield Line(name, one, two, unit=unit)
-
-
-def _touching(motion: Motion) -> float:
-    found = sum(len(close_pairs(position, motion.radius)) for position in motion.position)
-    return found / len(motion.position) / len(motion.radius)
 
 
 def crosschecks(out: Path, *, quick: bool = False) -> Iterator[Line]:
