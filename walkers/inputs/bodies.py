@@ -176,7 +176,12 @@ class Walkers(Table):
     @cached_property
     def pairs(self) -> Pairs:
         """The beads of a walker that touch at the start, numbered from 0."""
-        return touching(self.design, self.radii, _TOUCHING)
+        pairs, last = touching(self.design, self.radii, _TOUCHING), len(self.radii) - 1
+        if self.arrangement == "ring":  # closed by the last pair
+            pairs = (*(pair for pair in pairs if pair != (0, last)), (0, last))
+        if self.arrangement == "fan" and last > 2:  # not closed, even by beads all around
+            pairs = tuple(pair for pair in pairs if pair != (1, last))
+        return pairs
 
     @property
     def bridged(self) -> list[tuple[float, list[float]]]:
