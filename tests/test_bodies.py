@@ -22,9 +22,9 @@ from walkers.inputs.loads import contact_loads
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.standing import standing
 from walkers.inputs.toml import read_toml
-from walkers.postprocess.analyses.meetings import Course, collective
 from walkers.postprocess.figures import figures_of
 from walkers.postprocess.gait import postures, turned_over_at
+from walkers.postprocess.meetings import Course, collective
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.results import headlines, read
 from walkers.postprocess.tables import read_table

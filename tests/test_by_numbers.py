@@ -23,11 +23,11 @@ from walkers.inputs.drive import Harmonic, waveform
 from walkers.inputs.loads import bridge_at_rest, contact_loads
 from walkers.inputs.table import changed
 from walkers.inputs.units import Kind, quantity_text
-from walkers.postprocess.analyses.piles import _bed, _joined
 from walkers.postprocess.cycles import work_of
 from walkers.postprocess.films import speed_text
 from walkers.postprocess.gait import gait, settled_samples, turned_over_at
 from walkers.postprocess.motion import Bridges, Group, Motion
+from walkers.postprocess.piles import _joined, _of_climbs, _state_of
 from walkers.postprocess.report.player import _points
 from walkers.postprocess.scene import Scene, turns_of
 from walkers.postprocess.uncertainty import SPREAD_NAME, bands_of, spread_of
@@ -353,7 +353,7 @@ def test_the_state_of_a_bed() -> None:
     joined, bulk = _joined(bridges, 4), np.array([True, True, False, False])
     assert joined[1].tolist() == [False, False, True, False]
     moved = replace(motion, position=position, velocity=velocity)
-    state = _bed(moved, bridges, joined, bulk, [(frozenset({2, 3}), frozenset({SIDE}))])
+    state = _state_of(moved, bridges, joined, bulk, [(frozenset({2, 3}), frozenset({SIDE}))])
     bed = SimpleNamespace(**state)
     assert (bed.touching, bed.opened, bed.contacts, bed.bridges) == (1, 1, 0.5, 1.0)
     assert (bed.at_wall, bed.large_at_wall, bed.bulk, bed.clusters) == (1, 0, 2, 1)
@@ -362,6 +362,24 @@ def test_the_state_of_a_bed() -> None:
     assert bed.brazil_nut_of_bulk == 0.0
     assert (bed.mean_force, bed.highest) == pytest.approx((2e-6, 5e-3))
     assert bed.surface == pytest.approx(2.5e-3)  # both large beads are in one cell, 2 mm wide
+
+
+def test_the_numbers_of_climbs() -> None:
+    """The first counts from 0.5 s, though its greatest gain begins later; the speed of the second is not measured."""
+    clusters = {
+        "track": np.arange(3),
+        "climbed": np.array([True, True, False]),
+        "begin": np.array([3.0, 1.0, 0.1]),
+        "onset": np.array([0.5, 1.0, np.nan]),
+        "speed": np.array([2e-3, np.nan, 9e-3]),
+        "height": np.array([5e-3, 4e-3, 8e-3]),
+        "leader_large": np.array([False, True, True]),
+    }
+    expected = {"climbs": 2, "onset": 0.5, "speed": 2e-3, "highest": 5e-3, "led_by_large": 1}
+    assert _of_climbs(clusters) == expected
+    none = _of_climbs({name: column[2:] for name, column in clusters.items()})
+    assert (none["climbs"], none["led_by_large"]) == (0, 0)
+    assert np.isnan([none["onset"], none["speed"], none["highest"]]).all()
 
 
 # --- pictures ---------------------------------------------------------------------------------------------------------

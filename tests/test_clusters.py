@@ -7,10 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from walkers.postprocess.analyses.piles import segregation
 from walkers.postprocess.clusters import (
     Beads,
-    ClimbCriteria,
     Track,
     assembly_of,
     bulk_of,
@@ -22,6 +20,7 @@ from walkers.postprocess.clusters import (
 )
 from walkers.postprocess.dump import BoolArray, FloatArray
 from walkers.postprocess.motion import Bridges
+from walkers.postprocess.piles import segregation
 from walkers.postprocess.tables import Columns
 
 BULK = list(range(20))
@@ -58,8 +57,7 @@ class Scene:
     def beads(self, height: FloatArray, surface: FloatArray | None = None, bulk: Sequence[BoolArray] = ()) -> Beads:
         return Beads(TIME, height, self.large, np.zeros(FRAMES) if surface is None else surface, bulk, 0, NAMES)
 
-    def climbs(self, definition: ClimbCriteria | None = None) -> tuple[list[Track], list[SimpleNamespace]]:
-        rule = definition or ClimbCriteria()
+    def climbs(self) -> tuple[list[Track], list[SimpleNamespace]]:
         clusters, bulks = [], []
         for pairs, walls in zip(self.pairs, self.walls, strict=True):
             bridges = bridges_of([*pairwise(BULK), *pairs], walls)
@@ -67,9 +65,9 @@ class Scene:
             bulks.append(bulk_of(labels, bridges))
             clusters.append(list(held_clusters(labels, bridges, bulks[-1])))
         beads = self.seen = self.beads(self.height, bulk=bulks)
-        tracks = follow(TIME, clusters, rule)
-        self.table = climbs_of(tracks, beads, rule)
-        events = rows_of(events_of(tracks, self.table, beads, rule))
+        tracks = follow(TIME, clusters)
+        self.table = climbs_of(tracks, beads)
+        events = rows_of(events_of(tracks, self.table, beads))
         self.events = [(event.event, event.track, event.other) for event in events]
         return tracks, rows_of(self.table)
 
@@ -94,7 +92,7 @@ def test_a_climber_is_above_the_surface_as_it_is_then() -> None:
     scene.height[:, 20:22] += 3e-3 * TIME[:, None]
     (track,), _ = scene.climbs()
     beads = scene.beads(scene.height, np.linspace(3e-3, 1e-3, FRAMES))
-    (climb,) = rows_of(climbs_of([track], beads, ClimbCriteria()))
+    (climb,) = rows_of(climbs_of([track], beads))
     assert climb.height == pytest.approx(5e-3 + 3e-3 * TIME[-1])
     assert climb.above_surface == pytest.approx(4e-3 + 3e-3 * TIME[-1])
 
@@ -107,7 +105,7 @@ def test_the_error_of_a_speed_is_its_scatter() -> None:
     for _ in range(200):
         height = scene.height.copy()
         height[:, 20:22] += np.cumsum(draw.normal(5e-3, 20e-3, FRAMES) * 0.02)[:, None]
-        (climb,) = rows_of(climbs_of([track], scene.beads(height), ClimbCriteria()))
+        (climb,) = rows_of(climbs_of([track], scene.beads(height)))
         speeds.append(climb.speed)
         errors.append(climb.standard_error)
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(speeds), rel=0.25)
@@ -266,13 +264,14 @@ def test_what_comes_later_does_not_change_when_a_climb_qualified() -> None:
     assert (whole.onset, whole.begin) == pytest.approx((0.0, 1.6), abs=0.02)
     for frames in range(1, FRAMES):
         shorter = Track(track.frames[:frames], track.members[:frames], track.walls[:frames])
-        (climb,) = rows_of(climbs_of([shorter], scene.beads(scene.height), ClimbCriteria()))
+        (climb,) = rows_of(climbs_of([shorter], scene.beads(scene.height)))
         assert climb.climbed == (TIME[frames - 1] >= whole.qualified)
         if climb.climbed:
             assert (climb.onset, climb.qualified) == (whole.onset, whole.qualified)
-    _, (higher,) = scene.climbs(ClimbCriteria(min_rise=20e-3))
-    assert not higher.climbed
-    assert np.isnan(higher.qualified)
+    scene.height[:, 20:22] -= 0.9 * up[:, None]
+    _, (lower,) = scene.climbs()
+    assert not lower.climbed
+    assert np.isnan(lower.qualified)
 
 
 def test_a_fall_ends_a_climb_at_its_top() -> None:

@@ -29,10 +29,8 @@ from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.sweep import expand
 from walkers.inputs.toml import read_toml
-from walkers.postprocess.analyses.piles import Pile
 from walkers.postprocess.figures import figures_of
 from walkers.postprocess.motion import FLOOR, read_bridges, read_motion
-from walkers.postprocess.quantities import TABLES
 from walkers.postprocess.results import measure, read
 from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
@@ -181,8 +179,6 @@ def test_bridges_are_the_engines(run: Path) -> None:
 
 def test_tables_of_a_pile(run: Path) -> None:
     motion = read_motion(run)
-    for name in Pile.tables:
-        assert list(read_table(run, name).columns) == [column.name for column in TABLES[name]]
     bed, members = read_table(run, "bed"), read_table(run, "members")
     frames = np.searchsorted(bed["time"], members["time"])
     np.testing.assert_array_equal(members["height"], motion.position[frames, members["bead"], 2])
@@ -202,11 +198,6 @@ def test_contacts_and_bridges_are_counted_at_rest_and_while_shaken(run: Path) ->
     late = bed[bed["time"] >= bed["time"][bed["time"] >= 0.0].mean()]
     shaken = [found["contacts_shaken"], found["bridges_shaken"]]
     assert shaken == pytest.approx([late["contacts"].mean(), late["bridges"].mean()])
-    # A sweep's onset is that by which a cluster first counted, not where its greatest gain began.
-    told = as_results(np.array([0.5]), np.array([8.0]), 1.0)[Path("0")]["climbs"][0]
-    climbs = [{**told, "begin": 3.0, "height": 5e-3}]
-    empty = {"surface": {"end": 0.0}, "brazil_nut": {"end": 0.0}, "clusters": 1, "settling": 0.0}
-    assert Pile().row({**empty, "climbs": climbs})["onset"] == 0.5
 
 
 def test_an_interrupted_pile_goes_on_bit_for_bit(killed: Killed, tmp_path: Path) -> None:
@@ -239,7 +230,7 @@ def test_an_interrupted_pile_goes_on_bit_for_bit(killed: Killed, tmp_path: Path)
     for here, there in zip(segment_directories(place), segment_directories(run), strict=True):
         for name in ("beads.bin", "bridges.pairs.txt", "bridges.walls.txt"):
             assert (here / name).read_bytes() == (there / name).read_bytes()
-    for name in Pile.tables:
+    for name in read(place).about["tables"]:
         assert read_table(place, name).equals(read_table(run, name))
     kept = [(path / "state.restart").exists() for path in segment_directories(place)]
     assert kept == [False, False, True, True]
@@ -520,7 +511,7 @@ def test_of_runs_that_begin_alike_the_longest_counts(tmp_path: Path, monkeypatch
         (tmp_path / name / "manifest.json").write_text(json.dumps(manifest))
         cases[tmp_path / name] = case
     monkeypatch.setattr("walkers.sweeps.climbing.case_of", cases.get)
-    monkeypatch.setattr(Pile, "applies", lambda self, case: True)
+    monkeypatch.setattr("walkers.postprocess.piles.applies", lambda case: True)
     usual, other = conditions_in([tmp_path])
     assert (usual.label, usual.runs) == ("deck version = 7", [tmp_path / "b-2", tmp_path / "c-3"])
     assert (other.label, other.runs) == ("deck version = 6", [tmp_path / "e-5"])

@@ -14,7 +14,7 @@ from walkers.errors import InputError
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.sweep import Sweep, expand, load_sweep
-from walkers.postprocess.analyses.meetings import Meetings
+from walkers.postprocess import meetings
 from walkers.sweeps.scheduler import LONGEST_SECONDS, MOST_WALKERS, makespan, pack, unfinished_parts
 from walkers.templates.deck import render_shared_deck
 from walkers.templates.scene import sharing_key
@@ -129,7 +129,7 @@ def test_shipped_sweeps_are_the_papers() -> None:
     turned = _cases(load_sweep("alignment"))
     assert {round(np.degrees(case.walkers[0].angle)) for case in turned} == set(range(0, 91, 15))
     trays = [
-        (one.walkers[0].replicates, Meetings().derived_of(one)["coverage"]) for one in _cases(load_sweep("tray-phases"))
+        (one.walkers[0].replicates, meetings.derived(one)["coverage"]) for one in _cases(load_sweep("tray-phases"))
     ]
     assert len(trays) == 96
     assert {number for number, _ in trays} == {2, 16, 64}

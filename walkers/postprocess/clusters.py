@@ -4,9 +4,9 @@ Bridges, touching or open, divide the beads of a pile into connected components.
 together with all components that are bridged to the floor. A *cluster* is a component of at least two beads that is
 *free*, that is, not part of the bulk. It is *held* if a bridge joins one of its beads to a side wall. A *track* follows
 a cluster through time: in each frame it continues with the cluster that shares most of its beads. A track does not end
-if the cluster touches the pile or loses the wall for at most `ClimbCriteria.max_gap`.
+if the cluster touches the pile or loses the wall for at most `MAX_GAP`.
 
-A *climb* is a track that rises by at least `ClimbCriteria.min_rise` while its cluster is free and held. The rise
+A *climb* is a track that rises by at least `MIN_RISE` while its cluster is free and held. The rise
 between two successive frames is the change of the mean height of the beads that the cluster has in both, so that beads
 that join or leave do not count. A column that detaches high and sinks does not climb, nor does a bead in the air, which
 is not held.
@@ -32,22 +32,16 @@ Cluster = tuple[frozenset[int], frozenset[int]]
 Joined = tuple[IntArray, BoolArray]
 """Pairs of joined beads of a frame, shape (K, 2), and whether each bead is joined to a side wall, shape (N,)."""
 
+MIN_RISE = 2e-3
+"""Smallest rise of a climb, m: about two diameters of the paper's large beads."""
+MAX_GAP = 0.1
+"""Longest time, s, for which a cluster may touch the pile or lose the wall within a track."""
+MIN_OVERLAP = 0.5
+"""Smallest share of common beads (of the smaller cluster) in successive clusters of a track."""
 _FEWEST_BEADS = 2
 _FEWEST_FRAMES = 3
 _MOST_BLOCKS, _FEWEST_BLOCKS = 10, 4
 """Number of parts of a climb for the standard error of its speed."""
-
-
-@dataclass(frozen=True)
-class ClimbCriteria:
-    """Definition of a climb by thresholds."""
-
-    min_rise: float = 2e-3
-    """Smallest rise of a climb, m: about two diameters of the paper's large beads."""
-    max_gap: float = 0.1
-    """Longest time, s, for which a cluster may touch the pile or lose the wall within a track."""
-    min_overlap: float = 0.5
-    """Smallest share of common beads (of the smaller cluster) in successive clusters of a track."""
 
 
 @dataclass
@@ -96,19 +90,19 @@ def held_clusters(labels: IntArray, bridges: Bridges, bulk: BoolArray) -> Iterat
             yield frozenset(members.tolist()), frozenset(walls[np.isin(beads, members)].tolist())
 
 
-def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]], definition: ClimbCriteria) -> list[Track]:
+def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]]) -> list[Track]:
     """Tracks of the clusters of all frames (`held_clusters`; time in s, shape (F,)), in the order of their begins."""
     tracks: list[Track] = []
     alive: list[int] = []
     for frame, found in enumerate(clusters):
-        alive = [number for number in alive if time[frame] - time[tracks[number].frames[-1]] <= definition.max_gap]
+        alive = [number for number in alive if time[frame] - time[tracks[number].frames[-1]] <= MAX_GAP]
         # The larger overlap first: of two tracks that merge, the one with more beads continues.
         shared = []
         for number in alive:
             before = tracks[number].members[-1]
             for place, (members, _) in enumerate(found):
                 common = len(before & members)
-                if common >= definition.min_overlap * min(len(before), len(members)):
+                if common >= MIN_OVERLAP * min(len(before), len(members)):
                     shared.append((common, -number, place))
         taken: dict[int, int] = {}
         ended = set()
@@ -180,11 +174,11 @@ class Rise:
     leader: int
 
 
-def _rise_of(track: Track, beads: Beads, definition: ClimbCriteria) -> Rise:
+def _rise_of(track: Track, beads: Beads) -> Rise:
     time, height = beads.time, beads.height
     gained, seconds = _gained(track, time, height)
     risen = gained - np.minimum.accumulate(gained)
-    moments = _qualified(gained, definition.min_rise)
+    moments = _qualified(gained)
     onset, qualified = (float(time[track.frames[place]]) for place in moments) if moments else (np.nan, np.nan)
     end = int(np.argmax(risen))
     begin = int(np.argmin(gained[: end + 1]))
@@ -194,17 +188,17 @@ def _rise_of(track: Track, beads: Beads, definition: ClimbCriteria) -> Rise:
     return Rise(begin, end, float(risen[end]), speed, error, onset, qualified, topmost.most_common(1)[0][0])
 
 
-def _left_bulk(track: Track, beads: Beads, definition: ClimbCriteria) -> bool:
+def _left_bulk(track: Track, beads: Beads) -> bool:
     """Whether the first beads were in the bulk for some time; others have hung on a wall since before the drive."""
     before, members = slice(beads.first, track.frames[0]), list(track.members[0])
-    in_bulk = [bulk[members].mean() >= definition.min_overlap for bulk in beads.bulk[before]]
+    in_bulk = [bulk[members].mean() >= MIN_OVERLAP for bulk in beads.bulk[before]]
     seconds = np.diff(beads.time[beads.first : track.frames[0] + 1])[in_bulk].sum()
-    return bool(seconds >= definition.max_gap)
+    return bool(seconds >= MAX_GAP)
 
 
-def climbs_of(tracks: Sequence[Track], beads: Beads, definition: ClimbCriteria) -> Columns:
+def climbs_of(tracks: Sequence[Track], beads: Beads) -> Columns:
     """Table ``clusters``: the largest rise of each track of `follow`, and whether the track is a climb."""
-    rises = [_rise_of(track, beads, definition) for track in tracks]
+    rises = [_rise_of(track, beads) for track in tracks]
     pairs = list(zip(tracks, rises, strict=True))
     members, walls = (
         [track.members[rise.end] for track, rise in pairs],
@@ -222,7 +216,7 @@ def climbs_of(tracks: Sequence[Track], beads: Beads, definition: ClimbCriteria) 
         "last": beads.time[last],
         "begin": beads.time[begin],
         "end": beads.time[end],
-        "out_of_pile": np.array([_left_bulk(track, beads, definition) for track in tracks], dtype=np.bool_),
+        "out_of_pile": np.array([_left_bulk(track, beads) for track in tracks], dtype=np.bool_),
         **of_rises,
         "climbed": np.isfinite(of_rises["qualified"]),
         "leader": leader,
@@ -241,17 +235,17 @@ def _integers(values: Iterable[int]) -> IntArray:
     return np.array(list(values), dtype=np.int64)
 
 
-def _qualified(gained: FloatArray, min_rise: float) -> tuple[int, int] | None:
+def _qualified(gained: FloatArray) -> tuple[int, int] | None:
     """Begin of the rise that makes a track a climb, and the frame at which it qualifies; None without a climb.
 
-    It qualifies where its height above its lowest is a maximum so far, at least ``min_rise``, and the rise has enough
+    It qualifies where its height above its lowest is a maximum so far, at least `MIN_RISE`, and the rise has enough
     frames: a hop between two frames is not a climb.
     """
     places, least = np.arange(len(gained)), np.minimum.accumulate(gained)
     risen = gained - least
     lowest = np.maximum.accumulate(np.where(np.diff(least, prepend=np.inf) < 0.0, places, 0))
     farthest = risen == np.maximum.accumulate(risen)
-    found = np.flatnonzero(farthest & (risen >= min_rise) & (places - lowest + 1 >= _FEWEST_FRAMES))
+    found = np.flatnonzero(farthest & (risen >= MIN_RISE) & (places - lowest + 1 >= _FEWEST_FRAMES))
     return (int(lowest[found[0]]), int(found[0])) if len(found) else None
 
 
@@ -321,7 +315,7 @@ def assembly_of(tracks: Sequence[Track], climbs: Columns, beads: Beads, bridges:
     return {"time": beads.time[at], "track": track, **_of_beads(beads, at, bead), **states}
 
 
-def events_of(tracks: Sequence[Track], climbs: Columns, beads: Beads, definition: ClimbCriteria) -> Columns:
+def events_of(tracks: Sequence[Track], climbs: Columns, beads: Beads) -> Columns:
     """Table ``events`` in the order of time, without clusters at the start of the drive and those that may still go on.
 
     A cluster is ``freed`` (it leaves the pile or reaches a wall), ``split`` from another cluster, ``merged`` into
@@ -330,18 +324,18 @@ def events_of(tracks: Sequence[Track], climbs: Columns, beads: Beads, definition
     time = beads.time
     rows: list[tuple[int, int, int, str]] = []
     for number, track in enumerate(tracks):
-        born, last, parent = track.frames[0], track.frames[-1], _parent(tracks, number, time, definition)
+        born, last, parent = track.frames[0], track.frames[-1], _parent(tracks, number, time)
         if parent is not None:
             rows.append((born, number, parent, "split"))
         elif born > beads.first:
             rows.append((born, number, -1, "freed"))
         if track.merged_at is not None and track.merged_into is not None:
             rows.append((track.merged_at, number, track.merged_into, "merged"))
-        elif time[-1] - time[last] > definition.max_gap:
+        elif time[-1] - time[last] > MAX_GAP:
             # It rejoined the pile if most of its beads were in the bulk before the track ended.
-            until = min(int(np.searchsorted(time, time[last] + definition.max_gap, side="right")), len(time) - 1)
+            until = min(int(np.searchsorted(time, time[last] + MAX_GAP, side="right")), len(time) - 1)
             members, after = list(track.members[-1]), beads.bulk[last + 1 : until + 1]
-            back = any(bulk[members].mean() >= definition.min_overlap for bulk in after)
+            back = any(bulk[members].mean() >= MIN_OVERLAP for bulk in after)
             rows.append((last + 1, number, -1, "rejoined" if back else "detached"))
     rows.sort(key=lambda row: row[:2])
     frame, track_of, other = np.array([row[:3] for row in rows], dtype=np.int64).reshape(-1, 3).T
@@ -354,13 +348,13 @@ def events_of(tracks: Sequence[Track], climbs: Columns, beads: Beads, definition
     }
 
 
-def _parent(tracks: Sequence[Track], number: int, time: FloatArray, definition: ClimbCriteria) -> int | None:
+def _parent(tracks: Sequence[Track], number: int, time: FloatArray) -> int | None:
     """The track that had most of the beads of a track shortly before its begin."""
     first, members = tracks[number].frames[0], tracks[number].members[0]
-    best, most = None, definition.min_overlap * len(members)
+    best, most = None, MIN_OVERLAP * len(members)
     for other, track in enumerate(tracks):
         before = bisect_left(track.frames, first) - 1
-        if other == number or before < 0 or time[first] - time[track.frames[before]] > definition.max_gap:
+        if other == number or before < 0 or time[first] - time[track.frames[before]] > MAX_GAP:
             continue
         shared = len(track.members[before] & members)
         if shared >= most:

@@ -318,7 +318,16 @@ _HIDDEN = frozenset(
     }
 )
 """Numbers that rows leave out: errors of others, values of the case, and what the headline says."""
-_IF_ANY = ("open_*", "open_pair_*", "separated_fraction", "turned_round", "leaning", "turned_over", "upright")
+_IF_ANY = (
+    "events_*",
+    "open_*",
+    "open_pair_*",
+    "separated_fraction",
+    "turned_round",
+    "leaning",
+    "turned_over",
+    "upright",
+)
 """Numbers that rows leave out if they are zero."""
 
 

@@ -19,7 +19,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from walkers.errors import refused
-from walkers.postprocess.analysis import analyses_of
+from walkers.postprocess import piles
+from walkers.postprocess.clusters import connected
 from walkers.postprocess.drawing import check_every
 from walkers.postprocess.motion import Bridges, Motion, gathered, read_bridges, read_motion
 from walkers.postprocess.necks import ends_of
@@ -129,7 +130,7 @@ def _frames(motion: Motion, every: int) -> Iterator[tuple[int, dict[str, meshio.
     """Frames of the drive, each with its meshes ``beads``, ``boundary`` and, if there are any, ``bridges``."""
     recorded = read_bridges(motion)
     bridges = next(recorded, None)
-    further = [analysis.point_data(motion) for analysis in analyses_of(motion.case)]
+    tracks = piles.tracks_of(motion) if piles.applies(motion.case) else None
     walls = _walls(motion)
     for frame in range(motion.first_driven, len(motion.time), every):
         while bridges is not None and bridges.frame < frame:
@@ -137,8 +138,10 @@ def _frames(motion: Motion, every: int) -> Iterator[tuple[int, dict[str, meshio.
         meshes = {"beads": _beads(motion, frame), "boundary": walls.copy()}
         meshes["boundary"].points += motion.substrate[frame]
         if bridges is not None and bridges.frame == frame:
-            for arrays in further:
-                meshes["beads"].point_data |= arrays(bridges)
+            if tracks is not None:
+                track, climber = (values[frame].astype(np.int64) for values in tracks)
+                component = connected(len(motion.radius), bridges.beads)
+                meshes["beads"].point_data |= {"component": component, "track": track, "is_climber": climber}
             if len(bridges.force) + len(bridges.wall_force):  # meshio does not read empty arrays
                 meshes["bridges"] = _bridges(motion, bridges)
         yield frame, meshes

@@ -88,8 +88,7 @@ class Results(Mapping[str, Any]):
 
 def modules() -> tuple[Any, ...]:
     """The modules that measure, in the order of results."""
-    from walkers.postprocess import walking
-    from walkers.postprocess.former import meetings, piles
+    from walkers.postprocess import meetings, piles, walking
 
     return walking, meetings, piles
 

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from walkers.errors import refused
 from walkers.inputs.boundary import Flat
 from walkers.inputs.case import Case
-from walkers.postprocess.analyses.piles import Pile, tracks_of
+from walkers.postprocess import piles
 from walkers.postprocess.dump import FloatArray, IntArray
 from walkers.postprocess.motion import Motion, boundary_motion
 from walkers.postprocess.necks import BLUE, OPACITY, ends_of, necks_of, triangles_of
@@ -175,7 +175,7 @@ class Scene:
         """Highlighted beads in each frame: walkers and climbing clusters; shape (F, N)."""
         motion = self.motion
         chosen = np.tile(motion.walker_of >= 0, (len(motion.time), 1))
-        return chosen | tracks_of(motion)[1] if Pile().applies(motion.case) else chosen
+        return chosen | piles.tracks_of(motion)[1] if piles.applies(motion.case) else chosen
 
     def colours(self, chosen: npt.NDArray[np.bool_]) -> FloatArray:
         """Red, green, blue (to 255) of the dark and the pale lunes of beads, shape (2, N, 3); chosen ones in ruby."""

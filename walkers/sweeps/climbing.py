@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from walkers.errors import refused
 from walkers.inputs.keys import dotted
-from walkers.postprocess.analyses.piles import Pile
+from walkers.postprocess import piles
 from walkers.postprocess.results import plain, read
 from walkers.rounding import percent
 from walkers.runner.directory import CASE_NAME, case_of, finished_places, is_finished
@@ -110,8 +110,8 @@ def _groups(directory: Path) -> list[tuple[dict[str, str], list[Path]]]:
         varied = {place: {} for place in places}
     runs = filter(is_finished, varied)
     try:
-        piles = {str(read_manifest(run).get("run", run)): run for run in runs if Pile().applies(case_of(run))}
-        cases = {run: _determinants(run) for run in piles.values()}
+        found = {str(read_manifest(run).get("run", run)): run for run in runs if piles.applies(case_of(run))}
+        cases = {run: _determinants(run) for run in found.values()}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise refused(directory, f"a case cannot be read ({error})") from error
     if not cases:

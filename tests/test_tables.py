@@ -1,0 +1,89 @@
+"""Tables of runs: their columns, units and labels, and the arrays that are written."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from walkers.inputs.reading import load_case
+from walkers.postprocess.quantities import TABLES, axis, declared
+from walkers.postprocess.tables import read_columns, read_table, write_table
+
+
+@pytest.fixture(scope="module")
+def walked(run_directory: Callable[..., Path]) -> Path:
+    """Six dimers."""
+    return run_directory(load_case("fig1b"))
+
+
+@pytest.fixture(scope="module")
+def tray(run_directory: Callable[..., Path]) -> Path:
+    """Dimers that may meet."""
+    return run_directory(
+        dimers={"replicates": 4, "spacing": "1.6 mm", "meet": True}, run={"cycles": 4, "settling_cycles": 1}
+    )
+
+
+def test_each_file_has_what_is_declared(walked: Path, tray: Path, pile_run: Path) -> None:
+    files = {path.stem: path for run in (walked, tray, pile_run) for path in run.glob("*.parquet")}
+    assert files.keys() == TABLES.keys()
+    for name, path in files.items():
+        schema, known = pq.read_schema(path), TABLES[name]
+        places = [
+            next(place for place, quantity in enumerate(known) if quantity.names(column)) for column in schema.names
+        ]
+        assert places == sorted(places)
+        assert set(places) == set(range(len(known)))
+        for field in schema:
+            quantity = declared(field.name, known)
+            unit, label = quantity.si_unit.encode(), quantity.label.encode()
+            expected = {b"unit": unit, b"units": unit, b"long_name": label, b"meaning": quantity.meaning.encode()}
+            assert field.metadata == expected
+            assert "*" not in quantity.label
+        attributes = read_table(path.parent, name).attrs
+        assert attributes["units"].keys() == attributes["long_name"].keys() == set(schema.names)
+
+
+def test_labels_of_axes_have_the_displayed_unit() -> None:
+    assert axis("members", "height") == ("height (mm)", 1e3)
+    assert axis("walkers", "open_2") == ("bead 2 off its wall (%)", 100.0)
+    assert axis("trajectory", "sliding_pair_3") == ("sliding of pair 3 of beads (mm/s)", 1e3)
+    assert axis("clusters", "size") == ("beads", 1.0)
+    for name in ("rotation", "rotation_", "rotation_x", "gap_1_2", "speed"):
+        with pytest.raises(KeyError):
+            declared(name, TABLES["trajectory"])
+
+
+def test_dimers_have_columns_of_two_beads_and_a_pair(walked: Path) -> None:
+    families = {"walkers": ("rotation", "sliding", "open"), "trajectory": ("rotation", "sliding", "gap")}
+    for table, names in families.items():
+        columns = {name for name in read_table(walked, table) if name[-1].isdigit()}
+        pairs = {f"{name}_pair_1" for name in names[1:]}
+        assert columns == {f"{name}_{bead}" for name in names for bead in (1, 2)} | pairs
+
+
+@pytest.mark.parametrize("rows", [0, 1, 9])
+def test_a_table_is_read_as_it_was_written(tmp_path: Path, rows: int) -> None:
+    draw = np.random.default_rng(rows)
+    columns = {
+        "time": draw.random(rows),
+        "event": draw.choice(["merged", "parted"], rows),
+        "walker": draw.integers(0, 9, rows),
+        "other": draw.integers(0, 9, rows),
+        "size": np.arange(2 * rows)[::2],
+        "angle": np.where(draw.random(rows) < 0.5, np.nan, 1.0),
+    }
+    write_table(tmp_path, "meetings", columns)
+    for name, column in read_columns(tmp_path, "meetings").items():
+        np.testing.assert_array_equal(column, columns[name])
+    assert pq.ParquetFile(tmp_path / "meetings.parquet").metadata.row_group(0).column(0).compression == "ZSTD"
+
+
+def test_a_column_that_is_not_declared_is_refused(tmp_path: Path) -> None:
+    columns = dict.fromkeys(("time", "track", "bead", "large", "height"), np.arange(3.0))
+    write_table(tmp_path, "members", columns)
+    for wrong in (columns | {"power": np.arange(3.0)}, {"time": np.arange(3.0)}):
+        with pytest.raises(KeyError, match="missing or not declared"):
+            write_table(tmp_path, "members", wrong)

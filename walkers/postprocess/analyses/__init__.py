@@ -1,1 +1,0 @@
-"""The analyses: one class per module, found by `walkers.postprocess.analysis`."""

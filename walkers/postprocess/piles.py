@@ -1,0 +1,180 @@
+"""Loose beads in a container: the bed, and the clusters that leave it and climb."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import nan
+from typing import Any
+
+import numpy as np
+
+from walkers.inputs.boundary import Boundary
+from walkers.inputs.case import Case
+from walkers.postprocess.clusters import (
+    Beads,
+    Cluster,
+    Joined,
+    assembly_of,
+    bulk_of,
+    climbs_of,
+    connected,
+    events_of,
+    follow,
+    held_clusters,
+    members_of,
+)
+from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
+from walkers.postprocess.motion import FLOOR, Bridges, Motion, read_bridges
+from walkers.postprocess.numbers import EVENTS, Measured
+from walkers.postprocess.tables import Columns, read_columns
+
+NAME = "piles"
+"""Group of its numbers, see `walkers.postprocess.numbers.GROUPS`."""
+_WHOLE = 1.0 - 1e-6
+"""Fraction of the duration below which a run ended early."""
+State = dict[str, float]
+"""The columns of ``bed`` in a frame."""
+
+
+def applies(case: Case) -> bool:
+    """Whether a case has loose beads in a container."""
+    return case.loose and case.boundary.closed
+
+
+def derived(case: Case) -> dict[str, float]:
+    """Numbers of beads and duration of the drive."""
+    return {"beads": case.count, "large": case.large, "duration": case.duration}
+
+
+def measure(motion: Motion) -> Measured:
+    """Tables and numbers of the bed and of the clusters."""
+    case = motion.case
+    rows, bulks, held, joined = [], [], [], []
+    for bridges in read_bridges(motion):
+        labels = connected(len(motion.radius), bridges.beads)
+        bulks.append(bulk_of(labels, bridges, heap=case.mixture is not None))
+        # While the pile settles, most beads are free of the bulk.
+        driven = motion.time[bridges.frame] >= 0.0
+        held.append(list(held_clusters(labels, bridges, bulks[-1])) if driven else [])
+        joined.append(_joined(bridges, len(motion.radius)))
+        rows.append(_state_of(motion, bridges, joined[-1], bulks[-1], held[-1]))
+    bed, walls = {name: np.array([row[name] for row in rows]) for name in rows[0]}, case.boundary.walls
+    beads = Beads(
+        time=motion.time,
+        height=motion.position[..., 2],
+        large=motion.large,
+        surface=bed["surface"],
+        bulk=bulks,
+        first=motion.first_driven,
+        wall_names=[wall.name for wall in walls],
+    )
+    tracks = follow(motion.time, held)
+    clusters = climbs_of(tracks, beads)
+    events = events_of(tracks, clusters, beads)
+    tables = {
+        "bed": bed,
+        "clusters": clusters,
+        "events": events,
+        "members": members_of(tracks, beads),
+        "assembly": assembly_of(tracks, clusters, beads, joined),
+    }
+    counts = {f"events_{event}": int(np.sum(events["event"] == event)) for event in EVENTS}
+    numbers = {"clusters": len(tracks), **counts, **_of_climbs(clusters), **_of_bed(motion, bed)}
+    if numbers["driven"] < _WHOLE * case.duration:
+        early = f"shaken for {numbers['driven']:.3g} s of {case.duration:.3g} s: climbers left the container"
+        return Measured(tables, numbers, (early,))
+    return Measured(tables, numbers)
+
+
+def _of_climbs(clusters: Columns) -> dict[str, Any]:
+    """Numbers of all climbs; NaN without climbs."""
+    climbs = {name: column[clusters["climbed"]] for name, column in clusters.items()}
+    speeds = climbs["speed"][np.isfinite(climbs["speed"])].tolist()
+    return {
+        "climbs": len(climbs["track"]),
+        "onset": float(min(climbs["onset"], default=nan)),
+        "speed": sum(speeds) / len(speeds) if speeds else nan,
+        "highest": float(max(climbs["height"], default=nan)),
+        "led_by_large": int(climbs["leader_large"].sum()),
+    }
+
+
+def _of_bed(motion: Motion, bed: Columns) -> dict[str, Any]:
+    """Numbers of the bed at the start and the end of the drive, at rest, and in the second half of the drive."""
+    time, end = motion.time, motion.time[-1]
+    rest = max(int(np.searchsorted(time, 0.0, side="right")) - 1, 0)
+    late = time >= min(time[motion.first_driven :].mean(), end)
+    numbers = {"driven": float(max(end, 0.0)), "settling": float(min(end, 0.0) - time[0])}
+    for name in ("surface", "brazil_nut"):
+        numbers |= {f"{name}_start": float(bed[name][motion.first_driven]), f"{name}_end": float(bed[name][-1])}
+    for name in ("contacts", "bridges"):
+        numbers[f"{name}_at_rest"] = float(bed[name][rest])
+        numbers[f"{name}_shaken"] = float(np.mean(bed[name][late])) if end > 0.0 else nan
+    return numbers
+
+
+def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
+    """Track of each bead of a pile, -1 for none, and whether it climbs; shape (F, N)."""
+    members = read_columns(motion.directory, "members")
+    climbed = read_columns(motion.directory, "clusters")["climbed"]
+    track = np.full(motion.position.shape[:2], -1, dtype=np.int64)
+    frame = np.searchsorted(motion.time, members["time"]).clip(max=len(motion.time) - 1)
+    there = motion.time[frame] == members["time"]  # a motion need not have all frames
+    track[frame[there], members["bead"][there]] = members["track"][there]
+    return track, np.append(climbed, False)[track]
+
+
+def _joined(bridges: Bridges, count: int) -> Joined:
+    """The joined beads of a frame."""
+    at_wall = np.zeros(count, dtype=np.bool_)
+    at_wall[bridges.wall_beads[bridges.walls != FLOOR]] = True
+    return bridges.beads.astype(np.int32), at_wall
+
+
+def _state_of(
+    motion: Motion, bridges: Bridges, joined: Joined, bulk: BoolArray, held: Sequence[Cluster]
+) -> dict[str, Any]:
+    """State of a pile in a frame from its bulk and the held clusters."""
+    frame = bridges.frame
+    position, radius, large = motion.position[frame], motion.radius, motion.large
+    # Cells of the cross-section are about four large radii wide. Without a bulk the floor is the surface.
+    tops = _surface_cells(position[bulk], radius[bulk], motion.case.boundary, 4.0 * float(radius.max()))
+    low, middle, high = (float(value) for value in np.percentile(tops if len(tops) else [0.0], (10.0, 50.0, 90.0)))
+    touching = int((bridges.gap <= 0.0).sum())
+    return {
+        "time": float(motion.time[frame]),
+        "surface": middle,
+        "surface_low": low,
+        "surface_high": high,
+        "brazil_nut": segregation(position[:, 2], large),
+        "brazil_nut_of_bulk": segregation(position[bulk, 2], large[bulk]),
+        "mean_square_velocity": float(np.mean(np.sum(motion.velocity[frame] ** 2, axis=1))),
+        "contacts": 2.0 * touching / len(position),
+        "bridges": 2.0 * len(bridges.beads) / len(position),
+        "touching": touching,
+        "opened": len(bridges.gap) - touching,
+        "mean_force": float(bridges.force.mean()) if len(bridges.force) else 0.0,
+        "bulk": int(bulk.sum()),
+        "at_wall": int(joined[1].sum()),
+        "large_at_wall": int((joined[1] & large).sum()),
+        "clusters": len(held),
+        "highest": max([middle, *(float(position[bead, 2]) for members, _ in held for bead in members)]),
+    }
+
+
+def _surface_cells(position: FloatArray, radius: FloatArray, container: Boundary, cell: float) -> FloatArray:
+    """Height of the highest bead top in each x-y cell with beads, m."""
+    across = max(1, int(container.width / cell))
+    place = np.clip(((position[:, :2] / container.width + 0.5) * across).astype(int), 0, across - 1)
+    tops = np.full(across * across, -np.inf)
+    np.maximum.at(tops, place[:, 0] * across + place[:, 1], position[:, 2] + radius)
+    found: FloatArray = tops[np.isfinite(tops)]
+    return found
+
+
+def segregation(height: FloatArray, large: BoolArray) -> float:
+    """Brazil-nut index: ⟨z⟩ of large minus ⟨z⟩ of small beads, over their sum; 0 if a class is missing."""
+    if not large.any() or large.all():
+        return 0.0
+    above, below = float(height[large].mean()), float(height[~large].mean())
+    return (above - below) / (above + below)
