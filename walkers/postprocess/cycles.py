@@ -16,15 +16,12 @@ from math import pi
 import numpy as np
 
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.gait import distance_walked
+from walkers.postprocess.gait import Between, distance_walked
 from walkers.postprocess.motion import Group
 from walkers.postprocess.tables import Columns
 
-_PARTS = 10
-"""Parts of an interval between samples; the force is evaluated in the middle of each part."""
 
-
-def cycles_of(group: Group) -> Columns:
+def cycles_of(group: Group, looks: Between) -> Columns:
     """Table ``cycles`` of the walkers of one make, one walker after the other."""
     run = group.case.run
     strobe = run.samples_per_cycle
@@ -32,7 +29,7 @@ def cycles_of(group: Group) -> Columns:
     way = group.mass_centre[::strobe] - group.mass_centre[0]
     work = np.full(distance.shape, np.nan)
     if group.motion.follows_cycles:
-        works = work_of(group)
+        works = work_of(group, looks)
         work[: len(works)] = works
     count, walkers = distance.shape
     of_walkers = {
@@ -55,14 +52,15 @@ def mass_of(group: Group) -> float:
     return float(4.0 / 3.0 * pi * np.sum(group.radii**3) * group.case.beads.density)
 
 
-def work_of(group: Group) -> FloatArray:
-    """Work of the drive on each walker in each cycle, J, shape (cycles, W)."""
-    shares = np.linspace(0.0, 1.0, _PARTS + 1)
-    ways = [Group(group.motion.between(share), group.make, group.walkers).mass_centre for share in shares]
-    begin, interval = group.time[:-1], np.diff(group.time)
-    work = np.zeros(ways[0].shape[:2])
-    for part, (before, after) in enumerate(pairwise(ways)):
-        time = begin + (part + 0.5) / _PARTS * interval
+def work_of(group: Group, looks: Between) -> FloatArray:
+    """Work of the drive on each walker in each cycle, J, shape (cycles, W).
+
+    The force is evaluated in the middle of each part of the intervals between samples.
+    """
+    begin, interval, parts = group.time[:-1], np.diff(group.time), len(looks.centre) - 1
+    work = np.zeros(looks.centre.shape[1:3])
+    for part, (before, after) in enumerate(pairwise(looks.centre)):
+        time = begin + (part + 0.5) / parts * interval
         for harmonic in group.case.excitation.harmonics:
             phase = harmonic.angular_frequency * time + harmonic.phase
             pull = harmonic.peak_acceleration * np.sin(phase)

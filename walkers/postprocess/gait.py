@@ -91,22 +91,44 @@ _PARTS = 10
 """Parts of an interval between samples at which gaps are evaluated."""
 
 
-def averages(group: Group) -> Averages:
+@dataclass(frozen=True)
+class Between:
+    """Walkers at tenths of the intervals between samples (`looks_between`).
+
+    Share of the time with open contacts after the settling cycles, shape (W, n + pairs); mass centres from the begin
+    to the end of the intervals, m, shape (11, F - 1, W, 3).
+    """
+
+    open: FloatArray
+    centre: FloatArray
+
+
+def between(group: Group) -> Between:
+    """Contacts and paths between samples, by cubic interpolation."""
+    samples, shares = settled_samples(group), np.linspace(0.0, 1.0, looks_between(group.motion) + 1)
+    opened, centres = [], []
+    for share in shares.tolist():
+        look = Group(group.motion.between(share), group.make, group.walkers)
+        centres.append(look.mass_centre)
+        if share < 1.0:
+            opened.append((gaps(look)[samples] > 0.0).mean(axis=0))
+    return Between(np.mean(opened, axis=0), np.array(centres))
+
+
+def averages(group: Group, looks: Between | None = None) -> Averages:
     """Mean rotation and sliding and share of open contacts after the settling cycles.
 
     Means over 20 samples per cycle have errors up to 10 % if contacts open, because spins change within few steps when
     beads touch. Therefore spins are averages of the engine over all steps, velocities are displacements, and gaps are
-    evaluated ten times per interval between samples by cubic interpolation (with less than eight samples per cycle, at
-    the samples).
+    evaluated ten times per interval between samples (with less than eight samples per cycle, at the samples): these
+    are the ``looks``, which are computed if not given.
     """
     samples = settled_samples(group)
     mean = gait(Group(group.motion.averaged, group.make, group.walkers))
-    parts = looks_between(group.motion)
-    looks = (Group(group.motion.between(part / parts), group.make, group.walkers) for part in range(parts))
     return Averages(
         rotation=mean.rotation[samples].mean(axis=0),
         sliding=mean.sliding[samples].mean(axis=0),
-        open=np.mean([(gaps(look)[samples] > 0.0).mean(axis=0) for look in looks], axis=0),
+        open=(looks or between(group)).open,
     )
 
 
