@@ -254,19 +254,6 @@ def postures(group: Group) -> list[str]:
     return [POSTURES[number] for number in np.select([turned, stands], [2, 0], 1)]
 
 
-def came_near(centre: FloatArray, near: float) -> bool:
-    """Whether two of W points, shape (F, W, 2), ever came within a distance of each other."""
-    # Only points whose ranges overlap can have met: of a thousand, a few pairs remain.
-    middle = (centre.max(axis=0) + centre.min(axis=0)) / 2.0
-    reach = np.linalg.norm(centre - middle, axis=-1).max(axis=0)
-    for number in range(len(middle) - 1):
-        apart = np.linalg.norm(middle[number + 1 :] - middle[number], axis=-1)
-        within = number + 1 + np.flatnonzero(apart < reach[number + 1 :] + reach[number] + near)
-        if np.any(np.linalg.norm(centre[:, within] - centre[:, number, None], axis=-1) < near):
-            return True
-    return False
-
-
 def are_constant(directory: Path) -> bool:
     """Whether the velocities of a run, finished or not, are constant, so that it needs no more cycles.
 

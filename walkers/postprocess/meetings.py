@@ -20,7 +20,7 @@ from walkers.inputs.boundary import FLOOR
 from walkers.inputs.case import Case
 from walkers.postprocess.clusters import connected
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
-from walkers.postprocess.motion import Bridges, Group, Motion, read_bridges
+from walkers.postprocess.motion import Bridges, Group, Motion
 from walkers.postprocess.numbers import Measured
 from walkers.postprocess.tables import Columns
 
@@ -72,7 +72,7 @@ def derived(case: Case) -> dict[str, float]:
 def measure(motion: Motion) -> Measured:
     """Table and numbers; walkers that are joined in the first frame merge at that time."""
     centre, heading = places_of(motion)
-    states = [_state_of(motion, bridges) for bridges in read_bridges(motion)]
+    states = [_state_of(motion, bridges) for bridges in motion.bridges]
     table = _events(motion.time, heading, states)
     merged = int(np.sum(table["event"] == "merged"))
     run = motion.case.run

@@ -24,6 +24,8 @@ FLOOR = 0
 """Index of the floor among the walls of a container; the others are side walls."""
 LEAST_SAMPLES = 8
 """Smallest number of samples per cycle that resolves the motion within a cycle."""
+NEAR = 1.5
+"""Walkers whose centres of mass come closer than this multiple of their length have met."""
 _LEFT_OUT = 0.02  # largest part of a run after the last of several evenly spaced times
 _OF_BEADS = ("position", "velocity", "spin", "mean_spin")
 _OF_FRAMES = (*_OF_BEADS, "time", "substrate", "substrate_velocity", "frames")
@@ -150,6 +152,11 @@ class Motion:
         return owner
 
     @cached_property
+    def bridges(self) -> list[Bridges]:
+        """The bridges of all frames of `read_bridges`; those of piles are read one frame after the other."""
+        return list(read_bridges(self))
+
+    @cached_property
     def groups(self) -> list[Group]:
         """The walkers by make, during the drive."""
         driven = self.driven
@@ -249,6 +256,19 @@ class Group:
         )
         unwrapped: FloatArray = np.unwrap(angle, axis=0)
         return unwrapped
+
+
+def came_near(centre: FloatArray, near: float) -> bool:
+    """Whether two of W points, shape (F, W, 2), ever came within a distance of each other."""
+    # Only points whose ranges overlap can have met: of a thousand, a few pairs remain.
+    middle = (centre.max(axis=0) + centre.min(axis=0)) / 2.0
+    reach = np.linalg.norm(centre - middle, axis=-1).max(axis=0)
+    for number in range(len(middle) - 1):
+        apart = np.linalg.norm(middle[number + 1 :] - middle[number], axis=-1)
+        within = number + 1 + np.flatnonzero(apart < reach[number + 1 :] + reach[number] + near)
+        if np.any(np.linalg.norm(centre[:, within] - centre[:, number, None], axis=-1) < near):
+            return True
+    return False
 
 
 def even_frames(motion: Motion, count: int) -> list[int]:

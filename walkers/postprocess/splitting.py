@@ -10,8 +10,7 @@ import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.postprocess.dump import BinaryDump, local_frames, write_local_dump
-from walkers.postprocess.gait import came_near
-from walkers.postprocess.walking import NEAR
+from walkers.postprocess.motion import NEAR, came_near
 from walkers.runner.failures import WalkersMet
 from walkers.runner.files import write_json
 from walkers.templates.deck import LAYOUT_NAME

@@ -25,21 +25,17 @@ from walkers.postprocess.gait import (
     Gait,
     averages,
     between,
-    came_near,
     gait,
     postures,
     settled_samples,
     turned_over_at,
     walk,
 )
-from walkers.postprocess.motion import LEAST_SAMPLES, Bridges, Group, Motion, read_bridges
+from walkers.postprocess.motion import LEAST_SAMPLES, NEAR, Bridges, Group, Motion, came_near
 from walkers.postprocess.numbers import Measured
 from walkers.postprocess.sides import REST, SAME, SEPARATED, STEADY_SPEED, alike, differ, sides
 from walkers.postprocess.tables import Columns, numbered
 from walkers.rounding import percent
-
-NEAR = 1.5
-"""Walkers whose centres of mass come closer than this multiple of their length have met."""
 
 NAME = "walking"
 """Group of its numbers, see `walkers.postprocess.quantities.GROUPS`."""
@@ -167,7 +163,7 @@ def _bridges(motion: Motion) -> Columns:
         touching = [(bead, -1) for bead in walker.beads]
         touching += [(walker.beads[one], walker.beads[other]) for one, other in motion.case.walkers[walker.make].pairs]
         contact_of |= {ends: number for number, ends in enumerate(touching, 1)}
-    parts = [_bridge_rows(motion, bridges, contact_of) for bridges in read_bridges(motion)]
+    parts = [_bridge_rows(motion, bridges, contact_of) for bridges in motion.bridges]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     order = np.lexsort([columns[name] for name in ("bead_2", "contact", "walker", "time")])
     return {name: values[order] for name, values in columns.items()}
