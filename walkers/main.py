@@ -117,6 +117,7 @@ def program() -> App:
 def _call(tokens: list[str]) -> Any:
     """What the command returns that the words name; with ``--help`` its help is printed."""
     app = program()
+    walkers.inputs.chosen_library = None
     if tokens[0] == "--library" and len(tokens) > 1:
         walkers.inputs.chosen_library, tokens = Path(tokens[1]), tokens[2:]
     names, apps, words = app.parse_commands(tokens)
