@@ -306,7 +306,7 @@ def test_a_sweep_through_slurm(cluster: dict[str, str], files: Path) -> None:
 
 def test_engines_within_a_job(cluster: dict[str, str], in_folder: Path) -> None:
     """One process within a step of srun, and two ranks of mpirun within a job, as workers of a pilot start them."""
-    checks = [f"srun {PROGRAM} check engine --only thrown", f"{PROGRAM} check engine --only ranks"]
+    checks = [f"srun {PROGRAM} check engine --only stock", f"{PROGRAM} check engine --only ranks"]
     wrapped = "; ".join(f"{check}; echo ended with $? >> ended.new" for check in checks)
     wrapped += "; mv ended.new ended"
     job = ["sbatch", "--ntasks", "1", "--cpus-per-task", "2", "--output", "job.log", "--wrap", wrapped]

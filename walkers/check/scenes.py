@@ -223,19 +223,17 @@ class Setting:
             every = self.freely // 100
             series = bench.run(Plan(case, scene, **recording(self.freely, every)))
             start, frames = series.frames[0, :, :3], engine.run(self.freely, every)
-            found = {
-                "displacement": farthest(series.frames[1:, :, :3] - start, frames[..., :3] - start),
-                "spin": farthest(series.frames[1:, :, 6:], frames[..., 6:]),
+            pairs = {
+                "displacement": (series.frames[1:, :, :3] - start, frames[..., :3] - start),
+                "spin": (series.frames[1:, :, 6:], frames[..., 6:]),
             }
         else:
             series = bench.run(prescribed(case, scene))
             forces = np.array([engine.follow(frame) for frame in in_walls(case, series)])
-            found = {
-                "force": farthest(series.forces[1:, :, :3], forces[..., :3]),
-                "torque": farthest(series.forces[1:, :, 3:], forces[..., 3:]),
-            }
-        for what, error in found.items():
-            yield Line(f"{name}: {what}, both engines", 0.0, error, EQUAL)
+            parts = {"force": slice(0, 3), "torque": slice(3, 6)}
+            pairs = {what: (series.forces[1:, :, part], forces[..., part]) for what, part in parts.items()}
+        for what, both in pairs.items():
+            yield Line(f"{name}: {what}, both engines", 0.0, farthest(*both), EQUAL)
 
 
 def in_walls(case: Case, series: Measured) -> FloatArray:
@@ -299,14 +297,6 @@ SCENES: dict[str, Setting] = {
         [over(FLOOR, -DEEP, R), Bead(0, (2e-3, 0.0, 5e-3), S)],
         changes={"drive": {**_FAST, "axis": "z"}, "environment": _WEIGHT},
     ),
-}
-"""Scenes with prescribed motion."""
-for _name in LAWS:
-    _liquid = {"liquid": {"law": _name, "contact_angle": "10 deg"}}
-    SCENES[f"a bead leaves the floor ({_name})"] = Setting([_LEAVING], changes=_liquid)
-    SCENES[f"two beads separate ({_name})"] = Setting(_PARTING, changes=_liquid)
-
-FREE: dict[str, Setting] = {
     "thrown beads": Setting(_THROWN, (FLOOR,), {"environment": _WEIGHT, "drive": {"peak_acceleration": "4 g"}}, 6000),
     "a bead in free flight": Setting(
         [Bead(0, (0.0, 0.0, 5e-3), R, (0.1, 0.2, 0.0), (1.0, 2.0, 3.0))],
@@ -314,18 +304,16 @@ FREE: dict[str, Setting] = {
         freely=10_000,
     ),
 }
-"""Scenes with beads that move freely."""
+"""Scenes by name: with prescribed motion, and of beads that move freely."""
+for _name in LAWS:
+    _liquid = {"liquid": {"law": _name, "contact_angle": "10 deg"}}
+    SCENES[f"a bead leaves the floor ({_name})"] = Setting([_LEAVING], changes=_liquid)
+    SCENES[f"two beads separate ({_name})"] = Setting(_PARTING, changes=_liquid)
 
 
 def scene_lines(bench: Bench) -> Iterator[Line]:
-    """Forces on beads with prescribed motion, compared with the second engine."""
+    """Forces on beads with prescribed motion, and motions of free beads, in both engines."""
     for name, setting in SCENES.items():
-        yield from setting.lines(name, bench)
-
-
-def thrown_lines(bench: Bench) -> Iterator[Line]:
-    """Beads that move freely, in both engines from the same start."""
-    for name, setting in FREE.items():
         yield from setting.lines(name, bench)
 
 
@@ -449,7 +437,6 @@ def step_lines(bench: Bench) -> Iterator[Line]:
 
 CHECKS: Mapping[str, Callable[[Bench], Iterable[Line]]] = {
     "scenes": scene_lines,
-    "thrown": thrown_lines,
     "restart": restart_lines,
     "ranks": rank_lines,
     "stock": stock_lines,
