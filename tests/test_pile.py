@@ -398,7 +398,7 @@ def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
     assert bridges.n_cells > 50
     np.testing.assert_allclose(box.bounds, [-2e-3, 2e-3, -2e-3, 2e-3, 0.0, 20e-3], atol=1e-9)
     (in_folder / "pile-ci.toml").write_text(to_toml(document(run=HALF)))
-    assert "60 beads" in told("run", "pile-ci.toml", "--out", str(run.parent))
+    assert re.search(r"\n  beads +60\n", told("run", "pile-ci.toml", "--out", str(run.parent)))
     assert "in which the beads come to rest" in told("export", "pile-ci", "--to", "deck")
 
 
@@ -656,7 +656,6 @@ def test_what_is_said_of_a_pile_before_it_is_shaken(changes: dict[str, Any], tol
     found = notes(load_case("pile-small", changes))
     assert len(found) == len(told)
     assert all(re.match(one, other) for one, other in zip(told, found, strict=True))
-    assert notes(load_case("climber")) == [], "its error is measured"
 
 
 def test_the_parts_of_climbs_are_judged_at_the_time_of_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,8 +25,7 @@ from walkers.inputs.resolving import SUPPLIED
 from walkers.inputs.table import Table, example_of, keys_in, table_in
 from walkers.inputs.units import ACCELERATION, AUTO, TEMPERATURE, Kind, kind_in, quantity_text
 from walkers.main import help_of, overview, program
-from walkers.postprocess.numbers import GROUPS
-from walkers.postprocess.quantities import TABLES
+from walkers.postprocess.quantities import GROUPS, TABLES
 from walkers.sweeps.table import STATE
 
 if TYPE_CHECKING:

@@ -38,6 +38,8 @@ MAX_GAP = 0.1
 """Longest time, s, for which a cluster may touch the pile or lose the wall within a track."""
 MIN_OVERLAP = 0.5
 """Smallest share of common beads (of the smaller cluster) in successive clusters of a track."""
+EVENTS = ("freed", "split", "merged", "rejoined", "detached")
+"""Events of clusters, see `events_of`."""
 _FEWEST_BEADS = 2
 _FEWEST_FRAMES = 3
 _MOST_BLOCKS, _FEWEST_BLOCKS = 10, 4

@@ -18,7 +18,6 @@ import numpy as np
 from walkers.inputs.run import CONSTANT
 from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
 from walkers.postprocess.motion import Group, Motion, read_motion
-from walkers.postprocess.numbers import STEADY_DIFFERENCE
 from walkers.postprocess.sides import REST, SEPARATED, STEADY_SPEED
 
 if TYPE_CHECKING:
@@ -26,6 +25,9 @@ if TYPE_CHECKING:
 
     from walkers.postprocess.results import Results
 
+STEADY_DIFFERENCE = 0.05
+"""A walker is steady if the velocities of the two halves of the measured cycles differ by less than this share, or by
+a hundredth of a millimetre per second."""
 UPRIGHT = np.radians(15.0)
 """Largest final angle of an upright walker, rad."""
 _NO_MORE = np.radians(0.5)

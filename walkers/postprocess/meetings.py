@@ -25,7 +25,7 @@ from walkers.postprocess.numbers import Measured
 from walkers.postprocess.tables import Columns
 
 NAME = "meetings"
-"""Group of its numbers, see `walkers.postprocess.numbers.GROUPS`."""
+"""Group of its numbers, see `walkers.postprocess.quantities.GROUPS`."""
 _SLOW = 0.1
 """Walkers below this fraction of the speed of free walkers are slow."""
 _END = 0.1
@@ -130,7 +130,7 @@ def places_of(motion: Motion) -> tuple[FloatArray, FloatArray]:
 
 
 def collective(course: Course, merged: int, axis: FloatArray) -> dict[str, Any]:
-    """Collective numbers of a result (`walkers.postprocess.numbers`); NaN for undefined ones.
+    """Collective numbers of a result (`walkers.postprocess.quantities`); NaN for undefined ones.
 
     ``merged`` is the number of meetings, ``axis`` the unit vector of the drive.
     """

@@ -11,6 +11,7 @@ import numpy as np
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
 from walkers.postprocess.clusters import (
+    EVENTS,
     Beads,
     Cluster,
     Joined,
@@ -25,11 +26,11 @@ from walkers.postprocess.clusters import (
 )
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import FLOOR, Bridges, Motion, read_bridges
-from walkers.postprocess.numbers import EVENTS, Measured
+from walkers.postprocess.numbers import Measured
 from walkers.postprocess.tables import Columns, read_columns
 
 NAME = "piles"
-"""Group of its numbers, see `walkers.postprocess.numbers.GROUPS`."""
+"""Group of its numbers, see `walkers.postprocess.quantities.GROUPS`."""
 _WHOLE = 1.0 - 1e-6
 """Fraction of the duration below which a run ended early."""
 State = dict[str, float]

@@ -50,13 +50,10 @@ class Quantity:
         """The unit of the stored number: a share has none."""
         return "" if self.unit == "share" else self.unit
 
-    @property
-    def shown(self) -> tuple[str, float]:
-        """The displayed unit, and how many of it one SI unit is."""
-        return SHOWN_UNITS.get(self.unit, (self.unit, 1.0))
 
-
-Q = Quantity
+def unit_shown(unit: str) -> tuple[str, float]:
+    """The displayed unit of an SI unit, and how many of it one SI unit is."""
+    return SHOWN_UNITS.get(unit, (unit, 1.0))
 
 
 def _quantities(entries: Mapping[str, str | list[str]]) -> tuple[Quantity, ...]:
@@ -74,6 +71,10 @@ def _quantities(entries: Mapping[str, str | list[str]]) -> tuple[Quantity, ...]:
 
 TABLES: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(columns) for name, columns in _FILE["tables"].items()}
 """The columns of the tables of runs, in their order."""
+GROUPS: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(group) for name, group in _FILE["numbers"].items()}
+"""The numbers of results: of each module of `walkers.postprocess.results.modules`, and of all."""
+NUMBERS: Mapping[str, Quantity] = {quantity.name: quantity for group in GROUPS.values() for quantity in group}
+"""The numbers of results by name."""
 
 
 def declared(name: str, known: Iterable[Quantity]) -> Quantity:
@@ -104,5 +105,5 @@ def axis(table: str, name: str) -> tuple[str, float]:
     (('height (mm)', 1000.0), ('bead 2 off its wall (%)', 100.0))
     """
     quantity = declared(name, TABLES[table])
-    unit, factor = quantity.shown
+    unit, factor = unit_shown(quantity.unit)
     return f"{quantity.label} ({unit})" if unit else quantity.label, factor

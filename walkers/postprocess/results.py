@@ -1,6 +1,6 @@
 """Results of runs: measured and written once, read by all.
 
-A result is flat: a number of each name of `walkers.postprocess.numbers.NUMBERS`. Each module of `modules` has three
+A result is flat: a number of each name of `walkers.postprocess.quantities.NUMBERS`. Each module of `modules` has three
 functions: ``applies(case)``; ``derived(case)``, the numbers that follow from the case alone; and ``measure(motion)``.
 """
 

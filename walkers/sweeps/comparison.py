@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import refused
-from walkers.postprocess.numbers import GROUPS, band_text, declared, fell
+from walkers.postprocess.numbers import band_text, declared, fell
+from walkers.postprocess.quantities import GROUPS
 from walkers.postprocess.results import Results, read
 from walkers.postprocess.sides import alike, sides
 from walkers.postprocess.uncertainty import not_known

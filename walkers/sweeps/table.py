@@ -26,7 +26,8 @@ from walkers.errors import InputError, Problem, refused, suggestion
 from walkers.inputs.axes import is_axis, plain
 from walkers.inputs.case import Case
 from walkers.inputs.keys import flatten
-from walkers.postprocess.numbers import GROUPS, declared, is_declared, ordered
+from walkers.postprocess.numbers import declared, is_declared, ordered
+from walkers.postprocess.quantities import GROUPS
 from walkers.postprocess.results import Results, derived, modules_of, read
 from walkers.postprocess.sides import differ
 from walkers.rounding import DIGITS, SHOWN_UNITS, counted, rounded
