@@ -105,7 +105,7 @@ def test_what_goes_where_can_be_chosen(looked_through: Path) -> None:
     with pytest.warns(LeftOutWarning, match="not distinguished: peak acceleration"):
         figure = walkers.load(looked_through / "three").figure(**chosen)
     (axes,) = _panels(figure)
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("frequency (Hz)", "sliding 2 (mm/s)")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("frequency (Hz)", "sliding of bead 2 (mm/s)")
     # A column that follows from an axis stands for it.
     (axes,) = _panels(walkers.load(looked_through / "grid").figure(x="gamma0", log="x"))
     assert (axes.get_xlabel(), axes.get_xscale(), len(_drawn(axes))) == ("Γ0", "log", 2)
@@ -291,6 +291,6 @@ def test_walkers_that_face_down_a_slope_are_a_series_beside_those_that_face_up(t
     drawn = drawn_column(table, "axial_velocity", down="axial_left_facing")
     each = [walkers.load(Path(run)).walkers.set_index("facing")["axial_velocity"] for run in table["run"]]
     np.testing.assert_allclose([drawn.values, drawn.down], [[1e3 * one[way] for one in each] for way in (1, -1)])
-    assert drawn.label == "velocity along the axis (uphill) (mm/s)"
+    assert drawn.label == "velocity along the drive axis (mm/s)"
     alone = drawn_column(table.assign(left_facing=np.nan), "right_facing", down="left_facing")
     assert alone.down is None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from textwrap import wrap
@@ -70,10 +69,10 @@ Tables = Callable[[str], Columns]
 
 
 def figures_of(directory: Path) -> dict[str, Figure]:
-    """The figures of a run by the names of their files, drawn from its tables."""
-    from walkers.postprocess.tables import read_columns
+    """The figures of a run by the names of their files, drawn from its tables; its errors are those of `read`."""
+    from walkers.postprocess.results import read
 
-    case, tables = case_of(directory), partial(read_columns, directory)
+    case, tables = case_of(directory), read(directory).columns
     figures = {}
     if case.walkers:
         figures["walk"] = walk_figure(case, tables)

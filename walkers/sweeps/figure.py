@@ -23,6 +23,7 @@ from walkers.postprocess.drawing import (
     plain_text,
     styled,
 )
+from walkers.postprocess.numbers import declared, is_declared
 from walkers.sweeps.readable import readable_unit
 from walkers.sweeps.table import ERRORS, FACING_DOWN, default_column, find_name, value_text, varied_columns, with_unit
 
@@ -35,10 +36,6 @@ FloatArray = npt.NDArray[np.float64]
 _NONE = "none"
 """Instead of a column: no colours or no panels."""
 _SEEDS = ("run.seed", "seed")
-_SYMBOLS = {"gamma0": "Γ0", "sin_delta": "sin δ"}
-_SYMBOLS |= {"right_facing": "velocity, facing right (up)", "left_facing": "velocity, facing left (down)"}
-_SYMBOLS |= {"axial_velocity": "velocity along the axis (uphill), facing right (up)"}
-_SYMBOLS |= {"axial_left_facing": "velocity along the axis (uphill), facing left (down)"}
 _UP: dict[str, Any] = {"marker": "o", "color": "0.3", "label": "started facing right (up)"}
 _DOWN: dict[str, Any] = {"marker": "v", "color": "0.3", "label": "started facing left (down)"}
 _LEAST_ASYMMETRIES = 3  # smallest number of pairs of radii that are shown by sin δ
@@ -223,10 +220,10 @@ def _with(keys: Sequence[str]) -> str:
 
 
 def readable_key(key: str) -> str:
-    """A dotted key or a column as words: ``peak acceleration``, ``friction bead wall``, ``liquid``, ``Γ0``."""
+    """A dotted key or a column as words: ``friction bead wall``, ``liquid``; numbers of results by their labels."""
     table, _, name = key.partition(".")
-    if (name or table) in _SYMBOLS:
-        return _SYMBOLS[name or table]
+    if is_declared(name or table):
+        return declared(name or table).label
     words = table.partition("[")[0] if name in ("name", "material") else (name or table)
     return words.replace(".", " ").replace("_", " ")
 

@@ -25,14 +25,7 @@ Origins = tuple[Origin, ...] | None
 """Sources of the values of a case; None: as recorded in the run."""
 
 
-def report_run(
-    directory: Path,
-    to: Path | None = None,
-    origins: Origins = None,
-    *,
-    places: int = MOST_PLACES,
-    largest: int = LARGEST,
-) -> Path:
+def report_run(directory: Path, to: Path | None = None, origins: Origins = None, *, largest: int = LARGEST) -> Path:
     """Write the report of a run as a self-contained HTML file.
 
     Parameters
