@@ -50,19 +50,19 @@ class Author(NamedTuple):
 
 def describe_crate(contents: Contents, authors: Sequence[Author], licence: str) -> dict[str, Any]:
     """The metadata of an archive, JSON-LD; the licence is an SPDX identifier, the date is the end of the last run."""
-    made = _Crate(contents, authors)
-    root, profile = made.crate.root_dataset, {"name": "Process Run Crate", "version": PROFILE.rpartition("/")[2]}
+    described = _Crate(contents, authors)
+    root, profile = described.crate.root_dataset, {"name": "Process Run Crate", "version": PROFILE.rpartition("/")[2]}
     about = {"name": licence, "description": f"The licence {licence} of the SPDX list", "identifier": licence}
     root["name"] = f"{contents.name}: {contents.title}".rstrip(": ")
     root["description"] = contents.describe()
     root["datePublished"] = _moment(contents.finished)
-    root["license"] = made.entity(f"https://spdx.org/licenses/{licence}", "CreativeWork", **about)
-    root["conformsTo"] = made.entity(PROFILE, "CreativeWork", **profile)
-    root["citation"] = made.entity(PAPER, "ScholarlyArticle", **_PAPER_PROPERTIES)
-    root["mentions"] = [*(made.simulation(place) for place in contents.manifests), made.analysis()]
-    if made.people:
-        root["author"] = list(made.people)
-    metadata: dict[str, Any] = made.crate.metadata.generate()
+    root["license"] = described.entity(f"https://spdx.org/licenses/{licence}", "CreativeWork", **about)
+    root["conformsTo"] = described.entity(PROFILE, "CreativeWork", **profile)
+    root["citation"] = described.entity(PAPER, "ScholarlyArticle", **_PAPER_PROPERTIES)
+    root["mentions"] = [*(described.simulation(place) for place in contents.manifests), described.analysis()]
+    if described.people:
+        root["author"] = list(described.people)
+    metadata: dict[str, Any] = described.crate.metadata.generate()
     for entity in metadata["@graph"]:  # by the specification, lists have more than one item
         entity.update({key: value[0] for key, value in entity.items() if isinstance(value, list) and len(value) == 1})
     return metadata
@@ -76,7 +76,7 @@ class _Crate:
 
         self.contents, self.crate = contents, ROCrate(version=VERSION)
         self.crate.metadata.extra_terms["sha256"] = "http://schema.org/sha256"  # not in the context of that version
-        identifiers = [f"https://orcid.org/{one.orcid}" if one.orcid else f"#{quote(one.name)}" for one in authors]
+        identifiers = [f"https://orcid.org/{orcid}" if orcid else f"#{quote(name)}" for name, orcid in authors]
         self.people = [
             self.entity(identifier, "Person", name=author.name)
             for identifier, author in zip(identifiers, authors, strict=True)

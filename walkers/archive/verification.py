@@ -137,12 +137,12 @@ def _compared(
     others = [name for name in there if name not in listed]
     since = [name for name in others if _made_since(name) or beside(name)]
     folders = {"", *(name.rpartition("/")[0] for name in listed)}
-    made = [(name, name.rpartition("/")[0]) for name in since]
+    shown = [(name, name.rpartition("/")[0]) for name in since]
     findings = {
         "changed": changed,
         "missing": [name for name in listed if name not in now and name not in left_out],
         "not listed": [name for name in others if name not in since],
-        "made since": list(dict.fromkeys(name if parent in folders else f"{parent}/" for name, parent in made)),
+        "made since": list(dict.fromkeys(name if parent in folders else f"{parent}/" for name, parent in shown)),
     }
     absent = sum(name in listed and name not in now for name in left_out)
     return Verification(folder.resolve().name, len(now) - len(changed), findings, left_out=absent)

@@ -78,7 +78,7 @@ def crosscheck(
     []
     """
     cases = [case.changed({"run.seed": case.run.seed + number} if number else {}) for number in range(seeds)]
-    return compare([make(one, out).motion for one in cases], without)
+    return compare([make(start, out).motion for start in cases], without)
 
 
 def compare(motions: Sequence[Motion], without: Collection[str] = ()) -> list[Line]:
@@ -89,12 +89,12 @@ def compare(motions: Sequence[Motion], without: Collection[str] = ()) -> list[Li
     numbers = [np.mean([[*measured(motion).values()] for motion in side], axis=0).tolist() for side in sides]
     speeds = [abs(speed) for (_, unit), speed in zip(names, numbers[0], strict=True) if unit == "mm/s"]
     lines = []
-    for (what, unit), one, two in zip(names, *numbers, strict=True):
+    for (what, unit), first, second in zip(names, *numbers, strict=True):
         allowed = {"mm/s": max(GAIT * max(speeds), SPEED_FLOOR), "°": ORIENTATION}.get(unit, inf)
         if what.startswith("velocity"):
-            allowed = max(SPEED * abs(one), SPEED_FLOOR)
-        if unit != "%" or one or two:
-            lines.append(Line(what, one, two, inf if pile else allowed, unit, scale=None if pile else 1.0))
+            allowed = max(SPEED * abs(first), SPEED_FLOOR)
+        if unit != "%" or first or second:
+            lines.append(Line(what, first, second, inf if pile else allowed, unit, scale=None if pile else 1.0))
     check = " without ".join([motions[0].case.name, *([", ".join(without)] if without else [])])
     return [replace(line, check=check) for line in [*lines, *(line for start in starts for line in start.lines())]]
 

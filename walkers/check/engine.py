@@ -57,7 +57,9 @@ class SecondEngine:
             raise ValueError(f"without {unknown}: expected any of {', '.join(TERMS)}")
         self.clock, self.radius = clock, np.ascontiguousarray(radius, dtype=np.float64)
         self.constants = _constants(case, self.radius, walls or case.boundary.walls, without)
-        place, velocity, spin = (np.array(start[:, one : one + 3], dtype=np.float64, order="C") for one in (0, 3, 6))
+        place, velocity, spin = (
+            np.array(start[:, column : column + 3], dtype=np.float64, order="C") for column in (0, 3, 6)
+        )
         films = np.ones(len(radius)), np.zeros(len(radius))
         self.state = State(place, velocity, spin, np.zeros_like(place), np.zeros_like(place), *films)
         self._skin = _SKIN * float(self.radius.min())
@@ -102,7 +104,7 @@ class SecondEngine:
     def liquid(self) -> float:
         """Liquid on all beads and in all bridges, m³."""
         bridges, held = self.constants.bridges, self.pairs.bridge
-        return float(bridges.own @ self.state.film + bridges.volume[held[held >= 0]].sum())
+        return float(bridges.liquid @ self.state.film + bridges.volume[held[held >= 0]].sum())
 
     def _list(self) -> None:
         """List the neighbours, and keep contacts and bridges."""
@@ -113,8 +115,8 @@ class SecondEngine:
         at_walls = bodies * np.arange(beads)[:, None] + np.arange(beads, bodies)
         keys = np.sort(np.concatenate([near.min(axis=1) * bodies + near.max(axis=1), at_walls.ravel()]))
         pairs = Pairs(keys // bodies, keys % bodies, np.zeros((len(keys), 3)), np.full(len(keys), -1))
-        known = before.first * bodies + before.second
-        _, new, old = np.intersect1d(keys, known, assume_unique=True, return_indices=True)
+        listed = before.first * bodies + before.second
+        _, new, old = np.intersect1d(keys, listed, assume_unique=True, return_indices=True)
         pairs.spring[new], pairs.bridge[new] = before.spring[old], before.bridge[old]
         self.pairs = pairs
 
@@ -143,18 +145,18 @@ def _splined(law: BridgeLaw, surfaces: Surfaces) -> tuple[FloatArray, FloatArray
 def _bridges(case: Case, radius: FloatArray, without: Collection[str]) -> Bridges:
     sizes, kind = np.unique(radius, return_inverse=True)
     between, full = np.empty((len(sizes), len(sizes) + 1), dtype=np.int64), np.zeros((len(sizes), len(sizes) + 1, 2))
-    made: list[tuple[FloatArray, FloatArray, float]] = []
+    tables: list[tuple[FloatArray, FloatArray, float]] = []
     for row, small in enumerate(sizes.tolist()):
         between[row, :row], full[row, :row] = between[:row, row], full[:row, row, ::-1]
         for column, large in list(enumerate([*sizes.tolist(), inf]))[row:]:
             surfaces = Surfaces.of(small, large, case.liquid.of_bridges, case.contact.minimum_separation_ratio)
-            between[row, column], full[row, column] = len(made), surfaces.films[0]
-            made += [(*_splined(case.law, meeting), meeting.volume) for meeting in surfaces.volumes]
+            between[row, column], full[row, column] = len(tables), surfaces.films[0]
+            tables += [(*_splined(case.law, meeting), meeting.volume) for meeting in surfaces.volumes]
     acts = np.array(["capillary" not in without, *["lubrication" not in without] * 4], dtype=np.float64)
-    spans, splines, volumes = map(np.stack, zip(*made, strict=True))
-    own = 4.0 / 3.0 * pi * radius**3 * case.liquid.volume_fraction
+    spans, splines, volumes = map(np.stack, zip(*tables, strict=True))
+    liquid = 4.0 / 3.0 * pi * radius**3 * case.liquid.volume_fraction
     steps = 8 if case.liquid.conserved else 0
-    return Bridges(spans, splines * acts, kind.astype(np.int64), between, volumes, steps, full, own)
+    return Bridges(spans, splines * acts, kind.astype(np.int64), between, volumes, steps, full, liquid)
 
 
 def _constants(case: Case, radius: FloatArray, walls: Sequence[Wall], without: Collection[str]) -> Constants:
@@ -162,7 +164,8 @@ def _constants(case: Case, radius: FloatArray, walls: Sequence[Wall], without: C
     modulus, ratio, loss = contact.youngs_modulus, contact.poissons_ratio, log(contact.restitution)
     damping, friction, rolling, gravity, drive = (term not in without for term in TERMS[2:])
     waves = [
-        (*one.direction, one.angular_frequency, one.peak_acceleration, one.phase) for one in case.excitation.harmonics
+        (*wave.direction, wave.angular_frequency, wave.peak_acceleration, wave.phase)
+        for wave in case.excitation.harmonics
     ]
     none = (0.0, 0.0, 0.0)
     flat = [(wall.point, wall.normal) if isinstance(wall, Flat) else (none, none) for wall in walls]

@@ -44,7 +44,7 @@ class Bridges(NamedTuple):
 
     ``volume`` (T,), m³. Where liquid is conserved, two kinds have bridges of several volumes, in steps of √2 from the
     index on; full films give the volume after a number of ``steps``, else 0. ``full`` (K, K + 1, 2): what full films of
-    the first and second kind contribute to their bridge, m³; ``own`` (N,): the liquid of each bead, m³.
+    the first and second kind contribute to their bridge, m³; ``liquid`` (N,): the liquid of each bead, m³.
     """
 
     spans: FloatArray
@@ -54,7 +54,7 @@ class Bridges(NamedTuple):
     volume: FloatArray
     steps: int
     full: FloatArray
-    own: FloatArray
+    liquid: FloatArray
 
 
 class Constants(NamedTuple):
@@ -272,9 +272,9 @@ def bridge_of(b: Bridges, state: State, i: int, j: int, held: int, gap: float) -
         offers, sign = (b.full[kinds][0], b.full[kinds][1]), 1.0
     if b.steps:
         part = sign * b.volume[held] / (offers[0] + offers[1])
-        state.film[i] += part * offers[0] / b.own[i]
+        state.film[i] += part * offers[0] / b.liquid[i]
         if not wall:
-            state.film[j] += part * offers[1] / b.own[j]
+            state.film[j] += part * offers[1] / b.liquid[j]
     return held if sign < 0.0 else -1
 
 
@@ -283,8 +283,8 @@ def forces(c: Constants, state: State, pairs: Pairs, clock: int, moves: bool) ->
     """All forces and torques at the places and velocities of the state: weight, inertia, contacts and bridges."""
     beads, total = c.radius.shape[0], vector(c.gravity)
     if clock >= 0:
-        for one in range(c.harmonics.shape[0]):
-            wave = c.harmonics[one]
+        for number in range(c.harmonics.shape[0]):
+            wave = c.harmonics[number]
             total = plus(total, wave[4] * sin(wave[3] * clock * c.step + wave[5]), (wave[0], wave[1], wave[2]))
     for bead in range(beads):
         for axis in range(3):

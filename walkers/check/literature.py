@@ -34,10 +34,10 @@ def literature(
     for name, compute in LITERATURE.items():
         if name in only or not only:
             try:
-                found = list(compute(out, quick))
+                part = list(compute(out, quick))
             except WalkersError as error:
-                found = [Line.without_number(f"could not be computed: {error}", Verdict.ERROR)]
-            lines += [replace(line, check=name) for line in found]
+                part = [Line.without_number(f"could not be computed: {error}", Verdict.ERROR)]
+            lines += [replace(line, check=name) for line in part]
             if on_done:
                 on_done(name)
     return lines

@@ -348,9 +348,9 @@ def rank_lines(bench: Bench) -> Iterator[Line]:
     first, last = pair(-DEEP, 0.01, STILL)
     rows = (0.0, (first, last)), (2e-3, (last, first))
     scene = standing([*CLIMBING, *(_moved(bead, 2.6e-3, y, 0.9) for y, beads in rows for bead in beads)])
-    one, two = (bench.run(prescribed(full_case(), scene, 1000, ranks=ranks)).forces for ranks in (1, 2))
-    yield Line("forces: two MPI ranks and one", 0.0, farthest(two[..., :3], one[..., :3]), 1e-9)
-    yield Line("torques: two MPI ranks and one", 0.0, farthest(two[..., 3:], one[..., 3:]), 1e-9)
+    single, double = (bench.run(prescribed(full_case(), scene, 1000, ranks=ranks)).forces for ranks in (1, 2))
+    yield Line("forces: two MPI ranks and one", 0.0, farthest(double[..., :3], single[..., :3]), 1e-9)
+    yield Line("torques: two MPI ranks and one", 0.0, farthest(double[..., 3:], single[..., 3:]), 1e-9)
 
 
 def stock_lines(bench: Bench) -> Iterator[Line]:
@@ -362,7 +362,7 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
     meeting = Surfaces.of(S, R, bare.liquid.of_bridges, bare.contact.minimum_separation_ratio)
     fine = tabulated(by_name(bare.liquid.law), meeting, tolerance=1e-10).text()
     tables = deck.files[BRIDGES_NAME].split("bridge ")
-    tables = [f"1 1 {S!r} {R!r}\n{fine}" if one.startswith(f"1 1 {S!r} {R!r}") else one for one in tables]
+    tables = [f"1 1 {S!r} {R!r}\n{fine}" if table.startswith(f"1 1 {S!r} {R!r}") else table for table in tables]
     ours = bench.run(replace(deck, files={**deck.files, BRIDGES_NAME: "bridge ".join(tables)}))
     angle = degrees(sqrt(2.0 * bare.liquid.contact_angle))
     text = rendered("walkers.check", "stock.lig.j2", case=bare, scene=scene, layout=deck.layout, angle=angle)

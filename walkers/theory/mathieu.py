@@ -109,8 +109,8 @@ def _multipliers(slopes: FloatArray, step: float) -> npt.NDArray[np.complex128]:
     from scipy.linalg import expm
 
     period = np.eye(slopes.shape[-1])
-    for one in expm(slopes * step):
-        period = one @ period
+    for change in expm(slopes * step):
+        period = change @ period
     return np.linalg.eigvals(period).astype(np.complex128)
 
 
@@ -198,12 +198,12 @@ def turning_rate(case: Case) -> float | None:
     levers, spins = np.array([*dimer.radii, dimer.reduced_radius])[:, None], np.array([*spin, spin[0] - spin[1]])
     hindered = case.contact.rolling_friction * normal * levers / np.hypot(spins, speed / levers)
     slopes = _sideways(dimer, walker.resistances, drags, hindered, spin, push, torque)
-    found = _multipliers(slopes, 1.0 / (frequency * _STEPS))
+    multipliers = _multipliers(slopes, 1.0 / (frequency * _STEPS))
     # Beads that spin against each other about their vertical axes, as two wheels in mesh, are not damped.
-    neutral = np.abs(found - 1.0).argmin()
-    if abs(found[neutral] - 1.0) < _NEUTRAL:
-        found = np.delete(found, neutral)
-    return float(np.log(np.abs(found).max()) * frequency)
+    neutral = np.abs(multipliers - 1.0).argmin()
+    if abs(multipliers[neutral] - 1.0) < _NEUTRAL:
+        multipliers = np.delete(multipliers, neutral)
+    return float(np.log(np.abs(multipliers).max()) * frequency)
 
 
 def _sideways(

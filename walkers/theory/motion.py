@@ -60,8 +60,8 @@ class Friction:
     @classmethod
     def of_cases(cls, *cases: Case) -> Friction:
         """Coulomb's law with each case's coefficients."""
-        found = [case.contact for case in cases]
-        return cls.coulomb([one.friction.bead_wall for one in found], [one.friction.bead_bead for one in found])
+        laws = [case.contact.friction for case in cases]
+        return cls.coulomb([law.bead_wall for law in laws], [law.bead_bead for law in laws])
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,9 @@ class Walker:
     @classmethod
     def joined(cls, walkers: Sequence[Walker]) -> Walker:
         """Concatenate several sets of walkers."""
-        return cls(*(np.concatenate([getattr(one, field.name) for one in walkers], axis=-1) for field in fields(cls)))
+        return cls(
+            *(np.concatenate([getattr(walker, field.name) for walker in walkers], axis=-1) for field in fields(cls))
+        )
 
 
 @dataclass(frozen=True)
@@ -159,9 +161,9 @@ def walk(
     from walkers.theory.stepping import integrate
 
     given = (frequency, peak_acceleration, steady_acceleration, walker.scale)
-    drive = np.stack(np.broadcast_arrays(*(np.asarray(one, np.float64).reshape(-1) for one in given))[:3], axis=-1)
+    drive = np.stack(np.broadcast_arrays(*(np.asarray(value, np.float64).reshape(-1) for value in given))[:3], axis=-1)
     laws = (friction.kinetic, friction.linear)
-    law = np.stack([np.broadcast_to(np.asarray(one, np.float64), (3, len(drive))).T for one in laws], axis=1)
+    law = np.stack([np.broadcast_to(np.asarray(value, np.float64), (3, len(drive))).T for value in laws], axis=1)
     tables = _tables(walker, drive[:, 0] * steps_per_cycle)
     mean, least, repeated, solved, series = integrate(tables, law, drive, cycles, steps_per_cycle)
     velocity = translation(mean)
@@ -201,5 +203,5 @@ def _tables(walker: Walker, steps_per_second: FloatArray) -> FloatArray:
     presses = presses[:, None] - seconds * lifts @ gains
     rest = walker.at_rest.T[:, None, None]
     shape = coast.shape[:2]
-    parts = [np.broadcast_to(one, (*shape, *one.shape[2:])) for one in (coast, gains, presses, lifts, rest)]
+    parts = [np.broadcast_to(part, (*shape, *part.shape[2:])) for part in (coast, gains, presses, lifts, rest)]
     return np.concatenate(parts, axis=2)

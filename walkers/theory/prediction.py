@@ -230,17 +230,17 @@ def _cells(model: dict[str, Any]) -> list[str]:
     return [*speeds, *[""] * (4 - len(speeds)), "" if gamma is None else f"{gamma:.3f}", model.get("reason") or ""]
 
 
-def describe_alignment(found: dict[str, Any]) -> dict[str, str]:
+def describe_alignment(state: dict[str, Any]) -> dict[str, str]:
     """`alignment_of` as texts by name; with a second text if a force acts along the axis."""
-    equation = ", ".join(f"{name} = {found[key]:.3g}" for name, key in (("U", "u"), ("V", "v"), ("β", "damping")))
-    rolling = f"small angles {'stay small' if found['stable'] else 'grow'} if the beads roll"
-    if found["u"] == 0.0:
-        torque = rolling if found["v"] else "no torque toward the axis"
-        return {"alignment": f"Mathieu {equation}, stable up to V = {found['largest_stable_v']:.3g}: {torque}"}
+    equation = ", ".join(f"{name} = {state[key]:.3g}" for name, key in (("U", "u"), ("V", "v"), ("β", "damping")))
+    rolling = f"small angles {'stay small' if state['stable'] else 'grow'} if the beads roll"
+    if state["u"] == 0.0:
+        torque = rolling if state["v"] else "no torque toward the axis"
+        return {"alignment": f"Mathieu {equation}, stable up to V = {state['largest_stable_v']:.3g}: {torque}"}
     slip = "unknown: the axial motion is not periodic"
-    if found["rate"] is not None:
-        falls = f"turns over after about {found['turns_over_after'] or 0.0:.2g} s (from 1° to 90°)"
-        slip = f"{'stands' if found['stands'] else falls}; small angles grow by {found['rate']:.3g}/s"
+    if state["rate"] is not None:
+        falls = f"turns over after about {state['turns_over_after'] or 0.0:.2g} s (from 1° to 90°)"
+        slip = f"{'stands' if state['stands'] else falls}; small angles grow by {state['rate']:.3g}/s"
     return {"alignment": f"Mathieu {equation}: {rolling}", "with slip": slip}
 
 
@@ -281,8 +281,8 @@ def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, Floa
             reasons[f"{PAPER}: {why}"] += 1
         else:
             paper[place] = mean_velocity(dimer.gamma0(case.excitation.peak_acceleration), dimer.sin_delta)
-    found = {MODEL: model, PAPER: paper}
-    return {name: one for name, one in found.items() if np.isfinite(one).any()}, dict(reasons)
+    models = {MODEL: model, PAPER: paper}
+    return {name: values for name, values in models.items() if np.isfinite(values).any()}, dict(reasons)
 
 
 def _why_not(case: Case, column: str) -> str | None:

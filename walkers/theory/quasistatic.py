@@ -29,9 +29,9 @@ def mass_asymmetry(sin_delta: npt.ArrayLike) -> FloatArray:
 def normal_force_matrix(sin_delta: npt.ArrayLike) -> FloatArray:
     """The matrix D of F = F0 + D F∥ (their Eq. 2), from the balance of forces with fixed distances, shape (…, 3, 3)."""
     s = np.asarray(sin_delta, np.float64)
-    mu, one = mass_asymmetry(s), np.ones_like(s)
+    mu, ones = mass_asymmetry(s), np.ones_like(s)
     heavy, light = (1.0 + mu) / 2.0, (1.0 - mu) / 2.0
-    rows = [[-light * s, heavy * s, -one], [light * s, -heavy * s, one], [light, -heavy, s]]
+    rows = [[-light * s, heavy * s, -ones], [light * s, -heavy * s, ones], [light, -heavy, s]]
     matrix: FloatArray = _matrix(rows) / np.sqrt(1.0 - s**2)[..., None, None]
     return matrix
 
@@ -39,8 +39,8 @@ def normal_force_matrix(sin_delta: npt.ArrayLike) -> FloatArray:
 def inertia_matrix(sin_delta: npt.ArrayLike) -> FloatArray:
     """The matrix G of M dv/dt = -M a (1, 1, 0) - G F∥ (their Eq. 3), solid spheres, shape (…, 3, 3)."""
     mu = mass_asymmetry(sin_delta)
-    first, second, one = 5.0 / (1.0 + mu), 5.0 / (1.0 - mu), np.ones_like(mu)
-    return _matrix([[1.0 + first, one, first], [one, 1.0 + second, second], [first, second, first + second]])
+    first, second, ones = 5.0 / (1.0 + mu), 5.0 / (1.0 - mu), np.ones_like(mu)
+    return _matrix([[1.0 + first, ones, first], [ones, 1.0 + second, second], [first, second, first + second]])
 
 
 def rolling_matrix(first: npt.ArrayLike, second: npt.ArrayLike) -> FloatArray:
@@ -50,8 +50,8 @@ def rolling_matrix(first: npt.ArrayLike, second: npt.ArrayLike) -> FloatArray:
     have q1 = (v1 - v)/R1 and q2 = (v2 - v)/R2; on each other they have q3 = q1 - q2, the first bead as body 1. Shape
     (…, 3, 3), 1/m.
     """
-    one, two = 0.5 / np.asarray(first, np.float64), 0.5 / np.asarray(second, np.float64)
-    return _matrix([[one, -one, one], [-two, two, two], [one + two, -one - two, one - two]])
+    a, b = 0.5 / np.asarray(first, np.float64), 0.5 / np.asarray(second, np.float64)
+    return _matrix([[a, -a, a], [-b, b, b], [a + b, -a - b, a - b]])
 
 
 def _matrix(rows: list[list[FloatArray]]) -> FloatArray:

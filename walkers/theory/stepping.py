@@ -78,8 +78,8 @@ def integrate(
                 break
             if cycle >= cycles // 2:
                 later += totals[0] / (cycles - cycles // 2)
-                for one in (before, totals[0]):
-                    low, high = np.minimum(low, one), np.maximum(high, one)
+                for mean in (before, totals[0]):
+                    low, high = np.minimum(low, mean), np.maximum(high, mean)
             same = _REPEATED * max(1.0, np.abs(totals[0]).max() / _FAST)
             if np.abs(totals[0] - before).max() < same:
                 repeated[of] = True
@@ -111,16 +111,16 @@ def _advance(  # noqa: PLR0913, PLR0917
         now, part = begin + tick / _TICKS * length, width / _TICKS * length
         after[:] = state
         start = (state[0, 0], state[0, 1], state[0, 2])
-        found = _stage(tables[level], law, drive, now + STAGE * part, STAGE * part, start, work)
+        solved = _stage(tables[level], law, drive, now + STAGE * part, STAGE * part, start, work)
         # The second stage starts from where the slope of the first one leads.
         more = (1.0 - STAGE) / STAGE
         x, y, z = start
         start = (x + more * (after[0, 0] - x), y + more * (after[0, 1] - y), z + more * (after[0, 2] - z))
-        found &= _stage(tables[level], law, drive, now + part, STAGE * part, start, work)
-        if level < LEVELS - 1 and (not found or _differ(after[_MODE], state[_MODE])):
+        solved &= _stage(tables[level], law, drive, now + part, STAGE * part, start, work)
+        if level < LEVELS - 1 and (not solved or _differ(after[_MODE], state[_MODE])):
             level += 1
             continue
-        if not found:
+        if not solved:
             return False
         for at in range(3):
             totals[0, at] += part / 2.0 * (state[_SLIDING, at] + after[_SLIDING, at])
@@ -133,8 +133,8 @@ def _advance(  # noqa: PLR0913, PLR0917
 
 
 @njit(cache=True)
-def _differ(one: FloatArray, other: FloatArray) -> bool:
-    return one[0] != other[0] or one[1] != other[1] or one[2] != other[2]
+def _differ(a: FloatArray, b: FloatArray) -> bool:
+    return a[0] != b[0] or a[1] != b[1] or a[2] != b[2]
 
 
 @njit(cache=True)
@@ -167,13 +167,13 @@ def _settle(table: FloatArray, law: FloatArray, seconds: float, free: Three, res
         for at in range(3):
             normal = max(rest[at] + _row(table, _PRESS + at, parallel), 0.0)
             speed = free[at] - seconds * _row(table, _GAIN + at, parallel)
-            own = seconds * table[_GAIN + at, at]
-            wanted = parallel[at] + speed / own
+            scale = seconds * table[_GAIN + at, at]
+            wanted = parallel[at] + speed / scale
             if abs(wanted) <= normal * law[0, at]:
                 modes[at] = 0.0
                 for by in range(3):
                     rows[at, by] = table[_GAIN + at, by] / table[_GAIN + at, at]
-                right[at] = speed / own
+                right[at] = speed / scale
                 continue
             side = np.sign(wanted)
             modes[at] = side
