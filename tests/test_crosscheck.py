@@ -174,8 +174,9 @@ def test_fig1b_is_one_motion_in_both_engines(fig1b: Motion) -> None:
 @pytest.mark.parametrize("term", TERMS)
 def test_without_a_term_it_disagrees(fig1b: Motion, term: str) -> None:
     """So that agreement says something of that term."""
-    *_, together, _ = lines = compare([fig1b], [term])
+    velocity, *_, together, _ = lines = compare([fig1b], [term])
     assert failures(lines) or together.measured < together.expected
+    assert velocity.failed or term in ("damping", "gravity")  # which change it by 2 µm/s
 
 
 @pytest.mark.parametrize("name", ["groove of 120°", "two tones", "fan of three", "fig4b"])
