@@ -217,6 +217,21 @@ def test_walkers_are_named_by_the_direction_in_which_they_face(run_directory: Ca
     assert orientation.lines[0].get_ydata()[0] == pytest.approx(-30.0)  # type: ignore[index]
 
 
+def test_figures_of_slopes_show_the_way_up_as_who_goes_up_sees_it(run_directory: Callable[..., Path]) -> None:
+    slope = run_directory(boundary={"tilt": "10 deg"}, run={"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 20})
+    cycles, (height, orientation, path) = read(slope).columns("cycles"), figures_of(slope)["walk"].axes
+    first = {name: 1e3 * values[cycles["walker"] == 0] for name, values in cycles.items()}
+    np.testing.assert_allclose(height.lines[0].get_ydata(), first["along"])
+    np.testing.assert_allclose(path.lines[0].get_xydata().T, [first["across"], first["along"]])  # type: ignore[union-attr]
+    left, right = path.get_xlim()
+    assert left > right
+    for axes in (height, orientation):
+        (settling,) = axes.patches
+        assert settling.get_extents().transformed(axes.transData.inverted()).x1 == pytest.approx(
+            1e-3 * first["time"][2]
+        )
+
+
 def test_walkers_that_come_close_are_reported(moved: Group) -> None:
     assert not walkers_met([moved])
     position = moved.position.copy()

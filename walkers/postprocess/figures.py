@@ -229,17 +229,15 @@ def gait_figure(case: Case, tables: Tables) -> Figure:
     names = ["velocity", *(name for name in trajectory if _numbered("rotation_*", name))]
     names = [name for name in names if np.isfinite(trajectory[name][last]).all()]
     smooth = _smooth({name: trajectory[name][last] for name in ("cycle", *names)}, "cycle")
-    texts = ["walker, along its heading", *(f"bead {name.partition('_')[2]}, −R dφ/dt" for name in names[1:])]
-    means = [rounded(1e3 * walkers[name][0], "mm/s") for name in names]
     widths, colours = np.linspace(1.1 + 1.6 * len(names), 1.1, len(names)), [_PALE, *(f"C{n}" for n in range(1, 99))]
-    looks = [
-        {"label": f"{text}\n(mean of the run {mean} mm/s)", "color": colour, "linewidth": width}
-        for text, mean, colour, width in zip(texts, means, colours, widths, strict=False)
-    ]
+    looks = [{"color": colour, "linewidth": width} for colour, width in zip(colours, widths, strict=False)]
+    for look, name in zip(looks, names, strict=True):
+        label, mean = declared(name, TABLES["trajectory"]).label, rounded(1e3 * walkers[name][0], "mm/s")
+        look["label"] = f"{label}\n(mean of the run {mean} mm/s)"
     figure, (axes,) = _panels("gait", case, {"trajectory": smooth}, [looks], [2.0 * _HEIGHT])
     axes.axhline(0.0, color="0.4", lw=0.6)
     axes.set_title(f"Walker {number}; a bead rolls without sliding where its curve coincides with the walker's")
-    axes.set_ylabel("velocity relative to the substrate (mm/s)")
+    axes.set_ylabel("velocity relative to the substrate;\nbeads: −R dφ/dt (mm/s)")
     axes.set_xlim(smooth["cycle"][-1] - 2.0, smooth["cycle"][-1] + 0.02)
     return _explained(figure, [axes])
 
