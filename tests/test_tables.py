@@ -7,6 +7,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from walkers.errors import InputError
 from walkers.inputs.reading import load_case
 from walkers.postprocess.quantities import TABLES, axis, declared
 from walkers.postprocess.tables import read_columns, read_table, write_table
@@ -87,3 +88,14 @@ def test_a_column_that_is_not_declared_is_refused(tmp_path: Path) -> None:
     for wrong in (columns | {"power": np.arange(3.0)}, {"time": np.arange(3.0)}):
         with pytest.raises(KeyError, match="missing or not declared"):
             write_table(tmp_path, "members", wrong)
+
+
+def test_a_table_that_is_missing_or_cut_is_refused(tmp_path: Path) -> None:
+    columns = dict.fromkeys(("time", "track", "bead", "large", "height"), np.arange(300.0))
+    write_table(tmp_path, "members", columns)
+    with pytest.raises(InputError, match="has no table bed; it has members"):
+        read_columns(tmp_path, "bed")
+    path = tmp_path / "members.parquet"
+    path.write_bytes(path.read_bytes()[:-9])
+    with pytest.raises(InputError, match=r"members\.parquet: cannot be read .* measures the run again"):
+        read_table(tmp_path, "members")

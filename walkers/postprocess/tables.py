@@ -5,16 +5,15 @@ They are written with pyarrow alone, because pandas takes a third of a second to
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from walkers.errors import refused
 from walkers.postprocess.quantities import TABLES, Quantity, declared
 from walkers.runner.files import beside
-from walkers.runner.manifest import check_unchanged
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -75,20 +74,6 @@ def _arrow(values: npt.NDArray[Any]) -> Any:
     return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(np.ascontiguousarray(values))])
 
 
-def intact(directory: Path, names: Iterable[str]) -> bool:
-    """Whether the tables of a run directory exist and are complete (parquet magic bytes at both ends)."""
-    for name in names:
-        path = directory / f"{name}.parquet"
-        if not path.is_file() or path.stat().st_size < 12:
-            return False
-        with path.open("rb") as file:
-            head = file.read(4)
-            file.seek(-4, 2)
-            if not head == file.read(4) == b"PAR1":
-                return False
-    return True
-
-
 def read_table(directory: str | Path, name: str) -> pd.DataFrame:
     """Read a table of a run directory into pandas, SI units.
 
@@ -97,7 +82,7 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
     directory
         The run directory.
     name
-        A table of its analyses, such as ``trajectory``, ``walkers`` or ``bridges``; of a pile ``bed`` or ``clusters``.
+        A table, such as ``trajectory``, ``walkers`` or ``bridges``; of a pile ``bed`` or ``clusters``.
 
     Returns
     -------
@@ -106,10 +91,8 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
 
     Raises
     ------
-    FileNotFoundError
-        If the directory has no such table.
-    runner.manifest.FileChanged
-        If the table has changed since the run was finished.
+    InputError
+        If the directory has no such table, or it is damaged.
     """
     table = _read(Path(directory), name)
     frame: pd.DataFrame = table.to_pandas()
@@ -129,7 +112,9 @@ def _read(directory: Path, name: str) -> Any:
 
     path = directory / f"{name}.parquet"
     if not path.exists():
-        there = ", ".join(sorted(one.stem for one in directory.glob("*.parquet")))
-        raise FileNotFoundError(f"{directory} has no table {name}; it has {there or 'none'}")
-    check_unchanged(directory, [path.name])
-    return pq.read_table(path)
+        tables = ", ".join(sorted(path.stem for path in directory.glob("*.parquet")))
+        raise refused(directory, f"has no table {name}; it has {tables or 'none'}")
+    try:
+        return pq.read_table(path)
+    except (OSError, ValueError) as error:  # errors of pyarrow are both
+        raise refused(path, f"cannot be read ({error}); walkers run {directory} measures the run again") from error
