@@ -126,6 +126,15 @@ def test_beads_of_a_cluster_touch_as_its_arrangement_says(arrangement: str, size
     assert make.length == pytest.approx(max(extents), rel=2e-3)
 
 
+def test_pairs_of_beads_are_numbered_along_the_arrangement() -> None:
+    """Columns of results are numbered by them. The last pair closes a ring; none closes a fan all around."""
+    ring, fan = (
+        of_tables(cluster(name, sizes)).walkers[0].pairs for name, sizes in (("ring", "ssss"), ("fan", "s" * 7))
+    )
+    assert ring == ((0, 1), (1, 2), (2, 3), (0, 3))
+    assert fan == (*((0, bead) for bead in range(1, 7)), *((bead, bead + 1) for bead in range(1, 6)))
+
+
 def test_a_cluster_heads_to_its_large_bead_or_where_its_first_one_is() -> None:
     """Of s-L-s the centroids coincide, and alike beads have no large ones: then the design gives the heading."""
     expected = {"Lss": (1.0, -0.5, -0.5), "sLs": (1.0, 0.0, -1.0), "sss": (1.0, 0.0, -1.0)}
