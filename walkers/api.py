@@ -332,7 +332,6 @@ class Run:
         """
         from walkers.postprocess.series import render_series
 
-        walker = 0 if walker is None and self.case.apart else walker
         return render_series(self.finished_directory, _path(to), images=images, walker=walker)
 
     def film(

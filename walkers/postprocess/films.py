@@ -29,9 +29,9 @@ from walkers.postprocess.scene import (
     camera_axes,
     from_above,
     from_the_side,
-    one_walker,
     plan_axes,
     round_below,
+    shown_of,
 )
 from walkers.runner.files import beside
 
@@ -68,9 +68,7 @@ def render_film(
     _check_format(path, options)
     if path.suffix.lower() == ".mp4":
         require("film")
-    motion = read_motion(directory).driven
-    if motion.case.apart or options.walker is not None:
-        motion = one_walker(motion, options.walker or 0)
+    motion, _ = shown_of(read_motion(directory).driven, options.walker)
     times = film_times(motion, options)
     count, frames = len(times.time), slice(int(times.frame[0]), ceil(times.frame[-1]) + 1)
     wide, tall = options.size
@@ -182,7 +180,7 @@ def _captions(
         if scene.path is not None:
             said.append(f"{scene.moved(times.frame[number]) @ toward:z.1f} mm {direction} from the start")
         said += [case.boundary.tilted] if case.boundary.tilted else []
-        said += ["red: climbers"] if case.loose else []
+        said += scene.explained
         said += [bridges_text(case)]
         draw.text((edge, edge), clock, "black", large, anchor="lt")
         if tray:  # above it

@@ -47,12 +47,17 @@ _LONG, _ABOUT = 1.5, 1.4
 them; the second factor is the margin of that view."""
 
 
-def one_walker(motion: Motion, number: int) -> Motion:
-    """The motion of the walker with a number; `InputError` if there is none."""
-    count = len(motion.walkers)
+def shown_of(motion: Motion, walker: int | None) -> tuple[Motion, bool]:
+    """What pictures and films show: the walker with a number, the first of independent walkers, or all beads.
+
+    The second value is whether it is a walker by itself; `InputError` if there is no walker with this number.
+    """
+    if walker is None and not motion.case.apart:
+        return motion, False
+    number, count = walker or 0, len(motion.walkers)
     if not 0 <= number < count:
         raise refused("walker", f"{number}: " + (f"expected 0 to {count - 1}" if count else "the run has no walkers"))
-    return motion.of_walkers(motion.walkers[number : number + 1])
+    return motion.of_walkers(motion.walkers[number : number + 1]), True
 
 
 @dataclass(frozen=True)
@@ -176,6 +181,11 @@ class Scene:
         motion = self.motion
         chosen = np.tile(motion.walker_of >= 0, (len(motion.time), 1))
         return chosen | piles.tracks_of(motion)[1] if piles.applies(motion.case) else chosen
+
+    @property
+    def explained(self) -> list[str]:
+        """What colours of beads mean, if that is not plain."""
+        return ["red: climbers"] if self.motion.case.loose and self.pointed_out.any() else []
 
     def colours(self, chosen: npt.NDArray[np.bool_]) -> FloatArray:
         """Red, green, blue (to 255) of the dark and the pale lunes of beads, shape (2, N, 3); chosen ones in ruby."""

@@ -7,23 +7,19 @@ if it walks up a slope. On a tilted plane up in the picture is uphill.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from math import ceil, isclose
+from math import ceil
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from walkers.inputs.case import Case
 from walkers.postprocess.drawing import check_place, new_figure, plain_text, save_figure, styled
-from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.motion import Motion, even_frames, even_labels, gathered, read_motion
+from walkers.postprocess.motion import Motion, even_frames, even_labels, read_motion
 from walkers.postprocess.necks import EXPLAINED, bridges_at
-from walkers.postprocess.scene import Picture, Scene, Window, from_the_side, one_walker, plan_axes
+from walkers.postprocess.scene import Scene, Window, from_the_side, plan_axes, shown_of
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SERIES_NAME, PICTURE_NAME = "series.png", "walker.png"
@@ -33,24 +29,30 @@ _PIXELS = 40.0
 """Smallest resolution of a view in pixels per mm, unless it becomes too large."""
 _TALL, _TALLEST, _WIDEST = 1000, 1600, 1900
 """Pixels of a view: usual height, largest height (views that are much higher than wide), largest width."""
-_PAGE = (8.5, 9.0)
-"""Largest width and height of a picture, inches."""
-_PANEL = (1.4, 5.0)
-"""Width or height of a view, inches: the one that gives the larger view, if the page has room."""
-_BESIDE, _BENEATH, _EDGES = 0.3, 0.8, (0.9, 0.1)
-"""Space between views side by side (tick labels) and below each other (time, ticks, label); outer edges; inches."""
-_STRIP, _LENGTHS, _GAP = 0.8, (3.6, 5.4), 0.08
-"""Width, smallest and largest length of a strip, and space between strips, inches."""
-_MARGIN, _STILL, _LONG = 0.25, 0.1, 4.0
+_PAGE, _VIEW, _STRIP = (8.0, 9.0), (1.4, 5.0), 0.9
+"""Largest width and height of all views, width or height of a view (which gives the larger one), and width of a strip
+of the floor; inches."""
+_BESIDE, _BENEATH, _LINE = 0.25, 0.75, 0.2
+"""Space beside and beneath a view; height of a line of text; inches."""
+_MARGIN, _STILL, _LONG, _ASPECT = 0.25, 0.1, 4.0, 4.5
 """Edge of a strip over half the width of the walker; displacement of a walker at rest over half its length; number of
-lengths of a path beyond which each strip is centred on the walker."""
-_LETTERS: dict[Any, Any] = {
-    "font.size": 10,
-    "axes.titlesize": 10,
-    "axes.labelsize": 10,
-    "xtick.labelsize": 9,
-    "ytick.labelsize": 9,
-}
+lengths of a path beyond which each strip is centred on the walker; length of a level strip over its width, at least."""
+
+
+class _Views(NamedTuple):
+    """Views of frames with their titles: labels of the axes, lines above, scale (inches per mm), columns (0: any).
+
+    Axes of the figure count from ``origin`` (mm, to the right and up in the view).
+    """
+
+    scene: Scene
+    frames: Sequence[int]
+    titles: list[str]
+    labels: tuple[str, str]
+    said: list[str]
+    scale: float
+    columns: int = 0
+    origin: tuple[float, float] = (0.0, 0.0)
 
 
 @styled
@@ -61,7 +63,7 @@ def render_series(
     images: int = SHOWN,
     walker: int | None = None,
 ) -> list[Path]:
-    """Render views of a run in rows, with times and scales; walkers and climbers are coloured.
+    """Render views of a run in rows, with times and scales; walkers, climbers and liquid bridges are coloured.
 
     Parameters
     ----------
@@ -72,178 +74,123 @@ def render_series(
     images
         Largest number of pictures, evenly spaced through the drive; fewer if the last is then nearer to its end.
     walker
-        Number of a walker to show by itself.
+        Number of a walker to show by itself; None: the first of independent walkers, otherwise all beads.
 
     Raises
     ------
     InputError
         If the destination is no PNG, or the run has no walker with this number.
     """
-    from matplotlib import rc_context
-
-    path = destination or directory / (SERIES_NAME if walker is None else PICTURE_NAME)
-    check_place(path, ".png")
-    whole = read_motion(directory)
-    motion = gathered(whole if walker is None else one_walker(whole, walker))
+    if destination is not None:
+        check_place(destination, ".png")
+    motion, single = shown_of(read_motion(directory), walker)
     frames = even_frames(motion, images)
-    with rc_context(_LETTERS):
-        figure = _views(motion, frames) if walker is None else _strips(motion, frames)
+    figure = _figure(_strips(motion, frames) if single else _views(motion, frames))
+    path = destination or directory / (PICTURE_NAME if single else SERIES_NAME)
     return save_figure(figure, path, [directory.name])
 
 
-def _views(motion: Motion, frames: Sequence[int]) -> Figure:
+def _views(motion: Motion, frames: Sequence[int]) -> _Views:
     """All beads at several times, with axes in mm."""
-    boundary = motion.case.boundary
-    sideways = from_the_side(motion.case)
+    boundary, sideways = motion.case.boundary, from_the_side(motion.case)
     axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     if not sideways:
         axes = plan_axes(motion, np.array([1.0, 0.0, 0.0]))
     driven = slice(motion.first_driven, None)
     scene = Scene.around(motion, axes, 1.0 if sideways else 1.1, driven, shaken=False)
-    (left, low, _), (right, high, _) = scene.low, scene.high
-    high += 0.05 * (high - low) if sideways else 0.0
-    scene = replace(scene, high=np.array([right, high, scene.high[2]]))
-    window = Window(scene, _pixels(right - left, high - low))
-    said = [
-        motion.case.title or motion.case.name,
-        ", ".join([*(["red: climbers"] if motion.case.loose else []), EXPLAINED]),
-    ]
-    figure, panels = _panels(len(frames), right - left, high - low, said)
+    wide, tall = np.ptp([scene.low, scene.high], axis=0)[:2]
     names = ("x", "height") if sideways else ("across the slope", "uphill") if boundary.tilt else ("x", "y")
-    seen = zip(panels, frames, bridges_at(motion, frames), even_labels(motion.time[frames]), strict=True)
-    for panel, frame, bridges, time in seen:
-        panel.imshow(window.picture(frame, bridges), extent=(left, right, low, high), interpolation="antialiased")
-        panel.set_title(time)
-        panel.set_xlabel(f"{names[0]} (mm)")
-        panel.locator_params(axis="x", nbins=4, steps=[1, 2, 5, 10])
-        panel.spines["right"].set_visible(sideways)  # as the left one, a wall
-        panel.grid(visible=False)
-        foremost = isclose(panel.get_position().x0, panels[0].get_position().x0)
-        panel.tick_params(labelleft=foremost)
-        panel.set_ylabel(f"{names[1]} (mm)" if foremost else "")
-    window.close()
-    if boundary.tilted:
-        panels[0].annotate(boundary.tilted, (0.0, 1.0), (0.0, 20.0), "axes fraction", "offset points")
-    return figure
+    said = [motion.case.title or motion.case.name, *([boundary.tilted] if boundary.tilted else [])]
+    said += [", ".join([*scene.explained, EXPLAINED])]
+    labels = (f"{names[0]} (mm)", f"{names[1]} (mm)")
+    scale = max(_VIEW[0] / wide, _VIEW[1] / tall)
+    return _Views(scene, frames, even_labels(motion.time[frames]), labels, said, scale)
 
 
-def _strips(motion: Motion, frames: Sequence[int]) -> Figure:
+def _strips(motion: Motion, frames: Sequence[int]) -> _Views:
     """One walker at several times on strips of the floor; a long path is given as distances beside the times."""
     axes, radius = plan_axes(motion, np.array(motion.case.drive_axis)), 1e3 * motion.radius[:, None]
     place = 1e3 * motion.position[frames] @ axes.T
     middle = place.mean(axis=1)
     half, extent = (np.abs(place - middle[:, None]) + radius).max(axis=(0, 1)), np.ptp(middle, axis=0)
-    still = extent.max() < _STILL * half.max()
+    still, tilted = extent.max() < _STILL * half.max(), motion.case.boundary.tilted
     along = int(motion.case.boundary.tilt > 0.0 if still else extent[1] > extent[0])  # strips are upright, or level
     path, times = middle - middle[0], even_labels(motion.time[frames])
-    if long := bool(extent[along] > _LONG * 2.0 * half[along]):
-        times = [f"{time}\n{way:z.1f} mm" for time, way in zip(times, path[:, along], strict=True)]
+    direction = (("along the drive axis", "across the drive axis"), ("across the slope", "uphill"))[bool(tilted)][along]
+    said = [motion.case.title or motion.case.name, *([f"{tilted}, seen along its normal"] if tilted else [])]
+    if extent[along] > _LONG * 2.0 * half[along]:
+        join = "\n" if along else ", "
+        times = [f"{time}{join}{way:z.1f} mm" for time, way in zip(times, path[:, along], strict=True)]
+        said += [f"centred on the beads; time and displacement {direction}"]
     else:
         path[:, along] = 0.0
     seen, margin = place - path[:, None], _MARGIN * half[1 - along]
     low, high = (seen - radius).min(axis=(0, 1)) - margin, (seen + radius).max(axis=(0, 1)) + margin
-    inches = min(_STRIP / (high - low)[1 - along], _LENGTHS[1] / (high - low)[along])
-    wider = max((0.0 if along else _LENGTHS[0]) / inches - (high - low)[along], 0.0) / 2.0
+    narrow = (high - low)[1 - along]
+    wider = 0.0 if along else max(_ASPECT * narrow - (high - low)[along], 0.0) / 2.0
     low[along], high[along] = low[along] - wider, high[along] + wider
     camera = np.zeros((len(motion.time), 3))
     camera[frames] = path @ axes
-    window = Window(Scene(motion, axes, low, high, shaken=False, path=camera), _pixels(*(high - low)[:2].tolist()))
-    pictures = [
-        window.picture(frame, bridges) for frame, bridges in zip(frames, bridges_at(motion, frames), strict=True)
-    ]
-    window.close()
-    bounds = np.stack([low, high], axis=1)[:2] - middle[0, :2, None]
-    tilted = motion.case.boundary.tilted
-    said = [motion.case.title or motion.case.name]
-    said += [f"{tilted}, seen along its normal"] if tilted else []
-    direction = (("along the drive axis", "across the drive axis"), ("across the slope", "uphill"))[bool(tilted)][along]
-    said += [EXPLAINED]
-    said += [f"centred on the beads; time and displacement {direction}"] if long else []
-    figure, panels = _strip_panels(pictures, bounds, inches, along, said)
-    _describe_strips(figure, panels, motion.case, times, along, f"{direction} (mm)")
-    return figure
+    scene = Scene(motion, axes, low, high, shaken=False, path=camera)
+    labels = ("", f"{direction} (mm)") if along else (f"{direction} (mm)", "")
+    origin = (float(middle[0, 0]), float(middle[0, 1]))
+    return _Views(
+        scene, frames, times, labels, [*said, EXPLAINED], _STRIP / narrow, len(frames) if along else 1, origin
+    )
 
 
-def _strip_panels(
-    pictures: Sequence[Picture], bounds: FloatArray, inches: float, along: int, said: Sequence[str]
-) -> tuple[Figure, list[Axes]]:
-    """Pictures with bounds (mm, shape (2, 2)) below each other, or upright ones (``along`` 1) side by side.
+def _figure(views: _Views) -> Figure:
+    """Pictures in the number of columns that makes them largest, on slopes with an arrow for the pull of gravity."""
+    scene, case, count = views.scene, views.scene.motion.case, len(views.frames)
+    strips = views.columns > 0
+    bounds = np.stack([scene.low, scene.high], axis=1)[:2]
+    wide, tall = np.ptp(bounds, axis=1).tolist()
 
-    The lines of ``said`` are above them.
-    """
-    (across, up), left, below = np.ptp(bounds, axis=1) * inches, 0.75 if along else 0.3, 0.2 if along else 0.6
-    columns, rows = (len(pictures), 1) if along else (1, len(pictures))
-    wide = left + columns * (across + _GAP) + (0.9 if along or len(said) == 1 else 1.6)
-    lines = [line for one in said for line in wrap(plain_text(one), round(13.0 * wide))]
-    tall = below + rows * (up + _GAP) + 0.15 + 0.18 * len(lines) + (0.25 if along else 0.0)
-    figure, grid = new_figure(wide, tall, nrows=rows, ncols=columns, squeeze=False)
-    figure.set_layout_engine("none")
-    figure.suptitle("\n".join(lines), y=1.0 - 0.08 / tall, fontsize=10)
-    for number, (panel, picture) in enumerate(zip(grid.flat, pictures, strict=True)):
-        row, column = divmod(number, columns)
-        corner = left + column * (across + _GAP), below + (rows - 1 - row) * (up + _GAP)
-        panel.set_position((corner[0] / wide, corner[1] / tall, across / wide, up / tall))
-        panel.imshow(picture, extent=bounds.ravel().tolist(), interpolation="antialiased", aspect="auto")
+    def scale(columns: int) -> float:
+        """Inches per mm."""
+        across, up = _PAGE[0] / columns - _BESIDE, _PAGE[1] / ceil(count / columns) - _BENEATH
+        return float(min(views.scale, across / wide, up / tall))
+
+    columns = views.columns or max(range(1, count + 1), key=lambda number: (scale(number), number))
+    rows, inches = ceil(count / columns), scale(columns)
+    width = columns * (inches * wide + _BESIDE) + 0.8
+    lines = [line for text in views.said for line in wrap(plain_text(text), round(13.0 * width))]
+    height = rows * (inches * tall + _BENEATH) + _LINE * len(lines)
+    figure, axes = new_figure(width, height, nrows=rows, ncols=columns, squeeze=False, sharex=True, sharey=True)
+    figure.set_layout_engine("compressed")
+    figure.suptitle("\n".join(lines), fontsize=10)
+    window = Window(scene, _pixels(wide, tall))
+    extent = (bounds - np.array(views.origin)[:, None]).ravel().tolist()
+    seen = zip(axes.flat, views.frames, bridges_at(scene.motion, views.frames), views.titles, strict=False)
+    for number, (panel, frame, bridges, title) in enumerate(seen):
+        panel.imshow(window.picture(frame, bridges), extent=extent, interpolation="antialiased")
+        panel.set_title(title, fontsize=10)
         panel.grid(visible=False)
-        panel.spines[["left", "bottom"]].set_visible(False)
-        upright, level = bool(along) and column == 0, not along and row == rows - 1
-        panel.tick_params(left=upright, labelleft=upright, bottom=level, labelbottom=level)
-    return figure, list(grid.flat)
-
-
-def _describe_strips(
-    figure: Figure, panels: Sequence[Axes], case: Case, times: Sequence[str], along: int, label: str
-) -> None:
-    """Add times, the label of the axis, and on a slope an arrow for the component of gravity."""
-    wide = figure.get_figwidth()
-    for panel, time in zip(panels, times, strict=True):
-        if along:
-            panel.set_title(time)
-        else:
-            panel.text(1.03, 0.5, time, transform=panel.transAxes, va="center")
-    if along:
-        panels[0].set_ylabel(label)
-    else:
-        panels[-1].set_xlabel(label)
-    if case.boundary.tilted and case.environment.gravity:
-        place = 1.0 - 0.45 / wide
-        figure.text(place, 0.56, case.boundary.pull, ha="center")
-        how: dict[str, Any] = {"xycoords": "figure fraction", "arrowprops": {"arrowstyle": "-|>", "lw": 1.5, "fc": "k"}}
-        panels[0].annotate("", (place, 0.36), (place, 0.55), **how)
+        panel.spines[["left", "bottom"]].set_visible(not strips)
+        panel.spines["right"].set_visible(not strips and from_the_side(case))  # as the left one, a wall
+        below, left = (
+            bool(views.labels[0]) and number + columns >= count,
+            bool(views.labels[1]) and not number % columns,
+        )
+        panel.tick_params(left=left, labelleft=left, bottom=below, labelbottom=below, labelsize=9)
+        panel.set_xlabel(views.labels[0] if below else "", fontsize=10)
+        panel.set_ylabel(views.labels[1] if left else "", fontsize=10)
+        panel.locator_params(axis="x", nbins=4 if not strips else 9, steps=[1, 2, 5, 10])
+    window.close()
+    for panel in axes.flat[count:]:
+        panel.remove()
+    if strips and case.boundary.tilted and case.environment.gravity:
+        how = {"arrowstyle": "-|>", "lw": 1.5, "fc": "k"}
+        place = {"xycoords": "axes fraction", "ha": "center", "va": "bottom", "fontsize": 10}
+        last = axes.flat[count - 1]
+        last.annotate(case.boundary.pull, (1.3, 0.35), (1.3, 0.6), arrowprops=how, **place)
+    figure.draw_without_rendering()
+    box = figure.get_tightbbox()
+    figure.set_size_inches(box.width + 0.15, box.height + 0.15)
+    return figure
 
 
 def _pixels(wide: float, tall: float) -> list[int]:
     """Width and height in pixels of a view whose width and height are in mm."""
     pixels = min(max(_TALL / tall, min(_PIXELS, _TALLEST / tall)), _WIDEST / wide)
     return [max(1, round(extent * pixels)) for extent in (wide, tall)]
-
-
-def _panels(count: int, wide: float, tall: float, said: Sequence[str]) -> tuple[Figure, list[Axes]]:
-    """A figure with lines above and equal axes (width and height in mm), in the number of rows that makes them largest.
-
-    Their positions are calculated here because layouts of matplotlib do not know the size of axes of a fixed aspect.
-    """
-    aspired = max(_PANEL[0] / wide, _PANEL[1] / tall)
-
-    def inches(rows: int) -> float:
-        """Inches per mm."""
-        across, up = ((whole - edge) for whole, edge in zip(_PAGE, _EDGES, strict=True))
-        return min(aspired, (across / ceil(count / rows) - _BESIDE) / wide, (up / rows - _BENEATH) / tall)
-
-    rows = max(range(1, count + 1), key=lambda rows: (inches(rows), -rows))
-    columns = ceil(count / rows)
-    across, up = inches(rows) * wide + _BESIDE, inches(rows) * tall + _BENEATH
-    lines = [line for one in said for line in wrap(plain_text(one), round(13.0 * (_EDGES[0] + columns * across)))]
-    size = (_EDGES[0] + columns * across, _EDGES[1] + 0.18 * len(lines) + rows * up)
-    figure, axes = new_figure(*size, nrows=rows, ncols=columns, squeeze=False)
-    figure.set_layout_engine("none")
-    figure.suptitle("\n".join(lines), y=1.0 - 0.08 / size[1], fontsize=10)
-    for number, panel in enumerate(axes.flat):
-        if number >= count:
-            panel.remove()
-            continue
-        row, column = divmod(number, columns)
-        left, bottom = _EDGES[0] + column * across, (rows - 1 - row) * up + 0.6 * _BENEATH
-        corner = (left / size[0], bottom / size[1])
-        panel.set_position((*corner, (across - _BESIDE) / size[0], (up - _BENEATH) / size[1]))
-    return figure, list(axes.flat)[:count]
