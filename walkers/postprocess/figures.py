@@ -58,7 +58,7 @@ MOST_NAMED = 12  # lines in a legend
 LEAST = {"m": 0.01, "rad": 0.1, "m/s": 0.01}
 """Smallest ranges of axes by unit, in mm, ° and mm/s, so that rounding errors do not look like motion."""
 _HEIGHT = 1.6  # height of a panel, inches
-_LETTERS, _LETTERS_OF_AN_INCH = 90, 13  # letters of a line of a title; of a y label per inch of its panel
+_LETTERS, _LETTERS_OF_AN_INCH = 100, 13  # letters of a line of a title; of a y label per inch of its panel
 _ASIDE = 10.0  # smallest angle at the start (°) in a legend
 _BETWEEN, _BEFORE = 10, 3  # points of a smooth curve between samples; samples before it, which give its slope
 _GREY, _PALE, _OTHERS = "#5b6770", "#b4bec5", "#c78a2c"
@@ -229,7 +229,7 @@ def gait_figure(case: Case, tables: Tables) -> Figure:
     names = ["velocity", *(name for name in trajectory if _numbered("rotation_*", name))]
     names = [name for name in names if np.isfinite(trajectory[name][last]).all()]
     smooth = _smooth({name: trajectory[name][last] for name in ("cycle", *names)}, "cycle")
-    widths, colours = np.linspace(1.1 + 1.6 * len(names), 1.1, len(names)), [_PALE, *(f"C{n}" for n in range(1, 99))]
+    widths, colours = np.linspace(6.0, 1.1, len(names)), [_PALE, *(f"C{n}" for n in range(1, 99))]
     looks = [{"color": colour, "linewidth": width} for colour, width in zip(colours, widths, strict=False)]
     for look, name in zip(looks, names, strict=True):
         label, mean = declared(name, TABLES["trajectory"]).label, rounded(1e3 * walkers[name][0], "mm/s")
