@@ -40,7 +40,7 @@ def test_one_failed_line_fails_all_checks() -> None:
     assert as_dict(lines[:1])["passed"]
     assert failures(lines) == [BAD]
     assert (outcome(lines), outcome(lines[:1])) == ("1 of 3 lines fail", "all 1 lines pass")
-    assert [line.split()[0] for line in as_text(lines[1:]).splitlines()] == ["second", "pass", "FAIL"]
+    assert [line.split()[0] for line in as_text(lines[1:]).splitlines()] == ["second", "expected", "pass", "FAIL"]
 
 
 def _pile(cycles: list[float]) -> Motion:

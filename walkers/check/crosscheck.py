@@ -95,7 +95,8 @@ def compare(motions: Sequence[Motion], without: Collection[str] = ()) -> list[Li
             allowed = max(SPEED * abs(first), SPEED_FLOOR)
         if unit != "%" or first or second:
             lines.append(Line(what, first, second, inf if pile else allowed, unit, scale=None if pile else 1.0))
-    check = " without ".join([motions[0].case.name, *([", ".join(without)] if without else [])])
+    check = f"{motions[0].case.name}: LIGGGHTS (expected) and the second engine (measured)"
+    check += f" without {', '.join(without)}" if without else ""
     return [replace(line, check=check) for line in [*lines, *(line for start in starts for line in start.lines())]]
 
 

@@ -95,6 +95,7 @@ def as_text(lines: Iterable[Line]) -> str:
 
 def _rows(lines: Sequence[Line]) -> Iterable[str]:
     width = max(len(line.what) for line in lines)
+    yield f"{'':7} {'':{width}} {'expected':>11} {'measured':>11}"
     for line in lines:
         judged = f"error {line.error:.1e} of {line.tolerance:.0e}" if isfinite(line.error + line.tolerance) else ""
         numbers = f"{_number(line.expected):>11} {_number(line.measured):>11} {line.unit:4} {judged}"
