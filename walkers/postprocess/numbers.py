@@ -51,7 +51,7 @@ _HIDDEN = frozenset(
         *("facing_right", "facing_left", "walkers_met", "meets", "came_apart", "facings_differ", "depends_on_start"),
         *("mass_asymmetry", "radius_1", "radius_2", "numerical_error", "goes_uphill"),
         *("orientation_smallest", "orientation_largest", "turned_first", "turned_last", "ended_early", "duration"),
-        *("gamma0", "sin_delta"),
+        *("gamma0", "sin_delta", "climbing", "descending"),
         *(quantity.name for quantity in GROUPS["drive"]),
     }
 )
@@ -124,6 +124,8 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
     main, hidden = headline(numbers), set(_HIDDEN)
     if main == "axial_velocity" or (main == "right_facing" and numbers["goes_uphill"]):
         hidden -= {"axial_velocity", "axial_left_facing"}
+    if not (numbers.get("facing_right") and numbers.get("facing_left")):  # the velocity is that of the only direction
+        hidden |= {"right_facing", "left_facing", "axial_left_facing"}
     if main != "velocity":
         hidden.add("velocity")
     if numbers.get("came_apart"):
