@@ -233,9 +233,23 @@ def text(results: Results, *, cached: bool = False) -> str:
             ),
             *(f"  warning: {warning}" for warning in results.warnings),
             *lines_of_rest(results.about["rests_on"]),
+            *_not_measured(results),
             f"  run        {results.directory}",
         ]
     )
+
+
+def _not_measured(results: Results) -> Iterator[str]:
+    """A line about the errors that are not measured, and the options that measure them."""
+    main = headline(results)
+    errors = {
+        "numerical error (--accuracy)": "velocity" in results and "numerical_error" not in results,
+        "band over the ranges of these values (--spread)": bool(main)
+        and f"{main}_low" not in results
+        and any(one["range"] for one in results.about["rests_on"]),
+    }
+    if missing := [error for error, lacks in errors.items() if lacks]:
+        yield f"  unmeasured {', '.join(missing)}"
 
 
 def headlines(results: Results) -> list[str]:
