@@ -27,6 +27,7 @@ from walkers.paper.maps import MODES, POSTURES, classify, climber, paper_drives,
 from walkers.paper.published import OBSERVATIONS, NothingFinishedError, Observation, Point, Sources
 from walkers.postprocess.drawing import save_figure
 from walkers.postprocess.gait import gait, steady_walkers
+from walkers.postprocess.results import read
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.table import read_record
 from walkers.theory.mathieu import turning
@@ -127,7 +128,7 @@ def test_compared_numbers_are_those_of_the_runs(sources: Sources) -> None:
     fig4 = sources.table("fig4").set_index("liquid.name")
     assert rows["fig4a_velocity"]["engine"] == pytest.approx(fig4["velocity"]["Si AK5"] * 1e3)
     # Of Fig. 4b some walkers leave the axis or are not steady: they are left out, and told.
-    walkers, row = steady_walkers(fig4["run"]["Si AK10"]), rows["fig4b_rotation"]
+    walkers, row = steady_walkers(read(fig4["run"]["Si AK10"])), rows["fig4b_rotation"]
     assert row["left_out"] == fig4["walkers"]["Si AK10"] - len(walkers)
     assert row["engine"] == (pytest.approx(walkers["rotation_1"].mean() * 1e3) if len(walkers) else None)
     # Theory is of many cycles: it does not know the shortened runs.

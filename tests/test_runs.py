@@ -9,11 +9,9 @@ import shutil
 import signal
 import subprocess
 import time
-import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 
 import pytest
@@ -128,7 +126,7 @@ def test_a_run_is_found_by_its_directory_its_name_or_its_case_with_other_values_
     assert first["velocity"] == second["velocity"]
     for named in (first["run"], Path(first["run"]).name, case_file):
         assert walkers.load(named).directory == Path(first["run"])
-        assert f"{first['velocity']['mean'] * 1e3:.3f}" in call("run", str(named), check=True).stdout
+        assert f"{first['velocity'] * 1e3:.3f}" in call("run", str(named), check=True).stdout
     setting = ("--set", "drive.frequency=70Hz")
     assert f"first do: walkers run {case_file} --set drive.frequency=70Hz" in call("plot", case_file, *setting).stderr
     slower = json.loads(call("run", first["run"], *setting, "--json", check=True).stdout)
@@ -160,23 +158,6 @@ def test_a_running_simulation_is_looked_at_stopped_and_continued(in_folder: Path
     assert (run.status, "time limit of 0.2 s" in run.describe()) == ("failed", True)
 
 
-def test_damaged_tables_are_made_anew(tmp_path: Path) -> None:
-    case = make_case(run=SHORT)
-    outcome = run_case(case, tmp_path)
-    result = outcome.result
-    for name, contents in product(("result.json", "walkers.parquet", "bridges.parquet"), (None, b"{")):
-        path = outcome.directory / name
-        path.unlink()
-        if contents is not None:
-            path.write_bytes(contents)
-        with warnings.catch_warnings(record=True) as warned:
-            warnings.simplefilter("always")
-            assert run_case(case, tmp_path).result == result
-        assert any("recomputed from the dumps" in str(one.message) for one in warned) == (contents is not None)
-        walkers.load(outcome.directory)
-        assert path.stat().st_size > 100
-
-
 def test_a_run_without_its_description_is_told(run_directory: Callable[..., Path], tmp_path: Path) -> None:
     whole = run_directory(run=SHORT)
     for name in ("manifest.json", "case.json", "layout.json"):
@@ -190,7 +171,7 @@ def test_a_cut_dump_is_told_when_the_run_is_measured(tmp_path: Path) -> None:
     directory = run_case(make_case(run={"cycles": 8, "settling_cycles": 2}), tmp_path / "runs").directory
     os.truncate(directory / FIRST_SEGMENT / "beads.bin", 1000)
     (directory / "result.json").unlink()
-    done = call("plot", str(directory))
+    done = call("run", str(directory))
     assert (done.returncode, "Traceback" in done.stderr) == (2, False)
     assert f"walkers: {directory}: the run cannot be read" in done.stderr
 

@@ -76,7 +76,7 @@ def test_people_read_four_digits_and_each_number_by_its_name(runs_folder: Path) 
     numbers = re.findall(r"(?<![\w.])\d+\.?\d*(?:e-?\d+)?", "\n".join(lines))
     assert len(numbers) > 30
     assert not [one for one in numbers if len(one.partition("e")[0].replace(".", "").strip("0")) > 4]
-    assert re.search(r"  velocity +1.080 mm/s  scatter 0.001\n", told)
+    assert re.search(r"  velocity along the heading +1.080 mm/s  scatter 0.001\n", told)
 
 
 def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> None:

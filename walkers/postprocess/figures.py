@@ -69,7 +69,7 @@ Tables = Callable[[str], Columns]
 
 
 def figures_of(directory: Path) -> dict[str, Figure]:
-    """The figures of a run by the names of their files, drawn from its tables; its errors are those of `read`."""
+    """The figures of a run by the names of their files, drawn from its tables."""
     from walkers.postprocess.results import read
 
     case, tables = case_of(directory), read(directory).columns

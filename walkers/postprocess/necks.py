@@ -28,7 +28,7 @@ _WIDEST = 0.9  # largest width of a neck over that of the smaller bead
 
 
 def bridges_at(motion: Motion, frames: npt.ArrayLike) -> list[IntArray]:
-    """Contacts (`Bridges.contacts`) of the recorded bridges that are nearest in time to each of some frames."""
+    """Contacts of the recorded bridges that are nearest in time to each of some frames."""
     frames, recorded = np.asarray(frames), frames_with_bridges(motion)
     if not len(recorded):
         return [np.empty((0, 3), dtype=np.int64)] * len(frames)
