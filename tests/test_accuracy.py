@@ -136,6 +136,14 @@ def test_an_edited_accuracy_gives_one_message_and_can_be_measured_again(tmp_path
     assert json.loads(again.stdout.splitlines()[-1])["velocity_error"] == kept.errors["velocity"]["total"]
 
 
+def test_a_run_that_its_document_does_not_make_is_refused(tmp_path: Path) -> None:
+    """As after a change of the library or of a bridge law: the others would be runs of another case."""
+    done = walkers.run(make_case(run=QUICK).put("contact.restitution", 0.4), tmp_path)
+    with pytest.raises(InputError, match="expected a run of the installed engine"):
+        done.accuracy()
+    assert not list(tmp_path.glob("*-accuracy"))
+
+
 def test_a_pile_is_refused_before_it_runs(tmp_path: Path) -> None:
     told = call("run", "pile-ci", "--accuracy", "--out", str(tmp_path))
     assert told.returncode == 2

@@ -66,8 +66,10 @@ def measure_accuracy(
     """
     case = case_of(directory)
     possible = times_of(case)
-    if run_place(case, find_engine(engine), directory.parent).name != directory.name:
-        raise refused(directory.name, "expected a run of the installed engine and program; run its case again")
+    today = Case.read(case.document, source=directory.name, name=case.name)
+    if run_place(today, find_engine(engine), directory.parent).name != directory.name:
+        text = "expected a run of the installed engine and program, and of the library and bridge law as they are now"
+        raise refused(directory.name, f"{text}; run its case again")
     for last in range(2, len(possible)):
         sweep = _sweep(case, f"{directory.name}{ACCURACY}", possible[: last + 1])
         record, failures = run_sweep(sweep, directory.parent, options, engine=engine, **how)
