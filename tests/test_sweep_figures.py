@@ -18,9 +18,8 @@ from walkers.errors import InputError
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
 from walkers.plotting import LeftOutWarning
-from walkers.postprocess.drawing import SCATTER
 from walkers.runner.directory import case_of
-from walkers.sweeps.figure import draw, drawn_column, factors_of, layout_of
+from walkers.sweeps.figure import SCATTER, draw, drawn_column, factors_of, layout_of
 from walkers.theory.prediction import MODEL, PAPER, predict, predicted_column
 
 

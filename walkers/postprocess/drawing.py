@@ -25,8 +25,6 @@ FORMATS = ("png", "svg", "pdf")
 _STYLE = Path(__file__).parent / "style.mplstyle"
 _MAKER = "granular-walkers"
 _LEAST_ERROR = 0.02  # about half of the height of a symbol, over the range of values
-SCATTER = "bars: standard deviation of the copies (uncertain parameters not varied)"
-"""What the error bars of a sweep are."""
 _Given = ParamSpec("_Given")
 _Drawn = TypeVar("_Drawn")
 

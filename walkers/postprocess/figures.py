@@ -61,7 +61,7 @@ _HEIGHT = 1.6  # height of a panel, inches
 _LETTERS, _LETTERS_OF_AN_INCH = 100, 13  # letters of a line of a title; of a y label per inch of its panel
 _ASIDE = 10.0  # smallest angle at the start (°) in a legend
 _BETWEEN, _BEFORE = 10, 3  # points of a smooth curve between samples; samples before it, which give its slope
-_GREY, _PALE, _OTHERS = "#5b6770", "#b4bec5", "#c78a2c"
+_GREY, _PALE, _OTHERS = "#5b6770", "#b4bec5", "#8d99a1"
 _DASHES, _MARKERS = ("-", (0, (5, 1.5)), (0, (1, 1.2))), "os^Dv"
 _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
 """Markers of the events of clusters."""

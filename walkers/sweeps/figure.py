@@ -16,7 +16,6 @@ import numpy.typing as npt
 from walkers.errors import refused
 from walkers.inputs.library import unmeasured
 from walkers.postprocess.drawing import (
-    SCATTER,
     errors_seen,
     letter_panels,
     new_figure,
@@ -33,6 +32,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FloatArray = npt.NDArray[np.float64]
+SCATTER = "bars: standard deviation of the copies (uncertain parameters not varied)"
+"""What the error bars of a sweep are."""
 _NONE = "none"
 """Instead of a column: no colours or no panels."""
 _SEEDS = ("run.seed", "seed")
