@@ -25,7 +25,7 @@ from walkers.inputs.table import changed
 from walkers.inputs.units import Kind, quantity_text
 from walkers.postprocess.cycles import work_of
 from walkers.postprocess.films import speed_text
-from walkers.postprocess.gait import between, gait, settled_samples, turned_over_at
+from walkers.postprocess.gait import averages, gait, settled_samples, turned_over_at
 from walkers.postprocess.motion import Bridges, Group, Motion
 from walkers.postprocess.piles import _joined, _of_climbs, _state_of
 from walkers.postprocess.report.player import _points
@@ -282,9 +282,9 @@ def test_a_walker_is_separated_where_any_of_its_pairs_is() -> None:
     position = motion.position.copy()
     position[50:, 2, 0] -= 1e-3
     (group,) = replace(motion, position=position).groups
-    assert _rows(group, gait(group), between(group))["separated_fraction"] == pytest.approx(10.0 / 40.0)
+    assert _rows(group, gait(group), averages(group))["separated_fraction"] == pytest.approx(10.0 / 40.0)
     (group,) = motion.groups
-    assert _rows(group, gait(group), between(group))["separated_fraction"] == 0.0
+    assert _rows(group, gait(group), averages(group))["separated_fraction"] == 0.0
 
 
 def test_a_walker_has_turned_over_90_degrees_from_its_start() -> None:
@@ -315,7 +315,7 @@ def test_the_work_of_two_harmonics_with_phases() -> None:
     (group,) = replace(motion, position=position, velocity=velocity).groups
     mass = 4.0 / 3.0 * pi * (LARGE**3 + SMALL**3) * case.beads.density
     expected = pi * mass * (39.2 * 1e-4 + 2.0 * 19.6 * 3e-5)  # the second one has two periods in a cycle
-    np.testing.assert_allclose(work_of(group, between(group)), np.full((6, 1), expected), rtol=1e-3)
+    np.testing.assert_allclose(work_of(group, averages(group).centre), np.full((6, 1), expected), rtol=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -265,7 +265,7 @@ def _sampled(group: Group) -> Averages:
     """The same from the samples alone."""
     seen, samples = gait(group), settled_samples(group)
     means = (seen.rotation[samples], seen.sliding[samples], seen.gap[samples] > 0.0)
-    return Averages(*(one.mean(axis=0) for one in means))
+    return Averages(*(one.mean(axis=0) for one in means), group.mass_centre)
 
 
 def test_means_do_not_depend_on_how_often_is_looked(groups: dict[int, Group]) -> None:

@@ -16,20 +16,20 @@ from math import pi
 import numpy as np
 
 from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.gait import Between, distance_walked
+from walkers.postprocess.gait import distance_walked
 from walkers.postprocess.motion import Group
 from walkers.postprocess.tables import Columns
 
 
-def cycles_of(group: Group, looks: Between) -> Columns:
-    """Table ``cycles`` of the walkers of one make, one walker after the other."""
+def cycles_of(group: Group, centre: FloatArray) -> Columns:
+    """Table ``cycles`` of the walkers of one make, one walker after the other; for ``centre`` see `work_of`."""
     run = group.case.run
     strobe = run.samples_per_cycle
     time, distance = distance_walked(group)
     way = group.mass_centre[::strobe] - group.mass_centre[0]
     work = np.full(distance.shape, np.nan)
     if group.motion.follows_cycles:
-        works = work_of(group, looks)
+        works = work_of(group, centre)
         work[: len(works)] = works
     count, walkers = distance.shape
     of_walkers = {
@@ -52,14 +52,15 @@ def mass_of(group: Group) -> float:
     return float(4.0 / 3.0 * pi * np.sum(group.radii**3) * group.case.beads.density)
 
 
-def work_of(group: Group, looks: Between) -> FloatArray:
+def work_of(group: Group, centre: FloatArray) -> FloatArray:
     """Work of the drive on each walker in each cycle, J, shape (cycles, W).
 
-    The force is evaluated in the middle of each part of the intervals between samples.
+    The force is evaluated in the middle of each part of the intervals between samples; ``centre`` is that of
+    `walkers.postprocess.gait.Averages`.
     """
-    begin, interval, parts = group.time[:-1], np.diff(group.time), len(looks.centre) - 1
-    work = np.zeros(looks.centre.shape[1:3])
-    for part, (before, after) in enumerate(pairwise(looks.centre)):
+    begin, interval, parts = group.time[:-1], np.diff(group.time), len(centre) - 1
+    work = np.zeros(centre.shape[1:3])
+    for part, (before, after) in enumerate(pairwise(centre)):
         time = begin + (part + 0.5) / parts * interval
         for harmonic in group.case.excitation.harmonics:
             phase = harmonic.angular_frequency * time + harmonic.phase

@@ -17,7 +17,7 @@ import numpy as np
 
 from walkers.inputs.run import CONSTANT
 from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
-from walkers.postprocess.motion import Group, Motion, read_motion
+from walkers.postprocess.motion import Group, read_motion
 from walkers.postprocess.sides import REST, SEPARATED, STEADY_SPEED
 
 if TYPE_CHECKING:
@@ -77,66 +77,46 @@ def gait(group: Group) -> Gait:
     return Gait(velocity, rotation, np.concatenate(sliding, axis=-1), gaps(group, at_walls))
 
 
-@dataclass(frozen=True)
-class Averages:
-    """Means over the cycles after the settling ones; contacts as in `Gait`.
-
-    Rotation, m/s, shape (W, n); sliding, m/s, and share of the time with open contacts, shape (W, n + pairs).
-    """
-
-    rotation: FloatArray
-    sliding: FloatArray
-    open: FloatArray
-
-
 _PARTS = 10
 """Parts of an interval between samples at which gaps are evaluated."""
 
 
 @dataclass(frozen=True)
-class Between:
-    """Walkers at tenths of the intervals between samples (`looks_between`).
+class Averages:
+    """Means over the cycles after the settling ones, and paths between samples; contacts as in `Gait`.
 
-    Share of the time with open contacts after the settling cycles, shape (W, n + pairs); mass centres from the begin
-    to the end of the intervals, m, shape (11, F - 1, W, 3).
+    Rotation, m/s, shape (W, n); sliding, m/s, and share of the time with open contacts, shape (W, n + pairs); mass
+    centres at the ends of all parts of the intervals between samples, m, shape (parts + 1, F - 1, W, 3).
     """
 
+    rotation: FloatArray
+    sliding: FloatArray
     open: FloatArray
     centre: FloatArray
 
 
-def between(group: Group) -> Between:
-    """Contacts and paths between samples, by cubic interpolation."""
-    samples, shares = settled_samples(group), np.linspace(0.0, 1.0, looks_between(group.motion) + 1)
-    opened, centres = [], []
-    for share in shares.tolist():
-        look = Group(group.motion.between(share), group.make, group.walkers)
-        centres.append(look.mass_centre)
-        if share < 1.0:
-            opened.append((gaps(look)[samples] > 0.0).mean(axis=0))
-    return Between(np.mean(opened, axis=0), np.array(centres))
-
-
-def averages(group: Group, looks: Between | None = None) -> Averages:
+def averages(group: Group) -> Averages:
     """Mean rotation and sliding and share of open contacts after the settling cycles.
 
     Means over 20 samples per cycle have errors up to 10 % if contacts open, because spins change within few steps when
     beads touch. Therefore spins are averages of the engine over all steps, velocities are displacements, and gaps are
-    evaluated ten times per interval between samples (with less than eight samples per cycle, at the samples): these
-    are the ``looks``, which are computed if not given.
+    evaluated ten times per interval between samples by cubic interpolation (with less than eight samples per cycle, at
+    the samples).
     """
-    samples = settled_samples(group)
+    samples, parts = settled_samples(group), _PARTS if group.motion.follows_cycles else 1
     mean = gait(Group(group.motion.averaged, group.make, group.walkers))
+    opened, centres = [], []
+    for share in np.linspace(0.0, 1.0, parts + 1).tolist():
+        look = Group(group.motion.between(share), group.make, group.walkers)
+        centres.append(look.mass_centre)
+        if share < 1.0:
+            opened.append((gaps(look)[samples] > 0.0).mean(axis=0))
     return Averages(
         rotation=mean.rotation[samples].mean(axis=0),
         sliding=mean.sliding[samples].mean(axis=0),
-        open=(looks or between(group)).open,
+        open=np.mean(opened, axis=0),
+        centre=np.array(centres),
     )
-
-
-def looks_between(motion: Motion) -> int:
-    """Number of times per interval between samples at which gaps are evaluated."""
-    return _PARTS if motion.follows_cycles else 1
 
 
 def gaps(group: Group, at_walls: FloatArray | None = None) -> FloatArray:

@@ -21,10 +21,9 @@ from walkers.postprocess.cycles import cycles_of, mass_of
 from walkers.postprocess.dump import FloatArray, IntArray
 from walkers.postprocess.gait import (
     POSTURES,
-    Between,
+    Averages,
     Gait,
     averages,
-    between,
     gait,
     postures,
     settled_samples,
@@ -60,12 +59,12 @@ def derived(case: Case) -> dict[str, float]:
 def measure(motion: Motion) -> Measured:
     """Tables and numbers of all walkers; rotation, sliding and contacts are those of the first make."""
     case, groups = motion.case, motion.groups
-    gaits, looks = [gait(group) for group in groups], [between(group) for group in groups]
-    rows = [_rows(*parts) for parts in zip(groups, gaits, looks, strict=True)]
+    gaits, means = [gait(group) for group in groups], [averages(group) for group in groups]
+    rows = [_rows(*parts) for parts in zip(groups, gaits, means, strict=True)]
     tables = {
         "trajectory": _stacked([_trajectory(*one) for one in zip(groups, gaits, strict=True)]),
         "walkers": _stacked(rows),
-        "cycles": _stacked(cycles := [cycles_of(*parts) for parts in zip(groups, looks, strict=True)]),
+        "cycles": _stacked(cycles := [cycles_of(one, mean.centre) for one, mean in zip(groups, means, strict=True)]),
         "bridges": _bridges(motion),
     }
     numbers = {
@@ -139,9 +138,9 @@ def _by_kind(group: Group, **contacts: FloatArray) -> Columns:
     return columns
 
 
-def _rows(group: Group, motion: Gait, looks: Between) -> Columns:
+def _rows(group: Group, motion: Gait, mean: Averages) -> Columns:
     """Rows of the walkers of a group."""
-    samples, beads, mean = settled_samples(group), len(group.radii), averages(group, looks)
+    samples, beads = settled_samples(group), len(group.radii)
     reach = np.array([load.rupture for load in contact_loads(group.case, group.make)[beads:]])
     starts = ("walker", "make", "facing", "start_angle")
     return {
