@@ -1,13 +1,13 @@
-"""Progress: a bar on a terminal or in a notebook, plain lines elsewhere, on standard error."""
+"""Progress: a line that is written again in place on a terminal or in a notebook, a line now and then elsewhere."""
 
 from __future__ import annotations
 
+import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from html import escape
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from walkers.rounding import duration_text
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from walkers.sweeps.scheduler import SweepProgress
 
 T = TypeVar("T")
-_Show = Callable[[float, float, str, float], None]
-"""Shows the total, the completed part, a text and the elapsed seconds."""
+_BAR = 24
+"""Letters of the bar."""
 _FIRST_LINE_SECONDS = 1.0
 _LONGEST_SILENCE_SECONDS = 60.0
 
@@ -26,11 +26,7 @@ _LONGEST_SILENCE_SECONDS = 60.0
 def progress_of(name: str) -> Iterator[Callable[[Progress], None]]:
     """Yield a function that shows the progress of a run."""
     with _shown(name) as show:
-
-        def advance(run: Progress) -> None:
-            show(run.steps, run.step, str(run), run.elapsed)
-
-        yield advance
+        yield lambda run: show(run.step / run.steps if run.steps else 0.0, str(run), run.elapsed)
 
 
 @contextmanager
@@ -47,7 +43,7 @@ def progress_of_sweep(name: str) -> Iterator[Callable[[SweepProgress], None]]:
             elif made:
                 words += f", {duration_text(each)} per point"
             words += f", {duration_text(sweep.left)} left" if sweep.left is not None else ""
-            show(sweep.points, sweep.done + sweep.failed, words, sweep.elapsed)
+            show((sweep.done + sweep.failed) / max(sweep.points, 1), words, sweep.elapsed)
 
         yield advance
 
@@ -57,7 +53,7 @@ def progress_of_film(name: str) -> Iterator[Callable[[int, int], None]]:
     """Yield a function that shows the progress of a film."""
     begin = time.monotonic()
     with _shown(name) as show:
-        yield lambda made, count: show(count, made, f"{made} of {count} frames", time.monotonic() - begin)
+        yield lambda made, count: show(made / count, f"{made} of {count} frames", time.monotonic() - begin)
 
 
 def shown_if(wanted: bool | None, progress: AbstractContextManager[T]) -> AbstractContextManager[T | None]:
@@ -73,46 +69,22 @@ def _in_notebook() -> bool:
 
 
 @contextmanager
-def _shown(name: str) -> Iterator[_Show]:
-    if _in_notebook():
-        with _notebook_bar(name) as show:
-            yield show
-    elif sys.stderr.isatty():
-        from rich.console import Console
-        from rich.progress import BarColumn, TextColumn
-        from rich.progress import Progress as Bar
+def _shown(name: str) -> Iterator[Callable[[float, str, float], None]]:
+    """Yield a function that shows the completed share, a text and the elapsed seconds."""
+    stream, due = sys.stdout if _in_notebook() else sys.stderr, _FIRST_LINE_SECONDS
+    in_place, wide = _in_notebook() or stream.isatty(), shutil.get_terminal_size().columns - 1
 
-        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[words]}"))
-        with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
-            task = bar.add_task(name, total=None, words="")
-            yield lambda whole, done, words, _: bar.update(task, total=whole, completed=done, words=words)
-    else:
-        due = _FIRST_LINE_SECONDS
-
-        def line(_whole: float, _done: float, words: str, elapsed: float) -> None:
-            nonlocal due
-            if elapsed >= due:  # lines become rarer with time
-                due = elapsed + min(elapsed, _LONGEST_SILENCE_SECONDS)
-                print(f"{name}: {words}", file=sys.stderr, flush=True)
-
-        yield line
-
-
-@contextmanager
-def _notebook_bar(name: str) -> Iterator[_Show]:
-    """A bar that is updated in place. A stored notebook keeps its last line; of rich's widget it keeps an empty box."""
-    import IPython.display
-
-    shown: Any = IPython.display  # its types lack these functions
-    handle = shown.display(shown.HTML(""), display_id=True)
-    told = "stopped"
-
-    def show(whole: float, done: float, words: str, _elapsed: float) -> None:
-        bar = f'<progress max="{whole:g}" value="{done:g}"></progress>'
-        handle.update(shown.HTML(f"{escape(name)} {bar} {escape(words)}"))
+    def show(share: float, words: str, elapsed: float) -> None:
+        nonlocal due
+        if in_place:
+            bar = "━" * round(_BAR * share)
+            print(f"\r{f'{name} {bar:─<{_BAR}} {words}'[:wide]:{wide}}", end="", file=stream, flush=True)
+        elif elapsed >= due:  # lines become rarer with time
+            due = elapsed + min(elapsed, _LONGEST_SILENCE_SECONDS)
+            print(f"{name}: {words}", file=stream, flush=True)
 
     try:
         yield show
-        told = "done"
     finally:
-        handle.update(shown.HTML(f"{escape(name)}: {told}"))
+        if in_place:
+            print(f"\r{'':{wide}}", end="\r", file=stream, flush=True)
