@@ -88,7 +88,7 @@ def necks_of(
     points = begins[:, None, None] + height[..., None, None] * along[:, None, None]
     points = points + width[..., None, None] * out[:, None]
     normals = np.broadcast_to(out[:, None], points.shape)
-    return 1e3 * points.reshape(len(contacts), -1, 3), normals.reshape(len(contacts), -1, 3)
+    return 1e3 * points.reshape(len(contacts), rings * sides, 3), normals.reshape(len(contacts), rings * sides, 3)
 
 
 def triangles_of(count: int, rings: int, sides: int) -> npt.NDArray[Any]:

@@ -200,11 +200,15 @@ class Scene:
 
 def path_of(motion: Motion, begin: int = 0) -> FloatArray:
     """Displacement of the centre of the beads since a frame, smoothed over a cycle, mm, shape (F, 3)."""
-    from scipy.signal import savgol_filter
-
     middle = 1e3 * motion.position.mean(axis=1)
-    frames = 2 * (min(motion.case.run.samples_per_cycle, len(middle) - 1) // 2) + 1
-    smooth = savgol_filter(middle, frames, 1, axis=0) if frames > 1 else middle
+    half = min(motion.case.run.samples_per_cycle, len(middle) - 1) // 2
+    places = np.arange(2 * half + 1.0)
+    smooth = middle.copy()
+    if half:  # the mean over a cycle; straight lines at both ends
+        smooth[half:-half] = np.lib.stride_tricks.sliding_window_view(middle, len(places), axis=0).mean(axis=-1)
+        for part, cycle in ((slice(half), slice(len(places))), (slice(-half, None), slice(-len(places), None))):
+            slope, level = np.polyfit(places, middle[cycle], 1)
+            smooth[part] = level + slope * places[part, None]
     way: FloatArray = smooth - smooth[begin]
     return way
 
@@ -378,7 +382,7 @@ class Window:
         points, triangles, self._pale = beach_ball(rounds, scene.motion)
         self._beads = _Copies(self._plotter, points, triangles, radius, specular=0.4)
         self._round = next((fine for fewer, fine in _NECKS if len(radius) < fewer), (3, 8))
-        self._necks: pv.Actor | None = None
+        self._necks: pv.PolyData | None = None
 
     def picture(self, frame: float, bridges: IntArray | None = None) -> Picture:
         """Picture of a frame, or of a time between two frames (a fraction) by cubic interpolation.
@@ -410,34 +414,32 @@ class Window:
         self._plotter.close()
 
     def _wet(self, place: FloatArray, bridges: IntArray | None, shift: FloatArray) -> None:
-        """Replace the liquid necks."""
+        """Move the liquid necks; if their number changes, replace them."""
         import pyvista as pv
 
-        if self._necks is not None:
-            self._plotter.remove_actor(self._necks, render=False)
-            self._necks = None
-        if bridges is None or not len(bridges):
-            return
-        motion = self._scene.motion
+        motion, bridges = self._scene.motion, np.empty((0, 3), dtype=np.int64) if bridges is None else bridges
         begins, ends = ends_of(motion, place, bridges)
         # Walls before the beads are not drawn, nor are the necks to them.
         before = (bridges[:, 2] >= 0) & ((ends - begins) @ self._scene.axes[2] > 0.5 * motion.radius[bridges[:, 0]])
-        points, normals = necks_of(motion, place, bridges := bridges[~before], *self._round)
-        faces = triangles_of(len(bridges), *self._round)
-        necks = pv.PolyData.from_regular_faces((points + shift).reshape(-1, 3), faces)
-        necks.point_data["Normals"] = normals.reshape(-1, 3)
-        necks.point_data.active_normals_name = "Normals"
-        self._necks = self._plotter.add_mesh(
-            necks,
-            color=f"#{BLUE:06x}",
-            opacity=OPACITY,
-            ambient=0.45,
-            diffuse=0.75,
-            specular=0.4,
-            render=False,
-            reset_camera=False,
-        )
-        self._necks.prop.culling, self._necks.prop.interpolation = "back", "Phong"
+        points, normals = necks_of(motion, place, bridges[~before], *self._round)
+        points, normals = (points + shift).reshape(-1, 3), normals.reshape(-1, 3)
+        if self._necks is None or len(points) != self._necks.n_points:
+            self._plotter.renderer.remove_actor("necks", render=False)
+            self._necks = None
+            if not len(points):
+                return
+            self._necks = pv.PolyData.from_regular_faces(points, triangles_of(len(bridges[~before]), *self._round))
+            look: dict[str, Any] = {
+                "color": f"#{BLUE:06x}",
+                "opacity": OPACITY,
+                "ambient": 0.45,
+                "diffuse": 0.75,
+                "specular": 0.4,
+            }
+            drawn = self._plotter.add_mesh(self._necks, name="necks", render=False, reset_camera=False, **look)
+            drawn.prop.culling, drawn.prop.interpolation = "back", "Phong"
+        self._necks.points, self._necks.point_data["Normals"] = points, normals
+        self._necks.point_data.active_normals_name = "Normals"
 
     def _floor(self, wide: float) -> list[pv.Actor]:
         """A floor with lines that make its motion visible."""
