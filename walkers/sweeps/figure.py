@@ -48,6 +48,7 @@ _FEW_COLOURS = 6  # more colours are from a colour map, fewer from the style
 _MOST_COLOURS = 12  # numbers with more values have a colour scale instead of a legend
 _ROUNDING = 1e-12  # relative to the largest number
 _LEAST_RANGE = 1e-4  # smallest range of the y axis relative to the mean, so that rounding errors are not shown
+_LETTERS = 26  # letters of a line of a y label
 _FEW_TICKS = 6  # largest number of x values that all have ticks
 
 
@@ -361,7 +362,7 @@ def draw(layout: Layout, drawn: Drawn, *, title: str = "", log: str = "") -> Fig
             axes.set_xlabel(plain_text(x.label))
             axes.tick_params(labelbottom=True)
         if number % columns == 0:
-            axes.set_ylabel(plain_text(drawn.label))
+            axes.set_ylabel(plain_text("\n".join(wrap(drawn.label, _LETTERS))))
         _scale_x(axes, x, log)
     if len(parts) > 1:
         letter_panels(grid.flat[: len(parts)])
@@ -395,7 +396,9 @@ class _Colours:
             colour = f"C{place}" if count <= _FEW_COLOURS else shades[place]
             marker = _MARKERS[0 if self.scale else place % len(_MARKERS)]
             face = "none" if hollow else colour
-            self.looks.append({"marker": marker, "color": colour, "mfc": face, "ms": 4.5})
+            # Symbols that are drawn later are smaller, so that those of coinciding points are seen.
+            size = 4.5 if self.scale else 4.5 + min(1.0, 4.0 / count) * (count - 1 - place)
+            self.looks.append({"marker": marker, "color": colour, "mfc": face, "ms": size})
 
 
 def _panel(axes: Axes, x: Factor, here: npt.NDArray[np.bool_], drawn: Drawn, colours: _Colours, log: str) -> None:
