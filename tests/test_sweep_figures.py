@@ -88,7 +88,7 @@ def test_axes_go_along_x_into_colours_and_into_panels_of_the_same_scales(looked_
     first, second = _panels(figure)
     titles = [axes.get_title(loc="left") for axes in (first, second)]
     assert titles == ["(a) frequency = 60 Hz", "(b) frequency = 80 Hz"]
-    assert (first.get_xlabel(), first.get_ylabel()) == ("peak acceleration (g)", "velocity (mm/s)")
+    assert (first.get_xlabel(), first.get_ylabel()) == ("peak acceleration (g)", "velocity along the heading\n(mm/s)")
     assert (first.get_ylim(), _legend(figure)) == (second.get_ylim(), ["0.1", "0.2"])
     table = walkers.load(looked_through / "three").table()
     for friction, (x, y, errors) in zip((0.1, 0.2), _drawn(second), strict=True):
