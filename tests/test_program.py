@@ -2,6 +2,7 @@
 
 import json
 import os
+import pkgutil
 import re
 import shutil
 import subprocess
@@ -18,6 +19,7 @@ from tests.conftest import PROGRAM, SHORT, call, document, to_toml
 from walkers import load_case
 from walkers import run as run_case
 from walkers.commands import GROUPS
+from walkers.errors import InputError
 from walkers.inputs.reading import shipped
 from walkers.main import program
 from walkers.physics.time_step import WALKER_FRACTIONS
@@ -160,6 +162,44 @@ def test_help_names_every_command() -> None:
         assert done.stdout == shown
     targets = subprocess.run(["make"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     assert all(f"make {target}" in targets for target in ("walker", "test", "help", "clean"))
+
+
+CALLABLES = {
+    **{name: f"walkers:{name}" for name in ("new", "run", "sweep", "compare", "climb", "calibrate")},
+    **{name: f"walkers:Run.{name}" for name in ("plot", "render", "report", "export")},
+    **{"show": "walkers.show:summarise", "library": "walkers.commands.catalogue:catalogue"},
+    **{"list": "walkers.sweeps.folder:inventory", "clean": "walkers.sweeps.folder:clean"},
+    **{"check": "walkers.check.crosscheck:crosscheck", "check engine": "walkers.check.audit:run_audit"},
+    **{"check literature": "walkers.check.literature:literature", "check files": "walkers.archive.verification:verify"},
+    **{"paper figures": "walkers.paper.make:make_figures", "show --theory": "walkers:predict"},
+    **{f"run --{name}": f"walkers:Run.{name}" for name in ("spread", "accuracy")},
+    "render --film": "walkers:Run.film",
+}
+"""For each command, a function that does its work."""
+
+
+def test_what_a_command_does_a_function_does() -> None:
+    app = program()
+    names = {name for name in app if name[0] != "-"} - {"paper"}
+    names |= {f"{name} {part}" for name in ("check", "paper") for part in app[name]}
+    assert names == {name for name in CALLABLES if "--" not in name}
+    for name, place in CALLABLES.items():
+        function = pkgutil.resolve_name(place)
+        assert callable(function) and function.__doc__, name
+        option = name.partition(" --")[2]
+        assert not option or f"--{option} " in call(name.partition(" ")[0], "--help", check=True).stdout
+
+
+def test_a_function_gives_what_its_command_prints(looked_through: Path) -> None:
+    out = ["--out", str(looked_through)]
+    printed = json.loads(call("show", "fig1b", "--theory", "--json", *out, check=True).stdout)
+    assert json.loads(json.dumps(walkers.predict("fig1b", looked_through))) == printed
+    printed = json.loads(call("compare", "grid", "rough", "--json", *out, check=True).stdout)
+    assert json.loads(json.dumps(walkers.compare("grid", "rough", looked_through).contents)) == printed
+    with pytest.raises(InputError, match=r"^changes: is for runs and cases$"):
+        walkers.compare("grid", "rough", looked_through, {"run.seed": 2})
+    refused = call("compare", "grid", "rough", "--set", "run.seed=2", *out).stderr
+    assert refused == "walkers: --set: is for runs and cases\n"
 
 
 def test_the_library_lists_what_can_be_named_and_says_where_each_number_is_from() -> None:

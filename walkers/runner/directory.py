@@ -23,6 +23,7 @@ import shutil
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -98,8 +99,15 @@ def holds_unfinished(directory: Path) -> bool:
 
 def case_of(directory: Path) -> Case:
     """The resolved case of a run directory; raises `OSError` or `ValueError` if it is unreadable or was changed."""
+    file = (directory / CASE_NAME).stat()
+    return with_recorded_law(_case_in(directory.resolve(), file.st_ino, file.st_mtime_ns, file.st_size), directory)
+
+
+@lru_cache(maxsize=4)
+def _case_in(directory: Path, *_file: int) -> Case:
+    """The case in a file, which is read once as long as the file stays the same."""
     check_unchanged(directory, [CASE_NAME])
-    return with_recorded_law(Case.from_dict(read_json(directory / CASE_NAME)), directory)
+    return Case.from_dict(read_json(directory / CASE_NAME))
 
 
 def with_recorded_law(case: Case, directory: Path) -> Case:
