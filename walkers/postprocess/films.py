@@ -181,7 +181,7 @@ def _captions(
             said.append(f"{scene.moved(times.frame[number]) @ toward:z.1f} mm {direction} from the start")
         said += [case.boundary.tilted] if case.boundary.tilted else []
         said += scene.explained
-        said += [bridges_text(case)]
+        said += bridges_text(case).split(", ")  # lines beside the beads
         draw.text((edge, edge), clock, "black", large, anchor="lt")
         if tray:  # above it
             draw.text((2 * edge + large.getlength(clock), 1.2 * edge), ", ".join(said), "#333333", small, anchor="lt")

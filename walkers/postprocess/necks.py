@@ -41,7 +41,7 @@ def bridges_text(case: Case) -> str:
     """What is blue, and how often the bridges were recorded if not in every frame."""
     every = case.run.samples_per_cycle // case.run.samples_per_bridge_sample
     often = "once" if every == 1 else f"{every} times"
-    return EXPLAINED + (f", as recorded {often} in each cycle" if case.run.samples_per_bridge_sample > 1 else "")
+    return EXPLAINED + (f", recorded {often} per cycle" if case.run.samples_per_bridge_sample > 1 else "")
 
 
 def ends_of(motion: Motion, place: FloatArray, contacts: IntArray) -> tuple[FloatArray, FloatArray]:

@@ -40,7 +40,8 @@ _FLOOR, _LINES = 0xDFE5E8, 0x9AA6AE
 _AROUND = 1.15  # extent of the view over that of the beads
 _VIEW, _ASPECT = 30.0, 1.5  # angle of view, degrees; smallest ratio of width to height
 _MOST_LINES = 200.0  # largest number of lines on a floor
-_FEW_NECKS = 2000  # contacts times frames of necks that are drawn finely
+_NECKS = ((2000, (5, 16)), (10_000, (2, 12)), (np.inf, (2, 6)))
+"""Rings and sides of necks for fewer contacts times frames, which limits the file size."""
 _LANE = 1.25  # distance of the lanes of independent walkers, in lengths of a walker
 _GRID = 2.0**-13
 """Positions are rounded to this (mm, about 0.1 µm); multiples of a power of two can be packed."""
@@ -199,7 +200,7 @@ def _necks(motion: Motion, place: FloatArray, bridges: list[IntArray], path: Flo
         return []
     there = np.zeros((len(bridges), len(contacts)), dtype=bool)
     there[np.repeat(np.arange(len(bridges)), [len(each) for each in bridges]), held.ravel()] = True
-    fine = (5, 16) if there.size < _FEW_NECKS else (2, 6)
+    fine = next(each for most, each in _NECKS if there.size < most)
     points = np.zeros((len(bridges), len(contacts) * fine[0] * fine[1], 3))
     for frame, present in enumerate(there):
         near = np.flatnonzero(there[max(frame - 1, 0) : frame + 2].any(axis=0))
