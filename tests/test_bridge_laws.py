@@ -254,7 +254,7 @@ def test_the_documented_law_of_bagheri_fits_young_laplace(documented: Path, degr
 def test_documented_laws_run(documented: Path, name: str) -> None:
     changes = {"liquid.law": f"{documented}/{name}.py:law", "run.cycles": 4, "run.samples_per_cycle": 2}
     speed = run_case(load_case("fig1b", changes), documented).result["velocity"]
-    assert isfinite(speed["mean"])
+    assert isfinite(speed)
 
 
 def test_a_law_of_ones_own(tmp_path: Path) -> None:

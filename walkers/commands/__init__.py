@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -18,6 +18,8 @@ SECTIONS = {
     "paper": "Compare with the published results: figures and numbers.",
 }
 """Commands with commands of their own, in the module ``check``."""
+_FUNCTION = re.compile(r'\n\ndef ([a-z]\w*)\(.*?"""(.+?)\n', re.DOTALL)
+"""A public function without a decorator, and the first line of its docstring."""
 
 
 class Command(NamedTuple):
@@ -36,7 +38,5 @@ def commands() -> Iterator[Command]:
         if module == "check":
             yield from (Command(name, heading, f"{place}:{name}", text) for name, text in SECTIONS.items())
         text = Path(__file__).with_name(f"{module}.py").read_text("utf-8")
-        for node in ast.parse(text).body:
-            if isinstance(node, ast.FunctionDef) and node.name[0] != "_" and not node.decorator_list:
-                summary = (ast.get_docstring(node) or "").partition("\n")[0]
-                yield Command(node.name.strip("_"), heading, f"{place}:{node.name}", summary)
+        for name, summary in _FUNCTION.findall(text):
+            yield Command(name.strip("_"), heading, f"{place}:{name}", summary)
