@@ -244,7 +244,7 @@ def test_bash_completes_commands_options_and_names_of_runs(looked_through: Path,
 
     runs = {Path(run).name for run in walkers.load(looked_through / "three").table()["run"]}
     assert completed("comp") == ["compare"]
-    assert completed("list", "--status", "fa") == ["failed"]
+    assert completed("export", "--to", "ar") == ["archive"]
     assert completed("run", "fig") == [name for name in shipped("case") if name[:3] == "fig"]
     assert set(completed("plot", "")) >= runs | {"grid", "fig1b"}
     assert completed("run", "--out", "elsewhere", "base-") == []

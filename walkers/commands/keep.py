@@ -10,8 +10,9 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+from walkers import DEFAULT_OUT
 from walkers.api import Export
-from walkers.commands.options import AT_LEAST_1, At, Chosen, RunOrSweep, check_folder, refuse, refuse_any, tell
+from walkers.commands.options import AT_LEAST_1, At, Out, RunOrSweep, check_folder, refuse, refuse_any, tell
 
 
 @Parameter(name="*")
@@ -137,10 +138,8 @@ def _export_deck(what: str, at: At, output: Path | None) -> None:
 
 def clean(
     *runs: RunOrSweep,
-    at: At = At(),
+    out: Out = DEFAULT_OUT,
     finished: bool = False,
-    chosen: Chosen = Chosen(),
-    dry_run: bool = False,
     yes: Annotated[bool, Parameter(("--yes", "-y"))] = False,
 ) -> int:
     """Remove interrupted and failed runs, or the given runs and sweeps. Asks first. Runs in progress stay.
@@ -151,8 +150,6 @@ def clean(
         Runs and sweeps: folder, name in --out, or case.
     finished
         Also remove finished runs, except those of sweeps.
-    dry_run
-        Print what would be removed, and remove nothing.
     yes
         Do not ask for confirmation.
     """
@@ -161,17 +158,16 @@ def clean(
     from walkers.runner.directory import UNFINISHED
     from walkers.sweeps.folder import clean, plan_cleaning
 
-    check_folder("--out", at.out)
+    check_folder("--out", out)
     refuse("--finished", finished and bool(runs), "has no meaning with given runs")
-    refuse("--set", bool(at.changes) and not runs, "is for given runs and sweeps")
 
     def place_of(name: str) -> Path:
-        folder = at.out / Path(name).name
-        return folder if folder.suffix == UNFINISHED else directory_of(name, at.out, at.values)
+        folder = out / Path(name).name
+        return folder if folder.suffix == UNFINISHED else directory_of(name, out)
 
-    plan = plan_cleaning(at.out, each(place_of, runs), finished=finished, **vars(chosen))
+    plan = plan_cleaning(out, each(place_of, runs), finished=finished)
     print(plan.as_text())
-    if dry_run or not (plan.remove or plan.locks):
+    if not (plan.remove or plan.locks):
         return 0
     if not yes:
         refuse("--yes", not sys.stdin.isatty(), "expected, because there is no terminal to ask for confirmation")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import Parameter
 from cyclopts.validators import Number
@@ -13,7 +13,6 @@ import walkers
 from walkers import DEFAULT_OUT
 from walkers.commands.options import (
     At,
-    Chosen,
     Formats,
     Json,
     Out,
@@ -34,11 +33,7 @@ def list_(
     *,
     out: Out = DEFAULT_OUT,
     every: Annotated[bool, Parameter("--all")] = False,
-    chosen: Chosen = Chosen(),
-    status: Literal["finished", "running", "interrupted", "failed"] | None = None,
     where: Annotated[list[str] | None, Parameter(metavar="KEY=VALUE")] = None,
-    sort: Literal["name", "status", "velocity", "age", "size"] = "name",
-    reverse: bool = False,
     to: Path | None = None,
     as_json: Json = False,
 ) -> None:
@@ -50,30 +45,21 @@ def list_(
         A sweep (name or folder): print the status of its points and its table.
     every
         Include the runs of sweeps.
-    status
-        Only runs and sweeps with this status.
     where
         Only runs with this value, such as "drive.frequency=80 Hz". Repeatable.
-    sort
-        Sort by this; the fastest, youngest or largest comes first.
-    reverse
-        Reverse the order.
     to
         Write the table of the sweep, with units, to this file (.csv, .parquet, .json).
     """
     from walkers.sweeps import folder
 
     if sweep is not None:
-        given = {**vars(chosen), "status": status, "where": where, "all": every, "reverse": reverse}
-        given["sort"] = sort != "name"
-        refuse_any(given, "is for folders, not for a sweep")
+        refuse_any({"where": where, "all": every}, "is for folders, not for a sweep")
         _list_points(sweep, out, to, as_json)
         return
     refuse("--to", to is not None, "expected a sweep, whose table is written")
-    found = folder.inventory(out)
-    hidden = [] if every or where else folder.members(found)
-    shown = folder.select(found, status=status, where=where or (), **vars(chosen))
-    shown = folder.ordered([one for one in shown if one not in hidden], sort, reverse=reverse)
+    entries = folder.inventory(out)
+    hidden = [] if every or where else folder.members(entries)
+    shown = [one for one in folder.select(entries, where or ()) if one not in hidden]
     print_as(as_json, lambda: folder.as_json(shown), lambda: folder.as_text(shown, hidden=len(hidden)))
 
 

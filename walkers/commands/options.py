@@ -102,23 +102,6 @@ class By:
     allow_failed_audit: bool = False
 
 
-@Parameter(name="*")
-@dataclass(frozen=True)
-class Chosen:
-    """Which of the runs in a folder.
-
-    Parameters
-    ----------
-    case
-        Only runs of the case with this name.
-    older_than
-        Only runs and sweeps older than this, such as 7d or 12h.
-    """
-
-    case: Annotated[str | None, Parameter(metavar="NAME")] = None
-    older_than: Annotated[str | None, Parameter(metavar="AGE")] = None
-
-
 def refuse(option: str, wrong: bool, why: str) -> None:
     """Raise an `InputError` with the reason if an option is ``wrong``."""
     if wrong:

@@ -11,18 +11,16 @@ from __future__ import annotations
 import shutil
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from math import inf, isfinite, nan
-from operator import attrgetter
+from math import isfinite, nan
 from pathlib import Path
 from stat import S_ISDIR
-from typing import Any, Literal
+from typing import Any
 
 from walkers.errors import InputError, Problem, refused
 from walkers.inputs.case import Case
-from walkers.inputs.units import Kind, parse_quantity
 from walkers.postprocess.numbers import is_declared, shown
 from walkers.postprocess.results import Results, plain, read
 from walkers.postprocess.sides import REST
@@ -61,8 +59,6 @@ from walkers.sweeps.table import (
     worst_status,
 )
 
-Order = Literal["name", "status", "velocity", "age", "size"]
-AGE = Kind("age", "s", "7 d", 1e12)
 _SIZES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
 _LOCK = ".lock"
 _MOST_LINES = 40
@@ -200,31 +196,15 @@ def _sweep(path: Path, runs: Sequence[Entry], now: float) -> Entry | None:
     )
 
 
-def select(
-    entries: Sequence[Entry],
-    *,
-    case: str | None = None,
-    status: str | None = None,
-    older_than: str | None = None,
-    where: Sequence[str] = (),
-) -> list[Entry]:
-    """Select entries by case, by status, by age (older than, such as ``7 d``).
+def select(entries: Sequence[Entry], where: Sequence[str]) -> list[Entry]:
+    """The runs for which all conditions hold, such as ``drive.frequency=80 Hz``; without conditions all entries.
 
-    Conditions ``where``, such as ``drive.frequency=80 Hz``, must all hold and select runs only. `InputError` if an age
-    or a condition cannot be read, or no run has such a key.
+    `InputError` if a condition cannot be read, or no run has such a key.
     """
-    oldest = -inf
-    if older_than is not None:
-        try:
-            oldest = parse_quantity(older_than, AGE)
-        except ValueError as error:
-            raise refused("older_than", f'"{older_than}": {error}') from error
     conditions = []
     runs = [entry for entry in entries if not entry.is_sweep]
     for text in where:
         key, _, value = (part.strip() for part in text.partition("="))
-        if key in ("case", "status"):
-            raise refused("where", f'"{text}": expected {key} as an argument of its own')
         if not (key and value):
             told = 'expected KEY=VALUE, such as "drive.frequency=80 Hz"'
             raise refused("where", f'"{text}": {told}')
@@ -242,20 +222,8 @@ def select(
     return [
         entry
         for entry in (runs if conditions else entries)
-        if case in (None, entry.case)
-        and status in (None, entry.status)
-        and entry.age > oldest
-        and all(agrees(entry.parameters, key, value) for key, value in conditions)
+        if all(agrees(entry.parameters, key, value) for key, value in conditions)
     ]
-
-
-def ordered(entries: Sequence[Entry], order: Order, *, reverse: bool = False) -> list[Entry]:
-    """Sort entries: the fastest, youngest or largest first; those without a velocity last."""
-    keys: dict[str, Callable[[Entry], Any]] = {
-        "velocity": lambda entry: inf if entry.velocity is None else -entry.velocity,
-        "size": lambda entry: -entry.size,
-    }
-    return sorted(entries, key=keys.get(order, attrgetter(order)), reverse=reverse)
 
 
 def _varied(runs: Sequence[Entry]) -> Iterator[tuple[str, list[Entry], list[str]]]:
@@ -403,14 +371,12 @@ def plan_cleaning(
     given: Sequence[Path] = (),
     *,
     finished: bool = False,
-    case: str | None = None,
-    older_than: str | None = None,
 ) -> Cleaning:
     """Plan a cleaning; nothing is removed.
 
     If runs and sweeps are ``given`` by their directories, they are removed, with the runs of these sweeps that no other
     sweep has. Otherwise interrupted and failed runs are removed, and on request ``finished`` runs that no sweep has.
-    Case and age limit the choice (`select`). `InputError` if a given one does not exist, or a sweep cannot be read.
+    `InputError` if a given one does not exist, or a sweep cannot be read.
     """
     entries = inventory(out)
     if finished or given:
@@ -427,7 +393,7 @@ def plan_cleaning(
     if not given:
         wanted = [one for one in entries if not one.is_sweep and (finished or one.status != "finished")]
     remove, stay = [], Counter[str]()
-    for entry in select(list({one.directory: one for one in wanted}.values()), case=case, older_than=older_than):
+    for entry in {one.directory: one for one in wanted}.values():
         sweeps = [] if given else sweeps_of.get(entry.name, [])
         if entry.status == "running":
             stay["running"] += 1
@@ -441,7 +407,7 @@ def plan_cleaning(
     needing = Counter(name for run in remove for name in sweeps_of.get(run.name, ()) if name not in going)
     told = [f"needed by the sweep {name}, which would make them again: {number}" for name, number in needing.items()]
     told += [f"stays: {number} {reason}" for reason, number in stay.items()]
-    locks = [] if given or case or older_than else sorted(out.glob("*.lock"))
+    locks = [] if given else sorted(out.glob("*.lock"))
     stale = [lock for lock in locks if is_run_name(lock.stem) and not is_locked(lock.with_suffix(""))]
     return Cleaning(remove, stale, told)
 
