@@ -140,7 +140,7 @@ def test_a_run_is_found_by_its_directory_its_name_or_its_case_with_other_values_
 def test_a_running_simulation_is_looked_at_stopped_and_continued(in_folder: Path) -> None:
     case_file = _toml(in_folder, **LONG)
     program = subprocess.Popen([PROGRAM, "run", case_file], stderr=subprocess.DEVNULL)
-    wait_for(lambda: list(Path("runs").glob("*.lock")))
+    wait_for(lambda: list(Path("runs").glob("*.incomplete/case.json")))
     (place,) = Path("runs").glob("*.lock")
     run = walkers.load(place.with_suffix(""))
     assert isinstance(run, walkers.Run)

@@ -630,36 +630,27 @@ class Sweep:
         """The table in a notebook."""
         return str(self.table()._repr_html_())  # type: ignore[operator]
 
-    def figure(
-        self,
-        *,
-        x: str | None = None,
-        y: str | None = None,
-        hue: str | None = None,
-        panels: str | None = None,
-        log: str = "",
-        theory: bool = False,
-    ) -> Figure:
-        """A matplotlib figure of the table; see `walkers.plotting.sweep_figure`."""
+    def figure(self, **options: Any) -> Figure:
+        """A matplotlib figure of the table, with `walkers.sweeps.figure_options.FigureOptions`.
+
+        See `walkers.plotting.sweep_figure`.
+
+        Examples
+        --------
+        >>> walkers.sweep("fig4", tmp).figure(x="liquid.name", theory=True).axes[0].get_xscale()
+        'linear'
+        """
         from walkers.plotting import sweep_figure
+        from walkers.sweeps.figure_options import FigureOptions
 
-        return sweep_figure(self.directory, x=x, y=y, hue=hue, panels=panels, log=log, theory=theory)
+        return sweep_figure(self.directory, FigureOptions(**options))
 
-    def plot(
-        self,
-        to: str | Path | None = None,
-        *,
-        x: str | None = None,
-        y: str | None = None,
-        hue: str | None = None,
-        panels: str | None = None,
-        log: str = "",
-        theory: bool = False,
-    ) -> list[Path]:
-        """Plot the table to a file; see `walkers.plotting.plot_sweep`."""
+    def plot(self, to: str | Path | None = None, **options: Any) -> list[Path]:
+        """Plot the table to a file as in `figure`; see `walkers.plotting.plot_sweep`."""
         from walkers.plotting import plot_sweep
+        from walkers.sweeps.figure_options import FigureOptions
 
-        return [plot_sweep(self.directory, to, x=x, y=y, hue=hue, panels=panels, log=log, theory=theory)]
+        return [plot_sweep(self.directory, to, FigureOptions(**options))]
 
     def report(self, to: str | Path | None = None) -> Path:
         """Write a self-contained HTML report; see `walkers.sweeps.report.report_sweep`."""

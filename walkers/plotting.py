@@ -15,6 +15,7 @@ from walkers.postprocess.drawing import FORMATS, check_place, save_figure
 from walkers.postprocess.results import derived
 from walkers.runner.directory import case_of
 from walkers.sweeps.figure import Curves, Factor, LeftOutWarning, column_of, figure_of, tell
+from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.readable import readable_unit
 from walkers.sweeps.table import load, varied_columns
 
@@ -30,17 +31,7 @@ _OF_SHAPE = ("radii", "volume_fraction", "contact_angle")
 """Ends of the keys that change the shape of bridges, each of which takes a quarter of a second to solve."""
 
 
-def plot_sweep(  # noqa: PLR0913 (choices of a plot)
-    directory: str | Path,
-    to: str | Path | None = None,
-    *,
-    x: str | None = None,
-    y: str | None = None,
-    hue: str | None = None,
-    panels: str | None = None,
-    log: str = "",
-    theory: bool = False,
-) -> Path:
+def plot_sweep(directory: str | Path, to: str | Path | None = None, options: FigureOptions = FigureOptions()) -> Path:
     """Plot a sweep's table to a file.
 
     Parameters
@@ -49,8 +40,8 @@ def plot_sweep(  # noqa: PLR0913 (choices of a plot)
         A sweep's directory, such as ``runs/fig2``.
     to
         The file, with a suffix of `walkers.postprocess.drawing.FORMATS`; None: in the sweep's directory, named after
-        ``y``.
-    x, y, hue, panels, log, theory
+        its column.
+    options
         See `sweep_figure`.
 
     Raises
@@ -59,39 +50,23 @@ def plot_sweep(  # noqa: PLR0913 (choices of a plot)
         As `sweep_figure`, or if the suffix of the file is unknown.
     """
     table = load(directory)
-    place = Path(to) if to is not None else Path(directory) / f"{column_of(table, y)}.png"
+    place = Path(to) if to is not None else Path(directory) / f"{column_of(table, options.y)}.png"
     check_place(place, *(f".{form}" for form in FORMATS))
-    figure = figure_of(table, x=x, y=y, hue=hue, panels=panels, log=log, models=_models if theory else None)
+    figure = figure_of(table, options, _models if options.theory else None)
     runs = [Path(run).name for run in table.loc[table["status"] == "finished", "run"]]
     return save_figure(figure, place, runs, place.suffix.lower()[1:], str(table.attrs["sweep"]))[0]
 
 
-def sweep_figure(
-    directory: str | Path,
-    *,
-    x: str | None = None,
-    y: str | None = None,
-    hue: str | None = None,
-    panels: str | None = None,
-    log: str = "",
-    theory: bool = False,
-) -> Figure:
+def sweep_figure(directory: str | Path, options: FigureOptions = FigureOptions()) -> Figure:
     """Plot a sweep's table as a matplotlib figure.
 
     Parameters
     ----------
     directory
         A sweep's directory, such as ``runs/fig2``.
-    x, hue, panels
-        Keys that vary, such as ``drive.frequency`` or ``frequency``, or columns of the table (`walkers.load`);
-        chosen automatically if None. ``none``: no colours or panels.
-    y
-        A column of the table; default: ``velocity``, for piles ``climbs``; on slopes where the walkers that face up and
-        down differ, both.
-    log
-        Which axes are logarithmic: ``x``, ``y`` or ``xy``.
-    theory
-        Also draw the theory (`walkers.theory.prediction.predicted_column`).
+    options
+        What is drawn. x, hue and panels are chosen automatically if None. Without y, on slopes where the walkers that
+        face up and down differ, both are drawn. The theory is `walkers.theory.prediction.predicted_column`.
 
     Returns
     -------
@@ -104,8 +79,7 @@ def sweep_figure(
     InputError
         If it is no sweep's directory, no point is finished, or there is no such column.
     """
-    models = _models if theory else None
-    return figure_of(load(directory), x=x, y=y, hue=hue, panels=panels, log=log, models=models)
+    return figure_of(load(directory), options, _models if options.theory else None)
 
 
 def _models(done: pd.DataFrame, column: str) -> tuple[Mapping[str, FloatArray], Curves | None]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -18,13 +17,13 @@ from walkers.commands.options import (
     Out,
     Run,
     RunOrSweep,
-    Y,
     print_as,
     print_lines,
     refuse,
     refuse_any,
 )
 from walkers.postprocess.film_options import FilmOptions, Seconds
+from walkers.sweeps.figure_options import FigureOptions
 
 
 def list_(
@@ -81,43 +80,13 @@ def _list_points(name: str, out: Path, to: Path | None, as_json: bool) -> None:
         print(found.describe())
 
 
-@Parameter(name="*")
-@dataclass(frozen=True)
-class Axes:
-    """What the figure of a sweep shows.
-
-    Parameters
-    ----------
-    x
-        Sweeps: key or column on the x axis.
-    hue
-        Sweeps: key or column that sets the colour, or none.
-    panels
-        Sweeps: key or column that sets the panel, or none.
-    logx
-        Sweeps: logarithmic x axis.
-    logy
-        Sweeps: logarithmic y axis.
-    theory
-        Sweeps: also draw the theory.
-    """
-
-    x: str | None = None
-    y: Y = None
-    hue: str | None = None
-    panels: str | None = None
-    logx: bool = False
-    logy: bool = False
-    theory: bool = False
-
-
 def plot(
     what: RunOrSweep,
     /,
     *,
     at: At = At(),
     to: Path | None = None,
-    axes: Axes = Axes(),
+    options: FigureOptions = FigureOptions(),
     formats: Formats = None,
 ) -> None:
     """Plot a run (path, orientation and gait of walkers; climbs of piles) or a column of a sweep's table.
@@ -131,12 +100,11 @@ def plot(
     """
     found = at.load(what)
     if isinstance(found, walkers.Run):
-        refuse_any(vars(axes), "is for sweeps")
+        refuse_any(vars(options), "is for sweeps")
         print_lines(found.plot(to, formats or ["png"]))
         return
     refuse("--format", bool(formats), "is for runs: a sweep's figure has the format of --to's name")
-    choices = {name: value for name, value in vars(axes).items() if not name.startswith("log")}
-    print_lines(found.plot(to, log="x" * axes.logx + "y" * axes.logy, **choices))
+    print_lines(found.plot(to, **vars(options)))
 
 
 def render(
@@ -194,7 +162,7 @@ def compare(
     /,
     *,
     at: At = At(),
-    y: Y = None,
+    y: str | None = None,
     as_json: Json = False,
 ) -> None:
     """Compare two runs or cases in parameters and results, or two sweeps point by point; --set changes the second case.
@@ -205,6 +173,8 @@ def compare(
         A run or a sweep: its folder, its name in --out, or its case (file or name).
     second
         Another run or sweep, named in the same way; default: the first with the values of --set.
+    y
+        Sweeps: column of the table; default: velocity, or climbs for piles.
     """
     refuse(first, second is None and not at.changes, "expected a second run or sweep, or --set KEY=VALUE")
     found = walkers.compare(first, second, at.out, at.values, y)

@@ -43,7 +43,6 @@ Jobs = Annotated[
 ]
 Json = Annotated[bool, Parameter("--json", help="Print JSON in SI units.")]
 Formats = Annotated[list[str] | None, Parameter("--format", help="Format of the figures: png, svg or pdf. Repeatable.")]
-Y = Annotated[str | None, Parameter(help="Sweeps: column of the table; default: velocity, or climbs for piles.")]
 
 
 @Parameter(name="*")

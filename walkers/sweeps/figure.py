@@ -23,6 +23,7 @@ from walkers.postprocess.drawing import (
     styled,
 )
 from walkers.postprocess.numbers import declared, is_declared
+from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.readable import readable_unit
 from walkers.sweeps.table import ERRORS, FACING_DOWN, default_column, find_name, value_text, varied_columns, with_unit
 
@@ -130,18 +131,9 @@ class LeftOutWarning(UserWarning):
     """Something is not in a figure: points without a result, keys that are not distinguished, a theory's prediction."""
 
 
-def figure_of(
-    table: pd.DataFrame,
-    *,
-    x: str | None = None,
-    y: str | None = None,
-    hue: str | None = None,
-    panels: str | None = None,
-    log: str = "",
-    models: Models | None = None,
-) -> Figure:
+def figure_of(table: pd.DataFrame, options: FigureOptions = FigureOptions(), models: Models | None = None) -> Figure:
     """Figure of the table of a sweep (`walkers.plotting.sweep_figure`), with the predictions of models."""
-    column = column_of(table, y)
+    column = column_of(table, options.y)
     done = table[table["status"] == "finished"]
     counts = Counter(table["status"][table["status"] != "finished"])
     others = ", ".join(f"{number} {status}" for status, number in counts.items())
@@ -151,12 +143,12 @@ def figure_of(
         tell(f"{sum(counts.values())} of {len(table)} points left out: {others}")
     if empty := int(done[column].isna().sum()):
         tell(f"{empty} of {len(done)} finished points have no {column}")
-    layout = layout_of(table, done, x=x, hue=hue, panels=panels)
+    layout = layout_of(table, done, x=options.x, hue=options.hue, panels=options.panels)
     if layout.undistinguished:
         tell(f"not distinguished: {'; '.join(layout.undistinguished)}")
     predicted, curves = models(done, column) if models else ({}, None)
-    drawn = drawn_column(done, column, predicted, None if y else FACING_DOWN.get(column))
-    return draw(layout, replace(drawn, curves=curves), title=table.attrs["title"], log=log)
+    drawn = drawn_column(done, column, predicted, None if options.y else FACING_DOWN.get(column))
+    return draw(layout, replace(drawn, curves=curves), title=table.attrs["title"], log=options.log or "")
 
 
 def column_of(table: pd.DataFrame, wanted: str | None) -> str:
