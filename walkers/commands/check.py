@@ -21,7 +21,6 @@ from walkers.commands.options import (
     Json,
     Out,
     RunOrSweep,
-    check_folder,
     print_as,
     print_lines,
     refuse,
@@ -92,7 +91,6 @@ def literature(
     from walkers.check.lines import as_dict, as_text, failures, outcome
     from walkers.check.literature import literature
 
-    check_folder("--out", out)
     lines = literature(out, only, quick=quick, on_done=tell)
     print_as(as_json, lambda: as_dict(lines), lambda: f"{as_text(lines)}\n\n{outcome(lines)}")
     return 1 if failures(lines) else 0
@@ -146,7 +144,6 @@ def case(
     from walkers.check.lines import as_dict, as_text, failures
 
     loaded = case_at(case, at.out, at.values)[0]
-    check_folder("--out", at.out)
     refuse("--seeds", seeds > 1 and loaded.mixture is None, "is for piles: walkers and placed beads have one start")
     for term in without or ():
         refuse(f"--without {term}", term not in TERMS, f"expected one of {', '.join(TERMS)}")
@@ -238,8 +235,7 @@ def calibrate(
     from walkers.calibration.report import write_outcome
 
     folder = to or out / load_calibration(calibration).name
-    check_folder("--out", out)
-    check_folder("--to", folder)
+    refuse("--to", folder.is_file(), f"expected a folder, {folder} is a file")
     outcome = walkers.calibrate(calibration, out, jobs=jobs, progress=True, **vars(by))
     tell(*(f"{name}: {len(failures)} points failed" for name, failures in outcome.failures.items()))
     print_lines(write_outcome(outcome, folder))

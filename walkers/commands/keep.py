@@ -12,7 +12,7 @@ from cyclopts import Parameter
 
 from walkers import DEFAULT_OUT
 from walkers.api import Export
-from walkers.commands.options import AT_LEAST_1, At, Out, RunOrSweep, check_folder, refuse, refuse_any, tell
+from walkers.commands.options import AT_LEAST_1, At, Out, RunOrSweep, refuse, refuse_any, tell
 
 
 @Parameter(name="*")
@@ -158,7 +158,6 @@ def clean(
     from walkers.runner.directory import UNFINISHED
     from walkers.sweeps.folder import clean, plan_cleaning
 
-    check_folder("--out", out)
     refuse("--finished", finished and bool(runs), "has no meaning with given runs")
 
     def place_of(name: str) -> Path:

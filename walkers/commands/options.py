@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 from cyclopts.validators import Number
+from cyclopts.validators import Path as OfPath
 
 from walkers import DEFAULT_OUT, RECORDS
 from walkers.errors import refused
@@ -36,7 +37,8 @@ NOT_NEGATIVE = Number(gte=0)
 Case = Annotated[str, Parameter(name="CASE", completer=_names)]
 Run = Annotated[str, Parameter(name="RUN", completer=_names)]
 RunOrSweep = Annotated[str, Parameter(name="RUN|SWEEP", completer=_names)]
-Out = Annotated[Path, Parameter(help="Folder that contains the runs.")]
+Folder = Annotated[Path, Parameter(validator=OfPath(file_okay=False))]
+Out = Annotated[Folder, Parameter(help="Folder that contains the runs.")]
 Jobs = Annotated[
     int | None,
     Parameter(("--jobs", "-j"), validator=AT_LEAST_1, help="Number of parallel decks; default: one per core."),
@@ -54,12 +56,10 @@ class At:
     ----------
     changes
         Replace a value of the case, such as drive.frequency=70Hz. Repeatable.
-    out
-        Folder that contains the runs.
     """
 
     changes: Annotated[list[str] | None, Parameter("--set", metavar="KEY=VALUE")] = None
-    out: Path = DEFAULT_OUT
+    out: Out = DEFAULT_OUT
 
     @property
     def values(self) -> dict[str, Any]:
@@ -111,11 +111,6 @@ def refuse_any(given: dict[str, Any], why: str) -> None:
     """Raise an `InputError` with the reason if one of these options is given."""
     if option := next((name for name, value in given.items() if value), None):
         raise refused(f"--{option.replace('_', '-')}", why)
-
-
-def check_folder(option: str, folder: Path) -> None:
-    """Refuse a folder that is a file."""
-    refuse(option, folder.exists() and not folder.is_dir(), f"expected a folder, {folder} is a file")
 
 
 def print_as(as_json: bool, value: Callable[[], Any], text: Callable[[], str]) -> None:

@@ -17,7 +17,6 @@ from walkers.commands.options import (
     Case,
     Jobs,
     Json,
-    check_folder,
     print_as,
     print_lines,
     refuse,
@@ -115,7 +114,6 @@ def run(
     # Report a mistake in the last file before the first run starts.
     finished = each(lambda case: None if at.changes or force else finished_at(case, at.out), cases)
     loaded = each(lambda case: case_at(case, at.out, at.values), cases)
-    check_folder("--out", at.out)
     if accuracy:
         from walkers.sweeps.accuracy import SHARE, times_of
 
@@ -180,7 +178,6 @@ def sweep(
     from walkers.sweeps.site import load_site
 
     loaded = load_sweep(sweep, at.values)
-    check_folder("--out", at.out)
     refuse("--jobs", jobs is not None and site is not None, "the site file sets how many decks run at once")
     if len(loaded.rows) > _MANY:
         tell(f"{loaded.name}: resolving {len(loaded.rows)} points, about 2,000 per second")
