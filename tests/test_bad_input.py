@@ -253,6 +253,8 @@ REFUSED: list[tuple[str, str]] = [
     ("paper figures --only fig4 --to {case}", "base.toml"),
     # Mistyped names
     ("shw fig1b", 'Unknown command "shw". Did you mean "show"?'),
+    ("list a b", "Unexpected: b. See: walkers list --help"),
+    ("--library mine.toml", "--library: expected a library file, and a command after it"),
     ("new {case}", "exists already"),
     ("new mine fig1", 'did you mean "fig1b"?'),
     *((f"new '{name}'", f"{name or '.'}: expected a name") for name in ("", ".", "/", "..")),

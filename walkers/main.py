@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import walkers.inputs
 from walkers.commands import SECTIONS, commands
+from walkers.errors import InputError, WalkersError, refused, shortened
 
 if TYPE_CHECKING:
     from cyclopts import App
@@ -66,13 +67,17 @@ def main(arguments: list[str] | None = None) -> NoReturn:
 def _status(tokens: list[str]) -> int:
     """Run the program and return its exit status. Unexpected errors are raised."""
     try:
-        if not tokens or tokens[0] in _HELP:
-            print(overview())
-            outcome: Any = 0
-        elif tokens[0] == "--version":
+        walkers.inputs.chosen_library, words = None, tokens
+        if tokens[:1] == ["--library"]:
+            if len(tokens) < 3:
+                raise refused("--library", "expected a library file, and a command after it")
+            walkers.inputs.chosen_library, words = Path(tokens[1]), tokens[2:]
+        if not words or words[0] in _HELP:
+            outcome: Any = print(overview())
+        elif words[0] == "--version":
             outcome = print(describe_version())
         else:
-            outcome = _call(tokens)
+            outcome = _call(words)
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt, SystemExit, _Terminated) as stop:
         return _report_stop(stop, tokens)
@@ -117,9 +122,6 @@ def program() -> App:
 def _call(tokens: list[str]) -> Any:
     """What the command returns that the words name; with ``--help`` its help is printed."""
     app = program()
-    walkers.inputs.chosen_library = None
-    if tokens[0] == "--library" and len(tokens) > 1:
-        walkers.inputs.chosen_library, tokens = Path(tokens[1]), tokens[2:]
     names, apps, words = app.parse_commands(tokens)
     if names and (not {*words}.isdisjoint(_HELP) or (not words and names[-1] in SECTIONS)):
         return print(help_of(names, apps))
@@ -181,9 +183,6 @@ def describe_version() -> str:
 
 def _report_stop(stop: BaseException, tokens: list[str]) -> int:
     """Print why the program stopped, and return its exit status."""
-    from walkers.errors import InputError, WalkersError, shortened
-    from walkers.text import printable
-
     if isinstance(stop, SystemExit):
         return stop.code if isinstance(stop.code, int) else 0
     if isinstance(stop, InputError) and stop.source not in tokens:
@@ -198,11 +197,16 @@ def _report_stop(stop: BaseException, tokens: list[str]) -> int:
         return 0
     if isinstance(stop, OSError):  # a given path cannot be read or written
         return _tell(f"{stop.filename}: {stop.strerror}" if stop.filename else str(stop), 2)
-    from cyclopts import CycloptsError
+    from cyclopts import CycloptsError, UnusedCliTokensError
 
-    if isinstance(stop, CycloptsError):
-        return _tell(shortened(printable(str(stop)), _LONGEST_MESSAGE), 2)
-    raise stop
+    if not isinstance(stop, CycloptsError):
+        raise stop
+    from walkers.text import printable
+
+    unused = stop.unused_tokens if isinstance(stop, UnusedCliTokensError) else None
+    message = f"Unexpected: {' '.join(unused)}." if unused else str(stop)
+    help_command = " ".join(["walkers", *(stop.command_chain or ()), "--help"])
+    return _tell(f"{shortened(printable(message), _LONGEST_MESSAGE)} See: {help_command}", 2)
 
 
 def _options_of(names: str, tokens: list[str]) -> str:
