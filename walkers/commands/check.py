@@ -97,14 +97,8 @@ def literature(
 
 
 @check.command
-def files(what: Annotated[RunOrSweep, Parameter(name="PATH")], /, *, at: At = At()) -> int:
-    """Compare the files of a run, a sweep or an archive with their checksums.
-
-    Parameters
-    ----------
-    what
-        An unpacked archive, or a run or a sweep (folder, name in --out, or case).
-    """
+def files(what: RunOrSweep, /, *, at: At = At()) -> int:
+    """Compare the files of a run, a sweep or an unpacked archive (its folder) with their checksums."""
     from walkers.api import directory_of
     from walkers.archive.verification import verify
 
@@ -129,8 +123,6 @@ def case(
 
     Parameters
     ----------
-    case
-        A case file, the name of a shipped case such as fig1b, or a run (name or folder).
     cycles
         Number of drive cycles; default: as in the case.
     without

@@ -82,8 +82,6 @@ def export(
 
     Parameters
     ----------
-    what
-        A run or a sweep: its folder, its name in --out, or its case (file or name).
     form
         Format of the export. deck: LIGGGHTS deck of the case. vtk, paraview: .vtu files, their .pvd and a ParaView
         script; prints the .pvd or the script. lammps: the trajectory as a LAMMPS dump, for OVITO, ASE, MDAnalysis.
@@ -146,8 +144,6 @@ def clean(
 
     Parameters
     ----------
-    runs
-        Runs and sweeps: folder, name in --out, or case.
     finished
         Also remove finished runs, except those of sweeps.
     yes

@@ -93,8 +93,6 @@ def plot(
 
     Parameters
     ----------
-    what
-        A run or a sweep: its folder, its name in --out, or its case (file or name).
     to
         Runs: folder of the figures. Sweeps: file to write (.png, .pdf, .svg).
     """
@@ -121,8 +119,6 @@ def render(
 
     Parameters
     ----------
-    run
-        A run: its folder, its name in --out, or its case (file or name).
     to
         File to write: .png; films: .mp4, .gif; default: in the run's folder.
     images
@@ -144,8 +140,6 @@ def report(what: RunOrSweep, /, *, at: At = At(), to: Path | None = None) -> Non
 
     Parameters
     ----------
-    what
-        A run or a sweep: its folder, its name in --out, or its case (file or name).
     to
         HTML file to write; default: report.html in the folder of the run or sweep.
     """
@@ -169,8 +163,6 @@ def compare(
 
     Parameters
     ----------
-    first
-        A run or a sweep: its folder, its name in --out, or its case (file or name).
     second
         Another run or sweep, named in the same way; default: the first with the values of --set.
     y
@@ -182,7 +174,7 @@ def compare(
 
 
 def climb(
-    *what: RunOrSweep,
+    *what: Annotated[RunOrSweep, Parameter(help="Sweeps, folders of runs, runs or cases of piles.")],
     at: At = At(),
     within: Seconds | None = None,
     to: Path | None = None,
@@ -192,8 +184,6 @@ def climb(
 
     Parameters
     ----------
-    what
-        Sweeps, folders of runs, runs or cases of piles.
     within
         Count climbs up to this time of the drive, such as '5 s'; default: end of the shortest run without a climb.
     to

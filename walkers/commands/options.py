@@ -34,9 +34,11 @@ def _names(context: CompletionContext) -> list[str]:
 
 AT_LEAST_1 = Number(gte=1)
 NOT_NEGATIVE = Number(gte=0)
-Case = Annotated[str, Parameter(name="CASE", completer=_names)]
-Run = Annotated[str, Parameter(name="RUN", completer=_names)]
-RunOrSweep = Annotated[str, Parameter(name="RUN|SWEEP", completer=_names)]
+_CASE = "A case file, the name of a shipped case such as fig1b, or a run (name or folder)."
+_RUN = "its folder, its name in --out, or its case (file or name)."
+Case = Annotated[str, Parameter(name="CASE", completer=_names, help=_CASE)]
+Run = Annotated[str, Parameter(name="RUN", completer=_names, help=f"A run: {_RUN}")]
+RunOrSweep = Annotated[str, Parameter(name="RUN|SWEEP", completer=_names, help=f"A run or a sweep: {_RUN}")]
 Folder = Annotated[Path, Parameter(validator=OfPath(file_okay=False))]
 Out = Annotated[Folder, Parameter(help="Folder that contains the runs.")]
 Jobs = Annotated[

@@ -54,8 +54,6 @@ def show(case: Case, /, *, at: At = At(), theory: bool = False, as_json: Json = 
 
     Parameters
     ----------
-    case
-        A case file, the name of a shipped case such as fig1b, or a run (name or folder).
     theory
         Print the theory's prediction, with the result of the run if it exists.
     """
@@ -88,8 +86,6 @@ def run(
 
     Parameters
     ----------
-    cases
-        Case files, names of shipped cases, or runs (name or folder).
     force
         Run again if the run exists.
     limit
