@@ -80,14 +80,16 @@ class Found(NamedTuple):
     path: Path
 
 
-def find(name: str | Path, out: str | Path = DEFAULT_OUT) -> Found:
-    """What a path, a name in a folder of runs, or the name of a case means; nothing but names is read.
+def find(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Found:
+    """What a path, a name in a folder of runs, or the name of a case means; with changes, the case; see `load`.
 
-    A folder does not hide a shipped case of the same name; the file of a sweep means the sweep if it was run.
+    Nothing but names is read. A folder does not hide a shipped case of the same name; the file of a sweep means the
+    sweep if it was run.
     """
-    with suppress(OSError):  # a name that no file system accepts
-        return next(_meanings(Path(name), Path(out)))
-    return Found("case", Path(name))
+    if isinstance(what, (str, Path)) and not changes:
+        with suppress(OSError):  # a name that no file system accepts
+            return next(_meanings(Path(what), Path(out)))
+    return Found("case", Path(out))
 
 
 def _meanings(path: Path, out: Path) -> Iterator[Found]:
@@ -116,7 +118,7 @@ def case_at(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None)
     out = Path(out)
     if not isinstance(what, (str, Path, Mapping)):
         return what.changed(changes or {}), out
-    kind, path = Found("case", out) if isinstance(what, Mapping) else find(what, out)
+    kind, path = find(what, out)
     if kind == "run":
         return Run(path).check().case.changed(changes or {}), path.parent
     if kind in ("sweep", "calibration"):
@@ -129,7 +131,7 @@ def case_at(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None)
 def case_and_run(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> tuple[Case, Path | None]:
     """The case that a user names, and the directory of its finished run, if there is one; see `load`."""
     case, folder = case_at(what, out, changes)
-    kind, place = find(what, out) if isinstance(what, (str, Path)) and not changes else Found("case", folder)
+    kind, place = find(what, out, changes)
     if kind != "run":
         try:
             place = run_place(case, find_engine(), folder)
@@ -163,7 +165,7 @@ def load(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) ->
     >>> walkers.run("fig1b", tmp).directory == walkers.load("fig1b", tmp).directory
     True
     """
-    kind, path = find(what, out) if isinstance(what, (str, Path)) and not changes else Found("case", Path())
+    kind, path = find(what, out, changes)
     if kind == "sweep":
         return Sweep(path)
     if kind == "run":
@@ -181,8 +183,8 @@ def load(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) ->
 
 def directory_of(what: str | Path, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Path:
     """The directory that a user names, whatever it contains; for a case, the directory of its run."""
-    found = find(what, out)
-    return load(what, out, changes).directory if changes or found.kind == "case" else found.path
+    found = find(what, out, changes)
+    return load(what, out, changes).directory if found.kind == "case" else found.path
 
 
 # --- runs -------------------------------------------------------------------------------------------------------------
@@ -508,7 +510,7 @@ def run(
     from walkers.inputs.run import limits_of
     from walkers.sweeps.making import check_audit, make_runs
 
-    if isinstance(case, (str, Path)) and not force and (finished := finished_at(case, Path(out))):
+    if not force and (finished := finished_at(case, out)):
         return finished
     case, out = case_at(case, out)
     for text in (out.absolute(), case.name):
@@ -533,14 +535,16 @@ def run(
     return Run(made.runs[place.name], cached=place.name in made.found, asked=case)
 
 
-def finished_at(name: str | Path, out: Path) -> Run | None:
+def finished_at(what: Named, out: str | Path) -> Run | None:
     """The finished run with a name or a directory, also of a deck that was run by hand; None for a case."""
-    kind, path = find(name, out)
-    if is_deck_folder(path) and kind in ("run", "deck"):
+    kind, path = find(what, out)
+    if kind not in ("run", "deck"):
+        return None
+    if is_deck_folder(path):
         from walkers.sweeps.by_hand import take_in
 
         take_in(path)
-    return _measured(Run(path)) if kind in ("run", "deck") and is_finished(path) else None
+    return _measured(Run(path)) if is_finished(path) else None
 
 
 def _measured(run: Run) -> Run:
