@@ -219,7 +219,7 @@ REFUSED: list[tuple[str, str]] = [
     ("compare {sweep} {run}", "is a sweep; expected another sweep"),
     ("compare {sweep} fig1b", "is a sweep; expected another"),
     ("compare {sweep} {other}", "vary the same keys"),
-    ("compare fig1b", "fig1b: expected a second run or sweep, or --set KEY=VALUE"),
+    ("compare fig1b", "fig1b: expected a second run or sweep, or changed values (--set KEY=VALUE)"),
     ("compare {sweep} --set run.seed=2", "--set: is for runs and cases"),
     ("climb {sweep}", "expected a finished run of a pile"),
     ("check files .", "expected a run directory"),
@@ -303,7 +303,11 @@ REFUSED: list[tuple[str, str]] = [
     *((f"{what} {{pile}} --walker 0", "") for what in ("render", "render --film")),
     ("render --film {pile} --to box.png", ""),
     ("render {pile} --to box.jpg", ""),
-    *((f"export {{pile}} --to {form} --as-placed", "") for form in ("vtk", "paraview")),
+    *(
+        (f"export {{pile}} --to {form} --as-placed", "--as-placed: is for independent walkers")
+        for form in ("vtk", "paraview")
+    ),
+    ("export {sweep} --to vtk", "expected one of its runs for vtk, or archive"),
 ]  # fmt: skip
 """Commands, and a part of the line that they are refused with."""
 

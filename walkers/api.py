@@ -761,7 +761,7 @@ def compare(
     from walkers.sweeps.comparison import Side, compare_runs, compare_sweeps
 
     if second is None and not changes:
-        raise refused(first, "expected a second run or sweep, or changes")
+        raise refused(first, "expected a second run or sweep, or changed values (--set KEY=VALUE)")
     names = (first, first if second is None else second)
     sweeps = {name: path for name in names for kind, path in [find(name, out)] if kind == "sweep"}
     if len(sweeps) == len(set(names)):

@@ -6,13 +6,13 @@ import sys
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from walkers import DEFAULT_OUT
 from walkers.api import Export
-from walkers.commands.options import AT_LEAST_1, At, Out, RunOrSweep, refuse, refuse_any, tell
+from walkers.commands.options import AT_LEAST_1, At, Out, RunOrSweep, refuse, tell
 
 
 @Parameter(name="*")
@@ -62,7 +62,8 @@ class OfArchives:
 
 
 _OPTIONS = {
-    **dict.fromkeys(("vtk", "paraview"), ("every", "as_placed", "colour")),
+    "vtk": ("every", "as_placed", "colour"),
+    "paraview": ("every", "as_placed", "colour", "open"),
     "lammps": ("every",),
     "archive": ("without_dumps", "author", "orcid", "licence"),
 }
@@ -89,32 +90,24 @@ def export(
     to
         File or folder to write; default: in the run's folder, archives in the current folder. Decks are printed.
     """
-    for option, value in {**vars(files), **vars(archive)}.items():
-        forms = [name for name in _OPTIONS if option in _OPTIONS[name]] or ["paraview"]
-        if form not in forms:
-            refuse_any({option: value}, f"is for --to {', '.join(forms)}")
+    given = {name: value for name, value in {**vars(files), **vars(archive)}.items() if value}
+    for option in given:
+        forms = [name for name, options in _OPTIONS.items() if option in options]
+        refuse(f"--{option.replace('_', '-')}", form not in forms, f"is for --to {', '.join(forms)}")
     if form == "deck":
         _export_deck(what, at, to)
         return
-    options: dict[str, Any] = {"every": files.every}
+    shown = given.pop("open", False)
     if form == "archive":
         from walkers.archive.crate import Author
 
-        people = zip_longest(archive.author or (), archive.orcid or ())
-        refuse("--orcid", len(archive.orcid or ()) > len(archive.author or ()), "expected an --author for each")
-        options = {"dumps": not archive.without_dumps, "authors": [Author(*one) for one in people]}
-        options |= {"licence": archive.licence} if archive.licence else {}
-        print(at.load(what).export(form, to, **options))
-        return
-    if form in ("vtk", "paraview"):
-        options = {name: value for name, value in vars(files).items() if name != "open"}
-    run = at.run(what)
-    refuse(
-        "--as-placed", files.as_placed and not run.case.apart, "is for independent walkers: these stand where they are"
-    )
-    written = run.export(form, to, **options)
+        authors, orcids = given.pop("author", []), given.pop("orcid", [])
+        refuse("--orcid", len(orcids) > len(authors), "expected an --author for each")
+        given["authors"] = [Author(*one) for one in zip_longest(authors, orcids)]
+        given["dumps"] = not given.pop("without_dumps", False)
+    written = at.load(what).export(form, to, **given)
     print(written)
-    if files.open:
+    if shown:
         from walkers.postprocess.paraview import open_paraview
 
         open_paraview(written)

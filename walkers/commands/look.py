@@ -168,7 +168,6 @@ def compare(
     y
         Sweeps: column of the table; default: velocity, or climbs for piles.
     """
-    refuse(first, second is None and not at.changes, "expected a second run or sweep, or --set KEY=VALUE")
     found = walkers.compare(first, second, at.out, at.values, y)
     print_as(as_json, lambda: found.contents, lambda: found.text)
 

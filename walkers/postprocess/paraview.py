@@ -72,6 +72,8 @@ def write_vtk(
     destination = destination or directory / "vtk"
     earlier, place = _earlier(destination), destination.absolute()
     motion = read_motion(directory)
+    if as_placed and not motion.case.apart:
+        raise refused("as_placed", "is for independent walkers: these stand where they are")
     if motion.case.boundary.bare and not as_placed:
         motion = gathered(motion)
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
