@@ -86,7 +86,7 @@ def _of_run(name: str, case: str, changes: Mapping[str, Any] | None = None, film
     def make(out: Path, docs: Path) -> None:
         done = run(load_case(case, changes), out)
         if film:
-            done.film(docs / file, film)
+            done.film(docs / file, **vars(film))
         else:
             done.render(docs / file)
 

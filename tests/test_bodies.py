@@ -269,7 +269,7 @@ def test_walkers_on_a_tray_meet_and_stick(tmp_path: Path) -> None:
     assert apart.max() < 1.1 * group.make.length  # they hold on to each other, however they turn
     assert {path.name for path in tray.plot()} >= {"walk.png", "paths.png"}
     short = {"size": (64, 64), "fps": 10, "end": 5e-3}
-    films = [tray.film(tmp_path / "film.gif", walkers.FilmOptions(walker=one, **short)).read_bytes() for one in (3, 4)]
+    films = [tray.film(tmp_path / "film.gif", walker=one, **short).read_bytes() for one in (3, 4)]
     assert films[0] != films[1]
     (axes,) = figures_of(tray.directory)["paths"].axes
     for walker, line in enumerate(axes.lines[:9]):  # in the plane, where they stood

@@ -1,7 +1,7 @@
 """Wet granular walkers, simulated with LIGGGHTS.
 
 `load_case` reads a case. `run` and `sweep` run a case and a sweep, as the commands do. `load` finds runs and sweeps. A
-`Run` or a `Sweep` has methods that plot, film, report and export. `FilmOptions` describes a film for `Run.film`.
+`Run` or a `Sweep` has methods that plot, film, report and export.
 """
 
 from __future__ import annotations
@@ -14,10 +14,8 @@ if TYPE_CHECKING:
     from walkers.api import Run, Sweep, calibrate, climb, compare, load, predict, run, sweep
     from walkers.case_file import new
     from walkers.inputs.reading import load_case
-    from walkers.postprocess.film_options import FilmOptions
 
 __all__ = [
-    "FilmOptions",
     "Run",
     "Sweep",
     "calibrate",
@@ -40,7 +38,7 @@ _PACKAGES = (
 )
 _MODULES = {
     **dict.fromkeys(__all__, "api"),
-    **{"FilmOptions": "postprocess.film_options", "load_case": "inputs.reading", "new": "case_file"},
+    **{"load_case": "inputs.reading", "new": "case_file"},
 }
 """Modules of the public names."""
 

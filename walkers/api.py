@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from walkers.calibration.calibrate import Outcome
     from walkers.inputs.case import Case
     from walkers.inputs.origins import Origin
-    from walkers.postprocess.film_options import FilmOptions
     from walkers.postprocess.motion import Motion
     from walkers.postprocess.results import Results
     from walkers.runner.launch import Progress
@@ -339,15 +338,19 @@ class Run:
     def film(
         self,
         to: str | Path | None = None,
-        options: FilmOptions | None = None,
         *,
         progress: bool | None = None,
+        **options: Any,
     ) -> Path:
-        """Render a film; see `walkers.postprocess.films.render_film`."""
+        """Render a film with `walkers.postprocess.film_options.FilmOptions`, such as ``slowdown``.
+
+        See `walkers.postprocess.films.render_film`.
+        """
+        from walkers.postprocess.film_options import FilmOptions
         from walkers.postprocess.films import render_film
 
         with shown_if(progress, progress_of_film(self.case.name)) as advance:
-            return render_film(self.finished_directory, _path(to), options, on_progress=advance)
+            return render_film(self.finished_directory, _path(to), FilmOptions(**options), on_progress=advance)
 
     def view(self, *, height: int = 480) -> k3d.Plot:
         """An interactive 3-D view of the beads for a notebook, ``height`` pixels high.

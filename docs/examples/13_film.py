@@ -9,8 +9,7 @@ the floor shakes.
 import walkers
 
 run = walkers.run("fig4b")
-options = walkers.FilmOptions(size=(480, 240), fps=20, slowdown=50.0, walker=0, begin=0.05, end=0.1)
-picture = run.film("runs/walk.gif", options)
+picture = run.film("runs/walk.gif", size=(480, 240), fps=20, slowdown=50.0, walker=0, begin=0.05, end=0.1)
 
 # %%
 # A name that ends in ``.mp4`` gives an MP4 file.

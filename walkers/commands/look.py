@@ -128,7 +128,7 @@ def render(
     """
     if film:
         refuse("--images", images is not None, "is for pictures, not for --film")
-        print(at.run(run).film(to, options, progress=True))
+        print(at.run(run).film(to, progress=True, **vars(options)))
         return
     usual = vars(FilmOptions(walker=options.walker))
     refuse_any({name: value != usual[name] for name, value in vars(options).items()}, "is for --film")
