@@ -644,8 +644,8 @@ class Sweep:
 
         Examples
         --------
-        >>> walkers.sweep("fig4", tmp).figure(x="liquid.name", theory=True).axes[0].get_xscale()
-        'linear'
+        >>> walkers.sweep("fig4", tmp).figure(x="liquid.name", log="y").axes[0].get_yscale()
+        'log'
         """
         from walkers.plotting import sweep_figure
         from walkers.sweeps.figure_options import FigureOptions
