@@ -29,7 +29,7 @@ from walkers.postprocess.gait import averages, gait, settled_samples, turned_ove
 from walkers.postprocess.motion import Bridges, Group, Motion
 from walkers.postprocess.piles import _joined, _of_climbs, _state_of
 from walkers.postprocess.report.player import _points
-from walkers.postprocess.scene import Scene, turns_of
+from walkers.postprocess.scene import Scene, rotations_at, turned_in
 from walkers.postprocess.uncertainty import SPREAD_NAME, bands_of, spread_of
 from walkers.postprocess.walking import _rows, _scatter
 from walkers.runner.files import write_json
@@ -398,12 +398,13 @@ def test_a_bead_turns_about_axes_that_stay_where_they_are() -> None:
     spin = np.zeros_like(motion.spin)
     quarter = 0.5 * pi / (motion.time[1] - motion.time[0])
     spin[1, 0], spin[2, 0] = (0.0, 0.0, quarter), (quarter, 0.0, 0.0)  # means since the frame before
-    turns = turns_of(replace(motion, mean_spin=spin))
-    assert turns is not None
-    for frame, share, expected in ((0, 0.0, [1, 0, 0]), (1, 0.0, [0, 1, 0]), (2, 0.0, [0, 0, 1]), (0, 1.0, [0, 1, 0])):
-        np.testing.assert_allclose(turns.at(frame, share)[0] @ [1.0, 0.0, 0.0], expected, atol=1e-12)
-        np.testing.assert_allclose(turns.at(frame, share)[1], np.eye(3), atol=1e-12)
-    np.testing.assert_allclose(turns.at(1, 0.5)[0] @ [1.0, 0.0, 0.0], [0.0, sqrt(0.5), sqrt(0.5)], atol=1e-12)
+    turned = turned_in(replace(motion, mean_spin=spin))
+    assert turned is not None
+    half = [0.0, sqrt(0.5), sqrt(0.5)]
+    for frame, expected in {0: [1.0, 0.0, 0.0], 1: [0.0, 1.0, 0.0], 1.5: half, 2: [0.0, 0.0, 1.0]}.items():
+        first, other = rotations_at(turned, frame)[:2]
+        np.testing.assert_allclose(first @ [1.0, 0.0, 0.0], expected, atol=1e-12)
+        np.testing.assert_allclose(other, np.eye(3), atol=1e-12)
 
 
 def test_beads_have_the_colours_of_their_class() -> None:

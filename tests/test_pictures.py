@@ -31,11 +31,11 @@ from walkers.postprocess.drawing import styled
 from walkers.postprocess.figures import LEAST, MOST_NAMED, climb_figure, draw, figures_of, looks_of, plot_run
 from walkers.postprocess.film_options import FilmOptions, parse_time
 from walkers.postprocess.films import film_times, named_direction
-from walkers.postprocess.motion import Group, Motion, even_frames, even_labels, read_bridges, read_motion
+from walkers.postprocess.motion import Group, Motion, read_bridges, read_motion
 from walkers.postprocess.necks import bridges_at, ends_of, necks_of
 from walkers.postprocess.paraview import _walls, write_vtk
 from walkers.postprocess.scene import Scene, Window, axes_toward, camera_axes, mesh_of, walls_of
-from walkers.postprocess.series import _figure, _strips, render_series
+from walkers.postprocess.series import _figure, _strips, even_frames, even_labels, render_series
 from walkers.postprocess.tables import read_table
 from walkers.runner.directory import case_of
 

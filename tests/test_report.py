@@ -20,13 +20,13 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.sweep import expand
 from walkers.postprocess.caption import caption
 from walkers.postprocess.figures import figures_of
-from walkers.postprocess.motion import gathered, read_bridges, read_motion
+from walkers.postprocess.motion import read_bridges, read_motion
 from walkers.postprocess.numbers import rows, shown
 from walkers.postprocess.report.page import LARGEST, svg_of
 from walkers.postprocess.report.player import cameras_of, player_of
 from walkers.postprocess.report.run import report_run, shown_of
 from walkers.postprocess.results import Results, read
-from walkers.postprocess.scene import camera_axes
+from walkers.postprocess.scene import camera_axes, gathered
 from walkers.postprocess.tables import read_table
 from walkers.rounding import rounded, with_decimals
 from walkers.runner.provenance import software

@@ -8,6 +8,7 @@ boundary an arrow shows the direction of gravity.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from math import ceil, log10
 from pathlib import Path
 from typing import NamedTuple
@@ -75,29 +76,25 @@ def render_film(
     around = _AROUND_TRAY if from_above(motion.case) else _AROUND
     whole = Scene.around(motion, camera_axes(motion), around, frames, rolling=True)
     scene = whole.following(wide / tall, _AROUND, frames)
-    window = Window(scene, options.size)
     bridges = bridges_at(motion, times.frame)
-    write = _captions(scene, times, window.pixels_per_mm, options.size)
-
-    def picture(number: int) -> Picture:
-        return write(window.picture(times.frame[number], bridges[number]), number)
-
-    def pictures() -> Iterator[Picture]:
-        for number in range(count):
-            yield picture(number)
-            if on_progress is not None:
-                on_progress(number + 1, count)
-
     path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        with beside(path) as new:
-            if path.suffix.lower() == ".gif":
-                samples = np.linspace(0, count - 1, _SAMPLES).astype(int).tolist()
-                _write_gif(new, pictures(), options.fps, np.concatenate([*map(picture, samples)]))
-            else:
-                _write_mp4(new, pictures(), options, count)
-    finally:
-        window.close()
+    with closing(Window(scene, options.size)) as window, beside(path) as new:
+        write = _captions(scene, times, window.pixels_per_mm, options.size)
+
+        def picture(number: int) -> Picture:
+            return write(window.picture(times.frame[number], bridges[number]), number)
+
+        def pictures() -> Iterator[Picture]:
+            for number in range(count):
+                yield picture(number)
+                if on_progress is not None:
+                    on_progress(number + 1, count)
+
+        if path.suffix.lower() == ".gif":
+            samples = np.linspace(0, count - 1, _SAMPLES).astype(int).tolist()
+            _write_gif(new, pictures(), options.fps, np.concatenate([*map(picture, samples)]))
+        else:
+            _write_mp4(new, pictures(), options, count)
     return path
 
 

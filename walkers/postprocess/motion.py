@@ -26,7 +26,6 @@ LEAST_SAMPLES = 8
 """Smallest number of samples per cycle that resolves the motion within a cycle."""
 NEAR = 1.5
 """Walkers whose centres of mass come closer than this multiple of their length have met."""
-_LEFT_OUT = 0.02  # largest part of a run after the last of several evenly spaced times
 _OF_BEADS = ("position", "velocity", "spin", "mean_spin")
 _OF_FRAMES = (*_OF_BEADS, "time", "substrate", "substrate_velocity", "frames")
 
@@ -269,48 +268,6 @@ def came_near(centre: FloatArray, near: float) -> bool:
         if np.any(np.linalg.norm(centre[:, within] - centre[:, number, None], axis=-1) < near):
             return True
     return False
-
-
-def even_frames(motion: Motion, count: int) -> list[int]:
-    """Evenly spaced frames from the first of the drive: ``count``, or fewer if the last is then nearer to the end.
-
-    They are at the same phase if there are enough cycles; otherwise walkers would appear to move backward.
-    """
-    start, cycle = motion.first_driven, motion.case.run.samples_per_cycle
-    last = len(motion.time) - 1 - start
-    every, steps = (cycle, last // cycle) if last // cycle >= count - 1 else (1, last)
-    most = min(count - 1, steps)
-    parts = range(most, most // 2, -1)
-    if not parts:
-        return [start]
-    exact = [number for number in parts[:2] if steps % number == 0]
-    nearly = [number for number in parts if steps % number <= _LEFT_OUT * steps]
-    number = [*exact, *nearly, min(parts, key=lambda number: steps % number)][0]
-    return [start + every * (steps // number) * part for part in range(number + 1)]
-
-
-def even_labels(time: FloatArray) -> list[str]:
-    """Evenly spaced times (s) as text with the required number of decimals."""
-    between = float(time[-1] - time[0]) / max(len(time) - 1, 1)
-    decimals = next((places for places in range(2, 6) if abs(round(between, places) - between) <= 0.01 * between), 6)
-    return [f"{one:.{decimals}f} s" for one in time]
-
-
-def gathered(motion: Motion, lane: float = 2.0) -> Motion:
-    """Independent walkers moved onto parallel lanes for pictures; between walls the first walker alone.
-
-    All other motions are returned unchanged. ``lane`` is the distance of the lanes in lengths of the longest walker.
-    """
-    case = motion.case
-    if not case.apart:
-        return motion
-    lane *= max(make.length for make in case.walkers)
-    across = np.cross([0.0, 0.0, 1.0], case.drive_axis)
-    shift = np.zeros((len(motion.radius), 3))
-    for number, one in enumerate(motion.walkers):
-        shift[list(one.beads)] = -number * lane * across - [*one.origin, 0.0]
-    moved = replace(motion, position=motion.position + shift)
-    return moved if case.boundary.bare else moved.of_walkers(moved.walkers[:1])
 
 
 def read_motion(directory: str | Path) -> Motion:

@@ -22,9 +22,9 @@ from walkers.errors import refused
 from walkers.postprocess import piles
 from walkers.postprocess.clusters import connected
 from walkers.postprocess.drawing import check_every
-from walkers.postprocess.motion import Bridges, Motion, gathered, read_bridges, read_motion
+from walkers.postprocess.motion import Bridges, Motion, read_bridges, read_motion
 from walkers.postprocess.necks import ends_of
-from walkers.postprocess.scene import Scene, camera_axes, walls_of
+from walkers.postprocess.scene import Scene, camera_axes, gathered, walls_of
 
 if TYPE_CHECKING:
     import meshio

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from math import cos, pi, radians, sin
+from math import ceil, cos, pi, radians, sin
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -60,45 +60,51 @@ def shown_of(motion: Motion, walker: int | None) -> tuple[Motion, bool]:
     return motion.of_walkers(motion.walkers[number : number + 1]), True
 
 
-@dataclass(frozen=True)
-class Turns:
-    """Orientations of the beads.
+def gathered(motion: Motion, lane: float = 2.0) -> Motion:
+    """Independent walkers moved onto parallel lanes for pictures; between walls the first walker alone.
 
-    ``turned`` are quaternions (x, y, z, w) of the rotation since the first frame, shape (F, N, 4). ``step`` are
-    rotation vectors to the next frame, rad, shape (F, N, 3), zero in the last frame.
+    All other motions are returned unchanged. ``lane`` is the distance of the lanes in lengths of the longest walker.
     """
+    case = motion.case
+    if not case.apart:
+        return motion
+    lane *= max(make.length for make in case.walkers)
+    across = np.cross([0.0, 0.0, 1.0], case.drive_axis)
+    shift = np.zeros((len(motion.radius), 3))
+    for number, one in enumerate(motion.walkers):
+        shift[list(one.beads)] = -number * lane * across - [*one.origin, 0.0]
+    moved = replace(motion, position=motion.position + shift)
+    return moved if case.boundary.bare else moved.of_walkers(moved.walkers[:1])
 
-    turned: FloatArray
-    step: FloatArray
 
-    def at(self, frame: int, share: float) -> FloatArray:
-        """Rotation matrices of the beads, shape (N, 3, 3), at a fraction of the interval after a frame."""
-        from scipy.spatial.transform import Rotation
+def turned_in(motion: Motion) -> FloatArray | None:
+    """Orientations of the beads: quaternions (x, y, z, w) of the rotation since the first frame, shape (F, N, 4).
 
-        further = Rotation.from_rotvec(share * self.step[frame])
-        matrices: FloatArray = (further * Rotation.from_quat(self.turned[frame])).as_matrix()
-        return matrices
-
-
-def turns_of(motion: Motion) -> Turns | None:
-    """Integrate the spins of a motion, dR/dt = [ω]× R; None if the frames are too far apart.
-
-    The engine has no orientations of spheres. Here a bead turns by ω Δt about ω between two frames. With walkers, ω is
-    the average over all steps, and the result is exact if the axis is constant during the interval. Otherwise ω is the
-    mean of both frames, which is sufficient if the frames resolve the cycle.
+    The engine has no orientations of spheres; here its spins are integrated, dR/dt = [ω]× R. A bead turns by ω Δt about
+    ω between two frames. With walkers, ω is the average over all steps, and the result is exact if the axis is constant
+    during the interval. Otherwise ω is the mean of both frames, which is sufficient if the frames resolve the cycle;
+    None if they are too far apart.
     """
     from scipy.spatial.transform import Rotation
 
     if motion.mean_spin is None and not motion.follows_cycles:
         return None
-    step = np.zeros_like(motion.spin)
-    step[:-1] = motion.averaged.spin * np.diff(motion.time)[:, None, None]
-    turned = np.empty((*step.shape[:2], 4))
-    now = Rotation.identity(step.shape[1])
-    for frame, vectors in enumerate(step):
-        turned[frame] = now.as_quat()
-        now = Rotation.from_rotvec(vectors) * now
-    return Turns(turned, step)
+    steps, now = motion.averaged.spin * np.diff(motion.time)[:, None, None], Rotation.identity(len(motion.radius))
+    turned = [now.as_quat()]
+    for step in steps:
+        now = Rotation.from_rotvec(step) * now
+        turned.append(now.as_quat())
+    return np.array(turned)
+
+
+def rotations_at(turned: FloatArray, frame: float) -> FloatArray:
+    """Rotation matrices of the beads in a frame, or between two (a fraction), shape (N, 3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    number, share = int(frame), frame % 1.0
+    begin, end = (Rotation.from_quat(each) for each in turned[[number, number + ceil(share)]])
+    matrices: FloatArray = (Rotation.from_rotvec(share * (end * begin.inv()).as_rotvec()) * begin).as_matrix()
+    return matrices
 
 
 @dataclass(frozen=True)
@@ -146,8 +152,7 @@ class Scene:
 
         ``aspect`` is the width of the picture over its height; ``share`` and ``frames`` are those of `around`.
         """
-        path = path_of(self.motion, frames.start or 0)
-        options = {"shaken": self.shaken, "rolling": self.rolling, "path": path}
+        options = {"shaken": self.shaken, "rolling": self.rolling, "path": path_of(self.motion, frames.start or 0)}
         near = Scene.around(self.motion, self.axes, _ABOUT * share, frames, **options)
         return near if self.height(aspect) > _LONG * near.height(aspect) else self
 
@@ -155,10 +160,7 @@ class Scene:
         """Displacement of the camera in a frame, or between two (a fraction), mm."""
         if self.path is None:
             return np.zeros(3)
-        number, last = int(frame), len(self.path) - 1
-        begin, end = self.path[number], self.path[min(number + 1, last)]
-        moved: FloatArray = begin + (frame - number) * (end - begin)
-        return moved
+        return np.array([np.interp(frame, np.arange(len(self.path)), way) for way in self.path.T])
 
     def height(self, aspect: float) -> float:
         """Height of the picture, mm, for a ratio of width to height."""
@@ -171,9 +173,9 @@ class Scene:
         return middle + distance * self.axes[2], middle, self.axes[1]
 
     @cached_property
-    def turns(self) -> Turns | None:
-        """Orientations of the beads; None if not shown or unknown."""
-        return turns_of(self.motion) if self.rolling else None
+    def turned(self) -> FloatArray | None:
+        """Orientations of the beads (`turned_in`); None if not shown or unknown."""
+        return turned_in(self.motion) if self.rolling else None
 
     @cached_property
     def pointed_out(self) -> npt.NDArray[np.bool_]:
@@ -192,7 +194,7 @@ class Scene:
         large = self.motion.large
         packed = np.where(chosen, np.where(large, *RUBY), np.where(large, *GLASS))
         plain = (packed[:, None] >> np.array([16, 8, 0]) & 255).astype(np.float64)
-        if self.turns is None:
+        if self.turned is None:
             return np.stack([plain, plain])
         darker = plain * np.minimum(1.0, _BRIGHTEST / plain.mean(axis=1, keepdims=True))
         return np.stack([darker, plain + _PALE * (255.0 - plain)])
@@ -336,17 +338,9 @@ def beach_ball(rounds: int, motion: Motion) -> tuple[FloatArray, npt.NDArray[np.
     import pyvista as pv
 
     axis = np.cross([0.0, 0.0, 1.0], [1.0, 0.0, 0.0] if from_the_side(motion.case) else motion.case.drive_axis)
-    lunes = [
-        pv.Sphere(
-            radius=1.0,
-            direction=axis,
-            start_theta=begin,
-            end_theta=end,
-            theta_resolution=rounds // _LUNES,
-            phi_resolution=rounds // 2 + 1,
-        )
-        for begin, end in pairwise(np.linspace(0.0, 360.0, _LUNES + 1))
-    ]
+    look: dict[str, Any] = {"theta_resolution": rounds // _LUNES, "phi_resolution": rounds // 2 + 1}
+    ends = pairwise(np.linspace(0.0, 360.0, _LUNES + 1))
+    lunes = [pv.Sphere(radius=1.0, direction=axis, start_theta=begin, end_theta=end, **look) for begin, end in ends]
     ball = pv.merge(lunes, merge_points=False)
     points = np.asarray(ball.points)
     points = points / np.linalg.norm(points, axis=1, keepdims=True)
@@ -396,9 +390,9 @@ class Window:
             time += share * (motion.time[number + 1] - time)
         if self._scene.shaken:
             shift = 1e3 * boundary_motion(motion.case.excitation, np.array([time]))[0][0]
-        turns = self._scene.turns
+        turned = self._scene.turned
         self._beads.colour(self._scene.colours(self._scene.pointed_out[number])[self._pale].swapaxes(0, 1))
-        self._beads.move(1e3 * place + shift, None if turns is None else turns.at(number, share))
+        self._beads.move(1e3 * place + shift, None if turned is None else rotations_at(turned, frame))
         if self._bare:
             self._shadows.move(1e3 * place * [1.0, 1.0, 0.0] + shift)
         self._wet(place, bridges, shift)
@@ -429,15 +423,10 @@ class Window:
             if not len(points):
                 return
             self._necks = pv.PolyData.from_regular_faces(points, triangles_of(len(bridges[~before]), *self._round))
-            look: dict[str, Any] = {
-                "color": f"#{BLUE:06x}",
-                "opacity": OPACITY,
-                "ambient": 0.45,
-                "diffuse": 0.75,
-                "specular": 0.4,
-            }
-            drawn = self._plotter.add_mesh(self._necks, name="necks", render=False, reset_camera=False, **look)
-            drawn.prop.culling, drawn.prop.interpolation = "back", "Phong"
+            look: dict[str, Any] = {"ambient": 0.45, "diffuse": 0.75, "specular": 0.4, "culling": "back"}
+            look |= {"color": f"#{BLUE:06x}", "opacity": OPACITY, "render": False, "reset_camera": False}
+            drawn = self._plotter.add_mesh(self._necks, name="necks", **look)
+            drawn.prop.interpolation = "Phong"
         self._necks.points, self._necks.point_data["Normals"] = points, normals
         self._necks.point_data.active_normals_name = "Normals"
 
@@ -461,11 +450,12 @@ class Window:
         """Walls behind the beads and, slightly nearer to the camera, the edges of all walls."""
         faces = [1e3 * corners for corners in walls_of(self._scene.motion)]
         walls = mesh_of(faces).clean(tolerance=1e-6, absolute=True)
-        drawn = self._plotter.add_mesh(walls, color=_WALL, lighting=False)
-        drawn.prop.culling = "back"
         edges = walls.extract_feature_edges(feature_angle=30.0, manifold_edges=False, non_manifold_edges=False)
         edges.translate(1e-2 * wide * self._scene.axes[2], inplace=True)
-        parts = [drawn, self._plotter.add_mesh(edges, color=_EDGE, line_width=2, lighting=False)]
+        parts = [
+            self._plotter.add_mesh(walls, color=_WALL, lighting=False, culling="back"),
+            self._plotter.add_mesh(edges, color=_EDGE, line_width=2, lighting=False),
+        ]
         if self._scene.path is not None:
             marks = self._marks(faces, int(np.argmax(np.ptp(self._scene.path, axis=0))), round_below(wide / 8.0))
             parts.append(self._plotter.add_mesh(marks, color=_LINES, line_width=2, lighting=False))
@@ -497,8 +487,8 @@ class _Copies:
         self.colour(np.zeros((len(radius), len(points), 4 if "lighting" in look else 3)))
         self._mesh.point_data["Normals"] = np.asarray(self._mesh.points).copy()
         self._mesh.point_data.active_normals_name = "Normals"
-        drawn = plotter.add_mesh(self._mesh, scalars="colour", rgb=True, smooth_shading=False, **look)
-        drawn.prop.culling = "back"  # the invisible halves of spheres are half of the work
+        # The invisible halves of spheres are half of the work.
+        drawn = plotter.add_mesh(self._mesh, scalars="colour", rgb=True, smooth_shading=False, culling="back", **look)
         drawn.prop.interpolation = "Phong"  # with these normals; pyvista would compute others
 
     def move(self, centres: FloatArray, turned: FloatArray | None = None) -> None:

@@ -7,6 +7,7 @@ if it walks up a slope. On a tilted plane up in the picture is uphill.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import closing
 from math import ceil
 from pathlib import Path
 from textwrap import wrap
@@ -15,7 +16,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from walkers.postprocess.drawing import check_place, new_figure, plain_text, save_figure, styled
-from walkers.postprocess.motion import Motion, even_frames, even_labels, read_motion
+from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.motion import Motion, read_motion
 from walkers.postprocess.necks import EXPLAINED, bridges_at
 from walkers.postprocess.scene import Scene, Window, from_the_side, plan_axes, shown_of
 
@@ -37,6 +39,9 @@ _BESIDE, _BENEATH, _LINE = 0.25, 0.75, 0.2
 _MARGIN, _STILL, _LONG, _ASPECT = 0.25, 0.1, 4.0, 4.5
 """Edge of a strip over half the width of the walker; displacement of a walker at rest over half its length; number of
 lengths of a path beyond which each strip is centred on the walker; length of a level strip over its width, at least."""
+
+
+_LEFT_OUT = 0.02  # largest part of a run after the last of several evenly spaced times
 
 
 class _Views(NamedTuple):
@@ -88,6 +93,31 @@ def render_series(
     figure = _figure(_strips(motion, frames) if single else _views(motion, frames))
     path = destination or directory / (PICTURE_NAME if single else SERIES_NAME)
     return save_figure(figure, path, [directory.name])
+
+
+def even_frames(motion: Motion, count: int) -> list[int]:
+    """Evenly spaced frames from the first of the drive: ``count``, or fewer if the last is then nearer to the end.
+
+    They are at the same phase if there are enough cycles; otherwise walkers would appear to move backward.
+    """
+    start, cycle = motion.first_driven, motion.case.run.samples_per_cycle
+    last = len(motion.time) - 1 - start
+    every, steps = (cycle, last // cycle) if last // cycle >= count - 1 else (1, last)
+    most = min(count - 1, steps)
+    parts = range(most, most // 2, -1)
+    if not parts:
+        return [start]
+    exact = [number for number in parts[:2] if steps % number == 0]
+    nearly = [number for number in parts if steps % number <= _LEFT_OUT * steps]
+    number = [*exact, *nearly, min(parts, key=lambda number: steps % number)][0]
+    return [start + every * (steps // number) * part for part in range(number + 1)]
+
+
+def even_labels(time: FloatArray) -> list[str]:
+    """Evenly spaced times (s) as text with the required number of decimals."""
+    between = float(time[-1] - time[0]) / max(len(time) - 1, 1)
+    decimals = next((places for places in range(2, 6) if abs(round(between, places) - between) <= 0.01 * between), 6)
+    return [f"{one:.{decimals}f} s" for one in time]
 
 
 def _views(motion: Motion, frames: Sequence[int]) -> _Views:
@@ -159,24 +189,23 @@ def _figure(views: _Views) -> Figure:
     figure, axes = new_figure(width, height, nrows=rows, ncols=columns, squeeze=False, sharex=True, sharey=True)
     figure.set_layout_engine("compressed")
     figure.suptitle("\n".join(lines), fontsize=10)
-    window = Window(scene, _pixels(wide, tall))
     extent = (bounds - np.array(views.origin)[:, None]).ravel().tolist()
     seen = zip(axes.flat, views.frames, bridges_at(scene.motion, views.frames), views.titles, strict=False)
-    for number, (panel, frame, bridges, title) in enumerate(seen):
-        panel.imshow(window.picture(frame, bridges), extent=extent, interpolation="antialiased")
-        panel.set_title(title, fontsize=10)
-        panel.grid(visible=False)
-        panel.spines[["left", "bottom"]].set_visible(not strips)
-        panel.spines["right"].set_visible(not strips and from_the_side(case))  # as the left one, a wall
-        below, left = (
-            bool(views.labels[0]) and number + columns >= count,
-            bool(views.labels[1]) and not number % columns,
-        )
-        panel.tick_params(left=left, labelleft=left, bottom=below, labelbottom=below, labelsize=9)
-        panel.set_xlabel(views.labels[0] if below else "", fontsize=10)
-        panel.set_ylabel(views.labels[1] if left else "", fontsize=10)
-        panel.locator_params(axis="x", nbins=4 if not strips else 9, steps=[1, 2, 5, 10])
-    window.close()
+    with closing(Window(scene, _pixels(wide, tall))) as window:
+        for number, (panel, frame, bridges, title) in enumerate(seen):
+            panel.imshow(window.picture(frame, bridges), extent=extent, interpolation="antialiased")
+            panel.set_title(title, fontsize=10)
+            panel.grid(visible=False)
+            panel.spines[["left", "bottom"]].set_visible(not strips)
+            panel.spines["right"].set_visible(not strips and from_the_side(case))  # as the left one, a wall
+            below, left = (
+                bool(views.labels[0]) and number + columns >= count,
+                bool(views.labels[1]) and not number % columns,
+            )
+            panel.tick_params(left=left, labelleft=left, bottom=below, labelbottom=below, labelsize=9)
+            panel.set_xlabel(views.labels[0] if below else "", fontsize=10)
+            panel.set_ylabel(views.labels[1] if left else "", fontsize=10)
+            panel.locator_params(axis="x", nbins=4 if not strips else 9, steps=[1, 2, 5, 10])
     for panel in axes.flat[count:]:
         panel.remove()
     if strips and case.boundary.tilted and case.environment.gravity:

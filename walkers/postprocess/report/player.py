@@ -1,7 +1,7 @@
 """Interactive 3-D player of the beads of a run: a K3D plot for reports and notebooks.
 
 Lengths are in mm, in the frame of the boundary; the view follows a walker with a long path. Two-coloured balls show how
-beads roll, unless the frames are too far apart (`walkers.postprocess.scene.turns_of`).
+beads roll, unless the frames are too far apart (`walkers.postprocess.scene.turned_in`).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from walkers.extras import require
 from walkers.postprocess.dump import FloatArray, IntArray
-from walkers.postprocess.motion import Motion, gathered, read_motion
+from walkers.postprocess.motion import Motion, read_motion
 from walkers.postprocess.necks import BLUE, OPACITY, bridges_at, bridges_text, necks_of, triangles_of
 from walkers.postprocess.scene import (
     Scene,
@@ -25,6 +25,7 @@ from walkers.postprocess.scene import (
     camera_axes,
     floor_lines,
     from_the_side,
+    gathered,
     mesh_of,
     plan_axes,
     round_below,
@@ -84,11 +85,11 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
     cameras = cameras_of(motion, scene.path)
     look: dict[str, Any] = {"grid_visible": False, "axes": ["x", "y", "z"], "background_color": 0xFFFFFF}
     plot = k3d.plot(height=height, name=motion.case.name, fps=30.0, camera_fov=_VIEW, camera_auto_fit=False, **look)
-    if scene.turns is None:
+    if scene.turned is None:
         captions.append("The rolling of the beads is not shown: the frames are too far apart in time.")
         beads = [_points(shown, colours[0])]
     else:
-        beads = _balls(shown, scene.turns.turned[::stride], colours)
+        beads = _balls(shown, scene.turned[::stride], colours)
     boundary = _walls(motion, round_below(scene.height(_ASPECT) / 5.0))
     if path is not None:
         back = np.tile(np.eye(4), (len(path), 1, 1))
@@ -138,8 +139,7 @@ def _gravity(scene: Scene) -> Any:
     down = -against_gravity(scene.motion)
     origin = scene.camera(0.0)[1] - side * scene.axes[0] - long / 2.0 * down
     look = {"color": 0x1D2429, "head_size": 1.7 * long, "line_width": 0.04 * long}
-    ends = [one[None].astype(np.float32) for one in (origin, long * down)]
-    return k3d.vectors(*ends, name="gravity", **look)
+    return k3d.vectors(*np.array([[origin], [long * down]], dtype=np.float32), name="gravity", **look)
 
 
 def _thinned(motion: Motion, places: int) -> tuple[Motion, int, list[str]]:
@@ -169,20 +169,13 @@ def _balls(motion: Motion, turned: FloatArray, colours: FloatArray) -> list[Any]
     from scipy.spatial.transform import Rotation
 
     points, triangles, pale = beach_ball(24, motion)
-    balls = []
+    balls, unit = [], points.astype(np.float32)
     for bead, radius in enumerate(motion.radius * 1e3):
         matrices = np.tile(np.eye(4), (len(motion.time), 1, 1))
         matrices[:, :3, :3] = np.round(Rotation.from_quat(turned[:, bead]).as_matrix() * radius / _GRID) * _GRID
         matrices[:, :3, 3] = np.round(motion.position[:, bead] * 1e3 / _GRID) * _GRID
-        ball = k3d.mesh(
-            points.astype(np.float32),
-            triangles.astype(np.uint32),
-            normals=points.astype(np.float32),
-            colors=colours[pale, bead].astype(np.uint32),
-            flat_shading=False,
-            roughness=0.6,
-            name=f"bead {bead}",
-        )
+        look = {"colors": colours[pale, bead].astype(np.uint32), "flat_shading": False, "roughness": 0.6}
+        ball = k3d.mesh(unit, triangles.astype(np.uint32), normals=unit, name=f"bead {bead}", **look)
         ball.model_matrix = _series(motion, matrices)
         balls.append(ball)
     return balls
@@ -217,14 +210,9 @@ def _points(motion: Motion, colours: FloatArray) -> Any:
     """All beads as points of their size."""
     import k3d
 
-    points = k3d.points(
-        np.zeros((len(motion.radius), 3), dtype=np.float32),
-        point_sizes=(2e3 * motion.radius).astype(np.float32),
-        colors=colours.astype(np.uint32),
-        shader="3d",
-        roughness=0.5,
-        name="beads",
-    )
+    sizes, look = (2e3 * motion.radius).astype(np.float32), {"shader": "3d", "roughness": 0.5, "name": "beads"}
+    start = np.zeros((len(sizes), 3), dtype=np.float32)
+    points = k3d.points(start, point_sizes=sizes, colors=colours.astype(np.uint32), **look)
     coarse = 8.0 * _GRID  # beads are many
     points.positions = _series(motion, np.round(motion.position * 1e3 / coarse) * coarse)
     return points
