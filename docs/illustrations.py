@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.figure import Figure
 
 from walkers import load_case, run, sweep
-from walkers.api import Run
+from walkers.api import Run, climb
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.file import load_calibration
 from walkers.calibration.report import write_outcome
@@ -42,8 +42,7 @@ from walkers.postprocess.film_options import FilmOptions
 from walkers.postprocess.results import VERSION
 from walkers.runner.files import read_json, write_json, write_text
 from walkers.runner.launch import cores_here
-from walkers.sweeps import climbing
-from walkers.sweeps.climbing_figure import write_climbs
+from walkers.sweeps.climbing import describe_climbs
 from walkers.sweeps.scheduler import Options
 from walkers.templates.deck import CONTENT_VERSION
 
@@ -101,13 +100,11 @@ def _of_climbs(name: str, *others: str, assembly: Mapping[str, Any] | None = Non
     def make(out: Path, docs: Path) -> None:
         for sweep_name in names:
             sweep(sweep_name, out)
-        conditions = climbing.conditions_in([out / sweep_name for sweep_name in names])
-        found = list(map(climbing.summarise, conditions))
-        write_climbs(conditions, found, docs / files[0])
+        found = climb([out / sweep_name for sweep_name in names], to=docs / files[0])
         command = f"$ walkers climb {' '.join(names)}"
         write_text(
             docs / files[1],
-            "\n".join([f"# {name}", "", "```console", command, *map(climbing.describe, found), "```", ""]),
+            "\n".join([f"# {name}", "", "```console", command, *map(describe_climbs, found), "```", ""]),
         )
         if assembly:
             done = run(load_case("pile-small", assembly), out)
@@ -120,14 +117,14 @@ def _of_climbs(name: str, *others: str, assembly: Mapping[str, Any] | None = Non
 def _assembly(done: Run) -> Figure:
     """Heights of the beads of the first climb out of a pile, thick while joined, and numbers of joined beads."""
     clusters, past, bed = (done.table(name) for name in ("clusters", "assembly", "bed"))
-    climb = clusters[clusters["climbed"] & clusters["out_of_pile"]].sort_values("qualified").iloc[0]
-    past = past[past["track"] == climb["track"]]
+    chosen = clusters[clusters["climbed"] & clusters["out_of_pile"]].sort_values("qualified").iloc[0]
+    past = past[past["track"] == chosen["track"]]
     figure, (heights, numbers) = new_figure(TWO_COLUMNS, 4.8, nrows=2, height_ratios=(2.0, 1.0), sharex=True)
     seen = bed[bed["time"].between(past["time"].min(), past["time"].max())]
     heights.plot(seen["time"], 1e3 * seen["surface"], color="0.5", label="surface of the pile")
     for number, (bead, rows) in enumerate(past.groupby("bead")):
         size = "large" if rows["large"].iloc[0] else "small"
-        text = f"{size} bead {bead}{', leads' if bead == climb['leader'] else ''}"
+        text = f"{size} bead {bead}{', leads' if bead == chosen['leader'] else ''}"
         heights.plot(rows["time"], 1e3 * rows["height"], color=f"C{number}", lw=0.6)
         joined = rows["height"].where(rows["joined"])
         heights.plot(rows["time"], 1e3 * joined, color=f"C{number}", lw=2.0, label=text)

@@ -817,7 +817,7 @@ def climb(
     conditions = climbing.conditions_in(places)
     for left in filter(None, map(climbing.unfinished_points, places)):
         warnings.warn(left, stacklevel=2)
-    climbs = [climbing.summarise(condition, within) for condition in conditions]
+    climbs = [climbing.summarise_climbs(one.runs, within) | {"condition": one.label} for one in conditions]
     if to is not None:
         write_climbs(conditions, climbs, Path(to))
     return climbs

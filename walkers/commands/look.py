@@ -188,8 +188,8 @@ def climb(
     to
         Write the figure (.png, .svg, .pdf) or the table (.csv) to this file.
     """
-    from walkers.sweeps.climbing import describe
+    from walkers.sweeps.climbing import describe_climbs
 
     refuse("RUN|SWEEP", not what, "expected sweeps, folders of runs, runs or cases of piles")
     found = walkers.climb(what, at.out, at.values, within=within, to=to)
-    print_as(as_json, lambda: found, lambda: "\n".join(map(describe, found)))
+    print_as(as_json, lambda: found, lambda: "\n".join(map(describe_climbs, found)))

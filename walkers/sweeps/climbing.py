@@ -231,9 +231,8 @@ def _rate(name: str, events: int, seconds: float) -> dict[str, Any]:
     if seconds <= 0.0:
         return {name: None, f"{name}_interval": None}
     tail = (1.0 - _CONFIDENCE) / 2.0
-    low = float(chi2.ppf(tail, 2 * events) / 2.0) if events else 0.0
-    high = float(chi2.ppf(1.0 - tail, 2 * events + 2) / 2.0)
-    return {name: events / seconds, f"{name}_interval": [low / seconds, high / seconds]}
+    ends = chi2.ppf((tail, 1.0 - tail), (2 * events, 2 * events + 2)) / 2.0  # NaN: no lower end without events
+    return {name: events / seconds, f"{name}_interval": (np.nan_to_num(ends) / seconds).tolist()}
 
 
 def leaders(climbs: Sequence[tuple[int, int, Sequence[Mapping[str, Any]]]]) -> dict[str, Any]:
@@ -351,22 +350,14 @@ def survival_curve(first: FloatArray, watched: FloatArray) -> dict[str, list[flo
     return {name: [one if isfinite(one) else None for one in values.tolist()] for name, values in found.items()}
 
 
-def summarise(condition: Condition, within: float | None = None) -> dict[str, Any]:
-    """`summarise_climbs` of a condition, with its label as ``condition``."""
-    return summarise_climbs(condition.runs, within) | {"condition": condition.label}
-
-
-def describe(found: Mapping[str, Any]) -> str:
-    """`summarise` as text; s, mm, mm/s."""
-    return "\n".join(filter(None, [found["condition"], describe_climbs(found)]))
-
-
 def describe_climbs(found: Mapping[str, Any]) -> str:
-    """`summarise_climbs` as text; s, mm, mm/s."""
+    """`summarise_climbs` as text, below the label of its ``condition``, if any; s, mm, mm/s."""
+    label = [found["condition"]] if found.get("condition") else []
     if found["probability"] is None:
-        return f"no run is as long as {found['within']:g} s"
+        return "\n".join([*label, f"no run is as long as {found['within']:g} s"])
     half = "not reached" if found["median"] is None else f"{found['median']:.2f} s"
     lines = [
+        *label,
         f"{found['climbed']} of {found['runs']} runs climbed within {found['within']:.3g} s"
         + (f", {found['ended']} ended before without a climb" if found["ended"] else "")
         + f": probability {found['probability']:.2f}{_interval(found['interval'], '.2f', found['estimator'])}",
