@@ -232,6 +232,18 @@ def test_figures_of_slopes_show_the_way_up_as_who_goes_up_sees_it(run_directory:
         )
 
 
+def test_rows_name_directions_by_the_boundary(run_directory: Callable[..., Path]) -> None:
+    """On a slope, all numbers of those that face up alone say so."""
+    run = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 20}
+    places = [run_directory(boundary={"tilt": tilt}, dimers={"replicates": 2}, run=run) for tilt in ("0 deg", "10 deg")]
+    plane, sloped = ({row.name: row.label for row in rows(read(place))} for place in places)
+    assert (plane["right_facing"], sloped["right_facing"]) == ("velocity, facing right", "velocity, facing up")
+    assert (plane["left_facing"], sloped["left_facing"]) == ("velocity, facing left", "velocity, facing down")
+    assert (plane["sliding_1"], sloped["sliding_1"]) == ("sliding of bead 1", "sliding of bead 1, facing up")
+    assert sloped["axial_velocity"] == "velocity up the slope, facing up"
+    assert (plane["walkers"], sloped["walkers"]) == ("walkers", "walkers")
+
+
 def test_walkers_that_come_close_are_reported(moved: Group) -> None:
     assert not walkers_met([moved])
     position = moved.position.copy()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -56,6 +57,8 @@ _HIDDEN = frozenset(
     }
 )
 """Numbers that rows leave out: errors of others, values of the case, and what the headline says."""
+_OF_UP = "on a slope of those that started facing up"
+"""Ends the meaning of a number that leaves out walkers that face down."""
 _IF_ANY = (
     "events_*",
     "open_*",
@@ -139,8 +142,18 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
         starred = next((key for key in _IF_ANY if key == name or (key.endswith("*") and name.startswith(key[:-1]))), "")
         if name not in hidden and (number or not starred):
             text, unit = shown(number, one.unit)
-            listed.append(Row(name, one.label, text, unit, _errors(numbers, one)))
+            listed.append(Row(name, _label(one, numbers), text, unit, _errors(numbers, one)))
     return listed
+
+
+def _label(one: Quantity, numbers: Mapping[str, Any]) -> str:
+    """Label of a number: on a slope directions are up and down, and means over those that face up are called so."""
+    uphill = numbers.get("goes_uphill", False)
+    label = re.sub(r"(\w+) \((\w+)\)", r"\2" if uphill else r"\1", one.label)
+    if not uphill:
+        return label
+    label = label.replace("along the drive axis", "up the slope").replace("across the drive axis", "across the slope")
+    return f"{label}, facing up" if numbers.get("facing_left") and _OF_UP in one.meaning else label
 
 
 def shown(number: float, unit: str) -> tuple[str, str]:
