@@ -23,6 +23,7 @@ from walkers.postprocess.motion import Motion, frames_with_bridges, read_bridges
 BLUE, OPACITY = 0x3FA0FF, 0.8
 """Colour of necks; they are translucent."""
 EXPLAINED = "blue: liquid bridges"
+NO_BRIDGES: IntArray = np.empty((0, 3), dtype=np.int64)
 _ENDS, _WAIST = 1.12, 0.92  # width of a curved meniscus at its ends and in its middle over that of the straight one
 _WIDEST = 0.9  # largest width of a neck over that of the smaller bead
 
@@ -31,7 +32,7 @@ def bridges_at(motion: Motion, frames: npt.ArrayLike) -> list[IntArray]:
     """Contacts of the recorded bridges that are nearest in time to each of some frames."""
     frames, recorded = np.asarray(frames), frames_with_bridges(motion)
     if not len(recorded):
-        return [np.empty((0, 3), dtype=np.int64)] * len(frames)
+        return [NO_BRIDGES] * len(frames)
     nearest = recorded[np.abs(np.subtract.outer(frames, recorded)).argmin(axis=1)].tolist()
     contacts = {bridges.frame: bridges.contacts for bridges in read_bridges(motion, set(nearest))}
     return [contacts[frame] for frame in nearest]

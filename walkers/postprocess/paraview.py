@@ -24,7 +24,7 @@ from walkers.postprocess.clusters import connected
 from walkers.postprocess.drawing import check_every
 from walkers.postprocess.motion import Bridges, Motion, read_bridges, read_motion
 from walkers.postprocess.necks import ends_of
-from walkers.postprocess.scene import Scene, camera_axes, gathered, walls_of
+from walkers.postprocess.scene import Scene, camera_axes, fans_of, gathered, walls_of
 
 if TYPE_CHECKING:
     import meshio
@@ -190,11 +190,8 @@ def _walls(motion: Motion) -> meshio.Mesh:
     """The walls as triangles; two walls share no points."""
     import meshio
 
-    faces, triangles, first = walls_of(motion), list[tuple[int, int, int]](), 0
-    for face in faces:
-        triangles += [(first, first + corner, first + corner + 1) for corner in range(1, len(face) - 1)]
-        first += len(face)
-    return meshio.Mesh(np.concatenate(faces), {"triangle": triangles})
+    faces = walls_of(motion)
+    return meshio.Mesh(np.concatenate(faces), {"triangle": fans_of(faces)})
 
 
 def _view(motion: Motion, colour: str | None, arrays: Sequence[str]) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from walkers.inputs.case import Case
 from walkers.postprocess import piles
 from walkers.postprocess.dump import FloatArray, IntArray
 from walkers.postprocess.motion import Motion, boundary_motion
-from walkers.postprocess.necks import BLUE, OPACITY, ends_of, necks_of, triangles_of
+from walkers.postprocess.necks import BLUE, NO_BRIDGES, OPACITY, ends_of, necks_of, triangles_of
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -36,8 +36,8 @@ _GROUND, _LINES, _WALL, _EDGE = "#e3e8eb", "#bcc6cd", "#eef1f3", "#5a6670"
 _SHADOW = 0.4  # opacity of a shadow below the centre of a bead
 _PALE, _BRIGHTEST = 0.72, 150.0  # share of white in the pale lunes; largest mean of red, green, blue in the dark ones
 _LUNES = 6
-_NECKS = ((10, (9, 36)), (100, (7, 24)), (500, (5, 12)))  # rings and sides of a neck for fewer beads; else 3, 8
-_ROUNDS = ((10, 72), (100, 30), (500, 18))  # number of cells around a ball for fewer beads than the first; else 12
+_FINE = ((10, 72, (9, 36)), (100, 30, (7, 24)), (500, 18, (5, 12)), (np.inf, 12, (3, 8)))
+"""For fewer beads than the first number: cells around a ball; rings and sides of a neck."""
 _SIDES = 64  # sides of the prism that is drawn for a cylinder
 _BEYOND = 6.0  # extent of the floor over that of the picture
 _ELEVATION_OF_ONE, _ELEVATION = radians(35.0), radians(60.0)
@@ -312,6 +312,13 @@ def mesh_of(faces: Sequence[FloatArray]) -> pv.PolyData:
     return pv.PolyData(points, faces=cells)
 
 
+def fans_of(faces: Sequence[FloatArray]) -> IntArray:
+    """Corners of the triangles of convex polygons whose points are numbered one after the other, shape (T, 3)."""
+    ends = np.cumsum([len(face) for face in faces])
+    firsts = [(end - len(face), end) for face, end in zip(faces, ends, strict=True)]
+    return np.array([(first, corner - 1, corner) for first, end in firsts for corner in range(first + 2, end)])
+
+
 def floor_lines(low: FloatArray, high: FloatArray, step: float) -> FloatArray:
     """Ends of K lines on the floor between two corners, along x and y at multiples of a step, shape (2 K, 3)."""
     lines = []
@@ -372,13 +379,12 @@ class Window:
             black = np.zeros((disc.n_points, 4))
             black[:, 3] = 255.0 * _SHADOW * (1.0 - np.linalg.norm(disc.points, axis=1) ** 2) ** 2
             self._shadows.colour(np.tile(black, (len(radius), 1, 1)))
-        rounds = next((cells for fewer, cells in _ROUNDS if len(radius) < fewer), 12)
+        rounds, self._round = next((cells, neck) for most, cells, neck in _FINE if len(radius) < most)
         points, triangles, self._pale = beach_ball(rounds, scene.motion)
         self._beads = _Copies(self._plotter, points, triangles, radius, specular=0.4)
-        self._round = next((fine for fewer, fine in _NECKS if len(radius) < fewer), (3, 8))
         self._necks: pv.PolyData | None = None
 
-    def picture(self, frame: float, bridges: IntArray | None = None) -> Picture:
+    def picture(self, frame: float, bridges: IntArray = NO_BRIDGES) -> Picture:
         """Picture of a frame, or of a time between two frames (a fraction) by cubic interpolation.
 
         Bridges are contacts as in `walkers.postprocess.motion.Bridges`.
@@ -407,11 +413,11 @@ class Window:
         """Close the window."""
         self._plotter.close()
 
-    def _wet(self, place: FloatArray, bridges: IntArray | None, shift: FloatArray) -> None:
+    def _wet(self, place: FloatArray, bridges: IntArray, shift: FloatArray) -> None:
         """Move the liquid necks; if their number changes, replace them."""
         import pyvista as pv
 
-        motion, bridges = self._scene.motion, np.empty((0, 3), dtype=np.int64) if bridges is None else bridges
+        motion = self._scene.motion
         begins, ends = ends_of(motion, place, bridges)
         # Walls before the beads are not drawn, nor are the necks to them.
         before = (bridges[:, 2] >= 0) & ((ends - begins) @ self._scene.axes[2] > 0.5 * motion.radius[bridges[:, 0]])

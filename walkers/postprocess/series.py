@@ -164,9 +164,8 @@ def _strips(motion: Motion, frames: Sequence[int]) -> _Views:
     scene = Scene(motion, axes, low, high, shaken=False, path=camera)
     labels = ("", f"{direction} (mm)") if along else (f"{direction} (mm)", "")
     origin = (float(middle[0, 0]), float(middle[0, 1]))
-    return _Views(
-        scene, frames, times, labels, [*said, EXPLAINED], _STRIP / narrow, len(frames) if along else 1, origin
-    )
+    columns, said = len(frames) if along else 1, [*said, EXPLAINED]
+    return _Views(scene, frames, times, labels, said, _STRIP / narrow, columns, origin)
 
 
 def _figure(views: _Views) -> Figure:
@@ -198,10 +197,8 @@ def _figure(views: _Views) -> Figure:
             panel.grid(visible=False)
             panel.spines[["left", "bottom"]].set_visible(not strips)
             panel.spines["right"].set_visible(not strips and from_the_side(case))  # as the left one, a wall
-            below, left = (
-                bool(views.labels[0]) and number + columns >= count,
-                bool(views.labels[1]) and not number % columns,
-            )
+            edges = (number + columns >= count, not number % columns)
+            below, left = (bool(label) and at_edge for label, at_edge in zip(views.labels, edges, strict=True))
             panel.tick_params(left=left, labelleft=left, bottom=below, labelbottom=below, labelsize=9)
             panel.set_xlabel(views.labels[0] if below else "", fontsize=10)
             panel.set_ylabel(views.labels[1] if left else "", fontsize=10)

@@ -23,10 +23,10 @@ from walkers.postprocess.scene import (
     axes_toward,
     beach_ball,
     camera_axes,
+    fans_of,
     floor_lines,
     from_the_side,
     gathered,
-    mesh_of,
     plan_axes,
     round_below,
     walls_of,
@@ -231,10 +231,9 @@ def _walls(motion: Motion, step: float) -> list[Any]:
     parts = []
     for corners in faces:
         level = bool(np.ptp(corners[:, 2]) < 1e-6)
-        mesh, opacity = mesh_of([corners]).triangulate(), 1.0 if level else 0.12
-        points = (np.asarray(mesh.points) - [0.0, 0.0, 2e-3 * level]).astype(np.float32)  # below beads that touch it
+        points = (corners - [0.0, 0.0, 2e-3 * level]).astype(np.float32)  # below beads that touch it
         look = {"color": _FLOOR, "side": "double", "roughness": 1.0, "name": "floor" if level else "wall"}
-        parts.append(k3d.mesh(points, mesh.regular_faces.astype(np.uint32), opacity=opacity, **look))
+        parts.append(k3d.mesh(points, fans_of([corners]).astype(np.uint32), opacity=1.0 if level else 0.12, **look))
     if motion.case.boundary.bare:
         low, high = faces[0].min(axis=0), faces[0].max(axis=0)
         step = max(step, round_below(float(np.ptp([low, high])) / _MOST_LINES))
