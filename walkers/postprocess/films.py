@@ -157,7 +157,8 @@ def _captions(
     from matplotlib import get_data_path
     from PIL import Image, ImageDraw, ImageFont
 
-    (wide, tall), case, tray = size, scene.motion.case, from_above(scene.motion.case)
+    (wide, tall), case = size, scene.motion.case
+    above = from_above(case) or wide > 2 * tall  # of the beads, no room is left beside them
     edge = max(_LEAST_LETTERS, min(tall // _LETTERS, wide // _WIDE))
     # Pillow's own font has no × and no ².
     font = Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
@@ -178,9 +179,9 @@ def _captions(
             said.append(f"{scene.moved(times.frame[number]) @ toward:z.1f} mm {direction} from the start")
         said += [case.boundary.tilted] if case.boundary.tilted else []
         said += scene.explained
-        said += bridges_text(case).split(", ")  # lines beside the beads
+        said += bridges_text(case).split(", ")  # lines of their own beside the beads
         draw.text((edge, edge), clock, "black", large, anchor="lt")
-        if tray:  # above it
+        if above:
             draw.text((2 * edge + large.getlength(clock), 1.2 * edge), ", ".join(said), "#333333", small, anchor="lt")
         else:
             for row, text in enumerate(said):
