@@ -17,9 +17,9 @@ from tests.conftest import call, document, to_toml
 from walkers.errors import InputError
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
-from walkers.plotting import LeftOutWarning
 from walkers.runner.directory import case_of
-from walkers.sweeps.figure import SCATTER, draw, drawn_column, factors_of, layout_of
+from walkers.sweeps.figure import SCATTER, LeftOutWarning, factors_of, figure_of, layout_of
+from walkers.sweeps.figure_options import FigureOptions
 from walkers.theory.prediction import MODEL, PAPER, predict, predicted_column
 
 
@@ -43,8 +43,8 @@ def _legend(figure: Figure) -> list[str]:
 
 def _table(units: dict[str, str], rows: list[list[Any]], axes: list[tuple[str, ...]]) -> pd.DataFrame:
     """That of a sweep as far as what varies goes."""
-    table = pd.DataFrame(rows, columns=list(units)).assign(point=range(len(rows)))
-    table.attrs |= {"units": units, "meanings": dict.fromkeys(units, "varied"), "axes": axes}
+    table = pd.DataFrame(rows, columns=list(units)).assign(point=range(len(rows)), status="finished")
+    table.attrs |= {"units": units, "meanings": dict.fromkeys(units, "varied"), "axes": axes, "title": ""}
     return table
 
 
@@ -53,7 +53,7 @@ def test_error_bars_that_symbols_would_hide_are_left_out_and_the_figure_says_so(
     table = _table({"drive.frequency": "Hz"}, [[60.0], [70.0], [80.0]], [("drive.frequency",)])
     table = table.assign(velocity=[1e-3, 2e-3, 3e-3], scatter=error)
     table.attrs["units"] |= {"velocity": "m/s", "scatter": "m/s"}
-    figure = draw(layout_of(table, table), drawn_column(table, "velocity"))
+    figure = figure_of(table)
     (panel,) = _panels(figure)
     assert sum(len(one.get_segments()) for one in panel.collections if isinstance(one, LineCollection)) == bars
     said = " ".join(figure.get_suptitle().split())
@@ -65,7 +65,7 @@ def test_the_title_of_a_legend_is_the_name_of_the_colours_and_captions_stay_with
     rows = [[friction, frequency] for friction in (0.1, 0.3) for frequency in (60.0, 70.0, 80.0)]
     table = _table(units, rows, [(name,) for name in units]).assign(velocity=1e-3 * np.arange(6.0), scatter=1e-9)
     table.attrs["units"] |= {"velocity": "m/s", "scatter": "m/s"}
-    figure = draw(layout_of(table, table, x="drive.frequency"), drawn_column(table, "velocity"))
+    figure = figure_of(table, FigureOptions(x="drive.frequency"))
     figure.draw_without_rendering()
     (legend,) = figure.legends
     assert legend.get_title().get_text() == "friction bead bead"
@@ -78,7 +78,7 @@ def test_axes_do_not_magnify_rounding() -> None:
     for values in ([1e-3, 1e-3 * (1.0 + 1e-9), 1e-3], [3.2e-18, -3.2e-18, 0.0]):
         shown = table.assign(velocity=values, scatter=0.0)
         shown.attrs["units"] = {**table.attrs["units"], "velocity": "m/s"}
-        (panel,) = _panels(draw(layout_of(shown, shown), drawn_column(shown, "velocity")))
+        (panel,) = _panels(figure_of(shown))
         assert np.ptp(panel.get_ylim()) > 0.1
         assert [label.get_text() for label in panel.get_xticklabels()] == ["-30", "0", "30"]
 
@@ -110,11 +110,11 @@ def test_what_goes_where_can_be_chosen(looked_through: Path) -> None:
     assert (axes.get_xlabel(), axes.get_xscale(), len(_drawn(axes))) == ("Γ0", "log", 2)
 
 
-def test_pairs_of_beads_are_shown_by_their_asymmetry_and_texts_as_categories(looked_through: Path) -> None:
+def test_pairs_of_beads_can_be_shown_by_their_asymmetry_and_texts_as_categories(looked_through: Path) -> None:
     directory = looked_through / "beads"
-    figure = walkers.load(directory).figure()
+    figure = walkers.load(directory).figure(x="sin_delta")
     (axes,) = _panels(figure)
-    assert axes.get_xlabel() == "asymmetry sin δ"
+    assert axes.get_xlabel() == "sin δ"
     assert _drawn(axes)[0][0] == pytest.approx([0.05 / 0.45, 0.2, 0.15 / 0.55])
     assert _legend(figure) == ["Si AK5", "Si AK10"]
     figure = walkers.load(directory).figure(x="liquid.name")
@@ -165,10 +165,10 @@ def test_what_would_take_too_many_panels_is_not_told_apart() -> None:
     keys = ["drive.frequency", *(f"contact.friction.{name}" for name in ("a", "b", "c", "d"))]
     rows = [list(row) for row in product((1.0, 2.0, 3.0), repeat=5)]
     table = _table(dict.fromkeys(keys, ""), rows, [(key,) for key in keys])
-    layout = layout_of(table, table)
-    assert layout.panels is not None
-    assert (len(layout.panels.levels), len(layout.undistinguished)) == (9, 1)
-    assert layout_of(table, table, panels="none").panels is None
+    _, _, panels, undistinguished = layout_of(table, table)
+    assert panels is not None
+    assert (len(panels.levels), len(undistinguished)) == (9, 1)
+    assert layout_of(table, table, FigureOptions(panels="none"))[2] is None
 
 
 def test_theory_is_what_the_theory_says_of_each_point(looked_through: Path) -> None:
@@ -260,7 +260,7 @@ def _peak(case: Any, x: str, value: float) -> float:
 
 
 def test_theory_is_not_joined_where_it_has_no_curve(looked_through: Path) -> None:
-    """The radii, shown by sin δ: each pair has bridges of its own, and there is no walker between them."""
+    """Each pair of radii has bridges of its own, and there is no walker between them."""
     figure = walkers.load(looked_through / "beads").figure(theory=True)
     assert not [line for axes in _panels(figure) for line in axes.lines if line.get_linestyle() in ("--", ":")]
 
@@ -287,9 +287,10 @@ def test_walkers_that_face_down_a_slope_are_a_series_beside_those_that_face_up(t
     np.testing.assert_allclose(series, 1e3 * table[["right_facing", "left_facing"]].to_numpy().T)
     assert not _legend(swept.figure(y="right_facing"))
     # Of walkers that lean or turned over, velocities are those up the slope.
-    drawn = drawn_column(table, "axial_velocity", down="axial_left_facing")
+    leaning = table.assign(upright=0)
+    (axes,) = _panels(figure_of(leaning))
+    series = [line.get_ydata() for line in axes.lines if len(line.get_xdata()) == 3]
     each = [walkers.load(Path(run)).walkers.set_index("facing")["axial_velocity"] for run in table["run"]]
-    np.testing.assert_allclose([drawn.values, drawn.down], [[1e3 * one[way] for one in each] for way in (1, -1)])
-    assert drawn.label == "velocity along the drive axis (mm/s)"
-    alone = drawn_column(table.assign(left_facing=np.nan), "right_facing", down="left_facing")
-    assert alone.down is None
+    np.testing.assert_allclose(series, [[1e3 * one[way] for one in each] for way in (1, -1)])
+    assert axes.get_ylabel() == "velocity along the drive\naxis (mm/s)"
+    assert not _legend(figure_of(leaning.assign(axial_left_facing=np.nan)))

@@ -640,24 +640,30 @@ class Sweep:
     def figure(self, **options: Any) -> Figure:
         """A matplotlib figure of the table, with `walkers.sweeps.figure_options.FigureOptions`.
 
-        See `walkers.plotting.sweep_figure`.
+        See `walkers.sweeps.figure.figure_of`.
 
         Examples
         --------
         >>> walkers.sweep("fig4", tmp).figure(x="liquid.name", log="y").axes[0].get_yscale()
         'log'
         """
-        from walkers.plotting import sweep_figure
+        from walkers.paper.published import predicted
+        from walkers.sweeps.figure import figure_of
         from walkers.sweeps.figure_options import FigureOptions
 
-        return sweep_figure(self.directory, FigureOptions(**options))
+        chosen = FigureOptions(**options)
+        return figure_of(self.table(), chosen, predicted if chosen.theory else None)
 
     def plot(self, to: str | Path | None = None, **options: Any) -> list[Path]:
-        """Plot the table to a file as in `figure`; see `walkers.plotting.plot_sweep`."""
-        from walkers.plotting import plot_sweep
-        from walkers.sweeps.figure_options import FigureOptions
+        """Plot the table to a file as in `figure`; by default in the sweep's directory, named after the column."""
+        from walkers.postprocess.drawing import FORMATS, check_place, save_figure
+        from walkers.sweeps.figure import column_of
 
-        return [plot_sweep(self.directory, to, FigureOptions(**options))]
+        table = self.table()
+        place = _path(to) or self.directory / f"{column_of(table, options.get('y'))}.png"
+        check_place(place, *(f".{form}" for form in FORMATS))
+        runs = [Path(run).name for run in table.loc[table["status"] == "finished", "run"]]
+        return save_figure(self.figure(**options), place, runs, place.suffix.lower()[1:], str(table.attrs["sweep"]))
 
     def report(self, to: str | Path | None = None) -> Path:
         """Write a self-contained HTML report; see `walkers.sweeps.report.report_sweep`."""

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -24,9 +24,12 @@ from walkers.postprocess.caption import liquid_text, radii_text
 from walkers.postprocess.motion import Group, read_motion
 from walkers.sweeps.scheduler import SweepProgress
 from walkers.sweeps.table import load
+from walkers.theory.prediction import predicted_column
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from walkers.theory.quasistatic import FloatArray
 
 GRAVITY = ACCELERATION_OF_ONE_G
 """The value of g in the paper, m/s²."""
@@ -148,6 +151,15 @@ def outside_of_the_paper(case: Case) -> str | None:
     }
     beyond = [one for one, outside in found.items() if outside]
     return f"outside the paper's measurements: {', '.join(beyond)}; no model is tested there" if beyond else None
+
+
+def predicted(cases: Sequence[Case], column: str) -> tuple[Mapping[str, FloatArray], Mapping[str, int]]:
+    """`walkers.theory.prediction.predicted_column`; the remarks also say which cases no model is tested for."""
+    predictions, reasons = predicted_column(cases, column)
+    beyond = [sentence for case in cases if (sentence := outside_of_the_paper(case))]
+    if predictions and beyond:
+        reasons |= {beyond[0] + (", …" if len(beyond) > 1 else ""): len(beyond)}
+    return predictions, reasons
 
 
 # --- its walkers as cases, with the shipped parameters ----------------------------------------------------------------

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.errors import refused
 from walkers.postprocess.numbers import band_text, declared, fell
-from walkers.postprocess.quantities import GROUPS
+from walkers.postprocess.quantities import GROUPS, unit_shown
 from walkers.postprocess.results import Results, read
 from walkers.postprocess.sides import alike, sides
 from walkers.postprocess.uncertainty import not_known
 from walkers.rounding import percent, rounded
 from walkers.runner.directory import case_of
 from walkers.sweeps.folder import aligned
-from walkers.sweeps.readable import differing, flattened, readable, readable_unit
+from walkers.sweeps.readable import differing, flattened, readable
 from walkers.sweeps.table import (
     ERRORS,
     columns_of,
@@ -84,15 +84,15 @@ def _pair(
     names = ("first", "second", "first_scatter", "second_scatter", "difference", "numerical_error")
     numbers = zip(names, (*values, *scatters, difference, numerical), strict=True)
     contents = {"quantity": quantity, "unit": unit, **{name: one if isfinite(one) else None for name, one in numbers}}
-    usual, size = readable_unit(unit)
-    printed = [rounded(value / size, usual) for value in values]
-    apart = difference / size
+    usual, size = unit_shown(unit)
+    printed = [rounded(value * size, usual) for value in values]
+    apart = difference * size
     if abs(difference) < 2e-3 * abs(values[0]):  # digits that are not printed would contradict the printed ones
         apart = float(printed[1]) - float(printed[0])
     cells = [*printed, _difference(apart, usual)]
-    spreads = [(one, _two_digits(one / size, usual)) for one in scatters if isfinite(one)]
+    spreads = [(one, _two_digits(one * size, usual)) for one in scatters if isfinite(one)]
     both = " and ".join("<0.001" if one > 0.0 and text == "0" and usual == "mm/s" else text for one, text in spreads)
-    return contents, [with_unit(quantity, usual), *cells, both or "-", _two_digits(numerical / size, usual)]
+    return contents, [with_unit(quantity, usual), *cells, both or "-", _two_digits(numerical * size, usual)]
 
 
 def _difference(value: float, unit: str) -> str:
@@ -244,9 +244,9 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
         lines.append([*map(value_text, at.values()), *cells[:-1]])
     unmatched = [len(table) - len(both) for table in tables]
     heads = [*keys[0], *(f"{name}: {quantity}" for name in names), "difference", "scatter of copies"]
-    unit, size = readable_unit(tables[0].attrs["units"][column])
+    unit, size = unit_shown(tables[0].attrs["units"][column])
     largest = max((one["difference"] or 0.0 for one in points), key=abs)
-    line = f"{len(both)} points in both; largest difference {_difference(largest / size, unit)} {unit}".rstrip()
+    line = f"{len(both)} points in both; largest difference {_difference(largest * size, unit)} {unit}".rstrip()
     if any(unmatched):
         line += f"; left out: {unmatched[0]} of {names[0]}, {unmatched[1]} of {names[1]}"
     contents: dict[str, Any] = {**dict(zip(_SIDES, names, strict=True)), "keys": dict(records[0].units)}

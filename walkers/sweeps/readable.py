@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
-from math import isclose, pi
+from math import isclose
 from typing import Any
 
 from pydantic_core import to_jsonable_python
@@ -14,19 +14,6 @@ from walkers.inputs import units
 from walkers.inputs.case import Case
 from walkers.inputs.table import keys_of
 from walkers.inputs.units import Kind
-
-READABLE_UNITS: Mapping[str, tuple[str, float]] = {
-    "m": ("mm", 1e-3),
-    "m/s": ("mm/s", 1e-3),
-    "m/s^2": ("g", units.ACCELERATION_OF_ONE_G),
-    "rad": ("deg", pi / 180.0),
-    "N/m": ("mN/m", 1e-3),
-    "Pa*s": ("mPa*s", 1e-3),
-    "Pa": ("MPa", 1e6),
-    "kg/m^3": ("g/cm^3", 1e3),
-    "J": ("nJ", 1e-9),
-}
-"""For SI units the unit in which the field states such quantities, and what it is in the SI unit."""
 
 
 class FlatCase(dict[str, Any]):
@@ -51,15 +38,10 @@ def readable(key: str, value: Any) -> str:
     kind = kind_of(key)
     if kind is None or isinstance(value, str):
         return _number(value, 1.0)
-    unit, size = readable_unit(kind.unit) if kind is not units.TIME else ("us", 1e-6)
-    if key == "environment.gravity":  # the paper's g, 9.8 m/s², is not the case's gravity
-        unit, size = kind.unit, 1.0
-    return f"{_number(value, size)} {unit}"
-
-
-def readable_unit(unit: str) -> tuple[str, float]:
-    """The unit in which the field states what has such an SI unit, and what it is in the SI unit."""
-    return READABLE_UNITS.get(unit, (unit, 1.0))
+    unit = kind.example.partition(" ")[2]
+    if key == "environment.gravity" or kind is units.TEMPERATURE:  # the paper's g, 9.8 m/s², is not the case's gravity
+        unit = kind.unit
+    return f"{_number(value, units.parse_quantity(f'1 {unit}', kind))} {unit}"
 
 
 def kind_of(key: str) -> Kind | None:

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.errors import InputError
+from walkers.postprocess.quantities import unit_shown
 from walkers.postprocess.report.page import NAME, check_report, fill, page_of, svg_of
 from walkers.postprocess.results import read
 from walkers.postprocess.uncertainty import not_known
 from walkers.rounding import rounded
 from walkers.runner.files import write_text
 from walkers.sweeps.figure import LeftOutWarning, figure_of, readable_key
-from walkers.sweeps.readable import readable_unit
 from walkers.sweeps.table import SIDES, load, sides_differ, varied_columns, with_unit
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def _table(frame: pd.DataFrame) -> dict[str, Any]:
     apart = sides_differ(frame)
     wanted = [one for name in _SHOWN for one in (SIDES if apart and name == "velocity" else (name,))]
     results = [name for name in wanted if name in frame and name not in varied and frame[name].notna().any()]
-    shown = {name: (units[name], 1.0) for name in varied} | {name: readable_unit(units[name]) for name in results}
+    shown = {name: (units[name], 1.0) for name in varied} | {name: unit_shown(units[name] or "") for name in results}
     heads = {name: with_unit(readable_key(name), unit) for name, (unit, _) in shown.items()}
     cells = {
         name: [_cell(row[name], size, unit or "") for _, row in frame.iterrows()]
@@ -104,4 +104,4 @@ def _cell(value: Any, size: float, unit: str) -> dict[str, Any]:
     number = float(value)
     if number.is_integer() and size == 1.0:
         return {"text": f"{number:g}", "value": number}
-    return {"text": rounded(number / size, unit), "value": number}
+    return {"text": rounded(number * size, unit), "value": number}

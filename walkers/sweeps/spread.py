@@ -17,9 +17,10 @@ from walkers.inputs.origins import Origin
 from walkers.inputs.sweep import Sweep, settings_in
 from walkers.inputs.units import parse_quantity
 from walkers.postprocess.numbers import MAIN, declared
+from walkers.postprocess.quantities import unit_shown
 from walkers.postprocess.sides import REST, SEPARATED
 from walkers.postprocess.uncertainty import LEAST_PER_VALUE, SPREAD_NAME, spread_of
-from walkers.rounding import SHOWN_UNITS, rounded
+from walkers.rounding import rounded
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.runner.files import write_json
@@ -205,7 +206,7 @@ def describe(spread: Spread) -> str:
         text = ", ".join(f"{one.key} {one.text}" for one in spread.held)
         lines.append(f"    fixed    {text}; to vary these values, add ranges in [uncertain]")
     for name, band in spread.bands.items():
-        unit, factor = SHOWN_UNITS.get(declared(name).unit, (declared(name).unit, 1.0))
+        unit, factor = unit_shown(declared(name).unit)
         low, middle, high, smallest, largest = (
             rounded(float(f"{one * factor:.3g}"), unit) for one in astuple(band)[:5]
         )
