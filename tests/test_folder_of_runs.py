@@ -15,7 +15,7 @@ from tests.conftest import call, document, mounted, to_toml
 from walkers.runner.directory import finished_places, locked
 from walkers.runner.files import read_json, write_json
 from walkers.sweeps.folder import bytes_text, weigh
-from walkers.sweeps.readable import differing, flattened
+from walkers.sweeps.readable import agrees, differing, flattened, readable
 
 OTHER, FASTER = {"liquid.name": "Si AK10"}, {"drive.frequency": "90 Hz"}
 SHORTEST = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
@@ -139,6 +139,15 @@ def test_what_a_case_gives_is_a_difference_and_what_follows_is_none(
 ) -> None:
     cases = [flattened(walkers.load_case("fig1b", one)) for one in (first, second)]
     assert set(differing(cases)) == differ
+
+
+def test_values_of_all_kinds_are_shown_as_they_can_be_written() -> None:
+    for key, value in flattened(walkers.load_case("fig1b")).items():
+        assert agrees({key: value}, key, readable(key, value)), key
+    values = {"boundary.opening": 1.0, "environment.temperature": 293.15, "environment.gravity": 9.81}
+    shown = [readable(key, value) for key, value in values.items()]
+    assert shown == ["57.2958 deg", "293.15 K", "9.81 m/s^2"]
+    assert readable("liquid.kinematic_viscosity", 5e-6) == "5 mm^2/s"
 
 
 def test_compare_tells_parameters_and_results_of_two_runs(out: Path) -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache
-from math import isclose
+from math import inf, isclose
 from typing import Any
 
 from pydantic_core import to_jsonable_python
@@ -39,9 +40,13 @@ def readable(key: str, value: Any) -> str:
     if kind is None or isinstance(value, str):
         return _number(value, 1.0)
     unit = kind.example.partition(" ")[2]
-    if key == "environment.gravity" or kind is units.TEMPERATURE:  # the paper's g, 9.8 m/s², is not the case's gravity
+    if (
+        key == "environment.gravity" or kind.unit == units.TEMPERATURE.unit
+    ):  # the paper's g, 9.8 m/s², is not the case's gravity
         unit = kind.unit
-    return f"{_number(value, units.parse_quantity(f'1 {unit}', kind))} {unit}"
+    unbounded = replace(kind, smallest=0.0, largest=inf)
+    size = 1.0 if unit == kind.unit else units.parse_quantity(f"1 {unit}", unbounded)
+    return f"{_number(value, size)} {unit}"
 
 
 def kind_of(key: str) -> Kind | None:
