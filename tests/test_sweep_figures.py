@@ -274,6 +274,25 @@ def test_a_figure_does_not_deny_what_it_varies(looked_through: Path, sweep: str,
     assert ("standard deviation" in title, "not varied" in title) == (True, not varied)
 
 
+def test_headings_that_differ_on_a_level_floor_are_not_averaged(tmp_path: Path) -> None:
+    """Two tones push walkers of both headings the same way, the one forward and the other backward."""
+    tones = [{"frequency": "80 Hz", "peak_acceleration": "4 g"}, {"frequency": "160 Hz", "peak_acceleration": "3 g"}]
+    short = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
+    tables = document(dimers={"replicates": 2}, run=short)
+    tables["drive"] = {"harmonics": tones}
+    (tmp_path / "tones.toml").write_text(to_toml(tables))
+    (tmp_path / "phases.toml").write_text(
+        'case = "tones.toml"\n[axes]\n"drive.harmonics[1].phase" = ["0 deg", "90 deg"]\n'
+    )
+    swept = walkers.sweep(tmp_path / "phases.toml", tmp_path / "runs")
+    assert swept.table()["facings_differ"].any()
+    (header,) = (line for line in swept.describe().splitlines() if line.split()[:1] == ["point"])
+    assert "right_facing" in header
+    assert "left_facing" in header
+    assert " velocity " not in header
+    assert _legend(swept.figure()) == ["started facing right (up)", "started facing left (down)"]
+
+
 def test_walkers_that_face_down_a_slope_are_a_series_beside_those_that_face_up(tmp_path: Path) -> None:
     short = {"cycles": 4, "settling_cycles": 1, "samples_per_cycle": 10}
     (tmp_path / "slope.toml").write_text(to_toml(document(dimers={"replicates": 2}, run=short)))

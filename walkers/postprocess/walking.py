@@ -226,8 +226,9 @@ def _velocities(walkers: Columns, case: Case) -> dict[str, Any]:
         "depends_on_start": _depends_on_start(walkers, facing, case),
         "came_apart": separated > SEPARATED and not case.meets,
     }
-    # On trays the means include walkers that stopped.
-    numbers["facings_differ"] = not case.meets and differ(numbers["right_facing"], numbers["left_facing"])
+    # On trays the means include walkers that stopped; by symmetry, both headings are one.
+    one_heading = case.meets or _is_symmetric(case)
+    numbers["facings_differ"] = not one_heading and differ(numbers["right_facing"], numbers["left_facing"])
     return numbers
 
 
@@ -256,12 +257,16 @@ def _work(groups: Sequence[Group], cycles: Sequence[Columns], walkers: Columns) 
     return {"work": _mean(work[facing_up]), "cost_of_transport": _mean((work / lifted)[facing_up])}
 
 
+def _is_symmetric(case: Case) -> bool:
+    """Whether boundary and drive are the same for both headings."""
+    drive = case.excitation.harmonics
+    return not case.boundary.tilt and len(drive) == 1 and abs(drive[0].direction[2]) in (0.0, 1.0)
+
+
 def _depends_on_start(walkers: Columns, facing: IntArray, case: Case) -> bool:
     """Whether steady walkers of one make differ; both directions are one if boundary and drive are symmetric."""
-    drive = case.excitation.harmonics
-    symmetric = not case.boundary.tilt and len(drive) == 1 and abs(drive[0].direction[2]) in (0.0, 1.0)
     kept = walkers["steady"] & np.isnan(walkers["turned_at"]) & (walkers["separated_fraction"] < SEPARATED)
-    kind = 2 * walkers["make"] + (0 if symmetric else facing > 0)
+    kind = 2 * walkers["make"] + (0 if _is_symmetric(case) else facing > 0)
     alike = (walkers["velocity"][kept & (kind == one)] for one in set(kind[kept].tolist()))
     return not case.meets and any(differ(float(one.min()), float(one.max())) for one in alike)
 

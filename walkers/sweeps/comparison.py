@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot, isfinite, nan
 from pathlib import Path
@@ -142,7 +142,7 @@ def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
     results = [read(run) for run in runs]
     scatters = [_scatters(result) for result in results]
     units = columns_of({name for result in results for name in result if name not in _LEFT_OUT})
-    meant = _VELOCITIES if any(map(fell, results)) else ("velocity",) if any(map(_up_and_down, results)) else ()
+    meant = _VELOCITIES if any(map(fell, results)) else ("velocity",) if _differ(results) else ()
     units = {name: entry for name, entry in units.items() if name not in meant}  # these are no walker's way
     uphill, pairs = all(result.get("goes_uphill") for result in results), []
     for name, (unit, _) in units.items():
@@ -156,9 +156,9 @@ def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
     return pairs
 
 
-def _up_and_down(result: Mapping[str, Any]) -> bool:
-    """Whether walkers facing up and down a slope differ."""
-    return bool(result.get("goes_uphill") and result.get("facings_differ"))
+def _differ(results: Iterable[Mapping[str, Any]]) -> bool:
+    """Whether walkers of a result that face right (up) and left (down) differ."""
+    return any(result.get("facings_differ") for result in results)
 
 
 def _scatters(result: Results) -> dict[str, float]:
@@ -183,7 +183,7 @@ def _errors_text(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
         return []
     if any(map(fell, results)):  # errors and bands are those of velocities along the heading
         return []
-    name_of = "right_facing" if any(map(_up_and_down, results)) else "velocity"
+    name_of = "right_facing" if _differ(results) else "velocity"
     errors = [_number_of(one.get(f"{name_of}_error")) for one in results]
     own = [_number_of(one[name_of]) for one in results]
     total = hypot(*errors)

@@ -29,7 +29,6 @@ from walkers.inputs.keys import flatten
 from walkers.postprocess.numbers import declared, is_declared, ordered
 from walkers.postprocess.quantities import GROUPS
 from walkers.postprocess.results import Results, derived, modules_of, read
-from walkers.postprocess.sides import differ
 from walkers.rounding import DIGITS, SHOWN_UNITS, counted, rounded
 from walkers.runner.binary import Engine
 from walkers.runner.directory import FAILURE_NAME, is_finished, is_locked, run_place, unfinished
@@ -324,11 +323,8 @@ def varied_columns(frame: pd.DataFrame) -> list[str]:
 
 
 def sides_differ(frame: pd.DataFrame) -> bool:
-    """Whether walkers facing up and down a slope differ at a point, so that their mean velocity means nothing."""
-    if not {"upright", *SIDES} <= set(frame.columns):
-        return False
-    slopes = frame[frame["upright"].notna()]
-    return any(differ(float(one), float(other)) for one, other in zip(*(slopes[name] for name in SIDES), strict=True))
+    """Whether walkers facing right (up) and left (down) differ at a point: then their mean velocity means nothing."""
+    return "facings_differ" in frame and bool(frame["facings_differ"].eq(True).any())
 
 
 def main_columns(frame: pd.DataFrame) -> list[str]:
