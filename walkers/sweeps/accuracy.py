@@ -24,7 +24,7 @@ from walkers.runner.directory import case_of, run_place
 from walkers.runner.files import write_json
 from walkers.runner.manifest import recomputed
 from walkers.sweeps.scheduler import Options, SweepStopped, run_sweep
-from walkers.sweeps.table import load, main_columns
+from walkers.sweeps.table import SIDES, load, main_columns, sides_differ
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -111,7 +111,7 @@ def _sweep(case: Case, name: str, possible: Sequence[float]) -> Sweep:
 
 def _change(table: pd.DataFrame, case: Case) -> float:
     """The largest share of a headline velocity that the last increase of Young's modulus changes."""
-    names = {main_columns(table)[0], *(("right_facing", "left_facing") if case.goes_uphill else ())}
+    names = {main_columns(table)[0], *(SIDES if case.goes_uphill or sides_differ(table) else ())}
     before, after = table[[*names]].iloc[-2:].dropna(axis="columns").to_numpy(float)
     return float(max(abs(after - before) / abs(after).clip(STEADY_SPEED)))
 
