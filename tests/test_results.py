@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 
 import walkers
@@ -20,10 +19,9 @@ from walkers.postprocess.gait import Averages, averages, fit_slopes, gait, gaps,
 from walkers.postprocess.motion import Group, read_motion
 from walkers.postprocess.numbers import declared as declared_number
 from walkers.postprocess.numbers import rows
-from walkers.postprocess.quantities import TABLES, declared
 from walkers.postprocess.results import read
 from walkers.postprocess.sides import sides
-from walkers.postprocess.tables import read_table, write_table
+from walkers.postprocess.tables import read_table
 from walkers.postprocess.walking import measure, walkers_met
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import RESULT_NAME
@@ -148,43 +146,6 @@ def test_the_result_follows_the_papers_protocol(directory: Path) -> None:
     assert [result[name] for name in names] == pytest.approx(expected)
     assert result["axial_left_facing"] < 0 < result["axial_velocity"]
     assert (result["facing_right"], result["steady"], result["walkers_met"]) == (3, 6, False)
-
-
-def test_tables_have_units_labels_and_meanings(directory: Path) -> None:
-    """Each file has the declared columns in their order, with what is declared of them; nothing else."""
-    for path in directory.glob("*.parquet"):
-        schema, known = pq.read_schema(path), TABLES[path.stem]
-        places = [next(place for place, one in enumerate(known) if one.names(name)) for name in schema.names]
-        assert places == sorted(places)
-        assert set(places) == set(range(len(known)))
-        for field in schema:
-            quantity = declared(field.name, known)
-            unit, label = quantity.si_unit.encode(), quantity.label.encode()
-            expected = {b"unit": unit, b"units": unit, b"long_name": label, b"meaning": quantity.meaning.encode()}
-            assert field.metadata == expected
-            assert "*" not in quantity.label
-        attributes = read_table(directory, path.stem).attrs
-        assert attributes["units"].keys() == attributes["long_name"].keys() == set(schema.names)
-        assert pq.ParquetFile(path).metadata.row_group(0).column(0).compression == "ZSTD"
-
-
-def test_dimers_have_columns_of_two_beads_and_a_pair(directory: Path) -> None:
-    families = {"walkers": ("rotation", "sliding", "open"), "trajectory": ("rotation", "sliding", "gap")}
-    for table, names in families.items():
-        columns = {name for name in read_table(directory, table) if name[-1].isdigit()}
-        pairs = {f"{name}_pair_1" for name in names[1:]}
-        assert columns == {f"{name}_{bead}" for name in names for bead in (1, 2)} | pairs
-    cycles = read(directory)["cycles"]
-    for table, count in (("trajectory", 20 * cycles + 1), ("walkers", 1), ("bridges", 3 * (cycles + 1))):
-        assert len(read_table(directory, table)) == 6 * count
-
-
-def test_a_column_that_is_not_declared_is_refused(tmp_path: Path) -> None:
-    columns = dict.fromkeys(("time", "track", "bead", "large", "height"), np.arange(3.0))
-    write_table(tmp_path, "members", columns)
-    for wrong in (columns | {"power": np.arange(3.0)}, {"time": np.arange(3.0)}):
-        with pytest.raises(KeyError, match="missing or not declared"):
-            write_table(tmp_path, "members", wrong)
 
 
 def test_a_single_walker_has_no_scatter(run_directory: Callable[..., Path]) -> None:

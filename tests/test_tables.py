@@ -10,6 +10,7 @@ import pytest
 from walkers.errors import InputError
 from walkers.inputs.reading import load_case
 from walkers.postprocess.quantities import TABLES, axis, declared
+from walkers.postprocess.results import read
 from walkers.postprocess.tables import read_columns, read_table, write_table
 
 
@@ -63,6 +64,10 @@ def test_dimers_have_columns_of_two_beads_and_a_pair(walked: Path) -> None:
         columns = {name for name in read_table(walked, table) if name[-1].isdigit()}
         pairs = {f"{name}_pair_1" for name in names[1:]}
         assert columns == {f"{name}_{bead}" for name in names for bead in (1, 2)} | pairs
+    result = read(walked)
+    cycles, count = result["cycles"], result["walkers"]
+    for table, rows in (("trajectory", 20 * cycles + 1), ("walkers", 1), ("bridges", 3 * (cycles + 1))):
+        assert len(read_table(walked, table)) == count * rows
 
 
 @pytest.mark.parametrize("rows", [0, 1, 9])
