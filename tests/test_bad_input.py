@@ -300,6 +300,7 @@ REFUSED: list[tuple[str, str]] = [
         ("--begin '0.2 s'", "expected times within the drive, 0 to 0.1 s"),
         ("--begin '0.05 s' --end '0.05 s'", "expected times within the drive, 0 to 0.1 s"),
     )),
+    ("--library own.toml render --film {run} --size wide", "--size: 'wide': expected 360p, 480p, 720p, 1080p"),
     *((f"{what} {{pile}} --walker 0", "") for what in ("render", "render --film")),
     ("render --film {pile} --to box.png", ""),
     ("render {pile} --to box.jpg", ""),

@@ -234,6 +234,16 @@ def test_a_run_that_was_damaged_is_told_in_a_line_by_all_that_read_it(name: str,
     assert all(path.read_bytes() == contents for path, contents in files.items()), "nothing on disk is lost"
 
 
+def test_a_result_that_lacks_a_number_is_told_by_what_reads_it(short_run: Path) -> None:
+    for name in ("goes_uphill", "facings_differ"):
+        _edited("result.json", lambda result, name=name: result["numbers"].pop(name))(short_run)
+        for command in (f"plot {short_run}", "list --all"):
+            done = call(*command.split())
+            assert "its result.json cannot be read" in done.stdout + done.stderr, (command, done)
+            assert "Traceback" not in done.stderr, (command, done)
+        call("run", str(short_run), check=True)
+
+
 def test_a_sweep_goes_on_without_a_damaged_run_and_says_which(short_case: Path) -> None:
     call("sweep", "sweep.toml", check=True)
     runs = list(load_table("runs/sweep")["run"])

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import walkers
-from tests.conftest import call, document, mounted, to_toml
+from tests.conftest import call, document, make_case, mounted, to_toml
 from walkers.runner.directory import finished_places, locked
 from walkers.runner.files import read_json, write_json
 from walkers.sweeps.folder import bytes_text, weigh
@@ -329,3 +329,14 @@ def test_a_sweep_of_another_format_is_refused(out: Path) -> None:
     done = call("list", "rough")
     assert (done.returncode, "Traceback" in done.stderr) == (2, False)
     assert "format 99, expected 3" in done.stderr
+
+
+def test_an_interrupted_run_of_another_folder_is_not_mistaken_for_one_of_the_same_name(tmp_path: Path) -> None:
+    places = [tmp_path / folder / "killed-0123456789ab.incomplete" for folder in ("runs", "other")]
+    for place in places:
+        place.mkdir(parents=True)
+        (place / "case.json").write_text(json.dumps(make_case().as_dict()))
+    done = call("clean", str(places[1]), "--out", str(tmp_path / "runs"), "--yes")
+    assert (done.returncode, [place.exists() for place in places]) == (2, [True, True])
+    call("clean", places[0].name, "--out", str(tmp_path / "runs"), "--yes", check=True)
+    assert [place.exists() for place in places] == [False, True]

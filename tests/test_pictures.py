@@ -223,6 +223,7 @@ _WRONG: list[tuple[Callable[[walkers.Run, Path], object], str]] = [
     (lambda run, to: run.film(to / "a.gif", begin=1.0), "^begin, end: nothing to show"),
     (lambda run, to: run.render(to / "a.png", walker=2), "^walker: 2: expected 0 to 1$"),
     (lambda run, to: run.export("lammps", to / "a.lammpstrj", every=0), "^every: 0: expected a whole number from 1$"),
+    (lambda run, to: run.export("xyz", to / "a.xyz"), "^form: 'xyz': expected one of deck, vtk, paraview, "),
     (lambda run, to: run.export("vtk", to / "vtk", every=0), "^every: 0: expected a whole number from 1$"),
     (lambda run, to: run.export("paraview", to / "vtk", colour="beauty"), "^colour: 'beauty': expected one of bead, "),
     (lambda run, to: run.plot(to / "a.png"), r"a\.png: expected a folder"),

@@ -125,6 +125,8 @@ def test_pairs_of_beads_can_be_shown_by_their_asymmetry_and_texts_as_categories(
     assert np.abs(places - [0.0, 1.0]).max() < 0.3, "symbols are beside their category"
     with pytest.raises(InputError, match="has no numbers"):
         walkers.load(directory).figure(x="liquid.name", log="x")
+    with pytest.raises(InputError, match=r"^log: 'z': expected one of x, y, xy$"):
+        walkers.load(directory).figure(log="z")
 
 
 def test_samples_have_a_panel_for_each_key(looked_through: Path) -> None:

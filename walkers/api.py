@@ -12,10 +12,10 @@ from functools import cached_property
 from html import escape
 from math import isclose
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias, get_args
 
 from walkers import DEFAULT_OUT, RECORDS
-from walkers.errors import InputError, Problem, WalkersError, check_utf8, refused
+from walkers.errors import InputError, Problem, WalkersError, check_utf8, expected_of, refused
 from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped
 from walkers.progress import progress_of, progress_of_film, progress_of_sweep, shown_if
 from walkers.runner.binary import find_engine
@@ -446,6 +446,8 @@ class Run:
 
             collection = write_vtk(self.finished_directory, place, **options)
             return collection if form == "vtk" else collection.with_name(SCRIPT)
+        if form != "lammps":
+            raise refused("form", f"{form!r}: {expected_of(form, get_args(Export))}")
         from walkers.postprocess.trajectory_files import write_trajectory
 
         return write_trajectory(self.finished_directory, place, **options)

@@ -211,7 +211,8 @@ def _report_stop(stop: BaseException, tokens: list[str]) -> int:
 
 def _options_of(names: str, tokens: list[str]) -> str:
     """The options of the command for arguments of a function of the package, such as ``begin, end``."""
-    _, apps, _ = program().parse_commands(tokens)
+    words = tokens[2:] if tokens[:1] == ["--library"] else tokens
+    _, apps, _ = program().parse_commands(words)
     arguments = apps[-1].assemble_argument_collection()
     options = {one.name[2:]: one.name for one in arguments} | {one.field_info.name: one.name for one in arguments}
     return ", ".join(options.get(name, name) for name in names.split(", "))

@@ -150,8 +150,9 @@ def clean(
     refuse("--finished", finished and bool(runs), "has no meaning with given runs")
 
     def place_of(name: str) -> Path:
-        folder = out / Path(name).name
-        return folder if folder.suffix == UNFINISHED else directory_of(name, out)
+        if Path(name).suffix != UNFINISHED:
+            return directory_of(name, out)
+        return Path(name) if Path(name).is_dir() else out / name
 
     plan = plan_cleaning(out, each(place_of, runs), finished=finished)
     print(plan.as_text())

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from cyclopts import Parameter
+
+from walkers.errors import refused
+
+_LOG = Literal["x", "y", "xy"]
 
 
 @Parameter(name="*")
@@ -27,11 +31,21 @@ class FigureOptions:
         Sweeps: which axes are logarithmic.
     theory
         Sweeps: also draw the theory.
+
+    Raises
+    ------
+    InputError
+        If ``log`` is no choice.
     """
 
     x: str | None = None
     y: str | None = None
     hue: str | None = None
     panels: str | None = None
-    log: Literal["x", "y", "xy"] | None = None
+    log: _LOG | None = None
     theory: bool = False
+
+    def __post_init__(self) -> None:
+        """Check what does not depend on a table."""
+        if self.log not in (None, *get_args(_LOG)):
+            raise refused("log", f"{self.log!r}: expected one of {', '.join(get_args(_LOG))}")
