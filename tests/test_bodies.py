@@ -255,7 +255,8 @@ def test_walkers_on_a_tray_meet_and_stick(tmp_path: Path) -> None:
         assert joined["time"].min() == pytest.approx(row.time)
     numbers = tray.result
     slow, connected = (round(9 * numbers[name]) for name in ("slow_share", "clustered_share"))
-    assert f"{slow} of 9 slow, {connected} of 9 connected" in as_text(inventory(tmp_path))
+    for text in (as_text(inventory(tmp_path)), tray.describe().splitlines()[0]):
+        assert f"{slow} of 9 slow, {connected} of 9 connected" in text
     assert not [warning for warning in numbers.warnings if "not steady" in warning]  # walkers that have met stop
     assert not numbers["facings_differ"]
     group = tray.motion.groups[0]

@@ -307,6 +307,10 @@ def test_walkers_that_face_down_a_slope_are_a_series_beside_those_that_face_up(t
     series = [line.get_ydata() for line in axes.lines if len(line.get_xdata()) == 3]
     np.testing.assert_allclose(series, 1e3 * table[["right_facing", "left_facing"]].to_numpy().T)
     assert not _legend(swept.figure(y="right_facing"))
+    with pytest.warns(LeftOutWarning):  # without a prediction, lines are those of a figure without theory
+        predicted = swept.figure(y="axial_velocity", theory=True)
+    (axes,) = _panels(predicted)
+    assert axes.lines[0].get_linestyle() == "-"
     # Of walkers that lean or turned over, velocities are those up the slope.
     leaning = table.assign(upright=0)
     (axes,) = _panels(figure_of(leaning))

@@ -262,10 +262,19 @@ def headlines(results: Results) -> list[str]:
     drive, numbers = results.about["drive"], results.numbers
     if all(isfinite(numbers.get(name, nan)) for name in ("gamma0", "sin_delta")):
         drive += f", Γ0 = {numbers['gamma0']:.3g}, sin δ = {numbers['sin_delta']:.3g}"
-    states = [one for one in (_ways(numbers), _postures(numbers), *_doubts(numbers)) if one]
+    tray = f"{on_tray} at the end" if (on_tray := tray_text(numbers)) else ""
+    states = [one for one in (_ways(numbers), _postures(numbers), tray, *_doubts(numbers)) if one]
     if not states:
         return [f"{results.about['case']}: {drive}"]
     return [f"{results.about['case']}: {'; '.join(states)}", drive]
+
+
+def tray_text(numbers: Mapping[str, Any]) -> str:
+    """Numbers of walkers of a tray that are slow, and connected to others, at the end; empty without a tray."""
+    if not isfinite(numbers.get("slow_share", nan)):
+        return ""
+    count, shares = numbers["walkers"], {"slow": numbers["slow_share"], "connected": numbers["clustered_share"]}
+    return ", ".join(f"{round(count * share)} of {count} {state}" for state, share in shares.items())
 
 
 def _ways(numbers: Mapping[str, Any]) -> str:

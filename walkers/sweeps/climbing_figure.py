@@ -107,7 +107,7 @@ def _draw_climbs(panel: Axes, found: Mapping[str, Any]) -> None:
     for corner, (label, _, look) in enumerate(_KINDS[1:]):
         some = [one for one in found["each"] if one["speed"] is not None and (len(one["walls"]) > 1) == bool(corner)]
         sizes, speeds = [one["size"] for one in some], [one["speed"] * 1e3 for one in some]
-        panel.plot(sizes, speeds, look, markerfacecolor="none", label=label)
+        panel.plot(sizes, speeds, look, markerfacecolor="none", label=label, clip_on=False)
     panel.set(xlabel="beads", ylabel="speed (mm/s)", xlim=(0.0, None), ylim=(0.0, None))
 
 

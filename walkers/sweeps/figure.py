@@ -133,6 +133,8 @@ def figure_of(table: pd.DataFrame, options: FigureOptions = FigureOptions(), pre
         _tell(f"not distinguished: {'; '.join(undistinguished)}")
     log = options.log or ""
     theory = _Theory(predict, done, column, log) if predict else None
+    if theory and not theory.values:  # it was said why
+        theory = None
     return _draw(done, column, layout, theory, down=None if options.y else FACING_DOWN.get(column), log=log)
 
 

@@ -14,7 +14,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from math import isfinite, nan
 from pathlib import Path
 from stat import S_ISDIR
 from typing import Any
@@ -22,7 +21,7 @@ from typing import Any
 from walkers.errors import InputError, Problem, refused
 from walkers.inputs.case import Case
 from walkers.postprocess.numbers import is_declared, shown
-from walkers.postprocess.results import Results, plain, read
+from walkers.postprocess.results import Results, plain, read, tray_text
 from walkers.postprocess.sides import REST
 from walkers.postprocess.uncertainty import ACCURACY, SPREAD, SPREAD_NAME
 from walkers.rounding import counted, duration_text
@@ -287,10 +286,8 @@ def _result_text(results: Results) -> str:
         return counted(results["climbs"], "climb") if "climbs" in results else "-"
     if results["came_apart"]:
         return "came apart"
-    if isfinite(results.get("slow_share", nan)):
-        shares = {"slow": results["slow_share"], "connected": results["clustered_share"]}
-        count = results["walkers"]
-        return ", ".join(f"{round(count * share)} of {count} {state}" for state, share in shares.items())
+    if on_tray := tray_text(results):
+        return on_tray
     names = {"velocity": ""}
     if results["facings_differ"]:
         names = {"right_facing": "right", "left_facing": "left"}
