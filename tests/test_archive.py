@@ -24,8 +24,8 @@ from urllib3 import HTTPResponse
 from tests.conftest import SHORT, call, document, make_case, to_toml
 from walkers import Run, load_case
 from walkers.archive import writing
-from walkers.archive.crate import PAPER
-from walkers.archive.writing import ArchiveRefused, Contents, write_archive
+from walkers.archive.crate import PAPER, describe_crate
+from walkers.archive.writing import ArchiveRefused, Contents, contents_of, write_archive
 from walkers.inputs.case import Case
 from walkers.runner.manifest import read_manifest
 from walkers.runner.provenance import commit_of, software
@@ -204,6 +204,17 @@ def test_an_archive_of_a_run(run: Path, tmp_path: Path) -> None:
 def test_an_archive_has_the_date_of_its_last_run() -> None:
     dates = ("2026-03-01T10:00:00Z", "2026-03-02T09:00:00Z", "2026-02-28T23:00:00Z")
     assert Contents("three", "", {date: {"finished": date} for date in dates}, {}).finished == dates[1]
+
+
+def test_the_tables_of_an_archive_are_made_by_the_program_that_made_the_last(shared: Path) -> None:
+    """One run was measured again, by a later version, after both were finished."""
+    contents = contents_of(shared / "angles")
+    last = next(iter(contents.manifests.values()))
+    last["tabulated"] = {**software(), "granular_walkers": "99.0", "commit": None, "date": "2099-01-01T00:00:00Z"}
+    entities = {one["@id"]: one for one in describe_crate(contents, [], "CC0-1.0")["@graph"]}
+    (tables,) = (one for one in entities.values() if one.get("name") == "Tables of angles")
+    assert entities[tables["instrument"]["@id"]]["softwareVersion"] == "99.0"
+    assert tables["endTime"] == "2099-01-01T00:00:00+00:00"
 
 
 def test_what_an_archive_says_of_its_run(run: Path, tmp_path: Path) -> None:

@@ -31,6 +31,7 @@ from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import finished_places, run_place
 from walkers.show import summarise
+from walkers.sweeps.comparison import Side, compare_runs
 from walkers.sweeps.folder import as_text, inventory
 from walkers.sweeps.making import make_runs
 from walkers.templates.deck import render_deck
@@ -204,6 +205,12 @@ def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
     assert result["velocity_make_3"] == pytest.approx(done.walkers["velocity"].iloc[4])
     assert {path.name for path in done.plot()} == {"walk.png", "gait.png"}
     assert done.export("vtk").exists()
+    # What is said of single beads is that of the dimers, and so is its scatter.
+    side = Side("one", done.case, done.directory)
+    compared = {one["quantity"]: one for one in compare_runs(side, side).contents["results"]}
+    for name in ("rotation_1", "sliding_2"):
+        assert result[name] == pytest.approx(done.walkers[name][:2].mean())
+        assert compared[name]["first_scatter"] == pytest.approx(done.walkers[name][:2].std())
     # A column is of one kind of contact: of the third bead and the floor, or of two beads.
     assert {name for name in result if name.startswith("sliding")} == {"sliding_1", "sliding_2", "sliding_pair_1"}
     for family, table in (("sliding", done.walkers), ("open", done.walkers), ("gap", done.trajectory)):

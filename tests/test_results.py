@@ -148,6 +148,13 @@ def test_the_result_follows_the_papers_protocol(directory: Path) -> None:
     assert (result["facing_right"], result["steady"], result["walkers_met"]) == (3, 6, False)
 
 
+def test_velocities_of_both_directions_have_the_scatter_of_their_walkers(directory: Path) -> None:
+    numbers = {**read(directory), "scatter": 1e-5, "right_scatter": 2e-5, "left_scatter": 3e-5}
+    errors = {row.name: row.error for row in rows(numbers)}
+    said = {name: float(errors[name].removeprefix("scatter ")) for name in ("velocity", "right_facing", "left_facing")}
+    assert said == {"velocity": 0.01, "right_facing": 0.02, "left_facing": 0.03}  # mm/s
+
+
 def test_a_single_walker_has_no_scatter(run_directory: Callable[..., Path]) -> None:
     directory = run_directory()
     result = read(directory)

@@ -134,6 +134,7 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     # Of walkers that turned over it is the velocity up the slope that counts.
     turned = {**result, "turned_round": 1, "upright": 1, "turned_over": 1}
     assert headline(turned) == default_column(pd.DataFrame([turned])) == "axial_velocity"
+    assert default_column(pd.DataFrame([dict(result), turned])) == "axial_velocity"  # at one point is enough
     assert not fell({"goes_uphill": True, "climbs": 0})  # a pile
 
 

@@ -397,4 +397,4 @@ def _interval(ends: Sequence[float] | None, digits: str = ".2g", estimator: str 
 
 
 def _range(values: Sequence[float] | FloatArray) -> str:
-    return f"{min(values):.2f} to {max(values):.2f}"
+    return " to ".join(dict.fromkeys(f"{end:.2f}" for end in (min(values), max(values))))
