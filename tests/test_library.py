@@ -160,7 +160,7 @@ def test_a_liquid_of_ones_own_is_described_in_the_case() -> None:
 def test_a_library_elsewhere_is_named(own: Path) -> None:
     (own / "library.toml").rename(own / "other.toml")
     assert "weighed" in call("--library", "other.toml", "show", "mine.toml", check=True).stdout
-    assert "my beads  " in call("--library", "other.toml", "library", check=True).stdout
+    assert "my beads  " in call("--library=other.toml", "library", check=True).stdout
     assert "my beads  " not in call("library", check=True).stdout, "it is for one call"
 
 

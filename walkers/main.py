@@ -66,6 +66,8 @@ def main(arguments: list[str] | None = None) -> NoReturn:
 
 def _status(tokens: list[str]) -> int:
     """Run the program and return its exit status. Unexpected errors are raised."""
+    if tokens and tokens[0].startswith("--library="):
+        tokens = [*tokens[0].split("=", 1), *tokens[1:]]
     try:
         walkers.inputs.chosen_library, words = None, tokens
         if tokens[:1] == ["--library"]:
