@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from math import isfinite, nan
 from typing import TYPE_CHECKING, Any
 
@@ -46,29 +47,24 @@ _BAND = {"low": "5 %", "high": "95 %"}
 _ENDS = {name: f"{share} of the draws over the ranges of uncertain values" for name, share in _BAND.items()}
 _ENDS |= {"error": "numerical error, of time step and stiffness"}
 """Ends of names: of bands, and of numerical errors."""
-_HIDDEN = frozenset(
+ASIDE = frozenset(
     {
-        *("scatter", "smallest", "largest", "right_scatter", "left_scatter", "axial_velocity", "axial_left_facing"),
-        *("facing_right", "facing_left", "walkers_met", "meets", "came_apart", "facings_differ", "depends_on_start"),
-        *("mass_asymmetry", "radius_1", "radius_2", "numerical_error", "goes_uphill"),
-        *("orientation_smallest", "orientation_largest", "turned_first", "turned_last", "ended_early", "duration"),
-        *("gamma0", "sin_delta", "climbing", "descending"),
+        *("scatter", "smallest", "largest", "right_scatter", "left_scatter", "numerical_error"),
+        *("orientation_smallest", "orientation_largest", "facing_right", "facing_left"),
+        *("gamma0", "sin_delta", "mass_asymmetry", "radius_1", "radius_2"),
+        *("meets", "came_apart", "facings_differ", "depends_on_start"),
         *(quantity.name for quantity in GROUPS["drive"]),
     }
 )
-"""Numbers that rows leave out: errors of others, values of the case, and what the headline says."""
+"""Numbers that are not shown by themselves: errors of others, values of the case, conditions."""
+_HIDDEN = ASIDE | {
+    *("axial_velocity", "axial_left_facing", "walkers_met", "turned_first", "turned_last", "ended_early", "duration"),
+    *("climbing", "descending"),
+}
+"""Numbers that rows leave out, because the headline says them or others count."""
 _OF_UP = "on a slope of those that started facing up"
 """Ends the meaning of a number that leaves out walkers that face down."""
-_IF_ANY = (
-    "events_*",
-    "open_*",
-    "open_pair_*",
-    "separated_fraction",
-    "turned_round",
-    "leaning",
-    "turned_over",
-    "upright",
-)
+_IF_ANY = ("events_*", "open_*", "separated_fraction", "turned_round", "leaning", "turned_over", "upright")
 """Numbers that rows leave out if they are zero."""
 
 
@@ -80,6 +76,11 @@ def declared(name: str) -> Quantity:
     whole = declared_in(stem, NUMBERS.values() if end in _ENDS else ())
     label = f"{whole.label}, {_BAND.get(end, 'numerical error')}"
     return replace(whole, name=name, label=label, meaning=f"{_ENDS[end]}: {whole.meaning}", error="")
+
+
+def is_error(name: str) -> bool:
+    """Whether a number is an end of the band of another, or its numerical error."""
+    return name.rpartition("_")[2] in _ENDS
 
 
 def is_declared(name: str) -> bool:
@@ -116,7 +117,7 @@ def headline(numbers: Mapping[str, Any]) -> str:
 
 def fell(numbers: Mapping[str, Any]) -> bool:
     """Whether walkers turned over or lean on a slope: then a velocity along the heading says little about their way."""
-    return bool("upright" in numbers and (numbers["turned_round"] or numbers["upright"] < numbers["walkers"]))
+    return "upright" in numbers and bool(numbers["upright"] < numbers["walkers"])
 
 
 def rows(numbers: Mapping[str, Any]) -> list[Row]:
@@ -136,11 +137,10 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
     listed = []
     for name in ordered(numbers):
         number = numbers[name]
-        if isinstance(number, (bool, str)) or not isfinite(number) or name.rpartition("_")[2] in _ENDS:
+        if isinstance(number, (bool, str)) or not isfinite(number) or is_error(name):
             continue
         one = declared(name)
-        starred = next((key for key in _IF_ANY if key == name or (key.endswith("*") and name.startswith(key[:-1]))), "")
-        if name not in hidden and (number or not starred):
+        if name not in hidden and (number or not any(fnmatchcase(name, pattern) for pattern in _IF_ANY)):
             text, unit = shown(number, one.unit)
             listed.append(Row(name, _label(one, numbers), text, unit, _errors(numbers, one)))
     return listed

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import numpy.typing as npt
+    import pandas as pd
 
     from walkers.postprocess.dump import BoolArray, IntArray
 
@@ -38,7 +41,7 @@ def sides(facing: npt.ArrayLike, start_angle: npt.ArrayLike) -> IntArray:
     return np.where(np.cos(start_angle) < -_ACROSS, np.negative(facing), facing)
 
 
-def alike(facing: IntArray, *, uphill: bool) -> BoolArray:
-    """Walkers over which gait and work are averaged, shape (W,): on a slope those facing up, if there are any."""
-    up = facing > 0
+def alike(walkers: Mapping[str, Any] | pd.DataFrame, *, uphill: bool) -> BoolArray:
+    """Rows of a table ``walkers`` over which means are taken, shape (W,): on a slope those facing up, if any do."""
+    up = sides(walkers["facing"], walkers["start_angle"]) > 0
     return up if uphill and up.any() else up | True

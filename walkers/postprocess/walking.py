@@ -82,8 +82,8 @@ def measure(motion: Motion) -> Measured:
         numbers |= _work(groups, cycles, tables["walkers"])
     if len(groups) > 1:
         for number, one in enumerate(rows, 1):
-            facing_up = alike(sides(one["facing"], one["start_angle"]), uphill=case.goes_uphill)
-            numbers[f"velocity_make_{number}"] = float(one["velocity"][facing_up].mean())
+            velocity = one["velocity"][alike(one, uphill=case.goes_uphill)]
+            numbers[f"velocity_make_{number}"] = float(velocity.mean())
             numbers[f"walkers_make_{number}"] = len(one["velocity"])
             numbers[f"steady_make_{number}"] = int(np.sum(one["steady"]))
     return Measured(tables, numbers, tuple(_doubts(numbers)))
@@ -200,7 +200,7 @@ def _velocities(walkers: Columns, case: Case) -> dict[str, Any]:
     velocity, axial, end = walkers["velocity"], walkers["axial_velocity"], walkers["orientation_end"]
     facing = sides(walkers["facing"], walkers["start_angle"])
     right, left = facing > 0, facing < 0
-    meant = velocity[alike(facing, uphill=case.goes_uphill)]
+    meant = velocity[alike(walkers, uphill=case.goes_uphill)]
     separated = _mean(walkers["separated_fraction"])
     numbers = {
         "velocity": float(meant.mean()),
@@ -211,7 +211,7 @@ def _velocities(walkers: Columns, case: Case) -> dict[str, Any]:
         "left_facing": _mean(velocity[left]),
         "right_scatter": _scatter(velocity[right]),
         "left_scatter": _scatter(velocity[left]),
-        "axial_velocity": _mean(axial[alike(facing, uphill=case.goes_uphill or not case.meets)]),
+        "axial_velocity": _mean(axial[alike(walkers, uphill=case.goes_uphill or not case.meets)]),
         "axial_left_facing": _mean(axial[left]),
         "lateral_velocity": _mean(walkers["lateral_velocity"]),
         "separated_fraction": separated,
@@ -234,9 +234,8 @@ def _velocities(walkers: Columns, case: Case) -> dict[str, Any]:
 
 def _of_beads(walkers: Columns, case: Case) -> dict[str, float]:
     """Rotation, sliding and open contacts of the walkers of a make, on a slope of those that face up."""
-    families = ("rotation_", "sliding_", "open_")
-    facing_up = alike(sides(walkers["facing"], walkers["start_angle"]), uphill=case.goes_uphill)
-    return {name: _mean(one[facing_up]) for name, one in walkers.items() if name.startswith(families)}
+    families, meant = ("rotation_", "sliding_", "open_"), alike(walkers, uphill=case.goes_uphill)
+    return {name: _mean(one[meant]) for name, one in walkers.items() if name.startswith(families)}
 
 
 def _work(groups: Sequence[Group], cycles: Sequence[Columns], walkers: Columns) -> dict[str, float]:
@@ -249,12 +248,12 @@ def _work(groups: Sequence[Group], cycles: Sequence[Columns], walkers: Columns) 
     for group, columns in zip(groups, cycles, strict=True):
         of_cycles = np.ascontiguousarray(columns["work"].reshape(len(group.walkers), -1).T)
         each.append(of_cycles[case.run.settled_strobes : -1].mean(axis=0))
-    facing_up = alike(sides(walkers["facing"], walkers["start_angle"]), uphill=case.goes_uphill)
+    meant = alike(walkers, uphill=case.goes_uphill)
     work, speed = np.concatenate(each), np.abs(walkers["velocity"])
     speed = np.where(speed < STEADY_SPEED, nan, speed)
     mass = np.concatenate([np.full(len(group.walkers), mass_of(group)) for group in groups])
     lifted = mass * ACCELERATION_OF_ONE_G * speed / case.excitation.frequency
-    return {"work": _mean(work[facing_up]), "cost_of_transport": _mean((work / lifted)[facing_up])}
+    return {"work": _mean(work[meant]), "cost_of_transport": _mean((work / lifted)[meant])}
 
 
 def _is_symmetric(case: Case) -> bool:
@@ -267,8 +266,8 @@ def _depends_on_start(walkers: Columns, facing: IntArray, case: Case) -> bool:
     """Whether steady walkers of one make differ; both directions are one if boundary and drive are symmetric."""
     kept = walkers["steady"] & np.isnan(walkers["turned_at"]) & (walkers["separated_fraction"] < SEPARATED)
     kind = 2 * walkers["make"] + (0 if _is_symmetric(case) else facing > 0)
-    alike = (walkers["velocity"][kept & (kind == one)] for one in set(kind[kept].tolist()))
-    return not case.meets and any(differ(float(one.min()), float(one.max())) for one in alike)
+    velocities = (walkers["velocity"][kept & (kind == one)] for one in set(kind[kept].tolist()))
+    return not case.meets and any(differ(float(one.min()), float(one.max())) for one in velocities)
 
 
 def _posture(groups: Iterable[Group], walkers: Columns) -> dict[str, Any]:

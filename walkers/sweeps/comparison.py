@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import refused
-from walkers.postprocess.numbers import band_text, declared, fell
-from walkers.postprocess.quantities import GROUPS, unit_shown
+from walkers.postprocess.numbers import ASIDE, band_text, declared, fell, is_error
+from walkers.postprocess.quantities import unit_shown
 from walkers.postprocess.results import Results, read
-from walkers.postprocess.sides import alike, sides
+from walkers.postprocess.sides import alike
 from walkers.postprocess.uncertainty import not_known
 from walkers.rounding import percent, rounded
 from walkers.runner.directory import case_of
@@ -37,14 +37,6 @@ if TYPE_CHECKING:
     from walkers.inputs.case import Case
 
 _SIDES = ("first", "second")
-_LEFT_OUT = {
-    *("smallest", "largest", "scatter", "right_scatter", "left_scatter", "numerical_error", "truncated", "coverage"),
-    *("gamma0", "sin_delta", "mass_asymmetry", "radius_1", "radius_2", "orientation_smallest", "orientation_largest"),
-    *("meets", "came_apart", "facings_differ", "depends_on_start", "facing_right", "facing_left"),
-    *(one.name for one in GROUPS["drive"]),
-}
-_ERRORS = ("_low", "_high", "_error")
-"""Numbers of results, and ends of their names, that are not compared: errors, values of the case, conditions."""
 _VELOCITIES = ("velocity", "right_facing", "left_facing")
 """Columns whose scatter is in the result."""
 _UPHILL = {
@@ -110,13 +102,14 @@ def compare_runs(first: Side, second: Side) -> Comparison:
     parameters, differences = _different([first.case, second.case], names)
     not_run = [side.name for side in (first, second) if side.directory is None]
     runs = [side.directory for side in (first, second) if side.directory]
-    pairs = [] if not_run else _pairs(runs)
+    results = [] if not_run else [read(run) for run in runs]
+    pairs = _pairs(results) if results else []
     lengths = [cells[1:3] for one, cells in pairs if one["quantity"] == "cycles" and one["first"] != one["second"]]
     same_cases = "".join(["the cases are the same", *(f", but ran {' and '.join(one)} cycles" for one in lengths)])
     text = [differences or same_cases]
     if apart := [cells for one, cells in pairs if one["first"] != one["second"]]:
         text.append(aligned([["result", *names, "difference", "scatter of copies", "numerical error"], *apart]))
-        text += _errors_text(runs, names)
+        text += _errors_text(results, names)
     if same := [one["quantity"] for one, _ in pairs if one["first"] == one["second"]]:
         text.append(f"the same in both: {', '.join(same)}" if apart else "all results are the same")
     text += [f"{name}: no finished run; only the parameters are compared" for name in not_run]
@@ -137,17 +130,16 @@ def _number_of(value: Any) -> float:
     return nan if value is None or isinstance(value, str) else float(value)
 
 
-def _pairs(runs: Sequence[Path]) -> list[tuple[dict[str, Any], list[str]]]:
-    """The numbers of the results of two runs."""
-    results = [read(run) for run in runs]
+def _pairs(results: Sequence[Results]) -> list[tuple[dict[str, Any], list[str]]]:
+    """The numbers of two results, without errors, values of the case and conditions."""
     scatters = [_scatters(result) for result in results]
-    units = columns_of({name for result in results for name in result if name not in _LEFT_OUT})
+    units = columns_of({name for result in results for name in result if name not in {*ASIDE, "coverage"}})
     meant = _VELOCITIES if any(map(fell, results)) else ("velocity",) if _differ(results) else ()
     units = {name: entry for name, entry in units.items() if name not in meant}  # these are no walker's way
     uphill, pairs = all(result.get("goes_uphill") for result in results), []
     for name, (unit, _) in units.items():
         values = [_number_of(result.get(name)) for result in results]
-        if any(map(isfinite, values)) and not name.endswith(_ERRORS):
+        if any(map(isfinite, values)) and not is_error(name):
             error = hypot(*(_number_of(result.get(f"{name}_error")) for result in results))
             one, cells = _pair(name, unit, values, [known.get(name, nan) for known in scatters], error)
             if uphill and name in _UPHILL:
@@ -167,7 +159,7 @@ def _scatters(result: Results) -> dict[str, float]:
         return {}
     scatters = {name: float(result[declared(name).error]) for name in _VELOCITIES}
     walkers = result.table("walkers")
-    walkers = walkers[alike(sides(walkers["facing"], walkers["start_angle"]), uphill=result["goes_uphill"])]
+    walkers = walkers[alike(walkers, uphill=result["goes_uphill"])]
     for name in walkers.columns:
         of_first = name.rpartition("_")[0] in _FIRST_MAKE
         rows = walkers[walkers["make"] == 0] if of_first else walkers
@@ -176,9 +168,8 @@ def _scatters(result: Results) -> dict[str, float]:
     return scatters
 
 
-def _errors_text(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
+def _errors_text(results: Sequence[Results], names: Sequence[str]) -> list[str]:
     """Sentences that compare the difference of two velocities with numerical errors and bands."""
-    results = [read(run) for run in runs]
     if not all("velocity" in result for result in results):
         return []
     if any(map(fell, results)):  # errors and bands are those of velocities along the heading
@@ -200,8 +191,8 @@ def _errors_text(runs: Sequence[Path], names: Sequence[str]) -> list[str]:
         whose = "" if name_of == "velocity" else f" of those facing {facing}"
         lines.append(f"the velocities{whose} differ by {words} their numerical error ({shares})")
     lines += [
-        f"{name}: the numerical error is not measured: walkers run {run.name} --accuracy"
-        for name, run, error in zip(names, runs, errors, strict=True)
+        f"{name}: the numerical error is not measured: walkers run {one.directory.name} --accuracy"
+        for name, one, error in zip(names, results, errors, strict=True)
         if not isfinite(error)
     ]
     for name, one in zip(names, results, strict=True):
