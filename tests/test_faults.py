@@ -322,9 +322,9 @@ def test_a_disk_that_is_full_when_the_tables_are_written_is_a_failure_of_the_run
     case = make_case(run=SHORT)
     with mounted(tmp_path / "disk", "2m") as place:
 
-        def measure_without_room(directory: Path) -> object:
+        def measure_without_room(directory: Path) -> None:
             fill(place)
-            return measure(directory)
+            measure(directory)
 
         monkeypatch.setattr("walkers.sweeps.making.measure", measure_without_room)
         with pytest.raises(DiskFull, match="disk full"):

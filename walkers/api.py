@@ -649,12 +649,7 @@ class Sweep:
         >>> walkers.sweep("fig4", tmp).figure(x="liquid.name", log="y").axes[0].get_yscale()
         'log'
         """
-        from walkers.paper.published import predicted
-        from walkers.sweeps.figure import figure_of
-        from walkers.sweeps.figure_options import FigureOptions
-
-        chosen = FigureOptions(**options)
-        return figure_of(self.table(), chosen, predicted if chosen.theory else None)
+        return _figure(self.table(), options)
 
     def plot(self, to: str | Path | None = None, **options: Any) -> list[Path]:
         """Plot the table to a file as in `figure`; by default in the sweep's directory, named after the column."""
@@ -665,7 +660,7 @@ class Sweep:
         place = _path(to) or self.directory / f"{column_of(table, options.get('y'))}.png"
         check_place(place, *(f".{form}" for form in FORMATS))
         runs = [Path(run).name for run in table.loc[table["status"] == "finished", "run"]]
-        return save_figure(self.figure(**options), place, runs, place.suffix.lower()[1:], str(table.attrs["sweep"]))
+        return save_figure(_figure(table, options), place, runs, place.suffix.lower()[1:], str(table.attrs["sweep"]))
 
     def report(self, to: str | Path | None = None) -> Path:
         """Write a self-contained HTML report; see `walkers.sweeps.report.report_sweep`."""
@@ -680,6 +675,16 @@ class Sweep:
         if form != "archive":
             raise refused(self.directory, f"is a sweep: expected one of its runs for {form}, or archive")
         return write_archive(self.directory, _path(to), **options)
+
+
+def _figure(table: pd.DataFrame, options: Mapping[str, Any]) -> Figure:
+    """The figure of the table of a sweep."""
+    from walkers.paper.published import predicted
+    from walkers.sweeps.figure import figure_of
+    from walkers.sweeps.figure_options import FigureOptions
+
+    chosen = FigureOptions(**options)
+    return figure_of(table, chosen, predicted if chosen.theory else None)
 
 
 def sweep(

@@ -66,14 +66,14 @@ def main(arguments: list[str] | None = None) -> NoReturn:
 
 def _status(tokens: list[str]) -> int:
     """Run the program and return its exit status. Unexpected errors are raised."""
-    if tokens and tokens[0].startswith("--library="):
-        tokens = [*tokens[0].split("=", 1), *tokens[1:]]
+    walkers.inputs.chosen_library, words = None, tokens
+    if words and words[0].startswith("--library="):
+        words = [*words[0].split("=", 1), *words[1:]]
     try:
-        walkers.inputs.chosen_library, words = None, tokens
-        if tokens[:1] == ["--library"]:
-            if len(tokens) < 3:
+        if words[:1] == ["--library"]:
+            if len(words) < 3:
                 raise refused("--library", "expected a library file, and a command after it")
-            walkers.inputs.chosen_library, words = Path(tokens[1]), tokens[2:]
+            walkers.inputs.chosen_library, words = Path(words[1]), words[2:]
         if not words or words[0] in _HELP:
             outcome: Any = print(overview())
         elif words[0] == "--version":
@@ -82,7 +82,7 @@ def _status(tokens: list[str]) -> int:
             outcome = _call(words)
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt, SystemExit, _Terminated) as stop:
-        return _report_stop(stop, tokens)
+        return _report_stop(stop, words)
     return outcome if isinstance(outcome, int) else 0
 
 
@@ -213,8 +213,7 @@ def _report_stop(stop: BaseException, tokens: list[str]) -> int:
 
 def _options_of(names: str, tokens: list[str]) -> str:
     """The options of the command for arguments of a function of the package, such as ``begin, end``."""
-    words = tokens[2:] if tokens[:1] == ["--library"] else tokens
-    _, apps, _ = program().parse_commands(words)
+    _, apps, _ = program().parse_commands(tokens)
     arguments = apps[-1].assemble_argument_collection()
     options = {one.name[2:]: one.name for one in arguments} | {one.field_info.name: one.name for one in arguments}
     return ", ".join(options.get(name, name) for name in names.split(", "))

@@ -24,7 +24,7 @@ from walkers.postprocess.drawing import (
     styled,
 )
 from walkers.postprocess.motion import LEAST_SAMPLES
-from walkers.postprocess.quantities import TABLES, axis, declared
+from walkers.postprocess.quantities import TABLES, axis, declared, matches
 from walkers.postprocess.sides import sides, ways
 from walkers.postprocess.tables import Columns
 from walkers.rounding import rounded
@@ -117,7 +117,7 @@ def draw(axes: Axes, table: str, columns: Columns, x: str, y: str, by: str, look
         Options of `matplotlib.axes.Axes.plot` for each line.
     """
     x_label, x_factor = axis(table, x)
-    names = [name for part in y.split() for name in columns if name == part or _numbered(part, name)]
+    names = [name for part in y.split() for name in columns if matches(part, name)]
     series = columns[by] if by else np.zeros(len(columns[x]), dtype=np.int64)
     lines = [(name, series == value) for name in names for value in np.unique(series)]
     for (name, rows), look in zip(lines, looks, strict=True):
@@ -129,10 +129,6 @@ def draw(axes: Axes, table: str, columns: Columns, x: str, y: str, by: str, look
         least = LEAST.get(declared(name.split()[0], TABLES[table]).unit, 0.0)
         if np.isfinite(limits).all() and np.ptp(limits) < least:
             widen(*(limits.mean() + np.array([-0.5, 0.5]) * least))
-
-
-def _numbered(pattern: str, name: str) -> bool:
-    return pattern.endswith("*") and name.startswith(pattern[:-1]) and name[len(pattern) - 1 :].isdigit()
 
 
 def looks_of(labels: Sequence[str]) -> list[dict[str, Any]]:
@@ -226,7 +222,7 @@ def gait_figure(case: Case, tables: Tables) -> Figure:
     trajectory, walkers = tables("trajectory"), tables("walkers")
     number = walkers["walker"][0]
     last = np.flatnonzero(trajectory["walker"] == number)[-2 * case.run.samples_per_cycle - 1 - _BEFORE :]
-    names = ["velocity", *(name for name in trajectory if _numbered("rotation_*", name))]
+    names = ["velocity", *(name for name in trajectory if matches("rotation_*", name))]
     names = [name for name in names if np.isfinite(trajectory[name][last]).all()]
     smooth = _smooth({name: trajectory[name][last] for name in ("cycle", *names)}, "cycle")
     widths, colours = np.linspace(6.0, 1.1, len(names)), [_PALE, *(f"C{n}" for n in range(1, 99))]

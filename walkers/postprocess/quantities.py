@@ -42,13 +42,17 @@ class Quantity:
 
     def names(self, name: str) -> bool:
         """Whether it is the column or number of this name."""
-        number = name.removeprefix(self.name[:-1])
-        return name == self.name or (self.name.endswith("_*") and number.isdigit())
+        return matches(self.name, name)
 
     @property
     def si_unit(self) -> str:
         """The unit of the stored number: a share has none."""
         return "" if self.unit == "share" else self.unit
+
+
+def matches(pattern: str, name: str) -> bool:
+    """Whether a name is the pattern, or has a number in place of its ``*``: ``rotation_2`` of ``rotation_*``."""
+    return name == pattern or (pattern.endswith("_*") and name.removeprefix(pattern[:-1]).isdigit())
 
 
 def unit_shown(unit: str) -> tuple[str, float]:

@@ -108,7 +108,7 @@ def derived(case: Case) -> dict[str, Any]:
     return numbers
 
 
-def measure(directory: str | Path) -> Results:
+def measure(directory: Path) -> None:
     """Measure a run, finished or not; write its tables and, last, ``result.json``.
 
     Raises
@@ -118,12 +118,6 @@ def measure(directory: str | Path) -> Results:
     runner.manifest.FileChanged
         If a dump of a finished run is not what it was.
     """
-    _measure(Path(directory))
-    return read(directory)
-
-
-def _measure(directory: Path) -> None:
-    """Write tables and result of a run."""
     from walkers.postprocess.motion import read_motion
     from walkers.postprocess.tables import write_table
 
@@ -209,7 +203,7 @@ def ensure_measured(directory: Path) -> None:
             return
     except (InputError, OSError, ValueError):
         pass
-    _measure(directory)
+    measure(directory)
 
 
 def plain(numbers: Mapping[str, Any]) -> dict[str, Any]:

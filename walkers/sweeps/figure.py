@@ -448,7 +448,7 @@ def _series(
     if "down" in shown:
         shape = {"marker": _DOWN["marker"], "mfc": "none", "ls": "--" if is_line else "none"}
         axes.plot(at, shown["down"], lw=0.9, **{**look, **shape})
-    along, curves = theory.curves(rows, x) if theory and theory.values and is_line else (at, {})
+    along, curves = theory.curves(rows, x) if theory and is_line else (at, {})
     for number, (model, values) in enumerate(theory.values.items() if theory else ()):
         has_curve = model in curves
         curve = (along, curves[model]) if has_curve else (at, values[rows])

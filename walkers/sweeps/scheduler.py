@@ -335,6 +335,10 @@ def run_sweep(
             text = "replaces a sweep of the same name without common runs; figures and reports there show that one"
             warnings.warn(f"{record.directory}: {text}", SweepReplacedWarning, stacklevel=2)
     write_record(record)
+    for place in {record.out / run for run in record.runs}:
+        if is_finished(place):
+            with suppress(WalkersError, OSError, ValueError):  # it is among the failures
+                ensure_measured(place)
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     with suppress(ValueError, OSError):  # each point of a running deck keeps a lock file open
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
@@ -346,10 +350,6 @@ def run_sweep(
         raise OutputGone(record.directory)
     if list(read_record(record.directory).runs) != list(record.runs):
         raise SweepStopped(f"{record.directory} was replaced by another sweep of the same name; the runs are kept")
-    for run in dict.fromkeys(record.runs):
-        if is_finished(record.out / run):
-            with suppress(WalkersError, OSError, ValueError):  # it is among the failures
-                ensure_measured(record.out / run)
     return record, [*failures, *_failures(record, checked_states(record), [UNREADABLE])]
 
 
