@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -72,9 +73,9 @@ def fig1b(sources: Sources) -> Figure:
     for panel, frame, (_, middle), contacts in zip(axes, frames, centre, bridges, strict=True):
         bounds = np.array([along, (middle - half, middle + half), (0.0, 2.0 * largest)])
         scene = Scene(motion, view, 1e3 * bounds[:, 0], 1e3 * bounds[:, 1], shaken=False)
-        window = Window(scene, [round(pixels * extent) for extent in np.ptp(bounds[:2], axis=1).tolist()])
-        picture = window.picture(int(frame), contacts)
-        window.close()
+        size = [round(pixels * extent) for extent in np.ptp(bounds[:2], axis=1).tolist()]
+        with closing(Window(scene, size)) as window:
+            picture = window.picture(int(frame), contacts)
         edges = [(along[0] - origin) * 1e3, (along[1] - origin) * 1e3, -half * 1e3, half * 1e3]
         panel.imshow(picture, extent=edges, interpolation="bilinear")
         panel.set(yticks=[], title=f"{trajectory.time[frame]:.1f} s")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from math import isfinite, nan
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -98,8 +98,8 @@ def bands_of(directory: Path, rests: Sequence[Mapping[str, Any]], numbers: Mappi
             {one["key"]: one["range"] for one in part if one["range"]} for part in (spread["varied"], rests)
         )
         for name, band in spread["bands"].items() if drawn == ranges else ():
-            number = numbers.get(name, nan)
-            ends = [band["low"], band["high"], *([number] if isfinite(number) else [])]
+            number = numbers.get(name)
+            ends = [band["low"], band["high"], *([number] if number is not None and isfinite(number) else [])]
             bands |= {f"{name}_low": min(ends), f"{name}_high": max(ends)}
     return bands
 
