@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
+from docs import tables
 from walkers import load_case, run, sweep
 from walkers.api import Run, climb
 from walkers.calibration.calibrate import calibrate
@@ -42,7 +43,6 @@ from walkers.postprocess.film_options import FilmOptions
 from walkers.postprocess.results import VERSION
 from walkers.runner.files import read_json, write_json, write_text
 from walkers.runner.launch import cores_here
-from walkers.sweeps.climbing import describe_climbs
 from walkers.sweeps.scheduler import Options
 from walkers.templates.deck import CONTENT_VERSION
 
@@ -100,11 +100,9 @@ def _of_climbs(name: str, *others: str, assembly: Mapping[str, Any] | None = Non
     def make(out: Path, docs: Path) -> None:
         for sweep_name in names:
             sweep(sweep_name, out)
-        found = climb([out / sweep_name for sweep_name in names], to=docs / files[0])
-        command = f"$ walkers climb {' '.join(names)}"
+        climbs = climb([out / sweep_name for sweep_name in names], to=docs / files[0])
         write_text(
-            docs / files[1],
-            "\n".join([f"# {name}", "", "```console", command, *map(describe_climbs, found), "```", ""]),
+            docs / files[1], tables.page(f"walkers climb {' '.join(names)}", list(map(tables.climbs_of, climbs)))
         )
         if assembly:
             done = run(load_case("pile-small", assembly), out)
@@ -181,6 +179,12 @@ def _calibrated() -> list[Case]:
     return [load_case(read.file.case, {**base, **values}) for values in read.experiments.values()]
 
 
+def _make_trays(out: Path, docs: Path) -> None:
+    make_figures(out, docs / "figures", Options(cores_here()), only=["tray-phases"], formats=("png",))
+    rows = tables.means_of_trays(sweep("tray-phases", out).table())
+    write_text(docs / "figures" / "tray-phases.md", tables.page("walkers list tray-phases", rows))
+
+
 def _shipped(*names: str) -> Callable[[], list[Case]]:
     return lambda: [load_case(name) for name in names]
 
@@ -214,6 +218,11 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     ),
     "pile": _of_run("pile", "pile-small", {"run.duration": "10 s"}),
     **{name: _of_figure(name, f"figures/{name}.png", sweeps=one.sweeps) for name, one in FIGURES.items()},
+    "tray-phases": Illustration(
+        ("figures/tray-phases.png", "figures/tray-phases.md"),
+        lambda: load_sweep("tray-phases").cases(),
+        _make_trays,
+    ),
     "comparison": _of_figure("comparison", "figures/comparison.md", "figures/comparison.json", sweeps=COMPARED),
     "validation": Illustration(
         (CHECKED.as_posix(), "figures/benchmarks.png"),
@@ -277,11 +286,12 @@ def pages_of(docs: Path) -> list[Path]:
 
 
 def facts(docs: Path) -> dict[str, str]:
-    """Numbers that sentences may quote: of the comparison with the paper, and of `CHECKED`."""
+    """Numbers that sentences may quote: of the comparison with the paper, of `CHECKED`, of the tables of climbs."""
     compared: dict[str, Any] = read_json(docs / "figures" / "comparison.json")
     numbers = {one["key"]: f"{one['engine']:.3g}" for one in compared["numbers"] if one["engine"] is not None}
     checked = read_json(docs / CHECKED)["lines"]
-    return {**numbers, "agree": f"{compared['agree']} of {compared['of']}", **_of_checks(checked)}
+    agree = f"{compared['agree']} of {compared['of']}"
+    return {**numbers, "agree": agree, **_of_checks(checked), **dict(tables.cells(docs / "figures"))}
 
 
 def _of_checks(lines: Sequence[Mapping[str, Any]]) -> dict[str, str]:
