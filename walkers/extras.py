@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from walkers.errors import InputError, Problem
 
 EXTRAS = {
-    "archive": ("an archive", ("rocrate", "tomli-w")),
+    "archive": ("an archive", ("tomli-w",)),
     "calibrate": ("a calibration", ("corner", "scikit-learn", "threadpoolctl")),
     "check": ("a check of the engine", ("joblib", "numba")),
     "cluster": ("a sweep on a cluster", ("parsl",)),

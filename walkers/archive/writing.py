@@ -5,28 +5,24 @@ from __future__ import annotations
 import hashlib
 import io
 import re
-import time
+import shutil
 import zipfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, NamedTuple
 
-from walkers.archive.crate import METADATA_NAME, PAPER, README_NAME, Author, describe_crate
-from walkers.archive.verification import SUMS_NAME, verify
-from walkers.errors import InputError, Problem, WalkersError, refused
+from walkers.archive.crate import METADATA_NAME, PAPER, Author, describe_crate
+from walkers.archive.verification import SUMS_NAME
+from walkers.errors import refused
 from walkers.extras import require
 from walkers.runner.directory import CASE_NAME, case_of, name_of
 from walkers.runner.files import beside, checksum, json_bytes
-from walkers.runner.manifest import MANIFEST_NAME, read_manifest
-from walkers.runner.provenance import PROJECT
+from walkers.runner.manifest import MANIFEST_NAME, FileChanged, read_manifest
 from walkers.sweeps.table import RECORD_NAME, read_record, states
 from walkers.text import printable, rendered
 
-_STORED = ("/", ".parquet", ".png", ".mp4")
-"""Suffixes of names that are not compressed again, and of folders."""
-_CHUNK_BYTES = 1 << 20
-_MOMENT = "%Y-%m-%dT%H:%M:%SZ"
+README_NAME = "README.md"
 RUNS = "runs"
 """Folder of the run directories in an archive: the default folder of the program."""
 _MEANINGS = {
@@ -59,12 +55,7 @@ _OF_SUFFIX = {
 _REST = ("output", "other output of the engine")
 
 
-class ArchiveRefused(WalkersError):
-    """A run whose files have changed since it was finished."""
-
-
-@dataclass(frozen=True)
-class File:
+class File(NamedTuple):
     """A file of an archive: source or contents, SHA-256, role (in the actions of the crate) and meaning."""
 
     source: Path | bytes
@@ -80,14 +71,12 @@ class File:
         path = Path(place)
         return cls(source, sha256, *_MEANINGS.get(path.name, _OF_SUFFIX.get(path.suffix, _REST)))
 
-    @property
-    def size(self) -> int:
-        """Size in bytes."""
-        return len(self.source) if isinstance(self.source, bytes) else self.source.stat().st_size
+    def open(self) -> BinaryIO:
+        """The contents, to be read."""
+        return io.BytesIO(self.source) if isinstance(self.source, bytes) else self.source.open("rb")
 
 
-@dataclass(frozen=True)
-class Contents:
+class Contents(NamedTuple):
     """Contents of an archive: name, title, manifests of the runs by their folders, and files by their places."""
 
     name: str
@@ -99,16 +88,6 @@ class Contents:
     def finished(self) -> str:
         """End of the last run, ISO 8601."""
         return max(str(manifest["finished"]) for manifest in self.manifests.values())
-
-    def describe(self) -> str:
-        """The contents in a sentence."""
-        runs = "A run" if len(self.manifests) == 1 else f"{len(self.manifests)} runs"
-        left_out = any("left_out" in manifest for manifest in self.manifests.values())
-        return (
-            f"{runs} of wet granular walkers, simulated by the discrete element method with LIGGGHTS through {PROJECT}"
-            ": cases, decks, output of the engine, and the tables and results computed from it."
-            f"{' The dumps, from which the tables were computed, are left out.' if left_out else ''}"
-        )
 
 
 def write_archive(
@@ -134,40 +113,32 @@ def write_archive(
     ------
     InputError
         If the directory is no run or sweep, is not finished, or an option is invalid.
-    ArchiveRefused
+    FileChanged
         If a file differs from its manifest.
     """
     require("archive")
     _check(authors, licence)
-    directory = Path(directory)
-    changed = [part.describe() for part in verify(directory) if not (part.of_points or part.passed)]
-    if changed:  # `contents_of` asks for all points
-        raise ArchiveRefused(f"{directory} is not archived, files have changed:\n" + "\n".join(changed))
-    contents = contents_of(directory, dumps=dumps)
+    contents = contents_of(Path(directory), dumps=dumps)
     to = Path(f"{contents.name}.zip") if to is None else to
     if to.suffix != ".zip" or to.is_dir():
         raise refused("to", f"expected the name of a .zip file, not {to}")
-    about = {
+    by = printable(", ".join(author.name for author in authors))
+    about: dict[str, Any] = {"contents": contents, "by": by, "licence": licence, "paper": PAPER, "sums": SUMS_NAME}
+    about["left_out"] = any("left_out" in manifest for manifest in contents.manifests.values())
+    described = {
         METADATA_NAME: json_bytes(describe_crate(contents, authors, licence)),
-        README_NAME: rendered(
-            "walkers.archive",
-            "README.md.j2",
-            contents=contents,
-            by=printable(", ".join(author.name for author in authors)),
-            licence=licence,
-            paper=PAPER,
-            sums=SUMS_NAME,
-        ).encode(),
+        README_NAME: rendered("walkers.archive", "README.md.j2", **about).encode(),
     }
-    listed = {**{place: File.of(place, text) for place, text in about.items()}, **contents.files}
-    sums = "".join(f"{file.sha256}  {place}\n" for place, file in listed.items())
-    moment = time.strptime(contents.finished, _MOMENT)[:6]  # of all files, for the same bytes again
+    files = {**{place: File.of(place, text) for place, text in described.items()}, **contents.files}
+    sums = "".join(f"{file.sha256}  {place}\n" for place, file in files.items()).encode()
+    date = datetime.fromisoformat(contents.finished).timetuple()[:6]  # of all files, for the same bytes again
     with beside(to) as new, zipfile.ZipFile(new, "w") as archive:
-        for place in dict.fromkeys(f"{folder}/" for name in listed for folder in reversed(Path(name).parents[:-1])):
-            archive.writestr(_info(place, moment), b"")
-        archive.writestr(_info(SUMS_NAME, moment), sums)
-        for place, file in listed.items():
-            _write(archive, place, file, moment)
+        for place in contents.manifests:
+            folder = zipfile.ZipInfo(f"{place}/", date)
+            folder.external_attr = 0o40755 << 16 | 0x10
+            archive.writestr(folder, b"")
+        for place, file in {SUMS_NAME: File.of(SUMS_NAME, sums), **files}.items():
+            _write(archive, zipfile.ZipInfo(place, date), file)
     return to
 
 
@@ -181,24 +152,16 @@ def _check(authors: Sequence[Author], licence: str) -> None:
             raise refused("orcid", f"expected an ORCID such as 0000-0002-1825-0097, found {author.orcid}")
 
 
-def _info(place: str, moment: tuple[int, ...]) -> zipfile.ZipInfo:
-    info = zipfile.ZipInfo(place, moment)  # type: ignore[arg-type]
-    info.compress_type = zipfile.ZIP_STORED if place.endswith(_STORED) else zipfile.ZIP_DEFLATED
-    info.create_system = 3
-    info.external_attr = (0o40755 << 16 | 0x10) if place.endswith("/") else 0o100644 << 16
-    return info
-
-
-def _write(archive: zipfile.ZipFile, place: str, file: File, moment: tuple[int, ...]) -> None:
-    """Write a file, and check its checksum again."""
-    digest = hashlib.sha256()
-    source = io.BytesIO(file.source) if isinstance(file.source, bytes) else file.source.open("rb")
-    with source, archive.open(_info(place, moment), "w", force_zip64=file.size >= zipfile.ZIP64_LIMIT) as copy:
-        while chunk := source.read(_CHUNK_BYTES):
-            digest.update(chunk)
-            copy.write(chunk)
-    if digest.hexdigest() != file.sha256:
-        raise ArchiveRefused(f"{place} changed while it was archived")
+def _write(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: File) -> None:
+    """Write a file, and compare what was written with its checksum."""
+    info.compress_type, info.external_attr = zipfile.ZIP_DEFLATED, 0o100644 << 16
+    with file.open() as source, archive.open(info, "w", force_zip64=True) as copy:
+        shutil.copyfileobj(source, copy)
+    with archive.open(info) as written:
+        if hashlib.file_digest(written, "sha256").hexdigest() != file.sha256:  # type: ignore[arg-type]
+            raise FileChanged(
+                f"{info.filename} has changed since the run was finished: walkers check files lists all changes"
+            )
 
 
 def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
@@ -232,25 +195,18 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
 
 def _packed(directory: Path, dumps: bool) -> tuple[str, dict[str, Any], dict[str, File]]:
     """Place and manifest of a run, and its files by place: those of the manifest, and its case file, if it is known."""
-    manifest = read_manifest(directory)
-    for key in ("started", "finished"):
-        try:
-            time.strptime(manifest[key], _MOMENT)
-        except (ValueError, TypeError) as error:
-            text = "expected a time such as 2026-01-31T12:00:00Z"
-            raise InputError(str(directory / MANIFEST_NAME), [Problem(key, f'"{manifest[key]}"', text)]) from error
+    manifest, record = read_manifest(directory), directory / MANIFEST_NAME
     case, place = case_of(directory), f"{RUNS}/{directory.resolve().name}"
+    files = {name: File.of(name, directory / name, manifest["sha256"].get(name)) for name in manifest["files"]}
     before = set(manifest.get("left_out", ()))
-    listed = {name: File.of(name, directory / name, manifest["sha256"].get(name)) for name in manifest["files"]}
-    left_out = {name for name, file in listed.items() if name in before or (file.role == "dump" and not dumps)}
-    record: Path | bytes = directory / MANIFEST_NAME
+    left_out = {name for name, file in files.items() if name in before or (file.role == "dump" and not dumps)}
+    sources: dict[str, Path | bytes] = {f"{name_of(case.name)}.toml": _toml(case.document)} if case.document else {}
+    sources[MANIFEST_NAME] = record
     if left_out - before:
         manifest["left_out"] = sorted(left_out)
-        record = json_bytes(manifest)
-    written: dict[str, Path | bytes] = {f"{name_of(case.name)}.toml": _toml(case.document)} if case.document else {}
-    files = {name: File.of(name, source) for name, source in (written | {MANIFEST_NAME: record}).items()}
-    files |= {name: file for name, file in listed.items() if name not in left_out}
-    return place, manifest, {f"{place}/{name}": file for name, file in files.items()}
+        sources[MANIFEST_NAME] = json_bytes(manifest)
+    files |= {name: File.of(name, source) for name, source in sources.items()}
+    return place, manifest, {f"{place}/{name}": file for name, file in files.items() if name not in left_out}
 
 
 def _toml(tables: Any) -> bytes:
