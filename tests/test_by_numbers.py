@@ -23,15 +23,14 @@ from walkers.inputs.drive import Harmonic, waveform
 from walkers.inputs.loads import bridge_at_rest, contact_loads
 from walkers.inputs.table import changed
 from walkers.inputs.units import Kind, quantity_text
-from walkers.postprocess.cycles import work_of
 from walkers.postprocess.films import speed_text
-from walkers.postprocess.gait import averages, gait, settled_samples, turned_over_at
-from walkers.postprocess.motion import Bridges, Group, Motion
+from walkers.postprocess.gait import averages, settled_samples, turned_over_at
+from walkers.postprocess.motion import Bridges, Motion
 from walkers.postprocess.piles import _joined, _of_climbs, _state_of
 from walkers.postprocess.report.player import _points
 from walkers.postprocess.scene import Scene, rotations_at, turned_in
 from walkers.postprocess.uncertainty import SPREAD_NAME, bands_of, spread_of
-from walkers.postprocess.walking import _rows, _scatter
+from walkers.postprocess.walking import _scatter, tables_of
 from walkers.runner.files import write_json
 from walkers.runner.launch import Progress
 from walkers.runner.manifest import _iso
@@ -194,7 +193,7 @@ def test_measuring_begins_after_all_of_the_settling_cycles() -> None:
     tables = {"dimers": {"radii": ["0.3 mm", "0.2 mm"]}}
     case = case_of(**tables, run={"frames_per_second": 40, "cycles": 20, "settling_cycles": 7})
     assert (case.run.cycles_per_sample, case.run.samples_per_cycle, case.run.settled_strobes) == (2, 1, 4)
-    samples = settled_samples(Group(resting(case, 11), case.walkers[0], []))
+    samples = settled_samples(resting(case, 11).group(0))
     assert (samples.start, samples.stop) == (4, 10)
 
 
@@ -282,9 +281,9 @@ def test_a_walker_is_separated_where_any_of_its_pairs_is() -> None:
     position = motion.position.copy()
     position[50:, 2, 0] -= 1e-3
     (group,) = replace(motion, position=position).groups
-    assert _rows(group, gait(group), averages(group))["separated_fraction"] == pytest.approx(10.0 / 40.0)
+    assert tables_of(group)["walkers"]["separated_fraction"] == pytest.approx(10.0 / 40.0)
     (group,) = motion.groups
-    assert _rows(group, gait(group), averages(group))["separated_fraction"] == 0.0
+    assert tables_of(group)["walkers"]["separated_fraction"] == 0.0
 
 
 def test_a_walker_has_turned_over_90_degrees_from_its_start() -> None:
@@ -315,7 +314,7 @@ def test_the_work_of_two_harmonics_with_phases() -> None:
     (group,) = replace(motion, position=position, velocity=velocity).groups
     mass = 4.0 / 3.0 * pi * (LARGE**3 + SMALL**3) * case.beads.density
     expected = pi * mass * (39.2 * 1e-4 + 2.0 * 19.6 * 3e-5)  # the second one has two periods in a cycle
-    np.testing.assert_allclose(work_of(group, averages(group).centre), np.full((6, 1), expected), rtol=1e-3)
+    np.testing.assert_allclose(averages(group).work, np.full((6, 1), expected), rtol=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,7 @@ from walkers.postprocess.drawing import styled
 from walkers.postprocess.figures import LEAST, MOST_NAMED, climb_figure, draw, figures_of, looks_of, plot_run
 from walkers.postprocess.film_options import FilmOptions, parse_time
 from walkers.postprocess.films import film_times, named_direction
-from walkers.postprocess.motion import Group, Motion, read_bridges, read_motion
+from walkers.postprocess.motion import Group, Motion, between, read_bridges, read_motion
 from walkers.postprocess.necks import bridges_at, ends_of, necks_of
 from walkers.postprocess.paraview import _walls, write_vtk
 from walkers.postprocess.scene import Scene, Window, axes_toward, camera_axes, mesh_of, walls_of
@@ -384,8 +384,8 @@ def motion(filmed: Path) -> Motion:
 
 def test_places_between_frames_lie_on_the_motion(motion: Motion) -> None:
     """Each second frame, predicted from its neighbours, to a hundredth of what it moves meanwhile."""
-    between = motion.select(slice(None, None, 2)).between(0.5).position
-    errors = np.abs(between - motion.position[1::2]).max(axis=(1, 2))[20:60]
+    halfway = between(motion.select(slice(None, None, 2)), 0.5)
+    errors = np.abs(halfway - motion.position[1::2]).max(axis=(1, 2))[20:60]
     moved = np.abs(np.diff(motion.position, axis=0)).max()
     assert errors.max() < 0.1 * moved
     assert np.median(errors) < 0.01 * moved

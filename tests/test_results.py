@@ -123,8 +123,7 @@ def test_the_orientation_of_a_walker_that_goes_round_does_not_jump(moved: Group)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     position = moved.position.copy()
     position[..., :2] = np.einsum("xyf,wby->fwbx", turn, moved.position[0, ..., :2])
-    round_and_round = replace(moved)
-    round_and_round.__dict__["position"] = position
+    round_and_round = replace(moved, position=position)
     turned = round_and_round.orientation - round_and_round.orientation[0]
     np.testing.assert_allclose(turned, np.broadcast_to(angle[:, None], turned.shape), atol=1e-9)
 
@@ -245,7 +244,7 @@ def _sampled(group: Group) -> Averages:
     """The same from the samples alone."""
     seen, samples = gait(group), settled_samples(group)
     means = (seen.rotation[samples], seen.sliding[samples], seen.gap[samples] > 0.0)
-    return Averages(*(one.mean(axis=0) for one in means), group.mass_centre)
+    return Averages(*(one.mean(axis=0) for one in means), np.zeros(0))
 
 
 def test_means_do_not_depend_on_how_often_is_looked(groups: dict[int, Group]) -> None:
@@ -279,7 +278,7 @@ def test_with_few_samples_a_cycle_gaps_are_looked_at_there_alone(groups: dict[in
     motion = replace(few.motion, case=few.case.put("run.samples_per_cycle", 4))
     names = ("time", "position", "velocity", "spin", "substrate", "substrate_velocity", "mean_spin")
     motion = replace(motion, **{name: getattr(motion, name)[::5] for name in names}, frames=motion.frames[::5])
-    thinned = Group(motion, few.make, few.walkers)
+    (thinned,) = motion.groups
     samples = settled_samples(thinned)
     np.testing.assert_array_equal(averages(thinned).open, (gaps(thinned)[samples] > 0.0).mean(axis=0))
 

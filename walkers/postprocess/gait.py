@@ -1,23 +1,32 @@
-"""How walkers walk: velocities, rotation and sliding, orientation, contacts, posture; steady, constant or not.
+"""How walkers walk: velocities, rotation and sliding, contacts, work of the drive, posture; steady, constant or not.
 
 Velocities are relative to the substrate and along the heading e, from the small bead to the large one. With the normal
 z of the substrate and the angular velocity ω of a bead, the rotation velocity is R ω·(z × e), the paper's −R dφ/dt
 (Fig. 4), and the sliding velocity at the substrate is v·e − R ω·(z × e), its R dφ/dt + v_x. Between two beads the
 sliding velocity is R1 dφ1/dt + R2 dφ2/dt about the level line perpendicular to the line between their centres. A bead
 slides on its nearest wall, whose normal replaces z.
+
+In the frame of the walls, which have the acceleration a(t), an inertial force -M a(t) acts at the mass centre of a
+walker. Its work per cycle is W = -M ∮ a · dx along the path x of the mass centre relative to the walls. Friction,
+bridges and collisions of a steady walker dissipate this work; in the laboratory it is the work of the walls' forces. If
+a walker turns or is not steady, the two differ; the results are those of the inertial force. Compared with 200 samples
+per cycle, the work with 20 samples is within 0.01 %, with 10 samples within 0.2 %.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
+from functools import reduce
+from itertools import pairwise
+from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from walkers.inputs.run import CONSTANT
 from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
-from walkers.postprocess.motion import Group, read_motion
+from walkers.postprocess.motion import Group, between, read_motion
 from walkers.postprocess.sides import REST, SEPARATED, STEADY_SPEED
 
 if TYPE_CHECKING:
@@ -32,17 +41,17 @@ UPRIGHT = np.radians(15.0)
 """Largest final angle of an upright walker, rad."""
 _NO_MORE = np.radians(0.5)
 """Largest increase of its angle in the second half of a run, rad."""
-POSTURES = ("upright", "leaning", "turned_over")
 ASTRAY = np.pi / 4.0
 """Largest final angle of a walker that is on the axis, rad."""
 _LITTLE, _FADING, _NO_FASTER = 0.005, 0.9, 1e-4
 """A walker of constant velocity turns by less than the first angle (rad) per cycle, and in the second half of the run
 by less than the third angle more than in the first half; or by at most the second number times what it turned before.
 """
+_PARTS = 10
+"""Parts of an interval between samples at which gaps and the force of the drive are evaluated."""
 
 
-@dataclass(frozen=True)
-class Gait:
+class Gait(NamedTuple):
     """Time series of F frames and W walkers of n beads; SI units.
 
     Velocity of the mass centre along the heading, shape (F, W); rotation velocity of the beads, shape (F, W, n);
@@ -61,9 +70,8 @@ def gait(group: Group) -> Gait:
     radii, heading, upward = group.radii, group.heading, np.array([0.0, 0.0, 1.0])
     along = np.einsum("fwbx,fwx->fwb", group.velocity, heading)
     rotation = radii * np.einsum("fwbx,fwx->fwb", group.spin, np.cross(upward, heading))
-    at_walls, normal = _nearest_wall(group)
-    turning = rotation if normal is None else radii * np.einsum(
-        "fwbx,fwbx->fwb", group.spin, np.cross(normal, heading[:, :, None])
+    turning = rotation if group.case.boundary.bare else radii * np.einsum(
+        "fwbx,fwbx->fwb", group.spin, np.cross(_normals(group), heading[:, :, None])
     )  # fmt: skip
     sliding = [along - turning]
     for one, other in group.make.pairs:
@@ -74,76 +82,79 @@ def gait(group: Group) -> Gait:
         spin = radii[one] * group.spin[:, :, one] + radii[other] * group.spin[:, :, other]
         sliding.append(-np.einsum("fwx,fwx->fw", spin, np.cross(upward, arm))[..., None])
     velocity = along @ (radii**3 / np.sum(radii**3))
-    return Gait(velocity, rotation, np.concatenate(sliding, axis=-1), gaps(group, at_walls))
+    return Gait(velocity, rotation, np.concatenate(sliding, axis=-1), gaps(group))
 
 
-_PARTS = 10
-"""Parts of an interval between samples at which gaps are evaluated."""
+def gaps(group: Group) -> FloatArray:
+    """Gaps at the contacts (as in `Gait`), m, shape (F, W, n + pairs)."""
+    radii, position, boundary = group.radii, group.position, group.case.boundary
+    heights = [position[..., 2]] if boundary.bare else [wall.distances(position) for wall in boundary.walls]
+    gap = [reduce(np.minimum, heights) - radii]
+    for one, other in group.make.pairs:
+        distance = np.linalg.norm(position[:, :, one] - position[:, :, other], axis=-1)
+        gap.append((distance - (radii[one] + radii[other]))[..., None])
+    return np.concatenate(gap, axis=-1)
 
 
-@dataclass(frozen=True)
-class Averages:
-    """Means over the cycles after the settling ones, and paths between samples; contacts as in `Gait`.
+def _normals(group: Group) -> FloatArray:
+    """Normal of the wall that is nearest to each bead, shape (F, W, n, 3)."""
+    walls, position = group.case.boundary.walls, group.position
+    nearest = np.argmin([wall.distances(position) for wall in walls], axis=0)
+    normals = np.stack([wall.normals(position) for wall in walls])
+    normal: FloatArray = np.take_along_axis(normals, nearest[None, ..., None], axis=0)[0]
+    return normal
 
-    Rotation, m/s, shape (W, n); sliding, m/s, and share of the time with open contacts, shape (W, n + pairs); mass
-    centres at the ends of all parts of the intervals between samples, m, shape (parts + 1, F - 1, W, 3).
+
+class Averages(NamedTuple):
+    """Means over the cycles after the settling ones, and work of the drive; contacts as in `Gait`.
+
+    Rotation, m/s, shape (W, n); sliding, m/s, and share of the time with open contacts, shape (W, n + pairs); work on
+    each walker in each cycle, J, shape (cycles, W), NaN if the frames do not resolve a cycle.
     """
 
     rotation: FloatArray
     sliding: FloatArray
     open: FloatArray
-    centre: FloatArray
+    work: FloatArray
 
 
 def averages(group: Group) -> Averages:
-    """Mean rotation and sliding and share of open contacts after the settling cycles.
+    """Mean rotation and sliding, share of open contacts, and work.
 
     Means over 20 samples per cycle have errors up to 10 % if contacts open, because spins change within few steps when
-    beads touch. Therefore spins are averages of the engine over all steps, velocities are displacements, and gaps are
-    evaluated ten times per interval between samples by cubic interpolation (with less than eight samples per cycle, at
-    the samples).
+    beads touch. Therefore spins are averages of the engine over all steps, velocities are displacements, and gaps and
+    work are evaluated ten times per interval between samples by cubic interpolation (with less than eight samples per
+    cycle, gaps at the samples).
     """
-    samples, parts = settled_samples(group), _PARTS if group.motion.follows_cycles else 1
-    mean = gait(Group(group.motion.averaged, group.make, group.walkers))
-    opened, centres = [], []
-    for share in np.linspace(0.0, 1.0, parts + 1).tolist():
-        look = Group(group.motion.between(share), group.make, group.walkers)
-        centres.append(look.mass_centre)
-        if share < 1.0:
-            opened.append((gaps(look)[samples] > 0.0).mean(axis=0))
+    run, samples = group.case.run, settled_samples(group)
+    parts = _PARTS if group.motion.follows_cycles else 1
+    opened, begin, interval = [], group.time[:-1], np.diff(group.time)
+    work = np.full((len(interval), len(group.walkers)), 0.0 if parts > 1 else np.nan)
+    looks = (replace(group, position=between(group, share)) for share in np.linspace(0.0, 1.0, parts + 1).tolist())
+    for part, (before, after) in enumerate(pairwise(looks)):
+        opened.append((gaps(before)[samples] > 0.0).mean(axis=0))
+        for harmonic in group.case.excitation.harmonics:
+            phase = harmonic.angular_frequency * (begin + (part + 0.5) / parts * interval) + harmonic.phase
+            pull = harmonic.peak_acceleration * np.sin(phase)
+            work += pull[:, None] * ((after.mass_centre - before.mass_centre) @ np.array(harmonic.direction))
+    cycles = len(work) // run.samples_per_cycle
+    of_cycles = work[: cycles * run.samples_per_cycle].reshape(cycles, run.samples_per_cycle, -1).sum(axis=1)
+    mean = gait(group.motion.averaged.group(group.walkers[0].make))
     return Averages(
         rotation=mean.rotation[samples].mean(axis=0),
         sliding=mean.sliding[samples].mean(axis=0),
         open=np.mean(opened, axis=0),
-        centre=np.array(centres),
+        work=mass_of(group) * of_cycles,
     )
 
 
-def gaps(group: Group, at_walls: FloatArray | None = None) -> FloatArray:
-    """Gaps at the contacts (as in `Gait`), m, shape (F, W, n + pairs); ``at_walls`` are those at walls, if known."""
-    radii, position = group.radii, group.position
-    found = [_nearest_wall(group)[0] if at_walls is None else at_walls]
-    for one, other in group.make.pairs:
-        distance = np.linalg.norm(position[:, :, one] - position[:, :, other], axis=-1)
-        found.append((distance - (radii[one] + radii[other]))[..., None])
-    return np.concatenate(found, axis=-1)
+def mass_of(group: Group) -> float:
+    """Mass of a walker, kg."""
+    return float(4.0 / 3.0 * pi * np.sum(group.radii**3) * group.case.beads.density)
 
 
-def _nearest_wall(group: Group) -> tuple[FloatArray, FloatArray | None]:
-    """Gap of each bead to its nearest wall, and the normal of this wall; None if the floor is the only wall."""
-    boundary, position = group.case.boundary, group.position
-    if boundary.bare:
-        return position[..., 2] - group.radii, None
-    heights = np.stack([wall.distances(position) for wall in boundary.walls])
-    normals = np.stack([wall.normals(position) for wall in boundary.walls])
-    nearest = np.argmin(heights, axis=0)[None]
-    at_walls = np.take_along_axis(heights, nearest, axis=0)[0] - group.radii
-    return at_walls, np.take_along_axis(normals, nearest[..., None], axis=0)[0]
-
-
-@dataclass(frozen=True)
-class Walk:
-    """Velocities of W walkers after the settling cycles, m/s, each of shape (W,).
+class Walk(NamedTuple):
+    """Velocities of W walkers after the settling cycles, m/s, each of shape (W,), as in the table ``walkers``.
 
     ``velocity`` is the slope of the distance along the heading, one sample per cycle (`fit_slopes`). Axial and lateral
     velocities are those of the mass centre along and across the drive axis. ``steady`` is whether the first and the
@@ -166,8 +177,7 @@ def distance_walked(group: Group) -> tuple[FloatArray, FloatArray]:
     strobe = group.case.run.samples_per_cycle
     centre, heading = group.mass_centre[::strobe], group.heading[::strobe]
     steps = np.einsum("fwx,fwx->fw", np.diff(centre, axis=0), (heading[1:] + heading[:-1]) / 2.0)
-    distance = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
-    return group.time[::strobe], distance
+    return group.time[::strobe], np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
 
 
 def walk(group: Group) -> Walk:
@@ -183,8 +193,7 @@ def walk(group: Group) -> Walk:
     if len(time) < settled + 2:
         raise DumpError(f"the dump holds {len(time) - 1} cycles, no more than the {settled} settling ones")
     time, distance = time[settled:], distance[settled:]
-    velocity = fit_slopes(time, distance)
-    first = second = velocity
+    velocity = first = second = fit_slopes(time, distance)
     middle = (len(time) + 1) // 2
     if middle >= 2:
         first = fit_slopes(time[:middle], distance[:middle])
@@ -222,7 +231,7 @@ def turned_over_at(group: Group) -> FloatArray:
 
 
 def postures(group: Group) -> list[str]:
-    """Posture of each walker on a slope or a wall, one of `POSTURES`.
+    """Posture of each walker on a slope or a wall: ``upright``, ``leaning`` or ``turned_over``.
 
     A walker with its large bead uphill can tip over like an inverted pendulum; then its velocity has no meaning. The
     angle is evaluated once per cycle. A walker has turned over if it turned by more than 90° from its start. It is
@@ -230,10 +239,10 @@ def postures(group: Group) -> list[str]:
     the second half of the run. All others lean.
     """
     off = np.abs(group.orientation[:: group.case.run.samples_per_cycle])
-    end, middle = off[-1], off[len(off) // 2]
-    stands = (end <= UPRIGHT) & (end <= middle + _NO_MORE)
+    stands = (off[-1] <= UPRIGHT) & (off[-1] <= off[len(off) // 2] + _NO_MORE)
     turned = np.isfinite(turned_over_at(group))
-    return [POSTURES[number] for number in np.select([turned, stands], [2, 0], 1)]
+    found: list[str] = np.select([turned, stands], ["turned_over", "upright"], "leaning").tolist()
+    return found
 
 
 def are_constant(directory: Path) -> bool:

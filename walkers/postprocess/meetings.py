@@ -20,7 +20,7 @@ from walkers.inputs.boundary import FLOOR
 from walkers.inputs.case import Case
 from walkers.postprocess.clusters import connected
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
-from walkers.postprocess.motion import Bridges, Group, Motion
+from walkers.postprocess.motion import Bridges, Motion
 from walkers.postprocess.numbers import Measured
 from walkers.postprocess.tables import Columns
 
@@ -122,10 +122,9 @@ def _events(time: FloatArray, heading: FloatArray, states: Sequence[_State]) -> 
 def places_of(motion: Motion) -> tuple[FloatArray, FloatArray]:
     """Centres of mass (m) and headings of all walkers in the plane of the floor, shape (F, W, 2)."""
     centre, heading = (np.zeros((len(motion.time), len(motion.walkers), 2)) for _ in range(2))
-    for number, make in enumerate(motion.case.walkers):
-        group = Group(motion, make, [walker for walker in motion.walkers if walker.make == number])
-        own = [walker.walker for walker in group.walkers]
-        centre[:, own], heading[:, own] = group.mass_centre[..., :2], group.heading[..., :2]
+    for group in map(motion.group, range(len(motion.case.walkers))):
+        numbers = [walker.walker for walker in group.walkers]
+        centre[:, numbers], heading[:, numbers] = group.mass_centre[..., :2], group.heading[..., :2]
     return centre, heading
 
 

@@ -97,24 +97,22 @@ class Motion:
 
     def select(self, frames: slice = slice(None), beads: IntArray | None = None, **changes: Any) -> Motion:
         """The motion of selected frames and beads, with changes; beads are renumbered, walkers are not."""
-        parts: dict[str, Any] = {
-            name: None if (part := getattr(self, name)) is None else part[frames] for name in _OF_FRAMES
-        }
-        parts |= changes
-        if beads is not None:
-            parts |= {name: None if (part := parts[name]) is None else part[:, beads] for name in _OF_BEADS}
-            place = {bead: number for number, bead in enumerate(beads.tolist())}
-            kept = [walker for walker in self.walkers if place.keys() >= set(walker.beads)]
-            parts["radius"] = self.radius[beads]
-            parts["numbers"] = beads if self.numbers is None else self.numbers[beads]
-            parts["walkers"] = tuple(
-                replace(walker, beads=tuple(place[bead] for bead in walker.beads)) for walker in kept
-            )
-        return replace(self, **parts)
+        parts = {name: part[frames] for name in _OF_FRAMES if (part := getattr(self, name)) is not None} | changes
+        if beads is None:
+            return replace(self, **parts)
+        parts |= {name: part[:, beads] for name, part in parts.items() if name in _OF_BEADS}
+        place = {bead: number for number, bead in enumerate(beads.tolist())}
+        walkers = tuple(
+            replace(walker, beads=tuple(place[bead] for bead in walker.beads))
+            for walker in self.walkers
+            if place.keys() >= set(walker.beads)
+        )
+        numbers = beads if self.numbers is None else self.numbers[beads]
+        return replace(self, **parts, radius=self.radius[beads], numbers=numbers, walkers=walkers)
 
     def of_walkers(self, walkers: Collection[PlacedWalker]) -> Motion:
         """The motion of the beads of some walkers."""
-        return self.select(beads=np.array([bead for one in walkers for bead in one.beads]))
+        return self.select(beads=np.array([bead for walker in walkers for bead in walker.beads]))
 
     @property
     def averaged(self) -> Motion:
@@ -127,14 +125,6 @@ class Motion:
         position = (self.position[1:] + self.position[:-1]) / 2.0
         velocity = np.diff(self.position, axis=0) / np.diff(self.time)[:, None, None]
         return self.select(slice(1, None), position=position, velocity=velocity, spin=spin)
-
-    def between(self, share: float) -> Motion:
-        """Positions at a fraction of each of the F - 1 intervals between frames, by cubic Hermite interpolation."""
-        interval = np.diff(self.time)[:, None, None]
-        begin, end, left = self.position[:-1], self.position[1:], 1.0 - share
-        position = left**2 * (1.0 + 2.0 * share) * begin + share**2 * (3.0 - 2.0 * share) * end
-        position += share * left * interval * (left * self.velocity[:-1] - share * self.velocity[1:])
-        return self.select(slice(1, None), position=position)
 
     @property
     def large(self) -> BoolArray:
@@ -158,58 +148,41 @@ class Motion:
     @cached_property
     def groups(self) -> list[Group]:
         """The walkers by make, during the drive."""
-        driven = self.driven
-        return [
-            Group(driven, make, [walker for walker in self.walkers if walker.make == number])
-            for number, make in enumerate(self.case.walkers)
-        ]
+        return [self.driven.group(number) for number in range(len(self.case.walkers))]
+
+    def group(self, number: int) -> Group:
+        """The walkers of a make, in all frames."""
+        walkers = [walker for walker in self.walkers if walker.make == number]
+        rows = np.array([walker.beads for walker in walkers], dtype=np.int64)
+        moved = (array[:, rows] for array in (self.position, self.velocity, self.spin))
+        return Group(self, self.case, self.case.walkers[number], walkers, rows, self.time, *moved)
 
 
 @dataclass(frozen=True, repr=False)
 class Group:
-    """The W walkers of one make, of n beads each, in a motion of all beads."""
+    """The W walkers of one make, of n beads each, in F frames of a motion of all beads; SI units.
+
+    ``rows`` are the indices of their beads in the motion, shape (W, n). ``position`` and ``velocity`` of the centres
+    and ``spin`` (angular velocity, rad/s) have the shape (F, W, n, 3), ``time`` has the shape (F,).
+    """
 
     motion: Motion
+    case: Case
     make: Walkers
     walkers: list[PlacedWalker]
+    rows: IntArray
+    time: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    spin: FloatArray
 
     def __repr__(self) -> str:
         return f"<Group of {self.case.name}: {len(self.walkers)} walkers of {len(self.make.radii)} beads>"
 
     @property
-    def case(self) -> Case:
-        """The case."""
-        return self.motion.case
-
-    @property
-    def time(self) -> FloatArray:
-        """Time of the frames, s, shape (F,)."""
-        return self.motion.time
-
-    @property
     def radii(self) -> FloatArray:
         """Radii of the beads of each walker, m, shape (n,)."""
         return np.array(self.make.radii)
-
-    @cached_property
-    def rows(self) -> IntArray:
-        """Indices of the beads in the motion, shape (W, n)."""
-        return np.array([walker.beads for walker in self.walkers], dtype=np.int64)
-
-    @cached_property
-    def position(self) -> FloatArray:
-        """Positions of the bead centres, m, shape (F, W, n, 3)."""
-        return self.motion.position[:, self.rows]
-
-    @cached_property
-    def velocity(self) -> FloatArray:
-        """Velocities of the bead centres, m/s, shape (F, W, n, 3)."""
-        return self.motion.velocity[:, self.rows]
-
-    @cached_property
-    def spin(self) -> FloatArray:
-        """Angular velocity, rad/s, shape (F, W, n, 3)."""
-        return self.motion.spin[:, self.rows]
 
     @cached_property
     def mass_centre(self) -> FloatArray:
@@ -250,11 +223,18 @@ class Group:
         ahead, aside = np.array(self.make.front) @ np.array(self.make.design)
         arm = np.einsum("fwbx,b->fwx", self.position, np.array(self.make.front))
         facing = np.array([walker.facing for walker in self.walkers])
-        angle = np.arctan2(facing * (arm @ self.across_axis), facing * (arm @ self.drive_axis)) - np.arctan2(
-            aside, ahead
-        )
-        unwrapped: FloatArray = np.unwrap(angle, axis=0)
-        return unwrapped
+        turned = np.arctan2(facing * (arm @ self.across_axis), facing * (arm @ self.drive_axis))
+        angle: FloatArray = np.unwrap(turned - np.arctan2(aside, ahead), axis=0)
+        return angle
+
+
+def between(moved: Motion | Group, share: float) -> FloatArray:
+    """Positions at a fraction of each of the F - 1 intervals between frames, by cubic Hermite interpolation."""
+    interval = np.diff(moved.time).reshape(-1, *[1] * (moved.position.ndim - 1))
+    begin, end, left = moved.position[:-1], moved.position[1:], 1.0 - share
+    position = left**2 * (1.0 + 2.0 * share) * begin + share**2 * (3.0 - 2.0 * share) * end
+    position += share * left * interval * (left * moved.velocity[:-1] - share * moved.velocity[1:])
+    return position
 
 
 def came_near(centre: FloatArray, near: float) -> bool:
@@ -427,6 +407,9 @@ class Bridges:
     walls: IntArray
     wall_force: FloatArray
     wall_gap: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.beads) + len(self.walls)
 
     @property
     def contacts(self) -> IntArray:

@@ -21,7 +21,7 @@ from walkers.inputs.boundary import Flat
 from walkers.inputs.case import Case
 from walkers.postprocess import piles
 from walkers.postprocess.dump import FloatArray, IntArray
-from walkers.postprocess.motion import Motion, boundary_motion
+from walkers.postprocess.motion import Motion, between, boundary_motion
 from walkers.postprocess.necks import BLUE, NO_BRIDGES, OPACITY, ends_of, necks_of, triangles_of
 
 if TYPE_CHECKING:
@@ -392,7 +392,7 @@ class Window:
         motion, shift, number = self._scene.motion, np.zeros(3), int(frame)
         place, time, share = motion.position[number], motion.time[number], frame - number
         if share:
-            place = motion.select(slice(number, number + 2)).between(share).position[0]
+            place = between(motion.select(slice(number, number + 2)), share)[0]
             time += share * (motion.time[number + 1] - time)
         if self._scene.shaken:
             shift = 1e3 * boundary_motion(motion.case.excitation, np.array([time]))[0][0]

@@ -17,20 +17,9 @@ import numpy as np
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
-from walkers.postprocess.cycles import cycles_of, mass_of
+from walkers.postprocess import gait
 from walkers.postprocess.dump import FloatArray, IntArray
-from walkers.postprocess.gait import (
-    POSTURES,
-    Averages,
-    Gait,
-    averages,
-    gait,
-    postures,
-    settled_samples,
-    turned_over_at,
-    walk,
-)
-from walkers.postprocess.motion import LEAST_SAMPLES, NEAR, Bridges, Group, Motion, came_near
+from walkers.postprocess.motion import NEAR, Group, Motion, came_near
 from walkers.postprocess.numbers import Measured
 from walkers.postprocess.sides import REST, SAME, SEPARATED, STEADY_SPEED, alike, differ, sides
 from walkers.postprocess.tables import Columns, numbered
@@ -59,17 +48,12 @@ def derived(case: Case) -> dict[str, float]:
 def measure(motion: Motion) -> Measured:
     """Tables and numbers of all walkers; rotation, sliding and contacts are those of the first make."""
     case, groups = motion.case, motion.groups
-    gaits, means = [gait(group) for group in groups], [averages(group) for group in groups]
-    rows = [_rows(*parts) for parts in zip(groups, gaits, means, strict=True)]
-    tables = {
-        "trajectory": _stacked([_trajectory(*one) for one in zip(groups, gaits, strict=True)]),
-        "walkers": _stacked(rows),
-        "cycles": _stacked(cycles := [cycles_of(one, mean.centre) for one, mean in zip(groups, means, strict=True)]),
-        "bridges": _bridges(motion),
-    }
+    of_makes = [tables_of(group) for group in groups]
+    tables = {name: _stacked([tables[name] for tables in of_makes]) for name in of_makes[0]}
+    walkers = tables["walkers"]
     numbers = {
-        **_velocities(tables["walkers"], case),
-        **_of_beads(rows[0], case),
+        **_velocities(walkers, case),
+        **_of_beads({name: column[walkers["make"] == 0] for name, column in walkers.items()}, case),
         "walkers_met": walkers_met(groups),
         "meets": case.meets,
         "cycles": case.run.cycles,
@@ -77,16 +61,16 @@ def measure(motion: Motion) -> Measured:
         "ended_early": motion.ended_early,
     }
     if case.goes_uphill:
-        numbers |= _posture(groups, tables["walkers"])
-    if case.run.samples_per_cycle >= LEAST_SAMPLES:
-        numbers |= _work(groups, cycles, tables["walkers"])
-    if len(groups) > 1:
-        for number, one in enumerate(rows, 1):
-            velocity = one["velocity"][alike(one, uphill=case.goes_uphill)]
-            numbers[f"velocity_make_{number}"] = float(velocity.mean())
-            numbers[f"walkers_make_{number}"] = len(one["velocity"])
-            numbers[f"steady_make_{number}"] = int(np.sum(one["steady"]))
-    return Measured(tables, numbers, tuple(_doubts(numbers)))
+        numbers |= _posture(groups, walkers)
+    if motion.follows_cycles:
+        numbers |= _work(groups, tables["cycles"], walkers)
+    for make in range(len(groups)) if len(groups) > 1 else ():
+        of_make = {name: column[walkers["make"] == make] for name, column in walkers.items()}
+        velocity = of_make["velocity"][alike(of_make, uphill=case.goes_uphill)]
+        numbers[f"velocity_make_{make + 1}"] = float(velocity.mean())
+        numbers[f"walkers_make_{make + 1}"] = len(of_make["velocity"])
+        numbers[f"steady_make_{make + 1}"] = int(np.sum(of_make["steady"]))
+    return Measured({**tables, "bridges": _bridges(motion)}, numbers, tuple(_doubts(numbers)))
 
 
 def _doubts(numbers: Mapping[str, Any]) -> Iterable[str]:
@@ -100,7 +84,7 @@ def _doubts(numbers: Mapping[str, Any]) -> Iterable[str]:
         yield "walkers came close to each other and are not independent: increase the spacing"
 
 
-def _stacked(parts: list[Columns]) -> Columns:
+def _stacked(parts: Sequence[Columns]) -> Columns:
     """Concatenated tables; missing columns are NaN."""
     lengths = [len(part["walker"]) for part in parts]
     keys = dict.fromkeys(key for part in parts for key in part)
@@ -110,78 +94,86 @@ def _stacked(parts: list[Columns]) -> Columns:
     }
 
 
-def _trajectory(group: Group, motion: Gait) -> Columns:
-    """Rows of one walker after the other."""
-
-    def along(values: FloatArray) -> FloatArray:
-        return np.moveaxis(values, 0, 1).reshape(-1, *values.shape[2:])
-
-    time = np.tile(group.time, len(group.walkers))
-    return {
-        "walker": np.repeat([walker.walker for walker in group.walkers], len(group.time)),
-        "time": time,
-        "cycle": time * group.case.excitation.frequency,
-        **dict(zip("xyz", along(group.mass_centre).T, strict=True)),
-        "orientation": along(group.orientation),
-        "velocity": along(motion.velocity),
-        **numbered("rotation", along(motion.rotation)),
-        **_by_kind(group, sliding=along(motion.sliding), gap=along(motion.gap)),
+def tables_of(group: Group) -> dict[str, Columns]:
+    """Tables ``trajectory``, ``walkers`` and ``cycles`` of the walkers of one make, one walker after the other."""
+    run, seen, mean = group.case.run, gait.gait(group), gait.averages(group)
+    samples, beads = gait.settled_samples(group), len(group.radii)
+    reach = np.array([load.rupture for load in contact_loads(group.case, group.make)[beads:]])
+    starts = ("walker", "make", "facing", "start_angle")
+    walkers = {
+        **{name: np.array([getattr(walker, name) for walker in group.walkers]) for name in starts},
+        **gait.walk(group)._asdict(),
+        "orientation_mean": group.orientation[samples].mean(axis=0),
+        "orientation_end": group.orientation[-1],
+        "turned_at": gait.turned_over_at(group),
+        "separated_fraction": (seen.gap[samples, :, beads:] > reach).any(axis=-1).mean(axis=0),
+        **numbered("rotation", mean.rotation),
+        **_by_kind(beads, sliding=mean.sliding, open=mean.open),
     }
+    along = {
+        "time": group.time,
+        "cycle": group.time * group.case.excitation.frequency,
+        **dict(zip("xyz", np.moveaxis(group.mass_centre, -1, 0), strict=True)),
+        "orientation": group.orientation,
+        "velocity": seen.velocity,
+        **numbered("rotation", seen.rotation),
+        **_by_kind(beads, sliding=seen.sliding, gap=seen.gap),
+    }
+    strobe = run.samples_per_cycle
+    time, distance = gait.distance_walked(group)
+    way = group.mass_centre[::strobe] - group.mass_centre[0]
+    work = np.full(distance.shape, nan)
+    work[: len(mean.work)] = mean.work
+    cycles = {
+        "cycle": np.arange(len(time)) * run.cycles_per_sample,
+        "time": time,
+        "distance": distance,
+        "along": way @ group.drive_axis,
+        "across": way @ group.across_axis,
+        "orientation": group.orientation[::strobe],
+        "work": work,
+    }
+    return {"trajectory": _of_frames(group, along), "walkers": walkers, "cycles": _of_frames(group, cycles)}
 
 
-def _by_kind(group: Group, **contacts: FloatArray) -> Columns:
+def _of_frames(group: Group, columns: Columns) -> Columns:
+    """Columns of values in F frames, shape (F,) or (F, W), one walker after the other."""
+    number, shape = [walker.walker for walker in group.walkers], (len(next(iter(columns.values()))), len(group.walkers))
+    wide = {"walker": np.broadcast_to(number, shape)} | {
+        name: values if values.ndim > 1 else np.broadcast_to(values[:, None], shape) for name, values in columns.items()
+    }
+    return {name: values.T.reshape(-1) for name, values in wide.items()}
+
+
+def _by_kind(beads: int, **contacts: FloatArray) -> Columns:
     """Columns of values at contacts (`Gait`): of beads with walls, and ``…_pair_…`` of pairs of beads."""
-    beads = len(group.radii)
     columns: Columns = {}
     for name, values in contacts.items():
         columns |= numbered(name, values[..., :beads]) | numbered(f"{name}_pair", values[..., beads:])
     return columns
 
 
-def _rows(group: Group, motion: Gait, mean: Averages) -> Columns:
-    """Rows of the walkers of a group."""
-    samples, beads = settled_samples(group), len(group.radii)
-    reach = np.array([load.rupture for load in contact_loads(group.case, group.make)[beads:]])
-    starts = ("walker", "make", "facing", "start_angle")
-    return {
-        **{name: np.array([getattr(walker, name) for walker in group.walkers]) for name in starts},
-        **vars(walk(group)),
-        "orientation_mean": group.orientation[samples].mean(axis=0),
-        "orientation_end": group.orientation[-1],
-        "turned_at": turned_over_at(group),
-        "separated_fraction": (motion.gap[samples, :, beads:] > reach).any(axis=-1).mean(axis=0),
-        **numbered("rotation", mean.rotation),
-        **_by_kind(group, sliding=mean.sliding, open=mean.open),
-    }
-
-
 def _bridges(motion: Motion) -> Columns:
-    """Rows sorted by time, walker and contact."""
+    """Rows sorted by time, walker and contact; in a frame bridges between beads are before those to walls."""
     contact_of: dict[tuple[int, int], int] = {}  # by two beads, or by a bead and −1 for a wall
     for walker in motion.walkers:
         touching = [(bead, -1) for bead in walker.beads]
         touching += [(walker.beads[one], walker.beads[other]) for one, other in motion.case.walkers[walker.make].pairs]
         contact_of |= {ends: number for number, ends in enumerate(touching, 1)}
-    parts = [_bridge_rows(motion, bridges, contact_of) for bridges in motion.bridges]
-    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    order = np.lexsort([columns[name] for name in ("bead_2", "contact", "walker", "time")])
-    return {name: values[order] for name, values in columns.items()}
-
-
-def _bridge_rows(motion: Motion, bridges: Bridges, contact_of: Mapping[tuple[int, int], int]) -> Columns:
-    """Rows of a frame: bridges between beads, then bridges to walls."""
-    rows = bridges.rows()
+    parts = [{"frame": np.full(len(bridges), bridges.frame), **bridges.rows()} for bridges in motion.bridges]
+    rows = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     first, second = rows["bead_1"], rows["bead_2"]
     owner = motion.walker_of[first]
     joined = np.where(second >= 0, motion.walker_of[second], owner)
-    ends = zip(first.tolist(), second.tolist(), strict=True)
-    return {
-        "time": np.full(len(first), motion.time[bridges.frame]),
+    columns = {
+        "time": motion.time[rows.pop("frame")],
         "walker": owner,
-        "contact": np.array([contact_of.get(one, 0) for one in ends], dtype=np.int64),
+        "contact": np.array([contact_of.get(ends, 0) for ends in zip(first.tolist(), second.tolist(), strict=True)]),
         "other_walker": np.where(joined == owner, -1, joined),
         **rows,
     }
+    order = np.lexsort([columns[name] for name in ("bead_2", "contact", "walker", "time")])
+    return {name: values[order] for name, values in columns.items()}
 
 
 def _mean(values: FloatArray) -> float:
@@ -202,13 +194,16 @@ def _velocities(walkers: Columns, case: Case) -> dict[str, Any]:
     right, left = facing > 0, facing < 0
     meant = velocity[alike(walkers, uphill=case.goes_uphill)]
     separated = _mean(walkers["separated_fraction"])
-    numbers = {
+    # On trays the means include walkers that stopped; by symmetry, both headings are one.
+    one_heading = case.meets or _is_symmetric(case)
+    facings = _mean(velocity[right]), _mean(velocity[left])
+    return {
         "velocity": float(meant.mean()),
         "scatter": _scatter(meant),
         "smallest": float(meant.min()),
         "largest": float(meant.max()),
-        "right_facing": _mean(velocity[right]),
-        "left_facing": _mean(velocity[left]),
+        "right_facing": facings[0],
+        "left_facing": facings[1],
         "right_scatter": _scatter(velocity[right]),
         "left_scatter": _scatter(velocity[left]),
         "axial_velocity": _mean(axial[alike(walkers, uphill=case.goes_uphill or not case.meets)]),
@@ -225,34 +220,29 @@ def _velocities(walkers: Columns, case: Case) -> dict[str, Any]:
         "turned_round": int(np.sum(np.isfinite(walkers["turned_at"]))),
         "depends_on_start": _depends_on_start(walkers, facing, case),
         "came_apart": separated > SEPARATED and not case.meets,
+        "facings_differ": not one_heading and differ(*facings),
     }
-    # On trays the means include walkers that stopped; by symmetry, both headings are one.
-    one_heading = case.meets or _is_symmetric(case)
-    numbers["facings_differ"] = not one_heading and differ(numbers["right_facing"], numbers["left_facing"])
-    return numbers
 
 
 def _of_beads(walkers: Columns, case: Case) -> dict[str, float]:
     """Rotation, sliding and open contacts of the walkers of a make, on a slope of those that face up."""
     families, meant = ("rotation_", "sliding_", "open_"), alike(walkers, uphill=case.goes_uphill)
-    return {name: _mean(one[meant]) for name, one in walkers.items() if name.startswith(families)}
+    return {name: _mean(column[meant]) for name, column in walkers.items() if name.startswith(families)}
 
 
-def _work(groups: Sequence[Group], cycles: Sequence[Columns], walkers: Columns) -> dict[str, float]:
+def _work(groups: Sequence[Group], cycles: Columns, walkers: Columns) -> dict[str, float]:
     """Mean work of the drive per cycle, and cost of transport f W / (M g |v|) with the velocity v along the heading.
 
     The cost is the power of the drive over the power of lifting the walker as fast as it walks; walkers that hardly
     walk have none.
     """
-    case, each = groups[0].case, []
-    for group, columns in zip(groups, cycles, strict=True):
-        of_cycles = np.ascontiguousarray(columns["work"].reshape(len(group.walkers), -1).T)
-        each.append(of_cycles[case.run.settled_strobes : -1].mean(axis=0))
-    meant = alike(walkers, uphill=case.goes_uphill)
-    work, speed = np.concatenate(each), np.abs(walkers["velocity"])
+    case = groups[0].case
+    of_cycles = np.ascontiguousarray(cycles["work"].reshape(len(walkers["walker"]), -1).T)
+    work, speed = of_cycles[case.run.settled_strobes : -1].mean(axis=0), np.abs(walkers["velocity"])
     speed = np.where(speed < STEADY_SPEED, nan, speed)
-    mass = np.concatenate([np.full(len(group.walkers), mass_of(group)) for group in groups])
+    mass = np.array([gait.mass_of(group) for group in groups])[walkers["make"]]
     lifted = mass * ACCELERATION_OF_ONE_G * speed / case.excitation.frequency
+    meant = alike(walkers, uphill=case.goes_uphill)
     return {"work": _mean(work[meant]), "cost_of_transport": _mean((work / lifted)[meant])}
 
 
@@ -266,28 +256,27 @@ def _depends_on_start(walkers: Columns, facing: IntArray, case: Case) -> bool:
     """Whether steady walkers of one make differ; both directions are one if boundary and drive are symmetric."""
     kept = walkers["steady"] & np.isnan(walkers["turned_at"]) & (walkers["separated_fraction"] < SEPARATED)
     kind = 2 * walkers["make"] + (0 if _is_symmetric(case) else facing > 0)
-    velocities = (walkers["velocity"][kept & (kind == one)] for one in set(kind[kept].tolist()))
-    return not case.meets and any(differ(float(one.min()), float(one.max())) for one in velocities)
+    velocities = (walkers["velocity"][kept & (kind == number)] for number in set(kind[kept].tolist()))
+    return not case.meets and any(differ(float(alike.min()), float(alike.max())) for alike in velocities)
 
 
 def _posture(groups: Iterable[Group], walkers: Columns) -> dict[str, Any]:
     """Numbers of walkers by posture and way, times of turning over (s), largest final angle of the others (rad)."""
-    counts = Counter(posture for group in groups for posture in postures(group))
+    counts = Counter(posture for group in groups for posture in gait.postures(group))
     turned_at, end = walkers["turned_at"], np.abs(walkers["orientation_end"])
     uphill = walkers["axial_velocity"]
     over, kept = turned_at[np.isfinite(turned_at)], end[np.isnan(turned_at)]
     return {
-        **{name: counts[name] for name in POSTURES},
+        **{name: counts[name] for name in ("upright", "leaning", "turned_over")},
         "climbing": int(np.sum(uphill > REST)),
         "descending": int(np.sum(uphill < -REST)),
-        "turned_first": float(over.min()) if len(over) else nan,
-        "turned_last": float(over.max()) if len(over) else nan,
-        "ends_within": float(kept.max()) if len(kept) else nan,
+        "turned_first": float(min(over, default=nan)),
+        "turned_last": float(max(over, default=nan)),
+        "ends_within": float(max(kept, default=nan)),
     }
 
 
-def walkers_met(groups: Iterable[Group]) -> bool:
+def walkers_met(groups: Sequence[Group]) -> bool:
     """Whether two walkers came so close that they are not independent."""
-    groups = list(groups)
-    centre = np.concatenate([one.mass_centre[:: one.case.run.samples_per_cycle, :, :2] for one in groups], axis=1)
-    return came_near(centre, NEAR * max(one.make.length for one in groups))
+    centres = [group.mass_centre[:: group.case.run.samples_per_cycle, :, :2] for group in groups]
+    return came_near(np.concatenate(centres, axis=1), NEAR * max(group.make.length for group in groups))
