@@ -38,6 +38,8 @@ from walkers.runner.files import read_json
 from walkers.runner.manifest import read_manifest
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     import k3d
     import pandas as pd
     from matplotlib.figure import Figure
@@ -695,6 +697,7 @@ def sweep(
     changes: Mapping[str, Any] | None = None,
     progress: bool | None = None,
     site: str | Path | None = None,
+    executor: Executor | None = None,
     retries: int = 0,
     time_limit: float | None = None,
     **how: Any,
@@ -715,6 +718,8 @@ def sweep(
         Show the progress; None: only in notebooks.
     site
         The site file of a cluster; see `walkers.sweeps.site.load_site`.
+    executor
+        Runs the decks instead of threads of this process, ``jobs`` at once; all of its workers must see the folder.
     retries
         Number of retries for a failed point.
     time_limit
@@ -743,7 +748,7 @@ def sweep(
     from walkers.sweeps.site import load_site
 
     points = load_sweep(sweep, changes)
-    options = Options(jobs or cores_here(), load_site(Path(site)) if site else None, retries, time_limit)
+    options = Options(jobs or cores_here(), load_site(Path(site)) if site else None, executor, retries, time_limit)
     folder = Path(out).resolve() if site else Path(out)
     with shown_if(progress, progress_of_sweep(points.name)) as advance:
         record, failures = run_sweep(points, folder, options, on_progress=advance, **how)

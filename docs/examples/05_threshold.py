@@ -31,7 +31,7 @@ until_below = "0.002 mm/s"
 table = walkers.sweep("runs/threshold.toml").table()
 
 # %%
-# Each step is a run from rest. Lower steps are not run.
+# Each step is a run from rest.
 
 figure, axes = plt.subplots(figsize=(7, 4))
 for frequency, steps in table.groupby("drive.frequency"):

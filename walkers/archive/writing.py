@@ -176,7 +176,7 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
         return Contents(Path(place).name, case_of(directory).title, {place: manifest}, files)
     record = read_record(directory)
     points = states(record)
-    unfinished = sum(state.status not in ("finished", "not needed") for state in points)
+    unfinished = sum(state.status != "finished" for state in points)
     if unfinished:
         message = f"{unfinished} of {len(points)} points are not finished; see: walkers list {directory}"
         raise refused(directory, message)

@@ -47,7 +47,7 @@ class SampleTable(Table):
 
 
 class DescendTable(Table):
-    """``[descend]``: a key that is lowered step by step until the walkers stop."""
+    """``[descend]``: a key that is lowered step by step, to find where the walkers stop."""
 
     key: str = "drive.peak_acceleration"
     start: Any = Field(alias="from", examples=["4 g"])
@@ -82,7 +82,7 @@ class SweepFile(Table):
 
 @dataclass(frozen=True)
 class Descent:
-    """Descent along the last axis of a sweep until the walkers are slower than ``until_below`` (m/s).
+    """Descent along the last axis of a sweep to the value at which the walkers are slower than ``until_below`` (m/s).
 
     ``steps`` is the number of its points; consecutive points of the sweep, so many at a time, are one descent.
     """
@@ -90,10 +90,6 @@ class Descent:
     key: str
     steps: int
     until_below: float
-
-    def at_rest(self, velocity: float) -> bool:
-        """Whether walkers with a mean velocity (m/s) count as at rest; false for NaN."""
-        return abs(velocity) < self.until_below
 
 
 @dataclass(frozen=True, repr=False)
@@ -108,7 +104,7 @@ class Sweep:
     keys: tuple[str, ...]  # that vary
     units: tuple[str | None, ...]  # of each key; None if it has none
     rows: Sequence[tuple[Value, ...]]  # the points: one value a key
-    descent: Descent | None  # how the points depend on each other, if they do
+    descent: Descent | None
     file: Mapping[str, Any] = field(default_factory=dict)  # tables of the sweep file
 
     def __repr__(self) -> str:

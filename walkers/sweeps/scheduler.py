@@ -5,9 +5,9 @@ use the cores more evenly and give results sooner. Decks are packed by their pre
 together. The packing depends on the whole sweep and the number of workers, not on what is finished: an interrupted
 sweep continues with the same decks.
 
-Workers are threads on this machine, or Parsl's workers on a cluster. Parsl repeats a deck whose worker was lost. A deck
-that fails is repeated here, as two halves; until a point is finished, the second half waits for the first. A failure
-that hits every point stops the sweep.
+Workers are those of a `concurrent.futures.Executor`: threads on this machine, Parsl's workers on a cluster, or any that
+the caller hands over. Parsl repeats a deck whose worker was lost. A deck that fails is repeated here, as two halves;
+until a point is finished, the second half waits for the first. A failure that hits every point stops the sweep.
 """
 
 from __future__ import annotations
@@ -20,16 +20,13 @@ import time
 import warnings
 from collections import Counter
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil
 from pathlib import Path
 from platform import node
-from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING
 
 from walkers.errors import InputError, Stopped, WalkersError, check_utf8, refused
 from walkers.inputs.case import Case
@@ -52,14 +49,10 @@ from walkers.sweeps.table import (
     describe_sweep,
     read_record,
     states,
-    velocity_of,
     with_unit,
     write_record,
 )
 from walkers.templates.scene import sharing_key
-
-if TYPE_CHECKING:
-    from concurrent.futures import Future
 
 MOST_WALKERS = 96
 """Limit for a deck; with 96 walkers the cost of the deck itself is 4 % of the total."""
@@ -84,12 +77,14 @@ class SweepStopped(WalkersError):
 class Options:
     """Options of a sweep: cores of this machine (``workers``), or a cluster instead; MPI processes of a deck.
 
-    A failed point is repeated ``retries`` times. Failures with the names ``final`` are never repeated, not even by a
-    later call, because the engine would fail again. ``time_limit`` is the wall time in s that an engine may take.
+    An ``executor`` that is handed over runs as many decks at once as there are ``workers``. A failed point is repeated
+    ``retries`` times. Failures with the names ``final`` are never repeated, not even by a later call, because the
+    engine would fail again. ``time_limit`` is the wall time in s that an engine may take.
     """
 
     workers: int
     site: Site | None = None
+    executor: Executor | None = None
     retries: int = 0
     time_limit: float | None = None
     final: frozenset[str] = frozenset()
@@ -98,6 +93,8 @@ class Options:
     @property
     def decks_at_once(self) -> int:
         """Number of decks that run at the same time."""
+        if self.executor is not None:
+            return self.workers
         if self.site is None:
             return max(1, self.workers // self.ranks)
         return self.site.cores // self.ranks * self.site.nodes * self.site.jobs
@@ -228,10 +225,7 @@ def _missing_decks(
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """Plan of a sweep: points with their status, missing decks, failures that are not repeated.
-
-    A descent may end early: the decks are those down to its lowest point.
-    """
+    """Plan of a sweep: points with their status, missing decks, failures that are not repeated."""
 
     record: SweepRecord
     cases: Sequence[Case]
@@ -252,13 +246,12 @@ class SweepPlan:
         until = max(makespan((deck.seconds for deck in self.decks), at_once) + PROGRAM_SECONDS, besides)
         text = ", ".join(f"{count} {status}" for status, count in sorted(Counter(self.statuses).items()))
         keys = ", ".join(with_unit(key, unit) for key, unit in record.units.items())
-        at_most = "at most " if record.descent else ""
         lines = [
             f"{record.name}: {record.title}".rstrip(": "),
             f"  varied     {keys or 'nothing'}",
             f"  points     {len(record.runs)}: {text}",
-            f"  to do      {at_most}{counted(len(missing), 'point')} in {counted(len(self.decks), 'deck')}",
-            f"  predicted  {at_most}{seconds + besides:.0f} core-seconds ({apart + besides:.0f} without shared decks), "
+            f"  to do      {counted(len(missing), 'point')} in {counted(len(self.decks), 'deck')}",
+            f"  predicted  {seconds + besides:.0f} core-seconds ({apart + besides:.0f} without shared decks), "
             f"{duration_text(until)} with {counted(at_once, 'deck')} in parallel",
             f"  directory  {record.directory}",
         ]
@@ -276,7 +269,7 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
         check_path(record.directory)
     found = states(record)
     final = _failures(record, found, options.final)
-    settled = {point for point, state in enumerate(found) if state.status in ("finished", "not needed")}
+    settled = {point for point, state in enumerate(found) if state.status == "finished"}
     settled |= {failure.point for failure in final}
     decks = _missing_decks(cases, range(len(cases)), options, settled.__contains__)
     return SweepPlan(record, cases, binary, decks, [state.status for state in found], options, final)
@@ -314,8 +307,7 @@ def run_sweep(
     Returns
     -------
     record, failures
-        The sweep (`walkers.sweeps.table.load` reads the table from ``record.directory``), and the failed points. All
-        others are finished or, below the end of a descent, not needed.
+        The sweep (`walkers.sweeps.table.load` reads the table from ``record.directory``), and the failed points.
 
     Raises
     ------
@@ -344,8 +336,8 @@ def run_sweep(
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
     failures = plan.final
     if plan.decks:
-        with _workers(plan.options, record) as submit:
-            failures = _Scheduler(plan, submit).run(on_progress or (lambda _: None))
+        with _workers(plan.options, record) as (executor, stop):
+            failures = _Loop(plan, executor, stop).run(on_progress or (lambda _: None))
     if not (record.directory / RECORD_NAME).is_file():
         raise OutputGone(record.directory)
     if list(read_record(record.directory).runs) != list(record.runs):
@@ -358,9 +350,9 @@ def run_sweep(
 
 @dataclass(frozen=True)
 class Report:
-    """Outcome of a deck: velocities (m/s) of its finished runs, or name, `hits`, message and directory of a failure."""
+    """Outcome of a deck: names of its finished runs, or name, `hits`, message and directory of a failure."""
 
-    finished: Mapping[str, float] = field(default_factory=dict)
+    finished: Collection[str] = ()
     failure: str | None = None
     hits: str = ""
     message: str = ""
@@ -389,8 +381,7 @@ def work(
             raise EngineDiffers(f"the engine on {node()}, {own.path}, is not the engine that started this sweep")
         if list(runs) != [run_place(case, own, out).name for case in cases]:
             raise ProgramDiffers(f"the program on {node()} has another version than the one that started the sweep")
-        made = make_runs(cases, out, own, on_progress=look, time_limit=time_limit)
-        return Report({name: velocity_of(run) for name, run in made.runs.items()})
+        return Report([*make_runs(cases, out, own, on_progress=look, time_limit=time_limit).runs])
     except (OSError, WalkersError) as error:
         if retries and not isinstance(error, Stopped):
             return work(stop, runs, cases, out, engine, time_limit, retries - 1)
@@ -402,171 +393,119 @@ def work(
         elif isinstance(error, OSError) and error.filename:
             kind = OutputGone if error.errno == errno.ENOENT else kind
             message = f"{error.filename}: {error.strerror}"
-        return Report({}, kind.__name__, getattr(kind, "hits", ""), message, directory)
+        return Report((), kind.__name__, getattr(kind, "hits", ""), message, directory)
 
 
 @contextmanager
-def _workers(options: Options, record: SweepRecord) -> Iterator[Callable[..., Future[Report]]]:
-    """Start threads or Parsl, yield a function that submits `work` (arguments except ``stop``), and end all workers."""
+def _workers(options: Options, record: SweepRecord) -> Iterator[tuple[Executor, threading.Event | None]]:
+    """The executor of a sweep, with what stops its threads; threads and Parsl's workers end with the context."""
+    if options.executor is not None:
+        yield options.executor, None
+        return
     if options.site is None:
         stop = threading.Event()
-        with ThreadPoolExecutor(options.decks_at_once) as pool:
+        with ThreadPoolExecutor(options.decks_at_once) as threads:
             try:
-                yield lambda **deck: pool.submit(work, stop, **deck)
+                yield threads, stop
             finally:
                 stop.set()
-                pool.shutdown(wait=False, cancel_futures=True)
         return
-    import parsl
+    from parsl import DataFlowKernel
+    from parsl.concurrent import ParslPoolExecutor
 
     folder = record.directory / PARSL
     try:
-        kernel = parsl.DataFlowKernel(pilots(options.site, folder, options.ranks))
+        kernel = DataFlowKernel(pilots(options.site, folder, options.ranks))
     except Exception as error:  # any class: an address that this machine does not have, ports in use
         text = " ".join(str(error).split())
         text = f"Parsl cannot start ({text}); see {folder}, and [executor] address in the site file"
         raise SweepStopped(text) from error
     try:
-        yield partial(parsl.python_app(work, data_flow_kernel=kernel), None)
-    finally:
+        yield ParslPoolExecutor(dfk=kernel), None
+    finally:  # the executor would wait for the decks
         kernel.cleanup()
 
 
-def _check_cluster(error: BaseException) -> None:
-    """Raise `SweepStopped` if the jobs of the cluster fail, and not only this deck."""
-    from parsl.executors.errors import BadStateException
+def _report_of(future: Future[Report]) -> Report:
+    """The report of a deck, or a failure if the cluster lost it; an error of the program is raised."""
+    error = future.exception()
+    if error is None:
+        return future.result()
+    if isinstance(error, BrokenExecutor):
+        raise SweepStopped(f"the executor's workers ended: {error}") from error
+    if type(error).__module__.startswith("parsl."):
+        from parsl.errors import ParslError
+        from parsl.executors.errors import BadStateException
 
-    if isinstance(error, BadStateException):
-        first = " ".join(str(error).partition("Error 2:")[0].split())  # the other errors repeat the first
-        raise SweepStopped(f"the cluster's jobs fail: {first}") from error
+        if isinstance(error, BadStateException):
+            first = " ".join(str(error).partition("Error 2:")[0].split())  # the other errors repeat the first
+            raise SweepStopped(f"the cluster's jobs fail: {first}") from error
+        if isinstance(error, ParslError):
+            return Report(failure=type(error).__name__, message=str(error) or repr(error))
+    raise error
 
 
-class _Scheduler:
-    """Submits decks to the workers, one batch of each group of points at a time, and evaluates their reports."""
+class _Loop:
+    """Submits decks to an executor, and evaluates their reports."""
 
-    def __init__(self, plan: SweepPlan, submit: Callable[..., Future[Report]]) -> None:
-        self.plan, self.record, self.cases, self.submit = plan, plan.record, plan.cases, submit
+    def __init__(self, plan: SweepPlan, executor: Executor, stop: threading.Event | None) -> None:
+        self.plan, self.record, self.executor, self.stop = plan, plan.record, executor, stop
         self.failures = list(plan.final)
-        finished = [run for run, status in zip(plan.record.runs, plan.statuses, strict=True) if status == "finished"]
-        self.settled = {*finished, *(failure.run for failure in plan.final)}
-        """Names of the runs that are finished or failed for good."""
-        self.velocities: dict[str, float] = {}
-        self.ended: SimpleQueue[tuple[PlannedDeck, Future[Report]]] = SimpleQueue()
-        self.groups_of: dict[PlannedDeck, int] = {}
-        """Submitted decks, with the number of their group."""
-        groups: dict[Hashable, list[list[int]]] = {}
-        for chain in self.record.chains:  # one group for all points, or for all descents that may share decks
-            groups.setdefault(sharing_key(self.cases[chain[0]]) if self.record.descent else None, []).append(chain)
-        self.batches = [self._batches(chains) for chains in groups.values()]
-        self.halves: list[tuple[PlannedDeck, int]] = []
-        """Halves of failed decks, with their group, while no point is finished."""
+        self.decks: dict[Future[Report], PlannedDeck] = {}
+        """Submitted decks."""
+        self.halves: list[PlannedDeck] = []
+        """Second halves of failed decks, while no point is finished."""
         self.alone: Counter[tuple[str | None, str]] = Counter()
         """Failures of points alone, by name and message."""
         self.begin, self.seconds_done = time.perf_counter(), 0.0
-        self.found = self.done = len(finished)
+        self.found = self.done = plan.statuses.count("finished")
 
     def run(self, on_progress: Callable[[SweepProgress], None]) -> list[Failure]:
-        """Work until every point is settled; return the failures in the order of the points."""
+        """Work until every point is finished or failed; return the failures in the order of the points."""
         shown = 0.0
-        for group in range(len(self.batches)):
-            self._advance(group)
-        while self.groups_of or self.halves:
-            if self.halves and (self.done > self.found or not self.groups_of):
-                self._hand_out(*self.halves.pop())
-                continue
-            with suppress(Empty):
-                deck, future = self.ended.get(timeout=_LOOK_SECONDS)
-                group = self.groups_of.pop(deck)
-                self._take_in(deck, group, future)
-                self._advance(group)
-            if time.perf_counter() - shown > _LOOK_SECONDS:
-                shown = time.perf_counter()
-                on_progress(self._progress())
+        try:
+            for deck in self.plan.decks:
+                self._submit(deck)
+            while self.decks or self.halves:
+                if self.halves and (self.done > self.found or not self.decks):
+                    self._submit(self.halves.pop())
+                    continue
+                for future in wait(self.decks, _LOOK_SECONDS, FIRST_COMPLETED).done:
+                    self._take_in(self.decks.pop(future), _report_of(future))
+                if time.perf_counter() - shown > _LOOK_SECONDS:
+                    shown = time.perf_counter()
+                    on_progress(self._progress())
+        finally:
+            for future in self.decks:
+                with suppress(NotImplementedError):  # Parsl's
+                    future.cancel()
         on_progress(self._progress())
         return sorted(self.failures, key=lambda failure: failure.point)
 
-    def _is_settled(self, point: int) -> bool:
-        return self.record.runs[point] in self.settled
+    def _submit(self, deck: PlannedDeck) -> None:
+        plan = self.plan
+        runs, cases = [self.record.runs[point] for point in deck.points], [plan.cases[point] for point in deck.points]
+        retries = plan.options.retries if len(runs) == 1 else 0
+        how = (self.record.out, plan.engine, plan.options.time_limit, retries)
+        self.decks[self.executor.submit(work, self.stop, runs, cases, *how)] = deck
 
-    def _batches(self, chains: list[list[int]]) -> Iterator[list[int]]:
-        """The batches of a group: without descents all points, else the next steps of all descents that continue."""
-        # A batch has as many steps as fill a deck: wasted steps below the end of a descent cost less than short decks.
-        step, descent = 0, self.record.descent
-        while chains and step < len(chains[0]):
-            steps = len(chains[0])
-            if descent is not None:
-                keys = {sharing_key(self.cases[point]) for chain in chains for point in chain[step:]}
-                walkers = sum(pairs_of_beads(self.cases[chain[0]]) for chain in chains)
-                steps = max(1, MOST_WALKERS // walkers) if len(keys) == 1 else 1
-            now = slice(step, step + steps)
-            yield [point for chain in chains for point in chain[now]]
-            if descent is not None:
-                chains = [one for one in chains if not any(map(self._is_at_rest, one[now]))]
-            step += steps
-
-    def _is_at_rest(self, point: int) -> bool:
-        """Whether a settled point ends its descent; a failed one does not."""
-        run, descent = self.record.runs[point], self.record.descent
-        if run not in self.velocities:
-            self.velocities[run] = velocity_of(self.record.out / run)
-        return descent is not None and descent.at_rest(self.velocities[run])
-
-    def _advance(self, group: int) -> None:
-        """Submit the next batch of a group that has no submitted deck."""
-        while group not in [*self.groups_of.values(), *(number for _, number in self.halves)]:
-            batch = next(self.batches[group], None)
-            if batch is None:
-                return
-            for deck in _missing_decks(self.cases, batch, self.plan.options, self._is_settled):
-                self._hand_out(deck, group)
-
-    def _hand_out(self, deck: PlannedDeck, group: int) -> None:
-        self.groups_of[deck] = group
-        future = self.submit(
-            runs=[self.record.runs[point] for point in deck.points],
-            cases=[self.cases[point] for point in deck.points],
-            out=self.record.out,
-            engine=self.plan.engine,
-            time_limit=self.plan.options.time_limit,
-            retries=self.plan.options.retries if len(deck.points) == 1 else 0,
-        )
-        future.add_done_callback(lambda future: self.ended.put((deck, future)))
-
-    def _take_in(self, deck: PlannedDeck, group: int, future: Future[Report]) -> None:
+    def _take_in(self, deck: PlannedDeck, report: Report) -> None:
         """Count finished points, and submit the others again: in halves if the deck failed."""
-        report = self._report(future)
         if report.hits == "every point" or (report.hits == "all at first" and self.done == self.found):
             raise SweepStopped(f"{report.message}; this would hit every point, and the sweep is stopped")
-        self.settled |= set(report.finished)
-        self.velocities |= report.finished
-        left = [point for point in deck.points if not self._is_settled(point)]
-        settled = len(deck.points) - len(left)
-        self.seconds_done += deck.seconds * settled / len(deck.points)
-        self.done += settled
+        left = [point for point in deck.points if self.record.runs[point] not in report.finished]
+        self.done += len(deck.points) - len(left)
         if len(left) == 1 and report.failure is not None:
             run = self.record.runs[left[0]]
             self.failures.append(Failure(left[0], run, report.failure, report.message, report.directory))
-            self.settled.add(run)
-            self.seconds_done += deck.seconds
             self._check_alike(report)
         elif left:  # without a failure another process was making these points
             first, *second = _parts(left, 2) if report.failure else [left]
             parts = [PlannedDeck(tuple(part), deck.seconds * len(part) / len(deck.points)) for part in (first, *second)]
-            self._hand_out(parts[0], group)
-            self.halves += [(part, group) for part in parts[1:]]
-
-    def _report(self, future: Future[Report]) -> Report:
-        """The report of a deck, or a failure if the cluster lost it; an error of the program is raised."""
-        error = future.exception()
-        if error is None:
-            return future.result()
-        if self.plan.options.site is not None:
-            from parsl.errors import ParslError
-
-            _check_cluster(error)
-            if isinstance(error, ParslError):
-                return Report(failure=type(error).__name__, message=str(error) or repr(error))
-        raise error
+            self._submit(parts[0])
+            self.halves += parts[1:]
+            self.seconds_done -= sum(part.seconds for part in parts)
+        self.seconds_done += deck.seconds
 
     def _check_alike(self, report: Report) -> None:
         """Raise `SweepStopped` if the first points all failed alone in the same way, but not by their parameters."""
@@ -577,9 +516,9 @@ class _Scheduler:
             raise SweepStopped(f"{alike[1]}; {text}")
 
     def _progress(self) -> SweepProgress:
-        first = list(self.groups_of)[: 4 * self.plan.options.decks_at_once]  # later decks have not started
+        first = list(self.decks.values())[: 4 * self.plan.options.decks_at_once]  # later decks have not started
         made = [deck for deck in first if is_locked(self.record.out / self.record.runs[deck.points[0]])]
-        waiting = sum(deck.seconds for deck in [*self.groups_of, *(half for half, _ in self.halves)])
+        waiting = sum(deck.seconds for deck in [*self.decks.values(), *self.halves])
         elapsed = time.perf_counter() - self.begin
         return SweepProgress(
             points=len(self.record.runs),

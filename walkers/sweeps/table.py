@@ -15,7 +15,6 @@ import io
 import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from math import nan
@@ -69,7 +68,7 @@ UNREADABLE = "ResultUnreadable"
 """Reason of points whose run is finished and whose result cannot be read."""
 _VARIED = "varied"
 """Meaning of the columns of varied keys."""
-_STATUSES = ("finished", "running", "failed", "missing", "not needed")
+_STATUSES = ("finished", "running", "failed", "missing")
 _MOST_FAILURES = 10
 
 
@@ -109,12 +108,6 @@ class SweepRecord:
         together += [flatten(self.file.get("one_at_a_time", {}), is_axis)]
         axis_of = {key: tuple(keys) for keys in together for key in keys}
         return list(dict.fromkeys(axis_of.get(key, (key,)) for key in self.units))
-
-    @property
-    def chains(self) -> list[list[int]]:
-        """Numbers of the points of each descent, highest value first; without descents one list of all points."""
-        steps = self.descent.steps if self.descent else len(self.runs)
-        return [list(range(start, start + steps)) for start in range(0, len(self.runs), steps or 1)]
 
 
 def columns_of(names: Iterable[str]) -> dict[str, tuple[str, str]]:
@@ -197,7 +190,7 @@ def read_record(directory: str | Path) -> SweepRecord:
 
 @dataclass(frozen=True)
 class PointState:
-    """State of a point: finished, failed, running, missing, or not needed (below the end of a descent).
+    """State of a point: finished, failed, running or missing.
 
     ``directory`` is that of the finished or failed run, ``result`` is from `checked_states`; others describe a failure.
     """
@@ -212,18 +205,7 @@ class PointState:
 
 def states(record: SweepRecord) -> list[PointState]:
     """State of each point, read from the run directories."""
-    places = [record.out / run for run in record.runs]
-    found = list(map(state_at, places))
-    if record.descent is None:
-        return found
-    for chain in record.chains:
-        stopped = False
-        for number in chain:
-            if stopped:
-                found[number] = PointState("not needed")
-            elif found[number].status == "finished":
-                stopped = record.descent.at_rest(velocity_of(places[number]))
-    return found
+    return [state_at(record.out / run) for run in record.runs]
 
 
 def checked_states(record: SweepRecord) -> list[PointState]:
@@ -262,13 +244,6 @@ def unfinished_state(place: Path, directory: Path) -> PointState:
         return PointState("missing")
 
 
-def velocity_of(directory: Path) -> float:
-    """Mean velocity of the walkers of a finished run, m/s; NaN if its result cannot be read."""
-    with suppress(InputError):
-        return float(read(directory).get("velocity", nan))
-    return nan
-
-
 # --- the table --------------------------------------------------------------------------------------------------------
 
 
@@ -278,9 +253,8 @@ def load(directory: str | Path) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row per point, in the order of the sweep; a descent's points below its end are left out. Columns are
-        ``point``, the keys that vary (in the unit of the sweep file), and (SI units) the numbers of results
-        (`walkers.postprocess.quantities.NUMBERS`) and `STATE`.
+        One row per point, in the order of the sweep. Columns are ``point``, the keys that vary (in the unit of the
+        sweep file), and (SI units) the numbers of results (`walkers.postprocess.quantities.NUMBERS`) and `STATE`.
         ``attrs["units"]`` maps columns to units, ``attrs["meanings"]`` to their meanings. Unfinished points have NaN.
     """
     import pandas as pd
@@ -291,11 +265,11 @@ def load(directory: str | Path) -> pd.DataFrame:
         # A key with several numbers, such as the radii, has a column for each.
         parts = max((len(values[place]) for values in record.values if isinstance(values[place], list)), default=0)
         varied |= dict.fromkeys([f"{key}[{part}]" for part in range(parts)] or [key], (unit or "", _VARIED))
-    points = [(number, one) for number, one in enumerate(checked_states(record)) if one.status != "not needed"]
-    names = {*numbers_of([*record.measured, "drive"]), *(name for _, one in points for name in one.result or ())}
+    points = checked_states(record)
+    names = {*numbers_of([*record.measured, "drive"]), *(name for one in points for name in one.result or ())}
     found = columns_of(names)
     described = {"point": ("", "number of the point"), **varied, **found, **STATE}
-    rows = [dict.fromkeys(found, nan) | _row(record, number, state) for number, state in points]
+    rows = [dict.fromkeys(found, nan) | _row(record, number, state) for number, state in enumerate(points)]
     frame = _with_units(pd.DataFrame(rows, columns=list(described)), described)
     frame.attrs |= {"sweep": record.name, "title": record.title or record.name, "axes": record.axes}
     return frame
@@ -428,9 +402,9 @@ def thresholds(directory: str | Path) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row per descent: the other varied keys; ``moving`` and ``at_rest``, the last value of the lowered key at
-        which the walkers move and the first at which they rest (NaN if there is none); and ``gamma0_moving`` and
-        ``gamma0_at_rest``, the dimensionless peak forces Γ0 at these values.
+        One row per descent: the other varied keys; ``at_rest`` and ``moving``, the first value of the lowered key at
+        which the walkers rest and the last one before it at which they move (NaN if there is none); and
+        ``gamma0_moving`` and ``gamma0_at_rest``, the dimensionless peak forces Γ0 at these values.
     """
     import pandas as pd
 
@@ -444,7 +418,7 @@ def thresholds(directory: str | Path) -> pd.DataFrame:
         finished = points[points["status"] == "finished"]
         slow = finished["velocity"].astype(float).abs() < descent.until_below
         row = {name: points.iloc[0][name] for name in others}
-        for name, part in (("moving", finished[~slow].tail(1)), ("at_rest", finished[slow].head(1))):
+        for name, part in (("moving", finished[~slow.cummax()].tail(1)), ("at_rest", finished[slow].head(1))):
             row[name] = part.iloc[0][descent.key] if len(part) else nan
             row[f"gamma0_{name}"] = part.iloc[0]["gamma0"] if len(part) else nan
         rows.append(row)
