@@ -93,53 +93,31 @@ extras: setup .venv/with-all ## Install what reports, archives, calibrations, th
 setup: engine .venv/ready ## Install what is missing: liggghts and what compiles its contact model (apt-get), and .venv
 	@.venv/bin/python -c "from walkers.runner.binary import compile_model; compile_model()"
 
-# As root, through sudo, or with one message for whoever is root. $(1): packages, $(2): what they are for.
-# Without what Debian recommends: with liggghts that is ParaView, 2.4 GB.
-define debian
-	@if [ "$$(id -u)" = 0 ]; then apt-get update -qq && RUNLEVEL=1 DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $(1) >/dev/null; \
-	elif command -v sudo >/dev/null && { [ -t 0 ] || sudo -n true 2>/dev/null; }; then \
-	  sudo apt-get update -qq && sudo RUNLEVEL=1 DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $(1) >/dev/null; \
-	else echo "$(2) is missing and cannot be installed without root. Ask an administrator to run: apt-get install $(1)" >&2; exit 1; fi
-endef
-
+# Debian packages of targets, and the commands and files without which they are installed.
 # The engine, what its contact model is compiled with, and Mesa, by which pictures are drawn without a screen.
 ENGINE := liggghts openmpi-bin g++ libliggghts-dev libopenmpi-dev libegl1 libgl1 libgl1-mesa-dri libxrender1
-.PHONY: engine
-ifeq ($(shell command -v liggghts >/dev/null && command -v mpirun >/dev/null && command -v g++ >/dev/null && command -v mpicxx >/dev/null && test -d /usr/include/liggghts && ls /usr/lib/*/libEGL.so.1 >/dev/null 2>&1 && echo all),)
-engine:
-	@echo "installing the engine, liggghts, what its contact model is compiled with, and Mesa"
-	$(call debian,$(ENGINE),liggghts or what its contact model is compiled with)
-else
-engine:
-endif
-
+engine: PACKAGES := $(ENGINE)
+engine: NEEDED := liggghts mpirun g++ mpicxx /usr/include/liggghts /usr/lib/*/libEGL.so.1
+chromium: PACKAGES := chromium
+chromium: NEEDED := chromium
+paraview: PACKAGES := paraview python3-paraview xvfb xauth
+paraview: NEEDED := pvpython xvfb-run
+venv-package: PACKAGES := python3-venv
+venv-package: NEEDED := /usr/lib/python3*/ensurepip
 # The tests start a throw-away SLURM of their own where they are root; elsewhere they leave that out and say so.
-.PHONY: cluster
-ifeq ($(shell PATH="$$PATH:/usr/sbin" command -v slurmctld),)
-cluster:
-	@[ "$$(id -u)" != 0 ] || echo "installing slurm-wlm and munge, for the tests"
-	$(if $(filter 0,$(shell id -u)),$(call debian,slurm-wlm munge,slurm-wlm))
-else
-cluster:
-endif
+cluster: PACKAGES := slurm-wlm munge
+cluster: NEEDED := $(if $(filter 0,$(shell id -u)),/usr/sbin/slurmctld)
 
-.PHONY: chromium
-ifeq ($(shell command -v chromium),)
-chromium:
-	@echo "installing chromium, for the tests of reports"
-	$(call debian,chromium,chromium)
-else
-chromium:
-endif
-
-.PHONY: paraview
-ifeq ($(shell command -v pvpython >/dev/null && command -v xvfb-run >/dev/null && echo all),)
-paraview:
-	@echo "installing paraview, python3-paraview and xvfb, for the tests"
-	$(call debian,paraview python3-paraview xvfb xauth,paraview)
-else
-paraview:
-endif
+# As root, through sudo, or with one message for whoever is root.
+# Without what Debian recommends: with liggghts that is ParaView, 2.4 GB.
+.PHONY: engine chromium paraview venv-package cluster
+engine chromium paraview venv-package cluster:
+	@missing=; sudo=; for needed in $(NEEDED); do command -v $$needed || ls -d $$needed || missing=yes; done >/dev/null 2>&1; \
+	[ "$$missing" ] || exit 0; echo "installing $(PACKAGES)"; \
+	if [ "$$(id -u)" != 0 ]; then sudo=sudo; command -v sudo >/dev/null && { [ -t 0 ] || sudo -n true 2>/dev/null; } || { \
+	  echo "$@ is missing and cannot be installed without root. Ask an administrator to run: apt-get install $(PACKAGES)" >&2; exit 1; }; fi; \
+	$$sudo apt-get update -qq && \
+	$$sudo env RUNLEVEL=1 DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $(PACKAGES) >/dev/null
 
 .venv/ready: requirements.txt pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed: make PYTHON=/path/to/python3.11" >&2; exit 1; }
@@ -154,7 +132,3 @@ endif
 	@echo "installing the packages of granular-walkers[$*] into .venv"
 	@$(PIP) 'granular-walkers[$*]'
 	@touch $@
-
-.PHONY: venv-package
-venv-package:
-	$(call debian,python3-venv,python3-venv)

@@ -36,6 +36,7 @@ ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 OPTIONAL: dict[str, list[str]] = PROJECT["optional-dependencies"]
 FOR_USERS = {extra: OPTIONAL[extra] for extra in OPTIONAL if extra not in {"all", "docs", "dev"}}
+VERSION = "0.1.1.dev7+g0123abc"
 OURS = canonicalize_name(PROJECT["name"])
 
 
@@ -80,19 +81,19 @@ def python(*arguments: str, folder: Path, **environment: str) -> str:
 
 @pytest.fixture(scope="module")
 def wheel(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
-    """Folder with ``tree.whl``, built from the checkout, and ``sdist.whl``, from the source distribution."""
+    """Folder with ``tree/*.whl``, built from the checkout, and ``sdist/*.whl``, from the source distribution."""
 
     def build(folder: Path) -> None:
         source = folder / "source"
         shutil.copytree(ROOT / "walkers", source / "walkers", ignore=shutil.ignore_patterns("__pycache__"))
-        for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
+        for name in ("pyproject.toml", "README.md", "LICENSE"):
             shutil.copy(ROOT / name, source)
         pip = ("-m", "pip", "wheel", "--quiet", "--no-deps", "--no-index", "--no-build-isolation", "--wheel-dir")
         sdist = "import setuptools.build_meta as build; print(build.build_sdist('..'))"
-        name = python("-c", sdist, folder=source, WALKERS_COMMIT="0123abc").splitlines()[-1]
+        version = "SETUPTOOLS_SCM_PRETEND_VERSION"
+        name = python("-c", sdist, folder=source, **{version: VERSION}).splitlines()[-1]
         for kind, given in (("tree", source), ("sdist", folder / name)):
-            python(*pip, str(folder / kind), str(given), folder=folder, WALKERS_COMMIT="0123abc" * (kind == "tree"))
-            next((folder / kind).glob("*.whl")).rename(folder / f"{kind}-{PROJECT['name']}.whl")
+            python(*pip, str(folder / kind), str(given), folder=folder, **{version: VERSION * (kind == "tree")})
 
     return once("wheels", build)
 
@@ -108,23 +109,21 @@ def bare(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         for part in {file.parts[0] for file in one.files or () if file.parts[0] not in {"..", "__pycache__"}}:
             if not (site / part).exists():
                 (site / part).symlink_to(Path(str(one.locate_file(part))).resolve())
-    target = shutil.copy(
-        wheel / f"tree-{PROJECT['name']}.whl", place / f"granular_walkers-{PROJECT['version']}-py3-none-any.whl"
-    )
     pip = ("-m", "pip", "--python", str(place / "bin" / "python"), "install", "--quiet", "--no-deps", "--no-index")
-    python(*pip, str(target), folder=place)
+    python(*pip, str(next(wheel.glob("sdist/*.whl"))), folder=place)
     return place / "bin"
 
 
 def test_wheels_of_checkout_and_sdist_hold_all_files_of_the_package(wheel: Path) -> None:
     held = {}
-    for kind in ("tree", "sdist"):
-        with zipfile.ZipFile(wheel / f"{kind}-{PROJECT['name']}.whl") as packed:
-            held[kind] = {name: packed.getinfo(name).CRC for name in packed.namelist() if name.startswith("walkers/")}
+    for path in wheel.glob("*/*.whl"):
+        with zipfile.ZipFile(path) as packed:
+            names = (name for name in packed.namelist() if name.startswith("walkers/"))
+            held[path.parent.name] = {name: packed.getinfo(name).CRC for name in names}
     assert held["tree"] == held["sdist"]
     files = [path.relative_to(ROOT) for path in (ROOT / "walkers").rglob("*") if path.is_file()]
     ours = {path.as_posix() for path in files if "__pycache__" not in path.parts and path.name[0] != "."}
-    assert held["tree"].keys() == {*ours, "walkers/commit.txt"}
+    assert held["tree"].keys() == ours
 
 
 def test_mandatory_packages_run_tabulate_and_draw(bare: Path, in_folder: Path) -> None:
@@ -234,12 +233,12 @@ def test_faults_to_plant_are_in_the_code_once_and_name_tests_that_are_there() ->
 
 
 def test_lists_of_debian_packages_agree() -> None:
-    """The Makefile has them; recipes of containers add Python, the guide for contributors repeats them."""
+    """The Makefile has them; the container adds Python, the guide for contributors repeats them."""
     (engine,) = re.findall(r"^ENGINE := (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
     packages = set(engine.split())
-    recipes = [(ROOT / "containers" / name).read_text() for name in ("Dockerfile", "walkers.def")]
-    listed = [re.findall(r"--no-install-recommends \\\n(.*?)(?: \\)?$", text, re.MULTILINE)[0] for text in recipes]
-    assert [set(text.split()) - {"python3", "python3-venv"} for text in listed] == [packages] * 2
+    recipe = (ROOT / "containers" / "Dockerfile").read_text()
+    (listed,) = re.findall(r"--no-install-recommends \\\n(.*?) *\\?$", recipe, re.MULTILINE)
+    assert set(listed.split()) - {"python3", "python3-venv"} == packages
     (guide,) = re.findall(r"Debian packages: `([^`]*)`", (ROOT / "CONTRIBUTING.md").read_text())
     assert set(guide.split()) == packages
 

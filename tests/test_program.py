@@ -28,7 +28,6 @@ from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import is_finished, run_place
 from walkers.runner.manifest import read_manifest
-from walkers.runner.provenance import COMMIT_NAME, software
 
 ROOT = Path(__file__).parent.parent
 
@@ -214,18 +213,13 @@ def test_the_library_lists_what_can_be_named_and_says_where_each_number_is_from(
     assert (done.returncode, "expected one of stainless steel, chrome steel" in done.stderr) == (2, True)
 
 
-def test_version_names_package_commit_and_engine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_version_names_package_commit_and_engine(monkeypatch: pytest.MonkeyPatch) -> None:
     package, engine = call("--version", check=True).stdout.splitlines()
     assert package.startswith("granular-walkers 0.")
     if (ROOT / ".git").exists():
         told = subprocess.run(["git", "-C", ROOT, "rev-parse", "HEAD"], capture_output=True, text=True, check=True)
         assert package.partition("(commit ")[2].removesuffix(")").removesuffix("+changes") == told.stdout.strip()
     assert engine == f"LIGGGHTS-PUBLIC 3.8.0, {find_engine().path}"
-    # A wheel names the commit that it was built from.
-    wheel = shutil.copytree(Path(walkers.__file__).parent, tmp_path / "walkers")
-    (wheel / COMMIT_NAME).write_text("0123abc\n")
-    told_by_wheel = _python("from walkers.main import describe_version as one; print(one())", tmp_path)
-    assert told_by_wheel.startswith(f"granular-walkers {software()['granular_walkers']} (commit 0123abc)\n")
     monkeypatch.setenv("WALKERS_ENGINE", "no-such-engine")
     assert "no engine: no-such-engine" in call("--version", check=True).stdout
 

@@ -1,7 +1,4 @@
-"""Software of a run: version and commit of the program, versions of Python and of required packages.
-
-Uses only the standard library: the build of a wheel (``setup.py``) runs this file to find the commit.
-"""
+"""Software of a run: version and commit of the program, versions of Python and of required packages."""
 
 from __future__ import annotations
 
@@ -17,8 +14,6 @@ from pathlib import Path
 from typing import Any
 
 PROJECT = "granular-walkers"
-COMMIT_NAME = "commit.txt"
-"""File with the commit, in a wheel that was built in a checkout."""
 _PATIENCE_SECONDS = 20.0
 
 
@@ -26,7 +21,8 @@ _PATIENCE_SECONDS = 20.0
 def software() -> dict[str, Any]:
     """Versions of the program, of Python and of the required packages, as manifests have them; looked up once (30 ms).
 
-    ``commit`` is that of the checkout from which the program runs or was built (`commit_of`); None if unknown.
+    ``commit`` is that of the checkout from which the program runs (`commit_of`), else of the checkout from which it was
+    built, which setuptools-scm adds to the version; None if unknown.
     """
     try:
         version, required = metadata.version(PROJECT), metadata.requires(PROJECT) or []
@@ -37,12 +33,9 @@ def software() -> dict[str, Any]:
     for name in needed:
         with suppress(metadata.PackageNotFoundError):
             packages[name] = metadata.version(name)
-    package = Path(__file__).resolve().parents[1]
-    commit = commit_of(package.parent)
-    if commit is None and (package / COMMIT_NAME).is_file():
-        commit = (package / COMMIT_NAME).read_text("utf-8").strip() or None
-    python = platform.python_version()
-    return {"granular_walkers": version, "commit": commit, "python": python, "packages": packages}
+    version, _, built = version.partition("+")
+    commit = commit_of(Path(__file__).resolve().parents[2]) or built.removeprefix("g") or None
+    return {"granular_walkers": version, "commit": commit, "python": platform.python_version(), "packages": packages}
 
 
 def look_ahead() -> None:
@@ -59,11 +52,8 @@ def commit_of(checkout: Path) -> str | None:
         return None
     # A git hook may set another repository. Nothing is written, because many processes may ask at once.
     ours = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
-    ours["GIT_OPTIONAL_LOCKS"] = "0"
+    command = ["git", "--no-optional-locks", "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty=+changes"]
     how: dict[str, Any] = {"cwd": checkout, "env": ours, "timeout": _PATIENCE_SECONDS, "text": True}
-    command = ["git", "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty=+changes"]
-    try:
-        commit: str = subprocess.check_output(command, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **how)
-    except (OSError, subprocess.SubprocessError):  # no git here, or a file system that does not answer
-        return None
-    return commit.strip() or None
+    with suppress(OSError, subprocess.SubprocessError):  # no git here, or a file system that does not answer
+        return str(subprocess.run(command, check=True, capture_output=True, **how).stdout).strip()
+    return None
