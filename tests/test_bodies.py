@@ -24,7 +24,7 @@ from walkers.inputs.standing import standing
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.figures import figures_of
 from walkers.postprocess.gait import postures, turned_over_at
-from walkers.postprocess.meetings import Course, collective
+from walkers.postprocess.meetings import collective
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.results import headlines, read
 from walkers.postprocess.tables import read_table
@@ -297,8 +297,8 @@ def test_what_walkers_do_as_many_is_counted() -> None:
     speed = np.ones((100, 4)) * MM_PER_S
     speed[50:, :2], speed[10:30, 2:] = 0.0, 0.5 * MM_PER_S
     way = np.concatenate([np.zeros((1, 4)), np.cumsum(0.1 * speed, axis=0)])
-    course = Course(time, way[..., None] * heading, np.broadcast_to(heading, (101, 4, 2)), size, held)
-    found = collective(course, 2, np.array([1.0, 0.0]))
+    headings = np.broadcast_to(heading, (101, 4, 2))
+    found = collective(time, way[..., None] * heading, headings, size, held, 2, np.array([1.0, 0.0]))
     joined = 40 * 0.5 / 140  # of 140 intervals between frames in which one was joined, 40 at half the speed
     assert found == pytest.approx(
         {

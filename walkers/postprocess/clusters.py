@@ -19,12 +19,13 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import FLOOR, Bridges
-from walkers.postprocess.tables import Columns
+from walkers.postprocess.tables import Columns, columns_of
 
 Cluster = tuple[frozenset[int], frozenset[int]]
 """Beads of a cluster in a frame, and side walls that hold it."""
@@ -50,14 +51,14 @@ _MOST_BLOCKS, _FEWEST_BLOCKS = 10, 4
 class Track:
     """A cluster through time: frames in which it is free and held, its beads and side walls.
 
-    ``merged_into`` and ``merged_at`` are the track into which it merged and the frame in which it did, or None.
+    ``merged_into`` and ``merged_at`` are the track into which it merged and the frame in which it did, or -1.
     """
 
     frames: list[int] = field(default_factory=list)
     members: list[frozenset[int]] = field(default_factory=list)
     walls: list[frozenset[int]] = field(default_factory=list)
-    merged_into: int | None = None
-    merged_at: int | None = None
+    merged_into: int = -1
+    merged_at: int = -1
 
 
 def connected(count: int, pairs: IntArray) -> IntArray:
@@ -147,49 +148,6 @@ class Beads:
     wall_names: Sequence[str]
 
 
-@dataclass(frozen=True)
-class Rise:
-    """The largest rise of a track, and the first rise that counts as a climb.
-
-    Attributes
-    ----------
-    begin, end : int
-        Frames of the track at which the largest rise begins and ends, counted from its first.
-    gain, speed, standard_error : float
-        Increase of the mean height of the beads, m; gain over duration, m/s, and its standard error: that of the mean
-        over up to ten equal parts of the rise. It is too small if the speed changes more slowly than over a tenth of
-        the climb. Begin and end maximise the gain, so the speed of a short and unsteady climb is too large.
-    onset, qualified : float
-        Time at which the first rise that counts as a climb begins, and at which it is high enough, s; NaN without one.
-        They do not depend on later frames: up to a given time, records of any length contain the same climbs.
-    leader : int
-        The bead that is most often topmost.
-    """
-
-    begin: int
-    end: int
-    gain: float
-    speed: float
-    standard_error: float
-    onset: float
-    qualified: float
-    leader: int
-
-
-def _rise_of(track: Track, beads: Beads) -> Rise:
-    time, height = beads.time, beads.height
-    gained, seconds = _gained(track, time, height)
-    risen = gained - np.minimum.accumulate(gained)
-    moments = _qualified(gained)
-    onset, qualified = (float(time[track.frames[place]]) for place in moments) if moments else (np.nan, np.nan)
-    end = int(np.argmax(risen))
-    begin = int(np.argmin(gained[: end + 1]))
-    span = range(begin, end + 1)
-    topmost = Counter(max(track.members[place], key=lambda bead: height[track.frames[place], bead]) for place in span)
-    speed, error = _speed(seconds[begin : end + 1], gained[begin : end + 1])
-    return Rise(begin, end, float(risen[end]), speed, error, onset, qualified, topmost.most_common(1)[0][0])
-
-
 def _left_bulk(track: Track, beads: Beads) -> bool:
     """Whether the first beads were in the bulk for some time; others have hung on a wall since before the drive."""
     before, members = slice(beads.first, track.frames[0]), list(track.members[0])
@@ -199,45 +157,73 @@ def _left_bulk(track: Track, beads: Beads) -> bool:
 
 
 def climbs_of(tracks: Sequence[Track], beads: Beads) -> Columns:
-    """Table ``clusters``: the largest rise of each track of `follow`, and whether the track is a climb."""
-    rises = [_rise_of(track, beads) for track in tracks]
-    pairs = list(zip(tracks, rises, strict=True))
-    members, walls = (
-        [track.members[rise.end] for track, rise in pairs],
-        [track.walls[rise.end] for track, rise in pairs],
+    """Table ``clusters``: the largest rise of each track of `follow`, and whether the track is a climb.
+
+    Begin and end of a rise maximise the gain, so the speed of a short and unsteady climb is too large. Its standard
+    error is that of the mean over up to ten equal parts; it is too small if the speed changes more slowly than over a
+    tenth of the climb. ``onset`` and ``qualified`` do not depend on later frames: up to a given time, records of any
+    length contain the same climbs.
+    """
+    rows = [_climb_of(number, track, beads) for number, track in enumerate(tracks)]
+    return {name: np.array([row[name] for row in rows], dtype=kind) for name, kind in _KINDS.items()}
+
+
+_KINDS = {
+    "track": int,
+    **dict.fromkeys(("first", "last", "begin", "end"), float),
+    "out_of_pile": bool,
+    **dict.fromkeys(("onset", "qualified", "gain", "speed", "standard_error"), float),
+    "climbed": bool,
+    "leader": int,
+    "leader_large": bool,
+    **dict.fromkeys(("height", "above_surface"), float),
+    **dict.fromkeys(("size", "large", "walls"), int),
+    "wall_names": str,
+    "merged_into": int,
+}
+
+
+def _climb_of(number: int, track: Track, beads: Beads) -> dict[str, Any]:
+    """Row of a track in the table ``clusters``."""
+    frames, height = np.array(track.frames), beads.height
+    gained, seconds = _gained(track, beads.time, height)
+    risen = gained - np.minimum.accumulate(gained)
+    last = int(np.argmax(risen))
+    first = int(np.argmin(gained[: last + 1]))
+    rise, end = slice(first, last + 1), frames[last]
+    onset, qualified = beads.time[frames[moments]] if (moments := _qualified(gained)) else (np.nan, np.nan)
+    speed, error = _speed(seconds[rise], gained[rise])
+    topmost = (
+        max(members, key=lambda bead: height[frame, bead])
+        for frame, members in zip(track.frames[rise], track.members[rise], strict=True)
     )
-    names = [" ".join(beads.wall_names[wall] for wall in sorted(held)) for held in walls]
-    leader = _integers(rise.leader for rise in rises)
-    first, last = (_integers(track.frames[place] for track in tracks) for place in (0, -1))
-    begin, end = (_integers(track.frames[getattr(rise, at)] for track, rise in pairs) for at in ("begin", "end"))
-    numbers = ("onset", "qualified", "gain", "speed", "standard_error")
-    of_rises = {name: np.array([getattr(rise, name) for rise in rises], dtype=np.float64) for name in numbers}
+    leader, walls = Counter(topmost).most_common(1)[0][0], sorted(track.walls[last])
     return {
-        "track": np.arange(len(tracks)),
-        "first": beads.time[first],
-        "last": beads.time[last],
-        "begin": beads.time[begin],
+        "track": number,
+        "first": beads.time[frames[0]],
+        "last": beads.time[frames[-1]],
+        "begin": beads.time[frames[first]],
         "end": beads.time[end],
-        "out_of_pile": np.array([_left_bulk(track, beads) for track in tracks], dtype=np.bool_),
-        **of_rises,
-        "climbed": np.isfinite(of_rises["qualified"]),
+        "out_of_pile": _left_bulk(track, beads),
+        "onset": onset,
+        "qualified": qualified,
+        "gain": risen[last],
+        "speed": speed,
+        "standard_error": error,
+        "climbed": moments is not None,
         "leader": leader,
         "leader_large": beads.large[leader],
-        "height": beads.height[end, leader],
-        "above_surface": beads.height[end, leader] - beads.surface[end],
-        "size": _integers(map(len, members)),
-        "large": _integers(beads.large[list(own)].sum() for own in members),
-        "walls": _integers(map(len, walls)),
-        "wall_names": np.array(names, dtype=np.str_),
-        "merged_into": _integers(-1 if track.merged_into is None else track.merged_into for track in tracks),
+        "height": height[end, leader],
+        "above_surface": height[end, leader] - beads.surface[end],
+        "size": len(track.members[last]),
+        "large": beads.large[list(track.members[last])].sum(),
+        "walls": len(walls),
+        "wall_names": " ".join(beads.wall_names[wall] for wall in walls),
+        "merged_into": track.merged_into,
     }
 
 
-def _integers(values: Iterable[int]) -> IntArray:
-    return np.array(list(values), dtype=np.int64)
-
-
-def _qualified(gained: FloatArray) -> tuple[int, int] | None:
+def _qualified(gained: FloatArray) -> list[int] | None:
     """Begin of the rise that makes a track a climb, and the frame at which it qualifies; None without a climb.
 
     It qualifies where its height above its lowest is a maximum so far, at least `MIN_RISE`, and the rise has enough
@@ -248,7 +234,7 @@ def _qualified(gained: FloatArray) -> tuple[int, int] | None:
     lowest = np.maximum.accumulate(np.where(np.diff(least, prepend=np.inf) < 0.0, places, 0))
     farthest = risen == np.maximum.accumulate(risen)
     found = np.flatnonzero(farthest & (risen >= MIN_RISE) & (places - lowest + 1 >= _FEWEST_FRAMES))
-    return (int(lowest[found[0]]), int(found[0])) if len(found) else None
+    return [int(lowest[found[0]]), int(found[0])] if len(found) else None
 
 
 def _gained(track: Track, time: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -285,36 +271,42 @@ def _speed(seconds: FloatArray, gained: FloatArray) -> tuple[float, float]:
 def members_of(tracks: Sequence[Track], beads: Beads) -> Columns:
     """Table ``members``: by frame, and in a frame in the order in which `held_clusters` gives clusters."""
     clusters = sorted(
-        (frame, sorted(own), number)
+        (frame, sorted(members), number)
         for number, track in enumerate(tracks)
-        for frame, own in zip(track.frames, track.members, strict=True)
+        for frame, members in zip(track.frames, track.members, strict=True)
     )
-    rows = [(frame, number, bead) for frame, own, number in clusters for bead in own]
-    frame, track_of, bead = np.array(rows, dtype=np.int64).reshape(-1, 3).T
-    return {"time": beads.time[frame], "track": track_of, **_of_beads(beads, frame, bead)}
+    return _of_beads(
+        columns_of(
+            ((frame, number, bead) for frame, members, number in clusters for bead in members),
+            frame=int,
+            track=int,
+            bead=int,
+        ),
+        beads,
+    )
 
 
-def _of_beads(beads: Beads, frame: IntArray, bead: IntArray) -> Columns:
-    return {"bead": bead, "large": beads.large[bead], "height": beads.height[frame, bead]}
+def _of_beads(columns: Columns, beads: Beads) -> Columns:
+    """Columns with the time of their frames, and class and height of their beads."""
+    frame, bead = columns.pop("frame"), columns["bead"]
+    return columns | {"time": beads.time[frame], "large": beads.large[bead], "height": beads.height[frame, bead]}
 
 
 def assembly_of(tracks: Sequence[Track], climbs: Columns, beads: Beads, bridges: Sequence[Joined]) -> Columns:
     """Table ``assembly``: state of the beads of each climb in each frame, from rest until it qualifies."""
-    kinds = (np.int64, np.int64, np.int64, np.bool_, np.bool_, np.int64, np.bool_)
-    parts = [tuple(np.empty(0, dtype=kind) for kind in kinds)]
+    rows: list[tuple[Any, ...]] = []
     for number in np.flatnonzero(climbs["climbed"]).tolist():
         until = int(np.searchsorted(beads.time, climbs["qualified"][number]))
-        own = _integers(sorted(tracks[number].members[tracks[number].frames.index(until)]))
+        own = np.array(sorted(tracks[number].members[tracks[number].frames.index(until)]))
         for frame in range(max(beads.first - 1, 0), until + 1):
             pairs, walled = bridges[frame]
             within = np.searchsorted(own, pairs[np.isin(pairs, own).all(axis=1)])
             labels, neighbours = connected(len(own), within), np.bincount(within.ravel(), minlength=len(own))
             joined = (labels == np.bincount(labels).argmax()) & (neighbours > 0)
-            same = (np.full(len(own), value) for value in (frame, number))
-            parts.append((*same, own, beads.bulk[frame][own], walled[own], neighbours, joined))
-    at, track, bead, in_bulk, at_wall, neighbours, joined = map(np.concatenate, zip(*parts, strict=True))
-    states = {"in_bulk": in_bulk, "at_wall": at_wall, "neighbours": neighbours, "joined": joined}
-    return {"time": beads.time[at], "track": track, **_of_beads(beads, at, bead), **states}
+            states = (own, beads.bulk[frame][own], walled[own], neighbours, joined)
+            rows += [(frame, number, *state) for state in zip(*states, strict=True)]
+    kinds = {"frame": int, "track": int, "bead": int, "in_bulk": bool, "at_wall": bool, "neighbours": int}
+    return _of_beads(columns_of(rows, **kinds, joined=bool), beads)
 
 
 def events_of(tracks: Sequence[Track], climbs: Columns, beads: Beads) -> Columns:
@@ -327,11 +319,11 @@ def events_of(tracks: Sequence[Track], climbs: Columns, beads: Beads) -> Columns
     rows: list[tuple[int, int, int, str]] = []
     for number, track in enumerate(tracks):
         born, last, parent = track.frames[0], track.frames[-1], _parent(tracks, number, time)
-        if parent is not None:
+        if parent >= 0:
             rows.append((born, number, parent, "split"))
         elif born > beads.first:
             rows.append((born, number, -1, "freed"))
-        if track.merged_at is not None and track.merged_into is not None:
+        if track.merged_into >= 0:
             rows.append((track.merged_at, number, track.merged_into, "merged"))
         elif time[-1] - time[last] > MAX_GAP:
             # It rejoined the pile if most of its beads were in the bulk before the track ended.
@@ -339,21 +331,15 @@ def events_of(tracks: Sequence[Track], climbs: Columns, beads: Beads) -> Columns
             members, after = list(track.members[-1]), beads.bulk[last + 1 : until + 1]
             back = any(bulk[members].mean() >= MIN_OVERLAP for bulk in after)
             rows.append((last + 1, number, -1, "rejoined" if back else "detached"))
-    rows.sort(key=lambda row: row[:2])
-    frame, track_of, other = np.array([row[:3] for row in rows], dtype=np.int64).reshape(-1, 3).T
-    return {
-        "time": time[frame],
-        "event": np.array([event for *_, event in rows], dtype=np.str_),
-        "track": track_of,
-        "other": other,
-        "height": beads.height[frame, climbs["leader"][track_of]],
-    }
+    events = columns_of(sorted(rows), frame=int, track=int, other=int, event=str)
+    frame = events.pop("frame")
+    return events | {"time": time[frame], "height": beads.height[frame, climbs["leader"][events["track"]]]}
 
 
-def _parent(tracks: Sequence[Track], number: int, time: FloatArray) -> int | None:
-    """The track that had most of the beads of a track shortly before its begin."""
+def _parent(tracks: Sequence[Track], number: int, time: FloatArray) -> int:
+    """The track that had most of the beads of a track shortly before its begin; -1 for none."""
     first, members = tracks[number].frames[0], tracks[number].members[0]
-    best, most = None, MIN_OVERLAP * len(members)
+    best, most = -1, MIN_OVERLAP * len(members)
     for other, track in enumerate(tracks):
         before = bisect_left(track.frames, first) - 1
         if other == number or before < 0 or time[first] - time[track.frames[before]] > MAX_GAP:

@@ -440,7 +440,7 @@ def frames_with_bridges(motion: Motion) -> IntArray:
 def read_bridges(motion: Motion, frames: Collection[int] | None = None) -> Iterator[Bridges]:
     """The bridges between the beads of a motion in each frame that recorded them, or in some of these frames.
 
-    Raises a `DumpError` if a dump cannot be read or ends early.
+    Raises a `DumpError` if a dump cannot be read or ends early, or if no frame recorded bridges.
     """
     stride = motion.case.run.samples_per_bridge_sample
     wanted = {place: frame for frame, place in enumerate(motion.frames) if frames is None or frame in frames}
@@ -450,11 +450,13 @@ def read_bridges(motion: Motion, frames: Collection[int] | None = None) -> Itera
         walls = local_frames(segment / layout.wall_bridge_dump, layout.wall_bridge_columns)
         number = -1
         for number, ((_, between), (_, against)) in enumerate(zip(pairs, walls, strict=False)):
-            frame = wanted.get((segment, stride * number))
+            frame = wanted.pop((segment, stride * number), None)
             if frame is not None:
                 yield _bridges(motion, frame, between, against, layout)
         if number + 1 != layout.bridge_frames:
             raise DumpError(f"{segment}: its bridges hold {number + 1} of {layout.bridge_frames} frames")
+    if frames is None and len(wanted) == len(motion.frames):
+        raise DumpError(f"{motion.directory}: none of its frames recorded bridges")
 
 
 def _bridges(motion: Motion, frame: int, between: FloatArray, against: FloatArray, layout: Layout) -> Bridges:

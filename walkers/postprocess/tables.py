@@ -5,6 +5,7 @@ They are written with pyarrow alone, because pandas takes a third of a second to
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -24,6 +25,12 @@ Columns: TypeAlias = dict[str, npt.NDArray[Any]]
 def numbered(name: str, values: npt.NDArray[Any]) -> Columns:
     """Columns ``name_1``, ``name_2``, … of beads or contacts, which are the last axis of the values."""
     return {f"{name}_{number + 1}": values[..., number] for number in range(values.shape[-1])}
+
+
+def columns_of(rows: Iterable[Sequence[Any]], **kinds: type) -> Columns:
+    """Columns of these names and types from rows, of which there may be none."""
+    cells = list(zip(*rows, strict=True)) or [()] * len(kinds)
+    return {name: np.array(cell, dtype=kind) for (name, kind), cell in zip(kinds.items(), cells, strict=True)}
 
 
 def write_table(directory: Path, name: str, columns: Columns) -> None:
