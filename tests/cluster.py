@@ -1,4 +1,4 @@
-"""A throw-away SLURM cluster of one node: this machine, under daemons of its own that touch no other."""
+"""A throw-away SLURM cluster of one node: this machine, under daemons of its own that touch no other; a local site."""
 
 from __future__ import annotations
 
@@ -46,6 +46,17 @@ DefMemPerCPU=500
 NodeName={host} NodeAddr=127.0.0.1 CPUs={cores} RealMemory={memory} State=UNKNOWN
 PartitionName=main Nodes={host} Default=YES MaxTime=INFINITE State=UP
 """
+
+LOCAL = """\
+from parsl import Config
+from parsl.executors import HighThroughputExecutor
+from parsl.providers import LocalProvider
+
+hearts = {"heartbeat_period": 1, "heartbeat_threshold": 3}
+pilots = HighThroughputExecutor(provider=LocalProvider(), address="127.0.0.1", max_workers_per_node=2, **hearts)
+config = Config([pilots], strategy_period=2)
+"""
+"""A site file: pilots on this machine without a scheduler."""
 
 
 def why_not() -> str | None:

@@ -201,7 +201,7 @@ NO_UTF8 = os.fsdecode(b"x\xff")
 def case_file(in_folder: Path) -> Path:
     file = in_folder / "base.toml"
     file.write_text(to_toml(document(run=SHORT)))
-    (in_folder / "site.toml").write_text('scheduler = "local"\ncores = 2\n[executor]\naddress = "127.0.0.1"\n')
+    (in_folder / "site.toml").write_text("cores = 2\n")
     return file
 
 

@@ -42,7 +42,7 @@ from walkers.show import notes
 from walkers.sweeps.climbing import Condition, conditions_in, describe_climbs, leaders, summarise_climbs, survival
 from walkers.sweeps.climbing_figure import climbs_figure
 from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep
-from walkers.sweeps.site import Site
+from walkers.sweeps.site import Slurm
 from walkers.sweeps.table import load
 from walkers.templates.deck import Deck, Segment, render_deck
 
@@ -604,7 +604,7 @@ def test_placed_beads_reach_the_side_of_a_cylinder() -> None:
 
 
 def test_ranks_take_cores_of_this_machine_and_of_a_cluster() -> None:
-    site = Site(scheduler="slurm", cores=8, nodes=2, walltime="01:00:00")
+    site = Slurm(cores=8, nodes=2).config()
     assert Options(6, site).for_ranks(2).decks_at_once == 8
     assert Options(6).for_ranks(2).decks_at_once == 3
     with pytest.raises(InputError, match="16 MPI processes"):

@@ -1,4 +1,4 @@
-"""Site files: what is handed to Parsl, and what is said of one that makes no sense."""
+"""Sites of sweeps: what Parsl is given, workers of other processes and of SLURM."""
 
 import json
 import os
@@ -13,7 +13,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from tests.cluster import slurm_cluster, why_not
+from tests.cluster import LOCAL, slurm_cluster, why_not
 from tests.conftest import (
     PATIENCE,
     PROGRAM,
@@ -30,56 +30,45 @@ from tests.test_sweeps import SLOW, TINY, contents_of
 from walkers.errors import InputError
 from walkers.inputs.sweep import load_sweep
 from walkers.runner.launch import _off_the_network
-from walkers.sweeps.scheduler import Options
-from walkers.sweeps.site import check_path, load_site, pilots
+from walkers.sweeps.site import check_path, decks_at, load_site, prepare
 from walkers.sweeps.table import load
 
-SLURM = 'scheduler = "slurm"\ncores = 16\n'
+BAD = {
+    'partition = "main"': "toml: cores: missing",
+    "cores = 0": "toml: cores = 0: expected at least 1",
+    "cores = 1000000000": "toml: cores = 1000000000: expected .*at most 10000",
+    'cores = 2\npartitoin = "main"': 'toml: partitoin = .*did you mean "partition"',
+    'cores = 2\nwalltime = "2h"': 'toml: walltime = "2h": expected hours, minutes and seconds',
+    "import walkers": "py: expected a configuration: config = parsl.Config",
+    "import parsl\nconfig = parsl.Config([1])": "py: cannot be used: AttributeError: ",
+    "config = ": "py: cannot be used: SyntaxError: invalid syntax",
+}
 
 
-def _load(folder: Path, text: str) -> None:
-    (folder / "site.toml").write_text(text)
-    load_site(folder / "site.toml")
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("cores = 2", "scheduler: missing"),
-        (SLURM.replace("slurm", "slrum"), 'scheduler = "slrum": .*did you mean "slurm"'),
-        ('scheduler = "slurm"', "cores: missing"),
-        (SLURM.replace("16", "0"), "cores = 0: expected at least 1"),
-        (SLURM + 'partitoin = "main"', 'partitoin = .*did you mean "partition"'),
-        (SLURM + '[provider]\nqoss = "long"', "Parsl cannot use it: .*'qoss'"),
-        (SLURM + "[executor]\nadress = 1", "Parsl cannot use it: .*'adress'"),
-        (SLURM + 'launcher = "run"', "launcher = .*srun"),
-        ('scheduler = "local"\ncores = 2\npartition = "main"', "Parsl cannot use it: LocalProvider.* 'partition'"),
-        (SLURM + 'walltime = "2h"', 'walltime = "2h": expected hours, minutes and seconds'),
-        (SLURM.replace("16", "1000000000"), "cores = 1000000000: expected .*at most 10000"),
-        (SLURM + '[provider]\ninit_blocks = "three"', "Parsl cannot use it: .*init_blocks"),
-    ],
-)
-def test_a_site_that_makes_no_sense(tmp_path: Path, text: str, message: str) -> None:
-    with pytest.raises(InputError, match=f"site.toml: {message}"):
-        _load(tmp_path, text)
+@pytest.mark.parametrize("text", BAD)
+def test_a_site_that_makes_no_sense(tmp_path: Path, text: str) -> None:
+    name = f"site.{BAD[text].partition(':')[0]}"
+    (tmp_path / name).write_text(text)
+    with pytest.raises(InputError, match=f"site.{BAD[text]}"):
+        load_site(tmp_path / name)
 
 
 def test_what_parsl_is_told(tmp_path: Path) -> None:
-    file = {"partition": "main", "account": "granular", "walltime": "02:00:00", "nodes": 2, "jobs": 4}
-    file |= {"scheduler": "slurm", "cores": 16, "modules": ["openmpi"], "shell": ["ulimit -c 0"]}
-    file |= {"provider": {"qos": "long"}, "executor": {"heartbeat_period": 7, "worker_port_range": [54000, 54100]}}
-    (tmp_path / "site.toml").write_text(to_toml(file))
-    site = load_site(tmp_path / "site.toml")
-    assert Options(1, site).decks_at_once == 2 * 16 * 4
-    (executor,) = pilots(site, tmp_path / "parsl").executors
+    file = {"partition": "main", "account": "granular", "walltime": "02:00:00", "nodes": 2, "jobs": 4, "cores": 16}
+    file |= {"modules": ["openmpi"], "shell": ["ulimit -c 0"], "sbatch": ["--qos=long", "--mem=4G"]}
+    (tmp_path / "site.toml").write_text(to_toml(file | {"address": "10.1.0.1", "container": "apptainer exec w.sif"}))
+    config = load_site(tmp_path / "site.toml")
+    assert [decks_at(config, ranks) for ranks in (1, 3, 17)] == [2 * 16 * 4, 2 * 5 * 4, 0]
+    (executor,) = prepare(config, tmp_path / "parsl", 3).executors
     provider = executor.provider
-    told = {"partition": "main", "account": "granular", "walltime": "02:00:00", "qos": "long", "exclusive": False}
+    told = {"partition": "main", "account": "granular", "walltime": "02:00:00", "exclusive": False, "min_blocks": 0}
     told |= {"nodes_per_block": 2, "cores_per_node": 16, "max_blocks": 4}
     assert {name: getattr(provider, name) for name in told} == told
     assert type(provider.launcher).__name__ == "SrunLauncher"
     assert provider.worker_init.splitlines()[:2] == ["module load openmpi", "ulimit -c 0"]
-    assert (executor.max_workers_per_node, executor.heartbeat_period, executor.encrypted) == (16, 7, True)
-    assert executor.worker_port_range == (54000, 54100)
+    assert {"#SBATCH --qos=long", "#SBATCH --mem=4G"} <= {*provider.scheduler_options.splitlines()}
+    assert (executor.max_workers_per_node, executor.address, executor.encrypted) == (5, "10.1.0.1", True)
+    assert executor.launch_cmd.startswith("apptainer exec w.sif process_worker_pool.py ")
 
 
 # Of the last one SLURM makes something else: jobs end at once whose output goes to a folder that is not there.
@@ -88,43 +77,36 @@ SHELL = {**HOSTILE, "variable of SLURM": "100%N"}
 
 @pytest.mark.parametrize("text", SHELL.values(), ids=SHELL)
 def test_texts_that_a_shell_would_take_for_more_are_refused_or_quoted(in_folder: Path, text: str) -> None:
-    """Settings and folder stand in scripts and commands of schedulers; names of modules are quoted there."""
-    for key in ("partition", "account", "provider.qos", "provider.clusters", "executor.address"):
+    """Settings and folder stand in scripts and commands of SLURM; names of modules are quoted there."""
+    site, quoted = in_folder / "site.toml", json.dumps(text, ensure_ascii=False)
+    for key in ("partition", "account", "address"):
+        site.write_text(f"cores = 16\n{key} = {quoted}\n")
         with pytest.raises(InputError, match=rf"site\.toml: {key} = .*: expected letters"):
-            _load(in_folder, SLURM + f"{key} = {json.dumps(text, ensure_ascii=False)}\n")
+            load_site(site)
     with pytest.raises(InputError, match=r"^out: .* expected letters"):
         check_path(in_folder / text / "fig2")
-    (in_folder / "site.toml").write_text(SLURM + f"modules = [{json.dumps(text, ensure_ascii=False)}]\n")
-    script = pilots(load_site(in_folder / "site.toml"), in_folder / "parsl").executors[0].provider.worker_init
-    told = subprocess.run(
-        ["bash"], input=f"module() {{ printf '%s' \"$2\"; }}\n{script}", capture_output=True, text=True, check=True
-    )
+    site.write_text(f"cores = 16\nmodules = [{quoted}]\n")
+    (executor,) = load_site(site).executors
+    script = f"module() {{ printf '%s' \"$2\"; }}\n{executor.provider.worker_init}"
+    told = subprocess.run(["bash"], input=script, capture_output=True, text=True, check=True)
     assert told.stdout == text.replace("\r", "\n")  # as text is read
     assert sorted(path.name for path in in_folder.iterdir()) == ["site.toml"]
 
 
-def test_workers_of_another_process_give_the_same(in_folder: Path) -> None:
-    """Parsl's local provider: pilots without a scheduler, in a container.
-
-    A script in place of ``apptainer exec IMAGE`` starts what starts the engines.
-    """
+def test_workers_of_another_process_give_the_same(in_folder: Path, front: Callable[[str], str]) -> None:
+    """Pilots without a scheduler. The first engine ends its worker, whose deck is repeated."""
+    lost = f"grep -q spawn_main /proc/$PPID/cmdline && mkdir {in_folder}/once && kill -9 $PPID"
+    engine = front(f'{lost}\nexec liggghts "$@"')
     (in_folder / "base.toml").write_text(to_toml(document(run=TINY)))
-    (in_folder / "test.toml").write_text('case = "base.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
-    (in_folder / "apptainer").write_text(f'#!/bin/sh\necho "$@" >> {in_folder}/called\nshift 2\nexec "$@"\n')
-    (in_folder / "apptainer").chmod(0o755)
-    site = f'scheduler = "local"\ncores = 2\ncontainer = "{in_folder}/apptainer exec walkers.sif"\n'
-    (in_folder / "site.toml").write_text(site)
-    there = [PROGRAM, "sweep", "test.toml", "--out", "there", "--site", "site.toml"]
+    (in_folder / "test.toml").write_text('case = "base.toml"\n[axes]\nrun.time_step = ["2 us", "1 us"]\n')
+    (in_folder / "site.py").write_text(LOCAL)
+    there = [PROGRAM, "sweep", "test.toml", "--out", "there", "--site", "site.py", "--engine", engine]
     program = subprocess.Popen(there, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    call("sweep", "test.toml", "--out", "here", "-j", "2", check=True)  # meanwhile
+    call("sweep", "test.toml", "--out", "here", "-j", "2", "--engine", engine, check=True)  # meanwhile
     _, errors = program.communicate(timeout=PATIENCE)
     assert program.returncode == 0, errors
-    assert contents_of(in_folder / "here") == contents_of(in_folder / "there")
-    assert set(load(in_folder / "there" / "test")["status"]) == {"finished"}
-    assert (in_folder / "called").read_text().startswith("exec walkers.sif process_worker_pool.py ")
-
-
-LOCAL = 'scheduler = "local"\ncores = 2\n[executor]\nheartbeat_period = 1\nheartbeat_threshold = 3\n'
+    assert contents_of(in_folder / "here") == contents_of(in_folder / "there") != {}
+    assert "WorkerLost" in "".join(log.read_text() for log in in_folder.glob("there/test/parsl/*/parsl.log"))
 
 
 def _helpers(folder: Path) -> list[psutil.Process]:
@@ -155,7 +137,7 @@ def _reachable(processes: list[psutil.Process]) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize(("site", "ranks"), [("", 2), ('scheduler = "local"\ncores = 2\n', 1)])
+@pytest.mark.parametrize(("site", "ranks"), [("", 2), (LOCAL, 1)])
 def test_nothing_listens_beyond_this_machine(in_folder: Path, site: str, ranks: int) -> None:
     """Not the program, mpirun and the engines; nor Parsl's interchange, pilots and workers.
 
@@ -166,8 +148,8 @@ def test_nothing_listens_beyond_this_machine(in_folder: Path, site: str, ranks: 
     settings = {"run.ranks": ranks, "run.duration": "100 s"}
     sweep = {"case": "pile-ci", "set": settings, "axes": {"run.seed": [1, 2]}}
     (in_folder / "test.toml").write_text(to_toml(sweep))
-    (in_folder / "site.toml").write_text(site)
-    command = [PROGRAM, "sweep", "test.toml", *(["--site", "site.toml"] if site else ["-j", "2"])]
+    (in_folder / "site.py").write_text(site)
+    command = [PROGRAM, "sweep", "test.toml", *(["--site", "site.py"] if site else ["-j", "2"])]
     program = subprocess.Popen(command, start_new_session=True, stderr=subprocess.DEVNULL)
     found: set[str] = set()
     seen: set[int] = set()
@@ -200,8 +182,8 @@ def test_sweeps_of_pilots_leave_nobody_behind(in_folder: Path) -> None:
         folder.mkdir()
         (folder / "base.toml").write_text(to_toml(document(run=SLOW)))
         (folder / "test.toml").write_text('case = "base.toml"\n[axes]\ndrive.peak_acceleration = ["1 g", "2 g"]\n')
-        (folder / "site.toml").write_text(LOCAL)
-        command = [PROGRAM, "sweep", "test.toml", "--site", "site.toml"]
+        (folder / "site.py").write_text(LOCAL)
+        command = [PROGRAM, "sweep", "test.toml", "--site", "site.py"]
         programs[number] = subprocess.Popen(
             command, cwd=folder, start_new_session=True, stderr=subprocess.PIPE, text=True
         )
@@ -222,8 +204,7 @@ def test_sweeps_of_pilots_leave_nobody_behind(in_folder: Path) -> None:
 # --- a throw-away cluster ---------------------------------------------------------------------------------------------
 
 
-HEARTS = {"address": "127.0.0.1", "heartbeat_period": 1, "heartbeat_threshold": 5}
-SITE = {"scheduler": "slurm", "partition": "main", "walltime": "00:10:00", "cores": 1, "jobs": 2, "executor": HEARTS}
+SITE = {"partition": "main", "address": "127.0.0.1", "cores": 1, "jobs": 2, "sbatch": ["--comment=decks"]}
 # Twelve frequencies, a deck each; at the fifth the time step is far beyond the viscous limit of glycerol.
 STEPS = [*["2 us"] * 4, "40 us", *["2 us"] * 7]
 ZIP = {"drive.frequency": {"linspace": ["60 Hz", "71 Hz", 12]}, "run.time_step": STEPS}

@@ -430,7 +430,7 @@ def test_a_sweep_that_is_killed_three_times(
 def test_workers_that_are_handed_over_give_the_same(sweep_file: Callable[..., str], in_folder: Path) -> None:
     """The example of the documentation, in whose processes no stop of the program is seen."""
     page = (Path(__file__).parents[1] / "docs" / "how-to" / "clusters.md").read_text("utf-8")
-    (script,) = re.findall(r"```python\n(.+?)```", page, re.DOTALL)
+    _, script = re.findall(r"```python\n(.+?)```", page, re.DOTALL)
     (in_folder / "script.py").write_text(script)
     sweep_file("sweep", '[axes]\nrun.time_step = ["2 us", "1 us"]')
     done = subprocess.run([sys.executable, "script.py"], capture_output=True, text=True, check=True)

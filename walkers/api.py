@@ -717,7 +717,7 @@ def sweep(
     progress
         Show the progress; None: only in notebooks.
     site
-        The site file of a cluster; see `walkers.sweeps.site.load_site`.
+        The site file of a cluster, TOML or Python; see `walkers.sweeps.site.load_site`.
     executor
         Runs the decks instead of threads of this process, ``jobs`` at once; all of its workers must see the folder.
     retries

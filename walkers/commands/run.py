@@ -159,7 +159,7 @@ def sweep(
     sweep
         A sweep file, or the name of a shipped sweep such as fig2.
     site
-        Site file of a cluster to run on.
+        Site file of a cluster to run on: TOML for SLURM, or Python with a configuration of Parsl.
     dry_run
         Print the plan and its predicted cost, and run nothing.
     retries

@@ -27,6 +27,7 @@ from itertools import pairwise
 from math import ceil
 from pathlib import Path
 from platform import node
+from typing import TYPE_CHECKING
 
 from walkers.errors import InputError, Stopped, WalkersError, check_utf8, refused
 from walkers.inputs.case import Case
@@ -38,7 +39,7 @@ from walkers.runner.directory import is_finished, is_locked, run_place, unfinish
 from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, OutputGone, ProgramDiffers
 from walkers.show import PROGRAM_SECONDS, pairs_of_beads, predicted_overhead, predicted_seconds
 from walkers.sweeps.making import check_audit, make_runs
-from walkers.sweeps.site import Site, check_path, pilots
+from walkers.sweeps.site import check_path, decks_at, prepare
 from walkers.sweeps.table import (
     PARSL,
     RECORD_NAME,
@@ -53,6 +54,9 @@ from walkers.sweeps.table import (
     write_record,
 )
 from walkers.templates.scene import sharing_key
+
+if TYPE_CHECKING:
+    from parsl.config import Config
 
 MOST_WALKERS = 96
 """Limit for a deck; with 96 walkers the cost of the deck itself is 4 % of the total."""
@@ -83,7 +87,7 @@ class Options:
     """
 
     workers: int
-    site: Site | None = None
+    site: Config | None = None
     executor: Executor | None = None
     retries: int = 0
     time_limit: float | None = None
@@ -97,14 +101,14 @@ class Options:
             return self.workers
         if self.site is None:
             return max(1, self.workers // self.ranks)
-        return self.site.cores // self.ranks * self.site.nodes * self.site.jobs
+        return decks_at(self.site, self.ranks)
 
     def for_ranks(self, ranks: int) -> Options:
         """The same options for decks with a number of MPI processes; `InputError` if a node has fewer cores."""
-        if self.site is not None and ranks > self.site.cores:
-            text = f"a deck has {ranks} MPI processes (run.ranks), more than the {self.site.cores} cores of a node"
-            raise refused("cores", text)
-        return replace(self, ranks=ranks)
+        options = replace(self, ranks=ranks)
+        if not options.decks_at_once:
+            raise refused("cores", f"a deck has {ranks} MPI processes (run.ranks), more than the cores of a node")
+        return options
 
 
 @dataclass(frozen=True)
@@ -415,10 +419,10 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[tuple[Executor, 
 
     folder = record.directory / PARSL
     try:
-        kernel = DataFlowKernel(pilots(options.site, folder, options.ranks))
+        kernel = DataFlowKernel(prepare(options.site, folder, options.ranks))
     except Exception as error:  # any class: an address that this machine does not have, ports in use
         text = " ".join(str(error).split())
-        text = f"Parsl cannot start ({text}); see {folder}, and [executor] address in the site file"
+        text = f"Parsl cannot start ({text}); see {folder}, and the address in the site file"
         raise SweepStopped(text) from error
     try:
         yield ParslPoolExecutor(dfk=kernel), None

@@ -1,6 +1,5 @@
-"""Site files: the cluster on which a sweep runs.
+"""Sites: the cluster on which a sweep runs, as a file of SLURM's settings, or as a ``parsl.Config`` for any other.
 
-    scheduler = "slurm"
     partition = "main"
     walltime  = "02:00:00"
     cores     = 32
@@ -12,20 +11,18 @@ left.
 
 from __future__ import annotations
 
-import inspect
 import re
+import runpy
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import BaseModel, ConfigDict, Field
 
-from walkers.errors import InputError, Problem, expected_of, refused
+from walkers.errors import refused
 from walkers.extras import require
-from walkers.inputs.keys import value_at
-from walkers.inputs.messages import quoted, validated
+from walkers.inputs.messages import validated
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import Whole
 from walkers.text import printable
@@ -33,155 +30,120 @@ from walkers.text import printable
 if TYPE_CHECKING:
     from parsl.config import Config
 
-_OURS = {
-    # Key of a site file: its names in Parsl's providers.
-    "partition": ("partition", "queue"),
-    "account": ("account", "allocation", "project"),
-    "walltime": ("walltime",),
-    "nodes": ("nodes_per_block",),
-    "cores": ("cores_per_node", "cpus_per_node"),
-    "jobs": ("max_blocks",),
-}
-_SCHEDULERS = {
-    "slurm": "SlurmProvider",
-    "pbs": "PBSProProvider",
-    "torque": "TorqueProvider",
-    "lsf": "LSFProvider",
-    "grid-engine": "GridEngineProvider",
-    "condor": "CondorProvider",
-    "local": "LocalProvider",
-}
-"""Providers by name; a site file may also give the class name of another provider of Parsl."""
 _GUARDED = ("setsid", "setpriv", "--pdeathsig", "TERM")
 """Prefix of the command that starts Parsl's interchange. Ctrl-C must not end the interchange, because Parsl waits for
 its last message. If the sweep is killed, the interchange must end, so that the pilots notice and end, too."""
 _MOST_LOSSES = 5  # repetitions of a deck whose worker was lost (a cancelled job, a node that went down)
-_SHELL_TEXTS = ("scheduler_options", "worker_init", "launch_cmd", "interchange_launch_cmd", "regex_job_id")
-"""Settings of Parsl that are shell commands, and a regular expression that no shell reads."""
 # SLURM replaces patterns such as %N in paths; a job whose output cannot be written ends at once.
 _ODD = re.compile(r"[^\w./+@=,:-]")
-_TAKEN = "expected letters, digits and . _ / + @ = , : -"
+_TAKEN = "letters, digits and . _ / + @ = , : -"
 _Count = Annotated[Whole, Field(ge=1, le=10_000)]
+_Word = Annotated[str, Field(pattern=r"^[\w./+@=,:-]+$")]
 
 
-class Site(BaseModel):
-    """A cluster, as its site file describes it."""
+class Slurm(BaseModel):
+    """A cluster under SLURM, as its site file describes it."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    scheduler: str = Field(examples=["slurm"])
-    partition: str | None = None
-    account: str | None = None
-    walltime: Annotated[str, Field(pattern=r"^\d+:\d\d:\d\d$")] | None = Field(
-        None, description="hours, minutes and seconds", examples=["02:00:00"]
+    # Parsl writes words into shell scripts unquoted.
+    partition: _Word | None = Field(None, description=_TAKEN)
+    account: _Word | None = Field(None, description=_TAKEN)
+    walltime: Annotated[str, Field(pattern=r"^\d+:\d\d:\d\d$")] = Field(
+        "00:10:00", description="hours, minutes and seconds", examples=["02:00:00"]
     )
     nodes: _Count = 1
     cores: _Count
     jobs: _Count = 1
+    sbatch: list[str] = []
     modules: list[str] = []
     shell: list[str] = []
-    launcher: str | None = None
     container: str | None = None
-    provider: dict[str, Any] = {}
-    executor: dict[str, Any] = {}
+    address: _Word | None = Field(None, description=_TAKEN)
 
-    @field_validator("scheduler", "launcher")
-    @classmethod
-    def _check_known(cls, name: str, info: ValidationInfo) -> str:
-        import parsl.providers
+    def config(self) -> Config:
+        """Parsl's configuration. Without work there are no jobs; they share their nodes with others."""
+        from parsl.config import Config
+        from parsl.executors import HighThroughputExecutor
+        from parsl.executors.high_throughput.executor import DEFAULT_LAUNCH_CMD
+        from parsl.jobs.error_handlers import windowed_error_handler
+        from parsl.launchers import SingleNodeLauncher, SrunLauncher
+        from parsl.providers import SlurmProvider
 
-        if info.field_name == "launcher" and name not in _launchers():
-            raise ValueError(expected_of(name, sorted(_launchers())))
-        if info.field_name == "scheduler" and name not in (*_SCHEDULERS, *parsl.providers.__all__):
-            raise ValueError(f"{expected_of(name, _SCHEDULERS)}, or a provider of Parsl's")
-        return name
+        provider = SlurmProvider(
+            self.partition,
+            self.account,
+            walltime=self.walltime,
+            nodes_per_block=self.nodes,
+            cores_per_node=self.cores,
+            max_blocks=self.jobs,
+            exclusive=False,
+            scheduler_options="\n".join(f"#SBATCH {option}" for option in self.sbatch),
+            worker_init="\n".join([*(f"module load {quote(name)}" for name in self.modules), *self.shell]),
+            launcher=SrunLauncher() if self.nodes > 1 else SingleNodeLauncher(),
+        )
+        executor = HighThroughputExecutor(
+            provider=provider,
+            launch_cmd=f"{self.container} {DEFAULT_LAUNCH_CMD}" if self.container else None,
+            address=self.address,
+            max_workers_per_node=self.cores,
+            heartbeat_period=10,
+            heartbeat_threshold=60,
+            block_error_handler=windowed_error_handler,
+        )
+        return Config([executor], strategy_period=2)
 
 
-def load_site(path: str | Path) -> Site:
-    """Read a site file; `InputError` if it is invalid, with Parsl's message if Parsl refuses it."""
+def load_site(path: str | Path) -> Config:
+    """Parsl's configuration by a site file: a `Slurm` in TOML, or Python that calls its configuration ``config``.
+
+    `InputError` if the file cannot be used.
+    """
     require("cluster")
-    document = read_toml(Path(path))
-    site = validated(Site, document, str(path), "a site")
-    settings = [[table, key] for table in ("provider", "executor") for key in document.get(table, ())]
-    for place in (["partition"], ["account"], *settings):
-        value = value_at(document, place)
-        for text in value if isinstance(value, list) else [value]:
-            if isinstance(text, str) and place[-1] not in _SHELL_TEXTS and (odd := _ODD.search(text)):
-                expected = f"{_TAKEN}, found {odd[0]!r}; [provider] scheduler_options takes whole lines of a script"
-                raise InputError(str(path), [Problem(".".join(place), quoted(document, place), expected)])
+    from parsl.config import Config
+
+    if Path(path).suffix != ".py":
+        return validated(Slurm, read_toml(Path(path)), str(path), "a site").config()
     try:
-        pilots(site, Path("parsl"))
-    except Exception as error:  # whatever Parsl's classes raise about what they are given
-        message = " ".join(str(error).split())
-        raise refused(path, f"Parsl cannot use it: {message}") from error
-    return site
-
-
-def _launchers() -> Mapping[str, str]:
-    """Names of launchers in site files (``srun``) and in Parsl (``SrunLauncher``)."""
-    import parsl.launchers
-
-    return {name.removesuffix("Launcher").lower(): name for name in parsl.launchers.__all__ if name[:4] != "Wrap"}
+        config = runpy.run_path(str(path)).get("config")
+    except Exception as error:  # whatever the user's file raises
+        raise refused(path, f"cannot be used: {type(error).__name__}: {' '.join(str(error).split())}") from error
+    if not isinstance(config, Config):
+        raise refused(path, "expected a configuration: config = parsl.Config(...)")
+    return config
 
 
 def check_path(folder: Path) -> None:
     """Refuse a sweep's folder with a space, a quote or the like in it: Parsl writes it into shell scripts unquoted."""
     for source, text in (("out", str(folder.parent.resolve())), (printable(folder.name), folder.name)):
         if odd := _ODD.search(text):
-            raise refused(source, f"with a site file {_TAKEN} in the path, found {odd[0]!r} in {text!r}")
+            raise refused(source, f"with a site file expected {_TAKEN} in the path, found {odd[0]!r} in {text!r}")
 
 
-def pilots(site: Site, run_dir: Path, ranks: int = 1) -> Config:
-    """Parsl's configuration for decks of a number of MPI processes; the nodes must see ``run_dir`` (scripts, logs)."""
-    import parsl.launchers
-    import parsl.providers
-    from parsl.config import Config
-    from parsl.executors import HighThroughputExecutor
-    from parsl.executors.high_throughput.executor import DEFAULT_LAUNCH_CMD
-    from parsl.jobs.error_handlers import windowed_error_handler
+def decks_at(config: Config, ranks: int) -> int:
+    """Number of decks that run at once at a site, on all nodes of all jobs, each with a number of MPI processes."""
+    from parsl.executors.status_handling import BlockProviderExecutor
 
-    name = _SCHEDULERS.get(site.scheduler, site.scheduler)
-    provider_class = getattr(parsl.providers, name)
-    taken = inspect.signature(provider_class).parameters
-    # Nodes are shared with other jobs unless [provider] says otherwise; without work there are no jobs.
-    ours = {"worker_init": _worker_init(site), "exclusive": False, "min_blocks": 0}
-    settings = {key: value for key, value in ours.items() if key in taken}
-    for key, names in _OURS.items():
-        theirs = next((one for one in names if one in taken), None)
-        if theirs is not None or (key in site.model_fields_set and key != "cores"):  # Parsl refuses an unknown key
-            settings[theirs or key] = getattr(site, key)
-    settings = {key: value for key, value in settings.items() if value is not None}
-    # With several nodes, srun starts the workers of each node.
-    launcher = site.launcher or ("srun" if name == "SlurmProvider" and site.nodes > 1 else None)
-    if launcher is not None:
-        settings["launcher"] = getattr(parsl.launchers, _launchers()[launcher])()
-    options: dict[str, Any] = {
-        "max_workers_per_node": site.cores // ranks,
-        "heartbeat_period": 10,
-        "heartbeat_threshold": 60,
-        "block_error_handler": windowed_error_handler,
-        "worker_logdir_root": str(run_dir),
-        "interchange_launch_cmd": [*_GUARDED, str(Path(sys.executable).with_name("interchange.py"))],
-    }
-    if site.container:
-        options["launch_cmd"] = f"{site.container} {DEFAULT_LAUNCH_CMD}"
-    if name == "LocalProvider":  # pilots on this machine; by default Parsl accepts connections from everywhere
-        options["address"] = "127.0.0.1"
-    provider = provider_class(**(settings | _as_tuples(site.provider)))
-    executor = HighThroughputExecutor(label="pilots", provider=provider, **(options | _as_tuples(site.executor)))
-    return Config(
-        executors=[executor],
-        run_dir=str(run_dir),
-        strategy="simple",
-        strategy_period=2,
-        retries=_MOST_LOSSES,
-        retry_handler=_cost_of_failure,
+    return sum(
+        int(executor.workers_per_node // ranks) * executor.provider.nodes_per_block * executor.provider.max_blocks
+        for executor in config.executors
+        if isinstance(executor, BlockProviderExecutor) and executor.provider is not None
     )
 
 
-def _as_tuples(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings with tuples instead of lists: Parsl expects tuples, and TOML has only lists."""
-    return {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
+def prepare(config: Config, folder: Path, ranks: int) -> Config:
+    """The configuration for decks of a number of MPI processes; the nodes must see the folder (scripts, logs)."""
+    from parsl.executors import HighThroughputExecutor
+
+    config.run_dir, config.retries, config.retry_handler = str(folder), _MOST_LOSSES, _cost_of_failure
+    for executor in config.executors:
+        if isinstance(executor, HighThroughputExecutor):
+            executor.worker_logdir_root = str(folder)
+            executor.interchange_launch_cmd = [*_GUARDED, str(Path(sys.executable).with_name("interchange.py"))]
+            executor.max_workers_per_node = executor.workers_per_node // ranks
+            provider: Any = executor.provider
+            provider.worker_init += f'\nexport PATH={quote(str(Path(sys.executable).parent))}:"$PATH"\n'
+    return config
 
 
 def _cost_of_failure(error: Exception, _: object) -> float:
@@ -189,9 +151,3 @@ def _cost_of_failure(error: Exception, _: object) -> float:
     from parsl.executors.high_throughput.errors import ManagerLost, WorkerLost
 
     return 1.0 if isinstance(error, (ManagerLost, WorkerLost)) else _MOST_LOSSES + 1.0
-
-
-def _worker_init(site: Site) -> str:
-    """Shell lines before the workers: load the modules, the lines of the site file, this Python first in PATH."""
-    modules = [f"module load {quote(name)}" for name in site.modules]
-    return "\n".join([*modules, *site.shell, f'export PATH={quote(str(Path(sys.executable).parent))}:"$PATH"'])
