@@ -26,7 +26,7 @@ from walkers.postprocess.figures import figures_of
 from walkers.postprocess.gait import postures, turned_over_at
 from walkers.postprocess.meetings import collective
 from walkers.postprocess.motion import read_motion
-from walkers.postprocess.results import headlines, read
+from walkers.postprocess.results import read
 from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import finished_places, run_place
@@ -649,7 +649,6 @@ def test_the_shipped_climber_comes_upright_and_climbs(upright: Path) -> None:
     assert result["upright"] == result["climbing"] == result["walkers"] == 6
     assert result["velocity"] == pytest.approx(3.62e-3, rel=0.03)
     assert 0.0 < np.degrees(result["ends_within"]) < 0.3
-    assert headlines(result)[0] == "climber: all 6 climb"
 
 
 def test_posture_is_that_of_the_whole_run(upright: Path) -> None:

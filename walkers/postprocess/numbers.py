@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.postprocess.quantities import GROUPS, NUMBERS, Quantity, unit_shown
 from walkers.postprocess.quantities import declared as declared_in
-from walkers.rounding import rounded, with_decimals
+from walkers.postprocess.sides import REST
+from walkers.rounding import counted, rounded, with_decimals
 
 if TYPE_CHECKING:
     from walkers.postprocess.tables import Columns
@@ -59,12 +60,14 @@ ASIDE = frozenset(
 """Numbers that are not shown by themselves: errors of others, values of the case, conditions."""
 _HIDDEN = ASIDE | {
     *("axial_velocity", "axial_left_facing", "walkers_met", "turned_first", "turned_last", "ended_early", "duration"),
-    *("climbing", "descending"),
 }
-"""Numbers that rows leave out, because the headline says them or others count."""
+"""Numbers that rows leave out, because others count."""
 _OF_UP = "on a slope of those that started facing up"
 """Ends the meaning of a number that leaves out walkers that face down."""
-_IF_ANY = ("events_*", "open_*", "separated_fraction", "turned_round", "leaning", "turned_over", "upright")
+_IF_ANY = (
+    *("events_*", "open_*", "separated_fraction", "turned_round"),
+    *("leaning", "turned_over", "upright", "climbing", "descending"),
+)
 """Numbers that rows leave out if they are zero."""
 
 
@@ -112,12 +115,31 @@ def headline(numbers: Mapping[str, Any]) -> str:
         return "climbs" if "climbs" in numbers else ""
     if fell(numbers):
         return "axial_velocity"
-    return "right_facing" if numbers["facings_differ"] else "velocity"
+    return "right_facing" if numbers.get("facings_differ") else "velocity"
 
 
 def fell(numbers: Mapping[str, Any]) -> bool:
     """Whether walkers turned over or lean on a slope: then a velocity along the heading says little about their way."""
     return "upright" in numbers and bool(numbers["upright"] < numbers["walkers"])
+
+
+def state(numbers: Mapping[str, Any]) -> str:
+    """What walkers do where their velocity says little, such as ``at rest``; empty otherwise."""
+    if numbers.get("came_apart"):
+        return "came apart"
+    if isfinite(numbers.get("slow_share", nan)):
+        count, shares = numbers["walkers"], {"slow": numbers["slow_share"], "connected": numbers["clustered_share"]}
+        return ", ".join(f"{round(count * share)} of {count} {does}" for does, share in shares.items())
+    return "at rest" if "velocity" in numbers and abs(numbers[headline(numbers)]) < REST else ""
+
+
+def in_short(numbers: Mapping[str, Any]) -> str:
+    """The state or the main number (`headline`): ``3 climbs``, ``1.080 mm/s``; a dash without walkers and piles."""
+    main = headline(numbers)
+    if main in ("", "climbs"):
+        return counted(numbers[main], "climb") if main else "-"
+    ways = {"axial_velocity": " up the slope", "right_facing": f" facing {'up' if numbers['goes_uphill'] else 'right'}"}
+    return state(numbers) or f"{shown(numbers[main], 'm/s')[0]} mm/s{ways.get(main, '')}"
 
 
 def rows(numbers: Mapping[str, Any]) -> list[Row]:

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 from walkers.errors import InputError, refused
 from walkers.inputs.run import limits_of
 from walkers.postprocess.caption import conditions
-from walkers.postprocess.numbers import headline, rows
-from walkers.postprocess.sides import REST
+from walkers.postprocess.numbers import headline, rows, state
 from walkers.postprocess.uncertainty import accuracy_of, bands_of, lines_of_rest, rests_on
 from walkers.rounding import percent
 from walkers.runner.directory import SEGMENT_NAME, files_of_segments, segment_directories
@@ -181,7 +180,7 @@ def recorded(directory: Path) -> dict[str, Any]:
         version, _ = contents.pop("version"), [contents[name] for name in _BESIDE]
         numbers = {name: nan if one is None else one for name, one in contents["numbers"].items()}
         if version == VERSION:  # what every reader asks for
-            _ = numbers["goes_uphill"], headline(numbers)
+            _ = numbers["goes_uphill"], "velocity" in numbers and numbers["facings_differ"]
         contents["numbers"] = numbers
     except FileNotFoundError as error:
         raise refused(directory, f"has no {RESULT_NAME}; {again}") from error
@@ -252,49 +251,10 @@ def _not_measured(results: Results) -> Iterator[str]:
 
 
 def headlines(results: Results) -> list[str]:
-    """The case and its drive; what walkers on a slope do; why the numbers may say little."""
+    """The case, its drive, and the state of its walkers."""
     drive, numbers = results.about["drive"], results.numbers
     if all(isfinite(numbers.get(name, nan)) for name in ("gamma0", "sin_delta")):
         drive += f", Γ0 = {numbers['gamma0']:.3g}, sin δ = {numbers['sin_delta']:.3g}"
-    tray = f"{on_tray} at the end" if (on_tray := tray_text(numbers)) else ""
-    states = [one for one in (_ways(numbers), _postures(numbers), tray, *_doubts(numbers)) if one]
-    if not states:
-        return [f"{results.about['case']}: {drive}"]
-    return [f"{results.about['case']}: {'; '.join(states)}", drive]
-
-
-def tray_text(numbers: Mapping[str, Any]) -> str:
-    """Numbers of walkers of a tray that are slow, and connected to others, at the end; empty without a tray."""
-    if not isfinite(numbers.get("slow_share", nan)):
-        return ""
-    count, shares = numbers["walkers"], {"slow": numbers["slow_share"], "connected": numbers["clustered_share"]}
-    return ", ".join(f"{round(count * share)} of {count} {state}" for state, share in shares.items())
-
-
-def _ways(numbers: Mapping[str, Any]) -> str:
-    """Numbers of walkers by their way on a slope: "all 6 go down", or "3 climb, 3 rest"."""
-    if "climbing" not in numbers or numbers["came_apart"]:
-        return ""
-    count, ways = numbers["walkers"], [numbers["climbing"], numbers["descending"]]
-    words = (("climbs", "climb"), ("goes down", "go down"), ("rests", "rest"))
-    return ", ".join(
-        f"{'all ' * (1 < number == count)}{number} {said[number > 1]}"
-        for number, said in zip([*ways, count - sum(ways)], words, strict=True)
-        if number
-    )
-
-
-def _postures(numbers: Mapping[str, Any]) -> str:
-    """Numbers of walkers by posture, of those that do not stay upright."""
-    names = ("leaning", "turned_over")
-    return ", ".join(f"{numbers[name]} {name.replace('_', ' ')}" for name in names if numbers.get(name))
-
-
-def _doubts(numbers: Mapping[str, Any]) -> Iterator[str]:
-    if numbers.get("came_apart"):
-        share = percent(round(numbers["separated_fraction"], 2))
-        yield f"came apart: beads beyond the rupture distance for {share} of the time"
-    elif abs(numbers.get(headline(numbers), nan)) < REST and "velocity" in numbers and "climbing" not in numbers:
-        yield f"at rest (below {1e3 * REST:g} mm/s)"
-    if numbers.get("depends_on_start"):
-        yield "depends on the start"
+    if does := state(numbers):
+        return [f"{results.about['case']}: {does}", drive]
+    return [f"{results.about['case']}: {drive}"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from math import isfinite
 from pathlib import Path
@@ -46,26 +46,21 @@ def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
     ]
 
 
+_HEADS = ("guessed", "uncertain", "given", "calibrated", "assumed", "library", "own library")
+
+
 def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The uncertain values of a result (`rests_on`) as text, by origin."""
-
-    def listed(head: str, chosen: Iterable[Mapping[str, Any]], ends: str = "") -> list[str]:
-        text = ", ".join(f"{one['key'].partition('.')[2]} {one['value']}" for one in chosen) + ends
-        wrapper = textwrap.TextWrapper(_WIDTH, f"  {head:10} ", " " * 13, break_on_hyphens=False)
-        return wrapper.wrap(text) if text else []
-
-    guessed = [one for one in rests if one["guessed"] and one["origin"] == "default"]
-    lines = listed("guessed", guessed, " (not of these materials and this liquid)") if guessed else []
-    lines += listed("uncertain", [one for one in rests if one["guessed"] and one["origin"] != "default"])
-    whence = {
-        "given": "given",
-        "calibrated": "calibrated",
-        "assumed": "assumed",
-        "library": "own library",
-    }
-    for head, origin in whence.items():
-        lines += listed(head, [one for one in rests if not one["guessed"] and one["origin"] == origin])
-    return lines
+    """The uncertain values of a result (`rests_on`) as text, by origin; those of other materials are guessed."""
+    listed: dict[str, list[str]] = {}
+    for one in rests:
+        guess = "guessed" if one["origin"] == "default" else "uncertain"
+        values = listed.setdefault(guess if one["guessed"] else one["origin"], [])
+        values.append(f"{one['key'].partition('.')[2]} {one['value']}")
+    if "guessed" in listed:
+        listed["guessed"][-1] += " (not of these materials and this liquid)"
+    texts = [f"  {head:10} {', '.join(listed[head])}" for head in _HEADS if head in listed]
+    wrapper = textwrap.TextWrapper(_WIDTH, subsequent_indent=" " * 13, break_on_hyphens=False)
+    return [line for text in texts for line in wrapper.wrap(text)]
 
 
 def not_known(rests: Sequence[Mapping[str, Any]]) -> list[str]:

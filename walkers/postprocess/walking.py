@@ -53,7 +53,7 @@ def measure(motion: Motion) -> Measured:
     walkers = tables["walkers"]
     numbers = {
         **_velocities(walkers, case),
-        **_of_beads({name: column[walkers["make"] == 0] for name, column in walkers.items()}, case),
+        **_of_beads(of_makes[0]["walkers"], case),
         "walkers_met": walkers_met(groups),
         "meets": case.meets,
         "cycles": case.run.cycles,
@@ -64,12 +64,11 @@ def measure(motion: Motion) -> Measured:
         numbers |= _posture(groups, walkers)
     if motion.follows_cycles:
         numbers |= _work(groups, tables["cycles"], walkers)
-    for make in range(len(groups)) if len(groups) > 1 else ():
-        of_make = {name: column[walkers["make"] == make] for name, column in walkers.items()}
+    for number, of_make in enumerate([tables["walkers"] for tables in of_makes], 1) if len(groups) > 1 else ():
         velocity = of_make["velocity"][alike(of_make, uphill=case.goes_uphill)]
-        numbers[f"velocity_make_{make + 1}"] = float(velocity.mean())
-        numbers[f"walkers_make_{make + 1}"] = len(of_make["velocity"])
-        numbers[f"steady_make_{make + 1}"] = int(np.sum(of_make["steady"]))
+        numbers[f"velocity_make_{number}"] = float(velocity.mean())
+        numbers[f"walkers_make_{number}"] = len(of_make["velocity"])
+        numbers[f"steady_make_{number}"] = int(np.sum(of_make["steady"]))
     return Measured({**tables, "bridges": _bridges(motion)}, numbers, tuple(_doubts(numbers)))
 
 
@@ -78,6 +77,9 @@ def _doubts(numbers: Mapping[str, Any]) -> Iterable[str]:
     if (lacking := numbers["walkers"] - numbers["steady"]) and not numbers["meets"]:  # on trays walkers stop
         unsteady = f"{lacking} of {numbers['walkers']} walkers {'is' if lacking == 1 else 'are'} not steady"
         yield f"{unsteady}: the velocity depends on the length of the run"
+    if numbers["came_apart"]:
+        share = percent(round(numbers["separated_fraction"], 2))
+        yield f"walkers came apart: beads are beyond the rupture distance for {share} of the time"
     if numbers["depends_on_start"]:
         yield f"steady copies differ by more than {percent(SAME)}: the velocity depends on the start"
     if numbers["walkers_met"] and not numbers["meets"]:

@@ -20,9 +20,8 @@ from typing import Any
 
 from walkers.errors import InputError, Problem, refused
 from walkers.inputs.case import Case
-from walkers.postprocess.numbers import is_declared, shown
-from walkers.postprocess.results import Results, plain, read, tray_text
-from walkers.postprocess.sides import REST
+from walkers.postprocess.numbers import in_short, is_declared
+from walkers.postprocess.results import plain, read
 from walkers.postprocess.uncertainty import ACCURACY, SPREAD, SPREAD_NAME
 from walkers.rounding import counted, duration_text
 from walkers.runner.directory import (
@@ -148,7 +147,7 @@ def _run(path: Path, now: float) -> Entry | None:
     given: dict[str, Any] = {}
     try:
         results = read(path)
-        given = {"numbers": plain(results.numbers), "result": _result_text(results)}
+        given = {"numbers": plain(results.numbers), "result": in_short(results)}
         given["velocity"] = given["numbers"].get("axial_velocity" if results["goes_uphill"] else "velocity")
         if notes := results.about["by_hand"]:
             given["reason"] = "edited and run by hand" if "edited" in " ".join(notes) else notes[0]
@@ -278,26 +277,6 @@ def as_text(entries: Sequence[Entry], hidden: int = 0) -> str:
     size = bytes_text(sum(entry.size for entry in entries))
     more = f"; not shown: {hidden} runs of sweeps (--all)" if hidden else ""
     return "\n\n".join([*blocks, f"{', '.join(total)}, {size}{more}"])
-
-
-def _result_text(results: Results) -> str:
-    """Climbs of a pile, what walkers on a tray do, or velocities; a dash if there is no result."""
-    if "velocity" not in results:
-        return counted(results["climbs"], "climb") if "climbs" in results else "-"
-    if results["came_apart"]:
-        return "came apart"
-    if on_tray := tray_text(results):
-        return on_tray
-    names = {"velocity": ""}
-    if results["facings_differ"]:
-        names = {"right_facing": "right", "left_facing": "left"}
-        if results["goes_uphill"]:
-            names = {"axial_velocity": "started up", "axial_left_facing": "started down"}
-    elif results["goes_uphill"]:
-        names = {"axial_velocity": "uphill"}
-    if all(abs(results[name]) < REST for name in names):
-        return "at rest"
-    return ", ".join(f"{way} {shown(results[name], 'm/s')[0]}".strip() for name, way in names.items()) + " mm/s"
 
 
 def run_text(directory: Path) -> str:

@@ -25,7 +25,7 @@ from walkers.errors import InputError, Problem, refused, suggestion
 from walkers.inputs.axes import is_axis, plain
 from walkers.inputs.case import Case
 from walkers.inputs.keys import flatten
-from walkers.postprocess.numbers import declared, is_declared, ordered
+from walkers.postprocess.numbers import declared, headline, is_declared, ordered
 from walkers.postprocess.quantities import GROUPS
 from walkers.postprocess.results import Results, derived, modules_of, read
 from walkers.rounding import DIGITS, SHOWN_UNITS, counted, rounded
@@ -302,10 +302,12 @@ def sides_differ(frame: pd.DataFrame) -> bool:
 
 
 def main_columns(frame: pd.DataFrame) -> list[str]:
-    """The main results in order of preference; velocities up the slope where walkers turned over or lean."""
-    if "upright" in frame and (frame["upright"] < frame["walkers"]).any():
-        return ["axial_velocity", *_RESULTS]
-    return ["right_facing", *_RESULTS] if sides_differ(frame) else list(_RESULTS)
+    """The main results in order of preference: the `headline` of any point before those of all."""
+    if "velocity" not in frame:
+        return list(_RESULTS)
+    finished: Any = frame.dropna(subset="velocity").to_dict("records")
+    heads = set(map(headline, finished))
+    return [name for name in ("axial_velocity", "right_facing") if name in heads][:1] + list(_RESULTS)
 
 
 def default_column(frame: pd.DataFrame) -> str:
