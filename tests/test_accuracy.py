@@ -112,8 +112,8 @@ def test_walkers_up_and_down_a_slope_both_converge(tmp_path: Path) -> None:
 def test_an_interrupted_accuracy_continues(tmp_path: Path) -> None:
     done = walkers.run(make_case(run=QUICK), tmp_path)
 
-    def stop(progress: object) -> None:
-        if getattr(progress, "done", 0) >= 2:
+    def stop(_: object) -> None:
+        if len([*tmp_path.glob("*/manifest.json")]) > 2:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

@@ -21,6 +21,7 @@ from walkers.inputs.boundary import Boundary, Round
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Harmonic, waveform
 from walkers.inputs.loads import bridge_at_rest, contact_loads
+from walkers.inputs.reading import load_case
 from walkers.inputs.table import changed
 from walkers.inputs.units import Kind, quantity_text
 from walkers.postprocess.films import speed_text
@@ -32,10 +33,10 @@ from walkers.postprocess.scene import Scene, rotations_at, turned_in
 from walkers.postprocess.uncertainty import SPREAD_NAME, bands_of, spread_of
 from walkers.postprocess.walking import _scatter, tables_of
 from walkers.runner.files import write_json
-from walkers.runner.launch import Progress
 from walkers.runner.manifest import _iso
 from walkers.show import describe, summarise
-from walkers.templates.deck import render_deck, render_shared_deck
+from walkers.sweeps.making import progress_in
+from walkers.templates.deck import Segment, render_deck, render_shared_deck
 from walkers.templates.scene import place
 
 DENSITY, TENSION, LARGE, SMALL = 4000.0, 19.2e-3, 3e-4, 2e-4
@@ -230,11 +231,17 @@ def test_what_show_prints_of_a_case_is_in_its_units() -> None:
 
 
 def test_the_speed_of_a_run_that_goes_on_is_that_of_this_call() -> None:
-    """900 steps were there: 50 took a second, so 50 more take another."""
-    told = str(Progress(step=950, steps=1000, simulated=0.25, elapsed=1.0, made=50))
-    assert told == "95 %, 0.250 s simulated, 50 steps/s, 1 s left"
-    assert str(Progress(step=900, steps=1000, simulated=0.25, elapsed=0.0)).endswith(", 0 steps/s, starting")
-    assert str(Progress(950, 1000, 0.25, 1.0, 50, may_end_early=True)).endswith(", at most 1 s left")
+    """Of 1200 steps, 1104 were there: 48 took a second, so 48 more take another."""
+    run = make_case(run={"time_step": "250 us", "allow_unstable": True, "cycles": 20, "settling_cycles": 2}).run
+    assert run.steps == 1200
+    segment = Segment(1104, 1200, 0)
+    assert progress_in(run, 20, segment, 1152, 1.0) == (0.96, "96 %, 0.240 s simulated, 48 steps/s, 1 s left")
+    assert progress_in(run, 20, segment, 1104, 0.0).text.endswith(", 0 steps/s, starting")
+    steady = load_case("fig1b").run
+    begin = sum(steady.attempts[:-1]) * steady.steps_per_cycle
+    middle = progress_in(steady, steady.cycles, Segment(0, steady.steps, 0), steady.steps // 2, 1.0)
+    assert middle.share == pytest.approx((begin + steady.steps / 2) / (begin + steady.steps))
+    assert "at most" in middle.text
 
 
 def test_times_of_a_manifest_are_utc(monkeypatch: pytest.MonkeyPatch) -> None:

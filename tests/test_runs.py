@@ -32,6 +32,7 @@ from tests.conftest import (
 )
 from walkers import run as run_case
 from walkers.errors import InputError
+from walkers.progress import Progress
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import (
     FIRST_SEGMENT,
@@ -44,7 +45,6 @@ from walkers.runner.directory import (
     run_place,
 )
 from walkers.runner.failures import RunBusy
-from walkers.runner.launch import Progress
 from walkers.runner.manifest import read_manifest
 from walkers.sweeps.making import make_runs
 from walkers.templates.deck import render_deck
@@ -144,7 +144,7 @@ def test_a_running_simulation_is_looked_at_stopped_and_continued(in_folder: Path
     (place,) = Path("runs").glob("*.lock")
     run = walkers.load(place.with_suffix(""))
     assert isinstance(run, walkers.Run)
-    wait_for(lambda: run.progress and run.progress.step > 2 * run.case.run.steps_per_cycle)
+    wait_for(lambda: run.progress and run.progress.share > 2 / run.case.run.cycles)
     assert (run.status, walkers.load(case_file).status, len(engines_in(in_folder))) == ("running", "running", 1)
     assert "running: " in call("list", check=True).stdout
     assert f"{run.directory}: the run is running: " in call("plot", case_file).stderr
@@ -213,10 +213,9 @@ def test_a_finished_run_is_run_again_by_force_only(tmp_path: Path) -> None:
 def test_an_interrupted_run_goes_on_after_its_last_whole_segment(tmp_path: Path) -> None:
     """Walkers of six cycles in segments of two; what comes out is what a run without an interrupt gives."""
     case = make_case(run={**SHORT, "segment": "25 ms", "time_step": "1 us"})
-    two_cycles = case.run.steps // 3
 
     def interrupt(progress: Progress) -> None:
-        if progress.step > two_cycles:
+        if progress.share > 1 / 3:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

@@ -17,9 +17,9 @@ from walkers.inputs.reading import load_case
 from walkers.postprocess.gait import are_constant, walk
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.tables import read_table
+from walkers.progress import Progress
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import FIRST_SEGMENT, segment_directories
-from walkers.runner.launch import Progress
 from walkers.runner.manifest import read_manifest
 from walkers.sweeps.making import make_runs
 from walkers.templates.scene import sharing_key
@@ -138,14 +138,14 @@ def test_company_does_not_matter_whatever_forces_it_feels(tmp_path: Path) -> Non
     cases, engine = _companions(), find_engine()
     assert len({sharing_key(case) for case in cases}) == 1
     together = make_runs(cases, tmp_path / "together", engine)
-    decks = [read_manifest(run).get("shared_deck") for run in together.runs.values()]
+    decks = [read_manifest(run).get("shared_deck") for run in together.values()]
     assert len({deck["first"] if deck else None for deck in decks}) == 2  # the second has the one that went on
     cycles = {}
     for case in cases:
         alone = make_runs([case], tmp_path / "alone", engine)
-        ((name, run),) = alone.runs.items()
-        tables = [read_table(one, "walkers") for one in (together.runs[name], run)]
-        motions = [read_motion(one) for one in (together.runs[name], run)]
+        ((name, run),) = alone.items()
+        tables = [read_table(one, "walkers") for one in (together[name], run)]
+        motions = [read_motion(one) for one in (together[name], run)]
         ways = [one.position - one.position[0] for one in motions]
         assert ways[0].shape == ways[1].shape
         assert np.abs(ways[0] - ways[1]).max() < 2e-5 * np.abs(ways[1]).max(), case.name
@@ -161,8 +161,8 @@ def test_an_interrupted_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
     shown = [0.0]
 
     def stop(progress: Progress) -> None:
-        shown.append(progress.step / progress.steps)
-        if progress.made > 13 * case.run.steps_per_cycle:
+        shown.append(progress.share)
+        if progress.share * sum(case.run.attempts) > 13:
             raise Stopped("enough")
 
     with pytest.raises(Stopped):
@@ -171,7 +171,7 @@ def test_an_interrupted_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
     assert 13 < shown[-1] * sum(case.run.attempts) < 36
     dumps = []
     for folder in ("stopped", "at-a-stretch"):
-        ((_, run),) = make_runs([case], tmp_path / folder, engine).runs.items()
+        ((_, run),) = make_runs([case], tmp_path / folder, engine).items()
         dumps.append([(path / "beads.bin").read_bytes() for path in segment_directories(run)])
     assert len(dumps[0]) == 1
     assert dumps[0] == dumps[1]

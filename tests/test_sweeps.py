@@ -100,8 +100,8 @@ def test_points_of_a_shared_deck_are_what_they_are_alone(tmp_path: Path) -> None
     ]
     engine = find_engine()
     together = make_runs(cases, tmp_path / "together", engine)
-    for case, (name, there) in zip(cases, together.runs.items(), strict=True):
-        alone = make_runs([case], tmp_path / "alone", engine).runs[name]
+    for case, (name, there) in zip(cases, together.items(), strict=True):
+        alone = make_runs([case], tmp_path / "alone", engine)[name]
         motion, motion_alone = read_motion(there), read_motion(alone)
         assert motion.case == motion_alone.case == case
         for one, other in zip(motion.groups, motion_alone.groups, strict=True):
@@ -112,7 +112,7 @@ def test_points_of_a_shared_deck_are_what_they_are_alone(tmp_path: Path) -> None
             left, right = read_table(there, table), read_table(alone, table)
             pd.testing.assert_frame_equal(left, right, check_exact=False, rtol=1e-6, atol=1e-9)
         np.testing.assert_allclose(left["normal_force"], right["normal_force"], atol=1e-10)
-        first = next(iter(together.runs))
+        first = next(iter(together))
         assert read_manifest(there)["shared_deck"] == {"first": first, "runs": len(cases), "walkers": 10}
         names, own = ({path.name for path in run.rglob("*")} for run in (there, alone))
         assert {"shared_deck", "walker.lig", "engine.log"} <= names

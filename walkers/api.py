@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias, get_args
 from walkers import DEFAULT_OUT, RECORDS
 from walkers.errors import InputError, Problem, WalkersError, check_utf8, expected_of, refused
 from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped
-from walkers.progress import progress_of, progress_of_film, progress_of_sweep, shown_if
+from walkers.progress import Progress, progress_of
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import (
     CASE_NAME,
@@ -49,7 +49,6 @@ if TYPE_CHECKING:
     from walkers.inputs.origins import Origin
     from walkers.postprocess.motion import Motion
     from walkers.postprocess.results import Results
-    from walkers.runner.launch import Progress
     from walkers.sweeps.accuracy import Accuracy
     from walkers.sweeps.comparison import Comparison
     from walkers.sweeps.scheduler import Failure
@@ -261,7 +260,7 @@ class Run:
     def _state(self) -> str:
         """The status of an unfinished run, and what to do."""
         if (status := self.status) == "running":
-            return f"running{f': {progress}' if (progress := self.progress) else ''}"
+            return f"running{f': {progress.text}' if (progress := self.progress) else ''}"
         failure = self._files / FAILURE_NAME
         text = f": {read_json(failure).get('message')}" if failure.is_file() else ""
         return f"{status}{text}; continue it with: walkers run {self.directory}"
@@ -351,7 +350,7 @@ class Run:
         from walkers.postprocess.film_options import FilmOptions
         from walkers.postprocess.films import render_film
 
-        with shown_if(progress, progress_of_film(self.case.name)) as advance:
+        with progress_of(self.case.name, progress) as advance:
             return render_film(self.finished_directory, _path(to), FilmOptions(**options), on_progress=advance)
 
     def view(self, *, height: int = 480) -> k3d.Plot:
@@ -385,7 +384,7 @@ class Run:
         from walkers.sweeps.spread import run_spread
 
         case, options = self.asked or self.case, Options(cores_here())
-        with shown_if(progress, progress_of_sweep(f"{case.name}, spread")) as advance:
+        with progress_of(f"{case.name}, spread", progress) as advance:
             return run_spread(case, self.directory.parent, options, points=points, on_progress=advance, **how)
 
     def accuracy(self, share: float = 0.01, *, progress: bool | None = None, **how: Any) -> Accuracy:
@@ -410,7 +409,7 @@ class Run:
         from walkers.sweeps.accuracy import measure_accuracy
         from walkers.sweeps.scheduler import Options
 
-        with shown_if(progress, progress_of_sweep(f"{self.case.name}, accuracy")) as advance:
+        with progress_of(f"{self.case.name}, accuracy", progress) as advance:
             options = Options(cores_here())
             return measure_accuracy(self.finished_directory, options, share=share, on_progress=advance, **how)
 
@@ -535,11 +534,11 @@ def run(
     check_audit(binary, allow_failed_audit)
     # Numpy and pyarrow are loaded while the engine works and the interpreter is idle.
     threading.Thread(target=_load_postprocess, daemon=True).start()
-    with shown_if(progress, progress_of(case.name)) as advance:
-        made = make_runs([case], out, binary, force=force, on_progress=advance, time_limit=time_limit)
-    if made.busy:
+    with progress_of(case.name, progress) as advance:
+        runs = make_runs([case], out, binary, force=force, on_progress=advance, time_limit=time_limit)
+    if not runs:
         raise RunBusy("another process is still running this case", unfinished(place))
-    return Run(made.runs[place.name], cached=place.name in made.found, asked=case)
+    return Run(place, cached=False, asked=case)
 
 
 def finished_at(what: Named, out: str | Path) -> Run | None:
@@ -750,7 +749,7 @@ def sweep(
     points = load_sweep(sweep, changes)
     options = Options(jobs or cores_here(), load_site(Path(site)) if site else None, executor, retries, time_limit)
     folder = Path(out).resolve() if site else Path(out)
-    with shown_if(progress, progress_of_sweep(points.name)) as advance:
+    with progress_of(points.name, progress) as advance:
         record, failures = run_sweep(points, folder, options, on_progress=advance, **how)
     return Sweep(record.directory, tuple(failures))
 
@@ -858,11 +857,8 @@ def calibrate(
     from walkers.runner.launch import cores_here
     from walkers.sweeps.scheduler import Options
 
-    def shown(name: str) -> Any:
-        return shown_if(progress, progress_of_sweep(name))
-
     options = Options(jobs or cores_here())
-    return calibrate.calibrate(load_calibration(calibration), Path(out), options, progress_of=shown, **how)
+    return calibrate.calibrate(load_calibration(calibration), Path(out), options, progress=progress, **how)
 
 
 def predict(case: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -23,10 +22,10 @@ from walkers.inputs.keys import flatten
 from walkers.inputs.sweep import Sweep, expand
 from walkers.inputs.table import alternatives
 from walkers.paper.comparison import misalignment
-from walkers.paper.published import ProgressOf
 from walkers.postprocess.gait import steady_walkers, together
 from walkers.postprocess.results import read
 from walkers.postprocess.tables import read_table
+from walkers.progress import progress_of
 from walkers.runner.failures import BeadsLost, BlowUp
 from walkers.runner.files import read_json, write_json
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
@@ -144,7 +143,7 @@ class Outcome:
 
 
 def calibrate(
-    calibration: Calibration, out: Path, options: Options, *, progress_of: ProgressOf | None = None, **how: Any
+    calibration: Calibration, out: Path, options: Options, *, progress: bool | None = False, **how: Any
 ) -> Outcome:
     """Start or continue a calibration; finished runs are not repeated.
 
@@ -155,8 +154,8 @@ def calibrate(
     out
         Folder of the run directories; each wave is a sweep there, and its design is in a folder with the name of the
         calibration.
-    progress_of
-        See `walkers.paper.published.ProgressOf`.
+    progress
+        See `walkers.progress.progress_of`.
 
     Raises
     ------
@@ -175,7 +174,7 @@ def calibrate(
 
     def run(name: str, unit: FloatArray, extra: Mapping[str, Mapping[str, Any]] | None = None) -> Wave:
         sweep = wave_sweep(calibration, space.values(unit), f"{calibration.name}-{name}", extra)
-        with progress_of(sweep.name) if progress_of else nullcontext() as advance:
+        with progress_of(sweep.name, progress) as advance:
             final = replace(options, final=FINAL)
             wave = run_wave(calibration, unit, sweep, out, final, on_progress=advance, **how)
         if wave.failures:

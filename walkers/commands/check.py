@@ -190,12 +190,11 @@ def figures(
         Draw only the figure with this name, or comparison. Repeatable.
     """
     from walkers.paper.make import FORMATS, make_figures
-    from walkers.progress import progress_of_sweep
     from walkers.runner.launch import cores_here
     from walkers.sweeps.scheduler import Options
 
     options, wanted = Options(jobs or cores_here()), formats or FORMATS
-    made = make_figures(out, to, options, only=only or (), formats=wanted, progress_of=progress_of_sweep, **vars(by))
+    made = make_figures(out, to, options, only=only or (), formats=wanted, progress=True, **vars(by))
     for name, failures in made.failures.items():
         tell(*(f"{name}: point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
     tell(*(f"{figure} is left out: {reason}" for figure, reason in made.left_out.items()))

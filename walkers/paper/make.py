@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,8 +12,9 @@ from walkers.inputs.sweep import load_sweep
 from walkers.paper.comparison import as_dict, as_markdown, compare, count
 from walkers.paper.figures import fig1b, fig2, fig3, fig4, fig_sensitivity
 from walkers.paper.maps import fig_alignment, fig_climbing, fig_modes, fig_trays, fig_zoo
-from walkers.paper.published import NothingFinishedError, ProgressOf, Sources
+from walkers.paper.published import NothingFinishedError, Sources
 from walkers.postprocess.drawing import check_formats, save_figure
+from walkers.progress import progress_of
 from walkers.runner.files import write_json, write_text
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
 
@@ -70,7 +70,7 @@ def make_figures(
     *,
     only: Sequence[str] = (),
     formats: Sequence[str] = FORMATS,
-    progress_of: ProgressOf | None = None,
+    progress: bool | None = False,
     **how: Any,
 ) -> Made:
     """Make the missing runs, draw the figures and write the comparison.
@@ -85,6 +85,8 @@ def make_figures(
         Names of `FIGURES`, or ``comparison``; if empty, all except those that are drawn only on request.
     formats
         Formats of the figures, from `walkers.postprocess.drawing.FORMATS`.
+    progress
+        See `walkers.progress.progress_of`.
 
     Raises
     ------
@@ -106,7 +108,7 @@ def make_figures(
     needed = [FIGURES[name].sweeps if name in FIGURES else COMPARED for name in chosen]
     failed: dict[str, list[Failure]] = {}
     for sweep in dict.fromkeys(sweep for sweeps in needed for sweep in sweeps):
-        with progress_of(sweep) if progress_of else nullcontext() as advance:
+        with progress_of(sweep, progress) as advance:
             _, failures = run_sweep(load_sweep(sweep), out, options, on_progress=advance, **how)
         failed |= {sweep: failures} if failures else {}
     figures = [name for name in chosen if name in FIGURES]

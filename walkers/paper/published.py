@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -22,7 +21,6 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.caption import liquid_text, radii_text
 from walkers.postprocess.motion import Group, read_motion
-from walkers.sweeps.scheduler import SweepProgress
 from walkers.sweeps.table import load
 from walkers.theory.prediction import predicted_column
 
@@ -195,9 +193,6 @@ def described(case: Case) -> str:
 
 
 # --- the sweeps that figures are made from ----------------------------------------------------------------------------
-
-ProgressOf = Callable[[str], AbstractContextManager[Callable[[SweepProgress], None]]]
-"""Function from the name of a sweep to a context that yields a function for its progress."""
 
 
 class NothingFinishedError(WalkersError):

@@ -34,6 +34,7 @@ from walkers.postprocess.scene import (
     round_below,
     shown_of,
 )
+from walkers.progress import Progress, Tell
 from walkers.runner.files import beside
 
 _AROUND, _AROUND_TRAY = 1.2, 1.3  # extent of the picture over that of the paths of the beads, or of the tray
@@ -48,7 +49,7 @@ def render_film(
     destination: Path | None = None,
     options: FilmOptions | None = None,
     *,
-    on_progress: Callable[[int, int], None] | None = None,
+    on_progress: Tell | None = None,
 ) -> Path:
     """Render a film of one walker if walkers are independent or one is chosen, otherwise of all beads.
 
@@ -57,7 +58,7 @@ def render_film(
     directory, destination
         A run directory, and the MP4 or GIF file to write; None: ``film.mp4`` in the run directory.
     options, on_progress
-        Options; a function that is called with the number of finished frames and of all frames.
+        Options; a function that is called after each frame.
 
     Raises
     ------
@@ -88,7 +89,7 @@ def render_film(
             for number in range(count):
                 yield picture(number)
                 if on_progress is not None:
-                    on_progress(number + 1, count)
+                    on_progress(Progress((number + 1) / count, f"{number + 1} of {count} frames"))
 
         if path.suffix.lower() == ".gif":
             samples = np.linspace(0, count - 1, _SAMPLES).astype(int).tolist()

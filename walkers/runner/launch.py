@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from walkers.rounding import duration_text
 from walkers.runner import failures
 from walkers.runner.binary import Engine, plugin_of, version_in, write_run_script
 from walkers.runner.failures import AUDITED_VERSION
@@ -67,35 +66,6 @@ _STATUS_LINE = re.compile(rb"^ *(\d+) +(\d+) +(\S+)((?: +[-+.\w]+){6}) *$", re.M
 """Step, atoms, speed of the fastest bead (m/s), and the beads' bounds (m: x, x, y, y, z, z)."""
 _ERROR_LINE = re.compile(rb"^.*\bERROR\b.*$", re.MULTILINE)
 _LOOP_TIME = re.compile(rb"^Loop time of (\S+) on", re.MULTILINE)
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Progress of a run: steps of the drive, done and in total; simulated time, s; wall time and steps of this call.
-
-    ``resting``: the beads still come to rest. ``may_end_early``: the total is that of all attempts, and the last ones
-    may not be needed.
-    """
-
-    step: int
-    steps: int
-    simulated: float
-    elapsed: float
-    made: int = 0
-    resting: bool = False
-    may_end_early: bool = False
-
-    @property
-    def share(self) -> str:
-        """Completed share of the drive, as text."""
-        return "coming to rest" if self.resting else f"{100 * self.step / self.steps:.0f} %"
-
-    def __str__(self) -> str:
-        """Completed share, speed and remaining time."""
-        rate = self.made / self.elapsed if self.elapsed else 0.0
-        left = duration_text((self.steps - self.step) / rate) if rate else ""
-        left = f"{'at most ' * self.may_end_early}{left} left" if left else "starting"
-        return f"{self.share}, {self.simulated:.3f} s simulated, {rate:.0f} steps/s, {left}"
 
 
 @dataclass(frozen=True)

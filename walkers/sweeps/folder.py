@@ -142,7 +142,7 @@ def _run(path: Path, now: float) -> Entry | None:
         age = max(now - newest, 0.0)
         reason = state.reason
         if status == "running" and (progress := progress_at(path.with_name(name))):
-            reason = progress.share
+            reason = progress.text.partition(",")[0]
         return Entry(name, case_name, status, path, age, size, parameters, reason, state.message)
     given: dict[str, Any] = {}
     try:

@@ -24,6 +24,8 @@ from walkers.errors import Stopped, WalkersError
 from walkers.inputs.case import Case
 from walkers.inputs.run import Run
 from walkers.postprocess.results import measure
+from walkers.progress import Progress, Tell
+from walkers.rounding import duration_text
 from walkers.runner.binary import Engine, is_new, model_sha256, read_audit
 from walkers.runner.directory import (
     FAILURE_NAME,
@@ -47,7 +49,7 @@ from walkers.runner.directory import (
 )
 from walkers.runner.failures import AuditFailed, BeadsOverTheTop, UnauditedEngineWarning
 from walkers.runner.files import fsync_path, link_or_copy, read_json, settle, write_json
-from walkers.runner.launch import EngineReport, Progress, check_room, last_step, launch
+from walkers.runner.launch import EngineReport, check_room, last_step, launch
 from walkers.runner.manifest import write_manifest
 from walkers.runner.provenance import look_ahead
 from walkers.templates.deck import (
@@ -70,7 +72,6 @@ _LEAST_BYTES = 150
 """Smallest size of a complete restart file per atom; measured: 300 to 580."""
 _RMS_VELOCITY = re.compile(rb"^root mean square velocity (\S+)", re.MULTILINE)
 """Mass-weighted velocity of the beads, m/s, which decks print while the beads settle."""
-_Tell = Callable[[Progress], None]
 
 
 class DamagedSegment(WalkersError):
@@ -91,24 +92,15 @@ def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
         )
 
 
-@dataclass(frozen=True)
-class Made:
-    """Requested runs: directories of the finished ones by name, which existed before, which another process makes."""
-
-    runs: Mapping[str, Path]
-    found: frozenset[str]
-    busy: frozenset[str]
-
-
 def make_runs(
     cases: Sequence[Case],
     out: Path,
     engine: Engine,
     *,
     force: bool = False,
-    on_progress: _Tell | None = None,
+    on_progress: Tell | None = None,
     time_limit: float | None = None,
-) -> Made:
+) -> dict[str, Path]:
     """Make the missing runs in one deck, and measure them. A single run continues where it was interrupted.
 
     Parameters
@@ -118,8 +110,12 @@ def make_runs(
     force
         Make all runs again; a run is replaced when the new one is finished.
     on_progress, time_limit
-        Called a few times per second while the engine runs; its exceptions stop the engine. Limit of the wall time in s
-        for each segment.
+        Called while the engine runs. Limit of the wall time in s for each segment.
+
+    Returns
+    -------
+    dict
+        Directories of the finished runs by name, without those that another process makes.
 
     Raises
     ------
@@ -132,8 +128,6 @@ def make_runs(
         for place in ours:
             recover(place)
         runs = {} if force else {place.name: place for place in places if is_finished(place)}
-        found = frozenset(runs)
-        busy = frozenset(place.name for place in places if place not in ours and place.name not in runs)
         missing = {place: case for place, case in places.items() if place in ours and place.name not in runs}
         locks = [ours[place] for place in missing]
         if len(missing) == 1:
@@ -148,7 +142,7 @@ def make_runs(
                 if left:
                     runs |= _make_together(left, cycles, out, engine, locks, on_progress, time_limit)
                 left = {name: case for name, case in left.items() if name not in runs}
-    return Made(runs, found, busy)
+    return runs
 
 
 def progress_at(place: Path) -> Progress | None:
@@ -166,15 +160,19 @@ def progress_at(place: Path) -> Progress | None:
         seconds = time.time() - (folder / DECK_NAME).stat().st_mtime
     except (OSError, ValueError, KeyError, TypeError, WalkersError):
         return None
-    return _progress(run, cycles, step, start, seconds, step - begin)
+    return progress_in(run, cycles, Segment(begin, begin, start), step, seconds)
 
 
-def _progress(run: Run, cycles: int, step: int, start: int | None, seconds: float, made: int) -> Progress:
-    """The progress at a step of the attempt with a number of cycles, whose drive begins at the step ``start``."""
-    before = run.steps_until(cycles - 1)
+def progress_in(run: Run, cycles: int, segment: Segment, step: int, seconds: float) -> Progress:
+    """Progress at a step of a segment of the attempt with a number of cycles, so many seconds after its begin."""
+    before, steps, start = run.steps_until(cycles - 1), run.steps_until(run.cycles), segment.drive_from
+    step = max(step, segment.begin)
     done = before + (0 if start is None else step - start)
-    steps, simulated = run.steps_until(run.cycles), (before + step) * run.time_step
-    return Progress(done, steps, simulated, seconds, made, start is None, run.until_steady)
+    rate = (step - segment.begin) / seconds if seconds else 0.0
+    left = f"{'at most ' * run.until_steady}{duration_text((steps - done) / rate)} left" if rate else "starting"
+    share, simulated = done / steps, (before + step) * run.time_step
+    text = "coming to rest" if start is None else f"{100 * share:.0f} %"
+    return Progress(share, f"{text}, {simulated:.3f} s simulated, {rate:.0f} steps/s, {left}")
 
 
 def _are_constant(directory: Path) -> bool:
@@ -205,7 +203,7 @@ class OpenRun:
     def make(
         self,
         *,
-        on_progress: _Tell | None = None,
+        on_progress: Tell | None = None,
         time_limit: float | None = None,
         render: Callable[[Case, Segment], Deck] = render_deck,
     ) -> None:
@@ -213,7 +211,6 @@ class OpenRun:
 
         Complete segments are kept if the engine fails.
         """
-        begun, made = time.perf_counter(), 0
         look_ahead()
         for cycles in self.case.run.attempts:
             case = self.case.for_cycles(cycles)
@@ -222,7 +219,7 @@ class OpenRun:
                     shutil.rmtree(directory)
                 self.done.clear()
             while (segment := self._next_segment(case)) is not None:
-                tell = _teller(self.case.run, cycles, segment, on_progress, made, begun) if on_progress else None
+                tell = _teller(self.case.run, cycles, segment, on_progress)
                 try:
                     self._make(segment, render(case, segment), tell, time_limit)
                 except BeadsOverTheTop as over:
@@ -233,7 +230,6 @@ class OpenRun:
                     shutil.rmtree(self.directory / SEGMENTS / f"{len(self.done):04d}.new")
                     self.ended = f"{over.lost} bead(s) left the container over its walls in the next segment"
                     return
-                made += segment.end - segment.begin
             if cycles < self.case.run.cycles and _are_constant(self.directory):
                 return
 
@@ -286,17 +282,10 @@ class OpenRun:
         return self.place
 
 
-def _teller(
-    run: Run, cycles: int, segment: Segment, tell: _Tell, made: int = 0, begun: float | None = None
-) -> Callable[[int], None]:
+def _teller(run: Run, cycles: int, segment: Segment, tell: Tell | None) -> Callable[[int], None] | None:
     """A function that reports the progress of the run at a step of a segment."""
-    since = time.perf_counter() if begun is None else begun
-
-    def advance(step: int) -> None:
-        step, seconds = max(step, segment.begin), time.perf_counter() - since
-        tell(_progress(run, cycles, step, segment.drive_from, seconds, made + step - segment.begin))
-
-    return advance
+    begin = time.perf_counter()
+    return tell and (lambda step: tell(progress_in(run, cycles, segment, step, time.perf_counter() - begin)))
 
 
 @contextmanager
@@ -352,7 +341,7 @@ def _make_together(
     out: Path,
     engine: Engine,
     locks: Sequence[int],
-    on_progress: _Tell | None,
+    on_progress: Tell | None,
     time_limit: float | None,
 ) -> dict[str, Path]:
     """Make runs in one deck for a number of cycles; return those with constant velocities or all of their cycles."""
@@ -372,7 +361,7 @@ def _make_together(
                 write_case(incomplete / name, case)
             look_ahead()
             segment = first_segment(tried[first])
-            tell = _teller(cases[first].run, cycles, segment, on_progress) if on_progress else None
+            tell = _teller(cases[first].run, cycles, segment, on_progress)
             folder = incomplete / DECK_FOLDER
             report = launch(deck, folder, engine, on_step=tell, time_limit=time_limit, keep_open=locks)
             _part(incomplete, tried, deck, report)

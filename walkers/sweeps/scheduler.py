@@ -33,6 +33,7 @@ from walkers.errors import InputError, Stopped, WalkersError, check_utf8, refuse
 from walkers.inputs.case import Case
 from walkers.inputs.sweep import Sweep
 from walkers.postprocess.results import ensure_measured
+from walkers.progress import Progress, Tell
 from walkers.rounding import counted, duration_text
 from walkers.runner.binary import Engine, find_engine
 from walkers.runner.directory import is_finished, is_locked, run_place, unfinished
@@ -120,20 +121,6 @@ class Failure:
     reason: str
     message: str
     directory: str | None
-
-
-@dataclass(frozen=True)
-class SweepProgress:
-    """Progress of a sweep: numbers of points, and of running decks; seconds since the start, and left (if known)."""
-
-    points: int
-    found: int
-    done: int
-    failed: int
-    running: int
-    decks: int
-    elapsed: float
-    left: float | None
 
 
 @dataclass(frozen=True)
@@ -295,7 +282,7 @@ def run_sweep(
     *,
     engine: str | None = None,
     allow_failed_audit: bool = False,
-    on_progress: Callable[[SweepProgress], None] | None = None,
+    on_progress: Tell | None = None,
 ) -> tuple[SweepRecord, list[Failure]]:
     """Make the missing runs of a sweep.
 
@@ -306,7 +293,7 @@ def run_sweep(
     engine, allow_failed_audit
         See `walkers.run`.
     on_progress
-        Called a few times a second.
+        See `walkers.progress.Tell`.
 
     Returns
     -------
@@ -385,7 +372,7 @@ def work(
             raise EngineDiffers(f"the engine on {node()}, {own.path}, is not the engine that started this sweep")
         if list(runs) != [run_place(case, own, out).name for case in cases]:
             raise ProgramDiffers(f"the program on {node()} has another version than the one that started the sweep")
-        return Report([*make_runs(cases, out, own, on_progress=look, time_limit=time_limit).runs])
+        return Report([*make_runs(cases, out, own, on_progress=look, time_limit=time_limit)])
     except (OSError, WalkersError) as error:
         if retries and not isinstance(error, Stopped):
             return work(stop, runs, cases, out, engine, time_limit, retries - 1)
@@ -464,7 +451,7 @@ class _Loop:
         self.begin, self.seconds_done = time.perf_counter(), 0.0
         self.found = self.done = plan.statuses.count("finished")
 
-    def run(self, on_progress: Callable[[SweepProgress], None]) -> list[Failure]:
+    def run(self, on_progress: Tell) -> list[Failure]:
         """Work until every point is finished or failed; return the failures in the order of the points."""
         shown = 0.0
         try:
@@ -519,18 +506,17 @@ class _Loop:
             text = f"the first {_MOST_ALIKE} points failed in the same way, and the sweep is stopped"
             raise SweepStopped(f"{alike[1]}; {text}")
 
-    def _progress(self) -> SweepProgress:
+    def _progress(self) -> Progress:
         first = list(self.decks.values())[: 4 * self.plan.options.decks_at_once]  # later decks have not started
-        made = [deck for deck in first if is_locked(self.record.out / self.record.runs[deck.points[0]])]
-        waiting = sum(deck.seconds for deck in [*self.decks.values(), *self.halves])
+        decks = [deck for deck in first if is_locked(self.record.out / self.record.runs[deck.points[0]])]
+        running, points, failed = sum(len(deck.points) for deck in decks), len(self.record.runs), len(self.failures)
+        in_decks = f" in {len(decks)} decks" if 1 < len(decks) < running else ""
+        words = [f"{self.done} of {points} points done, {running} running{in_decks}, {failed} failed"]
         elapsed = time.perf_counter() - self.begin
-        return SweepProgress(
-            points=len(self.record.runs),
-            found=self.found,
-            done=self.done,
-            failed=len(self.failures),
-            running=sum(len(deck.points) for deck in made),
-            decks=len(made),
-            elapsed=elapsed,
-            left=waiting / self.seconds_done * elapsed if self.seconds_done else None,
-        )
+        if made := self.done - self.found:
+            each = elapsed / made
+            words.append(f"{60.0 / each:.0f} points per minute" if each < 10.0 else f"{duration_text(each)} per point")
+        if self.seconds_done:
+            waiting = sum(deck.seconds for deck in [*self.decks.values(), *self.halves])
+            words.append(f"{duration_text(waiting / self.seconds_done * elapsed)} left")
+        return Progress((self.done + failed) / max(points, 1), ", ".join(words))
