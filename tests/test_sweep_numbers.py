@@ -25,7 +25,7 @@ from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.sweeps.comparison import Side, compare_runs
 from walkers.sweeps.scheduler import Options, makespan, pack, run_sweep
 from walkers.sweeps.spread import run_spread
-from walkers.sweeps.table import SweepRecord, load, thresholds, write_record
+from walkers.sweeps.table import SweepRecord, groups, load, thresholds, write_record
 
 # --- spread -----------------------------------------------------------------------------------------------------------
 
@@ -73,6 +73,21 @@ def test_a_spread_has_the_quantiles_and_the_signed_ranks_of_its_draws(
         (RESTITUTION, pytest.approx(spearmanr(strong, speeds).statistic)),
     ]
     assert read_json(tmp_path / "spread.json")["bands"]["velocity"]["low"] == band.low
+
+
+# --- groups -----------------------------------------------------------------------------------------------------------
+
+
+def test_points_that_differ_in_their_seed_alone_are_a_group() -> None:
+    """A law that a case may leave to the program ("auto", none) is a value as others."""
+    values = {"drive.frequency": [90.0, 60.0] * 3, "contact.law": ["auto", 1.0, "auto", None, "auto", None]}
+    table = pd.DataFrame({**values, "run.seed": [1, 1, 2, 1, 3, 2], "boundary.tilt": 0.0})
+    table.attrs["varied"] = list(table)
+    found = [(named, list(rows.index)) for named, rows in groups(table)]
+    assert [rows for _, rows in found] == [[0, 2, 4], [1], [3, 5]]
+    assert found[1][0] == {"drive.frequency": 60.0, "contact.law": 1.0}
+    ((named, rows),) = groups(table.loc[[0, 2, 4]])
+    assert (named, list(rows.index), rows.attrs["varied"]) == ({}, [0, 2, 4], list(table))
 
 
 # --- descents ---------------------------------------------------------------------------------------------------------

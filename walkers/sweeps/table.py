@@ -6,7 +6,7 @@ run directory.
 
 The table has one row per point: the varied keys, quantities derived from the case, and the results of the run. Figure,
 report, comparison and spread of a sweep are made from it. Its ``attrs`` describe the columns (``units``, ``meanings``)
-and the sweep (``sweep``, ``title``, ``axes``: tuples of keys that vary together).
+and the sweep (``sweep``, ``title``, ``varied``: columns of the varied keys, ``axes``: keys that vary together).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from __future__ import annotations
 import io
 import os
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import nan
@@ -56,6 +56,8 @@ FACING_DOWN = {"right_facing": "left_facing", "axial_velocity": "axial_left_faci
 """Columns of walkers that face down, by the columns of those that face up (`main_columns`)."""
 ERRORS = {"velocity": "scatter"}
 """Columns that contain the scatter of other columns over copies."""
+SEEDS = ("run.seed", "seed")
+"""Keys of the random numbers of a start: points that differ in nothing else repeat an experiment."""
 FORMATS = ("csv", "parquet", "json")
 _SHOWN = {
     *("gamma0", "sin_delta", "rotation_1", "sliding_1", "steady", "walkers", "upright", "work", "cost_of_transport"),
@@ -272,6 +274,7 @@ def load(directory: str | Path) -> pd.DataFrame:
     rows = [dict.fromkeys(found, nan) | _row(record, number, state) for number, state in enumerate(points)]
     frame = _with_units(pd.DataFrame(rows, columns=list(described)), described)
     frame.attrs |= {"sweep": record.name, "title": record.title or record.name, "axes": record.axes}
+    frame.attrs["varied"] = list(varied)
     return frame
 
 
@@ -294,6 +297,23 @@ def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
 def varied_columns(frame: pd.DataFrame) -> list[str]:
     """The columns of varied keys in a sweep's table."""
     return [name for name, meaning in frame.attrs["meanings"].items() if meaning == _VARIED]
+
+
+def groups(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
+    """The points of a sweep's table in groups that differ in nothing but their seeds.
+
+    Yields
+    ------
+    tuple of dict and DataFrame
+        Values of the varied columns that distinguish the groups (units as in the table), and the rows of the group, in
+        the order of the sweep. Nothing distinguishes them if only seeds vary: then there is one group.
+    """
+    keys = [name for name in frame.attrs["varied"] if name not in SEEDS and frame[name].nunique(dropna=False) > 1]
+    if not keys:
+        yield {}, frame
+        return
+    for values, rows in frame.groupby(keys, sort=False, dropna=False):
+        yield dict(zip(keys, values, strict=True)), frame.loc[rows.index]
 
 
 def sides_differ(frame: pd.DataFrame) -> bool:
