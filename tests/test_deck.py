@@ -85,3 +85,17 @@ def test_a_mixture_is_placed_by_its_seed() -> None:
     pile = load_case("pile-ci")
     places = [[bead.centre for bead in place((pile.put("run.seed", seed),))[0].beads] for seed in (1, 1, 2)]
     assert places[0] == places[1] != places[2]
+
+
+def test_bridges_may_push_loose_beads() -> None:
+    pile, less = (load_case("pile-ci", {"liquid.contact_angle": f"{angle} deg"}) for angle in (90, 84))
+    assert pile.liquid.contact_angle == pytest.approx(1.5707963)
+    assert render_deck(pile).fastest > render_deck(less).fastest
+
+
+def test_a_liquid_may_have_no_viscosity() -> None:
+    assert make_case(run={"time_step": "20 us", "allow_unstable": True}).run.time_step > 19e-6
+    tables = render_deck(make_case(liquid={"viscosity_ratio": 0})).files["bridges.txt"].splitlines()
+    resistances = [[float(number) for number in line.split()[2:]] for line in tables if line[0] in "0123456789"]
+    assert len(resistances) > 100
+    assert not any(map(any, resistances))
