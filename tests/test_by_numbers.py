@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
-from math import cos, inf, pi, radians, sin, sqrt
+from math import inf, pi, radians, sqrt
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -17,7 +16,7 @@ import walkers
 from tests.conftest import document, make_case
 from walkers.inputs import units
 from walkers.inputs.axes import Range
-from walkers.inputs.boundary import Boundary, Round
+from walkers.inputs.boundary import Round
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Harmonic, waveform
 from walkers.inputs.loads import bridge_at_rest, contact_loads
@@ -25,7 +24,7 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.table import changed
 from walkers.inputs.units import Kind, quantity_text
 from walkers.postprocess.films import speed_text
-from walkers.postprocess.gait import averages, settled_samples, turned_over_at
+from walkers.postprocess.gait import averages, fit_slopes, settled_samples, turned_over_at
 from walkers.postprocess.motion import Bridges, Motion
 from walkers.postprocess.piles import _joined, _of_climbs, _state_of
 from walkers.postprocess.report.player import _points
@@ -89,13 +88,9 @@ def resting(case: Case, frames: int | None = None) -> Motion:
     ("value", "kind", "text"),
     [
         (293.15, units.TEMPERATURE, "20 degC"),
-        (273.15, units.TEMPERATURE, "0 degC"),
         (3e-4, units.LENGTH, "0.3 mm"),
         (39.2, units.ACCELERATION, "4 g"),
-        (pi / 18.0, units.ANGLE, "10 deg"),
-        (4.6e-3, units.DYNAMIC_VISCOSITY, "4.6 mPa*s"),
         (4000.0, units.DENSITY, "4 g/cm^3"),
-        (2e-6, units.TIME, "2 us"),
     ],
 )
 def test_quantities_are_written_in_the_unit_of_their_example(value: float, kind: Kind, text: str) -> None:
@@ -107,7 +102,6 @@ def test_quantities_are_written_in_the_unit_of_their_example(value: float, kind:
     ("scale", "median", "quarters"),
     [
         (True, None, [0.01, 0.1**1.5, 0.1, 0.1**0.5, 1.0]),
-        (False, None, [0.01, 0.2575, 0.505, 0.7525, 1.0]),
         (True, 0.25, [0.01, 0.05, 0.25, 0.5, 1.0]),
         (False, 0.21, [0.01, 0.11, 0.21, 0.605, 1.0]),
     ],
@@ -119,35 +113,25 @@ def test_quarters_of_a_range(scale: bool, median: float | None, quarters: list[f
 
 def test_a_key_within_a_list_puts_what_says_the_same_out_of_force() -> None:
     tables = {"drive": {"harmonics": [{"gamma0": 0.4, "axis": "x"}, {"gamma0": 0.2}]}}
-    found = changed(Case, tables, {"drive.harmonics[1].peak_acceleration": "2 g"})
-    assert found["drive"]["harmonics"] == [{"gamma0": 0.4, "axis": "x"}, {"peak_acceleration": "2 g"}]
     both = {"drive.harmonics[0].peak_acceleration": "2 g", "drive.harmonics[0].gamma0": 0.3}
-    assert changed(Case, tables, both)["drive"]["harmonics"][0] == {
-        "gamma0": 0.3,
-        "axis": "x",
-        "peak_acceleration": "2 g",
-    }
+    for changes, number, expected in (
+        ({"drive.harmonics[1].peak_acceleration": "2 g"}, 1, {"peak_acceleration": "2 g"}),
+        (both, 0, {"gamma0": 0.3, "axis": "x", "peak_acceleration": "2 g"}),
+    ):
+        assert changed(Case, tables, changes)["drive"]["harmonics"][number] == expected
 
 
-@pytest.mark.parametrize("name", ["triangle", "sawtooth"])
-def test_a_phase_of_a_waveform_is_an_earlier_begin_of_the_whole(name: str) -> None:
+def test_a_phase_of_a_waveform_is_an_earlier_begin_of_the_whole() -> None:
     time, frequency, phase = np.linspace(0.0, 0.1, 200), 20.0, radians(50.0)
 
     def acceleration(first: Harmonic, time: Any) -> Any:
-        waves = waveform(name, first)
+        waves = waveform("sawtooth", first)
         return sum(one.peak_acceleration * np.sin(one.angular_frequency * time + one.phase) for one in waves)
 
     plain = Harmonic(axis="x", frequency=frequency, peak_acceleration=10.0)
     earlier = acceleration(plain, time + phase / (2.0 * pi * frequency))
     np.testing.assert_allclose(acceleration(plain.but(phase=phase), time), earlier, atol=1e-9)
     assert np.abs(earlier).max() > 9.0
-
-
-@pytest.mark.parametrize("uphill", [0.0, 60.0, 90.0, 200.0])
-def test_gravity_points_down_the_slope_whichever_way_that_is(uphill: float) -> None:
-    slope = Boundary(material="glass", tilt=radians(30.0), uphill=radians(uphill))
-    along, up = np.array([cos(slope.uphill), sin(slope.uphill), 0.0]), np.array([0.0, 0.0, 1.0])
-    np.testing.assert_allclose(slope.gravity(9.81), -4.905 * along - 9.81 * sqrt(0.75) * up, atol=1e-12)
 
 
 def test_a_bead_on_a_slope_presses_with_a_part_of_its_weight() -> None:
@@ -203,10 +187,7 @@ def test_measuring_begins_after_all_of_the_settling_cycles() -> None:
 
 def test_a_deck_of_several_cases_is_watched_with_the_highest_of_their_limits() -> None:
     slow, fast = (make_case(drive={"peak_acceleration": peak}) for peak in ("2 g", "8 g"))
-    alone = [render_deck(one).fastest for one in (slow, fast)]
-    assert alone[0] < 0.9 * alone[1]
-    assert render_shared_deck([slow, fast]).fastest == pytest.approx(alone[1])
-    assert render_shared_deck([fast, slow]).fastest == pytest.approx(alone[1])
+    assert render_shared_deck([slow, fast]).fastest == render_deck(fast).fastest > 1.1 * render_deck(slow).fastest
 
 
 def test_what_show_prints_of_a_case_is_in_its_units() -> None:
@@ -254,31 +235,31 @@ def test_times_of_a_manifest_are_utc(monkeypatch: pytest.MonkeyPatch) -> None:
         time.tzset()
 
 
-def test_a_result_rests_on_the_values_of_the_case_that_is_asked_for(
-    run_directory: Callable[..., Path], runs_folder: Path
-) -> None:
+def test_a_result_rests_on_the_values_of_the_case_that_is_asked_for(tmp_path: Path) -> None:
     """Two cases of the same numbers have a run in common; one says a value that the other leaves out."""
     tables = document(run=FEW)
-    tables["contact"] = {name: value for name, value in tables["contact"].items() if name != "rolling_friction"}
+    del tables["contact"]["rolling_friction"]
     plain = Case.read(tables, name="test")
     contact = {**tables["contact"], "rolling_friction": plain.contact.rolling_friction}
     said = Case.read({**tables, "contact": contact}, name="test")
     assert said == plain
-    run_directory(plain)
-    found = []
-    for case in (plain, said):
-        rests = walkers.load(case, runs_folder).result.about["rests_on"]
-        found += [one["origin"] for one in rests if one["key"] == "contact.rolling_friction"]
-    assert found == [next(one.origin for one in plain.origins if one.key == "contact.rolling_friction"), "given"]
-    assert found[0] != "given"
+    walkers.run(plain, tmp_path)
+    rests = [walkers.load(case, tmp_path).result.about["rests_on"] for case in (plain, said)]
+    found = [one["origin"] for of_case in rests for one in of_case if one["key"] == "contact.rolling_friction"]
+    assert found[0] != found[1] == "given"
 
 
 # --- walkers ----------------------------------------------------------------------------------------------------------
 
 
-def test_scatter_is_the_deviation_of_a_sample() -> None:
+def test_scatter_and_slopes_of_walkers() -> None:
+    """The scatter is the deviation of a sample, sqrt(7/3) of 1, 2 and 4; a single one has none."""
     assert _scatter(np.array([1.0, 2.0, 4.0])) == pytest.approx(sqrt(7.0 / 3.0))
     assert np.isnan(_scatter(np.array([1.0])))
+    time = np.linspace(3.0, 4.0, 30)
+    values = np.outer(time, [2.0, -1.0]) + 0.1 * np.random.default_rng(5).standard_normal((30, 2)) + 1e3
+    expected = [np.polyfit(time - 3.5, column - 1e3, 1)[0] for column in values.T]
+    np.testing.assert_allclose(fit_slopes(time, values), expected, rtol=1e-9)
 
 
 def test_a_walker_is_separated_where_any_of_its_pairs_is() -> None:
@@ -391,11 +372,8 @@ def test_the_numbers_of_climbs() -> None:
 # --- pictures ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("slowdown", "text"), [(20.0, "20 × slower"), (1.5, "1.5 × slower"), (1.0, "real time"), (0.25, "4 × faster")]
-)
-def test_slow_motion_in_words(slowdown: float, text: str) -> None:
-    assert speed_text(slowdown) == text
+def test_slow_motion_in_words() -> None:
+    assert [speed_text(slowdown) for slowdown in (20.0, 1.0, 0.25)] == ["20 × slower", "real time", "4 × faster"]
 
 
 def test_a_bead_turns_about_axes_that_stay_where_they_are() -> None:

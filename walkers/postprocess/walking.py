@@ -229,8 +229,7 @@ def _velocities(walkers: Columns, case: Case) -> dict[str, Any]:
 def _of_beads(walkers: Columns, case: Case) -> dict[str, float]:
     """Rotation, sliding and open contacts of the walkers of a make, on a slope of those that face up."""
     families, meant = ("rotation_", "sliding_", "open_"), alike(walkers, uphill=case.goes_uphill)
-    of_make = {name: column[meant] for name, column in walkers.items() if name.startswith(families)}
-    return {name: _mean(column) for name, column in of_make.items() if not np.isnan(column).all()}
+    return {name: _mean(column[meant]) for name, column in walkers.items() if name.startswith(families)}
 
 
 def _work(groups: Sequence[Group], cycles: Columns, walkers: Columns) -> dict[str, float]:

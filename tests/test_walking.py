@@ -1,0 +1,394 @@
+"""Walkers as measured: velocities, means of rotation and sliding, work, results; runs that end when they are steady."""
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from math import isnan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import walkers
+from tests.conftest import document
+from walkers.errors import InputError, Stopped
+from walkers.inputs.case import Case
+from walkers.inputs.loads import contact_loads, dimer_of
+from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.toml import read_toml
+from walkers.postprocess.figures import figures_of
+from walkers.postprocess.gait import are_constant, averages, gait, gaps, settled_samples, steady_walkers, walk
+from walkers.postprocess.motion import Group, read_motion
+from walkers.postprocess.numbers import declared, rows
+from walkers.postprocess.results import read
+from walkers.postprocess.sides import sides
+from walkers.postprocess.walking import measure, walkers_met
+from walkers.progress import Progress
+from walkers.runner.binary import find_engine
+from walkers.runner.directory import FIRST_SEGMENT, case_of, segment_directories
+from walkers.runner.files import read_json, write_json
+from walkers.runner.manifest import RESULT_NAME, read_manifest
+from walkers.sweeps.making import make_runs
+from walkers.templates.scene import sharing_key
+
+RunDirectory = Callable[..., Path]
+SHORT = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 20}
+
+
+@pytest.fixture(scope="module")
+def directory(run_directory: RunDirectory) -> Path:
+    """The shipped walker of Fig. 1b: six replicates, driven until they are steady."""
+    return run_directory(load_case("fig1b"))
+
+
+@pytest.fixture(scope="module")
+def moved(directory: Path) -> Group:
+    return read_motion(directory).groups[0]
+
+
+# --- velocities and results -------------------------------------------------------------------------------------------
+
+
+def test_velocity_is_the_strobed_displacement_over_time(moved: Group) -> None:
+    run = moved.case.run
+    strobed = moved.mass_centre[:: run.samples_per_cycle][run.settling_cycles :]
+    seconds = (run.cycles - run.settling_cycles) / moved.case.excitation.frequency
+    facing = np.array([walker.facing for walker in moved.walkers])
+    crude = facing * (strobed[-1, :, 0] - strobed[0, :, 0]) / seconds
+    walked = walk(moved)
+    np.testing.assert_allclose(facing * walked.axial_velocity, crude, rtol=1e-3)
+    np.testing.assert_allclose(walked.velocity, crude, rtol=0.01)
+    assert np.abs(walked.lateral_velocity).max() < 0.1 * np.abs(walked.axial_velocity).min()
+    assert np.all(walked.steady)
+    # Twenty samples a cycle represent the gait: their mean velocity is the displacement a cycle.
+    motion = gait(moved)
+    np.testing.assert_allclose(motion.velocity[settled_samples(moved)].mean(axis=0), walked.velocity, rtol=0.03)
+    # Sliding is velocity less rotation: the mass centre moves as its beads do, weighted by their masses.
+    weights = moved.radii**3 / np.sum(moved.radii**3)
+    np.testing.assert_allclose((motion.sliding[..., :2] + motion.rotation) @ weights, motion.velocity, atol=1e-12)
+    np.testing.assert_allclose(motion.sliding[..., 2], -motion.rotation.sum(axis=-1), atol=1e-15)
+
+
+def test_the_orientation_of_a_walker_that_goes_round_does_not_jump(moved: Group) -> None:
+    angle = np.linspace(0.0, 4.0 * np.pi, len(moved.time))
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    position = moved.position.copy()
+    position[..., :2] = np.einsum("xyf,wby->fwbx", turn, moved.position[0, ..., :2])
+    orientation = replace(moved, position=position).orientation
+    np.testing.assert_allclose(orientation - orientation[0], np.tile(angle[:, None], len(moved.walkers)), atol=1e-9)
+
+
+def test_the_result_follows_the_papers_protocol(directory: Path) -> None:
+    result = read(directory)
+    each = result.table("walkers")
+    velocity, right = each["velocity"], each["velocity"][each["facing"] == 1]
+    expected = [velocity.mean(), velocity.min(), velocity.max(), velocity.std(), right.mean(), right.std()]
+    names = ("velocity", "smallest", "largest", "scatter", "right_facing", "right_scatter")
+    assert [result[name] for name in names] == pytest.approx(expected)
+    assert result["axial_left_facing"] < 0 < result["axial_velocity"]
+    assert (result["facing_right"], result["steady"], result["walkers_met"]) == (3, 6, False)
+    assert set(map(declared, result)) and all(isinstance(number, (bool, int, float)) for number in result.values())
+    assert json.loads(json.dumps(result.as_dict())) == result.as_dict()
+    # Velocities of both directions have the scatter of their walkers, in mm/s.
+    errors = {
+        row.name: row.error for row in rows({**result, "scatter": 1e-5, "right_scatter": 2e-5, "left_scatter": 3e-5})
+    }
+    said = {name: float(errors[name].removeprefix("scatter ")) for name in ("velocity", "right_facing", "left_facing")}
+    assert said == {"velocity": 0.01, "right_facing": 0.02, "left_facing": 0.03}
+
+
+def test_a_single_walker_has_no_scatter(run_directory: RunDirectory) -> None:
+    result = read(run_directory())
+    assert np.isnan([result[name] for name in ("scatter", "left_facing", "left_scatter")]).all()
+    assert not [row for row in rows(result) if "scatter" in row.error or row.name == "left_facing"]
+    assert result.as_dict()["scatter"] is None
+    unsettled = read(run_directory(run={"cycles": 6, "settling_cycles": 0}))
+    assert unsettled["steady"] == 0
+    assert any("not steady" in warning for warning in unsettled.warnings)
+
+
+def test_a_result_is_measured_again_by_walkers_run_alone(directory: Path, tmp_path: Path) -> None:
+    """One that was edited, that another version measured, and one whose table is damaged; the engine does not run."""
+    copy = Path(shutil.copytree(directory, tmp_path / directory.name))
+    before = {path: path.stat().st_mtime_ns for path in copy.rglob("*")}
+    right, contents = read(copy).as_dict(), read_json(copy / RESULT_NAME)
+    assert before == {path: path.stat().st_mtime_ns for path in copy.rglob("*")}  # reading writes nothing
+    edited = {**contents, "numbers": {**contents["numbers"], "velocity": 99.0}}
+    for wrong in ({**contents, "version": 0}, {"version": 1}, edited):
+        write_json(copy / RESULT_NAME, wrong)
+        if wrong is not edited:
+            with pytest.raises(InputError, match=f"walkers run {copy} measures it again"):
+                read(copy)
+        assert walkers.run(copy).result.as_dict() == right
+    (copy / "walkers.parquet").write_bytes(b"")
+    (copy / "bridges.parquet").unlink()
+    assert walkers.run(copy).result.as_dict() == right
+    assert len(read(copy).table("walkers")) == 6
+    (copy / RESULT_NAME).unlink()
+    with pytest.raises(InputError, match="measures it again"):
+        walkers.load(copy).result  # noqa: B018
+    for dump in copy.rglob("*.bin"):  # as in an archive without dumps
+        dump.unlink()
+    with pytest.raises(InputError, match="cannot be read"):
+        walkers.run(copy)
+
+
+def test_symmetric_dimers_need_not_be_on_the_axis_to_be_kept(run_directory: RunDirectory) -> None:
+    aside = {"angle": "80 deg", "facing": "right"}
+    for radius, kept in (("0.25 mm", 1), ("0.26 mm", 0)):
+        run = run_directory(dimers={"radii": [radius, "0.25 mm"], **aside}, run={**SHORT, "samples_per_cycle": 10})
+        assert len(steady_walkers(read(run))) == kept
+
+
+def test_walkers_are_named_by_the_direction_in_which_they_face(run_directory: RunDirectory) -> None:
+    """Their orientations are from this direction, on trays from the drive."""
+    degrees = np.array([0.0, 91.0, 150.0, 20.0, -175.0])
+    assert sides([1, 1, 1, -1, -1], np.radians(degrees)).tolist() == [1, 1, -1, -1, 1]
+    turned = run_directory(dimers={"angle": "150 deg"}, run=SHORT)
+    assert [read(turned)[name] for name in ("facing_right", "facing_left")] == [0, 1]
+    meeting = {"replicates": 2, "angle": "150 deg", "facing": "left", "meet": True}
+    tray = run_directory(dimers=meeting, boundary={"shape": "box", "width": "12 mm", "height": "4 mm"}, run=SHORT)
+    for run, label in ((turned, "0: left at -30°, "), (tray, "0: -30°, ")):
+        (line, *_) = figures_of(run)["walk"].axes[1].lines
+        assert str(line.get_label()).startswith(label)
+        assert line.get_ydata()[0] == pytest.approx(-30.0)  # type: ignore[index]
+
+
+def test_on_slopes_rows_and_figures_are_by_the_way_up(run_directory: RunDirectory) -> None:
+    """All numbers of those that face up alone say so; who goes up sees the path as it is drawn."""
+    places = [
+        run_directory(boundary={"tilt": tilt}, dimers={"replicates": 2}, run=SHORT) for tilt in ("0 deg", "10 deg")
+    ]
+    plane, sloped = ({row.name: row.label for row in rows(read(place))} for place in places)
+    assert (plane["right_facing"], sloped["right_facing"]) == ("velocity, facing right", "velocity, facing up")
+    assert (plane["sliding_1"], sloped["sliding_1"]) == ("sliding of bead 1", "sliding of bead 1, facing up")
+    assert sloped["axial_velocity"] == "velocity up the slope, facing up"
+    assert (plane["walkers"], sloped["walkers"]) == ("walkers", "walkers")
+    cycles, (height, orientation, path) = read(places[1]).columns("cycles"), figures_of(places[1])["walk"].axes
+    first = {name: 1e3 * values[cycles["walker"] == 0] for name, values in cycles.items()}
+    np.testing.assert_allclose(height.lines[0].get_ydata(), first["along"])
+    np.testing.assert_allclose(path.lines[0].get_xydata().T, [first["across"], first["along"]])  # type: ignore[union-attr]
+    left, right = path.get_xlim()
+    assert left > right
+    for axes in (height, orientation):
+        (settling,) = axes.patches
+        ends = settling.get_extents().transformed(axes.transData.inverted())
+        assert ends.x1 == pytest.approx(1e-3 * first["time"][2])
+
+
+def test_walkers_that_come_close_are_reported(moved: Group) -> None:
+    assert not walkers_met([moved])
+    position = moved.position.copy()
+    late = position[len(position) // 2 :]
+    late[:, 1] += late[:, 0].mean(axis=1, keepdims=True) - late[:, 1].mean(axis=1, keepdims=True)
+    late[:, 1, :, 1] += 1.2e-3  # beside walker 0, a fifth of a millimetre between them
+    places = moved.motion.position.copy()
+    places[:, moved.rows] = position
+    met = measure(replace(moved.motion, position=places))
+    assert met.numbers["walkers_met"]
+    assert any("not independent" in warning for warning in met.warnings)
+
+
+def test_the_drive_pays_for_what_slides(run_directory: RunDirectory) -> None:
+    """Equal beads that keep each other from rolling, hardly held by friction: 4 A μ N in a cycle, to no end."""
+    directory = run_directory(
+        dimers={"radii": ["0.25 mm", "0.25 mm"], "replicates": 1, "angle_spread": "0 deg", "gap_spread": 0.0},
+        liquid={"viscosity_ratio": 1e-4},
+        contact={"friction": {"bead_wall": 0.01, "bead_bead": 1.0}, "rolling_friction": 0.0},
+        run={"cycles": 60, "settling_cycles": 50, "samples_per_cycle": 20},
+    )
+    case, result = case_of(directory), read(directory)
+    pressed = sum(load.pull for load in contact_loads(case)[:2]) + dimer_of(case).total_mass * case.pressing_gravity
+    assert result["work"] == pytest.approx(4.0 * case.excitation.amplitude * 0.01 * pressed, rel=0.02)
+    assert isnan(result["cost_of_transport"])
+    works = result.table("cycles").set_index("cycle")["work"]
+    assert works[50:].mean() == pytest.approx(result["work"])
+    assert works.index[works.isna()].tolist() == [60]
+    (row,) = (row for row in rows(result) if row.name == "work")
+    assert (row.text, row.unit) == (f"{1e9 * result['work']:.4g}", "nJ")
+
+
+# --- means of rotation, sliding and open contacts ---------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def groups(trajectory: Callable[..., Group]) -> dict[int, Group]:
+    return {samples: trajectory(_hopping(samples)) for samples in (20, 200)}
+
+
+def _hopping(samples: int, **run: object) -> Case:
+    """Fig. 4b's walker, whose beads part in every cycle."""
+    tables = read_toml(shipped("case")["fig4b"])
+    tables["dimers"]["replicates"] = 1
+    tables["run"] = {"time_step": "3 us", "cycles": 12, "settling_cycles": 4, "samples_per_cycle": samples, **run}
+    return Case.read(tables, source="test", name=f"hopping-{samples}")
+
+
+def test_means_do_not_depend_on_how_often_is_looked(groups: dict[int, Group]) -> None:
+    """Rotation and sliding within 0.5 % of the fastest, open contacts within a sample of 200."""
+    few, many = averages(groups[20]), averages(groups[200])
+    scale = float(np.abs(many.sliding).max())
+    np.testing.assert_allclose(few.rotation, many.rotation, atol=5e-3 * scale)
+    np.testing.assert_allclose(few.sliding, many.sliding, atol=5e-3 * scale)
+    np.testing.assert_allclose(few.open, many.open, atol=0.01)
+    # What many samples say by themselves is near it, what few say is not.
+    sampled = {samples: gait(group).sliding[settled_samples(group)].mean(axis=0) for samples, group in groups.items()}
+    np.testing.assert_allclose(sampled[200], many.sliding, atol=1e-2 * scale)
+    assert np.abs(sampled[20] - many.sliding).max() > 5e-3 * scale
+
+
+def test_mean_spins_are_those_of_all_steps_between_two_samples(groups: dict[int, Group]) -> None:
+    """As ten times as many samples give them, which one sample of the twenty does not."""
+    few, many = groups[20].motion, groups[200].motion
+    assert few.mean_spin is not None
+    between = (many.spin[1:] + many.spin[:-1]).reshape(len(few.time) - 1, 10, *few.spin.shape[1:]).mean(axis=1) / 2.0
+    size = float(np.sqrt(np.mean(between**2)))
+    off, sampled = (float(np.sqrt(np.mean((one[1:] - between) ** 2))) / size for one in (few.mean_spin, few.spin))
+    assert off < 0.01
+    assert sampled > 0.1
+
+
+def test_with_few_samples_a_cycle_gaps_are_looked_at_there_alone(groups: dict[int, Group]) -> None:
+    """A cubic over a quarter of a cycle or more is no way of a bead that hops."""
+    motion = groups[20].motion.select(slice(None, None, 5), case=groups[20].case.put("run.samples_per_cycle", 4))
+    (thinned,) = motion.groups
+    samples = settled_samples(thinned)
+    np.testing.assert_array_equal(averages(thinned).open, (gaps(thinned)[samples] > 0.0).mean(axis=0))
+
+
+def test_a_run_in_parts_has_the_same_means(groups: dict[int, Group], trajectory: Callable[..., Group]) -> None:
+    """The first frame of a part, of which nothing is averaged yet, is the last one of the part before."""
+    parts = trajectory(_hopping(20, segment="0.05 s"))
+    assert len({segment for segment, _ in parts.motion.frames}) == 3
+    assert parts.motion.mean_spin is not None
+    assert np.abs(parts.motion.mean_spin[1:]).max(axis=(1, 2)).min() > 0.0
+    whole, found = averages(groups[20]), averages(parts)
+    scale = float(np.abs(whole.sliding).max())
+    np.testing.assert_allclose(found.rotation, whole.rotation, atol=1e-2 * scale)
+    np.testing.assert_allclose(found.sliding, whole.sliding, atol=1e-2 * scale)
+
+
+# --- runs that end when velocities are constant -----------------------------------------------------------------------
+
+
+def _shipped(angle: float = 0.0, boundary: dict[str, Any] | None = None, **changes: Any) -> Case:
+    """The shipped walker alone, started at an angle in degrees, with other values of the drive or other tables."""
+    run = {"run": changes.pop("run")} if "run" in changes else {}
+    facing = {"facing": changes.pop("facing")} if "facing" in changes else {}
+    dimers = {"radii": ["0.3 mm", "0.2 mm"], "replicates": 1, "angle": f"{angle} deg", "spacing": "80 mm", **facing}
+    tables: dict[str, Any] = {
+        "beads": {"material": "ruby"},
+        "dimers": dimers,
+        "liquid": {"name": "Si AK5"},
+        "boundary": {"material": "chromium-coated glass", **(boundary or {})},
+        "drive": {"frequency": "80 Hz", "peak_acceleration": "4 g", **changes},
+        **run,
+    }
+    return Case.read(tables, name="shipped")
+
+
+def _turning() -> Case:
+    """A walker that still turns to the axis after 12 cycles, and less and less after 24: little drags it."""
+    return _shipped(4.0, peak_acceleration="8 g").put("liquid.viscosity_ratio", 1.0)
+
+
+def test_a_steady_walker_ends_early_at_the_speed_of_a_long_run(directory: Path, runs_folder: Path) -> None:
+    case = load_case("fig1b")
+    full = case.but(run=case.run.but(until_steady=False, cycles_per_segment=case.run.cycles))
+    both = [walkers.load(directory), walkers.run(full, runs_folder)]
+    lengths = [[run.result[name] for name in ("cycles", "settling_cycles", "ended_early")] for run in both]
+    assert lengths == [[12, 4, True], [60, 20, False]]
+    assert both[0].result["velocity"] == pytest.approx(both[1].result["velocity"], rel=0.005)
+    # Until then the two are the same run.
+    np.testing.assert_array_equal(*(run.motion.position[:241] for run in both))
+
+
+def test_a_restless_walker_is_driven_for_longer_at_a_stretch(tmp_path: Path) -> None:
+    """Nothing of a shorter attempt is left: a restart would perturb it, and bridges that are open may be lost.
+
+    Nor does an interruption change what it does, or the progress that is shown.
+    """
+    case, shown = _turning(), [0.0]
+
+    def stop(progress: Progress) -> None:
+        shown.append(progress.share)
+        if progress.share * sum(case.run.attempts) > 13:
+            raise Stopped("enough")
+
+    with pytest.raises(Stopped):
+        make_runs([case], tmp_path, find_engine(), on_progress=stop)
+    assert shown == sorted(shown)  # the run begins again after 12 cycles, its progress does not
+    assert 13 < shown[-1] * sum(case.run.attempts) < 36
+    asked, at_once = (walkers.run(one, tmp_path) for one in (case, case.for_cycles(24)))
+    assert (asked.result["cycles"], asked.result["ended_early"]) == (24, True)
+    assert at_once.directory != asked.directory
+    assert len(segment_directories(asked.directory)) == 1
+    dumps = [(run.directory / FIRST_SEGMENT / "beads.bin").read_bytes() for run in (asked, at_once)]
+    assert dumps[0] == dumps[1]
+
+
+def test_a_walker_that_turns_ever_faster_is_not_steady_however_even_its_speed(tmp_path: Path) -> None:
+    """On a slope of 60° with its large bead above it turns over; after 12 cycles its speed is even to 0.2 % yet."""
+    run = {"cycles": 12, "settling_cycles": 4}
+    case = _shipped(0.4, {"tilt": "60 deg"}, facing="up", peak_acceleration="6 g", run=run)
+    directory = walkers.run(case, tmp_path).directory
+    found = walk(read_motion(directory).groups[0])
+    assert np.abs(found.first_half - found.second_half).max() < 0.002 * np.abs(found.velocity).max()
+    assert not are_constant(directory)
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({}, (True, 60, 20)),
+        ({"run": {"cycles": "auto", "most_cycles": 24}}, (True, 24, 8)),
+        ({"dimers": {"radii": ["0.25 mm", "0.22 mm"]}}, (False, 60, 20)),
+        ({"dimers": {"angle": "30 deg"}}, (False, 60, 20)),
+        ({"run": {"cycles": 30}}, (False, 30, 10)),
+        ({"run": {"duration": "0.5 s"}}, (False, 40, 13)),
+        ({"run": {"settling_cycles": 30}}, (False, 60, 30)),
+        ({"run": {"cycles": 30, "most_cycles": 60}}, r"run\.most_cycles.*either cycles or most_cycles, not both"),
+        ({"run": {"cycles": "auto", "settling_cycles": 5}}, r"run\.settling_cycles.*expected none: with run\.cycles"),
+        ({"run": {"most_cycles": 60, "segment": "0.1 s"}}, r"run\.segment.*expected none: with run\.most_cycles"),
+    ],
+)
+def test_what_settles_slowly_runs_in_full_and_numbers_are_obeyed(changes: dict[str, Any], expected: Any) -> None:
+    tables = {**document(**changes), "run": changes.get("run", {})}
+    if isinstance(expected, str):
+        with pytest.raises(InputError, match=f"(?s){expected}"):
+            Case.read(tables, name="test")
+    else:
+        run = Case.read(tables, name="test").run
+        assert (run.until_steady, run.cycles, run.settling_cycles) == expected
+
+
+def test_company_does_not_matter_whatever_forces_it_feels(tmp_path: Path) -> None:
+    """Walkers that feel other forces each, one of which goes on when the others are done."""
+    case, engine = _shipped(), find_engine()
+    changes = {
+        "one": ("title", ""),
+        "weak": ("drive.peak_acceleration", 0.5 * case.excitation.peak_acceleration),
+        "across": ("drive.axis", "y"),
+        "uphill": ("boundary.tilt", 0.3),
+        "light": ("environment.gravity", 5.0),
+        "rough": ("contact.friction.bead_wall", 0.2),
+        "thin": ("liquid.viscosity_ratio", 0.4),
+    }
+    cases = [case.put(*change).but(name=name) for name, change in changes.items()]
+    cases.insert(1, _turning().but(name="turning"))
+    assert len({sharing_key(one) for one in cases}) == 1
+    together = make_runs(cases, tmp_path / "together", engine)
+    decks = [read_manifest(run).get("shared_deck") for run in together.values()]
+    assert len({deck["first"] if deck else None for deck in decks}) == 2  # the second has the one that went on
+    cycles = {}
+    for one in cases:
+        ((name, run),) = make_runs([one], tmp_path / "alone", engine).items()
+        velocities = [read(place).table("walkers")["velocity"][0] for place in (together[name], run)]
+        ways = [(motion := read_motion(place)).position - motion.position[0] for place in (together[name], run)]
+        assert ways[0].shape == ways[1].shape
+        assert np.abs(ways[0] - ways[1]).max() < 2e-5 * np.abs(ways[1]).max(), one.name
+        assert velocities[0] == pytest.approx(velocities[1], rel=1e-6, abs=1e-12), one.name
+        cycles[one.name] = motion.case.run.cycles
+    assert (cycles["turning"], cycles["one"]) == (24, 12)
