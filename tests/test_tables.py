@@ -10,32 +10,19 @@ import pytest
 from walkers.errors import InputError
 from walkers.inputs.reading import load_case
 from walkers.postprocess.quantities import TABLES, axis, declared
-from walkers.postprocess.results import read
 from walkers.postprocess.tables import read_columns, read_table, write_table
 
 
-@pytest.fixture(scope="module")
-def walked(run_directory: Callable[..., Path]) -> Path:
-    """Six dimers."""
-    return run_directory(load_case("fig1b"))
-
-
-@pytest.fixture(scope="module")
-def tray(run_directory: Callable[..., Path]) -> Path:
-    """Dimers that may meet."""
-    return run_directory(
-        dimers={"replicates": 4, "spacing": "1.6 mm", "meet": True}, run={"cycles": 4, "settling_cycles": 1}
-    )
-
-
-def test_each_file_has_what_is_declared(walked: Path, tray: Path, pile_run: Path) -> None:
-    files = {path.stem: path for run in (walked, tray, pile_run) for path in run.glob("*.parquet")}
+def test_each_file_has_what_is_declared(run_directory: Callable[..., Path], pile_run: Path) -> None:
+    """Of six dimers, of dimers that may meet, and of a pile."""
+    meeting = {"replicates": 4, "spacing": "1.6 mm", "meet": True}
+    tray = run_directory(dimers=meeting, run={"cycles": 4, "settling_cycles": 1})
+    runs = (run_directory(load_case("fig1b")), tray, pile_run)
+    files = {path.stem: path for run in runs for path in run.glob("*.parquet")}
     assert files.keys() == TABLES.keys()
     for name, path in files.items():
         schema, known = pq.read_schema(path), TABLES[name]
-        places = [
-            next(place for place, quantity in enumerate(known) if quantity.names(column)) for column in schema.names
-        ]
+        places = [next(place for place, one in enumerate(known) if one.names(column)) for column in schema.names]
         assert places == sorted(places)
         assert set(places) == set(range(len(known)))
         for field in schema:
@@ -46,6 +33,12 @@ def test_each_file_has_what_is_declared(walked: Path, tray: Path, pile_run: Path
             assert "*" not in quantity.label
         attributes = read_table(path.parent, name).attrs
         assert attributes["units"].keys() == attributes["long_name"].keys() == set(schema.names)
+    # Columns of dimers are of two beads and a pair; of each walker there are rows of 20 samples and of 3 bridges a cycle.
+    table = read_table(runs[0], "trajectory")
+    assert [name for name in table if name.startswith("sliding")] == ["sliding_1", "sliding_2", "sliding_pair_1"]
+    cycles = table["cycle"].max()
+    assert len(table) == pytest.approx(6 * (20 * cycles + 1))
+    assert len(read_table(runs[0], "bridges")) == pytest.approx(6 * 3 * (cycles + 1))
 
 
 def test_labels_of_axes_have_the_displayed_unit() -> None:
@@ -56,18 +49,6 @@ def test_labels_of_axes_have_the_displayed_unit() -> None:
     for name in ("rotation", "rotation_", "rotation_x", "gap_1_2", "speed"):
         with pytest.raises(KeyError):
             declared(name, TABLES["trajectory"])
-
-
-def test_dimers_have_columns_of_two_beads_and_a_pair(walked: Path) -> None:
-    families = {"walkers": ("rotation", "sliding", "open"), "trajectory": ("rotation", "sliding", "gap")}
-    for table, names in families.items():
-        columns = {name for name in read_table(walked, table) if name[-1].isdigit()}
-        pairs = {f"{name}_pair_1" for name in names[1:]}
-        assert columns == {f"{name}_{bead}" for name in names for bead in (1, 2)} | pairs
-    result = read(walked)
-    cycles, count = result["cycles"], result["walkers"]
-    for table, rows in (("trajectory", 20 * cycles + 1), ("walkers", 1), ("bridges", 3 * (cycles + 1))):
-        assert len(read_table(walked, table)) == count * rows
 
 
 @pytest.mark.parametrize("rows", [0, 1, 9])
@@ -85,22 +66,12 @@ def test_a_table_is_read_as_it_was_written(tmp_path: Path, rows: int) -> None:
     for name, column in read_columns(tmp_path, "meetings").items():
         np.testing.assert_array_equal(column, columns[name])
     assert pq.ParquetFile(tmp_path / "meetings.parquet").metadata.row_group(0).column(0).compression == "ZSTD"
-
-
-def test_a_column_that_is_not_declared_is_refused(tmp_path: Path) -> None:
-    columns = dict.fromkeys(("time", "track", "bead", "large", "height"), np.arange(3.0))
-    write_table(tmp_path, "members", columns)
     for wrong in (columns | {"power": np.arange(3.0)}, {"time": np.arange(3.0)}):
         with pytest.raises(KeyError, match="missing or not declared"):
-            write_table(tmp_path, "members", wrong)
-
-
-def test_a_table_that_is_missing_or_cut_is_refused(tmp_path: Path) -> None:
-    columns = dict.fromkeys(("time", "track", "bead", "large", "height"), np.arange(300.0))
-    write_table(tmp_path, "members", columns)
-    with pytest.raises(InputError, match="has no table bed; it has members"):
+            write_table(tmp_path, "meetings", wrong)
+    with pytest.raises(InputError, match="has no table bed; it has meetings"):
         read_columns(tmp_path, "bed")
-    path = tmp_path / "members.parquet"
+    path = tmp_path / "meetings.parquet"
     path.write_bytes(path.read_bytes()[:-9])
-    with pytest.raises(InputError, match=r"members\.parquet: cannot be read .* measures the run again"):
-        read_table(tmp_path, "members")
+    with pytest.raises(InputError, match=r"meetings\.parquet: cannot be read .* measures the run again"):
+        read_table(tmp_path, "meetings")
