@@ -23,6 +23,7 @@ from walkers.inputs.loads import bridge_at_rest, contact_loads
 from walkers.inputs.reading import load_case
 from walkers.inputs.table import changed
 from walkers.inputs.units import Kind, quantity_text
+from walkers.postprocess import meetings
 from walkers.postprocess.films import speed_text
 from walkers.postprocess.gait import averages, fit_slopes, settled_samples, turned_over_at
 from walkers.postprocess.motion import Bridges, Motion
@@ -319,6 +320,17 @@ def test_a_band_holds_the_result(own: float | None, ends: tuple[float, float], t
 
 
 # --- piles ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_tray_that_has_hardly_been_driven_has_meetings_alone() -> None:
+    """One frame, in which a bridge joins two of three dimers."""
+    dimers = {"radii": ["0.3 mm", "0.2 mm"], "replicates": 3, "meet": True}
+    motion = resting(case_of(dimers=dimers), 2)
+    one, none = np.ones(1), np.array([], dtype=np.int64)
+    motion.__dict__["bridges"] = [Bridges(0, np.array([(0, 3)]), one, one, none, none, one[:0], one[:0])]
+    measured = meetings.measure(motion)
+    assert [measured.tables["meetings"][name].tolist() for name in ("walker", "other", "size")] == [[0], [1], [2]]
+    assert measured.numbers == {"merged": 1, "parted": 0, "largest_group": 2}
 
 
 def test_the_state_of_a_bed() -> None:

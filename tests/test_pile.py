@@ -2,14 +2,12 @@
 
 import json
 import os
-import re
 import shutil
 import signal
 import subprocess
 import threading
 import tomllib
 from collections.abc import Callable
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -22,23 +20,17 @@ import pandas as pd
 import pytest
 
 import walkers
-from tests.conftest import HALF, PROGRAM, call, engines_in, open_run, to_toml, wait_for
-from tests.printed import spoilt
+from tests.conftest import PROGRAM, call, engines_in, open_run, to_toml, wait_for
 from walkers.errors import InputError
 from walkers.inputs.case import Case
-from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.reading import shipped
 from walkers.inputs.sweep import expand
 from walkers.inputs.toml import read_toml
-from walkers.postprocess.figures import figures_of
-from walkers.postprocess.motion import FLOOR, read_bridges, read_motion
 from walkers.postprocess.results import measure, read
 from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place, segment_directories
 from walkers.runner.failures import EngineError, EngineKilled, RunBusy
-from walkers.runner.files import read_json
-from walkers.runner.manifest import MANIFEST_NAME
-from walkers.show import notes
 from walkers.sweeps.climbing import Condition, conditions_in, describe_climbs, leaders, summarise_climbs, survival
 from walkers.sweeps.climbing_figure import climbs_figure
 from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep
@@ -143,63 +135,6 @@ def killed(once: Once) -> Killed:
     return Killed(folder / "out", str(folder / "front"))
 
 
-def test_a_pile_settles_is_shaken_and_is_whole(run: Path) -> None:
-    case, motion = small(run=HALF), read_motion(run)
-    assert case.mixture is not None
-    manifest = json.loads((run / "manifest.json").read_text())
-    assert manifest["settled"] < case.run.settled_below
-    assert sorted(motion.radius) == pytest.approx(sorted(case.all_radii))
-    assert int(motion.large.sum()) == case.mixture.counts[1]
-    assert motion.time[0] < 0.0
-    assert motion.time[-1] == pytest.approx(case.run.cycles / case.excitation.frequency)
-    every = case.run.steps_per_sample * case.run.time_step
-    np.testing.assert_allclose(np.diff(motion.time), every)
-    # All beads are within the container, but for overlaps, and on its floor.
-    room = case.boundary.width / 2.0 - motion.radius[:, None] + 1e-5
-    assert (np.abs(motion.position[..., :2]) <= room).all()
-    assert (motion.position[..., 2] >= motion.radius - 1e-5).all()
-    agitation = (motion.velocity**2).sum(axis=2).mean(axis=1)
-    start = int(np.searchsorted(motion.time, 0.0))
-    assert agitation[start] < 6e-3**2  # it is to begin below 5 mm/s, weighed by mass
-    assert agitation[start + 3 :].min() > 1e-2**2
-
-
-def test_bridges_are_the_engines(run: Path) -> None:
-    motion = read_motion(run)
-    frames = list(read_bridges(motion))
-    assert len(frames) == len(motion.time)
-    bridges = frames[-1]
-    position, radius = motion.position[-1], motion.radius
-    apart = np.linalg.norm(position[bridges.beads[:, 0]] - position[bridges.beads[:, 1]], axis=1)
-    np.testing.assert_allclose(bridges.gap, apart - radius[bridges.beads].sum(axis=1), atol=1e-9)
-    on_floor = bridges.wall_beads[bridges.walls == FLOOR]
-    assert len(on_floor) == len(set(on_floor.tolist())) > 3
-    assert (position[on_floor, 2] - radius[on_floor] < 2e-4).all()
-
-
-def test_tables_of_a_pile(run: Path) -> None:
-    motion = read_motion(run)
-    bed, members = read_table(run, "bed"), read_table(run, "members")
-    frames = np.searchsorted(bed["time"], members["time"])
-    np.testing.assert_array_equal(members["height"], motion.position[frames, members["bead"], 2])
-    assert members.groupby("time")["track"].nunique().sum() == bed["clusters"].sum()
-    assert len(bed) == len(motion.time)
-    assert bed["bridges"].iloc[-1] > 2.0
-
-
-def test_contacts_and_bridges_are_counted_at_rest_and_while_shaken(run: Path) -> None:
-    """Bridges to walls and the floor count for none."""
-    motion, bed, found = read_motion(run), read_table(run, "bed"), read(run)
-    rest = bed[bed["time"] <= 0.0].iloc[-1]
-    assert found["contacts_at_rest"] == pytest.approx(rest["contacts"])
-    bridges = list(read_bridges(motion))[rest.name]
-    ends = [bead for pair in bridges.beads.tolist() for bead in pair]
-    assert found["bridges_at_rest"] == pytest.approx(rest["bridges"]) == pytest.approx(len(ends) / len(motion.radius))
-    late = bed[bed["time"] >= bed["time"][bed["time"] >= 0.0].mean()]
-    shaken = [found["contacts_shaken"], found["bridges_shaken"]]
-    assert shaken == pytest.approx([late["contacts"].mean(), late["bridges"].mean()])
-
-
 def test_an_interrupted_pile_goes_on_bit_for_bit(killed: Killed, tmp_path: Path) -> None:
     """Killed while it makes its second segment, and the engine alone while it makes the third.
 
@@ -234,23 +169,6 @@ def test_an_interrupted_pile_goes_on_bit_for_bit(killed: Killed, tmp_path: Path)
         assert read_table(place, name).equals(read_table(run, name))
     kept = [(path / "state.restart").exists() for path in segment_directories(place)]
     assert kept == [False, False, True, True]
-
-
-def test_both_frames_shake_alike(tmp_path: Path) -> None:
-    """Until chaotic trajectories part; in the laboratory the container's motion is taken off at any phase."""
-    run = {"duration": "0.03 s", "frames_per_second": 680.0, **QUICK}
-    cases = [small(drive={"frame": frame}, run=run) for frame in ("container", "lab")]
-    amplitude = cases[1].excitation.amplitude
-    motions = [walkers.run(case, tmp_path).motion for case in cases]
-    here, there = ([array[motion.first_driven :] for array in (motion.position, motion.velocity)] for motion in motions)
-    assert cases[1].run.samples_per_cycle == 4
-    apart = np.sqrt(((here[0] - there[0]) ** 2).sum(axis=2).mean(axis=1))
-    assert apart[:12].max() < 0.05 * amplitude
-    agitation = [float((velocity**2).sum(axis=2).mean()) for _, velocity in (here, there)]
-    assert agitation[0] == pytest.approx(agitation[1], rel=0.1)
-    # The lowest beads lie on the floor throughout the cycle.
-    lowest = (motions[1].position[..., 2] - motions[1].radius).min(axis=1)
-    assert np.abs(lowest).max() < 0.2 * amplitude
 
 
 def test_damaged_piles_are_told_in_a_line(run: Path, tmp_path: Path) -> None:
@@ -308,99 +226,6 @@ def test_an_error_of_the_engine_leaves_the_parts_before(tmp_path: Path) -> None:
     assert kept
     finished = walkers.run(case, tmp_path)
     assert kept.items() <= written(finished.directory).items()
-
-
-BAD: list[tuple[dict[str, dict[str, Any]], str]] = [
-    ({"mixture": {"count": None}}, "mixture.count"),
-    ({"mixture": {"fill_height": "3 mm"}}, "expected either count or fill_height"),
-    ({"mixture": {"large": ["0.29 mm", "0.4 mm"]}}, "mixture.large"),
-    ({"mixture": {"small": ["0.32 mm", "0.3 mm"]}}, "mixture.small"),
-    ({"boundary": {"width": "1.5 mm"}}, "boundary.width"),
-    ({"boundary": {"height": "2 mm"}}, "boundary.height"),
-    ({"run": {"duration": "9000 s"}}, "run.duration"),
-    ({"dimers": {"radii": ["0.5 mm", "0.3 mm"], "replicates": 1}, "liquid": {"conserved": True}}, "liquid.conserved"),
-]
-
-
-@pytest.mark.parametrize(("changes", "key"), BAD)
-def test_a_bad_pile_is_told_by_its_key(changes: dict[str, dict[str, Any]], key: str) -> None:
-    tables = document(**changes)
-    tables["mixture"] = {name: value for name, value in tables["mixture"].items() if value is not None}
-    with pytest.raises(InputError, match=re.escape(key)):
-        Case.read(tables, source="bad.toml", name="bad")
-
-
-def test_counts_of_beads_by_fill_height_mass_and_number() -> None:
-    tables = document()
-    del tables["mixture"]["count"]
-    tables["mixture"]["fill_height"] = "2 mm"
-    by_height = Case.read(tables, name="filled").mixture
-    by_mass, by_number = load_case("pile-fig1a").mixture, small(mixture={"mixed_by": "number"}).mixture
-    assert None not in (by_height, by_mass, by_number)
-    assert 60 <= sum(by_height.counts) <= 90  # a packing fraction of 0.55, with beads of 0.24 mm³ in the mean
-    volumes = [
-        sum(4.0 / 3.0 * np.pi * r**3 for r in sizes) / len(sizes)
-        for sizes in (by_mass.small_radii, by_mass.large_radii)
-    ]
-    assert by_mass.counts[0] * volumes[0] == pytest.approx(by_mass.counts[1] * volumes[1], rel=0.01)
-    assert by_number.counts == (30, 30)
-
-
-@pytest.mark.parametrize(("mixed_by", "counts"), [("mass", (80, 10)), ("volume", (80, 10)), ("number", (45, 45))])
-def test_a_share_is_of_what_a_mixture_is_mixed_by(mixed_by: str, counts: tuple[int, int]) -> None:
-    """Beads of twice the radius have eight times the volume, and the mass; the share is a half, of 90 beads."""
-    case = small(mixture={"small": ["0.25 mm"] * 2, "large": ["0.5 mm"] * 2, "mixed_by": mixed_by, "count": 90})
-    assert case.mixture is not None
-    assert case.mixture.counts == counts
-
-
-def test_the_engine_counts_the_steps_of_a_rest_too() -> None:
-    """2^31 steps of at most 2 us are 4,295 s: a drive of 4,000 s fits after a rest of 100 s, not after one of 300 s."""
-    run = {"duration": "4000 s", "time_step": "2 us", "longest_settling": "100 s"}
-    fits = small(run=run).run
-    assert 3900.0 < fits.steps * fits.time_step < 4001.0
-    with pytest.raises(InputError, match=r"run\.duration.*expected at most \d+ s: the engine counts steps"):
-        small(run={**run, "longest_settling": "300 s"})
-
-
-def test_the_program_on_piles(run: Path, in_folder: Path) -> None:
-    import imageio_ffmpeg
-    import pyvista as pv
-
-    def told(*command: str) -> str:
-        return call(*command, check=True).stdout.strip()
-
-    motion = read_motion(run)
-    assert "bridges per bead, at rest" in told("run", str(run))
-    assert told("plot", str(run), "--to", "here") == "here/climb.png"
-    assert spoilt(figures_of(run)["climb"]) == []
-    assert told("render", str(run), "--to", "here/box.png", "--images", "2") == "here/box.png"
-    picture = pv.read(in_folder / "here" / "box.png")
-    across, up, _ = picture.dimensions
-    edges = picture.point_data.active_scalars.reshape(up, across, -1)[..., :3]
-    assert all((edge == 255).all() for edge in (edges[0], edges[-1], edges[:, 0], edges[:, -1]))  # nothing is cut
-    told(
-        "render", "--film", str(run), "--to", "one.gif", "--fps", "10", "--size", "64x64", "--end", "8 ms"
-    )  # within a frame
-    film = told(
-        "render", "--film", str(run), "--to", "here/box.mp4", "--fps", "10", "--size", "160x120", "--slowdown", "5"
-    )
-    frames, seconds = imageio_ffmpeg.count_frames_and_secs(film)
-    assert frames == int(50.0 * motion.time[-1]) + 1
-    assert seconds == pytest.approx(5.0 * motion.time[-1], abs=0.1)
-    whole, begun = (told("climb", str(run), *cut) for cut in ([], ["--within", "1 ms"]))
-    assert float(re.findall(r"\(0 to (\S+) with", begun)[0]) > float(re.findall(r"\(0 to (\S+) with", whole)[0])
-    reader = pv.get_reader(told("export", str(run), "--to", "vtk", "--every", "4", "-o", "here/vtk"))
-    driven = np.flatnonzero(motion.time >= 0.0)[::4]
-    np.testing.assert_allclose(reader.time_values, motion.time[driven], atol=1e-12)
-    beads, bridges, box = (pv.read(f"here/vtk/{name}_{driven[1]:06d}.vtu") for name in ("beads", "bridges", "boundary"))
-    np.testing.assert_allclose(beads.points, motion.position[driven[1]], rtol=1e-6, atol=1e-9)
-    assert set(np.unique(beads["is_climber"])) <= {0, 1}
-    assert bridges.n_cells > 50
-    np.testing.assert_allclose(box.bounds, [-2e-3, 2e-3, -2e-3, 2e-3, 0.0, 20e-3], atol=1e-9)
-    (in_folder / "pile-ci.toml").write_text(to_toml(document(run=HALF)))
-    assert re.search(r"\n  beads +60\n", told("run", "pile-ci.toml", "--out", str(run.parent)))
-    assert "in which the beads come to rest" in told("export", "pile-ci", "--to", "deck")
 
 
 def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
@@ -549,114 +374,12 @@ def test_leaders_by_chance() -> None:
     assert one["share_of_large"] == 0.1
 
 
-def test_a_climber_that_leaves_the_container_ends_the_run(tmp_path: Path) -> None:
-    """It climbs at 4.8 mm/s; its upper bead is 3.2 mm below where the walls end; segments are of 0.05 s."""
-    tables = tomllib.loads(shipped("case")["cluster"].read_text())
-    tables["contact"]["friction"] = {"bead_bead": 0.3, "bead_wall": 0.3}
-    places = ((0.545, 2.0), (0.3075, 1.18135))
-    tables["placed"] = [{"radius": f"{r} mm", "at": [f"{2.5001 - r} mm", "0 mm", f"{z} mm"]} for r, z in places]
-    tables["boundary"]["height"] = "2.6 mm"
-    tables["run"] |= {"duration": "1 s", "segment": "0.05 s"}
-    finished = walkers.run(Case.read(tables, name="cluster"), tmp_path)
-    assert finished.result["driven"] == pytest.approx(3.2e-3 / 4.79e-3, abs=0.1)
-    assert "over its walls" in read_json(finished.directory / MANIFEST_NAME)["ended"]
-    assert "climbers left the container" in finished.describe()
-    assert call("check", "files", str(finished.directory)).returncode == 0
-
-
-def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(tmp_path: Path) -> None:
-    """The same dimer as that of `tests.test_bodies`, by the other way: a box, the pile's recording, clusters, climbs.
-
-    On the wall across from it is one led by its small bead.
-    """
-    tables = tomllib.loads(shipped("case")["cluster"].read_text())
-    large, small = 0.545, 0.3075
-    tables["contact"]["friction"] = {"bead_bead": 0.3, "bead_wall": 0.3}
-    tables["placed"] = [
-        {"radius": f"{radius} mm", "at": [f"{side * (2.5001 - radius)} mm", "0 mm", f"{height} mm"]}
-        for side, beads in ((1, (large, small)), (-1, (small, large)))
-        for radius, height in zip(beads, (8.0, 7.18135), strict=True)
-    ]
-    tables["run"]["duration"] = "0.5 s"
-    finished = walkers.run(Case.read(tables, name="cluster"), tmp_path)
-    assert finished.result["climbs"] == 1
-    clusters = finished.table("clusters")
-    (climb,) = clusters[clusters["climbed"]].to_dict("records")
-    assert climb["speed"] * 1e3 == pytest.approx(4.79, rel=0.03)
-    assert (climb["size"], climb["large"], climb["leader_large"], climb["wall_names"]) == (2, 1, True, "+x")
-    assert climb["begin"] == pytest.approx(0.0, abs=0.05)
-    assert finished.motion.position[-1, 2:, 2].max() < 7e-3
-
-
-def test_placed_beads_reach_the_side_of_a_cylinder() -> None:
-    tables = tomllib.loads(shipped("case")["cluster"].read_text())
-    tables["boundary"]["shape"] = "cylinder"
-    for number, bead in enumerate(tables["placed"]):
-        bead["at"] = ["0 mm", "0 mm", f"{8 - 2 * number} mm"]
-    case = Case.read(tables, name="cylinder")
-    assert [radius > case.border for radius in case.all_radii] == [True, False, False]
-    for turn, beyond in product((0.0, 0.3), (-1e-3, 0.02)):
-        reach = 2.5 - 0.545 + beyond
-        place = [f"{reach * np.cos(turn)} mm", f"{reach * np.sin(turn)} mm", "8 mm"]
-        tables["placed"] = [{"radius": "0.545 mm", "at": place}]
-        with pytest.raises(InputError, match="within the boundary") if beyond > 0.0 else nullcontext():
-            Case.read(tables, name="cylinder")
-
-
 def test_ranks_take_cores_of_this_machine_and_of_a_cluster() -> None:
     site = Slurm(cores=8, nodes=2).config()
     assert Options(6, site).for_ranks(2).decks_at_once == 8
     assert Options(6).for_ranks(2).decks_at_once == 3
     with pytest.raises(InputError, match="16 MPI processes"):
         Options(6, site).for_ranks(16)
-
-
-@pytest.mark.parametrize(("cores", "share"), [(1, "share 1 core of"), (2, "")])
-def test_more_processes_than_cores_are_noted_before_a_run(cores: int, share: str) -> None:
-    ours = os.sched_getaffinity(0)
-    if len(ours) < cores:
-        pytest.skip(f"this machine has less than {cores} cores")
-    os.sched_setaffinity(0, sorted(ours)[:cores])
-    try:
-        told = notes(load_case("pile-ci", {"run.ranks": 2}))
-    finally:
-        os.sched_setaffinity(0, ours)
-    assert [f"2 MPI processes (run.ranks) {share}" in note for note in told] == [True] * bool(share)
-
-
-@pytest.mark.parametrize(("shape", "walls"), [("cylinder", 1), ("octagon", 8)])
-def test_a_container_holds_its_beads(shape: str, walls: int, tmp_path: Path) -> None:
-    run = {"duration": "0.03 s", "frames_per_second": 680.0, **QUICK}
-    case = small(boundary={"shape": shape, "width": "5 mm"}, run=run)
-    motion = walkers.run(case, tmp_path).motion
-    driven = motion.position[motion.time >= 0.0]
-    room = case.boundary.side_clearance(driven.reshape(-1, 3)).reshape(driven.shape[:2]) - motion.radius
-    assert -1e-5 < room.min() < 0.05 * 2.5e-3
-    assert driven[..., :2].std() > 0.2 * 2.5e-3
-    number = 0
-    for bridges in read_bridges(motion):
-        held = bridges.wall_beads[bridges.walls != FLOOR]
-        assert set(bridges.walls.tolist()) <= {FLOOR, *range(1, 1 + walls)}
-        assert shape == "octagon" or len(held) == len(set(held.tolist()))
-        number += len(held)
-    assert number >= 2
-
-
-@pytest.mark.parametrize(
-    ("changes", "told"),
-    [
-        ({}, []),
-        ({"mixture.small_share": 1}, ["no large beads"]),
-        ({"mixture.small_share": 0}, ["no small beads"]),
-        ({"run.duration": "10 s"}, [r"climbers faster than 7\.[67] mm/s"]),
-        ({"run.time_step": "4 us"}, [r"the time step is 2\.1 times the largest of auto \(0\.4 of the viscous"]),
-    ],
-)
-def test_what_is_said_of_a_pile_before_it_is_shaken(changes: dict[str, Any], told: list[str]) -> None:
-    """(2 · 40 mm - 41 µL/(0.55 (5.3 mm)²))/10 s is 7.7 mm/s."""
-    found = notes(load_case("pile-small", changes))
-    assert len(found) == len(told)
-    assert all(re.match(one, other) for one, other in zip(told, found, strict=True))
 
 
 def test_the_parts_of_climbs_are_judged_at_the_time_of_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:

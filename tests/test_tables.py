@@ -33,7 +33,7 @@ def test_each_file_has_what_is_declared(run_directory: Callable[..., Path], pile
             assert "*" not in quantity.label
         attributes = read_table(path.parent, name).attrs
         assert attributes["units"].keys() == attributes["long_name"].keys() == set(schema.names)
-    # Columns of dimers are of two beads and a pair; of each walker there are rows of 20 samples and of 3 bridges a cycle.
+    # Columns of dimers are of two beads and a pair; of a walker there are rows of 20 samples and 3 bridges a cycle.
     table = read_table(runs[0], "trajectory")
     assert [name for name in table if name.startswith("sliding")] == ["sliding_1", "sliding_2", "sliding_pair_1"]
     cycles = table["cycle"].max()

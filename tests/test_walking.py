@@ -18,9 +18,10 @@ from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.toml import read_toml
+from walkers.postprocess.dump import DumpError
 from walkers.postprocess.figures import figures_of
 from walkers.postprocess.gait import are_constant, averages, gait, gaps, settled_samples, steady_walkers, walk
-from walkers.postprocess.motion import Group, read_motion
+from walkers.postprocess.motion import Group, read_bridges, read_motion
 from walkers.postprocess.numbers import declared, rows
 from walkers.postprocess.results import read
 from walkers.postprocess.sides import sides
@@ -189,6 +190,8 @@ def test_walkers_that_come_close_are_reported(moved: Group) -> None:
     met = measure(replace(moved.motion, position=places))
     assert met.numbers["walkers_met"]
     assert any("not independent" in warning for warning in met.warnings)
+    with pytest.raises(DumpError, match="none of its frames recorded bridges"):
+        list(read_bridges(moved.motion.select(slice(1, 19))))
 
 
 def test_the_drive_pays_for_what_slides(run_directory: RunDirectory) -> None:
