@@ -54,7 +54,7 @@ test: setup cluster chromium .venv/with-dev ## Lint, check types, run the tests 
 	.venv/bin/lint-imports
 	.venv/bin/pytest -q -m smoke tests/test_program.py
 	@# Compiles both integrators once; each worker would by itself.
-	@$(WALKERS) show fig1b --theory > /dev/null & .venv/bin/pytest -q tests/test_crosscheck.py -k momentum > /dev/null & wait
+	@$(WALKERS) show fig1b --theory > /dev/null & .venv/bin/pytest -q tests/test_check.py -k momentum > /dev/null & wait
 	.venv/bin/pytest -q -n 3 --dist worksteal -m "not smoke and not slow"
 
 .PHONY: test-slow

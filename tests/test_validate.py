@@ -12,8 +12,8 @@ import pytest
 from tests.conftest import call
 from walkers.check import literature
 from walkers.check.benchmarks import TESTS, farthest_point, published
-from walkers.check.bridges import LAWS, bridges
-from walkers.check.lines import Verdict, count, failures
+from walkers.check.bridges import LAWS, pulls
+from walkers.check.lines import Verdict, count
 from walkers.physics.capillary import derjaguin_radius
 from walkers.runner.failures import EngineFailure
 
@@ -49,9 +49,9 @@ def test_laws_have_derjaguins_limit(law: str, radius_2: float) -> None:
     assert pull == pytest.approx(2.0 * pi * radius * cos(0.3), rel=0.05)
 
 
-def test_published_laws_beside_young_laplace(tmp_path: Path) -> None:
+def test_published_laws_beside_young_laplace() -> None:
     """The fit of Willett et al. is within its published error; the law of Soulié et al. is too strong at walls."""
-    lines = {line.what: line for line in bridges(tmp_path, quick=True)}
+    lines = {line.what: line for line in pulls()}
     assert [count(lines.values(), verdict) for verdict in (Verdict.PASS, Verdict.NOT_JUDGED)] == [4, 44]
     assert lines["Soulié 2006, fig1b, wall: work over Young–Laplace"].measured == pytest.approx(1.37, abs=0.01)
     assert lines["Soulié 2006, fig1b, beads: work over Young–Laplace"].measured == pytest.approx(0.96, abs=0.01)
@@ -63,20 +63,14 @@ def test_published_laws_beside_young_laplace(tmp_path: Path) -> None:
 def test_benchmarks_pass_and_a_check_that_cannot_be_computed_leaves_the_others(
     in_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(out: Path, quick: bool) -> None:
+    def fail(out: Path) -> None:
         raise EngineFailure("no engine here")
 
     monkeypatch.setitem(literature.LITERATURE, "crosscheck", fail)
-    done = call("check", "literature", "benchmarks", "crosscheck", "--quick", "--json")
+    done = call("check", "literature", "benchmarks", "crosscheck", "--json")
     contents = json.loads(done.stdout)
     assert (done.returncode, contents["passed"]) == (1, False)
     *passed, failed = contents["lines"]
     assert {line["verdict"] for line in passed} == {"pass"}
     assert len(passed) > 55
     assert (failed["check"], failed["verdict"], "no engine here" in failed["what"]) == ("crosscheck", "ERROR", True)
-
-
-def test_a_quick_crosscheck_passes(tmp_path: Path) -> None:
-    lines = literature.literature(tmp_path, ["crosscheck"], quick=True)
-    assert count(lines, Verdict.PASS) > 5
-    assert failures(lines) == []

@@ -1,4 +1,4 @@
-"""``walkers check engine``: run the checks on an engine, two decks at a time, and report the results."""
+"""``walkers check engine``: run the checks on an engine, two decks at a time, and keep the outcome."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ import tempfile
 import time
 from collections.abc import Callable, Collection
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import Any
 
-from walkers.check.lines import Line, Verdict, as_dict, as_text, count, failures, outcome
-from walkers.check.scenes import CHECKS, LONG, Bench
-from walkers.errors import expected_of, refused
+from walkers.check.lines import Line, Verdict, chosen, computed, count, failures
+from walkers.check.scenes import CHECKS, Bench
 from walkers.runner.binary import AuditRecord, Engine, find_engine, model_sha256, write_audit
 
 
@@ -26,62 +25,25 @@ class Audit:
     version: str
     lines: tuple[Line, ...]
 
-    @property
-    def failures(self) -> list[Line]:
-        """The lines that fail, or could not be measured."""
-        return failures(self.lines)
-
-    def as_text(self) -> str:
-        """A table for each check, and the outcome."""
-        text = f"{self.version}, binary and contact model {self.engine.sha256[:12]}: {outcome(self.lines)}"
-        return f"{as_text(self.lines)}\n\n{text}"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain JSON types."""
-        engine = {"path": str(self.engine.path), "sha256": self.engine.sha256, "version": self.version}
-        return as_dict(self.lines, engine=engine)
-
-
-def selected(only: Collection[str] = (), *, quick: bool = False) -> tuple[str, ...]:
-    """Names of the checks to run: the given ones, else all, or all quick ones; `InputError` for unknown names."""
-    for name in only:
-        if name not in CHECKS:
-            raise refused("only", f"no check {name!r}; {expected_of(name, CHECKS)}")
-    return tuple(name for name in CHECKS if (name in only if only else not (quick and name in LONG)))
-
 
 def run_audit(
-    names: Collection[str] = tuple(CHECKS),
-    *,
-    engine: Engine | None = None,
-    on_done: Callable[[str], None] | None = None,
+    only: Collection[str] = (), *, engine: Engine | None = None, on_done: Callable[[str], None] | None = None
 ) -> Audit:
-    """Run some of the `CHECKS` on an engine, the installed one if None is given; ``on_done`` is told each name."""
-    binary = engine or find_engine()
-    model = model_sha256(binary) or ""
+    """Run all `CHECKS` or some on an engine, the installed one if None is given; ``on_done`` is told each name."""
+    names, binary = chosen(only, CHECKS), engine or find_engine()
     with tempfile.TemporaryDirectory(prefix="walkers-audit-") as folder:
         bench = Bench(binary, Path(folder))
-
-        def measure(name: str) -> list[Line]:
-            try:
-                lines = list(CHECKS[name](bench))
-            except Exception as failure:  # another build of the engine may fail in any way
-                reason = str(failure).split(" (see ", 1)[0] or type(failure).__name__
-                lines = [Line.without_number(reason, Verdict.ERROR)]
-            if on_done:
-                on_done(name)
-            return [replace(line, check=name) for line in lines]
-
         pool = ThreadPoolExecutor(2)
         try:
-            lines = tuple(chain.from_iterable(pool.map(measure, names)))
+            parts = pool.map(lambda name: computed(name, partial(CHECKS[name], bench), on_done), names)
+            lines = tuple(chain.from_iterable(parts))
         finally:
             bench.stop.set()
             pool.shutdown(cancel_futures=True)
-        return Audit(binary, model, bench.version, lines)
+    return Audit(binary, model_sha256(binary) or "", bench.version, lines)
 
 
-def record(audit: Audit, *, quick: bool) -> AuditRecord | None:
+def record(audit: Audit) -> AuditRecord | None:
     """Keep an audit for the user: runs with this binary name it, and are refused if it failed.
 
     An audit with lines that could not be measured is not kept, because the reason is the machine, not the binary.
@@ -92,9 +54,8 @@ def record(audit: Audit, *, quick: bool) -> AuditRecord | None:
         engine=audit.engine.sha256,
         contact_model=audit.contact_model,
         version=audit.version,
-        scope="quick" if quick else "full",
         lines=len(audit.lines),
-        failures=tuple(line.what for line in audit.failures),
+        failures=tuple(line.what for line in failures(audit.lines)),
         skipped=count(audit.lines, Verdict.SKIPPED),
         date=time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
     )

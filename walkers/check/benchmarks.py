@@ -91,7 +91,7 @@ class Benchmark:
             start[:, 2] += 6.0 * radius
             start = np.concatenate([start, start * [1, 1, 1, -1, 1, -1, 1, -1, 1] - [0, 0, 2 * radius, *[0] * 6]])
         steps = ceil(_LONGEST * self.impact.duration(float(self.closing.min())) / self.step)
-        case = bench_case(liquid=DRY).put("beads.density", self.sphere.density).put("run.time_step", self.step)
+        case = bench_case(DRY).put("beads.density", self.sphere.density).put("run.time_step", self.step)
         contact = case.contact.but(
             friction=Friction(bead_bead=self.friction, bead_wall=self.friction),
             restitution=self.restitution,

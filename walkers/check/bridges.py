@@ -48,39 +48,33 @@ LAWS = {
 }
 
 
-def shapes(name: str) -> dict[str, Surfaces]:
-    """Bridges of the dimer of a shipped case: between its beads, and of the large one at a wall."""
-    case = load_case(name)
-    large, small = dimer_of(case).radii
-    closest = case.contact.minimum_separation_ratio
-    return {
-        place: Surfaces.of(large, radius, case.liquid.of_bridges, closest)
-        for place, radius in (("beads", small), ("wall", inf))
-    }
-
-
-def bridges(out: Path, *, quick: bool = False) -> Iterator[Line]:
-    """Pull at contact, work and rupture distance of each law over those of Young–Laplace.
-
-    Unless ``quick``, also velocities of walkers by other laws than Young–Laplace; ``out`` is the folder of their runs.
-    """
-    for case in COMPARED:
-        for place, surfaces in shapes(case).items():
+def pulls() -> Iterator[Line]:
+    """Pull at contact, work and rupture distance of each law over those of Young–Laplace."""
+    for name in COMPARED:
+        case = load_case(name)
+        large, small = dimer_of(case).radii
+        for place, radius in (("beads", small), ("wall", inf)):
+            surfaces = Surfaces.of(large, radius, case.liquid.of_bridges, case.contact.minimum_separation_ratio)
             shape = (surfaces.radius, surfaces.other_radius, surfaces.volume, surfaces.liquid.contact_angle)
             exact = young_laplace.law(surfaces)
-            true = exact.forces(_even(exact.rupture)).pull / surfaces.liquid.surface_tension
-            for name, law in LAWS.items():
+            distances = _even(exact.rupture)
+            true = exact.forces(distances).pull / surfaces.liquid.surface_tension
+            for author, law in LAWS.items():
                 gaps = _even(law.rupture(*shape))
                 pull = law.pull(*shape, gaps)
-                work = float(np.trapezoid(pull, gaps) / np.trapezoid(true, _even(exact.rupture)))
-                what = f"{name}, {case}, {place}"
+                work = float(np.trapezoid(pull, gaps) / np.trapezoid(true, distances))
+                what = f"{author}, {name}, {place}"
                 yield Line(f"{what}: pull at contact over Young–Laplace", 1.0, float(pull[0] / true[0]), law.error)
                 yield Line(f"{what}: work over Young–Laplace", 1.0, work)
                 yield Line(f"{what}: rupture distance over Young–Laplace", 1.0, float(gaps[-1] / exact.rupture))
-    for case in () if quick else WALKED:
-        speeds = [1e3 * run(load_case(case, {"liquid.law": law}), out).result["velocity"] for law in WALKED_BY]
-        for walked_by, speed in zip(WALKED_BY[1:], speeds[1:], strict=True):
-            yield Line(f"velocity of {case}: {WALKED_BY[0]}, {walked_by}", speeds[0], speed, unit="mm/s")
+
+
+def velocities(out: Path) -> Iterator[Line]:
+    """Velocities of walkers by other laws than Young–Laplace; ``out`` is the folder of their runs."""
+    for name in WALKED:
+        exact, *others = (1e3 * run(load_case(name, {"liquid.law": law}), out).result["velocity"] for law in WALKED_BY)
+        for law, speed in zip(WALKED_BY[1:], others, strict=True):
+            yield Line(f"velocity of {name}: {WALKED_BY[0]}, {law}", exact, speed, unit="mm/s")
 
 
 def _even(rupture: float) -> FloatArray:

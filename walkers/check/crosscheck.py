@@ -5,16 +5,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from math import degrees, inf, sqrt
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from walkers.api import Run, run
+from walkers.api import run
 from walkers.check.engine import SecondEngine, close_pairs
 from walkers.check.kernels import FloatArray
 from walkers.check.lines import Line, Verdict
@@ -35,42 +35,25 @@ STARTS = 5
 """Number of starts of a pile in the documentation."""
 
 
-@dataclass(frozen=True)
-class Start:
-    """Both motions from one start: LIGGGHTS's, and the second engine's at the same samples."""
-
-    first: Motion
-    second: Motion
-
-    @cached_property
-    def apart(self) -> FloatArray:
-        """Largest distance between the positions of a bead in both motions, m, for each frame."""
-        return np.asarray(np.linalg.norm(self.first.position - self.second.position, axis=-1).max(axis=1))
-
-    @property
-    def together(self) -> float:
-        """Cycles of the drive during which both motions agree."""
-        over = np.flatnonzero(self.apart > ONE * float(self.first.radius.min()))
-        return self.first.case.excitation.frequency * float(self.first.time[over[0] if len(over) else -1])
-
-    def lines(self) -> Iterator[Line]:
-        """When and how far the motions diverge; piles, which are chaotic, fail if they diverge in the first cycle."""
-        case = self.first.case
-        pile = case.mixture is not None
-        name = f"start {case.run.seed}: " if pile else ""
-        cycles = case.excitation.frequency * float(self.first.time[-1])
-        early = Verdict.FAIL if pile and self.together < min(1.0, cycles) else None
-        yield Line(f"{name}cycles of the same motion", cycles, self.together, given=early)
-        yield Line(f"{name}largest distance of a bead", 0.0, 1e6 * float(self.apart.max()), unit="µm")
+def courses(first: Motion, second: Motion) -> Iterator[Line]:
+    """When and how far two motions diverge; piles, which are chaotic, fail if they diverge in the first cycle."""
+    case = first.case
+    apart = np.linalg.norm(first.position - second.position, axis=-1).max(axis=1)
+    over = np.flatnonzero(apart > ONE * float(first.radius.min()))
+    times = first.time[[over[0] if len(over) else -1, -1]]
+    together, cycles = (case.excitation.frequency * times).tolist()
+    pile = case.mixture is not None
+    name = f"start {case.run.seed}: " if pile else ""
+    early = Verdict.FAIL if pile and together < min(1.0, cycles) else None
+    yield Line(f"{name}cycles of the same motion", cycles, together, given=early)
+    yield Line(f"{name}largest distance of a bead", 0.0, 1e6 * float(apart.max()), unit="µm")
 
 
-def crosscheck(
-    case: Case, out: Path, without: Sequence[str] = (), *, seeds: int = 1, make: Callable[[Case, Path], Run] = run
-) -> list[Line]:
+def crosscheck(case: Case, out: Path, without: Collection[str] = (), *, seeds: int = 1, **how: Any) -> list[Line]:
     """Compare the run of a case with the second engine; for a pile, runs with a number of ``seeds``.
 
     ``out`` is the folder of the run directories, ``without`` are terms that the second engine leaves out
-    (`walkers.check.engine.TERMS`), ``make`` makes a missing run. `EngineFailure` if the engine fails.
+    (`walkers.check.engine.TERMS`), ``how`` are options of `walkers.run`. `EngineFailure` if the engine fails.
 
     Examples
     --------
@@ -78,15 +61,15 @@ def crosscheck(
     []
     """
     cases = [case.changed({"run.seed": case.run.seed + number} if number else {}) for number in range(seeds)]
-    return compare([make(start, out).motion for start in cases], without)
+    return compare([run(start, out, **how).motion for start in cases], without)
 
 
 def compare(motions: Sequence[Motion], without: Collection[str] = ()) -> list[Line]:
     """Compare finished runs of a case, one per start, with the second engine without some terms."""
-    starts = [Start(motion, simulate(motion, without)) for motion in motions]
-    pile = motions[0].case.mixture is not None
-    sides, names = ([start.first for start in starts], [start.second for start in starts]), [*measured(motions[0])]
-    numbers = [np.mean([[*measured(motion).values()] for motion in side], axis=0).tolist() for side in sides]
+    seconds = [simulate(motion, without) for motion in motions]
+    pile, names = motions[0].case.mixture is not None, [*measured(motions[0])]
+    sides = ([[*measured(motion).values()] for motion in side] for side in (motions, seconds))
+    numbers = [np.mean(side, axis=0).tolist() for side in sides]
     speeds = [abs(speed) for (_, unit), speed in zip(names, numbers[0], strict=True) if unit == "mm/s"]
     lines = []
     for (what, unit), first, second in zip(names, *numbers, strict=True):
@@ -97,7 +80,8 @@ def compare(motions: Sequence[Motion], without: Collection[str] = ()) -> list[Li
             lines.append(Line(what, first, second, inf if pile else allowed, unit, scale=None if pile else 1.0))
     check = f"{motions[0].case.name}: LIGGGHTS (expected) and the second engine (measured)"
     check += f" without {', '.join(without)}" if without else ""
-    return [replace(line, check=check) for line in [*lines, *(line for start in starts for line in start.lines())]]
+    lines += [line for both in zip(motions, seconds, strict=True) for line in courses(*both)]
+    return [replace(line, check=check) for line in lines]
 
 
 def measured(motion: Motion) -> dict[tuple[str, str], float]:
@@ -175,9 +159,9 @@ def _advanced(engine: SecondEngine, motion: Motion) -> Iterator[tuple[FloatArray
         yield frames, dense[..., 6:].reshape(end - begin, -1, dense.shape[1], 3).mean(axis=1)
 
 
-def crosschecks(out: Path, *, quick: bool = False) -> Iterator[Line]:
-    """Run cases of all kinds in both engines, or only a short run of one walker; errors as of `crosscheck`."""
-    for name, case in ({"fig1b": shortened(load_case("fig1b"), 6)} if quick else full_cases()).items():
+def crosschecks(out: Path) -> Iterator[Line]:
+    """Run cases of all kinds in both engines; errors as of `crosscheck`."""
+    for name, case in full_cases().items():
         for line in crosscheck(case, out, seeds=STARTS if case.mixture else 1):
             yield replace(line, what=f"{name}: {line.what}")
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import groupby
 from math import inf, isfinite, nan
 from typing import Any
+
+from walkers.errors import expected_of, refused
 
 
 class Verdict(StrEnum):
@@ -67,6 +70,26 @@ class Line:
         return {"check": self.check, "what": self.what, "unit": self.unit, **finite, "verdict": str(self.verdict)}
 
 
+def chosen(only: Collection[str], checks: Mapping[str, object]) -> list[str]:
+    """Names of checks: the given ones, or all; `InputError` for unknown names."""
+    for name in only:
+        if name not in checks:
+            raise refused("check", f"no check {name!r}; {expected_of(name, checks)}")
+    return [name for name in checks if name in only or not only]
+
+
+def computed(name: str, check: Callable[[], Iterable[Line]], on_done: Callable[[str], None] | None) -> list[Line]:
+    """Lines of a check, of which ``on_done`` is told; a check that cannot be computed is a line."""
+    try:
+        lines = list(check())
+    except Exception as failure:  # another build of the engine may fail in any way
+        reason = str(failure).split(" (see ", 1)[0] or type(failure).__name__
+        lines = [Line.without_number(f"could not be computed: {reason}", Verdict.ERROR)]
+    if on_done:
+        on_done(name)
+    return [replace(line, check=name) for line in lines]
+
+
 def failures(lines: Iterable[Line]) -> list[Line]:
     """Lines that fail or could not be measured."""
     return [line for line in lines if line.failed]
@@ -74,23 +97,17 @@ def failures(lines: Iterable[Line]) -> list[Line]:
 
 def count(lines: Iterable[Line], verdict: Verdict) -> int:
     """Number of lines with a verdict."""
-    return sum(line.verdict is verdict for line in lines)
+    return Counter(line.verdict for line in lines)[verdict]
 
 
-def outcome(lines: Sequence[Line]) -> str:
-    """Number of lines that pass, as text."""
+def as_text(lines: Sequence[Line], of: str = "") -> str:
+    """A table below the name of each check, and how many lines pass, after the words ``of``."""
+    tables = ["\n".join([check, *_rows(list(rows)), ""]) for check, rows in groupby(lines, lambda line: line.check)]
     passed, failed = count(lines, Verdict.PASS), count(lines, Verdict.FAIL)
-    sentence = f"{failed} of {passed + failed} lines fail" if failed else f"all {passed} lines pass"
+    outcome = f"{failed} of {passed + failed} lines fail" if failed else f"all {passed} lines pass"
     for verdict, words in ((Verdict.ERROR, "could not be measured"), (Verdict.SKIPPED, "skipped")):
-        sentence += f", {number} {words}" if (number := count(lines, verdict)) else ""
-    return sentence
-
-
-def as_text(lines: Iterable[Line]) -> str:
-    """A table below the name of each check."""
-    return "\n\n".join(
-        "\n".join([check, *_rows(list(rows))]) for check, rows in groupby(lines, lambda line: line.check)
-    )
+        outcome += f", {number} {words}" if (number := count(lines, verdict)) else ""
+    return "\n".join([*tables, of + outcome])
 
 
 def _rows(lines: Sequence[Line]) -> Iterable[str]:
@@ -98,12 +115,9 @@ def _rows(lines: Sequence[Line]) -> Iterable[str]:
     yield f"{'':7} {'':{width}} {'expected':>11} {'measured':>11}"
     for line in lines:
         judged = f"error {line.error:.1e} of {line.tolerance:.0e}" if isfinite(line.error + line.tolerance) else ""
-        numbers = f"{_number(line.expected):>11} {_number(line.measured):>11} {line.unit:4} {judged}"
-        yield f"{line.verdict:7} {line.what:{width}} {numbers}".rstrip()
-
-
-def _number(value: float) -> str:
-    return f"{value:.6g}" if isfinite(value) else "-"
+        pair = (line.expected, line.measured)
+        numbers = " ".join(f"{value:>11.6g}" if isfinite(value) else f"{'-':>11}" for value in pair)
+        yield f"{line.verdict:7} {line.what:{width}} {numbers} {line.unit:4} {judged}".rstrip()
 
 
 def as_dict(lines: Sequence[Line], **more: Any) -> dict[str, Any]:

@@ -8,13 +8,13 @@ resistances; two scenes test each law of the program.
 
 from __future__ import annotations
 
-import itertools
 import shutil
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import cos, degrees, inf, pi, sin, sqrt
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any
 
 import numpy as np
@@ -42,8 +42,8 @@ from walkers.text import rendered
 
 EQUAL = 1e-6
 """Tolerance between the engines, relative to the largest force, torque or displacement (interpolation errors)."""
-DRY = {"law": f"{__name__}:dry"}
-"""Liquid of a case without bridges."""
+DRY = {"liquid.law": f"{__name__}:dry"}
+"""Changes of a case without bridges."""
 FLOOR = BOTTOM
 R, S = 3e-4, 2e-4
 DEEP = 1.7123e-6
@@ -76,7 +76,7 @@ def law(surfaces: Surfaces) -> Curve:
     return Curve(forces, rupture=0.25 * size, formation=0.03 * size)
 
 
-_BARE: dict[str, dict[str, Any]] = {
+_BARE = {
     "beads": {"density": "4.0 g/cm^3"},
     "dimers": {"radii": ["0.3 mm", "0.2 mm"]},
     "liquid": {"surface_tension": "19.2 mN/m", "dynamic_viscosity": "0 Pa*s"},
@@ -86,26 +86,21 @@ _BARE: dict[str, dict[str, Any]] = {
     "run": {"time_step": "1 us", "samples_per_cycle": 1},
     "environment": {"gravity": "0 m/s^2"},
 }
-_FULL: dict[str, dict[str, Any]] = {
-    "contact": {
-        "friction": {"bead_bead": 0.23, "bead_wall": 0.31}, "rolling_friction": 0.04, "restitution": 0.4,
-    },
-    "liquid": {"dynamic_viscosity": "4.6 mPa*s", "law": f"{__name__}:law"},
-}  # fmt: skip
+_FULL = {
+    **{"contact.friction.bead_bead": 0.23, "contact.friction.bead_wall": 0.31},
+    **{"contact.rolling_friction": 0.04, "contact.restitution": 0.4},
+    **{"liquid.dynamic_viscosity": "4.6 mPa*s", "liquid.law": f"{__name__}:law"},
+}
 
 
-def bench_case(**changes: Mapping[str, Any]) -> Case:
-    """A case without friction, damping, viscosity, gravity and drive, with changes."""
-    return Case.read(_merged(_BARE, changes), source="<audit>", name="audit")
+def bench_case(changes: Mapping[str, Any]) -> Case:
+    """A case without friction, damping, viscosity, gravity and drive, with changes by dotted keys."""
+    return Case.read(_BARE, source="<audit>", name="audit", changes=changes)
 
 
-def full_case(**changes: Mapping[str, Any]) -> Case:
-    """A case with friction, rolling friction, damping and the law of this module, with changes."""
-    return bench_case(**_merged(_FULL, changes))
-
-
-def _merged(base: Mapping[str, Mapping[str, Any]], changes: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    return {table: {**base.get(table, {}), **changes.get(table, {})} for table in {**base, **changes}}
+def full_case(changes: Mapping[str, Any]) -> Case:
+    """A case with friction, rolling friction, damping and the law of this module, with changes by dotted keys."""
+    return bench_case({**_FULL, **changes})
 
 
 def over(wall: Flat, gap: float, radius: float, velocity: Vector = STILL, spin: Vector = SPIN, x: float = 0.0) -> Bead:
@@ -177,27 +172,23 @@ class Bench:
     folder: Path
     stop: threading.Event = field(default_factory=threading.Event)
     version: str = "unknown"
-    _numbers: itertools.count[int] = field(default_factory=itertools.count)
 
     def run(self, plan: Plan | Deck, carry: Path | None = None) -> Measured:
         """Run a plan that records forces, or its deck, with a file such as a restart file beside it."""
+        if self.stop.is_set():
+            raise Stopped("the audit was stopped")
         deck = compose(plan) if isinstance(plan, Plan) else plan
         deck = replace(deck, fastest=inf)  # prescribed beads may be faster than shaken ones
-        directory = self.folder / f"deck-{next(self._numbers):03d}"
-        directory.mkdir(parents=True)
+        directory = Path(mkdtemp(dir=self.folder))
         write_deck(deck, directory)
         if carry is not None:
             shutil.copy(carry, directory)
-        self.version = launch(deck, directory, self.engine, on_step=self._look).version
+        self.version = launch(deck, directory, self.engine).version
         dump = BinaryDump(directory / deck.layout.bead_dump, deck.layout.bead_columns)
         beads = dump.stack()
         vectors = [beads[:, :, dump.column(name) :][:, :, :3] for name in ("x", "vx", "omegax", "fx", "tqx")]
         time = dump.steps.astype(np.float64) * deck.layout.time_step
         return Measured(time, np.concatenate(vectors[:3], -1), np.concatenate(vectors[3:], -1), directory)
-
-    def _look(self, _: int) -> None:
-        if self.stop.is_set():
-            raise Stopped("the audit was stopped")
 
 
 def farthest(measured: FloatArray, expected: FloatArray) -> float:
@@ -212,12 +203,12 @@ class Setting:
 
     beads: Sequence[Bead]
     walls: Sequence[Wall] = (FLOOR,)
-    changes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    changes: Mapping[str, Any] = field(default_factory=dict)
     freely: int = 0
 
     def lines(self, name: str, bench: Bench) -> Iterator[Line]:
         """Run the scene in both engines and compare the results."""
-        case, scene = full_case(**self.changes), standing(self.beads, self.walls)
+        case, scene = full_case(self.changes), standing(self.beads, self.walls)
         engine = second_engine(case, scene)
         if self.freely:
             every = self.freely // 100
@@ -261,8 +252,8 @@ _THROWN = [
     over(FLOOR, -1e-7, R, (0.03, 0.0, 0.0), _ROLL, x=3e-3),
     *pair(1e-5, -0.1, (0.01, -0.02, 0.0)),
 ]
-_WEIGHT = {"gravity": "9.81 m/s^2"}
-_FAST = {"frequency": "300 Hz", "peak_acceleration": "8 g"}
+_WEIGHT = {"environment.gravity": "9.81 m/s^2"}
+_FAST = {"drive.frequency": "300 Hz", "drive.peak_acceleration": "8 g", "drive.frame": "lab"}
 
 SCENES: dict[str, Setting] = {
     "a bead leaves the floor": Setting([_LEAVING, over(FLOOR, 2e-5, S, WAY, x=2e-3)]),
@@ -287,26 +278,26 @@ SCENES: dict[str, Setting] = {
     "two beads roll on each other": Setting(pair(-DEEP, 0.0, STILL)),
     "three beads on the floor": Setting(CLIMBING),
     "the floor oscillates horizontally": Setting(
-        [over(FLOOR, -DEEP, R), over(FLOOR, -5e-7, S, spin=STILL, x=2e-3)], changes={"drive": {**_FAST, "frame": "lab"}}
+        [over(FLOOR, -DEEP, R), over(FLOOR, -5e-7, S, spin=STILL, x=2e-3)], changes=_FAST
     ),
     "the floor oscillates vertically": Setting(
         [over(FLOOR, -DEEP, R), over(FLOOR, 3e-6, S, spin=_ROLL, x=2e-3)],
-        changes={"drive": {**_FAST, "frame": "lab", "peak_acceleration": "25 g", "axis": "z"}},
+        changes={**_FAST, "drive.peak_acceleration": "25 g", "drive.axis": "z"},
     ),
     "weight and drive": Setting(
         [over(FLOOR, -DEEP, R), Bead(0, (2e-3, 0.0, 5e-3), S)],
-        changes={"drive": {**_FAST, "axis": "z"}, "environment": _WEIGHT},
+        changes={**_FAST, "drive.frame": "container", "drive.axis": "z", **_WEIGHT},
     ),
-    "thrown beads": Setting(_THROWN, (FLOOR,), {"environment": _WEIGHT, "drive": {"peak_acceleration": "4 g"}}, 6000),
+    "thrown beads": Setting(_THROWN, changes={**_WEIGHT, "drive.peak_acceleration": "4 g"}, freely=6000),
     "a bead in free flight": Setting(
         [Bead(0, (0.0, 0.0, 5e-3), R, (0.1, 0.2, 0.0), (1.0, 2.0, 3.0))],
-        changes={"environment": _WEIGHT, "drive": {"peak_acceleration": "4 g", "axis": "x"}},
+        changes={**_WEIGHT, "drive.peak_acceleration": "4 g"},
         freely=10_000,
     ),
 }
 """Scenes by name: with prescribed motion, and of beads that move freely."""
 for _name in LAWS:
-    _liquid = {"liquid": {"law": _name, "contact_angle": "10 deg"}}
+    _liquid = {"liquid.law": _name, "liquid.contact_angle": "10 deg"}
     SCENES[f"a bead leaves the floor ({_name})"] = Setting([_LEAVING], changes=_liquid)
     SCENES[f"two beads separate ({_name})"] = Setting(_PARTING, changes=_liquid)
 
@@ -322,8 +313,8 @@ def restart_lines(bench: Bench) -> Iterator[Line]:
     beads = [over(FLOOR, -DEEP, R, (0.002, 0.001, 0.0), STILL), *pair(-DEEP, 0.001, (0.001, -0.002, 0.001))]
     gone = replace(over(FLOOR, -DEEP, S, WAY), centre=(3e-3, 0.0, S - DEEP))
     scene = standing([*beads, gone, *(_moved(bead, 0.0, 3e-3) for bead in pair(-DEEP, 0.04, STILL))])
-    whole = bench.run(prescribed(full_case(), scene, 1000))
-    first = prescribed(full_case(), scene, 500, restart_to="half.restart")
+    whole = bench.run(prescribed(full_case({}), scene, 1000))
+    first = prescribed(full_case({}), scene, 500, restart_to="half.restart")
     carry = bench.run(first).directory / "half.restart"
     second = replace(first, segment=Segment(500, 1000, 0), restart_to=None, restart_from="half.restart")
     forces = bench.run(second, carry).forces[1:, :, :3]
@@ -348,15 +339,15 @@ def rank_lines(bench: Bench) -> Iterator[Line]:
     first, last = pair(-DEEP, 0.01, STILL)
     rows = (0.0, (first, last)), (2e-3, (last, first))
     scene = standing([*CLIMBING, *(_moved(bead, 2.6e-3, y, 0.9) for y, beads in rows for bead in beads)])
-    single, double = (bench.run(prescribed(full_case(), scene, 1000, ranks=ranks)).forces for ranks in (1, 2))
+    single, double = (bench.run(prescribed(full_case({}), scene, 1000, ranks=ranks)).forces for ranks in (1, 2))
     yield Line("forces: two MPI ranks and one", 0.0, farthest(double[..., :3], single[..., :3]), 1e-9)
     yield Line("torques: two MPI ranks and one", 0.0, farthest(double[..., 3:], single[..., 3:]), 1e-9)
 
 
 def stock_lines(bench: Bench) -> Iterator[Line]:
     """Two beads separate: Debian's own ``cohesion easo/capillary/viscous`` against the contact model's Soulié law."""
-    liquid = {"dynamic_viscosity": "4.6 mPa*s", "contact_angle": "20 deg", "law": "soulie"}
-    bare = bench_case(liquid=liquid, contact={"restitution": 0.5})
+    liquid = {"liquid.dynamic_viscosity": "4.6 mPa*s", "liquid.contact_angle": "20 deg", "liquid.law": "soulie"}
+    bare = bench_case({**liquid, "contact.restitution": 0.5})
     scene = standing(pair(-DEEP, 0.05, STILL, (STILL, STILL)))
     deck = compose(prescribed(bare, scene))
     meeting = Surfaces.of(S, R, bare.liquid.of_bridges, bare.contact.minimum_separation_ratio)
@@ -374,8 +365,8 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
 def liquid_lines(bench: Bench, ranks: int = 1) -> Iterator[Line]:
     """Beads that fly through each other along a floor and share their liquid, in both engines."""
     draw = np.random.default_rng(3)
-    case = bench_case(liquid={"volume_fraction": 0.02, "law": "willett"})  # whose tables take no time
-    case = case.put("liquid.conserved", True)
+    liquid = {"liquid.volume_fraction": 0.02, "liquid.law": "willett"}  # whose tables take no time
+    case = bench_case(liquid).put("liquid.conserved", True)
     radii = draw.choice([2e-4, 2.5e-4, 3e-4], 16)
     start = np.column_stack([draw.uniform(-8e-4, 8e-4, (16, 2)), radii + draw.uniform(-3e-5, 8e-5, 16)])
     velocity = np.column_stack([draw.uniform(-0.3, 0.3, (16, 2)), draw.uniform(-0.03, 0.03, 16)])
@@ -397,16 +388,10 @@ def liquid_lines(bench: Bench, ranks: int = 1) -> Iterator[Line]:
     yield Line("largest film", 1.0, float(np.max(films)))
 
 
-def _walker(cycles: int) -> Case:
-    """A single walker of Fig. 1b for a number of cycles."""
-    case = load_case("fig1b", {"dimers.replicates": 1})
-    return case.but(run=case.run.but(cycles=cycles, cycles_per_segment=cycles, until_steady=False))
-
-
 def company_lines(bench: Bench) -> Iterator[Line]:
     """A walker in a shared deck against the same walker in a deck of its own; and a repeated run."""
-    alone = _walker(10)
-    alone = alone.put("contact.rolling_friction", 0.0)  # which amplifies rounding
+    alone = load_case("fig1b", {"dimers.replicates": 1, "contact.rolling_friction": 0.0})  # which amplifies rounding
+    alone = alone.but(run=alone.run.but(cycles=10, cycles_per_segment=10, until_steady=False))
     other = alone.put("drive.peak_acceleration", 2.0 * alone.drive.peak_acceleration)
     sloping = alone.put("boundary.tilt", 0.3)
 
@@ -421,20 +406,6 @@ def company_lines(bench: Bench) -> Iterator[Line]:
     yield Line("a repeated run is bit-identical (0: yes)", 0.0, float(not same), 0.0)
 
 
-def step_lines(bench: Bench) -> Iterator[Line]:
-    """The displacement of a walker in four cycles, with the time step of ``auto``, its half and its quarter."""
-    case, ways = _walker(4), []
-    for finer in (1, 2, 4):
-        cycle = case.run.steps_per_cycle * finer
-        run = case.run.but(time_step=case.run.time_step / finer, steps_per_cycle=cycle)
-        plan, steps = plan_of(case.but(run=run)), 4 * cycle
-        frames = bench.run(replace(plan, **recording(steps, steps))).frames
-        ways.append(frames[-1, :, :3] - frames[0, :, :3])
-    coarse, fine = farthest(ways[0], ways[2]), farthest(ways[1], ways[2])
-    yield Line("displacement of a walker: half and quarter time step", 0.0, fine, 2e-3)
-    yield Line("displacement of a walker: full and quarter time step", 0.0, coarse, 5e-3)
-
-
 CHECKS: Mapping[str, Callable[[Bench], Iterable[Line]]] = {
     "scenes": scene_lines,
     "restart": restart_lines,
@@ -442,8 +413,5 @@ CHECKS: Mapping[str, Callable[[Bench], Iterable[Line]]] = {
     "stock": stock_lines,
     "liquid": liquid_lines,
     "company": company_lines,
-    "step": step_lines,
 }
 """Checks by name; each runs decks on a bench and returns lines; its docstring is its title."""
-LONG = ("step",)
-"""Checks that ``--quick`` skips."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 from cyclopts.validators import Number
@@ -28,72 +29,65 @@ from walkers.commands.options import (
 )
 from walkers.errors import refused
 
+if TYPE_CHECKING:
+    from walkers.check.lines import Line
+
 check = App(name="check", help=SECTIONS["check"], help_flags=(), version_flags=())
 paper = App(name="paper", help=SECTIONS["paper"], help_flags=(), version_flags=())
 
 
 @check.command
-def engine(
-    *,
-    only: list[str] | None = None,
-    quick: bool = False,
-    as_json: Json = False,
-    engine: str | None = None,
-) -> int:
+def engine(*, only: list[str] | None = None, as_json: Json = False, engine: str | None = None) -> int:
     """Compare the forces of the engine and its contact model with a second engine and exact formulas.
 
     Parameters
     ----------
     only
         Run only the check with this name. Repeatable.
-    quick
-        Skip the slowest checks.
     engine
         Name or path of the liggghts binary.
     """
-    from walkers.check.audit import record, run_audit, selected
+    from walkers.check.audit import record, run_audit
     from walkers.runner.binary import find_engine
     from walkers.runner.failures import EngineMissing
 
-    checks = selected(only or (), quick=quick)
     try:
         binary = find_engine(engine)
     except EngineMissing as missing:
         if engine is None:
             raise
         raise refused("--engine", str(missing)) from missing
-    audit = run_audit(checks, engine=binary, on_done=tell)
-    print_as(as_json, audit.as_dict, audit.as_text)
+    audit = run_audit(only or (), engine=binary, on_done=tell)
     if not only:
         try:
-            record(audit, quick=quick)
+            record(audit)
         except OSError as error:
             warnings.warn(f"the outcome cannot be kept: {error}", stacklevel=1)
-    return 1 if audit.failures else 0
+    about = {"path": str(binary.path), "sha256": binary.sha256, "version": audit.version}
+    name = f"{audit.version}, binary and contact model {binary.sha256[:12]}: "
+    return _print_checked(audit.lines, as_json, name, engine=about)
+
+
+def _print_checked(lines: Sequence[Line], as_json: bool, of: str = "", **more: Any) -> int:
+    """Print lines; returns the exit status."""
+    from walkers.check.lines import as_dict, as_text, failures
+
+    print_as(as_json, lambda: as_dict(lines, **more), lambda: as_text(lines, of))
+    return 1 if failures(lines) else 0
 
 
 @check.command
-def literature(
-    *only: Annotated[str, Parameter(name="CHECK")],
-    quick: bool = False,
-    out: Out = DEFAULT_OUT,
-    as_json: Json = False,
-) -> int:
+def literature(*only: Annotated[str, Parameter(name="CHECK")], out: Out = DEFAULT_OUT, as_json: Json = False) -> int:
     """Compare engine and bridge laws with published benchmarks, exact solutions and a second engine.
 
     Parameters
     ----------
     only
         benchmarks, bridges or crosscheck; default: all.
-    quick
-        Run only the fast part of each check.
     """
-    from walkers.check.lines import as_dict, as_text, failures, outcome
     from walkers.check.literature import literature
 
-    lines = literature(out, only, quick=quick, on_done=tell)
-    print_as(as_json, lambda: as_dict(lines), lambda: f"{as_text(lines)}\n\n{outcome(lines)}")
-    return 1 if failures(lines) else 0
+    return _print_checked(literature(out, only, on_done=tell), as_json)
 
 
 @check.command
@@ -133,7 +127,6 @@ def case(
     from walkers.api import case_at
     from walkers.check.crosscheck import crosscheck, shortened
     from walkers.check.engine import TERMS
-    from walkers.check.lines import as_dict, as_text, failures
 
     loaded = case_at(case, at.out, at.values)[0]
     refuse("--seeds", seeds > 1 and loaded.mixture is None, "is for piles: walkers and placed beads have one start")
@@ -143,17 +136,8 @@ def case(
         loaded = loaded if cycles is None else shortened(loaded, cycles)
     except ValueError as error:
         raise refused("--cycles", str(error)) from error
-    lines = crosscheck(
-        loaded,
-        at.out,
-        without or (),
-        seeds=seeds,
-        make=lambda one, folder: walkers.run(one, folder, progress=True, **vars(by)),
-    )
-    print_as(as_json, lambda: as_dict(lines, case=loaded.name, without=without or []), lambda: as_text(lines))
-    if not as_json:
-        tell(*(f"{loaded.name}: differs: {line.what}" for line in failures(lines)))
-    return 1 if failures(lines) else 0
+    lines = crosscheck(loaded, at.out, without or (), seeds=seeds, progress=True, **vars(by))
+    return _print_checked(lines, as_json, case=loaded.name, without=without or [])
 
 
 def library(name: Annotated[str | None, Parameter(name="NAME")] = None, /) -> None:

@@ -219,14 +219,13 @@ def compile_model() -> None:
 class AuditRecord:
     """Outcome of an audit of a binary, identified by its hash (``engine``) and its banner (``version``).
 
-    ``contact_model`` is the SHA-256 of the library that it loaded, ``scope`` is ``full`` or ``quick``, ``lines`` the
-    number of checked lines, ``failures`` those that failed, ``skipped`` the number of those that lack a program.
+    ``contact_model`` is the SHA-256 of the library that it loaded, ``lines`` the number of checked lines, ``failures``
+    those that failed, ``skipped`` the number of those that lack a program.
     """
 
     engine: str
     contact_model: str
     version: str
-    scope: str
     lines: int
     failures: tuple[str, ...]
     skipped: int
@@ -239,25 +238,19 @@ class AuditRecord:
 
     def summary(self) -> Mapping[str, Any]:
         """Summary for the manifest of a run."""
-        return {name: getattr(self, name) for name in ("scope", "passed", "lines", "skipped", "date")}
-
-
-def _record_of(engine: str, scope: str) -> Path:
-    return cache_folder() / "audits" / f"{engine}.{scope}.json"
+        return {name: getattr(self, name) for name in ("passed", "lines", "skipped", "date")}
 
 
 def read_audit(engine: str, model: str | None) -> AuditRecord | None:
-    """The record of a binary, by its hash: a failed one if it exists, else the full one, else the quick one.
+    """The record of a binary, by its hash.
 
     None if it has no readable record with this contact model (its hash; None: unknown, any).
     """
-    known = []
-    for scope in ("full", "quick"):
-        with suppress(OSError, ValueError, KeyError, TypeError):
-            values = read_json(_record_of(engine, scope))
-            record = AuditRecord(**{**values, "failures": tuple(values["failures"])})
-            known += [record] if model in (None, record.contact_model) else []
-    return min(known, key=lambda record: record.passed, default=None)
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        values = read_json(cache_folder() / "audits" / f"{engine}.json")
+        record = AuditRecord(**{**values, "failures": tuple(values["failures"])})
+        return record if model in (None, record.contact_model) else None
+    return None
 
 
 def is_new(engine: str, model: str | None) -> bool:
@@ -270,8 +263,5 @@ def is_new(engine: str, model: str | None) -> bool:
 
 
 def write_audit(record: AuditRecord) -> None:
-    """Save a record; a full one replaces a quick one. Raises `OSError` if the cache cannot be written."""
-    place = make_cache_folder("audits") / _record_of(record.engine, record.scope).name
-    write_json(place, asdict(record))
-    if record.scope == "full":
-        _record_of(record.engine, "quick").unlink(missing_ok=True)
+    """Save a record in place of the one before. Raises `OSError` if the cache cannot be written."""
+    write_json(make_cache_folder("audits") / f"{record.engine}.json", asdict(record))
