@@ -2,8 +2,6 @@
 
 import json
 import shutil
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -115,10 +113,24 @@ def test_list_reads_neither_dumps_nor_tables(out: Path) -> None:
     for path in [path for pattern in ("*.bin", "*.parquet", "*.txt") for path in out.rglob(pattern)]:
         path.unlink()
     assert told() == before
-    script = f"import sys; sys.argv[1:] = ['list', '--out', {str(out)!r}]\nimport walkers.main as m\ntry: m.main()\n"
-    script += "finally: print([n for n in ('numpy', 'pandas', 'pyarrow', 'matplotlib') if n in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
-    assert done.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"format": 99}, "its format is 99, expected 4); run the sweep again: finished runs are kept"),
+        ({"runs": ["base-0123456789ab"]}, "1 runs, expected the names of 6"),
+        ({"runs": None}, "cannot be read"),
+        ({"base": None}, "cannot be read"),
+        ({"file": {"case": "base", "axes": {"drive.frequncy": [1]}}}, 'did you mean "frequency"'),
+    ],
+)
+def test_a_sweep_of_another_format_is_refused(out: Path, change: dict[str, Any], message: str) -> None:
+    record = read_json(out / "grid" / "sweep.json")
+    assert record.keys() == {"format", "file", "case", "base", "runs"}
+    write_json(out / "grid" / "sweep.json", {**record, **change})
+    done = call("list", "grid")
+    assert (done.returncode, message in done.stderr) == (2, True), done.stderr
 
 
 @pytest.mark.parametrize(
@@ -241,7 +253,7 @@ def test_clean_keeps_the_runs_of_sweeps_that_were_renamed_or_cannot_be_read(out:
     runs = {Path(run).name for run in walkers.load(out / "old").table()["run"]}
     assert runs <= finished_places(out).keys() < before.keys()
     record = read_json(out / "old" / "sweep.json")
-    write_json(out / "old" / "sweep.json", {key: value for key, value in record.items() if key != "points"})
+    write_json(out / "old" / "sweep.json", {key: value for key, value in record.items() if key != "runs"})
     done = call("clean", "--finished", "--yes")
     assert (done.returncode, "sweep.json cannot be read" in done.stderr) == (2, True)
 

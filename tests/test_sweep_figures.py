@@ -44,7 +44,7 @@ def _legend(figure: Figure) -> list[str]:
 def _table(units: dict[str, str], rows: list[list[Any]], axes: list[tuple[str, ...]]) -> pd.DataFrame:
     """That of a sweep as far as what varies goes."""
     table = pd.DataFrame(rows, columns=list(units)).assign(point=range(len(rows)), status="finished")
-    table.attrs |= {"units": units, "meanings": dict.fromkeys(units, "varied"), "axes": axes, "title": ""}
+    table.attrs |= {"units": units, "varied": list(units), "axes": axes, "title": ""}
     return table
 
 

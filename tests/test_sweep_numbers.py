@@ -17,15 +17,15 @@ from scipy.stats import spearmanr
 
 from tests.conftest import call, document, make_case, to_toml
 from walkers.inputs.loads import dimer_of
-from walkers.inputs.sweep import Descent, expand
+from walkers.inputs.sweep import expand
 from walkers.postprocess.uncertainty import ACCURACY_NAME
 from walkers.runner.directory import case_of
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.sweeps.comparison import Side, compare_runs
 from walkers.sweeps.scheduler import Options, makespan, pack, run_sweep
-from walkers.sweeps.spread import run_spread
-from walkers.sweeps.table import SweepRecord, groups, load, thresholds, write_record
+from walkers.sweeps.spread import spread_in
+from walkers.sweeps.table import groups, load, thresholds
 
 # --- spread -----------------------------------------------------------------------------------------------------------
 
@@ -42,9 +42,7 @@ def _with_rank(order: np.ndarray[Any, Any], seed: int, low: float, high: float) 
             return [*map(float, values)]
 
 
-def test_a_spread_has_the_quantiles_and_the_signed_ranks_of_its_draws(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_spread_has_the_quantiles_and_the_signed_ranks_of_its_draws() -> None:
     """32 speeds 0.1 × 1.2ⁿ - 0.5 mm/s that fall with friction; two walkers came apart, a point failed."""
     number = np.arange(32)
     speeds = 1e-4 * 1.2**number - 5e-4
@@ -54,10 +52,7 @@ def test_a_spread_has_the_quantiles_and_the_signed_ranks_of_its_draws(
     others = pd.DataFrame({"velocity": [1.0, -1.0, 2.0], "separated_fraction": [0.5, 0.2, 0.0]})
     others = others.assign(status=["finished", "finished", "failed"], **dict.fromkeys(UNCERTAIN, 0.2))
     table = pd.concat([whole, others]).sample(frac=1.0, random_state=1).reset_index(drop=True)
-    record = SweepRecord(tmp_path, "spread", "", {}, [], [], [], None, [], {})
-    monkeypatch.setattr("walkers.sweeps.spread.run_sweep", lambda *_, **__: (record, []))
-    monkeypatch.setattr("walkers.sweeps.spread.load", lambda _: table)
-    spread = run_spread(make_case(uncertain=UNCERTAIN), tmp_path, Options(1))
+    spread = spread_in(table, make_case(uncertain=UNCERTAIN), Path())
     band = spread.bands["velocity"]
     # Of 32 sorted numbers, from 0 to 31, 5 and 95 % are at 1.55 and 29.45, the median between the two in the middle.
     assert band.low == pytest.approx(speeds[1] + 0.55 * (speeds[2] - speeds[1]))
@@ -72,7 +67,6 @@ def test_a_spread_has_the_quantiles_and_the_signed_ranks_of_its_draws(
         (FRICTION, pytest.approx(-1.0)),
         (RESTITUTION, pytest.approx(spearmanr(strong, speeds).statistic)),
     ]
-    assert read_json(tmp_path / "spread.json")["bands"]["velocity"]["low"] == band.low
 
 
 # --- groups -----------------------------------------------------------------------------------------------------------
@@ -93,9 +87,7 @@ def test_points_that_differ_in_their_seed_alone_are_a_group() -> None:
 # --- descents ---------------------------------------------------------------------------------------------------------
 
 
-def test_a_descents_thresholds_have_the_gamma0_of_their_own_drives(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_descents_thresholds_have_the_gamma0_of_their_own_drives() -> None:
     """Two descents from 1.2 g in steps of 0.2 g; walkers of the first go toward their small beads."""
     speeds = [[-3e-4, -1e-4, 1e-6], [2e-4, -1e-6, 2e-5]]
     dimer = dimer_of(make_case())
@@ -109,11 +101,8 @@ def test_a_descents_thresholds_have_the_gamma0_of_their_own_drives(
     table["drive.peak_acceleration"] = 1.2 - 0.2 * (table["point"] % 5)
     table["gamma0"] = [dimer.gamma0(9.80665 * g) for g in table["drive.peak_acceleration"]]
     units = {"drive.frequency": "Hz", "drive.peak_acceleration": "g"}
-    table.attrs |= {"units": units, "meanings": dict.fromkeys(units, "varied")}
-    descent = Descent("drive.peak_acceleration", 5, 1e-5)
-    write_record(SweepRecord(tmp_path, "down", "", units, [], [], [], descent, [], {}))
-    monkeypatch.setattr("walkers.sweeps.table.load", lambda _: table)
-    first, second = thresholds(tmp_path).to_dict("records")
+    table.attrs |= {"units": units, "varied": list(units), "until_below": 1e-5}
+    first, second = thresholds(table).to_dict("records")
     for row, moving, at_rest in ((first, 1.0, 0.8), (second, 1.2, 1.0)):
         assert (row["moving"], row["at_rest"]) == pytest.approx((moving, at_rest))
         # Γ0 = M a0/4πγR̄ is proportional to the drive.

@@ -350,7 +350,7 @@ def test_a_descent_finds_where_the_walkers_stop(sweep_file: Callable[..., str], 
     for _, descent in frame.groupby("drive.frequency"):
         assert list(descent["drive.peak_acceleration"]) == pytest.approx([1.4 - 0.2 * n for n in range(7)])
         assert list(descent["velocity"] < 2e-6) == sorted(descent["velocity"] < 2e-6)
-    ends = thresholds(in_folder / "runs" / "test")
+    ends = thresholds(load(in_folder / "runs" / "test"))
     assert list(ends["moving"] - ends["at_rest"]) == pytest.approx([0.2, 0.2])
     assert ends["moving"].nunique() == 1
     assert "moving (g)" in done.stdout

@@ -21,7 +21,7 @@ from walkers.postprocess.motion import Group
 from walkers.postprocess.results import read
 from walkers.postprocess.tables import read_table
 from walkers.sweeps.scheduler import Options, run_sweep
-from walkers.sweeps.table import thresholds
+from walkers.sweeps.table import load, thresholds
 from walkers.theory.mathieu import Alignment, alignment, is_stable, largest_stable_v, time_to_turn
 from walkers.theory.motion import Friction, Walker, walk
 from walkers.theory.prediction import alignment_of, describe_alignment, motion_of, predict, threshold
@@ -136,7 +136,7 @@ def test_theory_and_engine_agree_on_the_threshold(tmp_path: Path, friction: floa
     sweep = expand({"case": "base.toml", "descend": descend}, source="test", name="test", folder=tmp_path)
     record, failures = run_sweep(sweep, tmp_path / "runs", Options(1))
     assert not failures
-    (end,) = thresholds(record.directory).to_dict("records")
+    (end,) = thresholds(load(record.directory)).to_dict("records")
     assert end["at_rest"] < end["moving"]
     assert (end["at_rest"] + end["moving"]) / 2.0 == pytest.approx(expected, rel=0.3)
 

@@ -610,14 +610,14 @@ class Sweep:
         """The status of the points and their failures."""
         from walkers.sweeps.table import describe_status
 
-        return describe_status(self._record)
+        return describe_status(self.table())
 
     @property
     def status(self) -> str:
         """``finished``, ``running``, ``failed`` (some points) or ``interrupted`` (points are missing)."""
-        from walkers.sweeps.table import checked_states, worst_status
+        from walkers.sweeps.table import worst_status
 
-        return worst_status(state.status for state in checked_states(self._record))
+        return worst_status(self.table()["status"])
 
     @property
     def runs(self) -> list[Run]:

@@ -64,7 +64,7 @@ def verify(path: Path) -> list[Verification]:
             if state.status != "finished"
         ]
         runs = [state.directory for state in points if state.directory and state.status == "finished"]
-        whole = Verification(record.name, f"{len(runs)} points have a run", {"missing": missing})
+        whole = Verification(record.sweep.name, f"{len(runs)} points have a run", {"missing": missing})
         return [whole, *map(_of_run, dict.fromkeys(runs))]
     if (path / SUMS_NAME).is_file():
         return [_compared(path, _listed(path))]

@@ -185,12 +185,12 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
     table["run"] = [f"{RUNS}/{Path(run).name}" if run else "" for run in table["run"]]  # not where this machine has it
     sources: dict[str, Path | bytes] = {f"{place}/{RECORD_NAME}": record.directory / RECORD_NAME}
     sources |= {f"{place}/table.{form}": encoded(table, form) for form in ("csv", "parquet")}
-    sources |= {f"{place}/{name}.toml": _toml(record.file)} if record.file else {}
+    sources |= {f"{place}/{name}.toml": _toml(record.sweep.file)}
     files, manifests = {path: File.of(path, source) for path, source in sources.items()}, {}
     for run in dict.fromkeys(state.directory for state in points if state.directory is not None):
         place, manifests[place], of_run = _packed(run, dumps)
         files |= of_run
-    return Contents(name, record.title, manifests, files)
+    return Contents(name, record.sweep.title, manifests, files)
 
 
 def _packed(directory: Path, dumps: bool) -> tuple[str, dict[str, Any], dict[str, File]]:

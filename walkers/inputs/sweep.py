@@ -14,8 +14,8 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 from html import escape
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -23,7 +23,17 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from walkers.errors import InputError, Problem, each, refused, shortened, unusable
-from walkers.inputs.axes import MOST_POINTS, Axis, combinations, crossed, descending, one_at_a_time, sampled, zipped
+from walkers.inputs.axes import (
+    MOST_POINTS,
+    Axis,
+    combinations,
+    crossed,
+    descending,
+    one_at_a_time,
+    plain,
+    sampled,
+    zipped,
+)
 from walkers.inputs.case import Case
 from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
@@ -80,32 +90,59 @@ class SweepFile(Table):
         return axes + ([self.descend.axis()] if self.descend else [])
 
 
-@dataclass(frozen=True)
-class Descent:
-    """Descent along the last axis of a sweep to the value at which the walkers are slower than ``until_below`` (m/s).
-
-    ``steps`` is the number of its points; consecutive points of the sweep, so many at a time, are one descent.
-    """
-
-    key: str
-    steps: int
-    until_below: float
-
-
 @dataclass(frozen=True, repr=False)
 class Sweep:
-    """A base case and its variations."""
+    """A base case and its variations: what a sweep file says, and what follows from it.
 
-    name: str  # of its file
-    title: str
-    source: str  # the file, as messages call it
-    case_name: str  # of the base case, with which the runs' directories begin
-    document: Mapping[str, Any]  # tables of the base case, changed by ``[set]``
-    keys: tuple[str, ...]  # that vary
-    units: tuple[str | None, ...]  # of each key; None if it has none
-    rows: Sequence[tuple[Value, ...]]  # the points: one value a key
-    descent: Descent | None
-    file: Mapping[str, Any] = field(default_factory=dict)  # tables of the sweep file
+    Attributes
+    ----------
+    name
+        That of its file, and of its directory.
+    source
+        What messages call it.
+    case_name, base
+        Name of the base case, with which the runs' directories begin, and the tables of its file.
+    file
+        Tables of the sweep file.
+    document
+        Tables of the base case, changed by ``[set]``.
+    axes
+        Keys that vary, and their values.
+    rows
+        The points: one value a key.
+    until_below
+        The speed (m/s) below which walkers are at rest on the last axis, if that is a descent.
+    """
+
+    name: str
+    source: str
+    case_name: str
+    base: Mapping[str, Any]
+    file: Mapping[str, Any]
+    document: Mapping[str, Any]
+    axes: Sequence[Axis]
+    rows: Sequence[tuple[Value, ...]]
+    until_below: float | None
+
+    @property
+    def title(self) -> str:
+        """The title that the file gives, if it does."""
+        return str(self.file.get("title", ""))
+
+    @cached_property
+    def values(self) -> list[tuple[Any, ...]]:
+        """The points without units."""
+        return [tuple([*map(plain, one)] if isinstance(one, list) else plain(one) for one in row) for row in self.rows]
+
+    @cached_property
+    def units(self) -> dict[str, str | None]:
+        """The varied keys with their units; None if one has no unit."""
+        return {key: unit for axis in self.axes for key, unit in zip(axis.keys, axis.units, strict=True)}
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The varied keys."""
+        return tuple(self.units)
 
     def __repr__(self) -> str:
         varied = ", ".join(self.keys) or "nothing"
@@ -164,18 +201,25 @@ def _name_with(name: str, changes: Mapping[str, Value]) -> str:
     return f"{encoded[: _LONGEST_NAME - 13].decode('utf-8', 'ignore')}@{digest}"  # with a hyphen it might be a run's
 
 
-def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Sweep:
+def expand(
+    document: Mapping[str, Any],
+    *,
+    source: str,
+    name: str,
+    folder: Path = Path(),
+    base: tuple[str, Mapping[str, Any]] | None = None,
+) -> Sweep:
     """Expand a sweep given as nested tables; raises `InputError` if anything in it cannot be used.
 
-    ``source`` is what messages call it, ``folder`` where a base case given as a file is looked up.
+    ``source`` is what messages call it, ``folder`` where a base case given as a file is looked up. With ``base``, the
+    name of the base case and its tables, no file is read.
     """
     file = validated(SweepFile, document, source, "a sweep")
-    base = _base(file.case, source, folder)
+    path = None if base else _base(file.case, source, folder)
     try:
         with blaming(source):
             axes, settings = file.all_axes(), settings_in(file.set)
             keys, rows = combinations(axes)
-            units = tuple(unit for axis in axes for unit in axis.units)
             for key in keys:
                 if key == "title":
                     raise unusable(key, f"expected another key, for {key} does not determine a run")
@@ -183,23 +227,13 @@ def expand(document: Mapping[str, Any], *, source: str, name: str, folder: Path)
             for key in keys:
                 for other in alternatives(Case, key) & {*keys}:
                     raise unusable(key, f"expected one of {key} and {other}, which replace each other")
-            tables = changed(Case, read_case(base, folder), settings)
+            case_name, given = (path.stem, read_case(path, folder)) if path else base or ("", {})
+            tables = changed(Case, given, settings)
             changed(Case, tables, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:
         raise refused(source, "has infinitely nested tables") from error
-    descend = file.descend
-    return Sweep(
-        name=name,
-        title=file.title,
-        source=source,
-        case_name=base.stem,
-        document=tables,
-        keys=keys,
-        units=units,
-        rows=rows,
-        descent=Descent(descend.key, len(axes[-1].rows), descend.until_below) if descend else None,
-        file=document,
-    )
+    until = file.descend.until_below if file.descend else None
+    return Sweep(name, source, case_name, given, document, tables, axes, rows, until)
 
 
 def settings_in(tables: Mapping[str, Any]) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from walkers.postprocess.drawing import (
 from walkers.postprocess.gait import gait
 from walkers.postprocess.necks import bridges_at
 from walkers.postprocess.scene import Scene, Window, axes_toward
-from walkers.sweeps.table import thresholds
+from walkers.sweeps.table import load, thresholds
 from walkers.theory.prediction import motion_of, threshold
 from walkers.theory.quasistatic import FloatArray, detachment, mean_velocity, translation
 
@@ -146,7 +146,7 @@ def fig2(sources: Sources) -> Figure:
 def _threshold(axes: Axes, sources: Sources) -> None:
     """Γc by the protocol of the paper: between the last drive with motion and the first one without."""
     sources.finished("fig2-threshold")
-    ends = thresholds(sources.out / "fig2-threshold")
+    ends = thresholds(load(sources.out / "fig2-threshold"))
     bounds = ends[["gamma0_at_rest", "gamma0_moving"]].to_numpy(dtype=float)
     for number, (frequency, (low, high)) in enumerate(zip(ends["drive.frequency"], bounds, strict=True)):
         look: dict[str, Any] = {"fmt": _MARKERS[float(frequency)], "color": f"C{number}", "ms": 4, "lw": 1.0}

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, Problem, refused
 from walkers.inputs.case import STIFFEST, Case
-from walkers.inputs.sweep import Sweep, settings_in
+from walkers.inputs.sweep import Sweep, expand
 from walkers.postprocess.results import recorded
 from walkers.postprocess.sides import STEADY_SPEED
 from walkers.postprocess.uncertainty import ACCURACY, ACCURACY_NAME
@@ -79,7 +79,7 @@ def measure_accuracy(
         if (change := _change(table, case)) < share:
             break
     accuracy = Accuracy(
-        record.name, share, change < share, change, possible[last], _errors(recorded(directory)["numbers"], table)
+        record.sweep.name, share, change < share, change, possible[last], _errors(recorded(directory)["numbers"], table)
     )
     with recomputed(directory, [ACCURACY_NAME]):
         write_json(directory / ACCURACY_NAME, asdict(accuracy))
@@ -104,9 +104,9 @@ def _sweep(case: Case, name: str, possible: Sequence[float]) -> Sweep:
     factors = [(0.5, 1.0), *((times**-0.5, times) for times in possible[1:])]
     rows = [(f"{shorter * step!r} us", f"{harder * modulus!r} MPa") for shorter, harder in factors]
     points = {key: list(values) for key, values in zip(_KEYS, zip(*rows, strict=True), strict=True)}
-    file = {"case": case.name, "set": settings_in(case.document), "zip": [points]}
     title = f"{case.title or case.name}: smaller time steps and harder beads"
-    return Sweep(name, title, case.name, case.name, case.document, _KEYS, ("us", "MPa"), rows, None, file)
+    file = {"title": title, "case": case.name, "zip": [points]}
+    return expand(file, source=case.name, name=name, base=(case.name, case.document))
 
 
 def _change(table: pd.DataFrame, case: Case) -> float:

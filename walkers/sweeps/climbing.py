@@ -100,8 +100,8 @@ def _groups(directory: Path) -> list[tuple[dict[str, str], list[Path]]]:
     varied: dict[Path, dict[str, str]] = {}
     if (directory / RECORD_NAME).exists():
         record = read_record(directory)
-        for values, state in zip(record.values, states(record), strict=True):
-            named = zip(record.units.items(), values, strict=True)
+        for values, state in zip(record.sweep.values, states(record), strict=True):
+            named = zip(record.sweep.units.items(), values, strict=True)
             told = {key: value_text(value, unit) for (key, unit), value in named}
             if state.status == "finished" and state.directory is not None:
                 varied[state.directory] = {key: text for key, text in told.items() if key not in _NO_CONDITION}

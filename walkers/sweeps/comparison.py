@@ -27,7 +27,6 @@ from walkers.sweeps.table import (
     read_record,
     sides_differ,
     value_text,
-    varied_columns,
     with_unit,
 )
 
@@ -209,20 +208,20 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
 
     `InputError` if the varied keys differ, no finished point is common, or a sweep has no such column.
     """
-    records, source = (read_record(first), read_record(second)), f"{first}, {second}"
-    keys = [[with_unit(key, unit) for key, unit in one.units.items()] for one in records]
-    if dict(records[0].units) != dict(records[1].units):
+    sweeps, source = [read_record(directory).sweep for directory in (first, second)], f"{first}, {second}"
+    keys = [[with_unit(key, unit) for key, unit in one.units.items()] for one in sweeps]
+    if sweeps[0].units != sweeps[1].units:
         differences = " and ".join(", ".join(one) or "nothing" for one in keys)
         raise refused(source, f"expected sweeps that vary the same keys in the same units: {differences}")
     tables = [load(directory) for directory in (first, second)]
     numbers = [name for name in tables[0].columns if name in tables[1] and tables[0][name].dtype.kind in "fiu"]
     default = default_column(max(tables, key=sides_differ))
     column = find_name("column", column, numbers) if column else default
-    varied = list(dict.fromkeys(name for table in tables for name in varied_columns(table)))  # of the longest lists
+    varied = list(dict.fromkeys(name for table in tables for name in table.attrs["varied"]))  # of the longest lists
     both = _matched([table[table["status"] == "finished"] for table in tables], varied)
     if both.empty:
         raise refused(source, "have no finished point in common")
-    names = [record.name for record in records]
+    names = [sweep.name for sweep in sweeps]
     names = [str(first), str(second)] if names[0] == names[1] else names
     parameters, differences = _different([case_of(Path(both[f"run_{side}"].iloc[0])) for side in _SIDES], names)
     points, lines = [], []
@@ -230,7 +229,7 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
         names_of = (column, ERRORS.get(column))
         values, scatters = ([_number_of(row.get(f"{name}_{side}")) for side in _SIDES] for name in names_of)
         one, (quantity, *cells) = _pair(column, tables[0].attrs["units"][column], values, scatters)
-        at = dict(zip(records[0].units, records[0].values[row["point_first"]], strict=True))
+        at = dict(zip(sweeps[0].keys, sweeps[0].values[row["point_first"]], strict=True))
         points.append({"point": at, **one})
         lines.append([*map(value_text, at.values()), *cells[:-1]])
     unmatched = [len(table) - len(both) for table in tables]
@@ -240,7 +239,7 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
     line = f"{len(both)} points in both; largest difference {_difference(largest * size, unit)} {unit}".rstrip()
     if any(unmatched):
         line += f"; left out: {unmatched[0]} of {names[0]}, {unmatched[1]} of {names[1]}"
-    contents: dict[str, Any] = {**dict(zip(_SIDES, names, strict=True)), "keys": dict(records[0].units)}
+    contents: dict[str, Any] = {**dict(zip(_SIDES, names, strict=True)), "keys": sweeps[0].units}
     contents |= {"parameters": parameters, "points": points, "unmatched": unmatched}
     return Comparison(contents, "\n\n".join(filter(None, [differences, aligned([heads, *lines]), line])))
 

@@ -24,7 +24,7 @@ from walkers.postprocess.quantities import unit_shown
 from walkers.postprocess.results import derived
 from walkers.runner.directory import case_of
 from walkers.sweeps.figure_options import FigureOptions
-from walkers.sweeps.table import ERRORS, FACING_DOWN, default_column, find_name, value_text, varied_columns, with_unit
+from walkers.sweeps.table import ERRORS, FACING_DOWN, default_column, find_name, value_text, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -158,7 +158,7 @@ def factors_of(table: pd.DataFrame) -> list[Factor]:
 
 
 def _of_axis(table: pd.DataFrame, keys: Sequence[str]) -> list[Factor]:
-    known, units = varied_columns(table), table.attrs["units"]
+    known, units = table.attrs["varied"], table.attrs["units"]
     factors = []
     for key in keys:
         names = [name for name in known if name == key or name.startswith(f"{key}[")]
@@ -312,7 +312,7 @@ class _Theory:
         If x is no key, such as Γ0, the key that varies is changed.
         """
         points, case, units = self.done.iloc[rows], self.cases[rows[0]], self.done.attrs["units"]
-        (key, *further), known = x.keys, varied_columns(self.done)
+        (key, *further), known = x.keys, self.done.attrs["varied"]
         places = _along_axis(x.levels[0], x.levels[-1], self.log)
         if key not in known:
             moving = [name for name in known if points[name].nunique() > 1]
@@ -394,7 +394,7 @@ def _draw(
     _legend(figure, grid, hue, looks, scale, list(theory.values) if theory else [], down="down" in points)
     said = [done.attrs["title"]]
     if points["error"].notna().any():
-        bars = SCATTER.partition(" (")[0] if {*unmeasured()} & {*varied_columns(done)} else SCATTER
+        bars = SCATTER.partition(" (")[0] if {*unmeasured()} & {*done.attrs["varied"]} else SCATTER
         said.append(bars + ("" if errors_seen(points["error"], points["value"]) else ", smaller than the symbols"))
     figure.suptitle(plain_text("\n".join(line for one in said for line in wrap(one, round(14.0 * width)))))
     return figure

@@ -52,8 +52,8 @@ from walkers.sweeps.table import (
     PARSL,
     RECORD_NAME,
     read_record,
+    state_at,
     states,
-    unfinished_state,
     worst_status,
 )
 
@@ -137,7 +137,7 @@ def _run(path: Path, now: float) -> Entry | None:
             return None
     size, newest = weigh(path)
     if not finished:
-        state = unfinished_state(path.with_name(name), path)
+        state = state_at(path.with_name(name), path)
         status = "interrupted" if state.status == "missing" else state.status
         age = max(now - newest, 0.0)
         reason = state.reason
@@ -188,7 +188,12 @@ def _sweep(path: Path, runs: Sequence[Entry], now: float) -> Entry | None:
         directory=path,
         age=_age(path / RECORD_NAME, now),
         size=sum(run.size for run in runs if run.name in named),
-        parameters=FlatCase({key: len({str(row[at]) for row in record.values}) for at, key in enumerate(record.units)}),
+        parameters=FlatCase(
+            {
+                key: len({*map(str, column)})
+                for key, column in zip(record.sweep.keys, zip(*record.sweep.values, strict=True), strict=True)
+            }
+        ),
         points=points,
         runs=record.runs,
     )
@@ -334,7 +339,7 @@ def _own_files(directory: Path) -> list[Path]:
     record = read_record(directory)
 
     def is_page(path: Path) -> bool:
-        is_figure = path.suffix == ".png" and (path.stem in record.units or is_declared(path.stem))
+        is_figure = path.suffix == ".png" and (path.stem in record.sweep.units or is_declared(path.stem))
         return (is_figure or path.name == "report.html") and path.is_file() and not path.is_symlink()
 
     pages = [path for path in directory.iterdir() if is_page(path)]

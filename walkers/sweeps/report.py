@@ -18,7 +18,7 @@ from walkers.postprocess.uncertainty import not_known
 from walkers.rounding import rounded
 from walkers.runner.files import write_text
 from walkers.sweeps.figure import LeftOutWarning, figure_of, readable_key
-from walkers.sweeps.table import SIDES, load, sides_differ, varied_columns, with_unit
+from walkers.sweeps.table import SIDES, load, sides_differ, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -77,7 +77,7 @@ def _uncertain(frame: pd.DataFrame) -> list[str]:
 
 def _table(frame: pd.DataFrame) -> dict[str, Any]:
     """Heads and rows of varied keys (units of the file) and results (readable units); equal values are ``shared``."""
-    varied, units = varied_columns(frame), frame.attrs["units"]
+    varied, units = frame.attrs["varied"], frame.attrs["units"]
     apart = sides_differ(frame)
     wanted = [one for name in _SHOWN for one in (SIDES if apart and name == "velocity" else (name,))]
     results = [name for name in wanted if name in frame and name not in varied and frame[name].notna().any()]

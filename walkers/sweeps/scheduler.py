@@ -236,9 +236,9 @@ class SweepPlan:
         # Python works for one deck at a time, while other engines run.
         until = max(makespan((deck.seconds for deck in self.decks), at_once) + PROGRAM_SECONDS, besides)
         text = ", ".join(f"{count} {status}" for status, count in sorted(Counter(self.statuses).items()))
-        keys = ", ".join(with_unit(key, unit) for key, unit in record.units.items())
+        keys = ", ".join(with_unit(key, unit) for key, unit in record.sweep.units.items())
         lines = [
-            f"{record.name}: {record.title}".rstrip(": "),
+            f"{record.sweep.name}: {record.sweep.title}".rstrip(": "),
             f"  varied     {keys or 'nothing'}",
             f"  points     {len(record.runs)}: {text}",
             f"  to do      {counted(len(missing), 'point')} in {counted(len(self.decks), 'deck')}",

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass
 from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import refused, unusable
-from walkers.inputs.axes import Range, ranges_of, sampled, unit_cube, unit_of, written
+from walkers.inputs.axes import Range, ranges_of, unit_cube, written
 from walkers.inputs.case import Case
 from walkers.inputs.library import unmeasured
 from walkers.inputs.messages import blaming
 from walkers.inputs.origins import Origin
-from walkers.inputs.sweep import Sweep, settings_in
+from walkers.inputs.sweep import Sweep, expand
 from walkers.inputs.units import parse_quantity
 from walkers.postprocess.numbers import MAIN, declared
 from walkers.postprocess.quantities import unit_shown
@@ -123,23 +123,13 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
         return float(np.abs(np.corrcoef(cube.T) - np.eye(len(varied))).max())
 
     seed = min(_SEEDS, key=likeness) if len(varied) > 1 else _SEEDS[0]
-    axis = sampled("sobol", points, seed, ranges)
-    return Sweep(
-        name=spread_of(run_place(case, find_engine(engine), Path())).name,
-        title=f"{case.title or case.name}: uncertain values drawn from their ranges",
-        source=case.name,
-        case_name=case.name,
-        document=case.document,
-        keys=axis.keys,
-        units=tuple(unit_of(key, column) for key, column in zip(axis.keys, zip(*axis.rows, strict=True), strict=True)),
-        rows=axis.rows,
-        descent=None,
-        file={
-            "case": case.name,
-            "set": settings_in(case.document),
-            "sample": [{"method": "sobol", "points": points, "seed": seed, "ranges": ranges}],
-        },
-    )
+    file = {
+        "title": f"{case.title or case.name}: uncertain values drawn from their ranges",
+        "case": case.name,
+        "sample": [{"method": "sobol", "points": points, "seed": seed, "ranges": ranges}],
+    }
+    name = spread_of(run_place(case, find_engine(engine), Path())).name
+    return expand(file, source=case.name, name=name, base=(case.name, case.document))
 
 
 def run_spread(
@@ -155,9 +145,14 @@ def run_spread(
     Values are drawn independently. Calibrated values are correlated (docs/explanation/calibration.md): for them, the
     band is wider than that of the posterior.
     """
-    sweep = spread_sweep(case, points, engine)
-    record, failures = run_sweep(sweep, out, options, engine=engine, **how)
-    table = load(record.directory)
+    record, failures = run_sweep(spread_sweep(case, points, engine), out, options, engine=engine, **how)
+    spread = spread_in(load(record.directory), case, record.directory, failures)
+    write_json(record.directory / SPREAD_NAME, {**spread.as_dict(), "directory": record.directory.name})
+    return spread
+
+
+def spread_in(table: pd.DataFrame, case: Case, directory: Path, failures: Sequence[Failure] = ()) -> Spread:
+    """The spread of a case by the table of its sweep in a directory."""
     table = table[table["status"] == "finished"]
     together, counts = table, {}
     if "velocity" in table:
@@ -166,17 +161,16 @@ def run_spread(
         counts = {"forward": int((speeds > REST).sum()), "backward": int((speeds < -REST).sum())}
         counts |= {"at_rest": int((speeds.abs() <= REST).sum()), "separated": len(table) - len(together)}
     shown = [main_columns(together)[0]] if "velocity" in table else [name for name in MAIN if name in table]
-    spread = Spread(
-        directory=record.directory,
-        varied=tuple(one for one in case.origins if one.range is not None),
+    varied = tuple(one for one in case.origins if one.range is not None)
+    return Spread(
+        directory=directory,
+        varied=varied,
         held=tuple(one for one in case.origins if one.key in unmeasured() and one.range is None),
         bands={name: _band(together[name].dropna()) for name in shown if together[name].notna().any()},
-        depends={name: _ranks(together[together[name].notna()], name, sweep.keys) for name in shown},
+        depends={name: _ranks(together[together[name].notna()], name, [one.key for one in varied]) for name in shown},
         counts=counts,
         failures=tuple(failures),
     )
-    write_json(record.directory / SPREAD_NAME, {**spread.as_dict(), "directory": record.name})
-    return spread
 
 
 def _band(values: pd.Series[float]) -> Band:
@@ -184,7 +178,7 @@ def _band(values: pd.Series[float]) -> Band:
     return Band(low, middle, high, float(values.min()), float(values.max()), len(values))
 
 
-def _ranks(table: pd.DataFrame, name: str, keys: tuple[str, ...]) -> dict[str, float]:
+def _ranks(table: pd.DataFrame, name: str, keys: Sequence[str]) -> dict[str, float]:
     """Rank correlations of a column with each key, the strongest first, without insignificant ones."""
     if len(table) < LEAST_PER_VALUE * len(keys) or table[name].nunique() < 2:
         return {}

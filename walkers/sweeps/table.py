@@ -1,12 +1,13 @@
 """Sweeps on disk and as tables.
 
-A sweep's directory contains ``sweep.json``, the list of its points with the names of their runs. The run directories
-are beside the sweep's directory, and all sweeps of a folder share them. The status of a point is always read from its
-run directory.
+A sweep's directory contains ``sweep.json``: the tables of the sweep's file and of its base case, and the names of its
+runs. All else follows: the file is expanded again when it is read, and the status of a point is that of its run
+directory. The run directories are beside the sweep's directory, and all sweeps of a folder share them.
 
-The table has one row per point: the varied keys, quantities derived from the case, and the results of the run. Figure,
-report, comparison and spread of a sweep are made from it. Its ``attrs`` describe the columns (``units``, ``meanings``)
-and the sweep (``sweep``, ``title``, ``varied``: columns of the varied keys, ``axes``: keys that vary together).
+The table has one row per point: the varied keys and the numbers of the run. Lists, figures, reports, comparisons and
+spreads are groupings and prints of it. Its ``attrs`` describe the columns (``units``, ``meanings``) and the sweep
+(``sweep``, ``title``, ``varied``: columns of the varied keys, ``axes``: keys that vary together, ``until_below``: the
+speed (m/s) at which descents end, or None).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import io
 import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from math import nan
@@ -22,12 +24,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, Problem, refused, suggestion
-from walkers.inputs.axes import is_axis, plain
 from walkers.inputs.case import Case
-from walkers.inputs.keys import flatten
 from walkers.postprocess.numbers import declared, headline, is_declared, ordered
 from walkers.postprocess.quantities import GROUPS
-from walkers.postprocess.results import Results, derived, modules_of, read
+from walkers.postprocess.results import Results, modules_of, read
 from walkers.rounding import DIGITS, SHOWN_UNITS, counted, rounded
 from walkers.runner.binary import Engine
 from walkers.runner.directory import FAILURE_NAME, is_finished, is_locked, run_place, unfinished
@@ -37,16 +37,17 @@ from walkers.sweeps.readable import short_keys
 if TYPE_CHECKING:
     import pandas as pd
 
-    from walkers.inputs.sweep import Descent, Sweep
+    from walkers.inputs.sweep import Sweep
 
 RECORD_NAME = "sweep.json"
 PARSL = "parsl"
 """Folder in a sweep's directory for Parsl's scripts and logs."""
-_FORMAT = 3
+_FORMAT = 4
 STATE = {
     "status": ("", "finished, failed, running or missing"),
     "lost": ("", "number of beads that left the simulation box; a run that loses beads has no result"),
     "reason": ("", "name of the failure, or empty"),
+    "message": ("", "message of the failure, or empty"),
     "run": ("", "run directory, relative to the folder in which the table was written"),
 }
 _RESULTS = ("velocity", "climbs")
@@ -66,128 +67,66 @@ _SHOWN = {
     *("surface_end", "brazil_nut_end", "settling"),
 }
 """Numbers of results in the printed table, beside the main one."""
+_ASIDE = ("lost", "reason", "message")
+"""Columns of `STATE` that the printed table leaves out."""
 UNREADABLE = "ResultUnreadable"
 """Reason of points whose run is finished and whose result cannot be read."""
-_VARIED = "varied"
-"""Meaning of the columns of varied keys."""
 _STATUSES = ("finished", "running", "failed", "missing")
 _MOST_FAILURES = 10
 
 
-# --- the record -------------------------------------------------------------------------------------------------------
+# --- on disk ----------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class SweepRecord:
-    """A sweep as recorded in its directory.
-
-    ``units`` has the varied keys. For each point, ``values`` has the values of these keys, ``derived`` the numbers that
-    follow from the case, ``runs`` the name of the run. ``measured`` are the groups of numbers of its results
-    (`walkers.postprocess.quantities.GROUPS`); ``file`` has the tables of the sweep file, if they were recorded.
-    """
+    """A sweep in its directory, with the name of the run of each point."""
 
     directory: Path
-    name: str
-    title: str
-    units: Mapping[str, str | None]
-    values: Sequence[Sequence[Any]]
-    derived: Sequence[Mapping[str, float]]
+    sweep: Sweep
     runs: Sequence[str]
-    descent: Descent | None
-    measured: Sequence[str]
-    file: Mapping[str, Any]
 
     @property
     def out(self) -> Path:
         """Folder of the run directories."""
         return self.directory.parent
 
-    @property
-    def axes(self) -> list[tuple[str, ...]]:
-        """The varied keys; keys of one table of the file (``zip``, ``sample``, ``one_at_a_time``) are one axis."""
-        together = [flatten(table, is_axis) for table in self.file.get("zip", ())]
-        together += [flatten(table["ranges"], is_axis) for table in self.file.get("sample", ())]
-        together += [flatten(self.file.get("one_at_a_time", {}), is_axis)]
-        axis_of = {key: tuple(keys) for keys in together for key in keys}
-        return list(dict.fromkeys(axis_of.get(key, (key,)) for key in self.units))
-
-
-def columns_of(names: Iterable[str]) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of numbers of results, in the order of their declarations."""
-    quantities = map(declared, ordered(names))
-    return {one.name: ("" if one.unit == "share" else one.unit, one.meaning) for one in quantities}
-
-
-def numbers_of(groups: Iterable[str]) -> list[str]:
-    """Names of the numbers that the modules of results measure, without those of single beads."""
-    return [one.name for group in groups for one in GROUPS[group] if not one.name.endswith("*")]
-
 
 def describe_sweep(sweep: Sweep, cases: Sequence[Case], engine: Engine, out: Path) -> SweepRecord:
     """The record of a sweep with resolved points; `InputError` for descents of piles, which have no velocity."""
-    names = list(dict.fromkeys(module.NAME for case in cases for module in modules_of(case)))
-    if sweep.descent is not None and "walking" not in names:
+    if sweep.until_below is not None and not any(case.walkers for case in cases):
         raise InputError(sweep.source, [Problem("descend", None, "expected walkers: a pile has no velocity")])
-    following = [derived(case) for case in cases]
-    columns = ordered({name for numbers in following for name in numbers})
-    return SweepRecord(
-        directory=out / sweep.name,
-        name=sweep.name,
-        title=sweep.title,
-        units=dict(zip(sweep.keys, sweep.units, strict=True)),
-        values=[[list(map(plain, one)) if isinstance(one, list) else plain(one) for one in row] for row in sweep.rows],
-        derived=[{name: numbers.get(name, nan) for name in columns} for numbers in following],
-        runs=[run_place(case, engine, out).name for case in cases],
-        descent=sweep.descent,
-        measured=names,
-        file=sweep.file,
-    )
+    return SweepRecord(out / sweep.name, sweep, [run_place(case, engine, out).name for case in cases])
 
 
 def write_record(record: SweepRecord) -> None:
     """Write ``sweep.json`` into the sweep's directory, which is made if necessary."""
     record.directory.mkdir(parents=True, exist_ok=True)
-    points = [
-        {"values": list(values), "derived": list(derived.values()), "run": run}
-        for values, derived, run in zip(record.values, record.derived, record.runs, strict=True)
-    ]
-    contents = {
-        "format": _FORMAT,
-        "name": record.name,
-        "title": record.title,
-        "file": dict(record.file),
-        "units": dict(record.units),
-        "descent": vars(record.descent) if record.descent else None,
-        "measured": list(record.measured),
-        "derived": list(record.derived[0]) if record.derived else [],
-        "points": points,
-    }
-    write_json(record.directory / RECORD_NAME, contents)
+    sweep = record.sweep
+    contents = {"format": _FORMAT, "file": dict(sweep.file), "case": sweep.case_name, "base": dict(sweep.base)}
+    write_json(record.directory / RECORD_NAME, {**contents, "runs": list(record.runs)})
 
 
 def read_record(directory: str | Path) -> SweepRecord:
-    """Read the record in a sweep's directory; `InputError` if there is none."""
-    from walkers.inputs.sweep import Descent
+    """Read the record in a sweep's directory, and expand the sweep; `InputError` if there is none."""
+    from walkers.inputs.sweep import expand
 
     given, directory = directory, Path(directory).resolve()
     try:
         contents = read_json(directory / RECORD_NAME)
-        points = contents["points"]
         if contents["format"] != _FORMAT:
-            raise ValueError(f"format {contents['format']!r}, expected {_FORMAT}; run the sweep again")
-        return SweepRecord(
-            directory=directory,
-            **{key: contents[key] for key in ("name", "title", "units", "measured")},
-            values=[point["values"] for point in points],
-            derived=[dict(zip(contents["derived"], point["derived"], strict=True)) for point in points],
-            runs=[point["run"] for point in points],
-            descent=Descent(**contents["descent"]) if contents["descent"] else None,
-            file=contents.get("file", {}),
-        )
+            raise ValueError(f"its format is {contents['format']!r}, expected {_FORMAT}")
+        base = contents["case"], contents["base"]
+        sweep = expand(contents["file"], source=f"{given}/{RECORD_NAME}", name=directory.name, base=base)
+        runs = contents["runs"]
+        if len(runs) != len(sweep.rows) or not all(isinstance(run, str) for run in runs):
+            raise ValueError(f"{len(runs)} runs, expected the names of {len(sweep.rows)}")
+        return SweepRecord(directory, sweep, runs)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise refused(given, f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2") from error
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise refused(given, f"{RECORD_NAME} cannot be read ({error})") from error
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        text = f"{RECORD_NAME} cannot be read ({error}); run the sweep again: finished runs are kept"
+        raise refused(given, text) from error
 
 
 @dataclass(frozen=True)
@@ -229,15 +168,13 @@ def worst_status(points: Iterable[str]) -> str:
     return next((status for one, status in worst.items() if one in found), "finished")
 
 
-def state_at(place: Path) -> PointState:
-    """State of the run that belongs in a place."""
-    return PointState("finished", place) if is_finished(place) else unfinished_state(place, unfinished(place))
-
-
-def unfinished_state(place: Path, directory: Path) -> PointState:
-    """State of an unfinished run, or of one that is made again, in a directory."""
+def state_at(place: Path, directory: Path | None = None) -> PointState:
+    """State of the run that belongs in a place; with a ``directory`` that of the unfinished run in it."""
+    if directory is None and is_finished(place):
+        return PointState("finished", place)
     if is_locked(place):
         return PointState("running")
+    directory = directory or unfinished(place)
     try:
         failure = read_json(directory / FAILURE_NAME)
         reason, message = str(failure["reason"]), str(failure["message"])
@@ -262,41 +199,46 @@ def load(directory: str | Path) -> pd.DataFrame:
     import pandas as pd
 
     record = read_record(directory)
+    sweep, points = record.sweep, checked_states(record)
     varied: dict[str, tuple[str, str]] = {}
-    for place, (key, unit) in enumerate(record.units.items()):
+    for key, unit, values in zip(sweep.keys, sweep.units.values(), zip(*sweep.values, strict=True), strict=True):
         # A key with several numbers, such as the radii, has a column for each.
-        parts = max((len(values[place]) for values in record.values if isinstance(values[place], list)), default=0)
-        varied |= dict.fromkeys([f"{key}[{part}]" for part in range(parts)] or [key], (unit or "", _VARIED))
-    points = checked_states(record)
-    names = {*numbers_of([*record.measured, "drive"]), *(name for one in points for name in one.result or ())}
-    found = columns_of(names)
-    described = {"point": ("", "number of the point"), **varied, **found, **STATE}
-    rows = [dict.fromkeys(found, nan) | _row(record, number, state) for number, state in enumerate(points)]
-    frame = _with_units(pd.DataFrame(rows, columns=list(described)), described)
-    frame.attrs |= {"sweep": record.name, "title": record.title or record.name, "axes": record.axes}
-    frame.attrs["varied"] = list(varied)
+        parts = max((len(value) for value in values if isinstance(value, list)), default=0)
+        varied |= dict.fromkeys([f"{key}[{part}]" for part in range(parts)] or [key], (unit or "", "varied"))
+    numbers = {name for point in points for name in point.result or _declared(sweep)}
+    described = {"point": ("", "number of the point"), **varied, **columns_of(numbers), **STATE}
+    rows = [_row(number, sweep, state) for number, state in enumerate(points)]
+    frame = _described(pd.DataFrame(rows, columns=list(described)), described)
+    frame.attrs |= {"sweep": sweep.name, "title": sweep.title or sweep.name, "until_below": sweep.until_below}
+    frame.attrs |= {"varied": list(varied), "axes": [axis.keys for axis in sweep.axes]}
     return frame
 
 
-def _with_units(frame: pd.DataFrame, described: Mapping[str, tuple[str, str]]) -> pd.DataFrame:
+def columns_of(names: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of numbers of results, in the order of their declarations."""
+    return {one.name: (one.si_unit, one.meaning) for one in map(declared, ordered(names))}
+
+
+def _declared(sweep: Sweep) -> list[str]:
+    """The numbers of results of a sweep's cases, without those of single beads; none if a case cannot be read."""
+    with suppress(InputError):
+        groups = [module.NAME for module in modules_of(next(sweep.cases()))]
+        return [one.name for group in [*groups, "drive"] for one in GROUPS[group] if not one.name.endswith("*")]
+    return []
+
+
+def _described(frame: pd.DataFrame, described: Mapping[str, tuple[str, str]]) -> pd.DataFrame:
     frame.attrs["units"] = {name: unit for name, (unit, _) in described.items()}
     frame.attrs["meanings"] = {name: meaning for name, (_, meaning) in described.items()}
     return frame
 
 
-def _row(record: SweepRecord, number: int, state: PointState) -> dict[str, Any]:
-    row: dict[str, Any] = {"point": number}
-    for key, value in zip(record.units, record.values[number], strict=True):
+def _row(number: int, sweep: Sweep, state: PointState) -> dict[str, Any]:
+    row: dict[str, Any] = {"point": number, **(state.result or {})}
+    for key, value in zip(sweep.keys, sweep.values[number], strict=True):
         row |= {f"{key}[{part}]": one for part, one in enumerate(value)} if isinstance(value, list) else {key: value}
-    row |= record.derived[number]
-    row |= {"status": state.status, "lost": state.lost, "reason": state.reason or ""}
-    row["run"] = os.path.relpath(state.directory) if state.directory else ""
-    return row | dict(state.result or {})
-
-
-def varied_columns(frame: pd.DataFrame) -> list[str]:
-    """The columns of varied keys in a sweep's table."""
-    return [name for name, meaning in frame.attrs["meanings"].items() if meaning == _VARIED]
+    row |= {name: getattr(state, name) or "" for name in ("status", "reason", "message")}
+    return row | {"lost": state.lost, "run": os.path.relpath(state.directory) if state.directory else ""}
 
 
 def groups(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
@@ -399,10 +341,14 @@ def short_text(frame: pd.DataFrame) -> str:
     import pandas as pd
 
     wanted = _SHOWN | (set(SIDES) if sides_differ(frame) else {"velocity", default_column(frame)})
-    names = [name for name in frame.columns if name in wanted or not (is_declared(name) or name in ("lost", "reason"))]
+    names = [
+        name
+        for name in frame.columns
+        if name in wanted or not (is_declared(name) or name in ("lost", "reason", "message"))
+    ]
     shown = frame[names].copy()
     units = dict(frame.attrs.get("units", {}))
-    varied = varied_columns(frame)
+    varied = frame.attrs["varied"]
     for name in shown.columns.difference(varied):
         if units.get(name) in SHOWN_UNITS:
             units[name], factor = SHOWN_UNITS[units[name]]
@@ -418,8 +364,8 @@ def short_text(frame: pd.DataFrame) -> str:
     return f"{text}\n\nthe same at all points: {', '.join(words)}" if words else text
 
 
-def thresholds(directory: str | Path) -> pd.DataFrame:
-    """The ends of the descents of a sweep; `InputError` if it has none.
+def thresholds(frame: pd.DataFrame) -> pd.DataFrame:
+    """The ends of the descents in a sweep's table; `InputError` if it has none.
 
     Returns
     -------
@@ -430,40 +376,39 @@ def thresholds(directory: str | Path) -> pd.DataFrame:
     """
     import pandas as pd
 
-    record = read_record(directory)
-    if (descent := record.descent) is None:
-        raise refused(directory, "the sweep has no descent and therefore no thresholds")
-    frame = load(directory)
-    others = [name for name in varied_columns(frame) if name != descent.key]
+    if (until_below := frame.attrs["until_below"]) is None:
+        raise refused(frame.attrs["sweep"], "the sweep has no descent and therefore no thresholds")
+    *others, lowered = frame.attrs["varied"]
     rows = []
-    for _, points in frame.groupby(frame["point"] // descent.steps):
+    for _, points in frame.groupby(frame["point"] // frame[lowered].nunique()):
         finished = points[points["status"] == "finished"]
-        slow = finished["velocity"].astype(float).abs() < descent.until_below
+        slow = finished["velocity"].astype(float).abs() < until_below
         row = {name: points.iloc[0][name] for name in others}
         for name, part in (("moving", finished[~slow.cummax()].tail(1)), ("at_rest", finished[slow].head(1))):
-            row[name] = part.iloc[0][descent.key] if len(part) else nan
+            row[name] = part.iloc[0][lowered] if len(part) else nan
             row[f"gamma0_{name}"] = part.iloc[0]["gamma0"] if len(part) else nan
         rows.append(row)
-    unit = record.units[descent.key] or ""
-    described = {name: (frame.attrs["units"][name], _VARIED) for name in others} | {
-        "moving": (unit, f"last {descent.key} at which the walkers move"),
+    units = frame.attrs["units"]
+    described = {name: (units[name], "varied") for name in others} | {
+        "moving": (units[lowered], f"last {lowered} at which the walkers move"),
         "gamma0_moving": ("", "dimensionless peak force Γ0 of moving"),
-        "at_rest": (unit, f"first {descent.key} at which the walkers rest"),
+        "at_rest": (units[lowered], f"first {lowered} at which the walkers rest"),
         "gamma0_at_rest": ("", "dimensionless peak force Γ0 of at_rest"),
     }
-    return _with_units(pd.DataFrame(rows), described)
+    table = _described(pd.DataFrame(rows), described)
+    table.attrs["varied"] = others
+    return table
 
 
-def describe_status(record: SweepRecord) -> str:
+def describe_status(frame: pd.DataFrame) -> str:
     """Numbers of points by status, failures with their messages, and the thresholds of descents."""
-    found = checked_states(record)
-    count = Counter(state.status for state in found)
+    count = Counter(frame["status"])
     text = ", ".join(f"{count[status]} {status}" for status in _STATUSES if count[status])
-    lines = [f"{record.name}: {counted(len(found), 'point')}, {text or 'none'}"]
-    failed = [(number, state) for number, state in enumerate(found) if state.status == "failed"]
-    lines += [f"  failed     point {number}: {state.message}" for number, state in failed[:_MOST_FAILURES]]
+    lines = [f"{frame.attrs['sweep']}: {counted(len(frame), 'point')}, {text or 'none'}"]
+    failed = frame[frame["status"] == "failed"]
+    lines += [f"  failed     point {row.point}: {row.message}" for row in failed[:_MOST_FAILURES].itertuples()]
     if len(failed) > _MOST_FAILURES:
         lines.append(f"             and {len(failed) - _MOST_FAILURES} more")
-    if record.descent is not None:
-        lines += [f"  {line}" for line in short_text(thresholds(record.directory)).splitlines()]
+    if frame.attrs["until_below"] is not None:
+        lines += [f"  {line}" for line in short_text(thresholds(frame)).splitlines()]
     return "\n".join(lines)
