@@ -335,14 +335,6 @@ def test_sweeps_over_lists_of_different_lengths_are_compared_either_way(in_folde
         assert found["points"][0]["difference"] == 0.0
 
 
-def test_a_sweep_of_another_format_is_refused(out: Path) -> None:
-    record = read_json(out / "rough" / "sweep.json")
-    write_json(out / "rough" / "sweep.json", {**record, "format": 99})
-    done = call("list", "rough")
-    assert (done.returncode, "Traceback" in done.stderr) == (2, False)
-    assert "format 99, expected 3" in done.stderr
-
-
 def test_an_interrupted_run_of_another_folder_is_not_mistaken_for_one_of_the_same_name(tmp_path: Path) -> None:
     places = [tmp_path / folder / "killed-0123456789ab.incomplete" for folder in ("runs", "other")]
     for place in places:

@@ -232,7 +232,7 @@ def test_a_failing_point_does_not_stop_the_others(
     before = len(launches())
     assert _sweep(name, "--engine", engine, "--retries", "2").returncode == 1
     again = [made_in(place) for place in launches()[before:]]
-    assert again == 3 * [json.loads((in_folder / "runs" / "test" / "sweep.json").read_text())["points"][2]["run"]]
+    assert again == 3 * [json.loads((in_folder / "runs" / "test" / "sweep.json").read_text())["runs"][2]]
 
 
 def test_lost_beads_in_a_shared_deck_cost_only_their_own_point(
