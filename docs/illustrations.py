@@ -43,6 +43,7 @@ from walkers.postprocess.film_options import FilmOptions
 from walkers.postprocess.results import VERSION
 from walkers.runner.files import read_json, write_json, write_text
 from walkers.runner.launch import cores_here
+from walkers.sweeps.climbing import texts_of
 from walkers.sweeps.scheduler import Options
 from walkers.templates.deck import CONTENT_VERSION
 
@@ -101,9 +102,7 @@ def _of_climbs(name: str, *others: str, assembly: Mapping[str, Any] | None = Non
         for sweep_name in names:
             sweep(sweep_name, out)
         climbs = climb([out / sweep_name for sweep_name in names], to=docs / files[0])
-        write_text(
-            docs / files[1], tables.page(f"walkers climb {' '.join(names)}", list(map(tables.climbs_of, climbs)))
-        )
+        write_text(docs / files[1], tables.page(f"walkers climb {' '.join(names)}", list(map(texts_of, climbs))))
         if assembly:
             done = run(load_case("pile-small", assembly), out)
             save_figure(_assembly(done), docs / files[2], [done.directory.name])

@@ -5,42 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pandas as pd
 
-_PARTS = {"on plain walls": "on_plain_walls", "in corners": "in_corners", "out of the pile": "out_of_pile"}
 _OF_TRAYS = ["merged", "parted", "clustered_share", "largest_cluster", "slow_share", "nematic_order", "speed_ratio"]
-
-
-def climbs_of(climbs: Mapping[str, Any]) -> dict[str, str]:
-    """Statistics of climbs in one condition as texts; rates in 1/s with their 95 % interval."""
-
-    def rate(part: Mapping[str, Any]) -> str:
-        if part["rate"] is None:
-            return "–"
-        low, high = part["rate_interval"]
-        return f"{part['rate']:.2g} ({low:.2g} to {high:.2g})"
-
-    def between(values: Sequence[float], factor: float = 1.0) -> str:
-        return f"{factor * min(values):.2g} to {factor * max(values):.2g}" if values else "–"
-
-    return {
-        "pile": climbs["condition"] or "usual",
-        "climbed": f"{climbs['climbed']} of {climbs['runs']}",
-        "within (s)": f"{climbs['within']:.3g}",
-        "half by (s)": "–" if climbs["median"] is None else f"{climbs['median']:.2g}",
-        "climbs": f"{climbs['climbs']}",
-        "rate": rate(climbs),
-        **{words: rate(climbs[part]) for words, part in _PARTS.items()},
-        "led by large": f"{climbs['led_by_large']} of {climbs['climbs']}",
-        "large beads (%)": f"{100.0 * climbs['share_of_large']:.0f}",
-        "p by chance": "–" if climbs["p_among_beads"] is None else f"{max(climbs['p_among_beads'], 2e-4):.2g}",
-        "beads": between(climbs["sizes"]),
-        "speed (mm/s)": between(climbs["speeds"], 1e3),
-        "median speed (mm/s)": f"{1e3 * np.median(climbs['speeds']):.2g}" if climbs["speeds"] else "–",
-    }
 
 
 def means_of_trays(table: pd.DataFrame) -> list[dict[str, str]]:

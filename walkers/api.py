@@ -812,10 +812,12 @@ def climb(
 ) -> list[dict[str, Any]]:
     """Probability, rate and speed of climbs in piles for each condition, with confidence intervals.
 
+    Runs of a sweep that differ in nothing but their seed are a condition; a run by itself is another one.
+
     Parameters
     ----------
     what
-        Sweeps, folders of runs, runs or cases of piles.
+        Sweeps, runs or cases of piles.
     out, changes
         See `load`.
     within
@@ -825,18 +827,27 @@ def climb(
     """
     from walkers.errors import each
     from walkers.postprocess.drawing import FORMATS, check_place
-    from walkers.sweeps import climbing
+    from walkers.sweeps.climbing import conditions_in, summarise_climbs
     from walkers.sweeps.climbing_figure import write_climbs
 
     if to is not None:
         check_place(Path(to), *(f".{form}" for form in FORMATS), ".csv")
-    places = each(lambda name: directory_of(name, out, changes), what)
-    conditions = climbing.conditions_in(places)
-    for left in filter(None, map(climbing.unfinished_points, places)):
-        warnings.warn(left, stacklevel=2)
-    climbs = [climbing.summarise_climbs(one.runs, within) | {"condition": one.label} for one in conditions]
+    climbs, runs = [], []
+    for one in each(lambda name: load(name, out, changes), what):
+        source, conditions = [one.directory.name] * (len(what) > 1), iter([("", [one.directory])])
+        if isinstance(one, Sweep):
+            frame = one.table()
+            conditions, left = conditions_in(frame), int((frame["status"] != "finished").sum())
+            if left:
+                told = f"{left} of {len(frame)} points are not finished and left out"
+                warnings.warn(f"{one.directory.name}: {told}", stacklevel=2)
+        for label, paths in conditions:
+            climbs.append(
+                {**summarise_climbs(paths, within), "condition": ", ".join([*source, *filter(None, [label])])}
+            )
+            runs += [path.name for path in paths]
     if to is not None:
-        write_climbs(conditions, climbs, Path(to))
+        write_climbs(climbs, runs, Path(to))
     return climbs
 
 

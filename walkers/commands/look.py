@@ -173,7 +173,7 @@ def compare(
 
 
 def climb(
-    *what: Annotated[RunOrSweep, Parameter(help="Sweeps, folders of runs, runs or cases of piles.")],
+    *what: Annotated[RunOrSweep, Parameter(help="Sweeps, runs or cases of piles.")],
     at: At = At(),
     within: Seconds | None = None,
     to: Path | None = None,
@@ -190,6 +190,6 @@ def climb(
     """
     from walkers.sweeps.climbing import describe_climbs
 
-    refuse("RUN|SWEEP", not what, "expected sweeps, folders of runs, runs or cases of piles")
+    refuse("RUN|SWEEP", not what, "expected sweeps, runs or cases of piles")
     found = walkers.climb(what, at.out, at.values, within=within, to=to)
-    print_as(as_json, lambda: found, lambda: "\n".join(map(describe_climbs, found)))
+    print_as(as_json, lambda: found, lambda: describe_climbs(found))

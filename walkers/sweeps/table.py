@@ -303,6 +303,25 @@ def value_text(value: Any, unit: str | None = None) -> str:
     return f"{text} {unit}" if unit and not isinstance(value, str) else text
 
 
+def key_values(frame: pd.DataFrame, key: str) -> tuple[list[Any], str | None]:
+    """The values of a varied key at each point of a sweep's table, lists of keys with several numbers; their unit."""
+    names = [name for name in frame.attrs["varied"] if name == key or name.startswith(f"{key}[")]
+    rows = frame[names].astype(object)
+    values = rows[key].tolist() if names == [key] else [row.dropna().tolist() for _, row in rows.iterrows()]
+    return values, frame.attrs["units"][names[0]]
+
+
+def key_texts(frame: pd.DataFrame) -> pd.DataFrame:
+    """The values of the varied keys at each point of a sweep's table as text with units; a column for each key."""
+    import pandas as pd
+
+    texts = {}
+    for key in (key for axis in frame.attrs["axes"] for key in axis):
+        values, unit = key_values(frame, key)
+        texts[key] = [value_text(value, unit) for value in values]
+    return pd.DataFrame(texts, index=frame.index, dtype=object)
+
+
 def encoded(frame: pd.DataFrame, form: str) -> bytes:
     """A sweep's table as CSV (units in the head), JSON (with units and meanings) or parquet (units in the metadata)."""
     units, meanings = frame.attrs["units"], frame.attrs["meanings"]

@@ -1,0 +1,248 @@
+"""Statistics of climbs: a made-up pile with three climbs, worked out by hand or by a second formula; a real sweep."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from itertools import combinations, product
+from math import exp, log, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+import pytest
+from scipy.stats import poisson
+
+import walkers
+from tests.conftest import call, to_toml
+from walkers.inputs.reading import shipped
+from walkers.runner.files import read_json
+from walkers.sweeps.climbing import PARTS, conditions_in, leaders, summary, survival, texts_of
+from walkers.sweeps.climbing_figure import table_of
+
+BEADS, LARGE, LENGTH = 20, 4, 10.0
+CLIMB: dict[str, Any] = {"speed": 2e-3, "height": 0.01, "out_of_pile": True, "large": 1, "leader_large": True}
+CLIMBS = pd.DataFrame(
+    [
+        CLIMB | {"onset": 6.0, "qualified": 7.0, "wall_names": "+x +y", "leader": 1, "leader_large": False, "size": 4},
+        CLIMB | {"onset": 1.5, "qualified": 2.0, "wall_names": "+x", "leader": 0, "size": 2},
+        CLIMB
+        | {"onset": 3.0, "qualified": 4.0, "wall_names": "-y", "leader": 0, "size": 3, "speed": 4e-3}
+        | {"out_of_pile": False},
+    ]
+).assign(pile=[0, 0, 1])
+"""Climbs of four runs of 10 s; the first climb of the first run is the second in the table."""
+GARWOOD = {0: (0.0, 3.6889), 1: (0.0253, 5.5716), 2: (0.2422, 7.2247), 3: (0.6187, 8.7673)}
+"""Exact 95 % intervals of the mean of a Poisson distribution by the observed number, as tabulated."""
+FloatArray = npt.NDArray[np.float64]
+
+
+def piles(lengths: Any) -> pd.DataFrame:
+    return pd.DataFrame({"beads": BEADS, "large": LARGE, "driven": np.asarray(lengths, dtype=float)})
+
+
+PILES = piles([LENGTH] * 4)
+
+
+def drawn(begins: Any, lengths: Any, takes: float, within: float | None = None, **columns: Any) -> dict[str, Any]:
+    """`summary` of runs whose first climbs began so and take so long to gain enough, where the run shows that, s."""
+    rows = pd.DataFrame([CLIMB | {"size": 2, "leader": 0, "wall_names": "+x"}] * len(begins)).assign(**columns)
+    rows = rows.assign(pile=range(len(begins)), onset=begins, qualified=np.add(begins, takes))
+    return summary(piles(lengths), rows[rows["qualified"] <= lengths], within)
+
+
+def test_a_rate_has_the_exact_interval_of_a_poisson_distribution() -> None:
+    """Each end leaves 2.5 %: so many climbs or more at the lower end, so many or fewer at the upper one."""
+    found = summary(PILES, CLIMBS)
+    for part, climbs in {"": 3, "on_plain_walls": 2, "in_corners": 1, "out_of_pile": 2}.items():
+        one = found[part] if part else found
+        assert (one["climbs"], one["seconds"], one["rate"]) == (climbs, 40.0, pytest.approx(climbs / 40.0)), part
+        low, high = np.array(one["rate_interval"]) * 40.0
+        assert (low, high) == pytest.approx(GARWOOD[climbs], abs=6e-5), part
+        assert (poisson.sf(climbs - 1, low), poisson.cdf(climbs, high)) == pytest.approx((0.025, 0.025)), part
+    # Of first climbs, 2 in 2 + 4 + 10 + 10 seconds.
+    assert found["first_rate"] == pytest.approx(2.0 / 26.0)
+    assert np.array(found["first_rate_interval"]) * 26.0 == pytest.approx(GARWOOD[2], abs=6e-5)
+    none = summary(PILES[2:], CLIMBS[:0])
+    assert (none["rate"], none["dispersion"]) == (0.0, None)
+    assert np.array(none["rate_interval"]) * 20.0 == pytest.approx(GARWOOD[0], abs=6e-5)
+
+
+def test_climbs_within_a_time_are_those_of_the_runs_cut_there() -> None:
+    found = summary(PILES, CLIMBS, within=5.0)
+    assert (found["within"], found["seconds"], found["climbs"], found["climbed"]) == (5.0, 20.0, 2, 2)
+    assert found["rate"] == pytest.approx(2.0 / 20.0)
+    assert found["first_rate"] == pytest.approx(2.0 / (2.0 + 4.0 + 5.0 + 5.0))
+    # Counts 1, 1, 0, 0: mean 1/2, variance (4 × 1/4)/3.
+    assert found["dispersion"] == pytest.approx(2.0 / 3.0)
+
+
+def test_times_dispersion_and_probability_of_three_climbs() -> None:
+    found = summary(PILES, CLIMBS)
+    assert (found["within"], found["times"], found["onsets"]) == (LENGTH, [2.0, 4.0], [1.5, 3.0])
+    assert (found["median"], found["censored"], found["ended"]) == (4.0, 2, 0)
+    assert sorted(found["speeds"]) == [2e-3, 2e-3, 4e-3]
+    assert (sorted(found["sizes"]), found["led_by_large"]) == ([2, 3, 4], 2)
+    # Two of four, Clopper and Pearson: p with (1-p)⁴ + 4p(1-p)³ + 6p²(1-p)² = 0.025 at the upper end.
+    assert (found["probability"], found["estimator"]) == (0.5, "Clopper-Pearson")
+    assert found["interval"] == pytest.approx([0.0676, 0.9324], abs=6e-5)
+    # Counts 2, 1, 0, 0: mean 3/4, variance (25/16 + 1/16 + 18/16)/3 = 11/12.
+    assert found["dispersion"] == pytest.approx(11.0 / 12.0 / 0.75)
+    printed = texts_of({**found, "condition": ""})
+    assert (printed["climbed"], printed["half by (s)"], printed["led by large"]) == ("2 of 4", "4", "2 of 3")
+    assert (printed["rate"], printed["in corners"]) == ("0.075 (0.015 to 0.22)", "0.025 (0.00063 to 0.14)")
+    assert (printed["beads"], printed["speed (mm/s)"], printed["median speed (mm/s)"]) == ("2 to 4", "2 to 4", "2")
+
+
+def test_the_share_of_runs_of_all_lengths_is_kaplans_and_meiers() -> None:
+    """Climbs after 1, 3 and 4 s, ends without one after 2, 5 and 6 s: 6, then 4, then 3 piles were at risk."""
+    first, watched = np.array([1.0, np.inf, 3.0, 4.0, np.inf, np.inf]), np.array([7.0, 2.0, 7.0, 7.0, 5.0, 6.0])
+    found = survival(first, watched, 4.5)
+    stay = 5.0 / 6.0 * 3.0 / 4.0 * 2.0 / 3.0
+    assert (found["climbed"], found["ended"], found["censored"], found["median"]) == (3, 1, 3, 4.0)
+    assert (found["probability"], found["estimator"]) == (pytest.approx(1.0 - stay), "Kaplan-Meier")
+    # Greenwood's variance of ln(-ln S).
+    deviation = sqrt(1.0 / (6.0 * 5.0) + 1.0 / (4.0 * 3.0) + 1.0 / (3.0 * 2.0)) / -log(stay)
+    ends = [1.0 - stay ** exp(sign * 1.959964 * deviation) for sign in (-1.0, 1.0)]
+    assert found["interval"] == pytest.approx(ends, abs=1e-6)
+
+
+def test_runs_that_climbers_ended_tell_of_later_times() -> None:
+    """Two piles have climbed, and their climbers left. A third has not by 2.5 s: nobody knows after that."""
+    left = survival(np.array([1.0, 2.0]), np.array([3.0, 3.5]), 5.0)
+    assert (left["probability"], left["interval"]) == (1.0, pytest.approx([0.025**0.5, 1.0]))
+    half = survival(np.array([1.0, np.inf]), np.array([1.5, 3.5]), 3.0)  # one of two, Clopper and Pearson
+    assert half["interval"] == pytest.approx([1.0 - 0.975**0.5, 0.975**0.5])
+    assert survival(np.array([1.0, 2.0, np.inf]), np.array([3.0, 3.5, 2.5]), 5.0)["probability"] is None
+
+
+def test_as_many_large_leaders_by_chance_are_enumerated() -> None:
+    """Two of three leaders are large; as many by chance, over all ways to deal the labels and to choose leaders."""
+    found = leaders(PILES, CLIMBS)
+    first = [sum(bead < LARGE for bead in pair) for pair in combinations(range(BEADS), 2)]
+    second = [bead < LARGE for bead in range(BEADS)]
+    among_beads = np.mean([one + other >= 2 for one, other in product(first, second)])
+    assert found["p_among_beads"] == pytest.approx(among_beads, abs=0.01)
+    # One large bead each in clusters of 4, 2 and 3.
+    led = [sum(place == 0 for place in leaders) for leaders in product(range(4), range(2), range(3))]
+    assert found["p_among_own"] == pytest.approx(np.mean([one >= 2 for one in led]), abs=0.015)
+    assert found["share_of_large"] == LARGE / BEADS
+    # One bead that leads twice counts twice: 4 of 20 beads are large.
+    twice = leaders(PILES, CLIMBS[1:2].iloc[[0, 0]])
+    assert twice["p_among_beads"] == pytest.approx(LARGE / BEADS, abs=0.02)
+
+
+def test_a_longer_run_does_not_make_climbs_likelier() -> None:
+    """The same piles, shaken for 2 s and for 8 s: what began within 2 s and gained enough later is no climb by then."""
+    begins = np.random.default_rng(1).exponential(2.0, 40)
+    short, long = (drawn(begins, np.full(40, seconds), 1.0, within=2.0) for seconds in (2.0, 8.0))
+    assert short["climbed"] == (begins <= 1.0).sum() < (begins <= 2.0).sum()
+    for key in ("climbed", "probability", "interval", "climbs", "onsets"):
+        assert short[key] == long[key], key
+
+
+def test_climbers_that_hung_on_a_wall_since_the_pouring_can_be_left_out() -> None:
+    found = drawn([0.5, 1.0, 1.5, 2.0], np.full(4, 8.0), 1.0, out_of_pile=[False, True, False, True])
+    assert (found["climbed"], found["out_of_pile"]["climbed"]) == (4, 2)
+    assert found["out_of_pile"]["onsets"] == [1.0, 2.0]
+    assert found["median"] == 2.0  # half have qualified then; half had begun a second before
+
+
+def test_runs_of_different_lengths_tell_one_probability() -> None:
+    """Times to the first climb drawn from an exponential distribution, runs that end before it from another."""
+    draw = np.random.default_rng(1)
+    begins, driven = draw.exponential(2.0, 400), draw.uniform(0.5, 6.0, 400)
+    found = drawn(begins, driven, 0.0, within=3.0)
+    expected = 1.0 - np.exp(-3.0 / 2.0)
+    assert found["probability"] == pytest.approx(expected, abs=0.06)
+    assert found["climbed"] / found["runs"] < expected - 0.05  # as if those that had ended had not climbed
+    assert found["median"] == pytest.approx(2.0 * np.log(2.0), abs=0.2)
+    assert found["censored"] == (begins > np.minimum(driven, 3.0)).sum()
+    assert found["ended"] == (begins > driven)[driven < 3.0].sum()
+    assert drawn(begins, driven, 0.0, within=7.0)["probability"] is None
+
+
+def test_the_parts_of_climbs_are_judged_at_the_time_of_the_whole() -> None:
+    """Three runs: two climb, on a plain wall after 6 s and in a corner after 2 s; the third ends at 8 s."""
+    found = drawn([5.0, 1.0, 20.0], np.array([9.0, 7.0, 8.0]), 1.0, wall_names=["+x", "+x +y", "+x"])
+    parts = [found, found["on_plain_walls"], found["in_corners"]]
+    assert [one["within"] for one in parts] == [8.0] * 3
+    assert [one["probability"] for one in parts] == pytest.approx([2 / 3, 1 / 3, 1 / 3])
+
+
+def test_a_band_of_the_share_that_has_climbed_does_not_fall() -> None:
+    """Greenwood's band: both ends of it grow with time, as the share does."""
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        found = drawn(random.exponential(4.0, 14), random.uniform(1.0, 9.0, 14), 0.0)
+        json.dumps(found["curve"], allow_nan=False)
+        curve = pd.DataFrame(found["curve"]).astype(float)
+        assert curve["probability"].is_monotonic_increasing
+        inside = curve.dropna()
+        assert ((inside["low"] <= inside["probability"]) & (inside["probability"] <= inside["high"])).all()
+        assert inside["high"].is_monotonic_increasing, seed
+
+
+def test_the_table_of_climbs_has_a_row_of_numbers_for_each_part() -> None:
+    rows = table_of([{**summary(PILES, CLIMBS), "condition": "few"}]).set_index("where")
+    for where, climbs in {"all": 3, "plain walls": 2, "corners": 1}.items():
+        row = rows.loc[where]
+        assert (row["condition"], row["runs"], row["climbs"]) == ("few", 4, climbs)
+        assert (row["rate_low"] * 40.0, row["rate_high"] * 40.0) == pytest.approx(GARWOOD[climbs], abs=6e-5)
+    assert (rows["probability"]["all"], rows["probability"]["corners"]) == (0.5, 0.25)
+    ends = (rows["probability_low"]["all"], rows["probability_high"]["all"])
+    assert ends == pytest.approx((0.0676, 0.9324), abs=6e-5)
+
+
+def test_conditions_are_named_by_what_is_not_usual() -> None:
+    """Of one key at a time, the seeds and lists of numbers among them; the last point is not finished."""
+    columns = {"run.seed": "", "mixture.large[0]": "mm", "mixture.large[1]": "mm", "drive.frequency": "Hz"}
+    rows = [
+        (seed, *values)
+        for seed in (1, 2)
+        for values in ((0.5, 0.6, 170.0), (0.4, 0.4, 170.0), (0.5, 0.6, 100.0), (0.5, 0.6, 250.0))
+    ]
+    frame = pd.DataFrame(rows, columns=list(columns)).assign(run=list("01234567"), status=["finished"] * 7 + [""])
+    frame.attrs |= {"units": columns, "varied": list(columns), "sweep": ""}
+    frame.attrs["axes"] = [("run.seed",), ("mixture.large", "drive.frequency")]
+    assert {label: [path.name for path in runs] for label, runs in conditions_in(frame)} == {
+        "": ["0", "4"],
+        "mixture.large = 0.4/0.4 mm": ["1", "5"],
+        "drive.frequency = 100 Hz": ["2", "6"],
+        "drive.frequency = 250 Hz": ["3"],
+    }
+
+
+def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
+    """Two starts that do not climb."""
+    tables = tomllib.loads(shipped("case")["pile-ci"].read_text())
+    tables["run"] |= {"duration": "0.02 s", "time_step": "3 us", "longest_settling": "0.05 s"}
+    (tmp_path / "base.toml").write_text(to_toml(tables))
+    (tmp_path / "starts.toml").write_text('case = "base.toml"\n[axes]\nrun.seed = [1, 2]\n')
+    starts = walkers.sweep(tmp_path / "starts.toml", tmp_path / "runs", jobs=1)
+    frame, out = starts.table(), ("--out", str(tmp_path / "runs"))
+    assert frame[["beads", "climbs"]].to_numpy().tolist() == [[60, 0]] * 2
+    assert frame["surface_end"].between(1e-3, 9e-3).all()
+    printed = json.loads(call("climb", "starts", *out, "--json", check=True).stdout)
+    (found,) = printed
+    assert (found["condition"], found["runs"], found["climbed"], found["each"]) == ("", 2, 0, [])
+    assert found["interval"] == pytest.approx([0.0, 1.0 - 0.025**0.5])  # none of two, Clopper and Pearson
+    upper = 3.6889 / found["seconds"]  # of no event (Garwood 1936)
+    assert [found[part]["rate_interval"] for part in PARTS] == [pytest.approx([0.0, upper], rel=1e-4)] * 3
+    to = tmp_path / "climbs"
+    run = str(starts.runs[0].directory)
+    for form, within in ((".csv", "1s"), (".svg", "10ms")):
+        done = call("climb", "starts", run, *out, "--to", f"{to}{form}", "--within", within, check=True).stdout
+        assert [done.count(f"0 of {number}\n") for number in (2, 1)] == [1, 1], done
+    written = pd.read_csv(f"{to}.csv")
+    assert written["condition"].drop_duplicates().to_list() == ["starts", starts.runs[0].directory.name]
+    assert written["rate_high"].to_list()[:3] == pytest.approx([upper] * 3, rel=1e-4)
+    assert "share that has climbed" in Path(f"{to}.svg").read_text()
+    manifest = starts.runs[1].directory / "manifest.json"
+    assert read_json(manifest)
+    manifest.unlink()
+    done = call("climb", "starts", *out, check=True)
+    assert "0 of 1\n" in done.stdout
+    assert "walkers: warning: starts: 1 of 2 points are not finished and left out\n" in done.stderr
