@@ -40,7 +40,6 @@ class _Frame(NamedTuple):
     start: int
     end: int
     step: int
-    rows: int
     parts: list[tuple[int, int]]
 
 
@@ -61,38 +60,34 @@ class BinaryDump:
     """
 
     def __init__(self, path: Path, columns: tuple[str, ...]) -> None:
-        self.path, self.columns = path, columns
+        self.path, self.columns, self.truncated = path, columns, False
         self._bytes = np.memmap(path, np.uint8, "r").data if path.stat().st_size else memoryview(b"")
         self._frames: list[_Frame] = []
-        offset = 0
-        while offset < len(self._bytes) and (frame := self._frame_at(offset)) is not None:
-            self._frames.append(frame)
-            offset = frame.end
-        self.truncated = offset < len(self._bytes)
+        try:
+            while (end := self._frames[-1].end if self._frames else 0) < len(self._bytes):
+                self._frames.append(self._frame_at(end))
+        except struct.error:
+            self.truncated = True
         self.steps = np.array([frame.step for frame in self._frames], dtype=np.int64)
 
     def __len__(self) -> int:
         return len(self._frames)
 
-    def _frame_at(self, start: int) -> _Frame | None:
-        """The frame that begins at an offset; None if the file ends within it."""
-        if start + _HEADER.size > len(self._bytes):
-            return None
+    def _frame_at(self, start: int) -> _Frame:
+        """The frame that begins at an offset; `struct.error` if the file ends within it."""
         step, rows, *_, columns, processes = _HEADER.unpack_from(self._bytes, start)
         if columns != len(self.columns) or rows < 0 or not 1 <= processes < 1_000_000 or step < 0:
             raise DumpError(f"{self.path}: no dump of {len(self.columns)} columns (byte {start})")
         end, parts = start + _HEADER.size, []
         for _ in range(processes):
-            if end + _COUNT.size > len(self._bytes):
-                return None
             (count,) = _COUNT.unpack_from(self._bytes, end)
             parts.append((end + _COUNT.size, count))
             end += _COUNT.size + 8 * count
-            if end > len(self._bytes):
-                return None
+        if end > len(self._bytes):
+            raise struct.error
         if sum(count for _, count in parts) != rows * columns:
             raise DumpError(f"{self.path}: the parts of the frame of step {step} do not add up")
-        return _Frame(start, end, step, rows, parts)
+        return _Frame(start, end, step, parts)
 
     def stack(self) -> FloatArray:
         """All frames, shape (frames, rows, columns).
@@ -104,13 +99,12 @@ class BinaryDump:
         NoNumberError
             If there is a NaN or an infinity.
         """
-        rows = {frame.rows for frame in self._frames} or {0}
-        if len(rows) > 1:
+        sizes = {sum(count for _, count in frame.parts) for frame in self._frames}
+        if len(sizes) > 1:
             raise DumpError(f"{self.path}: the number of beads changes")
-        data = np.empty((len(self), rows.pop() * len(self.columns)))
-        for values, frame in zip(data, self._frames, strict=True):
+        data = np.empty((len(self), max(sizes, default=0) // len(self.columns), len(self.columns)))
+        for values, frame in zip(data.reshape(len(self), -1) if data.size else (), self._frames, strict=False):
             np.concatenate([np.frombuffer(self._bytes, float, count, at) for at, count in frame.parts], out=values)
-        data = data.reshape(len(self), -1, len(self.columns)) if data.size else np.empty((0, 0, len(self.columns)))
         if not np.isfinite(data).all():
             frame, _, column = (places[0] for places in np.nonzero(~np.isfinite(data)))
             raise NoNumberError(f"{self.path}: {self.columns[column]} is not a number at step {self.steps[frame]}")

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -239,15 +239,10 @@ def between(moved: Motion | Group, share: float) -> FloatArray:
 
 def came_near(centre: FloatArray, near: float) -> bool:
     """Whether two of W points, shape (F, W, 2), ever came within a distance of each other."""
-    # Only points whose ranges overlap can have met: of a thousand, a few pairs remain.
-    middle = (centre.max(axis=0) + centre.min(axis=0)) / 2.0
-    reach = np.linalg.norm(centre - middle, axis=-1).max(axis=0)
-    for number in range(len(middle) - 1):
-        apart = np.linalg.norm(middle[number + 1 :] - middle[number], axis=-1)
-        within = number + 1 + np.flatnonzero(apart < reach[number + 1 :] + reach[number] + near)
-        if np.any(np.linalg.norm(centre[:, within] - centre[:, number, None], axis=-1) < near):
-            return True
-    return False
+    return any(
+        np.linalg.norm(centre[:, number:] - centre[:, number - 1, None], axis=-1).min() < near
+        for number in range(1, centre.shape[1])
+    )
 
 
 def read_motion(directory: str | Path) -> Motion:
@@ -269,53 +264,43 @@ def read_motion(directory: str | Path) -> Motion:
     (241, 6, 3)
     """
     directory = Path(directory)
-    case = case_of(directory)
-    segments = [_opened(path) for path in segment_directories(directory)]
-    if not segments:
+    case, paths = case_of(directory), segment_directories(directory)
+    if not paths:
         raise DumpError(f"{directory}: no segment of the run is finished yet")
     try:
-        return _joined(case, segments)
+        return _joined(case, paths)
     except NoNumberError as error:
         finished = (directory / MANIFEST_NAME).is_file()  # then its dumps contained no such numbers
         message = "the dump was damaged after the run was finished" if finished else "the simulation blew up"
         raise DumpError(f"{error}: {message}") from error
 
 
-class _Segment(NamedTuple):
-    """A segment: its directory; first and last step, and the step at which the drive begins; layout, bead dump."""
-
-    path: Path
-    begin: int
-    end: int
-    drive_from: int | None
-    layout: Layout
-    dump: BinaryDump
-
-
-def _opened(path: Path) -> _Segment:
+def _opened(path: Path) -> tuple[dict[str, Any], Layout, BinaryDump]:
+    """Record, layout and bead dump of a segment."""
     place = path / SEGMENT_NAME
     try:
         record = read_json(place)
-        begin, end, drive_from = (record[name] for name in ("begin", "end", "drive_from"))
+        record = {name: record[name] for name in ("begin", "end", "drive_from")}
         place = path
         layout = layout_of(path)
-        dump = BinaryDump(path / layout.bead_dump, layout.bead_columns)
-        return _Segment(path, begin, end, drive_from, layout, dump)
+        return record, layout, BinaryDump(path / layout.bead_dump, layout.bead_columns)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DumpError(f"{place}: cannot be read ({error})") from error
 
 
-def _frames_of(case: Case, segments: Sequence[_Segment]) -> tuple[FloatArray, list[int], list[tuple[Path, int]]]:
-    """All frames, shape (frames, beads, columns), the step of each, and its segment and number there."""
+def _joined(case: Case, paths: Sequence[Path]) -> Motion:
+    """The motion over all segments."""
     steps: list[int] = []
     stacks: list[FloatArray] = []
     frames: list[tuple[Path, int]] = []
-    for path, begin, end, _, layout, dump in segments:
-        if begin != (steps[-1] if steps else 0):
+    start = None  # step
+    for path in paths:
+        record, layout, dump = _opened(path)
+        if record["begin"] != (steps[-1] if steps else 0):
             raise DumpError(f"{path}: the segment before it is missing")
         data = dump.stack()
-        whole = len(data) and not dump.truncated and dump.steps[-1] == end
-        if not whole and (len(segments) > 1 or case.run.rests):
+        whole = len(data) and not dump.truncated and dump.steps[-1] == record["end"]
+        if not whole and (len(paths) > 1 or case.run.rests):
             raise DumpError(f"{path}: its dump is incomplete")
         if len(data) < 2:
             raise DumpError(f"{dump.path}: {len(data)} complete frames, too few for a motion")
@@ -325,40 +310,43 @@ def _frames_of(case: Case, segments: Sequence[_Segment]) -> tuple[FloatArray, li
         stacks.append(data[first:])
         steps += dump.steps[first:].tolist()
         frames += [(path, number) for number in range(first, len(data))]
-    return np.concatenate(stacks) if len(stacks) > 1 else stacks[0], steps, frames
+        start = record["drive_from"] if start is None else start
+    data = np.concatenate(stacks) if len(stacks) > 1 else stacks[0]
+    moved = _motion(case, data, np.array(steps, dtype=np.float64), start, layout)
+    cycles = record["end"] // case.run.steps_per_cycle if case.run.until_steady else case.run.cycles
+    return replace(
+        moved,
+        case=case.for_cycles(cycles) if case.run.until_steady else case,
+        frames=frames,
+        truncated=dump.truncated,
+        ended_early=cycles < case.run.cycles,
+    )
 
 
-def _joined(case: Case, segments: Sequence[_Segment]) -> Motion:
-    """The motion over all segments."""
-    data, steps, frames = _frames_of(case, segments)
-    _, _, end, _, layout, dump = segments[-1]
-    cycles = end // case.run.steps_per_cycle if case.run.until_steady else case.run.cycles
-    # Before the drive, time is measured from the next frame.
-    starts = [segment.drive_from for segment in segments if segment.drive_from is not None]
-    start = starts[0] if starts else steps[-1] + case.run.steps_per_sample
-    time = (np.array(steps, dtype=np.float64) - start) * case.run.time_step
+def _motion(case: Case, data: FloatArray, steps: FloatArray, start: int | None, layout: Layout) -> Motion:
+    """The motion of frames at these steps; the drive begins at step ``start``, or in the frame after the last one."""
+    time = (steps - (steps[-1] + case.run.steps_per_sample if start is None else start)) * case.run.time_step
     shift, speed = prescribed_motion(case.excitation, time)
-    if starts and start:  # in the last frame at rest the walls do not move yet
+    if start:  # in the last frame at rest the walls do not move yet
         speed[time == 0.0] = 0.0
     shaken = (shift, speed) if case.drive.frame == "lab" else boundary_motion(case.excitation, time)
 
     def vectors(name: str) -> FloatArray:
-        column = dump.column(name)
+        column = layout.bead_columns.index(name)
         return data[:, :, column : column + 3]
 
     return Motion(
-        case=case.for_cycles(cycles) if case.run.until_steady else case,
+        case=case,
         time=time,
         position=vectors("x") - shift[:, None],
         velocity=vectors("vx") - speed[:, None],
         spin=vectors("omegax"),
         substrate=shaken[0],
         substrate_velocity=shaken[1],
-        radius=data[0, :, dump.column("radius")],
+        radius=data[0, :, layout.bead_columns.index("radius")],
         walkers=tuple(replace(one, beads=tuple(bead - 1 for bead in one.beads)) for one in layout.walkers),
-        frames=frames,
-        truncated=any(segment.dump.truncated for segment in segments),
-        ended_early=cycles < case.run.cycles,
+        frames=[],
+        truncated=False,
         mean_spin=vectors(MEAN_SPIN_COLUMNS[0]) if MEAN_SPIN_COLUMNS[0] in layout.bead_columns else None,
     )
 

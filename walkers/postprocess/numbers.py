@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from math import isfinite, nan
 from typing import TYPE_CHECKING, Any
@@ -45,9 +45,22 @@ class Row:
 MAIN = ("velocity", "right_facing", "axial_velocity", "climbs", "highest", "speed")
 """Main numbers, of which a spread measures bands."""
 _BAND = {"low": "5 %", "high": "95 %"}
-_ENDS = {name: f"{share} of the draws over the ranges of uncertain values" for name, share in _BAND.items()}
-_ENDS |= {"error": "numerical error, of time step and stiffness"}
-"""Ends of names: of bands, and of numerical errors."""
+_ENDS = {
+    **{name: (share, f"{share} of the draws over the ranges of uncertain values") for name, share in _BAND.items()},
+    "error": ("numerical error", "numerical error, of time step and stiffness"),
+}
+"""Ends of names of bands and of numerical errors, as in ``velocity_low``: words of their labels, meaning."""
+
+
+def _with_ends(number: Quantity) -> Iterator[Quantity]:
+    """A number, both ends of its band, and its numerical error."""
+    yield number
+    for end, (words, meaning) in _ENDS.items():
+        name, label, meant = f"{number.name}_{end}", f"{number.label}, {words}", f"{meaning}: {number.meaning}"
+        yield Quantity(name, number.unit, label, meant)
+
+
+_DECLARED = {quantity.name: quantity for number in NUMBERS.values() for quantity in _with_ends(number)}
 ASIDE = frozenset(
     {
         *("scatter", "smallest", "largest", "right_scatter", "left_scatter", "numerical_error"),
@@ -73,12 +86,7 @@ _IF_ANY = (
 
 def declared(name: str) -> Quantity:
     """The quantity of a number; ``velocity_low`` is an end of the band of ``velocity``. `KeyError` if there is none."""
-    with suppress(KeyError):
-        return declared_in(name, NUMBERS.values())
-    stem, _, end = name.rpartition("_")
-    whole = declared_in(stem, NUMBERS.values() if end in _ENDS else ())
-    label = f"{whole.label}, {_BAND.get(end, 'numerical error')}"
-    return replace(whole, name=name, label=label, meaning=f"{_ENDS[end]}: {whole.meaning}", error="")
+    return _DECLARED[name] if name in _DECLARED else declared_in(name, NUMBERS.values())
 
 
 def is_error(name: str) -> bool:
@@ -95,14 +103,8 @@ def is_declared(name: str) -> bool:
 
 def ordered(names: Iterable[str]) -> list[str]:
     """Names of numbers in the order of their declarations; both ends of a band follow the number."""
-    places = {name: place for place, name in enumerate(NUMBERS)}
-
-    def place_of(name: str) -> tuple[int, str, int]:
-        stem, _, end = name.rpartition("_")
-        bare, further = (stem, [*_ENDS].index(end) + 1) if end in _ENDS and name not in places else (name, 0)
-        return places.get(bare, places.get(f"{bare.rpartition('_')[0]}_*", -1)), bare, further
-
-    return sorted(names, key=place_of)
+    places = {name: place for place, name in enumerate(_DECLARED)}
+    return sorted(names, key=lambda name: (places.get(name, places.get(f"{name.rpartition('_')[0]}_*", -1)), name))
 
 
 def headline(numbers: Mapping[str, Any]) -> str:

@@ -219,35 +219,24 @@ def text(results: Results, *, cached: bool = False) -> str:
     first, *rest = headlines(results)
     if cached and not results.about["by_hand"]:  # it was never made by a command
         first += " (already run)"
-    table = [(one.label, one.text, one.unit, one.error) for one in rows(results)]
-    wide = [max((len(row[place]) for row in table), default=0) for place in range(3)]
+    table = [(row.label, row.text, row.unit, row.error) for row in rows(results)]
+    label, value, unit = (max((len(row[place]) for row in table), default=0) for place in range(3))
+    main, rests, unmeasured = headline(results), results.about["rests_on"], []
+    if "velocity" in results and "numerical_error" not in results:
+        unmeasured.append("numerical error (--accuracy)")
+    if main and f"{main}_low" not in results and any(one["range"] for one in rests):
+        unmeasured.append("band over the ranges of these values (--spread)")
     return "\n".join(
         [
             first,
             *(f"  {line}" for line in rest),
-            *(
-                f"  {label:{wide[0]}}  {value:>{wide[1]}} {unit:{wide[2]}}  {error}".rstrip()
-                for label, value, unit, error in table
-            ),
+            *(f"  {row[0]:{label}}  {row[1]:>{value}} {row[2]:{unit}}  {row[3]}".rstrip() for row in table),
             *(f"  warning: {warning}" for warning in results.warnings),
-            *lines_of_rest(results.about["rests_on"]),
-            *_not_measured(results),
+            *lines_of_rest(rests),
+            *([f"  unmeasured {', '.join(unmeasured)}"] if unmeasured else []),
             f"  run        {results.directory}",
         ]
     )
-
-
-def _not_measured(results: Results) -> Iterator[str]:
-    """A line about the errors that are not measured, and the options that measure them."""
-    main = headline(results)
-    errors = {
-        "numerical error (--accuracy)": "velocity" in results and "numerical_error" not in results,
-        "band over the ranges of these values (--spread)": bool(main)
-        and f"{main}_low" not in results
-        and any(one["range"] for one in results.about["rests_on"]),
-    }
-    if missing := [error for error, lacks in errors.items() if lacks]:
-        yield f"  unmeasured {', '.join(missing)}"
 
 
 def headlines(results: Results) -> list[str]:
