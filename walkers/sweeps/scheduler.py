@@ -19,12 +19,12 @@ import threading
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import ceil
+from math import ceil, inf
 from pathlib import Path
 from platform import node
 from typing import TYPE_CHECKING
@@ -131,40 +131,36 @@ class PlannedDeck:
     seconds: float
 
 
-def pack(cases: Mapping[int, Case], workers: int, longest_seconds: float = LONGEST_SECONDS) -> list[PlannedDeck]:
-    """Pack points, by number, into decks for a number of workers; the longest decks come first.
+def pack(cases: Sequence[Case], workers: int, longest_seconds: float = LONGEST_SECONDS) -> list[PlannedDeck]:
+    """Pack points into decks for a number of workers; the longest decks come first.
 
     The predicted time of a deck of several points is at most ``longest_seconds``.
     """
-    by_key: dict[Hashable, list[int]] = {}
-    for number, case in cases.items():
-        by_key.setdefault(sharing_key(case), []).append(number)
-    groups = list(by_key.values())
-    longest = max((_deck([number], cases).seconds for number in cases), default=0.0)
-    lengths = [longest]
-    if len(groups) < len(cases):
-        whole = sum(_deck(group, cases).seconds for group in groups)
-        lengths = [2.0 * max(whole / workers, longest) * 2.0 ** (-number / 4) for number in range(_TRIALS)]
-    plans = [
-        [deck for group in groups for deck in _parted(group, cases, min(length, longest_seconds))] for length in lengths
-    ]
+    groups: dict[Hashable, list[int]] = {}
+    for number, case in enumerate(cases):
+        groups.setdefault(sharing_key(case), []).append(number)
+    whole = sum(_deck(group, cases).seconds for group in groups.values())
+    longest = max(_deck([number], cases).seconds for number in range(len(cases)))
+    plans = []
+    for trial in range(_TRIALS if len(groups) < len(cases) else 1):
+        length = min(2.0 * max(whole / workers, longest) * 2.0 ** (-trial / 4), longest_seconds)
+        plans.append([deck for group in groups.values() for deck in _parted(group, cases, length)])
     spans = [makespan((deck.seconds for deck in plan), workers) for plan in plans]
     # Of plans that take equally long: the one with the smallest decks.
     good = max(number for number, span in enumerate(spans) if span <= _AS_GOOD * min(spans))
     return sorted(plans[good], key=lambda deck: -deck.seconds)
 
 
-def _parted(group: Sequence[int], cases: Mapping[int, Case], longest: float) -> list[PlannedDeck]:
+def _parted(group: Sequence[int], cases: Sequence[Case], longest: float) -> list[PlannedDeck]:
     """The smallest number of decks for a group within the limits, which do not apply to a deck of one point."""
     most_walkers = max(pairs_of_beads(cases[number]) for number in group)
-    for parts in range(1, len(group)):
-        points = ceil(len(group) / parts)
+
+    def is_possible(points: int) -> bool:
         walkers = points * most_walkers
         seconds = predicted_seconds(cases[group[0]], walkers)  # a group shares the number of steps
-        if points <= MOST_POINTS and walkers <= MOST_WALKERS and seconds <= longest:
-            break
-    else:
-        parts = len(group)
+        return points == 1 or (points <= MOST_POINTS and walkers <= MOST_WALKERS and seconds <= longest)
+
+    parts = next(parts for parts in range(1, len(group) + 1) if is_possible(ceil(len(group) / parts)))
     return [_deck(part, cases) for part in _parts(group, parts)]
 
 
@@ -174,7 +170,7 @@ def _parts(group: Sequence[int], count: int) -> list[Sequence[int]]:
     return [group[start:end] for start, end in pairwise(edges)]
 
 
-def _deck(points: Sequence[int], cases: Mapping[int, Case]) -> PlannedDeck:
+def _deck(points: Sequence[int], cases: Sequence[Case]) -> PlannedDeck:
     walkers = sum(pairs_of_beads(cases[number]) for number in points)
     return PlannedDeck(tuple(points), predicted_seconds(cases[points[0]], walkers))
 
@@ -188,30 +184,15 @@ def makespan(seconds: Iterable[float], workers: int) -> float:
     return max(ends)
 
 
-def unfinished_parts(
-    points: Sequence[int], cases: Mapping[int, Case], is_finished: Callable[[int], bool]
-) -> list[PlannedDeck]:
+def unfinished_parts(points: Sequence[int], cases: Sequence[Case], finished: Collection[int]) -> list[PlannedDeck]:
     """The unfinished part of a deck: the deck itself, or its largest halves, quarters, … without a finished point.
 
     A deck that fails is repeated as two halves. So the same decks are left whenever the sweep is interrupted.
     """
-    finished = [is_finished(number) for number in points]
-    if all(finished):
-        return []
-    if not any(finished):
+    done = [number in finished for number in points]
+    if not any(done):
         return [_deck(points, cases)]
-    return [part for half in _parts(points, 2) for part in unfinished_parts(half, cases, is_finished)]
-
-
-def _missing_decks(
-    cases: Sequence[Case], points: Sequence[int], options: Options, is_settled: Callable[[int], bool]
-) -> list[PlannedDeck]:
-    """Pack points into decks, and return the unfinished parts of these decks."""
-    numbered = {point: cases[point] for point in points}
-    # A shared deck stays well below the limit, because a single point may be close to it.
-    longest = min(LONGEST_SECONDS, 0.5 * options.time_limit) if options.time_limit else LONGEST_SECONDS
-    packed = pack(numbered, options.decks_at_once, longest) if numbered else []
-    return [part for deck in packed for part in unfinished_parts(deck.points, numbered, is_settled)]
+    return [] if all(done) else [deck for half in _parts(points, 2) for deck in unfinished_parts(half, cases, finished)]
 
 
 @dataclass(frozen=True)
@@ -262,7 +243,10 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     final = _failures(record, found, options.final)
     settled = {point for point, state in enumerate(found) if state.status == "finished"}
     settled |= {failure.point for failure in final}
-    decks = _missing_decks(cases, range(len(cases)), options, settled.__contains__)
+    # A shared deck stays well below the time limit, because a single point may be close to it.
+    longest = min(LONGEST_SECONDS, 0.5 * (options.time_limit or inf))
+    packed = pack(cases, options.decks_at_once, longest)
+    decks = [part for deck in packed for part in unfinished_parts(deck.points, cases, settled)]
     return SweepPlan(record, cases, binary, decks, [state.status for state in found], options, final)
 
 
@@ -448,7 +432,7 @@ class _Loop:
         """Second halves of failed decks, while no point is finished."""
         self.alone: Counter[tuple[str | None, str]] = Counter()
         """Failures of points alone, by name and message."""
-        self.begin, self.seconds_done = time.perf_counter(), 0.0
+        self.begin, self.seconds = time.perf_counter(), sum(deck.seconds for deck in plan.decks)
         self.found = self.done = plan.statuses.count("finished")
 
     def run(self, on_progress: Tell) -> list[Failure]:
@@ -491,12 +475,9 @@ class _Loop:
             self.failures.append(Failure(left[0], run, report.failure, report.message, report.directory))
             self._check_alike(report)
         elif left:  # without a failure another process was making these points
-            first, *second = _parts(left, 2) if report.failure else [left]
-            parts = [PlannedDeck(tuple(part), deck.seconds * len(part) / len(deck.points)) for part in (first, *second)]
-            self._submit(parts[0])
-            self.halves += parts[1:]
-            self.seconds_done -= sum(part.seconds for part in parts)
-        self.seconds_done += deck.seconds
+            first, *second = (_deck(part, self.plan.cases) for part in _parts(left, 2 if report.failure else 1))
+            self._submit(first)
+            self.halves += second
 
     def _check_alike(self, report: Report) -> None:
         """Raise `SweepStopped` if the first points all failed alone in the same way, but not by their parameters."""
@@ -516,7 +497,7 @@ class _Loop:
         if made := self.done - self.found:
             each = elapsed / made
             words.append(f"{60.0 / each:.0f} points per minute" if each < 10.0 else f"{duration_text(each)} per point")
-        if self.seconds_done:
-            waiting = sum(deck.seconds for deck in [*self.decks.values(), *self.halves])
-            words.append(f"{duration_text(waiting / self.seconds_done * elapsed)} left")
+        waiting = sum(deck.seconds for deck in [*self.decks.values(), *self.halves])
+        if waiting < self.seconds:
+            words.append(f"{duration_text(waiting / (self.seconds - waiting) * elapsed)} left")
         return Progress((self.done + failed) / max(points, 1), ", ".join(words))
