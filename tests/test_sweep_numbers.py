@@ -23,7 +23,7 @@ from walkers.runner.directory import case_of
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.sweeps.comparison import Side, compare_runs
-from walkers.sweeps.scheduler import Options, makespan, pack, run_sweep
+from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.spread import spread_in
 from walkers.sweeps.table import groups, load, thresholds
 
@@ -110,18 +110,6 @@ def test_a_descents_thresholds_have_the_gamma0_of_their_own_drives() -> None:
         expected = [mass * 9.80665 * g / force for g in (moving, at_rest)]
         assert [row["gamma0_moving"], row["gamma0_at_rest"]] == pytest.approx(expected, rel=0.05)
         assert row["gamma0_moving"] / row["gamma0_at_rest"] == pytest.approx(moving / at_rest)
-
-
-# --- plans of decks ---------------------------------------------------------------------------------------------------
-
-
-def test_of_plans_that_take_as_long_the_smallest_decks_are_made() -> None:
-    """A long point takes a core for as long as eight short ones would take together, however they are dealt."""
-    run = {"time_step": "2 us", "cycles": 12}
-    cases = dict.fromkeys(range(8), make_case(run=run)) | {8: make_case(run=run | {"cycles": 160})}
-    decks = pack(cases, 2)
-    assert [deck.points for deck in decks] == [(8,), *((number,) for number in range(8))]
-    assert makespan((deck.seconds for deck in decks), 2) == decks[0].seconds
 
 
 # --- comparisons ------------------------------------------------------------------------------------------------------

@@ -26,7 +26,7 @@ from tests.conftest import (
     wait_for_engines,
 )
 from tests.test_hostile import HOSTILE
-from tests.test_sweeps import SLOW, TINY, contents_of
+from tests.test_scheduler import SLOW, TINY, contents_of
 from walkers.errors import InputError
 from walkers.inputs.sweep import load_sweep
 from walkers.runner.launch import _off_the_network

@@ -1,0 +1,549 @@
+"""Sweeps run by the real engine: decks and their plan, failures, resumption, tables."""
+
+import json
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import psutil
+import pyarrow.parquet as pq
+import pytest
+
+from tests.conftest import PATIENCE, PROGRAM, call, document, engines_in, make_case, to_toml, wait_for, wait_for_engines
+from walkers.inputs.loads import dimer_of
+from walkers.inputs.sweep import load_sweep
+from walkers.postprocess.motion import read_motion
+from walkers.postprocess.tables import read_table
+from walkers.runner.binary import find_engine
+from walkers.runner.directory import FIRST_SEGMENT, case_of, locked
+from walkers.runner.failures import WalkersMet
+from walkers.runner.manifest import read_manifest
+from walkers.sweeps.making import make_runs
+from walkers.sweeps.scheduler import (
+    LONGEST_SECONDS,
+    MOST_WALKERS,
+    Options,
+    SweepReplacedWarning,
+    SweepStopped,
+    makespan,
+    pack,
+    plan_sweep,
+    run_sweep,
+    unfinished_parts,
+    work,
+)
+from walkers.sweeps.table import load, thresholds, write_record
+from walkers.templates.deck import render_shared_deck
+from walkers.templates.scene import sharing_key
+
+STEP = {"time_step": "2 us"}
+TINY = {**STEP, "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
+# Long enough for whoever is to be stopped meanwhile, however fast or busy the machine.
+SLOW = {**TINY, "cycles": 4000, "settling_cycles": 2}
+DONE = "finished"
+
+
+@pytest.fixture
+def sweep_file(in_folder: Path) -> Callable[..., str]:
+    """Write a sweep of the reference case into the working directory and return its file's name."""
+
+    def write(text: str, name: str = "test", **changes: Any) -> str:
+        (in_folder / "base.toml").write_text(to_toml(document(**{"run": TINY, **changes})))
+        (in_folder / f"{name}.toml").write_text(f'case = "base.toml"\n{text}\n')
+        return f"{name}.toml"
+
+    return write
+
+
+def _sweep(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return call("sweep", *arguments)
+
+
+def _start(*arguments: str) -> subprocess.Popen[str]:
+    command = [PROGRAM, "sweep", *arguments, "-j", "2"]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
+def contents_of(out: Path) -> dict[str, dict[str, bytes]]:
+    """What each finished run computed: tables, result and dumps, by the names of runs and files."""
+    manifests = [path for path in out.glob("*/manifest.json") if path.parent.suffix != ".incomplete"]
+    dumps = [str(FIRST_SEGMENT / name) for name in ("beads.bin", "bridges.pairs.txt", "bridges.walls.txt")]
+    kept = (*dumps, "trajectory.parquet", "walkers.parquet", "result.json")
+    return {path.parent.name: {name: (path.parent / name).read_bytes() for name in kept} for path in manifests}
+
+
+def made_in(place: str) -> str:
+    """Name of the run, the first of a shared deck, that an engine was launched for in a folder."""
+    (folder,) = (part for part in Path(place).parts if part.endswith(".incomplete"))
+    return folder.removesuffix(".incomplete")
+
+
+@pytest.fixture
+def counting_engine(in_folder: Path, front: Callable[[str], str]) -> Iterator[tuple[str, Callable[[], list[str]]]]:
+    """An engine that notes where it was launched, and the notes."""
+    log = in_folder / "launches"
+    log.touch()
+    yield front(f'pwd >> {log}\nexec liggghts "$@"'), lambda: log.read_text().split()
+
+
+# --- decks ------------------------------------------------------------------------------------------------------------
+
+
+def test_points_of_a_shared_deck_are_what_they_are_alone(tmp_path: Path) -> None:
+    """Other radii, frictions, restitution, starts, shapes, drives: the same to rounding, ordinary run directories."""
+    run = {**TINY, "cycles": 8, "settling_cycles": 2}
+    fan = {"radii": ["0.3 mm", "0.2 mm", "0.2 mm"], "arrangement": "fan", "replicates": 2}
+    cases = [
+        make_case(run=run),
+        make_case(run=run, contact={"friction": {"bead_bead": 0.05, "bead_wall": 0.2}, "restitution": 0.6}),
+        make_case(run=run, dimers={"radii": ["0.35 mm", "0.2 mm"], "angle": "20 deg", "replicates": 3}),
+        make_case(run=run, clusters=[fan]),  # dimers and clusters
+        make_case(run=run, drive={"peak_acceleration": "3 g", "axis": "y"}, dimers={"radii": ["0.25 mm", "0.25 mm"]}),
+    ]
+    engine = find_engine()
+    together = make_runs(cases, tmp_path / "together", engine)
+    for case, (name, there) in zip(cases, together.items(), strict=True):
+        alone = make_runs([case], tmp_path / "alone", engine)[name]
+        motion, motion_alone = read_motion(there), read_motion(alone)
+        assert motion.case == motion_alone.case == case
+        for one, other in zip(motion.groups, motion_alone.groups, strict=True):
+            way, way_alone = one.position - one.position[0], other.position - other.position[0]
+            assert np.abs(way - way_alone).max() < 1e-12
+            np.testing.assert_allclose(one.orientation, other.orientation, atol=1e-9)
+        for table in ("walkers", "bridges"):
+            left, right = read_table(there, table), read_table(alone, table)
+            pd.testing.assert_frame_equal(left, right, check_exact=False, rtol=1e-6, atol=1e-9)
+        assert read_manifest(there)["shared_deck"] == {"first": next(iter(together)), "runs": 5, "walkers": 9}
+        names, own = ({path.name for path in run.rglob("*")} for run in (there, alone))
+        assert {"shared_deck", "walker.lig", "engine.log"} <= names
+        assert own <= names, "what a run of its own has, one of a shared deck has too"
+
+
+def test_walkers_that_meet_are_taken_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They have room for more than they walk; so what counts as near is made larger than all of it."""
+    monkeypatch.setattr("walkers.postprocess.splitting.NEAR", 1e3)
+    with pytest.raises(WalkersMet):
+        make_runs([make_case(run={**TINY, "seed": seed}) for seed in (1, 2)], tmp_path, find_engine())
+    assert not list(tmp_path.glob("*"))
+
+
+def test_walkers_that_are_to_stand_close_keep_their_neighbours(sweep_file: Callable[..., str]) -> None:
+    """Replicates 1.6 mm apart run into each other; in a deck with others, 60 mm apart, they would not."""
+    text = '[axes]\ndimers.spacing = ["1.6 mm", "60 mm", "70 mm"]'
+    hard = {"run": {**TINY, "cycles": 10}, "drive": {"peak_acceleration": "6 g"}, "dimers": {"replicates": 6}}
+    assert _sweep(sweep_file(text, **hard), "-j", "1").returncode == 0
+    frame = load("runs/test")
+    assert list(frame["walkers_met"]) == [True, False, False]
+    assert [(Path(run) / "shared_deck").exists() for run in frame["run"]] == [False, True, True]
+
+
+SHARED = [
+    {},
+    {"run": {"seed": 2}, "dimers": {"angle": "30 deg", "replicates": 3}},
+    {"dimers": {"radii": ["0.35 mm", "0.2 mm"]}},
+    {"contact": {"friction": {"bead_bead": 0.2, "bead_wall": 0.05}, "restitution": 0.6}},
+    {"drive": {"peak_acceleration": "5 g", "axis": "y"}},
+    {"boundary": {"tilt": "20 deg"}},
+    {"environment": {"gravity": "0 m/s^2"}},
+    {"liquid": {"viscosity_ratio": 2.0}},
+]
+APART = [
+    {"drive": {"frequency": "60 Hz"}},
+    {"drive": {"phase": "90 deg"}},
+    {"contact": {"rolling_friction": 0.003}},
+    {"contact": {"youngs_modulus": "40 MPa"}},
+    {"beads": {"density": "3.9 g/cm^3"}},
+    {"run": {"cycles": 30}},
+    {"run": {"time_step": "1 us"}},
+    # Walls that move do so for all.
+    {"drive": {"frame": "lab"}},
+    {"drive": {"frame": "lab", "peak_acceleration": "5 g"}},
+    {"drive": {"frame": "lab"}, "environment": {"gravity": "0 m/s^2"}},
+]
+
+
+def test_what_may_differ_within_a_deck() -> None:
+    shared, apart = (
+        [make_case(**{**one, "run": {**STEP, **one.get("run", {})}}) for one in of] for of in (SHARED, APART)
+    )
+    assert len({*map(sharing_key, shared)}) == 1
+    assert len({sharing_key(case) for case in [shared[0], *apart]}) == 1 + len(apart)
+    rough = [make_case(run=STEP, contact={"rolling_friction": value}) for value in (0.003, 0.006)]
+    assert len({*map(sharing_key, rough)}) == 1
+    render_shared_deck(shared)
+    with pytest.raises(ValueError, match="cannot share"):
+        render_shared_deck([shared[0], apart[0]])
+
+
+@pytest.mark.parametrize("workers", [1, 16])
+@pytest.mark.parametrize("sweep", ["fig2", "alignment", "modes"])
+def test_every_point_travels_once_and_cores_finish_together(sweep: str, workers: int) -> None:
+    cases = list(load_sweep(sweep).cases())
+    decks = pack(cases, workers)
+    assert sorted(point for deck in decks for point in deck.points) == list(range(len(cases)))
+    for deck in decks:
+        assert len({sharing_key(cases[point]) for point in deck.points}) == 1
+        walkers = sum(cases[point].walkers[0].replicates for point in deck.points)
+        assert len(deck.points) == 1 or (walkers <= MOST_WALKERS and deck.seconds <= LONGEST_SECONDS)
+    seconds = [deck.seconds for deck in decks]
+    assert seconds == sorted(seconds, reverse=True)
+    # Within a fifth of the time in which no core would ever be idle, unless a single deck takes longer than that.
+    assert makespan(seconds, workers) <= max(1.2 * sum(seconds) / workers, seconds[0])
+
+
+def test_of_plans_that_take_as_long_the_smallest_decks_are_made() -> None:
+    """A long point takes a core for as long as eight short ones would take together, however they are dealt."""
+    run = {**STEP, "cycles": 12}
+    decks = pack([*[make_case(run=run)] * 8, make_case(run=run | {"cycles": 160})], 2)
+    assert [deck.points for deck in decks] == [(8,), *((number,) for number in range(8))]
+    assert makespan((deck.seconds for deck in decks), 2) == decks[0].seconds
+
+
+def test_what_is_left_of_a_deck_is_made_of_its_halves() -> None:
+    points, draw = range(13), random.Random(1)
+    for _ in range(50):
+        finished = {point for point in points if draw.random() < 0.2}
+        left = unfinished_parts(points, [make_case(run=STEP)] * 13, finished)
+        assert sorted(point for deck in left for point in deck.points) == sorted({*points} - finished)
+        wide = {(deck.points[0], deck.points[-1] + 1) for deck in left if len(deck.points) > 2}
+        assert wide <= {(0, 13), (0, 6), (6, 13), (0, 3), (3, 6), (6, 9), (9, 13)}
+
+
+def test_dry_run_says_what_is_to_do_and_writes_nothing(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    """Points of one frequency share a deck."""
+    name = sweep_file('[axes]\ndrive.frequency = ["60 Hz", "80 Hz"]\ndrive.peak_acceleration = ["2 g", "3 g"]')
+    before = sorted(in_folder.iterdir())
+    assert "4 points in 2 decks" in _sweep(name, "--dry-run").stdout
+    assert sorted(in_folder.iterdir()) == before
+    _sweep(name)
+    told = _sweep(name, "--dry-run").stdout
+    assert ("4: 4 finished" in told, "0 points in 0 decks" in told) == (True, True)
+
+
+# --- tables -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_table_of_a_sweep(sweep_file: Callable[..., str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """In all of its forms; also from within the sweep's directory."""
+    text = '[axes]\ndimers.radii = [["0.3 mm", "0.2 mm"], ["0.25 mm", "0.25 mm"]]\nrun.time_step = ["2 us", "auto"]'
+    done = _sweep(sweep_file(text, dimers={"replicates": 2}))
+    assert (done.returncode, done.stdout.splitlines()[0]) == (0, "test: 4 points, 4 finished")
+    directory = "runs/test"
+    shutil.rmtree(load(directory)["run"][3])
+    frame = load(directory)
+    wanted = {"point": [0, 1, 2, 3], "dimers.radii[0]": [0.3, 0.3, 0.25, 0.25], "lost": [0] * 4}
+    wanted |= {"run.time_step": [2.0, "auto"] * 2, "status": [DONE] * 3 + ["missing"]}
+    assert {name: list(frame[name]) for name in wanted} == wanted
+    units = frame.attrs["units"]
+    assert (units["run.time_step"], units["dimers.radii[1]"], units["velocity"]) == ("us", "mm", "m/s")
+    for row in frame[:3].itertuples():
+        case = case_of(Path(row.run))
+        numbers = json.loads((Path(row.run) / "result.json").read_text())["numbers"]
+        assert [row.velocity, row.smallest] == [numbers["velocity"], numbers["smallest"]]
+        assert row.gamma0 == pytest.approx(dimer_of(case).gamma0(case.excitation.peak_acceleration))
+    for file in ("table.csv", "table.parquet"):
+        call("list", directory, "--to", file, check=True)
+    np.testing.assert_array_equal(pd.read_csv("table.csv")["velocity (m/s)"], frame["velocity"])
+    contents = json.loads(call("list", directory, "--json", check=True).stdout)
+    assert contents["units"]["velocity"] == "m/s"
+    assert [point["amplitude"] for point in contents["points"]] == list(frame["amplitude"])
+    table = pq.read_table("table.parquet")
+    assert table.schema.field("velocity").metadata[b"unit"] == b"m/s"
+    assert table.column("velocity").to_pylist()[:3] == list(frame["velocity"][:3])
+    assert table.column("run.time_step").to_pylist() == ["2.0", "auto"] * 2, "numbers and words become words"
+    assert table.column("walkers_met").to_pylist() == [False] * 3 + [None], "truths where a point is missing"
+    shown = call("list", "test", check=True).stdout
+    assert ("velocity (mm/s)" in shown, len(shown.splitlines()), frame["run"][0] in shown) == (True, 9, False)
+    assert shown.splitlines()[-1].startswith("the same at all points: ")
+    monkeypatch.chdir(directory)
+    assert Path(load(".")["run"][0]).is_dir()
+
+
+def test_a_descent_finds_where_the_walkers_stop(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    """Coulomb friction: the threshold lies where inertia of the beads overcomes it, whatever the frequency."""
+    text = '[axes]\ndrive.frequency = ["60 Hz", "90 Hz"]\n'
+    text += '[descend]\nfrom = "1.4 g"\nto = "0.2 g"\nstep = "0.2 g"\nuntil_below = "0.002 mm/s"'
+    done = _sweep(sweep_file(text, run={"cycles": 20, "settling_cycles": 10}))
+    assert done.returncode == 0, done.stderr
+    for _, descent in load(in_folder / "runs" / "test").groupby("drive.frequency"):
+        assert list(descent["drive.peak_acceleration"]) == pytest.approx([1.4 - 0.2 * n for n in range(7)])
+        assert list(descent["velocity"] < 2e-6) == sorted(descent["velocity"] < 2e-6)
+    ends = thresholds(load(in_folder / "runs" / "test"))
+    assert list(ends["moving"] - ends["at_rest"]) == pytest.approx([0.2, 0.2])
+    assert ends["moving"].nunique() == 1
+    assert "moving (g)" in done.stdout
+
+
+def test_a_run_that_was_cut_since_is_told_and_stops_nothing(sweep_file: Callable[..., str]) -> None:
+    name = sweep_file('axes."drive.peak_acceleration" = ["3 g", "2.5 g", "2 g"]')
+    assert _sweep(name).returncode == 0
+    run = Path(load("runs/test")["run"][1])
+    (run / "result.json").unlink()
+    os.truncate(run / FIRST_SEGMENT / "beads.bin", 100)
+    frame = load("runs/test")
+    assert list(frame["status"]) == [DONE, "failed", DONE]
+    assert frame["reason"][1] == "ResultUnreadable"
+    assert _sweep(name).returncode == 1
+    (run / "manifest.json").unlink()
+    assert _sweep(name).returncode == 0
+    assert set(load("runs/test")["status"]) == {DONE}
+
+
+# --- failures ---------------------------------------------------------------------------------------------------------
+
+UNSTABLE = """
+set.run.allow_unstable = true
+[[zip]]
+run.seed = [1, 2, 3, 4, 5]
+run.time_step = ["2 us", "2 us", "30 us", "2 us", "2 us"]
+"""
+GLYCEROL = {"liquid": {"name": "glycerol 87 %"}, "run": {**TINY, "cycles": 20, "samples_per_cycle": 1}}
+LOSES = "s/^run /group gone id 2\\ndelete_atoms group gone compress no\\nrun /"
+FAILING: dict[str, tuple[str, dict[str, Any], str, tuple[str, int, str]]] = {
+    # A sweep whose third point fails, changes of its case, script of the engine, reason, lost beads, message.
+    "a time step far beyond the viscous limit": (UNSTABLE, GLYCEROL, "", ("BlowUp", 0, "blow-up")),
+    # Who has a restitution of 0.61 loses a bead, and takes all down that are in the deck.
+    "lost beads": (
+        "axes.contact.restitution = [0.3, 0.5, 0.61, 0.7, 0.4]",
+        {},
+        f'grep -qF " 0.61" walker.lig && sed -i "{LOSES}" walker.lig',
+        ("BeadsLost", 1, "bead"),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FAILING)
+def test_a_failing_point_does_not_stop_the_others(
+    name: str, sweep_file: Callable[..., str], in_folder: Path, front: Callable[[str], str]
+) -> None:
+    text, changes, script, (reason, lost, message) = FAILING[name]
+    log = in_folder / "launches"
+    engine = front(f'pwd >> {log}\n{script}\nexec liggghts "$@"')
+    done = _sweep(sweep_file(text, **changes), "-j", "1", "--engine", engine)
+    assert (done.returncode, "point 2, base-" in done.stderr, message in done.stderr) == (1, True, True)
+    frame = load("runs/test")
+    assert list(frame["status"]) == [DONE, DONE, "failed", DONE, DONE]
+    assert (frame["reason"][2], list(frame["lost"])) == (reason, [0, 0, lost, 0, 0])
+    assert np.isnan(frame["velocity"][2])
+    failed = Path(frame["run"][2])
+    assert (failed / "failure.json").exists()
+    status = call("list", "runs/test", check=True).stdout
+    assert "5 points, 4 finished, 1 failed" in status
+    assert "failed     point 2: " in status
+    log.unlink()
+    assert _sweep("test.toml", "--engine", engine, "--retries", "2").returncode == 1
+    assert [made_in(place) for place in log.read_text().split()] == 3 * [failed.name.removesuffix(".incomplete")]
+
+
+SIXTEEN = "[axes]\ncontact.restitution = { linspace = [0.3, 0.6, 16] }"
+HITS_ALL = {
+    # Script of an engine that is noted at each start, launches at most, message.
+    "no licence": ("echo 'LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0'; echo 'ERROR: no licence'", 8, "no licence"),
+    "dies at once": ("exit 7", 3, "never started"),
+    "another version": ('liggghts "$@" | sed "s/LIGGGHTS-PUBLIC 3.8.0/LIGGGHTS-PUBLIC 4.0.0/"', 1, "4.0.0"),
+}
+
+
+@pytest.mark.parametrize("name", HITS_ALL)
+def test_a_failure_of_every_point_stops_the_sweep(
+    name: str, sweep_file: Callable[..., str], in_folder: Path, front: Callable[[str], str]
+) -> None:
+    script, most, message = HITS_ALL[name]
+    launches = in_folder / "launches"
+    engine = front(f"echo >> {launches}\n{script}")
+    done = _sweep(sweep_file(SIXTEEN), "-j", "1", "--engine", engine)
+    assert (done.returncode, "Traceback" in done.stderr, done.stderr.count(message)) == (1, False, 1), done.stderr
+    assert 1 <= len(launches.read_text().splitlines()) <= most
+    assert _sweep("test.toml", "-j", "1").returncode == 0  # the next call makes all points
+
+
+def test_a_program_that_is_missing_or_wrong_stops_the_sweep(
+    sweep_file: Callable[..., str], in_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without mpirun; with an error of the program itself, which is raised as it is."""
+    (in_folder / "piles.toml").write_text('case = "pile-ci"\nset.run.ranks = 2\naxes."run.seed" = [1, 2, 3, 4]\n')
+    engine = str(find_engine().path)
+    with monkeypatch.context() as patch:
+        patch.setenv("PATH", "/nothing")
+        with pytest.raises(SweepStopped, match="mpirun"):
+            run_sweep(load_sweep("piles.toml"), in_folder / "runs", Options(2), engine=engine)
+    monkeypatch.delattr("walkers.sweeps.scheduler.make_runs")
+    with pytest.raises(NameError, match="make_runs"):
+        run_sweep(load_sweep(sweep_file(SIXTEEN)), in_folder / "runs", Options(1))
+
+
+def test_a_worker_of_another_version_refuses(tmp_path: Path) -> None:
+    engine, names, cases = find_engine(), ["test-0123456789ab"], [make_case(run=TINY)]
+    assert work(None, names, cases, tmp_path, engine, None).failure == "ProgramDiffers"
+    assert work(None, names, cases, tmp_path, replace(engine, sha256="0" * 64), None).failure == "EngineDiffers"
+    assert not list(tmp_path.iterdir())
+
+
+# --- several processes and sweeps -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGKILL, -9)])
+def test_interrupts_leave_no_engine_and_the_next_call_goes_on(
+    number: signal.Signals, status: int, sweep_file: Callable[..., str], in_folder: Path
+) -> None:
+    """Engines are the only children meanwhile."""
+    text = '[axes]\ndrive.peak_acceleration = { linspace = ["2 g", "3 g", 4] }'
+    program = _start(sweep_file(text, run=SLOW))
+    wait_for_engines(in_folder, program, 2)
+
+    def all_are_engines() -> bool:  # a process that is just started still has the name of its parent
+        children = psutil.Process(program.pid).children()
+        with suppress(FileNotFoundError):  # one that has just ended
+            return all(b"liggghts" in Path(f"/proc/{child.pid}/cmdline").read_bytes() for child in children)
+        return False
+
+    wait_for(all_are_engines)
+    program.send_signal(number)
+    _, errors = program.communicate(timeout=PATIENCE)
+    assert (program.returncode, "Traceback" in errors) == (status, False)
+    if number == signal.SIGKILL:
+        wait_for(lambda: not engines_in(in_folder))
+    assert not engines_in(in_folder)
+    assert _sweep(sweep_file(text)).returncode == 0
+
+
+def test_what_somebody_else_is_making_is_waited_for(
+    sweep_file: Callable[..., str], in_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("walkers.runner.directory._PATIENCE_SECONDS", 0.2)
+    sweep, out = load_sweep(sweep_file('[axes]\ndrive.peak_acceleration = ["2 g"]')), in_folder / "runs"
+    out.mkdir()
+    (place,) = plan_sweep(sweep, out, Options(2)).record.runs
+    with ThreadPoolExecutor(1) as pool:
+        with locked([out / place]):
+            made = pool.submit(run_sweep, sweep, out, Options(2))
+            time.sleep(1.2)  # several times as long as a sweep waits for a lock
+            assert not made.done()
+            assert not list(out.glob("base-*/"))
+            assert "1 running" in call("list", "runs/test", check=True).stdout
+        assert made.result(PATIENCE)[1] == []
+    assert set(load("runs/test")["status"]) == {DONE}
+
+
+def test_two_sweeps_over_the_same_points_share_them(
+    sweep_file: Callable[..., str], in_folder: Path, counting_engine: tuple[str, Callable[[], list[str]]]
+) -> None:
+    """Some points have a deck each, those of 80 Hz share one: each is made once, whichever sweep comes first."""
+    engine, launches = counting_engine
+    points = {
+        "first": [(60, 2), (70, 2), (80, 1), (80, 2), (80, 3)],
+        "second": [(70, 2), (80, 2), (80, 3), (80, 4), (90, 2)],
+    }
+    programs = []
+    for name, each in points.items():
+        values = {"drive.frequency": [f"{hertz} Hz" for hertz, _ in each]}
+        values |= {"drive.peak_acceleration": [f"{g} g" for _, g in each]}
+        programs.append(_start(sweep_file(to_toml({"zip": [values]}), name), "--engine", engine))
+    for program in programs:
+        program.communicate(timeout=PATIENCE)
+        assert program.returncode == 0
+    runs = {
+        (point, run) for name in points for point, run in zip(points[name], load(f"runs/{name}")["run"], strict=True)
+    }
+    made = {str(path.parent.relative_to(in_folder)) for path in in_folder.glob("runs/base-*/manifest.json")}
+    assert {run for _, run in runs} == made
+    assert len(made) == len(runs) == 7
+    assert len(set(launches())) == len(launches()) <= 7
+
+
+def test_two_sweeps_of_one_process_do_not_stop_each_other(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    axis = "[axes]\ndrive.peak_acceleration = "
+    short = load_sweep(sweep_file(axis + '["2 g"]', "short"))
+    long = load_sweep(sweep_file(axis + '["3 g", "4 g", "5 g"]', "long", run={**TINY, "cycles": 30}))
+    with ThreadPoolExecutor(2) as pool:
+        ends = [pool.submit(run_sweep, sweep, in_folder / "runs", Options(1)) for sweep in (long, short)]
+        assert [end.result()[1] for end in ends] == [[], []]
+
+
+def test_a_sweep_that_is_killed_three_times(
+    sweep_file: Callable[..., str], in_folder: Path, counting_engine: tuple[str, Callable[[], list[str]]]
+) -> None:
+    """SIGKILL at random moments, of the sweep and at times of an engine: nothing lost, nothing twice, bit for bit."""
+    text = """
+    [axes]
+    drive.frequency         = { linspace = ["60 Hz", "70 Hz", 3] }
+    drive.peak_acceleration = ["2 g", "5 g"]
+    dimers.angle            = ["0 deg", "20 deg"]
+    """
+    name = sweep_file(text, run={**TINY, "cycles": 10, "settling_cycles": 2})
+    engine, launches = counting_engine
+    assert _sweep(name, "--engine", engine, "--out", "undisturbed").returncode == 0
+    draw = random.Random(20)
+    finished: set[str] = set()
+    for kill in range(3):
+        then = len(launches()) + draw.choice((1, 2, 3))
+        program = _start(name, "--engine", engine)
+        if kill == 1:  # a point is finished
+            wait_for(lambda program=program: contents_of(in_folder / "runs") or program.poll() is not None)
+        wait_for(lambda then=then, program=program: len(launches()) >= then or program.poll() is not None)
+        time.sleep(draw.uniform(0.0, 0.2))
+        if draw.random() < 0.3 and (engines := engines_in(in_folder)):
+            os.kill(draw.choice(engines), signal.SIGKILL)
+            time.sleep(0.05)
+        program.kill()
+        program.communicate()
+        now = {*contents_of(in_folder / "runs")}
+        assert finished <= now
+        finished = now
+    assert finished
+    before = len(launches())
+    done = _sweep(name, "--engine", engine)
+    assert (done.returncode, "12 points, 12 finished" in done.stdout) == (0, True)
+    assert contents_of(in_folder / "runs") == contents_of(in_folder / "undisturbed")
+    # The last call made no finished point again: each of its decks holds points that were missing before.
+    assert not {made_in(place) for place in launches()[before:]} & finished
+    assert not [*in_folder.glob("runs/**/*.incomplete"), *in_folder.glob("runs/**/*.lock")]
+
+
+def test_workers_that_are_handed_over_give_the_same(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    """The example of the documentation; and a pool that breaks."""
+    page = (Path(__file__).parents[1] / "docs" / "how-to" / "clusters.md").read_text("utf-8")
+    _, script = re.findall(r"```python\n(.+?)```", page, re.DOTALL)
+    (in_folder / "script.py").write_text(script)
+    sweep_file('[axes]\nrun.time_step = ["2 us", "1 us"]', "sweep")
+    done = subprocess.run([sys.executable, "script.py"], capture_output=True, text=True, check=True)
+    assert "sweep: 2 points, 2 finished" in done.stdout
+    _sweep("sweep.toml", "-j", "2", "--out", "here")
+    assert contents_of(in_folder / "runs") == contents_of(in_folder / "here") != {}
+    with ProcessPoolExecutor(1) as pool:
+        worker = pool.submit(os.getpid).result()
+        (in_folder / "front").write_text(f'#!/bin/sh\nkill -9 {worker}\nexec liggghts "$@"\n')
+        (in_folder / "front").chmod(0o755)
+        options, engine = Options(1, executor=pool), str(in_folder / "front")
+        with pytest.raises(SweepStopped, match="executor's workers ended"):
+            run_sweep(load_sweep("sweep.toml"), in_folder / "again", options, engine=engine)
+
+
+def test_another_sweep_of_the_same_name_is_told(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    """Afterwards by a warning, at the same time by an error; an edit that keeps a point is neither."""
+    axis = "[axes]\ndrive.peak_acceleration = "
+    first, edited, other = (load_sweep(sweep_file(axis + a)) for a in ('["2 g"]', '["2 g", "3 g"]', '["4 g"]'))
+    out = in_folder / "runs"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", SweepReplacedWarning)
+        run_sweep(first, out, Options(1))
+        run_sweep(edited, out, Options(1))
+    with pytest.warns(SweepReplacedWarning, match="same name"):
+        run_sweep(other, out, Options(1))
+    record = plan_sweep(first, out / "new", Options(1)).record
+    with pytest.raises(SweepStopped, match="same name"):
+        run_sweep(edited, out / "new", Options(1), on_progress=lambda _: write_record(record))
