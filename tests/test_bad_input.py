@@ -191,13 +191,16 @@ LIBRARIES: list[tuple[str, str]] = [
     (pairs(["glass", "brass"], ["brass", "glass"]), "surface_pairs[1] = brass on glass: is given twice"),
 ]
 LAW = """
-import random, sys
+import dataclasses, random, sys
 import numpy as np
 from walkers.physics.bridge import Curve, Forces
 
 def forces(gaps, pull=4e-5):
     one = np.ones_like(gaps)
     return Forces(pull * one, 3e-3 * one, 1e-3 * one, 0.0 * one, 0.0 * one)
+
+def changed(**forces_of):
+    return lambda gaps: dataclasses.replace(forces(gaps), **{name: of(gaps) for name, of in forces_of.items()})
 """
 USE_LAW = "show fig1b --set liquid.law=own.py:law"
 LAWS: list[tuple[str, str]] = [

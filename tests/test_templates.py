@@ -1,0 +1,141 @@
+"""Decks: exact, and of one version as long as they compute the same; tables of bridges; the law that a run records."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from hashlib import sha256
+from math import inf
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.conftest import call, document, make_case, to_toml
+from tests.test_physics import OWN
+from walkers.inputs.boundary import Boundary
+from walkers.inputs.case import Case
+from walkers.inputs.reading import load_case, shipped
+from walkers.physics.bridge import Surfaces
+from walkers.physics.laws import LAWS, by_name
+from walkers.templates.bridge_tables import TOLERANCE, RecordedLaw, tabulated
+from walkers.templates.deck import CONTENT_VERSION, Deck, Segment, render_deck, render_shared_deck, settling_steps
+from walkers.templates.scene import place
+
+
+@pytest.mark.parametrize("name", shipped("case"))
+def test_numbers_are_rendered_in_full_precision(name: str) -> None:
+    case = load_case(name)
+    deck = render_deck(case).text
+    given = dict(re.findall(r"^variable +(\w+) string (\S+)", deck, re.MULTILINE))
+    assert "timestep        ${time_step}\n" in deck
+    assert 1.0 / (float(given["frequency"]) * int(given["steps_per_cycle"])) == case.run.time_step
+    assert float(given["friction_bead_wall"]) == case.contact.friction.bead_wall
+    lines = (line.split() for line in deck.splitlines() if line.startswith("create_atoms"))
+    assert [tuple(map(float, line[3:6])) for line in lines] == [bead.centre for bead in place((case,))[0].beads]
+    rolls = "rolling_friction cdt" in deck
+    assert rolls == (case.contact.rolling_friction > 0.0)
+
+
+def test_a_mixture_is_placed_by_its_seed() -> None:
+    pile = load_case("pile-ci")
+    places = [[bead.centre for bead in place((pile.put("run.seed", seed),))[0].beads] for seed in (1, 1, 2)]
+    assert places[0] == places[1] != places[2]
+
+
+def test_bridges_may_push_loose_beads_and_have_no_viscosity() -> None:
+    pile, less = (load_case("pile-ci", {"liquid.contact_angle": f"{angle} deg"}) for angle in (90, 84))
+    assert render_deck(pile).fastest > render_deck(less).fastest
+    tables = render_deck(make_case(liquid={"viscosity_ratio": 0})).files["bridges.txt"].splitlines()
+    resistances = [[float(number) for number in line.split()[2:]] for line in tables if line[0] in "0123456789"]
+    assert len(resistances) > 100
+    assert not any(map(any, resistances))
+
+
+CONTENT = {8: "29bebb5b15f61619"}
+"""Digest of all that the engine reads of some cases, for the version of the decks' content."""
+
+
+def _reads(deck: Deck) -> str:
+    """The commands and files of a deck; numbers to fewer digits than what other machines' arithmetic leaves alone."""
+    commands = [line.partition("#")[0] for line in deck.text.splitlines()]
+    files = [f"{name} {text}" for name, text in deck.files.items()]  # a million numbers: one may be close to a half
+    return f"{_rounded(commands, 9)} {_rounded(files, 6)}"
+
+
+def _rounded(texts: list[str], digits: int) -> str:
+    number = re.compile(r"[-+.\de]*\d[-+.\de]*")
+    words = " ".join(texts).split()
+    return " ".join(f"{float(word):.{digits}g}" if number.fullmatch(word) else word for word in words)
+
+
+def test_a_change_of_what_decks_compute_asks_for_another_version() -> None:
+    """Runs are named by the case and this version, so that a comment leaves them alone; a change of the rest must not.
+
+    If this fails and the decks are meant to have changed: raise `CONTENT_VERSION`, write it and its digest down.
+    """
+    harmonics = [{"frequency": "80 Hz", "peak_acceleration": "4 g", "axis": [1, 0, 1], "phase": "30 deg"}]
+    several = document(contact={"rolling_friction": 0.01}, boundary={"tilt": "20 deg"})
+    several["drive"] = {"harmonics": [*harmonics, {"frequency": "120 Hz", "peak_acceleration": "1 g"}]}
+    thick = {"liquid": {"viscosity_ratio": 2.0}, "dimers": {"replicates": 3, "angle": "10 deg"}}
+    decks = [render_deck(case) for case in (make_case(), make_case(**thick), Case.read(several))]
+    decks += [render_deck(make_case(**thick, drive={"frame": "lab", "axis": axis})) for axis in "xyz"]
+    shared = [
+        make_case(),
+        make_case(contact={"restitution": 0.6}, run={"seed": 2}),
+        make_case(**thick, drive={"peak_acceleration": "2 g", "axis": "y"}, boundary={"tilt": "20 deg"}),
+    ]
+    decks += [render_shared_deck(shared[:2]), render_shared_deck(shared)]
+    piles = [load_case("pile-ci"), load_case("cluster")]
+    square = piles[0].boundary
+    round_one = Boundary(shape="cylinder", material=square.material, width=square.width, height=square.height)
+    piles += [piles[0].put("run.ranks", 2), piles[0].but(boundary=round_one)]
+    for case in piles:
+        settled = settling_steps(case)
+        end = settled + case.run.cycles_per_segment * case.run.steps_per_cycle
+        decks += [render_deck(case, Segment(0, settled, None)), render_deck(case, Segment(settled, end, settled))]
+    digest = sha256("\n".join(map(_reads, decks)).encode()).hexdigest()[:16]
+    assert {CONTENT_VERSION: digest} == CONTENT
+
+
+@pytest.mark.parametrize("other", [inf, 2e-4], ids=["wall", "beads"])
+@pytest.mark.parametrize("name", LAWS)
+def test_the_engine_reads_the_law_out_of_its_table(name: str, other: float) -> None:
+    case, law = make_case(liquid={"contact_angle": "20 deg"}), by_name(name)
+    given = Surfaces.of(3e-4, other, case.liquid.of_bridges, case.contact.minimum_separation_ratio)
+    table = tabulated(law, given)
+    gaps = table.curve.rupture * np.random.default_rng(1).random(200) ** 3
+    expected = law(given).forces(gaps).columns()
+    scale = np.maximum(np.abs(expected), 1e-3 * np.abs(expected).max(axis=0))
+    read = RecordedLaw(f"\nbridge 1 1 {given.radius!r} {given.other_radius!r}\n{table.text()}", None)(given)
+    np.testing.assert_array_less(np.abs(read.forces(gaps).columns() - expected), 10 * TOLERANCE * scale + 1e-30)
+
+
+def numbers_of(folder: Path) -> list[list[float]]:
+    """The tables of a deck."""
+    lines = (folder / "bridges.txt").read_text().splitlines()
+    return [[float(f"{float(word):.6g}") for word in line.split()] for line in lines if line[0].isdigit()]
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_a_run_shows_and_exports_the_law_that_it_recorded(in_folder: Path, shared: bool) -> None:
+    """Whether its file is there, was edited or is gone; nothing of it is executed."""
+    (law := in_folder / "own.py").write_text(OWN)
+    settings = {"liquid.law": "own.py:law", "run.cycles": 4}
+    axes = {"liquid.surface_tension": ["20 mN/m", "30 mN/m"] if shared else ["20 mN/m"]}
+    (in_folder / "two.toml").write_text(to_toml({"case": "fig1b", "set": settings, "axes": axes}))
+    call("sweep", "two.toml", "-j", "1", check=True)
+    run = next((in_folder / "runs").glob("fig1b-*"))
+    expected = call("show", str(run), check=True)
+    deck = call("export", str(run), "--to", "deck", "-o", "deck", check=True)
+    assert "executes" not in expected.stderr + deck.stderr
+    assert expected.stdout.count("40 µN") == 3
+    assert shared or numbers_of(Path("deck")) == numbers_of(run / "segments" / "0000")
+    for text in (OWN.replace("4e-5", "9e-5"), None):
+        law.write_text(text) if text else law.unlink()
+        again = call("show", str(run), check=True)
+        assert (again.stdout, again.stderr) == (expected.stdout, "")
+    assert (run / "law.py").read_text() == OWN
+    assert call("export", str(run), "--to", "archive", "-o", "run.zip", check=True).stderr == ""
+    with zipfile.ZipFile("run.zip") as packed:
+        assert packed.read(f"runs/{run.name}/law.py").decode() == OWN
