@@ -392,7 +392,7 @@ def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(own: Pat
     (own / "library.toml").rename(own / "other.toml")
     again = Case.read(Case.from_dict(case.as_dict()).document, name="mine")
     assert (again, again.determinants()) == (case, case.determinants())
-    spread = expand({**varied.file, "case": "mine.toml"}, source="s", name="s", folder=own)
+    spread = expand(varied.file, source="s", name="s", base=(varied.case_name, varied.base))
     assert {point.beads.density for points in (sweep, spread) for point in points.cases()} == {2450.0}
     with pytest.raises(InputError, match=r'beads\.material = "my beads": not in the library'):
         load_case("mine.toml")
