@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache
 from math import isfinite
 from typing import TYPE_CHECKING, Any
@@ -36,6 +36,14 @@ def printable(text: str) -> str:
     'one two \\x1b[31m'
     """
     return "".join(one if one.isprintable() else repr(one)[1:-1] for one in " ".join(text.split()))
+
+
+def aligned(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
+    """Rows of cells as text with aligned columns, those with the numbers ``right`` at their right ends."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    ways = [str.rjust if number in right else str.ljust for number in range(len(widths))]
+    filled = ([way(cell, width) for way, cell, width in zip(ways, row, widths, strict=True)] for row in rows)
+    return "\n".join("  ".join(row).rstrip() for row in filled)
 
 
 def _formatted(value: float | None, form: str, missing: str = "-") -> str:

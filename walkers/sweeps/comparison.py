@@ -16,7 +16,6 @@ from walkers.postprocess.sides import alike
 from walkers.postprocess.uncertainty import not_known
 from walkers.rounding import percent, rounded
 from walkers.runner.directory import case_of
-from walkers.sweeps.folder import aligned
 from walkers.sweeps.readable import differing, flattened, readable
 from walkers.sweeps.table import (
     ERRORS,
@@ -29,6 +28,7 @@ from walkers.sweeps.table import (
     value_text,
     with_unit,
 )
+from walkers.text import aligned
 
 if TYPE_CHECKING:
     import pandas as pd

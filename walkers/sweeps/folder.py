@@ -56,6 +56,7 @@ from walkers.sweeps.table import (
     states,
     worst_status,
 )
+from walkers.text import aligned
 
 _SIZES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
 _LOCK = ".lock"
@@ -288,13 +289,6 @@ def run_text(directory: Path) -> str:
     """Status and result of the run in a directory, such as ``finished, 1.08 mm/s``."""
     run = _run(directory, time.time())
     return "missing" if run is None else f"{run.status}, {run.result}".removesuffix(", -")
-
-
-def aligned(rows: Sequence[Sequence[str]]) -> str:
-    """Rows of cells as text with aligned columns."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    filled = ([cell.ljust(width) for cell, width in zip(row, widths, strict=True)] for row in rows)
-    return "\n".join("  ".join(row).rstrip() for row in filled)
 
 
 def bytes_text(size: int) -> str:

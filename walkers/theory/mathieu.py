@@ -30,7 +30,7 @@ from scipy.special import mathieu_a, mathieu_b
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.physics.dimer import Dimer
-from walkers.theory.motion import Friction, Walker, walk
+from walkers.theory.motion import Walker, walk
 from walkers.theory.quasistatic import FloatArray, inertia_matrix, normal_force_matrix, rolling_matrix, translation
 
 _NEUTRAL = 1e-6
@@ -172,9 +172,9 @@ def turning_rate(case: Case) -> float | None:
     is almost along the axis; its bridge resists as along the axis. Similarly, rolling friction resists sideways rolling
     by μ F R/|ω|, with the engine's model of constant torque; it is left out of the axial motion.
     """
-    dimer, walker, friction = dimer_of(case), Walker.of_case(case), Friction.of_cases(case)
+    dimer, walker = dimer_of(case), Walker.of_case(case)
     frequency, peak, steady = case.excitation.frequency, case.excitation.peak_acceleration, case.axial_gravity
-    motion = walk(walker, friction, frequency, peak, steady_acceleration=steady, steps_per_cycle=_STEPS)
+    motion = walk(walker, frequency, peak, steady_acceleration=steady, steps_per_cycle=_STEPS)
     if not (motion.periodic[0] and motion.solved[0]):
         return None
     # The axial motion in the middle of each step, and the forces that go with it.
@@ -193,7 +193,7 @@ def turning_rate(case: Case) -> float | None:
     push = masses[0] * (accelerated + pull) + parallel[0]  # along the axis, of the second bead on the first
     torque = 0.4 * masses * radii * (accelerated - slope[:2]) - radii * parallel[:2] - couples[:2]  # of the other bead
     # Resistance to sideways sliding, and to rolling at the mean sideways speed of the beads at `_ANGLE`.
-    drags = np.asarray(friction.kinetic) * normal / np.maximum(np.abs(sliding), _SLOWEST)
+    drags = walker.friction * normal / np.maximum(np.abs(sliding), _SLOWEST)
     speed = 5.0 / 7.0 * peak / (2.0 * pi * frequency) * _ANGLE / sqrt(2.0)
     levers, spins = np.array([*dimer.radii, dimer.reduced_radius])[:, None], np.array([*spin, spin[0] - spin[1]])
     hindered = case.contact.rolling_friction * normal * levers / np.hypot(spins, speed / levers)

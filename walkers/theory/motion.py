@@ -1,6 +1,6 @@
-"""Equations of motion of a walker that stays in contact, integrated in time with a general friction law.
+"""Equations of motion of a walker that stays in contact, integrated in time with Coulomb friction.
 
-    M dv/dt = -M a(t) (1, 1, 0) - G (F∥ + f + Hᵀm),    F = F0 + D (F∥ + f),    F∥ = law(v, F)
+    M dv/dt = -M a(t) (1, 1, 0) - G (F∥ + f + Hᵀm),    F = F0 + D (F∥ + f),    F∥ = μ F sign v
 
 (symbols as in `walkers.theory.quasistatic`). Liquid bridges resist sliding and rolling, q = H v, by forces and couples,
 
@@ -9,13 +9,14 @@
 (`walkers.physics.bridge`); the couples do not load contacts. Coulomb's law is set-valued: the friction of a sticking
 contact is the force that keeps it at rest. Steps are implicit (`walkers.theory.stepping`) and find the friction forces
 by a semi-smooth Newton method. Sticking needs no regularisation; steps are short only where a contact begins to stick
-or to slip.
+or to slip. F is that of rigid beads; the Coulomb limit of the engine includes contact damping, which vanishes while the
+gap is constant.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from math import inf
 
 import numpy as np
@@ -24,10 +25,8 @@ import numpy.typing as npt
 from walkers.extras import require
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of, resistances_at_rest
-from walkers.physics.dimer import Dimer
 from walkers.theory.quasistatic import (
     FloatArray,
-    forces_at_rest,
     inertia_matrix,
     normal_force_matrix,
     rolling_matrix,
@@ -40,31 +39,6 @@ CYCLES = 60
 
 
 @dataclass(frozen=True)
-class Friction:
-    """F∥ = F (μ sign v + κ v) at each of the three contacts; at v = 0 any force up to F μ.
-
-    Each is a number, or an array that broadcasts to (3, N) for N parameter sets: contacts 1, 2 (beads on the substrate)
-    and 3 (bead on bead). F is that of rigid beads; the Coulomb limit of the engine includes contact damping, which
-    vanishes while the gap is constant.
-    """
-
-    kinetic: npt.ArrayLike = 0.0  # μ, Coulomb's coefficient
-    linear: npt.ArrayLike = 0.0  # κ, s/m: the paper's law
-
-    @classmethod
-    def coulomb(cls, bead_wall: npt.ArrayLike, bead_bead: npt.ArrayLike) -> Friction:
-        """Coulomb's law with one coefficient on the substrate and one between the beads."""
-        wall, bead = np.broadcast_arrays(np.asarray(bead_wall, np.float64), np.asarray(bead_bead, np.float64))
-        return cls(kinetic=np.stack([wall, wall, bead]).reshape(3, -1))
-
-    @classmethod
-    def of_cases(cls, *cases: Case) -> Friction:
-        """Coulomb's law with each case's coefficients."""
-        laws = [case.contact.friction for case in cases]
-        return cls.coulomb([law.bead_wall for law in laws], [law.bead_bead for law in laws])
-
-
-@dataclass(frozen=True)
 class Walker:
     """N walkers, each array of shape (N,) unless said otherwise."""
 
@@ -72,6 +46,7 @@ class Walker:
     scale: FloatArray  # 4πγR̄/M, m/s²: the acceleration that a force of 1 in the theory's unit gives
     force_unit: FloatArray  # 4πγR̄, N
     at_rest: FloatArray  # normal forces at rest, in that unit, shape (3, N)
+    friction: FloatArray  # Coulomb's coefficient μ at contacts 1, 2 and 3, shape (3, N)
     resistances: FloatArray  # S (N s/m), C (N s), Q (N m s) of the bridges at contacts 1, 2 and 3, the first bead as
     # body 1 of the last, shape (3, 3, N)
 
@@ -81,28 +56,24 @@ class Walker:
         return (self.radii[0] - self.radii[1]) / self.radii.sum(axis=0)  # type: ignore[no-any-return]
 
     @classmethod
-    def of_dimer(cls, dimer: Dimer) -> Walker:
-        """The walker of the paper: perfect wetting, no weight, no viscous drag."""
-        return cls(
-            radii=np.array(dimer.radii)[:, None],
-            scale=np.array([dimer.capillary_scale / dimer.total_mass]),
-            force_unit=np.array([dimer.capillary_scale]),
-            at_rest=forces_at_rest(dimer.sin_delta)[:, None],
-            resistances=np.zeros((3, 3, 1)),
-        )
-
-    @classmethod
     def of_case(cls, case: Case, *, viscous: bool = True) -> Walker:
-        """The walker of a case: weight, and pulls and (if viscous) resistances of its bridges as in the engine."""
-        dimer = dimer_of(case)
+        """The walker of a case: friction, weight, and pulls and (if viscous) resistances of its bridges."""
+        dimer, unit = dimer_of(case), dimer_of(case).capillary_scale
         pulls = np.array([load.pull for load in contact_loads(case)])
         forces = pulls + np.array([*dimer.masses, 0.0]) * case.pressing_gravity
         first, second = dimer.radii
         meeting = ((first, inf), (second, inf), (first, second))
         resistances = np.array([resistances_at_rest(case, *pair) for pair in meeting]).T
         resistances[1, 2] *= -1.0 if first > second else 1.0  # that of the smaller bead as body 1
-        at_rest = (forces / dimer.capillary_scale)[:, None]
-        return replace(cls.of_dimer(dimer), at_rest=at_rest, resistances=resistances[..., None] * viscous)
+        law = case.contact.friction
+        return cls(
+            radii=np.array(dimer.radii)[:, None],
+            scale=np.array([unit / dimer.total_mass]),
+            force_unit=np.array([unit]),
+            at_rest=(forces / unit)[:, None],
+            friction=np.array([law.bead_wall, law.bead_wall, law.bead_bead])[:, None],
+            resistances=resistances[..., None] * viscous,
+        )
 
     @classmethod
     def joined(cls, walkers: Sequence[Walker]) -> Walker:
@@ -117,7 +88,7 @@ class Motion:
     """Means of N walkers over the last cycle, m/s; over the second half of all cycles if the last two do not agree.
 
     The velocity, positive toward the large bead, is NaN where a contact opened (the model does not hold) and where the
-    forces have no solution (the paper's law beyond a certain Γ0).
+    forces have no solution.
     """
 
     velocity: FloatArray  # shape (N,)
@@ -136,7 +107,6 @@ class Motion:
 
 def walk(
     walker: Walker,
-    friction: Friction,
     frequency: npt.ArrayLike,
     peak_acceleration: npt.ArrayLike,
     *,
@@ -148,8 +118,8 @@ def walk(
 
     Parameters
     ----------
-    walker, friction
-        N walkers and their contacts.
+    walker
+        N walkers, or one for all drives.
     frequency, peak_acceleration
         f in Hz and a0 in m/s², each a number or of shape (N,).
     steady_acceleration
@@ -162,10 +132,9 @@ def walk(
 
     given = (frequency, peak_acceleration, steady_acceleration, walker.scale)
     drive = np.stack(np.broadcast_arrays(*(np.asarray(value, np.float64).reshape(-1) for value in given))[:3], axis=-1)
-    laws = (friction.kinetic, friction.linear)
-    law = np.stack([np.broadcast_to(np.asarray(value, np.float64), (3, len(drive))).T for value in laws], axis=1)
+    friction = np.broadcast_to(walker.friction, (3, len(drive))).T.copy()
     tables = _tables(walker, drive[:, 0] * steps_per_cycle)
-    mean, least, repeated, solved, series = integrate(tables, law, drive, cycles, steps_per_cycle)
+    mean, least, repeated, solved, series = integrate(tables, friction, drive, cycles, steps_per_cycle)
     velocity = translation(mean)
     if not np.any(drive[:, 2]):  # by symmetry; the rest is the error of the steps
         velocity = np.where(walker.sin_delta == 0.0, 0.0, velocity)

@@ -12,8 +12,9 @@ import numpy as np
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.rounding import with_decimals
+from walkers.text import aligned
 from walkers.theory.mathieu import Alignment, alignment, largest_stable_v, time_to_turn, turning_rate
-from walkers.theory.motion import Friction, Motion, Walker, walk
+from walkers.theory.motion import Motion, Walker, walk
 from walkers.theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, FloatArray, detachment, mean_velocity
 
 MOVING = 1e-6
@@ -38,7 +39,6 @@ def motion_of(*cases: Case, viscous: bool = True) -> Motion:
     check_applies(*cases)
     return walk(
         Walker.joined([Walker.of_case(case, viscous=viscous) for case in cases]),
-        Friction.of_cases(*cases),
         [case.excitation.frequency for case in cases],
         [case.excitation.peak_acceleration for case in cases],
         steady_acceleration=[case.axial_gravity for case in cases],
@@ -65,7 +65,7 @@ def threshold(case: Case, *, viscous: bool = True) -> float:
     symmetric dimer.
     """
     check_applies(case)
-    dimer, walker, friction = dimer_of(case), Walker.of_case(case, viscous=viscous), Friction.of_cases(case)
+    dimer, walker = dimer_of(case), Walker.of_case(case, viscous=viscous)
     if dimer.sin_delta == 0.0:
         return float("nan")
     low, high = 0.0, float(detachment(dimer.sin_delta).gamma)
@@ -73,7 +73,7 @@ def threshold(case: Case, *, viscous: bool = True) -> float:
         trials = np.linspace(low, high, _TRIALS)
         accelerations = np.array([dimer.peak_acceleration(float(gamma)) for gamma in trials])
         pull = case.axial_gravity
-        motion = walk(walker, friction, case.excitation.frequency, accelerations, steady_acceleration=pull)
+        motion = walk(walker, case.excitation.frequency, accelerations, steady_acceleration=pull)
         moves = np.abs(motion.velocity) > MOVING
         if not moves.any():
             return float("nan")
@@ -179,69 +179,52 @@ def alignment_of(case: Case) -> dict[str, Any]:
 
 def describe(prediction: dict[str, Any], result: Mapping[str, Any] | None) -> str:
     """A prediction as a table, with the result of the engine if it exists."""
-    end = prediction["detachment"]
+    end, outside = prediction["detachment"], prediction.get("outside")
     models = {
         f"paper's fit, κ = {prediction['paper']['friction'] * 1e-3:g} s/mm": prediction["paper"],
         "Coulomb friction": prediction["coulomb"],
         "Coulomb friction and drag": prediction["viscous"],
         **(_of_engine(result) if result else {"engine": {"velocity": None, "reason": "run it: walkers run CASE"}}),
     }
-    head = ["mm/s", "velocity", "rotation 1", "rotation 2", "sliding 1", "Γc", ""]
-    rows = [head, *([name, *_cells(model)] for name, model in models.items())]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    aligned = [
-        "  ".join([f"{row[0]:{widths[0]}}", *map(str.rjust, row[1:-1], widths[1:]), row[-1]]).rstrip() for row in rows
+    rows = [["mm/s", "velocity", "rotation 1", "rotation 2", "sliding 1", "Γc", ""]]
+    rows += [[name, *_cells(model)] for name, model in models.items()]
+    detaches = f"{end['contact']} opens first, at Γ = {end['gamma']:.3g} of a steady pull"
+    notes = [
+        ["detachment", f"{detaches} (the peak of an oscillating one may exceed it)"],
+        *_describe_alignment(prediction["alignment"]),
     ]
-    notes = {
-        "detachment": f"{end['contact']} opens first, at Γ = {end['gamma']:.3g} of a steady pull "
-        "(the peak of an oscillating one may exceed it)",
-        **describe_alignment(prediction["alignment"]),
-    }
-    outside = prediction.get("outside")
-    return "\n".join(
-        [
-            f"Γ0 = {prediction['gamma0']:.3g}, sin δ = {prediction['sin_delta']:.3g}",
-            *([outside] if outside else []),
-            *aligned,
-            *(f"{name:12}{text}" for name, text in notes.items()),
-        ]
-    )
+    head = f"Γ0 = {prediction['gamma0']:.3g}, sin δ = {prediction['sin_delta']:.3g}"
+    return "\n".join([head, *([outside] if outside else []), aligned(rows, right=range(1, 6)), aligned(notes)])
 
 
 def _of_engine(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """The result of a run as a model; on a slope that of the walkers that face uphill, whom the theory describes."""
     both = result["goes_uphill"] and result["facing_right"] and result["facing_left"]
-    model = {
-        "velocity": result["velocity"],
-        "rotation": [result["rotation_1"], result["rotation_2"]],
-        "sliding": [result["sliding_1"]],
-    }
-    return {"engine, facing up" if both else "engine": model}
+    speeds = {"rotation": [result["rotation_1"], result["rotation_2"]], "sliding": [result["sliding_1"]]}
+    return {"engine, facing up" if both else "engine": {"velocity": result["velocity"], **speeds}}
 
 
 def _cells(model: dict[str, Any]) -> list[str]:
     """Cells of the row of a model, and the reason why it has no velocity."""
-    if model["velocity"] is None:
-        speeds = ["-", "", "", ""]
-    else:
-        numbers = [*model.get("rotation", []), *model.get("sliding", [])[:1]]
-        speeds = [with_decimals(model["velocity"] * 1e3, 3), *(with_decimals(speed * 1e3, 2) for speed in numbers)]
-    gamma = model.get("threshold")
+    velocity, gamma = model["velocity"], model.get("threshold")
+    others = [] if velocity is None else [*model.get("rotation", []), *model.get("sliding", [])[:1]]
+    speeds = ["-" if velocity is None else with_decimals(velocity * 1e3, 3)]
+    speeds += [with_decimals(speed * 1e3, 2) for speed in others]
     return [*speeds, *[""] * (4 - len(speeds)), "" if gamma is None else f"{gamma:.3f}", model.get("reason") or ""]
 
 
-def describe_alignment(state: dict[str, Any]) -> dict[str, str]:
-    """`alignment_of` as texts by name; with a second text if a force acts along the axis."""
+def _describe_alignment(state: dict[str, Any]) -> list[list[str]]:
+    """`alignment_of` as texts; with a second text if a force acts along the axis."""
     equation = ", ".join(f"{name} = {state[key]:.3g}" for name, key in (("U", "u"), ("V", "v"), ("β", "damping")))
     rolling = f"small angles {'stay small' if state['stable'] else 'grow'} if the beads roll"
     if state["u"] == 0.0:
         torque = rolling if state["v"] else "no torque toward the axis"
-        return {"alignment": f"Mathieu {equation}, stable up to V = {state['largest_stable_v']:.3g}: {torque}"}
+        return [["alignment", f"Mathieu {equation}, stable up to V = {state['largest_stable_v']:.3g}: {torque}"]]
     slip = "unknown: the axial motion is not periodic"
     if state["rate"] is not None:
         falls = f"turns over after about {state['turns_over_after'] or 0.0:.2g} s (from 1° to 90°)"
         slip = f"{'stands' if state['stands'] else falls}; small angles grow by {state['rate']:.3g}/s"
-    return {"alignment": f"Mathieu {equation}: {rolling}", "with slip": slip}
+    return [["alignment", f"Mathieu {equation}: {rolling}"], ["with slip", slip]]
 
 
 def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, FloatArray], dict[str, int]]:

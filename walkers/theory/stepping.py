@@ -33,7 +33,7 @@ _SCATTER = 10.0
 
 @njit(cache=True)
 def integrate(
-    tables: FloatArray, law: FloatArray, drive: FloatArray, cycles: int, steps: int
+    tables: FloatArray, mu: FloatArray, drive: FloatArray, cycles: int, steps: int
 ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, FloatArray]:
     """Walk N walkers from rest.
 
@@ -42,8 +42,8 @@ def integrate(
     tables : ndarray, shape (N, 3, 13, 3)
         For each walker, and for stages (of h seconds) of a step, of an 8th and of a 64th of it: velocities v0 become
         P v0 - h G F∥, normal forces are F0 + B P v0 + D F∥. Three rows of P, G (m/s²), D and B (s/m), and F0.
-    law : ndarray, shape (N, 2, 3)
-        μ and κ (s/m) of each walker and contact.
+    mu : ndarray, shape (N, 3)
+        Coulomb's coefficient of each walker and contact.
     drive : ndarray, shape (N, 3)
         Frequency (Hz), peak acceleration and steady acceleration (m/s²).
     cycles, steps
@@ -70,7 +70,7 @@ def integrate(
             before = totals[0].copy()
             totals[0], totals[1] = 0.0, np.inf
             for step in range(steps):
-                if not _advance(tables[of], law[of], drive[of], step / steps, 1.0 / steps, state, totals, work):
+                if not _advance(tables[of], mu[of], drive[of], step / steps, 1.0 / steps, state, totals, work):
                     solved[of] = False
                     break
                 series[of, step] = state[_SLIDING]
@@ -93,7 +93,7 @@ def integrate(
 @njit(cache=True)
 def _advance(  # noqa: PLR0913, PLR0917
     tables: FloatArray,
-    law: FloatArray,
+    mu: FloatArray,
     drive: FloatArray,
     begin: float,
     length: float,
@@ -111,12 +111,12 @@ def _advance(  # noqa: PLR0913, PLR0917
         now, part = begin + tick / _TICKS * length, width / _TICKS * length
         after[:] = state
         start = (state[0, 0], state[0, 1], state[0, 2])
-        solved = _stage(tables[level], law, drive, now + STAGE * part, STAGE * part, start, work)
+        solved = _stage(tables[level], mu, drive, now + STAGE * part, STAGE * part, start, work)
         # The second stage starts from where the slope of the first one leads.
         more = (1.0 - STAGE) / STAGE
         x, y, z = start
         start = (x + more * (after[0, 0] - x), y + more * (after[0, 1] - y), z + more * (after[0, 2] - z))
-        solved &= _stage(tables[level], law, drive, now + part, STAGE * part, start, work)
+        solved &= _stage(tables[level], mu, drive, now + part, STAGE * part, start, work)
         if level < LEVELS - 1 and (not solved or _differ(after[_MODE], state[_MODE])):
             level += 1
             continue
@@ -139,7 +139,13 @@ def _differ(a: FloatArray, b: FloatArray) -> bool:
 
 @njit(cache=True)
 def _stage(
-    table: FloatArray, law: FloatArray, drive: FloatArray, end: float, length: float, start: Three, work: FloatArray
+    table: FloatArray,
+    mu: FloatArray,
+    drive: FloatArray,
+    end: float,
+    length: float,
+    start: Three,
+    work: FloatArray,
 ) -> bool:
     """An implicit Euler step from the velocities ``start``, in place; returns whether forces were found."""
     seconds, state = length / drive[0], work[:4]
@@ -147,7 +153,7 @@ def _stage(
     free = _times(table, _COAST, (start[0] - push, start[1] - push, start[2]))
     x, y, z = _times(table, _LIFT, free)
     rest = (table[_REST, 0] + x, table[_REST, 1] + y, table[_REST, 2] + z)
-    solved = _settle(table, law, seconds, free, rest, work)
+    solved = _settle(table, mu, seconds, free, rest, work)
     for at in range(3):
         slips = state[_MODE, at] != 0.0
         state[_SLIDING, at] = free[at] - seconds * _row(table, _GAIN + at, state[_PARALLEL]) if slips else 0.0
@@ -156,7 +162,7 @@ def _stage(
 
 
 @njit(cache=True)
-def _settle(table: FloatArray, law: FloatArray, seconds: float, free: Three, rest: Three, work: FloatArray) -> bool:
+def _settle(table: FloatArray, mu: FloatArray, seconds: float, free: Three, rest: Three, work: FloatArray) -> bool:
     """Find the friction forces and modes at the end of a stage, in place, by a semi-smooth Newton method.
 
     A contact sticks if the force that holds it is within the limit, else it slips (Alart and Curnier, Comput. Methods
@@ -169,20 +175,18 @@ def _settle(table: FloatArray, law: FloatArray, seconds: float, free: Three, res
             speed = free[at] - seconds * _row(table, _GAIN + at, parallel)
             scale = seconds * table[_GAIN + at, at]
             wanted = parallel[at] + speed / scale
-            if abs(wanted) <= normal * law[0, at]:
+            if abs(wanted) <= normal * mu[at]:
                 modes[at] = 0.0
                 for by in range(3):
                     rows[at, by] = table[_GAIN + at, by] / table[_GAIN + at, at]
                 right[at] = speed / scale
                 continue
-            side = np.sign(wanted)
-            modes[at] = side
-            drag = normal * law[1, at]
-            slope = side * law[0, at] + law[1, at] * speed
+            modes[at] = np.sign(wanted)
+            slope = modes[at] * mu[at]
             for by in range(3):
-                rows[at, by] = drag * seconds * table[_GAIN + at, by] - slope * table[_PRESS + at, by]
+                rows[at, by] = -slope * table[_PRESS + at, by]
             rows[at, at] += 1.0
-            right[at] = side * law[0, at] * normal + drag * speed - parallel[at]
+            right[at] = slope * normal - parallel[at]
         change = _solved(rows, right)
         for at in range(3):
             parallel[at] += change[at]
