@@ -20,8 +20,8 @@ import numpy.typing as npt
 from walkers.errors import refused
 from walkers.postprocess.results import plain, read
 from walkers.rounding import percent
-from walkers.sweeps.folder import aligned
 from walkers.sweeps.table import SEEDS, groups, key_texts
+from walkers.text import aligned
 
 if TYPE_CHECKING:
     import pandas as pd
