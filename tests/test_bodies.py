@@ -528,7 +528,7 @@ def test_walkers_on_a_tray_meet_and_stick(tmp_path: Path) -> None:
     one, other = next(pair for pair in zip(merged["walker"], merged["other"], strict=True) if pair not in parted)
     apart = np.linalg.norm(centre[-12:, one] - centre[-12:, other], axis=-1)
     assert apart.max() < 1.1 * group.make.length  # they hold on to each other, however they turn
-    (axes,) = figures_of(tray.directory)["paths"].axes
+    (axes,) = figures_of(tray.result)["paths"].axes
     for walker, line in enumerate(axes.lines[:9]):  # in the plane, where they stood
         np.testing.assert_allclose(line.get_xydata(), 1e3 * centre[:, walker, :2])
     beads = tray.motion.position[-1, group.rows].reshape(-1, 3)

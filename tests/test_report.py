@@ -153,7 +153,7 @@ def test_a_sweeps_report_has_its_figure_and_table_and_links_to_the_reports_of_it
 
 def test_a_reports_figures_are_those_that_are_plotted(walked_run: Path, walked_report: Path) -> None:
     """Without elements of the page's names and metadata that would ask a network."""
-    text, drawings = walked_report.read_text("utf-8"), [svg_of(one) for one in figures_of(walked_run).values()]
+    text, drawings = walked_report.read_text("utf-8"), [svg_of(one) for one in figures_of(read(walked_run)).values()]
     assert len(drawings) == 2
     assert all(one in text and "<metadata" not in one and "purl.org" not in one for one in drawings)
     ids = re.findall(r'\sid="([^"]+)"', "".join(drawings))

@@ -152,7 +152,7 @@ def test_walkers_are_named_by_the_direction_in_which_they_face(run_directory: Ru
     meeting = {"replicates": 2, "angle": "150 deg", "facing": "left", "meet": True}
     tray = run_directory(dimers=meeting, boundary={"shape": "box", "width": "12 mm", "height": "4 mm"}, run=SHORT)
     for run, label in ((turned, "0: left at -30°, "), (tray, "0: -30°, ")):
-        (line, *_) = figures_of(run)["walk"].axes[1].lines
+        (line, *_) = figures_of(read(run))["walk"].axes[1].lines
         assert str(line.get_label()).startswith(label)
         assert line.get_ydata()[0] == pytest.approx(-30.0)  # type: ignore[index]
 
@@ -167,7 +167,7 @@ def test_on_slopes_rows_and_figures_are_by_the_way_up(run_directory: RunDirector
     assert (plane["sliding_1"], sloped["sliding_1"]) == ("sliding of bead 1", "sliding of bead 1, facing up")
     assert sloped["axial_velocity"] == "velocity up the slope, facing up"
     assert (plane["walkers"], sloped["walkers"]) == ("walkers", "walkers")
-    cycles, (height, orientation, path) = read(places[1]).columns("cycles"), figures_of(places[1])["walk"].axes
+    cycles, (height, orientation, path) = read(places[1]).columns("cycles"), figures_of(read(places[1]))["walk"].axes
     first = {name: 1e3 * values[cycles["walker"] == 0] for name, values in cycles.items()}
     np.testing.assert_allclose(height.lines[0].get_ydata(), first["along"])
     np.testing.assert_allclose(path.lines[0].get_xydata().T, [first["across"], first["along"]])  # type: ignore[union-attr]

@@ -5,14 +5,16 @@ from __future__ import annotations
 import shlex
 import threading
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
+from inspect import signature
 from math import isclose
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias, get_args
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 from walkers import DEFAULT_OUT, RECORDS
 from walkers.errors import InputError, Problem, WalkersError, check_utf8, expected_of, refused
@@ -35,6 +37,7 @@ from walkers.runner.directory import (
 )
 from walkers.runner.failures import EngineMissing, RunBusy
 from walkers.runner.files import read_json
+from walkers.runner.launch import cores_here
 from walkers.runner.manifest import read_manifest
 
 if TYPE_CHECKING:
@@ -58,6 +61,14 @@ if TYPE_CHECKING:
 Named: TypeAlias = "Case | str | Path | Mapping[str, Any]"
 Changes: TypeAlias = "Mapping[str, Any] | None"
 Export = Literal["deck", "vtk", "paraview", "lammps", "archive"]
+EXPORTS = {
+    "deck": "walkers.sweeps.by_hand:write_folder",
+    "vtk": "walkers.postprocess.paraview:write_vtk",
+    "paraview": "walkers.postprocess.paraview:write_vtk",
+    "lammps": "walkers.postprocess.trajectory_files:write_trajectory",
+    "archive": "walkers.archive.writing:write_archive",
+}
+"""Functions that write the forms of exports."""
 NOT_A_RUN = {
     "folder": "not a finished run: expected a folder with a manifest.json",
     "deck": "is a deck that was run by hand; first do: walkers run {}",
@@ -379,7 +390,6 @@ class Run:
 
     def spread(self, points: int = 32, *, progress: bool | None = None, **how: Any) -> Spread:
         """Run the case with uncertain values drawn from their ranges; see `walkers.sweeps.spread.run_spread`."""
-        from walkers.runner.launch import cores_here
         from walkers.sweeps.scheduler import Options
         from walkers.sweeps.spread import run_spread
 
@@ -405,7 +415,6 @@ class Run:
         >>> round(1e3 * error, 3)  # mm/s
         0.024
         """
-        from walkers.runner.launch import cores_here
         from walkers.sweeps.accuracy import measure_accuracy
         from walkers.sweeps.scheduler import Options
 
@@ -414,44 +423,43 @@ class Run:
             return measure_accuracy(self.finished_directory, options, share=share, on_progress=advance, **how)
 
     def export(self, form: Export, to: str | Path | None = None, **options: Any) -> Path:
-        """Write the run for other programs.
+        """Write the run for other programs; the functions of `EXPORTS` take the options, such as ``every``.
 
         Parameters
         ----------
         form
-            ``vtk`` or ``paraview`` (`walkers.postprocess.paraview`), ``lammps``
-            (`walkers.postprocess.trajectory_files`), ``archive`` (`walkers.archive.writing`), ``deck``
-            (`walkers.sweeps.by_hand.write_folder`).
+            ``vtk``, ``paraview``, ``lammps``, ``archive`` or ``deck``.
         to
             The file, or the folder for ``vtk``, ``paraview`` and ``deck``. None: in the run directory, for ``archive``
             and ``deck`` in the current folder.
-        options
-            Arguments of these functions, such as ``every``; for an archive, those of its function.
 
         Examples
         --------
         >>> walkers.run("fig1b", tmp).export("lammps", tmp / "walk.lammpstrj", every=20).name
         'walk.lammpstrj'
         """
-        place = _path(to)
+        write, place = writer_of(form, options), _path(to)
         if form == "deck":
-            from walkers.sweeps.by_hand import as_run, write_folder
+            from walkers.sweeps.by_hand import as_run
 
-            return write_folder(as_run(self.case, self.directory), place or Path(f"{self.directory.name}-deck"))
-        if form == "archive":
-            from walkers.archive.writing import write_archive
+            return write(as_run(self.case, self.directory), place or Path(f"{self.directory.name}-deck"))
+        written = write(self.finished_directory, place, **options)
+        return written.with_name("show.py") if form == "paraview" else written
 
-            return write_archive(self.finished_directory, place, **options)
-        if form in ("vtk", "paraview"):
-            from walkers.postprocess.paraview import SCRIPT, write_vtk
 
-            collection = write_vtk(self.finished_directory, place, **options)
-            return collection if form == "vtk" else collection.with_name(SCRIPT)
-        if form != "lammps":
-            raise refused("form", f"{form!r}: {expected_of(form, get_args(Export))}")
-        from walkers.postprocess.trajectory_files import write_trajectory
+def writer_of(form: str, options: Iterable[str] = ()) -> Callable[..., Path]:
+    """The function of a form of `EXPORTS`; `InputError` if there is none, or it does not take one of the options."""
 
-        return write_trajectory(self.finished_directory, place, **options)
+    def takes(name: str, option: str) -> bool:
+        return option in signature(resolve_name(EXPORTS[name])).parameters
+
+    if form not in EXPORTS:
+        raise refused("form", f"{form!r}: {expected_of(form, EXPORTS)}")
+    for option in options:
+        if not takes(form, option):
+            raise refused(option, f"is for --to {', '.join(name for name in EXPORTS if takes(name, option))}")
+    write: Callable[..., Path] = resolve_name(EXPORTS[form])
+    return write
 
 
 @contextmanager
@@ -742,7 +750,6 @@ def sweep(
     {'liquid.name': ['Si AK5', 'Si AK10'], 'status': ['finished', 'finished']}
     """
     from walkers.inputs.sweep import load_sweep
-    from walkers.runner.launch import cores_here
     from walkers.sweeps.scheduler import Options, run_sweep
     from walkers.sweeps.site import load_site
 
@@ -865,7 +872,6 @@ def calibrate(
     """
     from walkers.calibration import calibrate
     from walkers.calibration.file import load_calibration
-    from walkers.runner.launch import cores_here
     from walkers.sweeps.scheduler import Options
 
     options = Options(jobs or cores_here())

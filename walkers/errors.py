@@ -11,6 +11,7 @@ import json
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import TypeVar
 
@@ -96,6 +97,12 @@ def shown(value: object) -> str:
 def shortened(text: str, longest: int = _LONGEST_VALUE) -> str:
     """A text as a message quotes it."""
     return text if len(text) <= longest else f"{text[: longest - 3]}..."
+
+
+def check_limits(name: str, value: float | None, low: float, high: float = inf) -> None:
+    """Refuse an argument that is given and not within its limits."""
+    if value is not None and not low <= value <= high:
+        raise refused(name, f"{value:g}: expected " + (f"{low:g} to {high:g}" if high < inf else f"{low:g} or more"))
 
 
 def check_utf8(word: str | Path) -> None:

@@ -11,14 +11,14 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from walkers import DEFAULT_OUT
-from walkers.api import Export
-from walkers.commands.options import AT_LEAST_1, At, Out, RunOrSweep, refuse, tell
+from walkers.api import Export, writer_of
+from walkers.commands.options import At, Out, RunOrSweep, refuse, tell
 
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class OfFiles:
-    """Options of trajectories and files for ParaView.
+class Options:
+    """Options of exports.
 
     Parameters
     ----------
@@ -30,24 +30,9 @@ class OfFiles:
         vtk, paraview: array that colours the beads in the script; default: walker, for piles speed.
     open
         paraview: start ParaView with the script.
-    """
-
-    every: Annotated[int | None, Parameter(validator=AT_LEAST_1)] = None
-    as_placed: bool = False
-    colour: str | None = None
-    open: bool = False
-
-
-@Parameter(name="*")
-@dataclass(frozen=True)
-class OfArchives:
-    """Options of archives.
-
-    Parameters
-    ----------
-    without_dumps
+    dumps
         archive: leave out the engine's dumps; tables and results are included.
-    author
+    authors
         archive: name of an author. Repeatable.
     orcid
         archive: ORCID of an author, in the order of --author. Repeatable.
@@ -55,18 +40,14 @@ class OfArchives:
         archive: an SPDX identifier; default: CC-BY-4.0.
     """
 
-    without_dumps: bool = False
-    author: list[str] | None = None
+    every: int | None = None
+    as_placed: bool = False
+    colour: str | None = None
+    open: bool = False
+    dumps: Annotated[bool, Parameter("--without-dumps")] = False
+    authors: Annotated[list[str] | None, Parameter("--author")] = None
     orcid: list[str] | None = None
     licence: str | None = None
-
-
-_OPTIONS = {
-    "vtk": ("every", "as_placed", "colour"),
-    "paraview": ("every", "as_placed", "colour", "open"),
-    "lammps": ("every",),
-    "archive": ("without_dumps", "author", "orcid", "licence"),
-}
 
 
 def export(
@@ -76,8 +57,7 @@ def export(
     form: Annotated[Export, Parameter("--to")],
     to: Annotated[Path | None, Parameter("-o", metavar="PATH")] = None,
     at: At = At(),
-    files: OfFiles = OfFiles(),
-    archive: OfArchives = OfArchives(),
+    options: Options = Options(),
 ) -> None:
     """Write a run for other programs: LIGGGHTS deck, VTK, ParaView, LAMMPS dump, or an archive to publish.
 
@@ -90,21 +70,20 @@ def export(
     to
         File or folder to write; default: in the run's folder, archives in the current folder. Decks are printed.
     """
-    given = {name: value for name, value in {**vars(files), **vars(archive)}.items() if value}
-    for option in given:
-        forms = [name for name, options in _OPTIONS.items() if option in options]
-        refuse(f"--{option.replace('_', '-')}", form not in forms, f"is for --to {', '.join(forms)}")
-    if form == "deck":
-        _export_deck(what, at, to)
-        return
-    shown = given.pop("open", False)
-    if form == "archive":
+    given = {name: value for name, value in vars(options).items() if value not in (None, False)}
+    shown, orcids = given.pop("open", False), given.pop("orcid", [])
+    refuse("--open", shown and form != "paraview", "is for --to paraview")
+    refuse("--orcid", len(orcids) > len(given.get("authors", [])), "expected an --author for each")
+    if "authors" in given:
         from walkers.archive.crate import Author
 
-        authors, orcids = given.pop("author", []), given.pop("orcid", [])
-        refuse("--orcid", len(orcids) > len(authors), "expected an --author for each")
-        given["authors"] = [Author(*one) for one in zip_longest(authors, orcids)]
-        given["dumps"] = not given.pop("without_dumps", False)
+        given["authors"] = [Author(*one) for one in zip_longest(given["authors"], orcids)]
+    if "dumps" in given:
+        given["dumps"] = False
+    if form == "deck":
+        writer_of(form, given)
+        _export_deck(what, at, to)
+        return
     written = at.load(what).export(form, to, **given)
     print(written)
     if shown:

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
-from cyclopts.validators import Number
 
 import walkers
 from walkers import DEFAULT_OUT
@@ -111,7 +110,7 @@ def render(
     *,
     at: At = At(),
     to: Path | None = None,
-    images: Annotated[int | None, Parameter(validator=Number(gte=1, lte=20))] = None,
+    images: int | None = None,
     film: bool = False,
     options: FilmOptions = FilmOptions(),
 ) -> None:
@@ -132,7 +131,7 @@ def render(
         return
     usual = vars(FilmOptions(walker=options.walker))
     refuse_any({name: value != usual[name] for name, value in vars(options).items()}, "is for --film")
-    print_lines(at.run(run).render(to, images=images or 6, walker=options.walker))
+    print_lines(at.run(run).render(to, images=6 if images is None else images, walker=options.walker))
 
 
 def report(what: RunOrSweep, /, *, at: At = At(), to: Path | None = None) -> None:

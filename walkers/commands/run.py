@@ -77,7 +77,7 @@ def run(
     as_json: Json = False,
     limit: Annotated[float | None, Parameter(validator=NOT_NEGATIVE)] = None,
     spread: bool = False,
-    points: Annotated[int | None, Parameter(validator=Number(gte=2, lte=4096))] = None,
+    points: int | None = None,
     accuracy: bool = False,
     share: Annotated[float | None, Parameter(validator=Number(gte=1e-6, lte=1.0))] = None,
     by: By = By(),
@@ -118,7 +118,7 @@ def run(
         from walkers.sweeps.spread import POINTS, describe, spread_sweep
 
         for case, _ in loaded:  # also an unusable range
-            list(spread_sweep(case, points or POINTS, by.engine).cases())
+            list(spread_sweep(case, POINTS if points is None else points, by.engine).cases())
     failed = False
     for (case, folder), found in zip(loaded, finished, strict=True):
         tell(*(f"{case.name}: {note}" for note in notes(case) if found is None))
@@ -130,7 +130,7 @@ def run(
             continue
         if accuracy:
             done.accuracy(share or SHARE, progress=True, **vars(by))
-        band = done.spread(points or POINTS, progress=True, **vars(by)) if spread else None
+        band = done.spread(POINTS if points is None else points, progress=True, **vars(by)) if spread else None
         failed |= bool(band and band.failures)
         if as_json:
             ranges = {"spread": band.as_dict()} if band else {}

@@ -99,12 +99,6 @@ def check_place(path: Path, *suffixes: str) -> None:
         raise refused(path, f"expected the name of a {' or '.join(suffixes)} file")
 
 
-def check_every(every: int | None) -> None:
-    """Raise `InputError` if every ``every``-th sample cannot be written."""
-    if every is not None and every < 1:
-        raise refused("every", f"{every}: expected a whole number from 1")
-
-
 def save_figure(
     figure: Figure, path: Path, sources: Sequence[str], formats: str | Sequence[str] = ("png",), title: str = ""
 ) -> list[Path]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -34,30 +34,39 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FIGURES: Mapping[str, Sequence[tuple[str, str, str, str]]] = {
+    from walkers.postprocess.results import Results
+
+
+class Panel(NamedTuple):
+    """A plot: its table, x, y (one column or several), the column with the number of the line, title, inches high."""
+
+    table: str
+    x: str
+    y: str
+    by: str
+    title: str
+    height: float = 1.6
+
+
+_ROLLS = "Walker {number}; a bead rolls without sliding where its curve coincides with the walker's"
+_TRAY = "Paths seen from above; circles: start; beads at the end, to scale"
+FIGURES: Mapping[str, Sequence[Panel]] = {
     "walk": (
-        ("cycles", "time", "distance", "walker"),
-        ("cycles", "time", "orientation", "walker"),
-        ("cycles", "along", "across", "walker"),
+        Panel("cycles", "time", "distance", "walker", "Distance {way}; grey: settling"),
+        Panel("cycles", "time", "orientation", "walker", "Orientation from {reference}"),
+        Panel("cycles", "along", "across", "walker", "Paths of the centres of mass, {seen}"),
     ),
-    "slope": (
-        ("cycles", "time", "along", "walker"),
-        ("cycles", "time", "orientation", "walker"),
-        ("cycles", "across", "along", "walker"),
-    ),
-    "gait": (("trajectory", "cycle", "velocity rotation_*", ""),),
-    "paths": (("trajectory", "x", "y", "walker"),),
+    "gait": (Panel("trajectory", "cycle", "velocity rotation_*", "", _ROLLS, 3.2),),
+    "paths": (Panel("trajectory", "x", "y", "walker", _TRAY),),
     "climb": (
-        ("members", "time", "height", "track"),
-        ("bed", "time", "brazil_nut brazil_nut_of_bulk", ""),
-        ("bed", "time", "bridges contacts", ""),
+        Panel("members", "time", "height", "track", "Clusters' leaders", 3.2),
+        Panel("bed", "time", "brazil_nut brazil_nut_of_bulk", "", "Segregation: (z of large − z of small) / their sum"),
+        Panel("bed", "time", "bridges contacts", "", "Bridges and contacts with other beads"),
     ),
 }
-"""Panels of figures: table, x, y (one column or several), and the column with the number of the line."""
 MOST_NAMED = 12  # lines in a legend
 LEAST = {"m": 0.01, "rad": 0.1, "m/s": 0.01}
 """Smallest ranges of axes by unit, in mm, ° and mm/s, so that rounding errors do not look like motion."""
-_HEIGHT = 1.6  # height of a panel, inches
 _LETTERS, _LETTERS_OF_AN_INCH = 100, 13  # letters of a line of a title; of a y label per inch of its panel
 _ASIDE = 10.0  # smallest angle at the start (°) in a legend
 _BETWEEN, _BEFORE = 10, 3  # points of a smooth curve between samples; samples before it, which give its slope
@@ -68,11 +77,9 @@ _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached"
 Tables = Callable[[str], Columns]
 
 
-def figures_of(directory: Path) -> dict[str, Figure]:
+def figures_of(results: Results) -> dict[str, Figure]:
     """The figures of a run by the names of their files, drawn from its tables."""
-    from walkers.postprocess.results import read
-
-    case, tables = case_of(directory), read(directory).columns
+    case, tables = case_of(results.directory), results.columns
     figures = {}
     if case.walkers:
         figures["walk"] = walk_figure(case, tables)
@@ -91,6 +98,8 @@ def plot_run(directory: Path, destination: Path | None = None, formats: str | Se
     The files are written into ``destination``, by default the run directory. A format that is not in
     `walkers.postprocess.drawing.FORMATS` raises ``InputError``, as does the name of a picture for the folder.
     """
+    from walkers.postprocess.results import read
+
     formats = check_formats(formats)
     destination = destination or directory
     if destination.suffix.lower()[1:] in FORMATS and not destination.is_dir():
@@ -98,7 +107,7 @@ def plot_run(directory: Path, destination: Path | None = None, formats: str | Se
     destination.mkdir(parents=True, exist_ok=True)
     return [
         path
-        for name, figure in figures_of(directory).items()
+        for name, figure in figures_of(read(directory)).items()
         for path in save_figure(figure, destination / name, [directory.name], formats)
     ]
 
@@ -149,18 +158,16 @@ def looks_of(labels: Sequence[str]) -> list[dict[str, Any]]:
 
 
 def _panels(
-    name: str,
-    case: Case,
-    tables: Mapping[str, Columns],
-    looks: Sequence[Sequence[Mapping[str, Any]]],
-    heights: Sequence[float],
+    name: str, case: Case, tables: Mapping[str, Columns], looks: Sequence[Sequence[Mapping[str, Any]]], **words: object
 ) -> tuple[Figure, list[Axes]]:
-    """A figure of `FIGURES` with its panels (heights in inches) one below the other, without titles and legends."""
+    """A figure of `FIGURES`, whose titles have the words, with panels one below the other and no legends."""
+    heights = [panel.height for panel in FIGURES[name]]
     figure, grid = new_figure(TWO_COLUMNS, sum(heights), nrows=len(heights), height_ratios=heights, squeeze=False)
     panels = list(grid[:, 0])
-    for axes, (table, x, y, by), look, high in zip(panels, FIGURES[name], looks, heights, strict=True):
-        draw(axes, table, tables[table], x, y, by, look)
-        axes.set_ylabel("\n".join(wrap(axes.get_ylabel(), round(_LETTERS_OF_AN_INCH * high))))
+    for axes, panel, look in zip(panels, FIGURES[name], looks, strict=True):
+        draw(axes, panel.table, tables[panel.table], panel.x, panel.y, panel.by, look)
+        axes.set_ylabel("\n".join(wrap(axes.get_ylabel(), round(_LETTERS_OF_AN_INCH * panel.height))))
+        axes.set_title(panel.title.format(**words))
     for upper, lower in pairwise(panels):
         if upper.get_xlabel() == lower.get_xlabel():
             upper.sharex(lower)
@@ -193,26 +200,25 @@ def walk_figure(case: Case, tables: Tables) -> Figure:
     cycles = cycles | {"orientation": cycles["orientation"] - np.repeat(turned, len(cycles["cycle"]) // len(turned))}
     labels = []
     for row in np.argsort(walkers["walker"]):
-        angle, way = f"{np.degrees(start - turned)[row]:.0f}°", ways(uphill=uphill)[int(side[row] < 0)]
-        aside = f"{way} at {angle}" if abs(np.degrees(start - turned)[row]) > _ASIDE else way
+        degrees, side_way = np.degrees(start - turned)[row], ways(uphill=uphill)[int(side[row] < 0)]
+        aside = f"{side_way} at {degrees:.0f}°" if abs(degrees) > _ASIDE else side_way
         velocity = rounded(1e3 * walkers["axial_velocity" if uphill else "velocity"][row], "mm/s")
-        labels.append(f"{walkers['walker'][row]}: {angle if case.meets else aside}, {velocity} mm/s")
-    name, looks = "slope" if uphill else "walk", [looks_of(labels)] * 3
-    figure, panels = _panels(name, case, {"cycles": cycles}, looks, [_HEIGHT] * 3)
-    distance, orientation, path = panels
-    settled = cycles["time"][case.for_cycles(int(cycles["cycle"].max())).run.settled_strobes]
-    for axes in (distance, orientation):
-        axes.axvspan(0.0, float(settled), color="0.93", zorder=0)
+        labels.append(f"{walkers['walker'][row]}: {f'{degrees:.0f}°' if case.meets else aside}, {velocity} mm/s")
     way = "uphill" if uphill else "along the heading"
-    distance.set_title(f"Distance {way}; grey: settling")
-    reference = "the drive axis" if case.meets else "the direction that the legend names"
-    orientation.set_title(f"Orientation from {reference}")
-    seen = f"{case.boundary.tilted}, seen along its normal" if case.boundary.tilted else "seen from above"
-    path.set_title(f"Paths of the centres of mass, {seen}")
     if uphill:
-        path.invert_xaxis()  # what is on the left is on the left of who goes up
-        path.set(xlabel="across the slope, to the left (mm)", ylabel="uphill (mm)")
-        distance.set_ylabel("uphill (mm)")
+        names = {"distance": "along", "along": "across", "across": "along"}
+        cycles |= {name: cycles[column] for name, column in names.items()}
+    reference = "the drive axis" if case.meets else "the direction that the legend names"
+    seen = f"{case.boundary.tilted}, seen along its normal" if case.boundary.tilted else "seen from above"
+    looks = [looks_of(labels)] * 3
+    figure, panels = _panels("walk", case, {"cycles": cycles}, looks, way=way, reference=reference, seen=seen)
+    settled = cycles["time"][case.for_cycles(int(cycles["cycle"].max())).run.settled_strobes]
+    for axes in panels[:2]:
+        axes.axvspan(0.0, float(settled), color="0.93", zorder=0)
+    if uphill:
+        panels[2].invert_xaxis()  # what is on the left is on the left of who goes up
+        panels[2].set(xlabel="across the slope, to the left (mm)", ylabel="uphill (mm)")
+        panels[0].set_ylabel("uphill (mm)")
     return _explained(figure, panels, f"walker: {'angle' if case.meets else 'facing'} at the start,\nvelocity {way}")
 
 
@@ -230,9 +236,8 @@ def gait_figure(case: Case, tables: Tables) -> Figure:
     for look, name in zip(looks, names, strict=True):
         label, mean = declared(name, TABLES["trajectory"]).label, rounded(1e3 * walkers[name][0], "mm/s")
         look["label"] = f"{label}\n(mean of the run {mean} mm/s)"
-    figure, (axes,) = _panels("gait", case, {"trajectory": smooth}, [looks], [2.0 * _HEIGHT])
+    figure, (axes,) = _panels("gait", case, {"trajectory": smooth}, [looks], number=number)
     axes.axhline(0.0, color="0.4", lw=0.6)
-    axes.set_title(f"Walker {number}; a bead rolls without sliding where its curve coincides with the walker's")
     axes.set_ylabel("velocity relative to the substrate;\nbeads: −R dφ/dt (mm/s)")
     axes.set_xlim(smooth["cycle"][-1] - 2.0, smooth["cycle"][-1] + 0.02)
     return _explained(figure, [axes])
@@ -261,7 +266,8 @@ def paths_figure(case: Case, tables: Tables) -> Figure:
     looks = [look | {"marker": "", "linestyle": "-"} for look in looks_of([f"walker {n}" for n in range(len(x))])]
     reach = 2.0 * max(make.length for make in case.walkers)
     height = 0.7 * TWO_COLUMNS * min(1.2, max(0.3, (np.ptp(y) + reach) / (np.ptp(x) + reach)))
-    figure, (axes,) = _panels("paths", case, {"trajectory": columns}, [looks], [0.9 + height])
+    figure, (axes,) = _panels("paths", case, {"trajectory": columns}, [looks])
+    figure.set_figheight(0.9 + height)
     axes.plot(1e3 * x[:, 0], 1e3 * y[:, 0], "o", color=_GREY, mfc="none", ms=2.5, mew=0.6)
     drive, across = np.array(case.drive_axis), np.cross([0.0, 0.0, 1.0], case.drive_axis)
     for row, make in enumerate(case.walkers[number] for number in walkers["make"]):
@@ -279,7 +285,7 @@ def paths_figure(case: Case, tables: Tables) -> Figure:
         places = np.stack(np.meshgrid(edge, edge, case.boundary.height / 2.0), axis=-1)[:, :, 0]
         inside = np.min([wall.distances(places) for wall in case.boundary.walls], axis=0)
         axes.contour(1e3 * edge, 1e3 * edge, inside, levels=[0.0], colors=[_GREY], linewidths=1.0)
-    axes.set(aspect="equal", title="Paths seen from above; circles: start; beads at the end, to scale")
+    axes.set_aspect("equal")
     axes.margins(0.08)
     return _explained(figure, [axes])
 
@@ -306,9 +312,8 @@ def climb_figure(case: Case, tables: Tables) -> Figure:
         [{"color": "C0", "label": first}, {"color": "C2", "linestyle": "--", "label": second}]
         for first, second in (("all beads", "bulk alone"), ("bridges", "contacts"))
     ]
-    heights = [2.0 * _HEIGHT, _HEIGHT, _HEIGHT]
-    figure, panels = _panels("climb", case, {"members": lines, "bed": bed}, [looks, *two], heights)
-    (leaders, segregation, joined), height = panels, axis("bed", "surface")[1]
+    figure, panels = _panels("climb", case, {"members": lines, "bed": bed}, [looks, *two])
+    (leaders, _, joined), height = panels, axis("bed", "surface")[1]
     low, middle, high = (height * bed[name] for name in ("surface_low", "surface", "surface_high"))
     band = "surface, 10th to\n90th percentile"
     leaders.fill_between(bed["time"], low, high, color="0.85", lw=0, label=band, zorder=0)
@@ -319,9 +324,7 @@ def climb_figure(case: Case, tables: Tables) -> Figure:
         if rows.any():
             look = {"marker": marker, "mfc": "none", "ls": "none", "color": _GREY, "label": kind}
             leaders.plot(events["time"][rows], 1e3 * events["height"][rows], **look)
-    leaders.set_title("Clusters' leaders")
-    segregation.set_title("Segregation: (z of large − z of small) / their sum")
-    joined.set(title="Bridges and contacts with other beads", ylabel="number per bead")
+    joined.set_ylabel("number per bead")
     joined.axhline(0.0, color="0.4", lw=0.6)
     for axes in panels:
         axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), borderaxespad=0.0)

@@ -4,32 +4,25 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from cyclopts import Parameter
-from cyclopts.validators import Number
 
-from walkers.errors import refused
+from walkers.errors import check_limits, refused
 from walkers.inputs.units import DURATION, parse_quantity
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from cyclopts import Token
 
 _NUMBER = re.compile(r"[\d.]+(e[-+]?\d+)?", re.IGNORECASE)
 _SIZES = {"360p": (640, 360), "480p": (854, 480), "720p": (1280, 720), "1080p": (1920, 1080)}
+_LEAST = 64
 
 
 def parse_size(text: str) -> tuple[int, int]:
     """Read a size such as ``720p`` or ``1280x720`` as width and height in pixels; otherwise `InputError`."""
-    numbers = re.fullmatch(r"(\d{2,4})x(\d{2,4})", text.strip().lower())
-    if numbers and min(map(int, numbers.groups())) >= 64:
+    if numbers := re.fullmatch(r"(\d{2,4})x(\d{2,4})", text.strip().lower()):
         return int(numbers[1]), int(numbers[2])
-    if text in _SIZES:
-        return _SIZES[text]
-    expected = f"expected {', '.join(_SIZES)}, or width and height such as 1280x720, at least 64"
-    raise refused("size", f"{text!r}: {expected}")
+    if text not in _SIZES:
+        raise refused("size", f"{text!r}: expected {', '.join(_SIZES)}, or width and height such as 1280x720")
+    return _SIZES[text]
 
 
 def parse_time(option: str, text: str) -> float:
@@ -40,12 +33,12 @@ def parse_time(option: str, text: str) -> float:
         raise refused(option, f'{text!r}: expected a time such as "0.1 s"') from error
 
 
-def _size(_type: Any, tokens: Sequence[Token]) -> tuple[int, int]:
+def _size(_type: Any, tokens: Any) -> tuple[int, int]:
     return parse_size(tokens[0].value)
 
 
-def _seconds(_type: Any, tokens: Sequence[Token]) -> float:
-    return parse_time(str(tokens[0].keyword), tokens[0].value)
+def _seconds(_type: Any, tokens: Any) -> float:
+    return parse_time(tokens[0].keyword, tokens[0].value)
 
 
 Seconds = Annotated[float, Parameter(converter=_seconds, metavar="TIME")]
@@ -55,7 +48,7 @@ Seconds = Annotated[float, Parameter(converter=_seconds, metavar="TIME")]
 @Parameter(name="*")
 @dataclass(frozen=True)
 class FilmOptions:
-    """Options of a film.
+    """Options of a film; numbers that cannot be used raise `InputError`.
 
     Parameters
     ----------
@@ -71,22 +64,17 @@ class FilmOptions:
         Film: physical time of the first frame, s; as an option with its unit, such as '0.1 s'.
     end
         Film: physical time of the last frame; default: the end of the run.
-
-    Raises
-    ------
-    InputError
-        If ``size``, ``fps`` or ``slowdown`` is not positive.
     """
 
     size: Annotated[tuple[int, int], Parameter(converter=_size, n_tokens=1, metavar="SIZE")] = _SIZES["720p"]
-    fps: Annotated[int, Parameter(validator=Number(gte=1, lte=60))] = 25
-    slowdown: Annotated[float | None, Parameter(validator=Number(gte=0.05, lte=10000.0))] = None
-    walker: Annotated[int | None, Parameter(validator=Number(gte=0))] = None
+    fps: int = 25
+    slowdown: float | None = None
+    walker: int | None = None
     begin: Seconds = 0.0
     end: Seconds | None = None
 
     def __post_init__(self) -> None:
-        """Check the numbers that do not depend on a run."""
-        for name, value in (("size", min(self.size)), ("fps", self.fps), ("slowdown", self.slowdown)):
-            if value is not None and not value > 0:
-                raise refused(name, f"{value:g}: expected more than 0")
+        """Check what does not depend on a run."""
+        check_limits("size", min(self.size), _LEAST)
+        check_limits("fps", self.fps, 1, 60)
+        check_limits("slowdown", self.slowdown, 0.05, 1e4)

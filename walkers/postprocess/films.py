@@ -7,7 +7,7 @@ boundary an arrow shows the direction of gravity.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from math import ceil, log10
 from pathlib import Path
@@ -17,23 +17,12 @@ import numpy as np
 
 from walkers.errors import WalkersError, refused
 from walkers.extras import require
+from walkers.postprocess import scene as view
 from walkers.postprocess.drawing import check_place
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.film_options import FilmOptions
 from walkers.postprocess.motion import Motion, read_motion
 from walkers.postprocess.necks import bridges_at, bridges_text
-from walkers.postprocess.scene import (
-    Picture,
-    Scene,
-    Window,
-    against_gravity,
-    camera_axes,
-    from_above,
-    from_the_side,
-    plan_axes,
-    round_below,
-    shown_of,
-)
 from walkers.progress import Progress, Tell
 from walkers.runner.files import beside
 
@@ -45,17 +34,13 @@ _COLOURS, _SAMPLES = 40, 6  # colours of a GIF; pictures from which they are cho
 
 
 def render_film(
-    directory: Path,
-    destination: Path | None = None,
-    options: FilmOptions | None = None,
-    *,
-    on_progress: Tell | None = None,
+    directory: Path, to: Path | None = None, options: FilmOptions = FilmOptions(), *, on_progress: Tell | None = None
 ) -> Path:
     """Render a film of one walker if walkers are independent or one is chosen, otherwise of all beads.
 
     Parameters
     ----------
-    directory, destination
+    directory, to
         A run directory, and the MP4 or GIF file to write; None: ``film.mp4`` in the run directory.
     options, on_progress
         Options; a function that is called after each frame.
@@ -66,47 +51,39 @@ def render_film(
         If the format cannot hold the film, the walker does not exist, or no frame is between begin and end; if ffmpeg
         fails.
     """
-    path, options = destination or directory / "film.mp4", options or FilmOptions()
-    _check_format(path, options)
-    if path.suffix.lower() == ".mp4":
+    path, (wide, tall) = to or directory / "film.mp4", options.size
+    check_place(path, ".mp4", ".gif")
+    if is_gif := path.suffix.lower() == ".gif":
+        if 100 % options.fps or options.fps > 50:  # pictures last whole hundredths of a second
+            raise refused("fps", f"{options.fps}: expected 1, 2, 4, 5, 10, 20, 25 or 50 for a GIF")
+    elif wide % 2 or tall % 2:
+        raise refused("size", f"{wide}x{tall}: expected even numbers for an MP4")
+    else:
         require("film")
-    motion, _ = shown_of(read_motion(directory).driven, options.walker)
+    motion, _ = view.shown_of(read_motion(directory).driven, options.walker)
     times = film_times(motion, options)
     count, frames = len(times.time), slice(int(times.frame[0]), ceil(times.frame[-1]) + 1)
-    wide, tall = options.size
-    around = _AROUND_TRAY if from_above(motion.case) else _AROUND
-    whole = Scene.around(motion, camera_axes(motion), around, frames, rolling=True)
+    around = _AROUND_TRAY if view.from_above(motion.case) else _AROUND
+    whole = view.Scene.around(motion, view.camera_axes(motion), around, frames, rolling=True)
     scene = whole.following(wide / tall, _AROUND, frames)
     bridges = bridges_at(motion, times.frame)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with closing(Window(scene, options.size)) as window, beside(path) as new:
+    with closing(view.Window(scene, options.size)) as window, beside(path) as new:
         write = _captions(scene, times, window.pixels_per_mm, options.size)
 
-        def picture(number: int) -> Picture:
-            return write(window.picture(times.frame[number], bridges[number]), number)
+        def pictures(numbers: Iterable[int], tell: Tell | None = None) -> Iterator[view.Picture]:
+            for number in numbers:
+                yield write(window.picture(times.frame[number], bridges[number]), number)
+                if tell is not None:
+                    tell(Progress((number + 1) / count, f"{number + 1} of {count} frames"))
 
-        def pictures() -> Iterator[Picture]:
-            for number in range(count):
-                yield picture(number)
-                if on_progress is not None:
-                    on_progress(Progress((number + 1) / count, f"{number + 1} of {count} frames"))
-
-        if path.suffix.lower() == ".gif":
+        every = pictures(range(count), on_progress)
+        if is_gif:
             samples = np.linspace(0, count - 1, _SAMPLES).astype(int).tolist()
-            _write_gif(new, pictures(), options.fps, np.concatenate([*map(picture, samples)]))
+            _write_gif(new, every, options.fps, np.concatenate([*pictures(samples)]))
         else:
-            _write_mp4(new, pictures(), options, count)
+            _write_mp4(new, every, options, count)
     return path
-
-
-def _check_format(path: Path, options: FilmOptions) -> None:
-    """Raise `InputError` for options that a format does not support."""
-    suffix, (wide, tall), fps = path.suffix.lower(), options.size, options.fps
-    check_place(path, ".mp4", ".gif")
-    if suffix == ".mp4" and (wide % 2 or tall % 2):
-        raise refused("size", f"{wide}x{tall}: expected even numbers for an MP4")
-    if suffix == ".gif" and (100 % fps or fps > 50):  # pictures last whole hundredths of a second
-        raise refused("fps", f"{fps}: expected 1, 2, 4, 5, 10, 20, 25 or 50 for a GIF")
 
 
 class FilmTimes(NamedTuple):
@@ -138,7 +115,7 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
         largest = _SECONDS / (end - begin)
         if not follows:
             largest = min(largest, 1.0 / (_LEAST_SEEN * float(np.median(np.diff(motion.time)))))
-        slowdown = max(1.0, round_below(largest))
+        slowdown = max(1.0, view.round_below(largest))
     interval, cycle = 1.0 / (options.fps * slowdown), 1.0 / motion.case.excitation.frequency
     time = begin + interval * np.arange(int((end - begin) / interval + 1e-9) + 1)
     strobed = interval >= cycle / 2.0
@@ -152,14 +129,14 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
 
 
 def _captions(
-    scene: Scene, times: FilmTimes, pixels_per_mm: float, size: tuple[int, int]
-) -> Callable[[Picture, int], Picture]:
+    scene: view.Scene, times: FilmTimes, pixels_per_mm: float, size: tuple[int, int]
+) -> Callable[[view.Picture, int], view.Picture]:
     """A function that draws time, distance, slow motion, drive, tilt, scale bar and gravity into a picture."""
     from matplotlib import get_data_path
     from PIL import Image, ImageDraw, ImageFont
 
     (wide, tall), case = size, scene.motion.case
-    above = from_above(case) or wide > 2 * tall  # of the beads, no room is left beside them
+    above = view.from_above(case) or wide > 2 * tall  # of the beads, no room is left beside them
     edge = max(_LEAST_LETTERS, min(tall // _LETTERS, wide // _WIDE))
     # Pillow's own font has no × and no ².
     font = Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
@@ -168,11 +145,11 @@ def _captions(
     decimals = max(0, ceil(-log10(float(np.diff(times.time).max(initial=0.0)) or 1.0) - 1e-9))
     speed = speed_text(times.slowdown) + (", stroboscopic" if times.stroboscopic else "")
     drive = f"{case.excitation.frequency:g} Hz, {case.excitation.peak_acceleration:.3g} m/s²"
-    bar = round_below(wide / 5.0 / pixels_per_mm)
+    bar = view.round_below(wide / 5.0 / pixels_per_mm)
     toward, direction = named_direction(scene.motion)
     left, right, level, thick = wide - edge - bar * pixels_per_mm, wide - edge, tall - edge, max(2, edge // 8)
 
-    def written(picture: Picture, number: int) -> Picture:
+    def written(picture: view.Picture, number: int) -> view.Picture:
         page = Image.fromarray(picture)
         draw = ImageDraw.Draw(page)
         clock, said = f"{times.time[number]:.{decimals}f} s", [speed]
@@ -202,9 +179,9 @@ def _captions(
 
 def named_direction(motion: Motion) -> tuple[FloatArray, str]:
     """Direction of the displacement that is written into pictures, and its name."""
-    if from_the_side(motion.case):
-        return against_gravity(motion), "up"
-    right, up, _ = plan_axes(motion, np.array(motion.case.drive_axis))
+    if view.from_the_side(motion.case):
+        return view.against_gravity(motion), "up"
+    right, up, _ = view.plan_axes(motion, np.array(motion.case.drive_axis))
     return (up, "uphill") if motion.case.boundary.tilt else (right, "along the drive axis")
 
 
@@ -215,7 +192,7 @@ def speed_text(slowdown: float) -> str:
     return f"{slowdown:.4g} × slower" if slowdown > 1.0 else f"{1.0 / slowdown:.4g} × faster"
 
 
-def _write_mp4(path: Path, pictures: Iterator[Picture], options: FilmOptions, count: int) -> None:
+def _write_mp4(path: Path, pictures: Iterator[view.Picture], options: FilmOptions, count: int) -> None:
     """Write H.264 with ffmpeg, which does not report a full disk."""
     from imageio_ffmpeg import count_frames_and_secs, write_frames
 
@@ -237,7 +214,7 @@ def _write_mp4(path: Path, pictures: Iterator[Picture], options: FilmOptions, co
         raise WalkersError(f"ffmpeg wrote {written} of the {count} pictures of {path.parent}: is the disk full?")
 
 
-def _write_gif(path: Path, pictures: Iterator[Picture], fps: int, samples: Picture) -> None:
+def _write_gif(path: Path, pictures: Iterator[view.Picture], fps: int, samples: view.Picture) -> None:
     """Write all pictures with one palette and no dithering, so that parts at rest need no space."""
     from PIL import Image
 

@@ -23,6 +23,7 @@ from walkers.postprocess.motion import Motion, frames_with_bridges, read_bridges
 BLUE, OPACITY = 0x3FA0FF, 0.8
 """Colour of necks; they are translucent."""
 EXPLAINED = "blue: liquid bridges"
+Ends = tuple[FloatArray, FloatArray]
 NO_BRIDGES: IntArray = np.empty((0, 3), dtype=np.int64)
 _ENDS, _WAIST = 1.12, 0.92  # width of a curved meniscus at its ends and in its middle over that of the straight one
 _WIDEST = 0.9  # largest width of a neck over that of the smaller bead
@@ -45,7 +46,7 @@ def bridges_text(case: Case) -> str:
     return EXPLAINED + (f", recorded {often} per cycle" if case.run.samples_per_bridge_sample > 1 else "")
 
 
-def ends_of(motion: Motion, place: FloatArray, contacts: IntArray) -> tuple[FloatArray, FloatArray]:
+def ends_of(motion: Motion, place: FloatArray, contacts: IntArray) -> Ends:
     """Centres of the first beads of contacts, and of the second beads or the nearest points of walls, m, shape (K, 3).
 
     ``place`` are the centres of all beads relative to the boundary, m, shape (N, 3).
@@ -58,13 +59,13 @@ def ends_of(motion: Motion, place: FloatArray, contacts: IntArray) -> tuple[Floa
 
 
 def necks_of(
-    motion: Motion, place: FloatArray, contacts: IntArray, rings: int, sides: int, share: FloatArray | float = 1.0
-) -> tuple[FloatArray, FloatArray]:
-    """Points and normals of the necks of contacts, mm, shape (K, rings × sides, 3); ``place`` as in `ends_of`.
+    motion: Motion, contacts: IntArray, between: Ends, rings: int, sides: int, share: FloatArray | float = 1.0
+) -> Ends:
+    """Points and normals of the necks of contacts, mm, shape (K, rings × sides, 3), ``between`` their ends (`ends_of`).
 
     ``share`` is the width that is drawn over the width of the neck.
     """
-    begins, ends = ends_of(motion, place, contacts)
+    begins, ends = between
     radius, other = motion.radius[contacts[:, 0]], np.where(contacts[:, 1] < 0, np.inf, motion.radius[contacts[:, 1]])
     given = np.vectorize(share_of_bead, otypes=[float])
     fraction = motion.case.liquid.volume_fraction

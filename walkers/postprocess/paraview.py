@@ -18,10 +18,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from walkers.errors import refused
+from walkers.errors import check_limits, refused
 from walkers.postprocess import piles
 from walkers.postprocess.clusters import connected
-from walkers.postprocess.drawing import check_every
 from walkers.postprocess.motion import Bridges, Motion, read_bridges, read_motion
 from walkers.postprocess.necks import ends_of
 from walkers.postprocess.scene import Scene, camera_axes, fans_of, gathered, walls_of
@@ -68,7 +67,7 @@ def write_vtk(
         The ``.pvd`` file with times in s; each frame has the blocks ``beads`` (vertices, `_beads`), ``boundary``
         (triangles) and, if there are any, ``bridges`` (lines, `_bridges`).
     """
-    check_every(every)
+    check_limits("every", every, 1)
     destination = destination or directory / "vtk"
     earlier, place = _earlier(destination), destination.absolute()
     motion = read_motion(directory)
@@ -93,7 +92,7 @@ def write_vtk(
                     ElementTree.SubElement(entries, "DataSet", entry)
             ElementTree.indent(root)
             ElementTree.ElementTree(root).write(new / _COLLECTION)
-            shutil.copyfile(Path(__file__).with_name("paraview_show.py"), new / SCRIPT)
+            shutil.copyfile(Path(__file__).with_name("show.py.txt"), new / SCRIPT)
             for path in earlier:
                 path.unlink()
             new.rename(place)  # refused by the system if the folder is not empty

@@ -382,7 +382,6 @@ class Window:
         rounds, self._round = next((cells, neck) for most, cells, neck in _FINE if len(radius) < most)
         points, triangles, self._pale = beach_ball(rounds, scene.motion)
         self._beads = _Copies(self._plotter, points, triangles, radius, specular=0.4)
-        self._necks: pv.PolyData | None = None
 
     def picture(self, frame: float, bridges: IntArray = NO_BRIDGES) -> Picture:
         """Picture of a frame, or of a time between two frames (a fraction) by cubic interpolation.
@@ -414,27 +413,23 @@ class Window:
         self._plotter.close()
 
     def _wet(self, place: FloatArray, bridges: IntArray, shift: FloatArray) -> None:
-        """Move the liquid necks; if their number changes, replace them."""
+        """Draw the liquid necks; walls before the beads are not drawn, nor are the necks to them."""
         import pyvista as pv
 
         motion = self._scene.motion
         begins, ends = ends_of(motion, place, bridges)
-        # Walls before the beads are not drawn, nor are the necks to them.
         before = (bridges[:, 2] >= 0) & ((ends - begins) @ self._scene.axes[2] > 0.5 * motion.radius[bridges[:, 0]])
-        points, normals = necks_of(motion, place, bridges[~before], *self._round)
-        points, normals = (points + shift).reshape(-1, 3), normals.reshape(-1, 3)
-        if self._necks is None or len(points) != self._necks.n_points:
-            self._plotter.renderer.remove_actor("necks", render=False)
-            self._necks = None
-            if not len(points):
-                return
-            self._necks = pv.PolyData.from_regular_faces(points, triangles_of(len(bridges[~before]), *self._round))
-            look: dict[str, Any] = {"ambient": 0.45, "diffuse": 0.75, "specular": 0.4, "culling": "back"}
-            look |= {"color": f"#{BLUE:06x}", "opacity": OPACITY, "render": False, "reset_camera": False}
-            drawn = self._plotter.add_mesh(self._necks, name="necks", **look)
-            drawn.prop.interpolation = "Phong"
-        self._necks.points, self._necks.point_data["Normals"] = points, normals
-        self._necks.point_data.active_normals_name = "Normals"
+        contacts, between = bridges[~before], (begins[~before], ends[~before])
+        self._plotter.renderer.remove_actor("necks", render=False)
+        if not len(contacts):
+            return
+        points, normals = (each.reshape(-1, 3) for each in necks_of(motion, contacts, between, *self._round))
+        necks = pv.PolyData.from_regular_faces(points + shift, triangles_of(len(contacts), *self._round))
+        necks.point_data["Normals"] = normals
+        necks.point_data.active_normals_name = "Normals"
+        look: dict[str, Any] = {"ambient": 0.45, "diffuse": 0.75, "specular": 0.4, "culling": "back", "name": "necks"}
+        look |= {"color": f"#{BLUE:06x}", "opacity": OPACITY, "render": False, "reset_camera": False}
+        self._plotter.add_mesh(necks, **look).prop.interpolation = "Phong"
 
     def _floor(self, wide: float) -> list[pv.Actor]:
         """A floor with lines that make its motion visible."""

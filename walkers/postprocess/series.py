@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from walkers.errors import check_limits
 from walkers.postprocess.drawing import check_place, new_figure, plain_text, save_figure, styled
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, read_motion
@@ -86,6 +87,7 @@ def render_series(
     InputError
         If the destination is no PNG, or the run has no walker with this number.
     """
+    check_limits("images", images, 1, 20)
     if destination is not None:
         check_place(destination, ".png")
     motion, single = shown_of(read_motion(directory), walker)

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from walkers.postprocess.drawing import check_every, check_place
+from walkers.errors import check_limits
+from walkers.postprocess.drawing import check_place
 from walkers.postprocess.motion import read_motion
 from walkers.runner.files import beside
 
@@ -33,7 +34,7 @@ def write_trajectory(directory: Path, destination: Path | None = None, *, every:
     """
     path = destination or directory / f"trajectory{SUFFIX}"
     check_place(path, SUFFIX)
-    check_every(every)
+    check_limits("every", every, 1)
     motion = read_motion(directory).driven.select(slice(None, None, every))
     radius, count = motion.radius[:, None], len(motion.radius)
     low, high = (motion.position - radius).min(axis=(0, 1)), (motion.position + radius).max(axis=(0, 1))

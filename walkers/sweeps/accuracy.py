@@ -13,7 +13,7 @@ from math import hypot, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.errors import InputError, Problem, refused
+from walkers.errors import InputError, Problem, check_limits, refused
 from walkers.inputs.case import STIFFEST, Case
 from walkers.inputs.sweep import Sweep, expand
 from walkers.postprocess.results import recorded
@@ -62,8 +62,9 @@ def measure_accuracy(
     """Make the runs that measure the numerical errors of a finished run, and record the errors in the run.
 
     Finished runs are used again. Other arguments: see `walkers.sweeps.scheduler.run_sweep`. `InputError` if the run is
-    none of walkers, or not of the installed engine; `SweepStopped` if a run fails.
+    none of walkers or not of the installed engine, or the share is not 1e-6 to 1; `SweepStopped` if a run fails.
     """
+    check_limits("share", share, 1e-6, 1.0)
     case = case_of(directory)
     possible = times_of(case)
     today = Case.read(case.document, source=directory.name, name=case.name)

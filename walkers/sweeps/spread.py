@@ -8,7 +8,7 @@ from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.errors import refused, unusable
+from walkers.errors import check_limits, refused, unusable
 from walkers.inputs.axes import Range, ranges_of, unit_cube, written
 from walkers.inputs.case import Case
 from walkers.inputs.library import unmeasured
@@ -106,11 +106,12 @@ def _half(one: Origin) -> str:
 def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> Sweep:
     """A sweep over the uncertain values of a case by Sobol's sequence, scrambled for the least correlated columns.
 
-    The medians are the values of the case. `InputError` if no value is uncertain, or a range does not contain the value
-    of the case.
+    The medians are the values of the case. `InputError` if no value is uncertain, a range does not contain the value
+    of the case, or there are not 2 to 4096 points.
     """
     import numpy as np
 
+    check_limits("points", points, 2, 4096)
     varied = [one for one in case.origins if one.range is not None]
     if not varied:
         message = "no value is uncertain: give ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"

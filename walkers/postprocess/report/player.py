@@ -14,23 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.extras import require
+from walkers.postprocess import scene as view
 from walkers.postprocess.dump import FloatArray, IntArray
 from walkers.postprocess.motion import Motion, read_motion
-from walkers.postprocess.necks import BLUE, OPACITY, bridges_at, bridges_text, necks_of, triangles_of
-from walkers.postprocess.scene import (
-    Scene,
-    against_gravity,
-    axes_toward,
-    beach_ball,
-    camera_axes,
-    fans_of,
-    floor_lines,
-    from_the_side,
-    gathered,
-    plan_axes,
-    round_below,
-    walls_of,
-)
+from walkers.postprocess.necks import BLUE, OPACITY, bridges_at, bridges_text, ends_of, necks_of, triangles_of
 
 if TYPE_CHECKING:
     import k3d
@@ -72,8 +59,10 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
 
     read = run if isinstance(run, Motion) else read_motion(run)
     motion, stride, captions = _thinned(read.driven, places)
-    motion = gathered(motion, lane=_LANE)
-    scene = Scene.around(motion, camera_axes(motion), _AROUND, shaken=False, rolling=True).following(_ASPECT, _AROUND)
+    motion = view.gathered(motion, lane=_LANE)
+    scene = view.Scene.around(motion, view.camera_axes(motion), _AROUND, shaken=False, rolling=True).following(
+        _ASPECT, _AROUND
+    )
     shown, path = motion.select(slice(None, None, stride)), scene.path
     bridges = bridges_at(motion, np.arange(0, len(motion.time), stride))
     captions.append(f"{bridges_text(motion.case).capitalize()}.")
@@ -90,7 +79,7 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
         beads = [_points(shown, colours[0])]
     else:
         beads = _balls(shown, scene.turned[::stride], colours)
-    boundary = _walls(motion, round_below(scene.height(_ASPECT) / 5.0))
+    boundary = _walls(motion, view.round_below(scene.height(_ASPECT) / 5.0))
     if path is not None:
         back = np.tile(np.eye(4), (len(path), 1, 1))
         back[:, :3, 3] = np.round(-path / _GRID) * _GRID
@@ -114,29 +103,33 @@ def cameras_of(motion: Motion, path: FloatArray | None = None) -> dict[str, list
 
     ``path`` is subtracted from the positions of the beads (`walkers.postprocess.scene.Scene`).
     """
-    upward, sideways = against_gravity(motion), from_the_side(motion.case)
-    first = np.array([-0.25, -1.0, 0.2 if sideways else 2.0]) if motion.case.boundary.closed else camera_axes(motion)[2]
+    upward, sideways = view.against_gravity(motion), view.from_the_side(motion.case)
+    first = (
+        np.array([-0.25, -1.0, 0.2 if sideways else 2.0])
+        if motion.case.boundary.closed
+        else view.camera_axes(motion)[2]
+    )
     views = {
-        "as at first": axes_toward(first, upward),
-        "from the side": axes_toward(np.array([0.0, -1.0, 0.0]), upward),
-        "onto the floor": plan_axes(motion, np.array([1.0, 0.0, 0.0])),
+        "as at first": view.axes_toward(first, upward),
+        "from the side": view.axes_toward(np.array([0.0, -1.0, 0.0]), upward),
+        "onto the floor": view.plan_axes(motion, np.array([1.0, 0.0, 0.0])),
     }
     cameras = {}
     for name, axes in views.items():
-        seen = Scene.around(motion, axes, _AROUND, shaken=False, path=path)
+        seen = view.Scene.around(motion, axes, _AROUND, shaken=False, path=path)
         distance = seen.height(_ASPECT) / 2.0 / tan(radians(_VIEW / 2.0)) + float(seen.high[2] - seen.low[2]) / 2.0
         place, middle, up = seen.camera(distance)
         cameras[name] = np.concatenate([place, middle, up]).tolist()
     return cameras
 
 
-def _gravity(scene: Scene) -> Any:
+def _gravity(scene: view.Scene) -> Any:
     """An arrow in the direction of gravity, at the left edge of the first view."""
     import k3d
 
     long = 0.3 * scene.height(_ASPECT)
     side = max(float(scene.high[0] - scene.low[0]) / 2.0, 0.4 * _ASPECT * scene.height(_ASPECT))
-    down = -against_gravity(scene.motion)
+    down = -view.against_gravity(scene.motion)
     origin = scene.camera(0.0)[1] - side * scene.axes[0] - long / 2.0 * down
     look = {"color": 0x1D2429, "head_size": 1.7 * long, "line_width": 0.04 * long}
     return k3d.vectors(*np.array([[origin], [long * down]], dtype=np.float32), name="gravity", **look)
@@ -168,7 +161,7 @@ def _balls(motion: Motion, turned: FloatArray, colours: FloatArray) -> list[Any]
     import k3d
     from scipy.spatial.transform import Rotation
 
-    points, triangles, pale = beach_ball(24, motion)
+    points, triangles, pale = view.beach_ball(24, motion)
     balls, unit = [], points.astype(np.float32)
     for bead, radius in enumerate(motion.radius * 1e3):
         matrices = np.tile(np.eye(4), (len(motion.time), 1, 1))
@@ -198,7 +191,8 @@ def _necks(motion: Motion, place: FloatArray, bridges: list[IntArray], path: Flo
     for frame, present in enumerate(there):
         near = np.flatnonzero(there[max(frame - 1, 0) : frame + 2].any(axis=0))
         width = present[near].astype(float)
-        necks = necks_of(motion, place[frame], contacts[near], *fine, width)[0]
+        ends = ends_of(motion, place[frame], contacts[near])
+        necks = necks_of(motion, contacts[near], ends, *fine, width)[0]
         points[frame].reshape(len(contacts), -1, 3)[near] = necks - (0.0 if path is None else path[frame])
     look = {"color": BLUE, "opacity": OPACITY, "flat_shading": True, "name": "bridges"}
     mesh = k3d.mesh(points[0].astype(np.float32), triangles_of(len(contacts), *fine).astype(np.uint32), **look)
@@ -227,17 +221,19 @@ def _walls(motion: Motion, step: float) -> list[Any]:
     """The boundary, with transparent side walls, and lines on a bare floor with a spacing (mm)."""
     import k3d
 
-    faces = [1e3 * corners for corners in walls_of(motion)]
+    faces = [1e3 * corners for corners in view.walls_of(motion)]
     parts = []
     for corners in faces:
         level = bool(np.ptp(corners[:, 2]) < 1e-6)
         points = (corners - [0.0, 0.0, 2e-3 * level]).astype(np.float32)  # below beads that touch it
         look = {"color": _FLOOR, "side": "double", "roughness": 1.0, "name": "floor" if level else "wall"}
-        parts.append(k3d.mesh(points, fans_of([corners]).astype(np.uint32), opacity=1.0 if level else 0.12, **look))
+        parts.append(
+            k3d.mesh(points, view.fans_of([corners]).astype(np.uint32), opacity=1.0 if level else 0.12, **look)
+        )
     if motion.case.boundary.bare:
         low, high = faces[0].min(axis=0), faces[0].max(axis=0)
-        step = max(step, round_below(float(np.ptp([low, high])) / _MOST_LINES))
-        ends = floor_lines(low, high, step).astype(np.float32)
+        step = max(step, view.round_below(float(np.ptp([low, high])) / _MOST_LINES))
+        ends = view.floor_lines(low, high, step).astype(np.float32)
         pairs = np.arange(len(ends), dtype=np.uint32).reshape(-1, 2)
         look = {"indices_type": "segment", "shader": "simple", "color": _LINES, "name": f"every {step:g} mm"}
         parts.append(k3d.lines(ends, pairs, **look))

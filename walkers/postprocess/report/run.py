@@ -45,45 +45,39 @@ def report_run(directory: Path, to: Path | None = None, origins: Origins = None,
     require("report")
     path = to or directory / NAME
     check_report(path)
-    case, motion = case_of(directory), read_motion(directory)
-    title = case.title or case.name
+    results, motion = read(directory, origins), read_motion(directory)
+    title = motion.case.title or motion.case.name
     run = {
         "name": directory.resolve().name,
         "title": title,
-        "shown": shown_of(case, read(directory, origins), origins),
+        "summary": f"{caption(motion.case)}.",
+        "shown": shown_of(motion.case, results, origins),
         "manifest": read_manifest(directory),
-        "figures": {name: svg_of(figure) for name, figure in figures_of(directory).items()},
+        "figures": {name: svg_of(figure) for name, figure in figures_of(results).items()},
     }
-    places = MOST_PLACES
-    while True:
+    places, page = 2 * MOST_PLACES, ""
+    while not page or (len(page.encode()) >= largest and places > len(motion.radius)):
+        places //= 2
         player = player_of(motion, places=places)
         carried = {"player": base64.b64encode(player.plot.get_binary_snapshot(9)).decode()}
         page = page_of(title, fill("run.html.j2", run=run, player=player), carried)
-        if len(page.encode()) < largest or places <= len(motion.radius):
-            break
-        places //= 2
     write_text(path, page)
     return path
 
 
 def shown_of(case: Case, results: Results, origins: Origins = None) -> dict[str, Any]:
-    """Warnings and rows of a result; summary and parameters of a case.
-
-    Parameters without recorded origins are in SI units.
-    """
+    """Warnings and rows of a result, and parameters of its case, in SI units if no origins are recorded."""
     parameters = [
         vars(one) | {"range": " … ".join(map(text_of, one.range or ())), "origin": one.word}
         for one in (case.origins if origins is None else origins)
     ]
     said = ((key, value) for key, value in dotted(case.as_dict()) if value not in (None, "", [], ()))
-    as_run = [{"key": key, "text": text_of(value)} for key, value in said]
     return {
-        "summary": f"{caption(case)}.",
         "warnings": results.warnings,
         "rows": rows(results),
         "guessed": [one for one in parameters if one["origin"] == "guessed"],
         "uncertain": [one for one in parameters if one["origin"].endswith("uncertain")],
-        "parameters": parameters or as_run,
+        "parameters": parameters or [{"key": key, "text": text_of(value)} for key, value in said],
     }
 
 
