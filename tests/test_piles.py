@@ -232,7 +232,7 @@ def test_the_program_on_piles(pile_run: Path, in_folder: Path) -> None:
     run, motion = str(pile_run), read_motion(pile_run)
     assert "bridges per bead, at rest" in told("run", run)
     assert told("plot", run, "--to", "here") == "here/climb.png"
-    assert spoilt(figures_of(pile_run)["climb"]) == []
+    assert spoilt(figures_of(read(pile_run))["climb"]) == []
     assert told("render", run, "--to", "here/box.png", "--images", "2") == "here/box.png"
     picture = pv.read(in_folder / "here" / "box.png")
     across, up, _ = picture.dimensions
