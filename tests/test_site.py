@@ -109,32 +109,18 @@ def test_workers_of_another_process_give_the_same(in_folder: Path, front: Callab
     assert "WorkerLost" in "".join(log.read_text() for log in in_folder.glob("there/test/parsl/*/parsl.log"))
 
 
-def _helpers(folder: Path) -> list[psutil.Process]:
-    """Parsl's processes for a sweep in a folder: interchange, pilots, workers."""
-    found = []
-    for process in psutil.process_iter():
-        with suppress(psutil.Error):
-            command = " ".join(process.cmdline())
-            if ("interchange" in command or "process_worker_pool" in command) and (
-                str(folder) in command or process.cwd().startswith(str(folder))
-            ):
-                found.append(process)
-    return found
+def _helpers(folder: Path) -> list[int]:
+    """Process ids of Parsl's interchange, pilots and workers for a sweep in a folder."""
+    return [pid for word in (b"interchange", b"process_worker_pool") for pid in processes_in(folder, word)]
 
 
-def _reachable(processes: list[psutil.Process]) -> set[str]:
-    """What processes listen on, or take datagrams at, that others than this machine may reach."""
-    found = set()
-    for process in processes:
-        with suppress(psutil.Error, OSError):
-            devices = Path(f"/proc/{process.pid}/net/dev").read_text().splitlines()[2:]
-            if [line.split(":")[0].strip() for line in devices] == ["lo"]:
-                continue
-            for one in process.net_connections("inet"):
-                here = ip_address(one.laddr.ip.partition("%")[0].removeprefix("::ffff:")) if one.laddr else None
-                if here is not None and not here.is_loopback and not one.raddr:
-                    found.add(f"{process.name()} {one.type.name} {one.laddr}")
-    return found
+def _reachable(process: psutil.Process) -> Iterator[str]:
+    """What a process listens on, or takes datagrams at, that others than this machine may reach."""
+    devices = Path(f"/proc/{process.pid}/net/dev").read_text().splitlines()[2:]
+    for one in process.net_connections("inet") if [line.split(":")[0].strip() for line in devices] != ["lo"] else ():
+        here = ip_address(one.laddr.ip.partition("%")[0].removeprefix("::ffff:")) if one.laddr else None
+        if here is not None and not here.is_loopback and not one.raddr:
+            yield f"{process.name()} {one.type.name} {one.laddr}"
 
 
 @pytest.mark.parametrize(("site", "ranks"), [("", 2), (LOCAL, 1)])
@@ -157,11 +143,11 @@ def test_nothing_listens_beyond_this_machine(in_folder: Path, site: str, ranks: 
     def looked() -> bool:
         """Until beads have moved in two processes."""
         assert program.poll() is None
-        there = [program.pid, *processes_in(in_folder), *(one.pid for one in _helpers(in_folder))]
-        there += [one.pid for one in psutil.Process(program.pid).children(recursive=True)]
+        there = {*processes_in(in_folder), *(one.pid for one in psutil.Process(program.pid).children(recursive=True))}
         seen.update(there)
-        with suppress(psutil.NoSuchProcess):
-            found.update(_reachable([psutil.Process(pid) for pid in set(there) if psutil.pid_exists(pid)]))
+        for pid in there:
+            with suppress(psutil.Error, OSError):
+                found.update(_reachable(psutil.Process(pid)))
         dumps = [dump for dump in in_folder.glob("runs/**/beads.bin") if dump.stat().st_size > 1000]
         return len(dumps) * ranks >= 2
 
@@ -223,73 +209,52 @@ def cluster() -> Iterator[dict[str, str]]:
             yield environment
 
 
-@pytest.fixture
-def files(in_folder: Path) -> Path:
+def test_a_sweep_through_slurm(cluster: dict[str, str], in_folder: Path, front: Callable[[str], str]) -> None:
+    """A failing point, a pilot cancelled midway, an interrupt and a resumption: bit for bit what this machine gives."""
     (in_folder / "base.toml").write_text(to_toml(document(liquid={"name": "glycerol 87 %"}, run=RUN)))
     (in_folder / "test.toml").write_text(to_toml(SWEEP))
     (in_folder / "site.toml").write_text(to_toml(SITE))
-    front, log, go = in_folder / "front", in_folder / "launches", in_folder / "go"
     # Ten launches are enough for six points, though one fails and one is cancelled; twelve points need two more.
-    front.write_text(
-        f"""#!/bin/sh
-        echo >> {log}
-        [ $(wc -l < {log}) -le 10 ] || while ! [ -e {go} ]; do sleep 0.1; done
-        exec liggghts "$@"
-        """
-    )
-    front.chmod(0o755)
-    return in_folder
+    log, go = in_folder / "launches", in_folder / "go"
+    waits = f"[ $(wc -l < {log}) -le 10 ] || while ! [ -e {go} ]; do sleep 0.1; done"
+    command = ["sweep", "test.toml", "--engine", front(f'echo >> {log}\n{waits}\nexec liggghts "$@"'), "--out"]
 
+    def start() -> subprocess.Popen[str]:
+        through = [PROGRAM, *command, "cluster", "--site", "site.toml"]
+        return subprocess.Popen(through, env=cluster, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
 
-def _jobs(environment: dict[str, str], *options: str) -> list[str]:
-    command = ["squeue", "-h", "-o", "%A", *options]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()
+    def jobs(*options: str) -> list[str]:
+        told = subprocess.run(["squeue", "-h", "-o", "%A", *options], env=cluster, capture_output=True, check=True)
+        return told.stdout.decode().split()
 
-
-def _sweep(environment: dict[str, str]) -> subprocess.Popen[str]:
-    command = [PROGRAM, "sweep", "test.toml", "--engine", "./front", "--site", "site.toml", "--out", "cluster"]
-    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-
-def test_a_sweep_through_slurm(cluster: dict[str, str], files: Path) -> None:
-    """A failing point, a pilot cancelled midway, an interrupt and a resumption: bit for bit what this machine gives."""
-
-    def at_least(number: int) -> Callable[[], bool]:
-        return lambda: first.poll() is not None or len(contents_of(files / "cluster")) >= number
-
-    first = _sweep(cluster)
-    wait_for(at_least(2))
-    pilot, *_ = _jobs(cluster, "-t", "running")
-    subprocess.run(["scancel", pilot], env=cluster, check=True)
-    wait_for(at_least(6))
+    first = start()
+    for least in (2, 6):
+        wait_for(lambda least=least: first.poll() is not None or len(contents_of(in_folder / "cluster")) >= least)
+        if least == 2:
+            pilot, *_ = jobs("-t", "running")
+            subprocess.run(["scancel", pilot], env=cluster, check=True)
     assert first.poll() is None
-    assert pilot not in _jobs(cluster)
+    assert pilot not in jobs()
     first.send_signal(signal.SIGINT)
     _, errors = first.communicate(timeout=PATIENCE)
     assert (first.returncode, "Traceback" in errors) == (130, False)
-    wait_for(lambda: not _jobs(cluster))
-    left = contents_of(files / "cluster")
-    assert 6 <= len(left) < 11
-    (files / "go").touch()
-    second = _sweep(cluster)
+    wait_for(lambda: not jobs())
+    assert 6 <= len(contents_of(in_folder / "cluster")) < 11
+    go.touch()
+    second = start()
     _, errors = second.communicate(timeout=PATIENCE)
-    assert second.returncode == 1
-    assert "point 4, base-" in errors
-    assert "blow-up" in errors
-    wait_for(lambda: not _jobs(cluster))
-    frame = load(files / "cluster" / "test")
-    assert list(frame["status"]) == ["finished"] * 4 + ["failed"] + ["finished"] * 7
-    local = call("sweep", "test.toml", "--engine", "./front", "--out", "local")
-    assert local.returncode == 1
-    assert contents_of(files / "cluster") == contents_of(files / "local")
-    assert len(contents_of(files / "local")) == 11
+    assert (second.returncode, "point 4, base-" in errors, "blow-up" in errors) == (1, True, True), errors
+    wait_for(lambda: not jobs())
+    assert list(load("cluster/test")["status"]) == ["finished"] * 4 + ["failed"] + ["finished"] * 7
+    assert call(*command, "local").returncode == 1
+    assert contents_of(in_folder / "cluster") == contents_of(in_folder / "local")
+    assert len(contents_of(in_folder / "local")) == 11
 
 
 def test_engines_within_a_job(cluster: dict[str, str], in_folder: Path) -> None:
     """One process within a step of srun, and two ranks of mpirun within a job, as workers of a pilot start them."""
     checks = [f"srun {PROGRAM} check engine --only stock", f"{PROGRAM} check engine --only ranks"]
-    wrapped = "; ".join(f"{check}; echo ended with $? >> ended.new" for check in checks)
-    wrapped += "; mv ended.new ended"
+    wrapped = "; ".join([*(f"{check}; echo ended with $? >> ended.new" for check in checks), "mv ended.new ended"])
     job = ["sbatch", "--ntasks", "1", "--cpus-per-task", "2", "--output", "job.log", "--wrap", wrapped]
     subprocess.run(job, env=cluster, capture_output=True, check=True)
     wait_for((in_folder / "ended").exists)  # sbatch's own --wait looks every ten seconds
