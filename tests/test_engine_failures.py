@@ -17,13 +17,11 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-import psutil
 import pytest
 
 from tests.conftest import (
     LONG,
     PATIENCE,
-    PROGRAM,
     SHORT,
     call,
     document,
@@ -46,7 +44,7 @@ from walkers.runner.binary import find_engine, plugin_of
 from walkers.runner.directory import write_deck
 from walkers.runner.failures import EngineNeverStarted
 from walkers.runner.files import beside
-from walkers.runner.launch import ALONE, _off_the_network, judge, launch, postponed_interrupts
+from walkers.runner.launch import _off_the_network, judge, launch
 from walkers.templates.deck import Deck, Segment, render_deck, whole
 
 Front = Callable[[str], str]
@@ -357,19 +355,6 @@ def test_a_launcher_that_was_stopped_does_not_take_that_for_silence(tmp_path: Pa
 # --- disks ------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("what", ["run long.toml", "sweep sweep.toml"])
-def test_an_output_that_was_removed_meanwhile_is_told(what: str, in_folder: Path) -> None:
-    (in_folder / "long.toml").write_text(to_toml(document(run=LONG)))
-    (in_folder / "sweep.toml").write_text('case = "long.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
-    with subprocess.Popen([PROGRAM, *what.split()], stderr=subprocess.PIPE, text=True) as program:
-        wait_for(lambda: list(in_folder.glob("runs/**/beads.bin")))
-        shutil.rmtree(in_folder / "runs", ignore_errors=True)
-        _, told = program.communicate()
-    assert program.returncode == 1, told
-    assert "was removed while it was written" in told
-    assert "Traceback" not in told
-
-
 def test_a_disk_without_room_for_the_dump_and_one_that_fills_up_during_the_run(tmp_path: Path) -> None:
     with mounted(tmp_path / "disk", "2m") as place:
         with pytest.raises(failures.DiskFull, match="disk full"):
@@ -510,41 +495,6 @@ def test_a_file_can_be_written_by_many_threads_at_once(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-def test_an_interrupt_while_the_engine_is_being_started_comes_after() -> None:
-    started = False
-    with pytest.raises(KeyboardInterrupt), postponed_interrupts():
-        signal.raise_signal(signal.SIGINT)
-        time.sleep(0.01)
-        started = True
-    assert started
-
-
-@pytest.mark.parametrize(
-    ("command", "number", "status", "told"),
-    [
-        ("run long.toml", signal.SIGINT, 130, "interrupted"),
-        ("run long.toml", signal.SIGTERM, 143, "terminated"),
-        ("run long.toml", signal.SIGHUP, 129, "the terminal was closed"),
-        ("check engine --only step", signal.SIGINT, 130, "interrupted"),
-    ],
-)
-def test_interrupts_stop_the_engine_and_leave_no_run(
-    command: str, number: int, status: int, told: str, in_folder: Path
-) -> None:
-    (in_folder / "long.toml").write_text(to_toml(document(run=LONG)))
-    how = {"env": {**os.environ, "TMPDIR": str(in_folder)}, "start_new_session": True}
-    program = subprocess.Popen([PROGRAM, *command.split()], stderr=subprocess.PIPE, text=True, **how)
-    wait_for_engines(in_folder, program)
-    program.send_signal(number)
-    _, errors = program.communicate(timeout=PATIENCE)
-    assert (program.returncode, errors.splitlines()[-1]) == (status, f"walkers: {told}")
-    assert "Traceback" not in errors
-    assert not engines_in(in_folder)
-    assert not [
-        path for name in ("runs/*/manifest.json", "runs/*.lock", "walkers-audit-*") for path in in_folder.glob(name)
-    ]
-
-
 def test_a_failed_run_is_reported_and_the_next_one_goes_on(in_folder: Path) -> None:
     (in_folder / "hot.toml").write_text(to_toml(document(**UNSTABLE)))
     (in_folder / "good.toml").write_text(to_toml(document(run=SHORT)))
@@ -608,30 +558,3 @@ def test_an_engine_starts_where_nothing_temporary_can_be_written(
     plugin_of(find_engine())  # is there: a compiler needs such files
     monkeypatch.setenv("TMPDIR", "/proc")
     assert not run_case(make_case(run=SHORT), tmp_path).cached
-
-
-def test_a_plain_sweep_listens_to_nobody_and_has_no_daemon(in_folder: Path) -> None:
-    (in_folder / "base.toml").write_text(to_toml(document(run=LONG)))
-    (in_folder / "test.toml").write_text(
-        'case = "base.toml"\n[axes]\ndrive.frequency = ["60 Hz", "70 Hz", "80 Hz", "90 Hz"]\n'
-    )
-    program = subprocess.Popen([PROGRAM, "sweep", "test.toml", "-j", "2"], stderr=subprocess.DEVNULL)
-    try:
-        running = wait_for(lambda: [one for one in engines_in(in_folder) if _has_begun(one)][1:])
-        assert running
-        starter = psutil.Process(program.pid)
-        family = [starter, *starter.children(recursive=True)]
-        assert not [one.name() for one in family if "orted" in one.name()]
-        open_ports = [each for one in family for each in one.net_connections() if each.status == psutil.CONN_LISTEN]
-        assert open_ports == []
-        for engine in running:
-            assert psutil.Process(engine).environ().items() >= ALONE.items()
-        assert not list(in_folder.glob("runs/*/failure.json"))  # the box of 4,000 cycles at 60 Hz has many bins
-    finally:
-        program.kill()
-        program.wait()
-
-
-def _has_begun(engine: int) -> bool:
-    """Whether MPI is up in an engine: it writes frames by then."""
-    return any(Path(each.path).name == "beads.bin" for each in psutil.Process(engine).open_files())

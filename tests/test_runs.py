@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-import random
 import shutil
 import signal
 import subprocess
-import time
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,7 +29,6 @@ from tests.conftest import (
 )
 from walkers import run as run_case
 from walkers.errors import InputError
-from walkers.progress import Progress
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import (
     FIRST_SEGMENT,
@@ -44,7 +40,6 @@ from walkers.runner.directory import (
     locked,
     run_place,
 )
-from walkers.runner.failures import RunBusy
 from walkers.runner.manifest import read_manifest
 from walkers.sweeps.making import make_runs
 from walkers.templates.deck import render_deck
@@ -56,16 +51,6 @@ def _toml(folder: Path, **run: object) -> str:
     file = folder / "test.toml"
     file.write_text(to_toml(document(run=run or SHORT)))
     return str(file)
-
-
-def _forked(work: Callable[[], object]) -> int:
-    """Do something in a process of its own, which spares it the imports; its number."""
-    child = os.fork()
-    if child:
-        return child
-    with suppress(BaseException):
-        work()
-    os._exit(0)
 
 
 # --- what is there ----------------------------------------------------------------------------------------------------
@@ -210,36 +195,6 @@ def test_a_finished_run_is_run_again_by_force_only(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == [first.directory.name]
 
 
-def test_an_interrupted_run_goes_on_after_its_last_whole_segment(tmp_path: Path) -> None:
-    """Walkers of six cycles in segments of two; what comes out is what a run without an interrupt gives."""
-    case = make_case(run={**SHORT, "segment": "25 ms", "time_step": "1 us"})
-
-    def interrupt(progress: Progress) -> None:
-        if progress.share > 1 / 3:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        make_runs([case], tmp_path, find_engine(), on_progress=interrupt)
-    (part,) = tmp_path.glob("*.incomplete")
-    *whole, begun = sorted(part.glob("segments/*"))
-    assert whole
-    assert begun.suffix == ".new"
-    for folder in (part, begun):
-        (folder / "leftover").touch()
-    node = (part / FIRST_SEGMENT / "beads.bin").stat().st_ino
-    outcome = run_case(case, tmp_path)
-    assert not outcome.cached
-    assert not part.exists()
-    assert not list(outcome.directory.rglob("leftover"))
-    assert (outcome.directory / FIRST_SEGMENT / "beads.bin").stat().st_ino == node
-    straight = run_case(case, tmp_path / "straight")
-    segments = [sorted(run.directory.glob("segments/*/beads.bin")) for run in (outcome, straight)]
-    assert [len(dumps) for dumps in segments] == [3, 3]
-    for one, other in zip(*segments, strict=True):
-        assert one.read_bytes() == other.read_bytes()
-    assert outcome.result == straight.result
-
-
 def test_a_run_that_somebody_else_finished_meanwhile_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     case = make_case(run=SHORT)
     stamp = read_manifest(run_case(case, tmp_path).directory)["finished"]
@@ -278,78 +233,6 @@ def test_a_lock_that_somebody_has_is_refused(tmp_path: Path, monkeypatch: pytest
         assert is_locked(tmp_path / "x")
     assert not is_locked(tmp_path / "x")
     assert not list(tmp_path.iterdir())
-
-
-def test_an_engine_that_outlives_its_launcher_keeps_others_away(
-    front: Callable[[str], str], in_folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The kernel ends an engine whose launcher dies, but not the engine's own children."""
-    monkeypatch.setattr(PATIENCE_OF_LOCKS, 0.5)
-    _toml(in_folder, **LONG)
-    engine = front('liggghts "$@"\nexit 0')
-    program = subprocess.Popen([PROGRAM, "run", "test.toml", "--engine", engine], stderr=subprocess.DEVNULL)
-    begun = "runs/*.incomplete/segments/0000.new/beads.bin"
-    wait_for(lambda: program.poll() is not None or list(in_folder.glob(begun)))
-    assert program.poll() is None
-    program.kill()
-    program.wait()
-    case = make_case(run=LONG)
-    try:
-        with pytest.raises(RunBusy):
-            run_case(case, in_folder / "runs", engine=engine)
-    finally:
-        for orphan in engines_in(in_folder):
-            os.kill(orphan, signal.SIGKILL)
-    with open_run(case, find_engine(engine), in_folder / "runs"):
-        pass
-
-
-def test_after_each_kill_the_next_call_runs(tmp_path: Path) -> None:
-    """The launcher is killed before, at and after the birth of its engine; whoever calls then gets the run."""
-    draw = random.Random(14)
-    for kill in range(4):
-        case = make_case(run={**BRIEF, "cycles": 100, "seed": kill})
-        child = _forked(lambda case=case: run_case(case, tmp_path, force=True))  # type: ignore[misc]
-        if kill % 2:
-            wait_for(lambda: engines_in(tmp_path))
-        else:
-            time.sleep(draw.uniform(0.0, 0.4))
-        os.kill(child, signal.SIGKILL)
-        outcome = run_case(case, tmp_path)
-        os.waitpid(child, 0)
-        assert is_finished(outcome.directory)
-        assert not is_locked(outcome.directory)
-    wait_for(lambda: not engines_in(tmp_path))
-    assert not list(tmp_path.glob("*.incomplete"))
-    assert not list(tmp_path.glob("*.lock"))
-
-
-def test_no_engine_is_orphaned_by_a_kill_at_its_birth(tmp_path: Path) -> None:
-    """Decks that would run for minutes: an engine that its launcher's death did not reach would still be there."""
-    case, draw = make_case(run=LONG), random.Random(3)
-    for kill in range(20):
-        folder = tmp_path / str(kill)
-        child = _forked(lambda folder=folder: run_case(case, folder))  # type: ignore[misc]
-        wait_for(lambda folder=folder: list(folder.glob("*.incomplete/segments/0000.new/engine.log")))  # type: ignore[misc]
-        time.sleep(draw.uniform(0.0, 0.02))  # the fork, setpriv, sh and the engine follow within that time
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
-    wait_for(lambda: not engines_in(tmp_path))
-    time.sleep(0.5)  # one that was still being born
-    assert not engines_in(tmp_path)
-
-
-def test_nohup_outlives_a_closed_terminal(in_folder: Path) -> None:
-    _toml(in_folder, **LONG)
-    command = ["nohup", PROGRAM, "run", "test.toml"]
-    program = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    engines = wait_for(lambda: engines_in(in_folder))
-    program.send_signal(signal.SIGHUP)
-    time.sleep(0.3)
-    assert engines_in(in_folder) == engines
-    program.terminate()
-    assert program.wait() == 143
-    assert not engines_in(in_folder)
 
 
 def test_tables_are_run_as_their_file_is(tmp_path: Path, run_directory: Callable[..., Path]) -> None:

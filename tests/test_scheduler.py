@@ -5,25 +5,22 @@ import os
 import random
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-import psutil
 import pyarrow.parquet as pq
 import pytest
 
-from tests.conftest import PATIENCE, PROGRAM, call, document, engines_in, make_case, to_toml, wait_for, wait_for_engines
+from tests.conftest import PATIENCE, PROGRAM, call, document, make_case, to_toml
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.motion import read_motion
@@ -52,8 +49,6 @@ from walkers.templates.scene import sharing_key
 
 STEP = {"time_step": "2 us"}
 TINY = {**STEP, "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
-# Long enough for whoever is to be stopped meanwhile, however fast or busy the machine.
-SLOW = {**TINY, "cycles": 4000, "settling_cycles": 2}
 DONE = "finished"
 
 
@@ -288,21 +283,6 @@ def test_a_descent_finds_where_the_walkers_stop(sweep_file: Callable[..., str], 
     assert "moving (g)" in done.stdout
 
 
-def test_a_run_that_was_cut_since_is_told_and_stops_nothing(sweep_file: Callable[..., str]) -> None:
-    name = sweep_file('axes."drive.peak_acceleration" = ["3 g", "2.5 g", "2 g"]')
-    assert _sweep(name).returncode == 0
-    run = Path(load("runs/test")["run"][1])
-    (run / "result.json").unlink()
-    os.truncate(run / FIRST_SEGMENT / "beads.bin", 100)
-    frame = load("runs/test")
-    assert list(frame["status"]) == [DONE, "failed", DONE]
-    assert frame["reason"][1] == "ResultUnreadable"
-    assert _sweep(name).returncode == 1
-    (run / "manifest.json").unlink()
-    assert _sweep(name).returncode == 0
-    assert set(load("runs/test")["status"]) == {DONE}
-
-
 # --- failures ---------------------------------------------------------------------------------------------------------
 
 UNSTABLE = """
@@ -396,31 +376,6 @@ def test_a_worker_of_another_version_refuses(tmp_path: Path) -> None:
 # --- several processes and sweeps -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGKILL, -9)])
-def test_interrupts_leave_no_engine_and_the_next_call_goes_on(
-    number: signal.Signals, status: int, sweep_file: Callable[..., str], in_folder: Path
-) -> None:
-    """Engines are the only children meanwhile."""
-    text = '[axes]\ndrive.peak_acceleration = { linspace = ["2 g", "3 g", 4] }'
-    program = _start(sweep_file(text, run=SLOW))
-    wait_for_engines(in_folder, program, 2)
-
-    def all_are_engines() -> bool:  # a process that is just started still has the name of its parent
-        children = psutil.Process(program.pid).children()
-        with suppress(FileNotFoundError):  # one that has just ended
-            return all(b"liggghts" in Path(f"/proc/{child.pid}/cmdline").read_bytes() for child in children)
-        return False
-
-    wait_for(all_are_engines)
-    program.send_signal(number)
-    _, errors = program.communicate(timeout=PATIENCE)
-    assert (program.returncode, "Traceback" in errors) == (status, False)
-    if number == signal.SIGKILL:
-        wait_for(lambda: not engines_in(in_folder))
-    assert not engines_in(in_folder)
-    assert _sweep(sweep_file(text)).returncode == 0
-
-
 def test_what_somebody_else_is_making_is_waited_for(
     sweep_file: Callable[..., str], in_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -472,46 +427,6 @@ def test_two_sweeps_of_one_process_do_not_stop_each_other(sweep_file: Callable[.
     with ThreadPoolExecutor(2) as pool:
         ends = [pool.submit(run_sweep, sweep, in_folder / "runs", Options(1)) for sweep in (long, short)]
         assert [end.result()[1] for end in ends] == [[], []]
-
-
-def test_a_sweep_that_is_killed_three_times(
-    sweep_file: Callable[..., str], in_folder: Path, counting_engine: tuple[str, Callable[[], list[str]]]
-) -> None:
-    """SIGKILL at random moments, of the sweep and at times of an engine: nothing lost, nothing twice, bit for bit."""
-    text = """
-    [axes]
-    drive.frequency         = { linspace = ["60 Hz", "70 Hz", 3] }
-    drive.peak_acceleration = ["2 g", "5 g"]
-    dimers.angle            = ["0 deg", "20 deg"]
-    """
-    name = sweep_file(text, run={**TINY, "cycles": 10, "settling_cycles": 2})
-    engine, launches = counting_engine
-    assert _sweep(name, "--engine", engine, "--out", "undisturbed").returncode == 0
-    draw = random.Random(20)
-    finished: set[str] = set()
-    for kill in range(3):
-        then = len(launches()) + draw.choice((1, 2, 3))
-        program = _start(name, "--engine", engine)
-        if kill == 1:  # a point is finished
-            wait_for(lambda program=program: contents_of(in_folder / "runs") or program.poll() is not None)
-        wait_for(lambda then=then, program=program: len(launches()) >= then or program.poll() is not None)
-        time.sleep(draw.uniform(0.0, 0.2))
-        if draw.random() < 0.3 and (engines := engines_in(in_folder)):
-            os.kill(draw.choice(engines), signal.SIGKILL)
-            time.sleep(0.05)
-        program.kill()
-        program.communicate()
-        now = {*contents_of(in_folder / "runs")}
-        assert finished <= now
-        finished = now
-    assert finished
-    before = len(launches())
-    done = _sweep(name, "--engine", engine)
-    assert (done.returncode, "12 points, 12 finished" in done.stdout) == (0, True)
-    assert contents_of(in_folder / "runs") == contents_of(in_folder / "undisturbed")
-    # The last call made no finished point again: each of its decks holds points that were missing before.
-    assert not {made_in(place) for place in launches()[before:]} & finished
-    assert not [*in_folder.glob("runs/**/*.incomplete"), *in_folder.glob("runs/**/*.lock")]
 
 
 def test_workers_that_are_handed_over_give_the_same(sweep_file: Callable[..., str], in_folder: Path) -> None:

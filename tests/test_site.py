@@ -1,7 +1,6 @@
 """Sites of sweeps: what Parsl is given, workers of other processes and of SLURM."""
 
 import json
-import os
 import signal
 import subprocess
 import tempfile
@@ -19,18 +18,17 @@ from tests.conftest import (
     PROGRAM,
     call,
     document,
-    engines_in,
     processes_in,
     to_toml,
     wait_for,
-    wait_for_engines,
 )
 from tests.test_hostile import HOSTILE
-from tests.test_scheduler import SLOW, TINY, contents_of
+from tests.test_scheduler import TINY, contents_of
 from walkers.errors import InputError
 from walkers.inputs.sweep import load_sweep
 from walkers.runner.launch import _off_the_network
-from walkers.sweeps.site import check_path, decks_at, load_site, prepare
+from walkers.sweeps.scheduler import Options
+from walkers.sweeps.site import Slurm, check_path, decks_at, load_site, prepare
 from walkers.sweeps.table import load
 
 BAD = {
@@ -160,33 +158,6 @@ def test_nothing_listens_beyond_this_machine(in_folder: Path, site: str, ranks: 
     assert not found
 
 
-def test_sweeps_of_pilots_leave_nobody_behind(in_folder: Path) -> None:
-    """Ctrl-C of a terminal reaches the whole group of processes, SIGKILL the program alone; two sweeps at a time."""
-    programs = {}
-    for number in (signal.SIGINT, signal.SIGKILL):
-        folder = in_folder / number.name
-        folder.mkdir()
-        (folder / "base.toml").write_text(to_toml(document(run=SLOW)))
-        (folder / "test.toml").write_text('case = "base.toml"\n[axes]\ndrive.peak_acceleration = ["1 g", "2 g"]\n')
-        (folder / "site.py").write_text(LOCAL)
-        command = [PROGRAM, "sweep", "test.toml", "--site", "site.py"]
-        programs[number] = subprocess.Popen(
-            command, cwd=folder, start_new_session=True, stderr=subprocess.PIPE, text=True
-        )
-    try:
-        for number, program in programs.items():
-            wait_for_engines(in_folder / number.name, program, 2)
-        os.killpg(programs[signal.SIGINT].pid, signal.SIGINT)
-        programs[signal.SIGKILL].kill()
-        for number, status in ((signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)):
-            _, errors = programs[number].communicate(timeout=PATIENCE)
-            assert (programs[number].returncode, "Traceback" in errors) == (status, False), errors
-            wait_for(lambda folder=in_folder / number.name: not engines_in(folder) and not _helpers(folder))  # type: ignore[misc]
-    finally:
-        for program in programs.values():
-            program.kill()
-
-
 # --- a throw-away cluster ---------------------------------------------------------------------------------------------
 
 
@@ -273,3 +244,11 @@ def test_a_sweep_with_many_changes_has_a_name_that_a_cluster_takes(in_folder: Pa
     check_path(in_folder / "runs" / name)
     with pytest.raises(InputError, match=r"^a sweep: .* expected letters"):
         check_path(in_folder / "runs" / "a sweep")
+
+
+def test_ranks_take_cores_of_this_machine_and_of_a_cluster() -> None:
+    site = Slurm(cores=8, nodes=2).config()
+    assert Options(6, site).for_ranks(2).decks_at_once == 8
+    assert Options(6).for_ranks(2).decks_at_once == 3
+    with pytest.raises(InputError, match="16 MPI processes"):
+        Options(6, site).for_ranks(16)
