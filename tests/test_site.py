@@ -53,7 +53,7 @@ def test_a_site_that_makes_no_sense(tmp_path: Path, text: str) -> None:
 
 def test_what_parsl_is_told(tmp_path: Path) -> None:
     file = {"partition": "main", "account": "granular", "walltime": "02:00:00", "nodes": 2, "jobs": 4, "cores": 16}
-    file |= {"modules": ["openmpi"], "shell": ["ulimit -c 0"], "sbatch": ["--qos=long", "--mem=4G"]}
+    file |= {"shell": ["module load openmpi", "ulimit -c 0"], "sbatch": ["--qos=long", "--mem=4G"]}
     (tmp_path / "site.toml").write_text(to_toml(file | {"address": "10.1.0.1", "container": "apptainer exec w.sif"}))
     config = load_site(tmp_path / "site.toml")
     assert [decks_at(config, ranks) for ranks in (1, 3, 17)] == [2 * 16 * 4, 2 * 5 * 4, 0]
@@ -74,8 +74,8 @@ SHELL = {**HOSTILE, "variable of SLURM": "100%N"}
 
 
 @pytest.mark.parametrize("text", SHELL.values(), ids=SHELL)
-def test_texts_that_a_shell_would_take_for_more_are_refused_or_quoted(in_folder: Path, text: str) -> None:
-    """Settings and folder stand in scripts and commands of SLURM; names of modules are quoted there."""
+def test_texts_that_a_shell_would_take_for_more_are_refused(in_folder: Path, text: str) -> None:
+    """Settings and folder stand in scripts and commands of SLURM."""
     site, quoted = in_folder / "site.toml", json.dumps(text, ensure_ascii=False)
     for key in ("partition", "account", "address"):
         site.write_text(f"cores = 16\n{key} = {quoted}\n")
@@ -83,11 +83,6 @@ def test_texts_that_a_shell_would_take_for_more_are_refused_or_quoted(in_folder:
             load_site(site)
     with pytest.raises(InputError, match=r"^out: .* expected letters"):
         check_path(in_folder / text / "fig2")
-    site.write_text(f"cores = 16\nmodules = [{quoted}]\n")
-    (executor,) = load_site(site).executors
-    script = f"module() {{ printf '%s' \"$2\"; }}\n{executor.provider.worker_init}"
-    told = subprocess.run(["bash"], input=script, capture_output=True, text=True, check=True)
-    assert told.stdout == text.replace("\r", "\n")  # as text is read
     assert sorted(path.name for path in in_folder.iterdir()) == ["site.toml"]
 
 

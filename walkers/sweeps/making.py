@@ -59,11 +59,9 @@ from walkers.templates.deck import (
     RESTART_NAME,
     Deck,
     Segment,
-    first_segment,
     next_segment,
     render_deck,
     render_shared_deck,
-    settling_steps,
 )
 
 DECK_FOLDER = "shared_deck"
@@ -218,7 +216,7 @@ class OpenRun:
                 for directory in segment_directories(self.directory):  # those of an attempt with fewer cycles
                     shutil.rmtree(directory)
                 self.done.clear()
-            while (segment := self._next_segment(case)) is not None:
+            while (segment := self._next_segment(case)).end > segment.begin:
                 tell = _teller(self.case.run, cycles, segment, on_progress)
                 try:
                     self._make(segment, render(case, segment), tell, time_limit)
@@ -233,14 +231,8 @@ class OpenRun:
             if cycles < self.case.run.cycles and _are_constant(self.directory):
                 return
 
-    def _next_segment(self, case: Case) -> Segment | None:
-        """The next segment of the run or of an attempt; None after the last one."""
-        if not self.done:
-            return first_segment(case)
-        begin, start = int(self.done[-1]["end"]), drive_from(self.case, self.done)
-        if start is None:
-            return Segment(begin, begin + settling_steps(case), None)
-        return next_segment(case, Segment(begin, begin, start))
+    def _next_segment(self, case: Case) -> Segment:
+        return next_segment(case, int(self.done[-1]["end"]) if self.done else 0, drive_from(self.case, self.done))
 
     def _make(self, segment: Segment, deck: Deck, tell: Callable[[int], None] | None, time_limit: float | None) -> None:
         folder, number = self.directory / SEGMENTS, len(self.done)
@@ -273,9 +265,9 @@ class OpenRun:
         report = EngineReport(self.done[0]["version"], wall_seconds, loop_seconds, int(self.done[-1]["end"]))
         start = drive_from(self.case, self.done) or 0
         rest = [segment["root_mean_square_velocity"] for segment in self.done if segment["end"] <= start]
-        settling = {"drive_from": start, "settled": rest[-1] if rest else None, "segments": len(self.done)}
-        settling |= {"ended": self.ended} if self.ended else {}
-        about: dict[str, Any] = {"started": self.started, "directory": self.directory, **settling}
+        about: dict[str, Any] = {"started": self.started, "directory": self.directory, "segments": len(self.done)}
+        about |= {"drive_from": start, "settled": rest[-1] if rest else None}
+        about |= {"ended": self.ended} if self.ended else {}
         write_manifest(self.case, self.place.name, self.engine, report, **about)
         settle()
         move_into_place(self.directory, self.place)
@@ -360,8 +352,7 @@ def _make_together(
                 (incomplete / name).mkdir(exist_ok=True)
                 write_case(incomplete / name, case)
             look_ahead()
-            segment = first_segment(tried[first])
-            tell = _teller(cases[first].run, cycles, segment, on_progress)
+            tell = _teller(cases[first].run, cycles, next_segment(tried[first]), on_progress)
             folder = incomplete / DECK_FOLDER
             report = launch(deck, folder, engine, on_step=tell, time_limit=time_limit, keep_open=locks)
             _part(incomplete, tried, deck, report)
@@ -390,5 +381,5 @@ def _part(incomplete: Path, cases: Mapping[str, Case], deck: Deck, report: Engin
         place.mkdir(parents=True)
     split_output(incomplete / DECK_FOLDER, deck.layout, places)
     for name, (place, case) in zip(cases, places.items(), strict=True):
-        write_segment_record(place, first_segment(case), report)
+        write_segment_record(place, next_segment(case), report)
         shutil.copytree(incomplete / DECK_FOLDER, incomplete / name / DECK_FOLDER, copy_function=link_or_copy)

@@ -56,7 +56,6 @@ class Slurm(BaseModel):
     cores: _Count
     jobs: _Count = 1
     sbatch: list[str] = []
-    modules: list[str] = []
     shell: list[str] = []
     container: str | None = None
     address: _Word | None = Field(None, description=_TAKEN)
@@ -79,7 +78,7 @@ class Slurm(BaseModel):
             max_blocks=self.jobs,
             exclusive=False,
             scheduler_options="\n".join(f"#SBATCH {option}" for option in self.sbatch),
-            worker_init="\n".join([*(f"module load {quote(name)}" for name in self.modules), *self.shell]),
+            worker_init="\n".join(self.shell),
             launcher=SrunLauncher() if self.nodes > 1 else SingleNodeLauncher(),
         )
         executor = HighThroughputExecutor(

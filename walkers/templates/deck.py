@@ -103,25 +103,23 @@ class Plan:
     # wide bins, for few beads far apart
 
 
-def first_segment(case: Case) -> Segment:
-    """The first segment of a run: the whole run, its first cycles, or the first one in which the beads come to rest."""
+def next_segment(case: Case, begin: int = 0, start: int | None = None) -> Segment:
+    """The segment of a run that begins at a step, after the start of the drive at another; empty after the last one.
+
+    Without a start of the drive, the beads come to rest if they have to.
+    """
     run = case.run
-    if run.rests:
-        return Segment(0, settling_steps(case), None)
-    return Segment(0, min(run.cycles_per_segment, run.attempts[0]) * run.steps_per_cycle, 0)
+    if start is None and run.rests:
+        return Segment(begin, begin + settling_steps(case), None)
+    start = start or 0
+    end = min(begin + run.cycles_per_segment * run.steps_per_cycle, start + run.attempts[0] * run.steps_per_cycle)
+    return Segment(begin, end, start)
 
 
 def whole(case: Case) -> Segment:
     """A run in one segment, as by hand: enough time to rest for most piles, and the cycles of the first attempt."""
     rest = RESTING_SEGMENTS * settling_steps(case) if case.run.rests else 0
     return Segment(0, rest + case.run.attempts[0] * case.run.steps_per_cycle, rest)
-
-
-def next_segment(case: Case, segment: Segment) -> Segment | None:
-    """The next segment of the drive; None after the last one."""
-    run, start = case.run, segment.drive_from or 0
-    end = min(segment.end + run.cycles_per_segment * run.steps_per_cycle, start + run.steps)
-    return Segment(segment.end, end, start) if end > segment.end else None
 
 
 def settling_steps(case: Case) -> int:
@@ -146,7 +144,7 @@ def render_shared_deck(cases: Sequence[Case]) -> Deck:
 def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
     """The plan of a segment of cases that share a deck: their bodies on one boundary, with their sampling."""
     case, run = cases[0], cases[0].run
-    segment = segment or first_segment(case)
+    segment = segment or next_segment(case)
     scene, walkers = place(cases)
     columns = [*BEAD_COLUMNS, *(MEAN_SPIN_COLUMNS if walkers else ()), *([FILM_COLUMN] * case.liquid.conserved)]
     restart = None if run.in_one else RESTART_NAME
