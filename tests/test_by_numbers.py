@@ -297,8 +297,7 @@ def test_a_tray_that_has_hardly_been_driven_has_meetings_alone() -> None:
     """One frame, in which a bridge joins two of three dimers."""
     dimers = {"radii": ["0.3 mm", "0.2 mm"], "replicates": 3, "meet": True}
     motion = resting(case_of(dimers=dimers), 2)
-    one, none = np.ones(1), np.array([], dtype=np.int64)
-    motion.__dict__["bridges"] = [Bridges(0, np.array([(0, 3)]), one, one, none, none, one[:0], one[:0])]
+    motion.__dict__["bridges"] = [Bridges(0, np.array([(0, 3, -1)]), np.ones(1), np.ones(1))]
     measured = meetings.measure(motion)
     assert [measured.tables["meetings"][name].tolist() for name in ("walker", "other", "size")] == [[0], [1], [2]]
     assert measured.numbers == {"merged": 1, "parted": 0, "largest_group": 2}
@@ -310,16 +309,8 @@ def test_the_state_of_a_bed() -> None:
     position, velocity = motion.position.copy(), motion.velocity.copy()
     position[1, :, 2] = [1e-3, 2e-3, 5e-3, 4e-3]
     velocity[1] = 1e-3 * np.array([(1.0, 2.0, 2.0), (0.0, 0.0, 0.0), (0.0, 3.0, 4.0), (0.0, 0.0, 0.0)])
-    bridges = Bridges(
-        frame=1,
-        beads=np.array([(0, 1), (1, 2)]),
-        force=np.array([1e-6, 3e-6]),
-        gap=np.array([-1e-9, 2e-6]),
-        wall_beads=np.array([0, 2]),
-        walls=np.array([FLOOR, SIDE]),
-        wall_force=np.array([1e-6, 1e-6]),
-        wall_gap=np.array([-1e-9, -1e-9]),
-    )
+    contacts = np.array([(0, 1, -1), (1, 2, -1), (0, -1, FLOOR), (2, -1, SIDE)])
+    bridges = Bridges(1, contacts, np.array([1e-6, 3e-6, 1e-6, 1e-6]), np.array([-1e-9, 2e-6, -1e-9, -1e-9]))
     joined, bulk = _joined(bridges, 4), np.array([True, True, False, False])
     assert joined[1].tolist() == [False, False, True, False]
     moved = replace(motion, position=position, velocity=velocity)

@@ -29,10 +29,9 @@ UP = 3e-3 * TIME[:, None]
 
 def bridges_of(pairs: list[tuple[int, int]], walls: dict[int, int]) -> Bridges:
     """Bridges that touch and pull, between beads and of beads to walls."""
-    beads = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-    ones, held = np.ones(len(beads)), np.ones(len(walls))
-    ends = (np.array(list(one), dtype=np.int64) for one in (walls, walls.values()))
-    return Bridges(0, beads, ones, -ones, *ends, held, -held)
+    contacts = [(*pair, -1) for pair in pairs] + [(bead, -1, wall) for bead, wall in walls.items()]
+    ones = np.ones(len(contacts))
+    return Bridges(0, np.array(contacts), ones, -ones)
 
 
 def rows_of(columns: Columns) -> list[Any]:

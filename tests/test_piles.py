@@ -72,8 +72,9 @@ def test_bridges_and_tables_are_of_the_beads(pile_run: Path) -> None:
     assert len(frames) == len(motion.time) == len(bed)
     bridges, position, radius = frames[-1], motion.position[-1], motion.radius
     apart = np.linalg.norm(position[bridges.beads[:, 0]] - position[bridges.beads[:, 1]], axis=1)
-    np.testing.assert_allclose(bridges.gap, apart - radius[bridges.beads].sum(axis=1), atol=1e-9)
-    on_floor = bridges.wall_beads[bridges.walls == FLOOR]
+    np.testing.assert_allclose(bridges.gap[: len(apart)], apart - radius[bridges.beads].sum(axis=1), atol=1e-9)
+    beads, walls = bridges.at_walls
+    on_floor = beads[walls == FLOOR]
     assert len(on_floor) == len(set(on_floor.tolist())) > 3
     assert (position[on_floor, 2] - radius[on_floor] < 2e-4).all()
     at = np.searchsorted(bed["time"], members["time"])
@@ -111,9 +112,9 @@ def test_a_container_holds_its_beads(shape: str, walls: int, tmp_path: Path) -> 
     room = case.boundary.side_clearance(driven.reshape(-1, 3)).reshape(driven.shape[:2]) - motion.radius
     assert -1e-5 < room.min() < 0.05 * 2.5e-3
     assert driven[..., :2].std() > 0.2 * 2.5e-3
-    held = [bridges.wall_beads[bridges.walls != FLOOR] for bridges in read_bridges(motion)]
+    held = [bridges.at_walls[0, bridges.at_walls[1] != FLOOR] for bridges in read_bridges(motion)]
     assert sum(map(len, held)) >= 2
-    assert all(set(bridges.walls.tolist()) <= set(range(1 + walls)) for bridges in read_bridges(motion))
+    assert all(set(bridges.at_walls[1].tolist()) <= set(range(1 + walls)) for bridges in read_bridges(motion))
     assert shape == "octagon" or all(len(beads) == len(set(beads.tolist())) for beads in held)
 
 

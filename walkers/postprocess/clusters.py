@@ -77,7 +77,8 @@ def bulk_of(labels: IntArray, bridges: Bridges, *, heap: bool = True) -> BoolArr
     Without a ``heap`` (beads placed one by one) the largest component may be a cluster on a wall; then the bulk is what
     is bridged to the floor.
     """
-    on_floor = labels[bridges.wall_beads[bridges.walls == FLOOR]]
+    beads, walls = bridges.at_walls
+    on_floor = labels[beads[walls == FLOOR]]
     most = [np.bincount(labels).argmax()] if heap else []
     bulk: BoolArray = np.isin(labels, [*most, *on_floor])
     return bulk
@@ -85,8 +86,7 @@ def bulk_of(labels: IntArray, bridges: Bridges, *, heap: bool = True) -> BoolArr
 
 def held_clusters(labels: IntArray, bridges: Bridges, bulk: BoolArray) -> Iterator[Cluster]:
     """The clusters that are free and held in a frame."""
-    side = bridges.walls != FLOOR
-    beads, walls = bridges.wall_beads[side], bridges.walls[side]
+    beads, walls = bridges.at_walls[:, bridges.at_walls[1] != FLOOR]
     for label in np.unique(labels[beads[~bulk[beads]]]):
         members = np.flatnonzero(labels == label)
         if len(members) >= _FEWEST_BEADS:

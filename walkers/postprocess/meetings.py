@@ -74,7 +74,8 @@ def _state_of(motion: Motion, bridges: Bridges) -> tuple[frozenset[tuple[int, ..
     between = owners[(owners[:, 0] >= 0) & (owners[:, 0] != owners[:, 1])]
     labels = connected(len(motion.walkers), np.unique(between, axis=0))
     floored = motion.case.boundary.walls[0].name == FLOOR
-    at_sides = motion.walker_of[bridges.wall_beads[(bridges.walls > 0) & floored]]
+    beads, walls = bridges.at_walls
+    at_sides = motion.walker_of[beads[(walls > 0) & floored]]
     held = np.isin(labels, labels[at_sides[at_sides >= 0]])
     return frozenset(map(tuple, between.tolist())), np.bincount(labels)[labels], held
 

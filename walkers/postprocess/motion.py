@@ -371,51 +371,40 @@ def boundary_motion(drive: Excitation, time: FloatArray) -> tuple[FloatArray, Fl
 
 @dataclass(frozen=True)
 class Bridges:
-    """The bridges of one frame: K between beads, M to walls.
+    """The bridges of one frame of a motion (index ``frame``): K between beads, then M to walls.
 
     Tangential forces are left out: the engine reports wrong ones for sliding contacts.
 
     Attributes
     ----------
-    frame : int
-        Index of the frame in the motion.
-    beads : ndarray of int, shape (K, 2)
-        Indices of the two beads, from 0.
-    force, gap : ndarray, shape (K,)
+    contacts : ndarray of int, shape (K + M, 3)
+        Both beads, from 0, in ascending order, and -1; of a bridge to a wall the bead, -1 and the wall (0: floor).
+    force, gap : ndarray, shape (K + M,)
         Net normal force (capillary, viscous and elastic), positive for attraction, N; gap, negative for overlap, m.
-    wall_beads, walls, wall_force, wall_gap : ndarray, shape (M,)
-        Index of the bead and of the wall (0: floor), force and gap of the bridges to walls.
     """
 
     frame: int
-    beads: IntArray
+    contacts: IntArray
     force: FloatArray
     gap: FloatArray
-    wall_beads: IntArray
-    walls: IntArray
-    wall_force: FloatArray
-    wall_gap: FloatArray
 
     def __len__(self) -> int:
-        return len(self.beads) + len(self.walls)
+        return len(self.contacts)
 
     @property
-    def contacts(self) -> IntArray:
-        """Both beads and the wall of each bridge, those between beads first; -1 for none; shape (K + M, 3)."""
-        rows = self.rows()
-        return np.stack([rows[name] for name in ("bead_1", "bead_2", "wall")], axis=1)
+    def beads(self) -> IntArray:
+        """Both beads of bridges between beads, shape (K, 2)."""
+        return self.contacts[self.contacts[:, 2] < 0, :2]
+
+    @property
+    def at_walls(self) -> IntArray:
+        """Beads and walls of bridges to walls, shape (2, M)."""
+        return self.contacts[self.contacts[:, 2] >= 0][:, [0, 2]].T
 
     def rows(self) -> dict[str, npt.NDArray[Any]]:
-        """Columns of all bridges, those between beads first; ``bead_2`` of a wall and ``wall`` of none are -1."""
-        pairs, gap = np.sort(self.beads, axis=1), np.concatenate([self.gap, self.wall_gap])
-        return {
-            "bead_1": np.concatenate([pairs[:, 0], self.wall_beads]),
-            "bead_2": np.concatenate([pairs[:, 1], np.full(len(self.walls), -1)]),
-            "wall": np.concatenate([np.full(len(pairs), -1), self.walls]),
-            "gap": gap,
-            "normal_force": np.concatenate([self.force, self.wall_force]),
-            "touching": gap <= 0.0,
-        }
+        """Columns of a table."""
+        ends = dict(zip(("bead_1", "bead_2", "wall"), self.contacts.T, strict=True))
+        return {**ends, "gap": self.gap, "normal_force": self.force, "touching": self.gap <= 0.0}
 
 
 def frames_with_bridges(motion: Motion) -> IntArray:
@@ -464,5 +453,8 @@ def _bridges(motion: Motion, frame: int, between: FloatArray, against: FloatArra
     walls = against[:, wall("wall")].astype(np.int64)
     normals = np.stack([one.normals(place[beads]) for one in motion.case.boundary.walls])[walls, np.arange(len(walls))]
     wall_pull = -np.einsum("mx,mx->m", against[:, wall("fx") : wall("fx") + 3], normals)
-    gap, wall_gap = -between[:, pair("overlap")], -against[:, wall("overlap")]
-    return Bridges(frame, ids, pull, gap, beads, walls, wall_pull, wall_gap)
+    contacts = np.full((len(ids) + len(walls), 3), -1)
+    contacts[: len(ids), :2] = np.sort(ids, axis=1)
+    contacts[len(ids) :, [0, 2]] = np.stack([beads, walls], axis=1)
+    gap = -np.concatenate([between[:, pair("overlap")], against[:, wall("overlap")]])
+    return Bridges(frame, contacts, np.concatenate([pull, wall_pull]), gap)

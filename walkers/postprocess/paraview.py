@@ -143,7 +143,7 @@ def _frames(motion: Motion, every: int) -> Iterator[tuple[int, dict[str, meshio.
                 track, climber = (values[frame].astype(np.int64) for values in tracks)
                 component = connected(len(motion.radius), bridges.beads)
                 meshes["beads"].point_data |= {"component": component, "track": track, "is_climber": climber}
-            if len(bridges.force) + len(bridges.wall_force):  # meshio does not read empty arrays
+            if len(bridges):  # meshio does not read empty arrays
                 meshes["bridges"] = _bridges(motion, bridges)
         yield frame, meshes
 

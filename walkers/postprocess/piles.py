@@ -128,7 +128,8 @@ def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
 def _joined(bridges: Bridges, count: int) -> Joined:
     """The joined beads of a frame."""
     at_wall = np.zeros(count, dtype=np.bool_)
-    at_wall[bridges.wall_beads[bridges.walls != FLOOR]] = True
+    beads, walls = bridges.at_walls
+    at_wall[beads[walls != FLOOR]] = True
     return bridges.beads.astype(np.int32), at_wall
 
 
@@ -141,7 +142,8 @@ def _state_of(
     # Cells of the cross-section are about four large radii wide. Without a bulk the floor is the surface.
     tops = _surface_cells(position[bulk], radius[bulk], motion.case.boundary, 4.0 * float(radius.max()))
     low, middle, high = (float(value) for value in np.percentile(tops if len(tops) else [0.0], (10.0, 50.0, 90.0)))
-    touching = int((bridges.gap <= 0.0).sum())
+    pairs = len(bridges.beads)
+    touching = int((bridges.gap[:pairs] <= 0.0).sum())
     return {
         "time": float(motion.time[frame]),
         "surface": middle,
@@ -151,10 +153,10 @@ def _state_of(
         "brazil_nut_of_bulk": segregation(position[bulk, 2], large[bulk]),
         "mean_square_velocity": float(np.mean(np.sum(motion.velocity[frame] ** 2, axis=1))),
         "contacts": 2.0 * touching / len(position),
-        "bridges": 2.0 * len(bridges.beads) / len(position),
+        "bridges": 2.0 * pairs / len(position),
         "touching": touching,
-        "opened": len(bridges.gap) - touching,
-        "mean_force": float(bridges.force.mean()) if len(bridges.force) else 0.0,
+        "opened": pairs - touching,
+        "mean_force": float(bridges.force[:pairs].mean()) if pairs else 0.0,
         "bulk": int(bulk.sum()),
         "at_wall": int(joined[1].sum()),
         "large_at_wall": int((joined[1] & large).sum()),
