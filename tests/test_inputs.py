@@ -16,7 +16,6 @@ import walkers
 from tests.conftest import REFERENCE, call, document, make_case, origins, to_toml
 from walkers.errors import InputError
 from walkers.inputs import units
-from walkers.inputs.axes import number_of
 from walkers.inputs.case import Case
 from walkers.inputs.keys import settings_of
 from walkers.inputs.library import library_of, unmeasured
@@ -193,16 +192,6 @@ def test_names_and_what_no_law_asks_for_do_not_determine_a_run() -> None:
     assert make_case(run={"seed": 2}).determinants() != make_case().determinants()
 
 
-def test_a_case_shows_what_is_given_and_where_the_rest_is_from() -> None:
-    case = load_case("fig1b", {"title": "<1b>"})
-    assert repr(case).startswith("<Case fig1b: ")
-    assert "drive.frequency = 80 Hz" in repr(case)
-    assert "density" not in repr(case)
-    shown = case._repr_html_()
-    assert "<caption>&lt;1b&gt;</caption>" in shown
-    assert "<tr><td>drive.frequency</td><td>80 Hz</td><td>given</td><td></td></tr>" in shown
-
-
 # --- changes, JSON, schema --------------------------------------------------------------------------------------------
 
 
@@ -217,6 +206,8 @@ def test_a_case_is_changed_as_its_file_would_be(tmp_path: Path) -> None:
     assert origins(faster)["contact.friction.bead_wall"].word == "given"
     assert faster == Case.read(faster.document, name="fig1b")
     assert case.for_cycles(2).origins == case.but(name="other").origins == case.origins
+    assert "drive.frequency = 80 Hz" in repr(case)
+    assert "<tr><td>drive.frequency</td><td>80 Hz</td><td>given</td><td></td></tr>" in case._repr_html_()
     # What says the same in other words goes, in one of several harmonics as well.
     assert case.changed({"drive.gamma0": 0.5}).drive.peak_acceleration > 50.0
     harmonic = {"drive.harmonics[0].peak_acceleration": "4 g"}
@@ -280,12 +271,10 @@ def test_a_new_case_names_its_schema_which_all_shipped_cases_keep(in_folder: Pat
     ("changes", "place"),
     [
         ({"drive.frequenzy": "80 Hz"}, "drive"),
-        ({"drive.frequency": 80}, "drive.frequency"),
         ({"drive.frequency": "80"}, "drive.frequency"),
         ({"drive": "80 Hz"}, "drive"),
         ({"dimers.radii": ["0.3 mm", 0.2]}, "dimers.radii.1"),
         ({"dimers.radii": ["0.3 mm"] * 3}, "dimers.radii"),
-        ({"dimers.meet": "yes"}, "dimers.meet"),
         ({"dimers.facing": "north"}, "dimers.facing"),
         ({"run.cycles": "many"}, "run.cycles"),
         ({"run.steps_per_cycle": 3}, "run"),
@@ -305,18 +294,6 @@ def test_the_schema_refuses_what_the_program_refuses(changes: dict[str, Any], pl
 
 
 # --- the library ------------------------------------------------------------------------------------------------------
-
-
-def test_every_number_of_the_library_has_a_source() -> None:
-    shipped = library_of({})
-    known = [
-        number
-        for kind in ("materials", "liquids")
-        for name in shipped.names(kind)
-        for number in shipped.numbers(kind, name).values()
-    ]
-    assert len(known) >= 90
-    assert all(number_of("", number.written) > 0 and len(number.source) > 8 for number in known)
 
 
 # Mass fraction, °C, viscosity (mPa s; Segur and Oberstar 1951), density (g/cm³; Bosart and Snoddy 1928), both as in the
