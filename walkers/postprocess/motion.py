@@ -391,12 +391,12 @@ class Bridges:
     def __len__(self) -> int:
         return len(self.contacts)
 
-    @property
+    @cached_property
     def beads(self) -> IntArray:
         """Both beads of bridges between beads, shape (K, 2)."""
         return self.contacts[self.contacts[:, 2] < 0, :2]
 
-    @property
+    @cached_property
     def at_walls(self) -> IntArray:
         """Beads and walls of bridges to walls, shape (2, M)."""
         return self.contacts[self.contacts[:, 2] >= 0][:, [0, 2]].T
