@@ -148,7 +148,7 @@ def _of_frames(group: Group, columns: Columns) -> Columns:
 
 
 def _by_kind(beads: int, **contacts: FloatArray) -> Columns:
-    """Columns of values at contacts (`Gait`): of beads with walls, and ``…_pair_…`` of pairs of beads."""
+    """Columns of values at contacts (as in `gait.Gait`): of beads with walls, and ``…_pair_…`` of pairs of beads."""
     columns: Columns = {}
     for name, values in contacts.items():
         columns |= numbered(name, values[..., :beads]) | numbered(f"{name}_pair", values[..., beads:])
