@@ -175,20 +175,22 @@ class Bench:
 
     def run(self, plan: Plan | Deck, carry: Path | None = None) -> Measured:
         """Run a plan that records forces, or its deck, with a file such as a restart file beside it."""
-        if self.stop.is_set():
-            raise Stopped("the audit was stopped")
         deck = compose(plan) if isinstance(plan, Plan) else plan
         deck = replace(deck, fastest=inf)  # prescribed beads may be faster than shaken ones
         directory = Path(mkdtemp(dir=self.folder))
         write_deck(deck, directory)
         if carry is not None:
             shutil.copy(carry, directory)
-        self.version = launch(deck, directory, self.engine).version
+        self.version = launch(deck, directory, self.engine, on_step=self._look).version
         dump = BinaryDump(directory / deck.layout.bead_dump, deck.layout.bead_columns)
         beads = dump.stack()
         vectors = [beads[:, :, dump.column(name) :][:, :, :3] for name in ("x", "vx", "omegax", "fx", "tqx")]
         time = dump.steps.astype(np.float64) * deck.layout.time_step
         return Measured(time, np.concatenate(vectors[:3], -1), np.concatenate(vectors[3:], -1), directory)
+
+    def _look(self, _: int) -> None:
+        if self.stop.is_set():
+            raise Stopped("the audit was stopped")
 
 
 def farthest(measured: FloatArray, expected: FloatArray) -> float:
