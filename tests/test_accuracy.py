@@ -74,7 +74,6 @@ def test_errors_add_up_in_a_comparison_and_a_changed_case_has_none(tmp_path: Pat
     done.accuracy(0.2)
     assert "velocity_error" not in faster.result
     sides = [one.directory for one in (done, faster)]
-    assert f"walkers run {faster.directory.name} --accuracy" in walkers.compare(*sides).text
     faster.accuracy(0.2)
     found = {one["quantity"]: one for one in walkers.compare(*sides).contents["results"]}
     for name in ("velocity", "rotation_2"):

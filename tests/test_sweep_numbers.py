@@ -138,7 +138,7 @@ def test_compared_runs_differ_by_so_many_times_both_their_numerical_errors(
     (velocity,) = (one for one in found.contents["results"] if one["quantity"] == "velocity")
     assert velocity["difference"] == pytest.approx(-5e-5)
     assert velocity["numerical_error"] == pytest.approx(hypot(3e-6, 4e-6))
-    assert "the velocities differ by 10 times their numerical error" in found.text
+    assert "velocity: differs by 10 times its numerical error" in found.text
     assert re.search(r"\nvelocity \(mm/s\) +1\.05 +1 +-0\.05 ", found.text)
 
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot, isfinite, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.errors import refused
-from walkers.postprocess.numbers import ASIDE, band_text, declared, fell, is_error
+from walkers.postprocess.numbers import ASIDE, declared, headline, is_error
 from walkers.postprocess.quantities import unit_shown
 from walkers.postprocess.results import Results, read
 from walkers.postprocess.sides import alike
-from walkers.postprocess.uncertainty import not_known
-from walkers.rounding import percent, rounded
+from walkers.rounding import rounded
 from walkers.runner.directory import case_of
 from walkers.sweeps.readable import differing, flattened, readable
 from walkers.sweeps.table import (
@@ -22,8 +21,9 @@ from walkers.sweeps.table import (
     columns_of,
     default_column,
     find_name,
+    key_texts,
+    key_values,
     load,
-    read_record,
     sides_differ,
     value_text,
     with_unit,
@@ -31,27 +31,16 @@ from walkers.sweeps.table import (
 from walkers.text import aligned
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from walkers.inputs.case import Case
 
-_SIDES = ("first", "second")
 _VELOCITIES = ("velocity", "right_facing", "left_facing")
 """Columns whose scatter is in the result."""
-_UPHILL = {
-    "right_facing": "along the heading, facing up",
-    "left_facing": "along the heading, facing down",
-    "axial_velocity": "velocity up the slope",
-    "axial_left_facing": "velocity up the slope, facing down",
-}
-"""Names of columns if the drive axis goes up a slope."""
 _FIRST_MAKE = ("rotation", "sliding", "sliding_pair", "open", "open_pair")
 _OF_ALL = ("orientation_end", "separated_fraction")
 """Columns that are means over walkers of the first make, and over all walkers."""
 
 
-@dataclass(frozen=True)
-class Side:
+class Side(NamedTuple):
     """One of two that are compared: its name, its case, and the directory of its finished run if there is one."""
 
     name: str
@@ -68,25 +57,25 @@ class Comparison:
 
 
 def _pair(
-    quantity: str, unit: str, values: Sequence[float], scatters: Sequence[float], numerical: float = nan
+    quantity: str, unit: str, values: Sequence[Any], scatters: Sequence[Any], numerical: float = nan
 ) -> tuple[dict[str, Any], list[str]]:
     """A quantity of both sides, with difference and errors, as JSON (SI units) and cells of text (readable units)."""
-    difference = values[1] - values[0]
+    given = (*values, *scatters)
+    first, second, *errors = (nan if one is None or isinstance(one, str) else float(one) for one in given)
+    difference = second - first
     names = ("first", "second", "first_scatter", "second_scatter", "difference", "numerical_error")
-    numbers = zip(names, (*values, *scatters, difference, numerical), strict=True)
+    numbers = zip(names, (first, second, *errors, difference, numerical), strict=True)
     contents = {"quantity": quantity, "unit": unit, **{name: one if isfinite(one) else None for name, one in numbers}}
     usual, size = unit_shown(unit)
-    printed = [rounded(value * size, usual) for value in values]
-    apart = difference * size
-    if abs(difference) < 2e-3 * abs(values[0]):  # digits that are not printed would contradict the printed ones
-        apart = float(printed[1]) - float(printed[0])
-    cells = [*printed, _difference(apart, usual)]
-    spreads = [(one, _two_digits(one * size, usual)) for one in scatters if isfinite(one)]
-    both = " and ".join("<0.001" if one > 0.0 and text == "0" and usual == "mm/s" else text for one, text in spreads)
-    return contents, [with_unit(quantity, usual), *cells, both or "-", _two_digits(numerical * size, usual)]
+    printed = [rounded(value * size, usual) for value in (first, second)]
+    if abs(difference) < 2e-3 * abs(first):  # digits that are not printed would contradict the printed ones
+        difference = (float(printed[1]) - float(printed[0])) / size
+    both = " and ".join(_two_digits(one * size, usual) for one in errors if isfinite(one)) or "-"
+    cells = [*printed, _signed(difference * size, usual), both, _two_digits(numerical * size, usual)]
+    return contents, [with_unit(quantity, usual), *cells]
 
 
-def _difference(value: float, unit: str) -> str:
+def _signed(value: float, unit: str) -> str:
     text = rounded(value, unit)
     return text if text[:1] == "-" or text == "0" else f"+{text}"
 
@@ -97,24 +86,29 @@ def _two_digits(value: float, unit: str) -> str:
 
 def compare_runs(first: Side, second: Side) -> Comparison:
     """Compare two runs, or cases not yet run."""
-    names = [side.name for side in (first, second)]
-    parameters, differences = _different([first.case, second.case], names)
+    names, runs = [first.name, second.name], [side.directory for side in (first, second) if side.directory]
     not_run = [side.name for side in (first, second) if side.directory is None]
-    runs = [side.directory for side in (first, second) if side.directory]
-    results = [] if not_run else [read(run) for run in runs]
-    pairs = _pairs(results) if results else []
-    lengths = [cells[1:3] for one, cells in pairs if one["quantity"] == "cycles" and one["first"] != one["second"]]
-    same_cases = "".join(["the cases are the same", *(f", but ran {' and '.join(one)} cycles" for one in lengths)])
-    text = [differences or same_cases]
-    if apart := [cells for one, cells in pairs if one["first"] != one["second"]]:
-        text.append(aligned([["result", *names, "difference", "scatter of copies", "numerical error"], *apart]))
-        text += _errors_text(results, names)
+    parameters, differences = _different([first.case, second.case], names)
+    pairs = [] if not_run else _pairs([read(run) for run in runs])
+    apart = [(one, cells) for one, cells in pairs if one["first"] != one["second"]]
+    text = [differences or "the cases are the same"]
+    for one, cells in apart:
+        if one["quantity"] == "cycles" and not differences:
+            text = [f"{text[0]}, but ran {' and '.join(cells[1:3])} cycles"]
+    if apart:
+        heads = ["result", *names, "difference", "scatter of copies", "numerical error"]
+        text.append(aligned([heads, *(cells for _, cells in apart)]))
+        text += [_times_the_error(one) for one, _ in apart if one["quantity"] in _VELOCITIES and one["numerical_error"]]
     if same := [one["quantity"] for one, _ in pairs if one["first"] == one["second"]]:
         text.append(f"the same in both: {', '.join(same)}" if apart else "all results are the same")
     text += [f"{name}: no finished run; only the parameters are compared" for name in not_run]
-    contents: dict[str, Any] = {**dict(zip(_SIDES, names, strict=True)), "parameters": parameters}
-    contents |= {"results": [one for one, _ in pairs], "not_run": not_run}
-    return Comparison(contents, "\n\n".join(text))
+    contents = {"first": first.name, "second": second.name, "parameters": parameters, "not_run": not_run}
+    return Comparison(contents | {"results": [one for one, _ in pairs]}, "\n\n".join(text))
+
+
+def _times_the_error(one: Mapping[str, Any]) -> str:
+    times = abs(one["difference"]) / one["numerical_error"]
+    return f"{one['quantity']}: differs by {_two_digits(times, '')} times its numerical error"
 
 
 def _different(cases: Sequence[Case], names: Sequence[str]) -> tuple[dict[str, list[Any]], str]:
@@ -125,31 +119,19 @@ def _different(cases: Sequence[Case], names: Sequence[str]) -> tuple[dict[str, l
     return parameters, aligned([["parameter", *names], *rows]) if rows else ""
 
 
-def _number_of(value: Any) -> float:
-    return nan if value is None or isinstance(value, str) else float(value)
-
-
 def _pairs(results: Sequence[Results]) -> list[tuple[dict[str, Any], list[str]]]:
-    """The numbers of two results, without errors, values of the case and conditions."""
-    scatters = [_scatters(result) for result in results]
-    units = columns_of({name for result in results for name in result if name not in {*ASIDE, "coverage"}})
-    meant = _VELOCITIES if any(map(fell, results)) else ("velocity",) if _differ(results) else ()
-    units = {name: entry for name, entry in units.items() if name not in meant}  # these are no walker's way
-    uphill, pairs = all(result.get("goes_uphill") for result in results), []
-    for name, (unit, _) in units.items():
-        values = [_number_of(result.get(name)) for result in results]
-        if any(map(isfinite, values)) and not is_error(name):
-            error = hypot(*(_number_of(result.get(f"{name}_error")) for result in results))
-            one, cells = _pair(name, unit, values, [known.get(name, nan) for known in scatters], error)
-            if uphill and name in _UPHILL:
-                cells[0] = cells[0].replace(name, _UPHILL[name])
+    """The numbers of two results, without errors, values of the case and conditions, and means that say little."""
+    scatters, heads = [_scatters(result) for result in results], {*map(headline, results)}
+    little = _VELOCITIES if "axial_velocity" in heads else ("velocity",) if "right_facing" in heads else ()
+    names = {name for result in results for name in result if not is_error(name)}
+    pairs = []
+    for name, (unit, _) in columns_of(names.difference(ASIDE, little, ["coverage"])).items():
+        error = hypot(*(result.get(f"{name}_error", nan) for result in results))
+        both = [result.get(name) for result in results], [scatter.get(name) for scatter in scatters]
+        one, cells = _pair(name, unit, *both, error)
+        if one["first"] is not None or one["second"] is not None:
             pairs.append((one, cells))
     return pairs
-
-
-def _differ(results: Iterable[Mapping[str, Any]]) -> bool:
-    """Whether walkers of a result that face right (up) and left (down) differ."""
-    return any(result.get("facings_differ") for result in results)
 
 
 def _scatters(result: Results) -> dict[str, float]:
@@ -167,86 +149,45 @@ def _scatters(result: Results) -> dict[str, float]:
     return scatters
 
 
-def _errors_text(results: Sequence[Results], names: Sequence[str]) -> list[str]:
-    """Sentences that compare the difference of two velocities with numerical errors and bands."""
-    if not all("velocity" in result for result in results):
-        return []
-    if any(map(fell, results)):  # errors and bands are those of velocities along the heading
-        return []
-    name_of = "right_facing" if _differ(results) else "velocity"
-    errors = [_number_of(one.get(f"{name_of}_error")) for one in results]
-    own = [_number_of(one[name_of]) for one in results]
-    total = hypot(*errors)
-    lines = []
-    if isfinite(total + own[0] + own[1]) and total > 0.0:
-        times = abs(own[1] - own[0]) / total
-        words = "less than" if times < 1.0 else f"{_two_digits(times, '')} times"
-        shares = " and ".join(
-            f"{percent(float(f'{error / abs(value):.2g}'))} of {name}"
-            for name, error, value in zip(names, errors, own, strict=True)
-            if value
-        )
-        facing = "up" if all(one["goes_uphill"] for one in results) else "right"
-        whose = "" if name_of == "velocity" else f" of those facing {facing}"
-        lines.append(f"the velocities{whose} differ by {words} their numerical error ({shares})")
-    lines += [
-        f"{name}: the numerical error is not measured: walkers run {one.directory.name} --accuracy"
-        for name, one, error in zip(names, results, errors, strict=True)
-        if not isfinite(error)
-    ]
-    for name, one in zip(names, results, strict=True):
-        if f"{name_of}_low" in one:
-            band = band_text(one[f"{name_of}_low"], one[f"{name_of}_high"], "m/s")
-            lines.append(f"{name}: {band} mm/s over the ranges of uncertain values (5 to 95 %)")
-        else:
-            lines += [f"{name}: {sentence}" for sentence in not_known(one.about["rests_on"])]
-    return ["\n".join(lines)] if lines else []
-
-
 def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comparison:
     """Compare a column of two sweeps (default: ``velocity`` or ``climbs``) at the points that are finished in both.
 
     `InputError` if the varied keys differ, no finished point is common, or a sweep has no such column.
     """
-    sweeps, source = [read_record(directory).sweep for directory in (first, second)], f"{first}, {second}"
-    keys = [[with_unit(key, unit) for key, unit in one.units.items()] for one in sweeps]
-    if sweeps[0].units != sweeps[1].units:
-        differences = " and ".join(", ".join(one) or "nothing" for one in keys)
+    tables, source = [load(directory) for directory in (first, second)], f"{first}, {second}"
+    names = [str(table.attrs["sweep"]) for table in tables]
+    names = [str(first), str(second)] if names[0] == names[1] else names
+    values, others = ({key: key_values(table, key) for axis in table.attrs["axes"] for key in axis} for table in tables)
+    units = [{key: unit for key, (_, unit) in one.items()} for one in (values, others)]
+    heads = [[*map(with_unit, one, one.values())] for one in units]
+    if units[0] != units[1]:
+        differences = " and ".join(", ".join(one) or "nothing" for one in heads)
         raise refused(source, f"expected sweeps that vary the same keys in the same units: {differences}")
-    tables = [load(directory) for directory in (first, second)]
-    numbers = [name for name in tables[0].columns if name in tables[1] and tables[0][name].dtype.kind in "fiu"]
-    default = default_column(max(tables, key=sides_differ))
-    column = find_name("column", column, numbers) if column else default
-    varied = list(dict.fromkeys(name for table in tables for name in table.attrs["varied"]))  # of the longest lists
-    both = _matched([table[table["status"] == "finished"] for table in tables], varied)
+    known = [name for name in tables[0].columns if name in tables[1] and tables[0][name].dtype.kind in "fiu"]
+    column = find_name("column", column or default_column(max(tables, key=sides_differ)), known)
+    at = [table.assign(at=[", ".join(row) for row in key_texts(table).to_numpy()]) for table in tables]
+    done = [table[table["status"] == "finished"] for table in at]
+    both = done[0].merge(done[1], on="at", suffixes=("_first", "_second"))
     if both.empty:
         raise refused(source, "have no finished point in common")
-    names = [sweep.name for sweep in sweeps]
-    names = [str(first), str(second)] if names[0] == names[1] else names
-    parameters, differences = _different([case_of(Path(both[f"run_{side}"].iloc[0])) for side in _SIDES], names)
-    points, lines = [], []
+    cases = [case_of(Path(both[f"run_{side}"].iloc[0])) for side in ("first", "second")]
+    parameters, differences = _different(cases, names)
+    unit, points, lines = tables[0].attrs["units"][column], [], []
     for row in both.to_dict("records"):
-        names_of = (column, ERRORS.get(column))
-        values, scatters = ([_number_of(row.get(f"{name}_{side}")) for side in _SIDES] for name in names_of)
-        one, (quantity, *cells) = _pair(column, tables[0].attrs["units"][column], values, scatters)
-        at = dict(zip(sweeps[0].keys, sweeps[0].values[row["point_first"]], strict=True))
-        points.append({"point": at, **one})
-        lines.append([*map(value_text, at.values()), *cells[:-1]])
-    unmatched = [len(table) - len(both) for table in tables]
-    heads = [*keys[0], *(f"{name}: {quantity}" for name in names), "difference", "scatter of copies"]
-    unit, size = unit_shown(tables[0].attrs["units"][column])
+        numbers, errors = (
+            [row.get(f"{name}_{side}") for side in ("first", "second")] for name in (column, ERRORS.get(column))
+        )
+        one, (_, *cells) = _pair(column, unit, numbers, errors)
+        point = {key: of_key[row["point_first"]] for key, (of_key, _) in values.items()}
+        points.append({"point": point, **one})
+        lines.append([*map(value_text, point.values()), *cells[:-1]])
+    usual, size = unit_shown(unit)
     largest = max((one["difference"] or 0.0 for one in points), key=abs)
-    line = f"{len(both)} points in both; largest difference {_difference(largest * size, unit)} {unit}".rstrip()
+    line = f"{len(both)} points in both; largest difference {_signed(largest * size, usual)} {usual}".rstrip()
+    unmatched = [len(table) - len(both) for table in tables]
     if any(unmatched):
         line += f"; left out: {unmatched[0]} of {names[0]}, {unmatched[1]} of {names[1]}"
-    contents: dict[str, Any] = {**dict(zip(_SIDES, names, strict=True)), "keys": sweeps[0].units}
-    contents |= {"parameters": parameters, "points": points, "unmatched": unmatched}
-    return Comparison(contents, "\n\n".join(filter(None, [differences, aligned([heads, *lines]), line])))
-
-
-def _matched(tables: Sequence[pd.DataFrame], keys: list[str]) -> pd.DataFrame:
-    """The rows of two tables with the same values of the keys, the columns of both side by side."""
-    columns = list(dict.fromkeys([*keys, *tables[0].columns, *tables[1].columns]))
-    first, second = (table.reindex(columns=columns).astype(dict.fromkeys(keys, object)) for table in tables)
-    how: dict[str, Any] = {"on": keys} if keys else {"how": "cross"}
-    return first.merge(second, suffixes=(f"_{_SIDES[0]}", f"_{_SIDES[1]}"), **how)
+    head = [*heads[0], *(f"{name}: {with_unit(column, usual)}" for name in names), "difference", "scatter of copies"]
+    contents = {"first": names[0], "second": names[1], "keys": units[0], "parameters": parameters}
+    text = "\n\n".join(filter(None, [differences, aligned([head, *lines]), line]))
+    return Comparison({**contents, "points": points, "unmatched": unmatched}, text)
