@@ -76,7 +76,7 @@ def _quantities(entries: Mapping[str, str | list[str]]) -> tuple[Quantity, ...]:
 TABLES: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(columns) for name, columns in _FILE["tables"].items()}
 """The columns of the tables of runs, in their order."""
 GROUPS: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(group) for name, group in _FILE["numbers"].items()}
-"""The numbers of results: of each module of `walkers.postprocess.results.modules`, and of all."""
+"""The numbers of results: of each module of `walkers.postprocess.results.modules_of`, and of all."""
 NUMBERS: Mapping[str, Quantity] = {quantity.name: quantity for group in GROUPS.values() for quantity in group}
 """The numbers of results by name."""
 

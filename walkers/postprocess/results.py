@@ -1,7 +1,7 @@
 """Results of runs: measured and written once, read by all.
 
-A result is flat: a number of each name of `walkers.postprocess.quantities.NUMBERS`. Each module of `modules` has three
-functions: ``applies(case)``; ``derived(case)``, the numbers that follow from the case alone; and ``measure(motion)``.
+A result is flat: a number of each name of `walkers.postprocess.quantities.NUMBERS`. Each module of `modules_of` has
+three functions: ``applies(case)``; ``derived(case)``, numbers that follow from the case alone; and ``measure(motion)``.
 """
 
 from __future__ import annotations
@@ -87,16 +87,11 @@ class Results(Mapping[str, Any]):
         return {**self.about, **plain(self.numbers), "warnings": list(self.warnings)}
 
 
-def modules() -> tuple[Any, ...]:
-    """The modules that measure, in the order of results."""
+def modules_of(case: Case) -> list[Any]:
+    """The modules that measure a case, in the order of results."""
     from walkers.postprocess import meetings, piles, walking
 
-    return walking, meetings, piles
-
-
-def modules_of(case: Case) -> list[Any]:
-    """The modules that measure a case."""
-    return [module for module in modules() if module.applies(case)]
+    return [module for module in (walking, meetings, piles) if module.applies(case)]
 
 
 def derived(case: Case) -> dict[str, Any]:
