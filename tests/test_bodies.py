@@ -201,23 +201,6 @@ def test_walkers_placed_beads_and_a_mixture_share_a_box(tmp_path: Path) -> None:
     assert done.table("bed")["time"].max() >= 0.03
 
 
-def test_replicates_are_perturbed_and_keep_their_distance(trajectory: Moved) -> None:
-    case = load_case("fig1b", {"run.cycles": 10, "run.settling_cycles": 4})
-    moved = trajectory(case)
-    assert [walker.facing for walker in moved.walkers] == [1, -1, 1, -1, 1, -1]
-    angles = [walker.start_angle for walker in moved.walkers]
-    overlaps = moved.radii[0] - moved.position[0, :, 0, 2]
-    assert len(set(angles)) == len(set(overlaps)) == 6
-    assert max(map(abs, angles)) <= np.radians(1.0)
-    np.testing.assert_allclose(moved.orientation[0], angles, atol=1e-12)
-    assert np.all(overlaps > 0.0)
-    centre = moved.mass_centre[..., :2]
-    first, second = np.triu_indices(6, 1)
-    assert np.linalg.norm(centre[:, first] - centre[:, second], axis=-1).min() > 0.5 * case.walkers[0].spacing
-    other = {walker.start_angle for walker in render_deck(case.put("run.seed", 2)).layout.walkers}
-    assert not other & set(angles)
-
-
 # --- drives and slopes ------------------------------------------------------------------------------------------------
 
 

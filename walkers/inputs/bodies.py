@@ -19,6 +19,7 @@ from pydantic import Field
 from walkers.inputs import units
 from walkers.inputs.table import Choice, Filled, Indirect, Table, key
 from walkers.inputs.units import Diameter, Length, Number, Radius, SignedLength, Whole
+from walkers.physics.capillary import bead_volume
 
 Apart = Callable[[int, int], float]
 """Distance of two touching beads seen from above, m, by their numbers."""
@@ -328,7 +329,7 @@ class Mixture(Table):
     @property
     def _shares(self) -> tuple[float, float]:
         """Share of the small beads by number, and the mean volume of a bead, m³."""
-        volumes = [_mean_volume(radii) for radii in (self.small_radii, self.large_radii)]
+        volumes = [sum(map(bead_volume, radii)) / len(radii) for radii in (self.small_radii, self.large_radii)]
         share = self.small_share
         if self.mixed_by != "number":  # one density: by mass is by volume
             by_number = [share / volumes[0], (1.0 - share) / volumes[1]]
@@ -371,10 +372,6 @@ def _middles(ends: tuple[float, float], number: int) -> tuple[float, ...]:
     """The middles of equal shares of a range of radii, m."""
     low, high = ends
     return tuple(dict.fromkeys(float(f"{low + (high - low) * (k + 0.5) / number:.12g}") for k in range(number)))
-
-
-def _mean_volume(radii: Sequence[float]) -> float:
-    return sum(4.0 / 3.0 * pi * radius**3 for radius in radii) / len(radii)
 
 
 class PlacedBead(Table):

@@ -224,7 +224,7 @@ class Case(Table):
                     document = changed(cls, document, changes)
                 return cls.read(document, source=source, name=name, around=around)
         with blaming(source, document):
-            tables, sources, unknown = supplied(document, library_of(document, source))
+            tables, sources, unknown = supplied(cls, document, library_of(document, source))
             try:
                 case = validated(cls, tables, source, further=[*unknown, *contradictions(cls, tables)])
             except InputError as error:  # what a wrong name would have given is not missing too

@@ -139,10 +139,17 @@ def library_of(document: Mapping[str, Any], source: str = "") -> Library:
     if own is None:
         return _shipped()
     try:
-        check_library(own, source)
+        check_library(_tables_in(own), source)
     except InputError as error:
         raise InputError(source, [replace(one, key=f"library.{one.key}") for one in error.problems]) from error
     return Library(own)
+
+
+def _tables_in(own: object) -> object:
+    """The library of a case without the name of its file, which `read_library` puts beside its tables."""
+    if not isinstance(own, Mapping):
+        return own
+    return {name: tables for name, tables in own.items() if name != "file" or not isinstance(tables, str)}
 
 
 @cache
@@ -159,9 +166,6 @@ def read_library(folder: Path) -> dict[str, Any]:
     if not (inputs.chosen_library or path.is_file()):
         return {}
     tables = read_toml(path)
-    if "file" in tables:  # as in a case that names the file of its library
-        message = "unknown key; a library takes materials, liquids, surface_pairs"
-        raise InputError(str(path), [Problem("file", shown(tables["file"]), message)])
     check_library(tables, str(path))
     return {"file": str(path), **tables}
 

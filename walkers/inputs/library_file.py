@@ -77,9 +77,8 @@ class SurfacePairTable(Table):
 
 
 class LibraryFile(Table):
-    """A library: materials, liquids and surface pairs, each number with its source; ``file`` is where it was read."""
+    """A library: materials, liquids and surface pairs, each number with its source."""
 
-    file: str = ""
     materials: dict[Text, MaterialTable] = Field(default={})
     liquids: dict[Text, LiquidTable] = Field(default={})
     surface_pairs: list[SurfacePairTable] = Field(default=[])

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from math import inf, pi
+from math import inf
 from typing import TYPE_CHECKING, NamedTuple
 
+from walkers.physics.capillary import bead_volume
 from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.physics.dimer import Dimer
 
@@ -69,7 +70,7 @@ def contact_loads(case: Case, walkers: Walkers | None = None) -> list[Load]:
     loads = []
     for radius in make.radii:
         bridge = bridge_at_rest(case, radius, inf)
-        weight = 4.0 / 3.0 * pi * radius**3 * case.beads.density * case.pressing_gravity
+        weight = bead_volume(radius) * case.beads.density * case.pressing_gravity
         loads.append(bridge._replace(overlap=hertz_overlap(bridge.pull + weight, radius, modulus)))
     for one, other in make.pairs:
         pair = (make.radii[one], make.radii[other])

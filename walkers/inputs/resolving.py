@@ -20,6 +20,7 @@ from walkers.inputs.loads import bridge_at_rest, contact_loads, dimer_of, reach
 from walkers.inputs.origins import Source
 from walkers.inputs.run import with_run
 from walkers.inputs.standing import OVERLAP, check_bodies, overlaps
+from walkers.inputs.table import changed
 from walkers.inputs.units import TEMPERATURE, parse_quantity
 from walkers.physics.capillary import DEFAULT_LAW
 from walkers.physics.laws import LAWS
@@ -55,7 +56,9 @@ SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_OF_SURFACES)
 # --- from the library -------------------------------------------------------------------------------------------------
 
 
-def supplied(document: Mapping[str, Any], library: Library) -> tuple[dict[str, Any], dict[str, Source], list[Problem]]:
+def supplied(
+    model: type[Case], document: Mapping[str, Any], library: Library
+) -> tuple[dict[str, Any], dict[str, Source], list[Problem]]:
     """The tables of a case with what they leave out and the library has of the materials and the liquid they name.
 
     Also the sources of these values, and names that the library does not know.
@@ -72,20 +75,12 @@ def supplied(document: Mapping[str, Any], library: Library) -> tuple[dict[str, A
     calibrated = liquid if said["liquid.law"] in (MISSING, DEFAULT_LAW) else None
     tables = {name: value for name, value in document.items() if name != "library"}
     tables.setdefault("contact", {})
+    written = {}
     for key in SUPPLIED:
         instead = key in _VISCOSITIES and not given.isdisjoint(_VISCOSITIES)
         if key in values and not (key in given or instead) and isinstance(tables.get(key.split(".")[0]), Mapping):
-            tables = _with(tables, parts_of(key), values[key].written)
-            sources[key] = _source_of(key, values[key], calibrated)
-    return tables, sources, problems
-
-
-def _with(table: Any, parts: Sequence[str | int], value: Any) -> Any:
-    """Nested tables with another value at a place, if there are tables on the way to it."""
-    if not isinstance(table, Mapping):
-        return table
-    name, *rest = parts
-    return {**table, name: _with(table.get(name, {}), rest, value) if rest else value}
+            written[key], sources[key] = values[key].written, _source_of(key, values[key], calibrated)
+    return changed(model, tables, written), sources, problems
 
 
 def _unknown(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil, inf, pi, prod, sqrt
+from math import ceil, inf, prod, sqrt
 from typing import Any, NamedTuple
 
 from walkers.errors import InputError, Problem
@@ -12,6 +12,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
 from walkers.inputs.loads import bridge_at_rest, hop_height, reach
 from walkers.inputs.run import limits_of
+from walkers.physics.capillary import bead_volume
 from walkers.physics.laws import LAWS
 from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, MEAN_SPIN_COLUMNS, Layout, PlacedWalker
 from walkers.templates.parameters import PRINTED, STATUS_LINES_PER_CYCLE, along, in_cycles, suffixes
@@ -246,7 +247,7 @@ def _search(plan: Plan) -> dict[str, Any]:
 def fastest_of(case: Case, scene: Scene) -> float:
     """Ten times the boundary's peak velocity (20 in a pile), plus the speeds of the deepest fall and a bridge, m/s."""
     sizes = sorted(bead.radius for bead in scene.beads)
-    mass = 4.0 / 3.0 * pi * sizes[0] ** 3 * case.beads.density
+    mass = bead_volume(sizes[0]) * case.beads.density
     bridge = bridge_at_rest(case, sizes[-1], inf)
     work = abs(bridge.pull) * bridge.rupture  # among loose beads, a bridge may push
     deep = hop_height(case) if case.boundary.tilt == 0.0 else reach(case)
