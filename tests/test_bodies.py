@@ -33,7 +33,7 @@ from walkers.runner.launch import launch
 from walkers.sweeps.comparison import Side, compare_runs
 from walkers.templates.deck import render_deck
 from walkers.templates.scene import place
-from walkers.theory.prediction import motion_of, predict
+from walkers.theory.prediction import alignment_of, motion_of
 
 Ran = Callable[..., Path]
 Moved = Callable[..., Group]
@@ -550,7 +550,7 @@ def test_a_dimer_on_the_axis_climbs_if_friction_suffices(run_directory: Ran, fri
 def test_a_climbers_weight_pulls_along_the_axis() -> None:
     case = on_a_wall()
     assert (case.pressing_gravity, case.axial_gravity) == (0.0, case.environment.gravity)
-    assert predict(case)["alignment"]["u"] < 0.0  # it stands on its head
+    assert alignment_of(case)["u"] < 0.0  # it stands on its head
 
 
 def test_the_shipped_climber_comes_upright_and_climbs_and_its_posture_is_that_of_the_whole_run(
