@@ -24,7 +24,16 @@ from walkers.postprocess.quantities import unit_shown
 from walkers.postprocess.results import derived
 from walkers.runner.directory import case_of
 from walkers.sweeps.figure_options import FigureOptions
-from walkers.sweeps.table import ERRORS, FACING_DOWN, default_column, find_name, value_text, with_unit
+from walkers.sweeps.table import (
+    ERRORS,
+    FACING_DOWN,
+    SEEDS,
+    default_column,
+    find_name,
+    key_values,
+    value_text,
+    with_unit,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,13 +47,12 @@ SCATTER = "bars: standard deviation of the copies (uncertain parameters not vari
 """What the error bars of a sweep are."""
 _NONE = "none"
 """Instead of a column: no colours or no panels."""
-_SEEDS = ("run.seed", "seed")
 _UP: dict[str, Any] = {"marker": "o", "color": "0.3", "label": "started facing right (up)"}
 _DOWN: dict[str, Any] = {"marker": "v", "color": "0.3", "label": "started facing left (down)"}
 _MOST_PANELS = 12
 _MARKERS = "osD^vXP<>*"
 _MODELS = (("--", "_"), (":", "+"))  # line of each model, and its symbol if points are not joined
-_CURVE, _BEYOND = 61, 0.04  # points of a model's curve; its length beyond the points, divided by their range
+_CURVE = 61  # points of a model's curve
 _OF_SHAPE = ("radii", "volume_fraction", "contact_angle")
 """Ends of the keys that change the shape of bridges, each of which takes a quarter of a second to solve."""
 _MOST_COLOURS = 12  # numbers with more values have a colour scale instead of a legend
@@ -158,12 +166,9 @@ def factors_of(table: pd.DataFrame) -> list[Factor]:
 
 
 def _of_axis(table: pd.DataFrame, keys: Sequence[str]) -> list[Factor]:
-    known, units = table.attrs["varied"], table.attrs["units"]
     factors = []
     for key in keys:
-        names = [name for name in known if name == key or name.startswith(f"{key}[")]
-        rows, unit = table[names].astype(object), units[names[0]]
-        values = rows[key].tolist() if names == [key] else [row.dropna().tolist() for _, row in rows.iterrows()]
+        values, unit = key_values(table, key)
         if is_number := {*map(type, values)} <= {int, float}:
             values = [*map(float, values)]
         else:
@@ -265,8 +270,8 @@ def layout_of(
     along = [asked["x"]] if "x" in asked else samples
     if not along:
         ranked = [one for one in left if one.is_number] or left or [_numbers(rows, "point", "x")]
-        along = [max(ranked, key=lambda one: (one.keys[0] not in _SEEDS, len(one.levels)))]
-    left = [one for one in left if one not in along and one.keys[0] not in _SEEDS]
+        along = [max(ranked, key=lambda one: (one.keys[0] not in SEEDS, len(one.levels)))]
+    left = [one for one in left if one not in along and one.keys[0] not in SEEDS]
     left.sort(key=lambda one: -len(one.levels))
     colours = asked.get("hue") or (left.pop(0) if left and options.hue is None else None)
     apart = asked.get("panels")
@@ -286,7 +291,7 @@ def _same(one: Factor, other: Factor) -> bool:
 
 
 class _Theory:
-    """Predictions of models for the points, and between and beyond them, in the displayed unit."""
+    """Predictions of models for the points, and between them, in the displayed unit."""
 
     def __init__(self, predict: Predict, done: pd.DataFrame, column: str, log: str) -> None:
         self.predict, self.done, self.column, self.log = predict, done, column, log
@@ -298,47 +303,31 @@ class _Theory:
             _tell(f"{number} of {len(done)} points: {remark}")
 
     def curves(self, rows: npt.NDArray[np.int64], x: Factor) -> tuple[FloatArray, dict[str, FloatArray]]:
-        """Values of x and the predictions there, for rows that differ only in x; none if they take too long."""
-        along, cases = self._between(rows, x)
-        predicted, remarks = self.predict(cases, self.column) if cases else ({}, {})
-        if not all(np.isfinite(values).all() for values in predicted.values()):
-            for remark in remarks.keys() - self.remarks.keys():
-                _tell(f"the theory's curve has gaps: {remark}")
-        return along, {model: self.factor * values for model, values in predicted.items()}
-
-    def _between(self, rows: npt.NDArray[np.int64], x: Factor) -> tuple[FloatArray, list[Case]]:
-        """Values of x and cases between points that differ in one key.
+        """Values of x and the predictions there, between points that differ in one key; none if they take too long.
 
         If x is no key, such as Γ0, the key that varies is changed.
         """
         points, case, units = self.done.iloc[rows], self.cases[rows[0]], self.done.attrs["units"]
-        (key, *further), known = x.keys, self.done.attrs["varied"]
-        places = _along_axis(x.levels[0], x.levels[-1], self.log)
-        if key not in known:
-            moving = [name for name in known if points[name].nunique() > 1]
-            if len(moving) != 1 or key not in derived(case) or points[moving[0]].dtype.kind not in "if":
-                return places, []
-            (key,) = moving
-            places = np.linspace(points[key].min(), points[key].max(), _CURVE)
-        if further or not case.document or key.endswith(_OF_SHAPE):
-            return places, []
+        moving, name = [key for key in self.done.attrs["varied"] if points[key].nunique() > 1], x.keys[0]
+        if len(moving) != 1 or not case.document or not (name in moving or name in derived(case)):
+            return np.array([]), {}
+        (key,) = moving
+        if key.endswith(_OF_SHAPE) or points[key].dtype.kind not in "if":
+            return np.array([]), {}
+        low, high = points[key].min(), points[key].max()
+        is_log = "x" in self.log and low > 0.0
         cases: dict[float, Case] = {}
-        for place in places.tolist():
+        for place in (np.geomspace if is_log else np.linspace)(low, high, _CURVE).tolist():
             with suppress(InputError, ValueError):  # a value that no case may have
                 cases[place] = case.changed({key: f"{place!r} {units[key]}" if units[key] else place})
-        along = np.array(list(cases))
-        if key != x.keys[0]:
-            along = unit_shown(units[x.keys[0]])[1] * np.array([derived(one)[x.keys[0]] for one in cases.values()])
-        return along, list(cases.values())
-
-
-def _along_axis(low: float, high: float, log: str) -> FloatArray:
-    """Values of x for curves, to a little beyond the smallest and largest values."""
-    if "x" in log and low > 0.0:
-        beyond = (high / low) ** _BEYOND
-        return np.geomspace(low / beyond, high * beyond, _CURVE)
-    beyond = _BEYOND * (high - low)
-    return np.linspace(low - beyond if low <= 0.0 else max(low - beyond, 0.1 * low), high + beyond, _CURVE)
+        predicted, remarks = self.predict(list(cases.values()), self.column)
+        if not all(np.isfinite(values).all() for values in predicted.values()):
+            for remark in remarks.keys() - self.remarks.keys():
+                _tell(f"the theory's curve has gaps: {remark}")
+        along = (
+            list(cases) if name == key else [unit_shown(units[name])[1] * derived(one)[name] for one in cases.values()]
+        )
+        return np.array(along), {model: self.factor * values for model, values in predicted.items()}
 
 
 def _points(done: pd.DataFrame, column: str, down: str | None) -> tuple[str, pd.DataFrame]:
@@ -440,7 +429,7 @@ def _series(
     rows = np.flatnonzero(here)
     rows = rows[np.argsort(places[rows], kind="stable")]
     at, shown = places[rows], points.iloc[rows]
-    is_course = x.is_number and not x.is_sample and x.keys[0] not in _SEEDS
+    is_course = x.is_number and not x.is_sample and x.keys[0] not in SEEDS
     is_line = is_course and len(set(at)) == len(rows) > 1
     line = "-" if is_line and not theory else "none"
     bars = shown["error"] if errors_seen(points["error"], points["value"]) else None
