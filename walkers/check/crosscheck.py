@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.distance import pdist
 
 from walkers.api import run
-from walkers.check.engine import SecondEngine, close_pairs
+from walkers.check.engine import SecondEngine
 from walkers.check.kernels import FloatArray
 from walkers.check.lines import Line, Verdict
 from walkers.inputs.case import Case
@@ -91,7 +92,9 @@ def measured(motion: Motion) -> dict[tuple[str, str], float]:
     """
     if motion.case.mixture is not None:
         late = motion.select(slice(int(np.searchsorted(motion.time, motion.time[-1] / 2.0)), None))
-        touching = sum(len(close_pairs(position, late.radius)) for position in late.position)
+        apart = (pdist(position) for position in late.position)
+        radii = pdist(late.radius[:, None], lambda one, other: one[0] + other[0])
+        touching = sum(int(np.sum(distances < radii)) for distances in apart)
         return {
             ("height of the beads", "mm"): 1e3 * float(late.position[..., 2].mean()),
             ("root mean square velocity", "mm/s"): 1e3 * sqrt(float(np.sum(late.velocity**2, axis=-1).mean())),

@@ -8,10 +8,9 @@ from math import inf, log, pi, sqrt
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.spatial import cKDTree
 
 from walkers.check import kernels
-from walkers.check.kernels import CELLS, Bridges, Constants, FloatArray, IntArray, Pairs, State
+from walkers.check.kernels import CELLS, Bridges, Constants, FloatArray, State
 from walkers.inputs.boundary import Flat, Wall
 from walkers.inputs.case import Case
 from walkers.physics.bridge import BridgeLaw, Surfaces
@@ -55,31 +54,30 @@ class SecondEngine:
     ) -> None:
         if unknown := set(without) - set(TERMS):
             raise ValueError(f"without {unknown}: expected any of {', '.join(TERMS)}")
-        self.clock, self.radius = clock, np.ascontiguousarray(radius, dtype=np.float64)
-        self.constants = _constants(case, self.radius, walls or case.boundary.walls, without)
+        self.clock = clock
+        radius = np.ascontiguousarray(radius, dtype=np.float64)
+        self.constants = _constants(case, radius, walls or case.boundary.walls, without)
         place, velocity, spin = (
             np.array(start[:, column : column + 3], dtype=np.float64, order="C") for column in (0, 3, 6)
         )
-        films = np.ones(len(radius)), np.zeros(len(radius))
-        self.state = State(place, velocity, spin, np.zeros_like(place), np.zeros_like(place), *films)
-        self._skin = _SKIN * float(self.radius.min())
-        self._reach = self.radius + (self.constants.bridges.spans[:, kernels.RUPTURE].max() + self._skin) / 2.0
-        none = np.zeros(0, dtype=np.int64)
-        self.pairs = Pairs(none, none, np.zeros((0, 3)), none)
-        self._list()
+        beads = len(radius)
+        contacts = (beads, beads + len(self.constants.point))
+        self.state = State(
+            *(place, velocity, spin, np.zeros_like(place), np.zeros_like(place), np.ones(beads), np.zeros(beads)),
+            *(np.zeros((*contacts, 3)), np.full(contacts, -1), np.zeros((beads, beads), np.bool_), place.copy()),
+        )
+        kernels.look_around(self.constants, self.state)
         self.evaluate()
 
     def evaluate(self) -> None:
         """Evaluate the forces at the present positions and velocities, as LIGGGHTS does at its start."""
-        self._advance(self.clock, (self.clock, 1), np.empty((0, len(self.radius), 9)))
+        kernels.forces(self.constants, self.state, self.clock, False)
 
     def run(self, steps: int, every: int) -> FloatArray:
         """Integrate: position, velocity and spin after each ``every`` steps, shape (steps // every, N, 9)."""
-        begin, end = self.clock, self.clock + steps
-        frames = np.empty((steps // every, len(self.radius), 9))
-        while self.clock < end:
-            self.clock = self._advance(end, (begin, every), frames)
-            self._list()
+        frames = np.empty((steps // every, len(self.state.film), 9))
+        kernels.advance(self.constants, self.state, self.clock, every, frames)
+        self.clock += every * len(frames)
         return frames
 
     def follow(self, frame: FloatArray) -> FloatArray:
@@ -87,46 +85,14 @@ class SecondEngine:
         state = self.state
         state.position[:], state.velocity[:], state.spin[:] = frame[:, :3], frame[:, 3:6], frame[:, 6:]
         self.clock += 1
-        self._list()
-        kernels.forces(self.constants, state, self.pairs, self.clock, True)
+        kernels.look_around(self.constants, state)
+        kernels.forces(self.constants, state, self.clock, True)
         return np.hstack([state.force, state.torque])
-
-    def _advance(self, end: int, records: tuple[int, int], frames: FloatArray) -> int:
-        """Integrate to a step, or until new neighbour lists are needed; return the present step."""
-        clock = (self.clock, records[0], end, records[1])
-        return kernels.advance(self.constants, self.state, self.pairs, self._listed, self._skin, clock, frames)
-
-    def bridges(self) -> list[tuple[int, int]]:
-        """Indices of the surfaces of each bridge: two beads, or a bead and a wall (numbered after the beads)."""
-        held = self.pairs.bridge >= 0
-        return list(zip(self.pairs.first[held].tolist(), self.pairs.second[held].tolist(), strict=True))
 
     def liquid(self) -> float:
         """Liquid on all beads and in all bridges, m³."""
-        bridges, held = self.constants.bridges, self.pairs.bridge
+        bridges, held = self.constants.bridges, self.state.bridge
         return float(bridges.liquid @ self.state.film + bridges.volume[held[held >= 0]].sum())
-
-    def _list(self) -> None:
-        """List the neighbours, and keep contacts and bridges."""
-        before, self._listed = self.pairs, self.state.position.copy()
-        near = close_pairs(self._listed, self._reach)
-        beads = len(self.radius)
-        bodies = beads + len(self.constants.point)
-        at_walls = bodies * np.arange(beads)[:, None] + np.arange(beads, bodies)
-        keys = np.sort(np.concatenate([near.min(axis=1) * bodies + near.max(axis=1), at_walls.ravel()]))
-        pairs = Pairs(keys // bodies, keys % bodies, np.zeros((len(keys), 3)), np.full(len(keys), -1))
-        listed = before.first * bodies + before.second
-        _, new, old = np.intersect1d(keys, listed, assume_unique=True, return_indices=True)
-        pairs.spring[new], pairs.bridge[new] = before.spring[old], before.bridge[old]
-        self.pairs = pairs
-
-
-def close_pairs(position: FloatArray, reach: FloatArray) -> IntArray:
-    """Indices (P, 2) of beads at positions (N, 3) that are closer than the sum of their reaches (N,), m."""
-    near = cKDTree(position).query_pairs(2.0 * float(reach.max()), output_type="ndarray").astype(np.int64)
-    apart = np.linalg.norm(position[near[:, 0]] - position[near[:, 1]], axis=1)
-    close: IntArray = near[apart < reach[near].sum(axis=1)]
-    return close
 
 
 @lru_cache(maxsize=4096)
@@ -167,7 +133,7 @@ def _constants(case: Case, radius: FloatArray, walls: Sequence[Wall], without: C
         (*wave.direction, wave.angular_frequency, wave.peak_acceleration, wave.phase)
         for wave in case.excitation.harmonics
     ]
-    none = (0.0, 0.0, 0.0)
+    none, bridges, skin = (0.0, 0.0, 0.0), _bridges(case, radius, without), _SKIN * float(radius.min())
     flat = [(wall.point, wall.normal) if isinstance(wall, Flat) else (none, none) for wall in walls]
     return Constants(
         step=case.run.time_step,
@@ -184,5 +150,7 @@ def _constants(case: Case, radius: FloatArray, walls: Sequence[Wall], without: C
         friction_beads=contact.friction.bead_bead * friction,
         friction_walls=contact.friction.bead_wall * friction,
         rolling=contact.rolling_friction * rolling,
-        bridges=_bridges(case, radius, without),
+        reach=radius + (bridges.spans[:, kernels.RUPTURE].max() + skin) / 2.0,
+        skin=skin,
+        bridges=bridges,
     )

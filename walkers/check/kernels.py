@@ -60,6 +60,8 @@ class Bridges(NamedTuple):
 class Constants(NamedTuple):
     """Constants: N beads, W walls (``hollow``: radii of cylinders, 0 for planes), H harmonics; SI units.
 
+    Beads are near each other if they are closer than the sum of their ``reach`` (N,), which includes the ``skin``.
+
     ``harmonics`` (H, 6) are directions, ω, accelerations and phases; moduli are E* and G*, ``damping`` is β. Rolling
     friction is the same for beads and walls.
     """
@@ -78,14 +80,19 @@ class Constants(NamedTuple):
     friction_beads: float
     friction_walls: float
     rolling: float
+    reach: FloatArray
+    skin: float
     bridges: Bridges
 
 
 class State(NamedTuple):
-    """State of N beads, arrays of shape (N, 3).
+    """State of N beads, arrays of shape (N, 3), and of their contacts with each other and W walls.
 
     ``film`` (N,): liquid on a bead, not in bridges, over its whole liquid; ``offered`` (N,): the same at the end of the
-    step before, which all bridges between beads form from.
+    step before, which all bridges between beads form from. Contacts are those of a bead with one of a higher number, or
+    with a wall (numbered after the beads): ``spring`` (N, N + W, 3) has tangential displacements, m, ``bridge``
+    (N, N + W) the index of the bridge, or -1. ``near`` (N, N) are the beads that may meet before one of them has moved
+    by nearly half the ``skin`` from where they were ``listed`` (N, 3).
     """
 
     position: FloatArray
@@ -95,18 +102,10 @@ class State(NamedTuple):
     torque: FloatArray
     film: FloatArray
     offered: FloatArray
-
-
-class Pairs(NamedTuple):
-    """P pairs, sorted: neighbouring beads, and each bead with each wall (numbered after the beads).
-
-    ``spring`` (P, 3) has tangential displacements, m; ``bridge`` (P,) the index of the bridge, or -1.
-    """
-
-    first: IntArray
-    second: IntArray
     spring: FloatArray
     bridge: IntArray
+    near: npt.NDArray[np.bool_]
+    listed: FloatArray
 
 
 class Meeting(NamedTuple):
@@ -279,7 +278,17 @@ def bridge_of(b: Bridges, state: State, i: int, j: int, held: int, gap: float) -
 
 
 @compiled
-def forces(c: Constants, state: State, pairs: Pairs, clock: int, moves: bool) -> None:
+def look_around(c: Constants, state: State) -> None:
+    """List the beads that are near each other."""
+    state.listed[:] = state.position
+    for i in range(c.radius.shape[0]):
+        for j in range(i + 1, c.radius.shape[0]):
+            away = plus(vector(state.position[i]), -1.0, vector(state.position[j]))
+            state.near[i, j] = sqrt(dot(away, away)) < c.reach[i] + c.reach[j]
+
+
+@compiled
+def forces(c: Constants, state: State, clock: int, moves: bool) -> None:
     """All forces and torques at the places and velocities of the state: weight, inertia, contacts and bridges."""
     beads, total = c.radius.shape[0], vector(c.gravity)
     if clock >= 0:
@@ -290,31 +299,33 @@ def forces(c: Constants, state: State, pairs: Pairs, clock: int, moves: bool) ->
         for axis in range(3):
             state.force[bead, axis] = c.mass[bead] * total[axis]
             state.torque[bead, axis] = 0.0
-    for at in range(pairs.first.shape[0]):
-        i, j = pairs.first[at], pairs.second[at]
-        n, gap = separation(c, state, i, j)
-        bridge = pairs.bridge[at] = bridge_of(c.bridges, state, i, j, pairs.bridge[at], gap)
-        if gap >= 0.0:
-            pairs.spring[at, :] = 0.0
-            if bridge < 0:
+    for i in range(beads):
+        for j in range(i + 1, beads + c.point.shape[0]):
+            if j < beads and not state.near[i, j]:
                 continue
-        arm, spin = c.radius[i] + 0.5 * gap, vector(state.spin[i])
-        between, turn, turning = vector(state.velocity[i]), spin, plus(NONE, arm, spin)
-        radius, mass, friction, order, other_arm = c.radius[i], c.mass[i], c.friction_walls, 1.0, 0.0
-        if j < beads:
-            other_arm, other_spin = c.radius[j] + 0.5 * gap, vector(state.spin[j])
-            between = plus(between, -1.0, vector(state.velocity[j]))
-            turn, turning = plus(spin, -1.0, other_spin), plus(turning, other_arm, other_spin)
-            radius = c.radius[i] * c.radius[j] / (c.radius[i] + c.radius[j])
-            mass = c.mass[i] * c.mass[j] / (c.mass[i] + c.mass[j])
-            friction, order = c.friction_beads, -1.0 if c.radius[i] > c.radius[j] else 1.0
-        apart = dot(between, n)
-        slide = plus(plus(between, -apart, n), 1.0, cross(n, turning))
-        m = Meeting(bridge, order, gap, radius, mass, friction, n, apart, slide, turn)
-        acting = meet(c, m, pairs.spring[at], moves)
-        push(state, i, 1.0, arm, n, acting)
-        if j < beads:
-            push(state, j, -1.0, other_arm, n, acting)
+            n, gap = separation(c, state, i, j)
+            bridge = state.bridge[i, j] = bridge_of(c.bridges, state, i, j, state.bridge[i, j], gap)
+            if gap >= 0.0:
+                state.spring[i, j, :] = 0.0
+                if bridge < 0:
+                    continue
+            arm, spin = c.radius[i] + 0.5 * gap, vector(state.spin[i])
+            between, turn, turning = vector(state.velocity[i]), spin, plus(NONE, arm, spin)
+            radius, mass, friction, order, other_arm = c.radius[i], c.mass[i], c.friction_walls, 1.0, 0.0
+            if j < beads:
+                other_arm, other_spin = c.radius[j] + 0.5 * gap, vector(state.spin[j])
+                between = plus(between, -1.0, vector(state.velocity[j]))
+                turn, turning = plus(spin, -1.0, other_spin), plus(turning, other_arm, other_spin)
+                radius = c.radius[i] * c.radius[j] / (c.radius[i] + c.radius[j])
+                mass = c.mass[i] * c.mass[j] / (c.mass[i] + c.mass[j])
+                friction, order = c.friction_beads, -1.0 if c.radius[i] > c.radius[j] else 1.0
+            apart = dot(between, n)
+            slide = plus(plus(between, -apart, n), 1.0, cross(n, turning))
+            m = Meeting(bridge, order, gap, radius, mass, friction, n, apart, slide, turn)
+            acting = meet(c, m, state.spring[i, j], moves)
+            push(state, i, 1.0, arm, n, acting)
+            if j < beads:
+                push(state, j, -1.0, other_arm, n, acting)
     state.offered[:] = state.film
 
 
@@ -331,41 +342,25 @@ def kick(c: Constants, state: State) -> None:
 
 
 @compiled
-def advance(
-    c: Constants,
-    state: State,
-    pairs: Pairs,
-    listed: FloatArray,
-    skin: float,
-    clock: tuple[int, int, int, int],
-    frames: FloatArray,
-) -> int:
-    """Integrate until the end or until new neighbour lists are needed; at the end, only evaluate the forces.
-
-    ``listed`` has the positions of the last neighbour lists, ``skin`` (m) the distance of surfaces that these include.
-    ``clock`` has the present step, the first step of the records, the end, and the steps between records, which go to
-    ``frames``, of shape (F, N, 9). Returns the present step.
-    """
-    now, begin, end, every = clock
-    if now == end:
-        forces(c, state, pairs, now, False)
-    far = (0.4 * skin) ** 2
-    while now < end:
+def advance(c: Constants, state: State, now: int, every: int, frames: FloatArray) -> None:
+    """Integrate from a step on, ``every`` steps for each of the frames, of shape (F, N, 9)."""
+    far = (0.4 * c.skin) ** 2
+    look_around(c, state)
+    for number in range(frames.shape[0] * every):
         kick(c, state)
-        now, farthest = now + 1, 0.0
+        farthest = 0.0
         for bead in range(c.radius.shape[0]):
             way = 0.0
             for axis in range(3):
                 state.position[bead, axis] += c.step * state.velocity[bead, axis]
-                way += (state.position[bead, axis] - listed[bead, axis]) ** 2
+                way += (state.position[bead, axis] - state.listed[bead, axis]) ** 2
             farthest = max(farthest, way)
-        forces(c, state, pairs, now, True)
+        forces(c, state, now + number + 1, True)
         kick(c, state)
-        if (now - begin) % every == 0:
-            frame = frames[(now - begin) // every - 1]
+        if (number + 1) % every == 0:
+            frame = frames[(number + 1) // every - 1]
             frame[:, :3] = state.position
             frame[:, 3:6] = state.velocity
             frame[:, 6:] = state.spin
         if farthest > far:
-            break
-    return now
+            look_around(c, state)
