@@ -220,6 +220,12 @@ def looked_through(once: Callable[[str, Callable[[Path], object]], Path]) -> Pat
     return once("looked-through", fill) / "runs"
 
 
+def brief_pile(**run: Any) -> Case:
+    """The shipped pile, settled and shaken for some hundredths of a second."""
+    brief = {"duration": "0.03 s", "time_step": "3 us", "longest_settling": "0.02 s", "segment": "0.01 s"}
+    return Case.read({**read_toml(shipped("case")["pile-ci"]), "run": {**brief, **run}}, name="brief")
+
+
 HALF = {"duration": "0.1 s", "segment": "0.05 s"}
 """Of the shipped pile: half as long as it ships, in as many segments."""
 

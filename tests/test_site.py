@@ -22,7 +22,7 @@ from tests.conftest import (
     to_toml,
     wait_for,
 )
-from tests.test_hostile import HOSTILE
+from tests.test_damaged import HOSTILE
 from tests.test_scheduler import TINY, contents_of
 from walkers.errors import InputError
 from walkers.inputs.sweep import load_sweep
@@ -120,7 +120,7 @@ def _reachable(process: psutil.Process) -> Iterator[str]:
 def test_nothing_listens_beyond_this_machine(in_folder: Path, site: str, ranks: int) -> None:
     """Not the program, mpirun and the engines; nor Parsl's interchange, pilots and workers.
 
-    Plain engines of one rank are looked at by `test_engine_failures`.
+    Plain engines of one rank are looked at by `test_stopped`.
     """
     if ranks > 1 and not _off_the_network():
         pytest.skip("mpirun listens on every address where nobody may have a network of his own")

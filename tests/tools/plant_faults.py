@@ -3,7 +3,7 @@
     python tests/tools/plant_faults.py TABLE.md [WORD] [--all]
 
 TABLE.md gets a row for each fault: caught or not, and the first test that failed. WORD chooses faults by their name or
-file. Each entry of a fault's ``tests`` is what pytest is given (``tests/test_runs.py -k resume``), by itself, until one
+file. Each entry of a fault's ``tests`` is what pytest is given (``tests/test_runner.py -k lost``), by itself, until one
 fails; with ``--all`` the whole suite follows. A fault is taken back however its tests end, also after Ctrl-C.
 """
 

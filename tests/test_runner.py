@@ -1,4 +1,4 @@
-"""Every failure of a run, provoked for real on the installed engine."""
+"""Run directories and engines: what is there, what is made again, and every failure, provoked for real."""
 
 from __future__ import annotations
 
@@ -19,16 +19,18 @@ from pathlib import Path
 
 import pytest
 
+import walkers
 from tests.conftest import (
+    BRIEF,
     LONG,
     PATIENCE,
+    PROGRAM,
     SHORT,
+    brief_pile,
     call,
     document,
     engines_in,
-    fill,
     make_case,
-    mounted,
     open_run,
     processes_in,
     to_toml,
@@ -36,16 +38,206 @@ from tests.conftest import (
     wait_for_engines,
 )
 from walkers import run as run_case
+from walkers.errors import InputError
 from walkers.inputs.case import Case
-from walkers.inputs.reading import shipped
-from walkers.inputs.toml import read_toml
 from walkers.runner import binary, failures
 from walkers.runner.binary import find_engine, plugin_of
-from walkers.runner.directory import write_deck
+from walkers.runner.directory import (
+    FIRST_SEGMENT,
+    case_of,
+    finished_places,
+    is_finished,
+    is_locked,
+    layout_of,
+    locked,
+    run_place,
+    write_deck,
+)
 from walkers.runner.failures import EngineNeverStarted
 from walkers.runner.files import beside
 from walkers.runner.launch import _off_the_network, judge, launch
+from walkers.runner.manifest import read_manifest
+from walkers.sweeps.making import make_runs
 from walkers.templates.deck import Deck, Segment, render_deck, whole
+
+PATIENCE_OF_LOCKS = "walkers.runner.directory._PATIENCE_SECONDS"
+
+
+def _toml(folder: Path, **run: object) -> str:
+    file = folder / "test.toml"
+    file.write_text(to_toml(document(run=run or SHORT)))
+    return str(file)
+
+
+# --- what is there ----------------------------------------------------------------------------------------------------
+
+
+def test_the_name_depends_on_what_determines_the_run() -> None:
+    def name(**changes: object) -> str:
+        return run_place(make_case(**changes), find_engine(), Path()).name
+
+    names = {
+        name(),
+        name(drive={"peak_acceleration": "4.01 g"}),
+        name(run={"seed": 2}),
+        name(contact={"rolling_friction": 0.001}),
+        name(run={"cycles": 61}),
+        name(drive={"frame": "lab"}),
+    }
+    assert len(names) == 6
+    assert name(title="another title") == name()
+    other = replace(find_engine(), sha256="0" * 64)
+    assert run_place(make_case(), other, Path()).name != name()
+    long = run_place(make_case().but(name="a b/" * 100), other, Path()).name
+    assert len(long) < 100
+    assert "/" not in long
+
+
+def test_contents_of_a_run_directory(tmp_path: Path) -> None:
+    """And the deck can be run by hand, with the same numbers."""
+    case = make_case(run=SHORT)
+    run = run_case(case, tmp_path / "runs").directory
+    assert is_finished(run)
+    assert {path.name for path in run.iterdir()} == {
+        *("case.json", "manifest.json", "result.json", "segments"),
+        *("trajectory.parquet", "walkers.parquet", "bridges.parquet", "cycles.parquet"),
+    }
+    assert {path.name for path in (run / "segments").iterdir()} == {"0000"}
+    assert {path.name for path in (run / FIRST_SEGMENT).iterdir()} == {
+        *("layout.json", "walker.lig", "bridges.txt", "engine.log", "segment.json", "run.sh"),
+        *("beads.bin", "bridges.pairs.txt", "bridges.walls.txt"),
+    }
+    assert case_of(run) == case
+    assert layout_of(run / FIRST_SEGMENT) == render_deck(case).layout
+    manifest = read_manifest(run)
+    assert (manifest["status"], manifest["steps"]) == ("finished", case.run.steps)
+    assert manifest["steps_per_second"] > 0
+    assert manifest["engine"]["sha256"] == find_engine().sha256
+    assert {"host", "started", "finished", "seconds"} <= set(manifest)
+    by_hand = tmp_path / "byhand"
+    call("export", _toml(tmp_path), "--to", "deck", "-o", str(by_hand), check=True)
+    subprocess.run(["sh", "run.sh"], cwd=by_hand, check=True)
+    assert (by_hand / "beads.bin").read_bytes() == (run / FIRST_SEGMENT / "beads.bin").read_bytes()
+
+
+def test_a_run_is_found_by_its_directory_its_name_or_its_case_with_other_values_too(in_folder: Path) -> None:
+    case_file = _toml(in_folder)
+    first, second = (json.loads(call("run", case_file, "--json", check=True).stdout) for _ in range(2))
+    assert (first["cached"], second["cached"]) == (False, True)
+    assert first["velocity"] == second["velocity"]
+    for named in (first["run"], Path(first["run"]).name, case_file):
+        assert walkers.load(named).directory == Path(first["run"])
+        assert f"{first['velocity'] * 1e3:.3f}" in call("run", str(named), check=True).stdout
+    setting = ("--set", "drive.frequency=70Hz")
+    assert f"first do: walkers run {case_file} --set drive.frequency=70Hz" in call("plot", case_file, *setting).stderr
+    slower = json.loads(call("run", first["run"], *setting, "--json", check=True).stdout)
+    for named in (first["run"], Path(first["run"]).name, case_file):
+        assert walkers.load(named, "runs", {"drive.frequency": "70 Hz"}).directory == Path(slower["run"])
+        assert json.loads(call("run", named, *setting, "--json", check=True).stdout)["cached"]
+        assert "70Hz" in call("show", named, *setting, check=True).stdout
+    assert walkers.run(case_file, "runs").directory == walkers.run(first["run"]).directory == Path(first["run"])
+
+
+def test_a_running_simulation_is_looked_at_stopped_and_continued(in_folder: Path) -> None:
+    case_file = _toml(in_folder, **LONG)
+    program = subprocess.Popen([PROGRAM, "run", case_file], stderr=subprocess.DEVNULL)
+    wait_for(lambda: list(Path("runs").glob("*.incomplete/case.json")))
+    (place,) = Path("runs").glob("*.lock")
+    run = walkers.load(place.with_suffix(""))
+    assert isinstance(run, walkers.Run)
+    wait_for(lambda: run.progress and run.progress.share > 2 / run.case.run.cycles)
+    assert (run.status, walkers.load(case_file).status, len(engines_in(in_folder))) == ("running", "running", 1)
+    assert "running: " in call("list", check=True).stdout
+    assert f"{run.directory}: the run is running: " in call("plot", case_file).stderr
+    program.send_signal(signal.SIGINT)
+    assert program.wait(30) == 130
+    assert (run.status, run.progress, engines_in(in_folder)) == ("interrupted", None, [])
+    refused = call("plot", f"{run.directory}.incomplete").stderr
+    assert f"the run is interrupted; continue it with: walkers run {run.directory}" in refused
+    stopped = call("run", str(run.directory), "--limit", "0.2")
+    assert (stopped.returncode, "time limit of 0.2 s" in stopped.stderr) == (1, True)
+    assert (run.status, "time limit of 0.2 s" in run.describe()) == ("failed", True)
+
+
+@pytest.mark.parametrize("out", ["test.toml/x", "/proc/x"])
+def test_places_that_cannot_be_written(in_folder: Path, out: str) -> None:
+    done = call("run", _toml(in_folder), "--out", out)
+    assert (done.returncode, "Traceback" in done.stderr) == (2, False)
+    assert done.stderr.startswith("walkers: ")
+
+
+# --- again, and on ----------------------------------------------------------------------------------------------------
+
+
+def test_a_finished_run_is_run_again_by_force_only(tmp_path: Path) -> None:
+    """One by force that fails leaves the old one."""
+    case = make_case(run=SHORT)
+    first = run_case(case, tmp_path)
+    again = run_case(case, tmp_path)
+    assert (first.cached, again.cached) == (False, True)
+    assert again.result == first.result
+    dump = first.directory / FIRST_SEGMENT / "beads.bin"
+
+    def interrupt(_: object) -> None:
+        raise KeyboardInterrupt
+
+    with dump.open("rb") as before:  # as long as it is open no other file gets its number
+        with pytest.raises(KeyboardInterrupt):
+            make_runs([case], tmp_path, find_engine(), force=True, on_progress=interrupt)
+        assert run_case(case, tmp_path).cached
+        assert os.path.samestat(os.fstat(before.fileno()), dump.stat())
+        contents = dump.read_bytes()
+        assert not run_case(case, tmp_path, force=True).cached
+        assert not os.path.samestat(os.fstat(before.fileno()), dump.stat())
+    assert dump.read_bytes() == contents, "the same to the last bit"
+    assert [path.name for path in tmp_path.iterdir()] == [first.directory.name]
+
+
+def test_a_run_that_somebody_else_finished_meanwhile_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    case = make_case(run=SHORT)
+    stamp = read_manifest(run_case(case, tmp_path).directory)["finished"]
+    # It is not there at the first look, but at the second, after the run has been locked.
+    answers = iter([False])
+    monkeypatch.setattr("walkers.api.is_finished", lambda place: next(answers, is_finished(place)))
+    outcome = run_case(case, tmp_path)
+    assert not list(answers)  # the first look has been
+    assert read_manifest(outcome.directory)["finished"] == stamp
+    assert not list(tmp_path.glob("*.incomplete"))
+
+
+def test_a_crash_within_a_replacement_leaves_no_trace(tmp_path: Path) -> None:
+    """Between its two renames the old run is put back; after them it goes, and is no run meanwhile."""
+    case = make_case(run=BRIEF)
+    place = run_case(case, tmp_path).directory
+    left = place.with_name(place.name + ".replaced")
+    place.rename(left)
+    with open_run(case, find_engine(), tmp_path):
+        assert is_finished(place)
+    shutil.copytree(place, left)
+    assert finished_places(tmp_path) == {place.name: place}
+    assert run_case(case, tmp_path).cached
+    assert run_case(case, tmp_path, force=True).directory == place
+    assert not left.exists()
+
+
+# --- locks and kills --------------------------------------------------------------------------------------------------
+
+
+def test_a_lock_that_somebody_has_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(PATIENCE_OF_LOCKS, 0.1)
+    with locked([tmp_path / "x"]) as ours, locked([tmp_path / "x", tmp_path / "y"]) as theirs:
+        assert (list(ours), list(theirs)) == ([tmp_path / "x"], [tmp_path / "y"])
+        assert is_locked(tmp_path / "x")
+    assert not is_locked(tmp_path / "x")
+    assert not list(tmp_path.iterdir())
+
+
+def test_tables_are_run_as_their_file_is(tmp_path: Path, run_directory: Callable[..., Path]) -> None:
+    found = walkers.run(document(run=SHORT), tmp_path)
+    assert found.result["velocity"] == walkers.load(run_directory(run=SHORT)).result["velocity"]
+    with pytest.raises(InputError, match=r"no finished run .*; first do: walkers run case --set run\.seed=3"):
+        walkers.load(document(run=SHORT), tmp_path, {"run.seed": 3})
+
 
 Front = Callable[[str], str]
 
@@ -321,108 +513,7 @@ def test_an_engine_that_writes_now_and_then_is_not_silent(front: Front, tmp_path
     _launch(make_case(run=SHORT), tmp_path / "runs", engine=engine, silence=2.0)
 
 
-LAUNCHER = """
-from dataclasses import replace
-from pathlib import Path
-import walkers
-from walkers.runner.binary import find_engine
-from walkers.runner.directory import write_deck
-from walkers.runner.launch import launch
-from walkers.templates.deck import render_deck
-
-deck = replace(render_deck(walkers.load_case("long.toml")), silence=3.0)
-write_deck(deck, Path.cwd())
-launch(deck, Path.cwd(), find_engine())
-"""
-
-
-def test_a_launcher_that_was_stopped_does_not_take_that_for_silence(tmp_path: Path) -> None:
-    """As a job is that SLURM suspends: launcher and engine stop, and go on together."""
-    (tmp_path / "long.toml").write_text(to_toml(document(run=LONG)))
-    program = subprocess.Popen([sys.executable, "-c", LAUNCHER], cwd=tmp_path, stderr=subprocess.PIPE, text=True)
-    try:
-        everybody = [program.pid, *wait_for_engines(tmp_path, program)]
-        for number in (signal.SIGSTOP, signal.SIGCONT):
-            for process in everybody:
-                os.kill(process, number)
-            time.sleep(4.0 if number == signal.SIGSTOP else 1.0)
-        assert program.poll() is None
-    finally:
-        program.terminate()
-        program.communicate(timeout=PATIENCE)
-
-
-# --- disks ------------------------------------------------------------------------------------------------------------
-
-
-def test_a_disk_without_room_for_the_dump_and_one_that_fills_up_during_the_run(tmp_path: Path) -> None:
-    with mounted(tmp_path / "disk", "2m") as place:
-        with pytest.raises(failures.DiskFull, match="disk full"):
-            _launch(make_case(run={"cycles": 600, "samples_per_cycle": 20}), place / "before")
-        assert _reason(place / "before") == "DiskFull"
-    with mounted(tmp_path / "other", "2m") as place:
-
-        def fill_soon() -> None:
-            wait_for(lambda: list(place.glob("during/*.incomplete/segments/0000.new/beads.bin")))
-            fill(place)
-
-        filler = threading.Thread(target=fill_soon)
-        filler.start()
-        with pytest.raises(failures.DiskFull):
-            _launch(make_case(run={"cycles": 180, "settling_cycles": 2, "samples_per_cycle": 20}), place / "during")
-        filler.join()
-        assert not list(place.glob("during/*/manifest.json"))
-        assert not engines_in(place)
-
-
-def _brief_pile(**run: object) -> Case:
-    """Settled and shaken for some hundredths of a second."""
-    brief = {"duration": "0.03 s", "time_step": "3 us", "longest_settling": "0.02 s", "segment": "0.01 s"}
-    return Case.read({**read_toml(shipped("case")["pile-ci"]), "run": {**brief, **run}}, name="brief")
-
-
-def test_a_full_folder_of_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One process needs nothing there; mpirun would have its processes wait for each other without end."""
-    with mounted(tmp_path / "tmp", "2m") as place:
-        monkeypatch.setenv("TMPDIR", str(place))
-        assert not run_case(make_case(run=SHORT), tmp_path / "runs").cached
-        with pytest.raises(failures.DiskFull, match=rf"disk full: 16 MB .* are free \(see {place}\)"):
-            run_case(_brief_pile(ranks=2), tmp_path / "runs", time_limit=PATIENCE)
-
-
-def test_a_pile_that_was_killed_goes_on_when_a_full_disk_has_room_again(tmp_path: Path) -> None:
-    """Nothing is lost, and the numbers are those of a pile that nobody stopped."""
-    case = _brief_pile(duration="0.06 s")
-    with mounted(tmp_path / "disk", "16m") as place:
-        child = os.fork()
-        if not child:
-            with suppress(BaseException):
-                run_case(case, place)
-            os._exit(0)
-        (whole,) = wait_for(lambda: list(place.glob("*.incomplete/segments/0001")))
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
-        wait_for(lambda: not engines_in(place))
-        node = (whole / "beads.bin").stat().st_ino
-        ballast = fill(place)
-        with pytest.raises(failures.DiskFull, match="disk full"):
-            run_case(case, place)
-        ballast.unlink()
-        done = run_case(case, place)
-        assert (done.directory / "segments" / "0001" / "beads.bin").stat().st_ino == node
-        assert done.result == run_case(case, tmp_path / "runs").result
-
-
 # --- surroundings -----------------------------------------------------------------------------------------------------
-
-
-def test_variables_of_open_mpi_that_a_user_has_set_do_not_matter(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name in ("btl=tcp", "pml=cm", "mtl=no", "rmaps=no", "oob=no", "ess=singleton", "orte_default_hostfile=/none"):
-        monkeypatch.setenv(*f"OMPI_MCA_{name}".split("="))
-    for case in (_brief_pile(ranks=2), make_case(run=SHORT)):
-        assert not run_case(case, tmp_path, time_limit=PATIENCE).cached
 
 
 def _path_without(programs: Collection[str], folder: Path) -> str:
@@ -441,44 +532,18 @@ def test_ranks_need_mpirun_but_neither_ssh_nor_unshare(tmp_path: Path, monkeypat
     _off_the_network.cache_clear()
     try:
         with pytest.warns(UserWarning, match="listens on all networks"):
-            assert not run_case(_brief_pile(ranks=2), tmp_path / "runs", time_limit=PATIENCE).cached
+            assert not run_case(brief_pile(ranks=2), tmp_path / "runs", time_limit=PATIENCE).cached
     finally:
         _off_the_network.cache_clear()
     (tmp_path / "bin" / "mpirun").unlink()
     with pytest.raises(EngineNeverStarted, match=r"run\.ranks = 2 needs mpirun: apt-get install openmpi-bin"):
-        run_case(_brief_pile(ranks=2), tmp_path / "other")
-
-
-def test_a_library_to_preload_that_does_not_exist_does_not_matter(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("LD_PRELOAD", "/no/such/library.so")
-    assert not run_case(make_case(run=SHORT), tmp_path).cached
+        run_case(brief_pile(ranks=2), tmp_path / "other")
 
 
 def test_a_script_of_a_run_starts_the_engine_that_ran(front: Front, tmp_path: Path) -> None:
     engine = front('exec liggghts "$@"')
     run = run_case(make_case(run=SHORT), tmp_path / "runs", engine=engine)
     assert f" {engine} -in " in next(run.directory.rglob("run.sh")).read_text()
-
-
-def test_a_step_that_is_printed_twice_is_no_division_by_zero(tmp_path: Path) -> None:
-    deck = render_deck(make_case(run=SHORT), whole(make_case(run=SHORT)))
-    atoms, log = deck.layout.atoms, tmp_path / "engine.log"
-    lines = [f" 100 {count} 0.01 -1e-3 1e-3 -1e-3 1e-3 0 1e-3" for count in (atoms, atoms - 1)]
-    log.write_text("\n".join(["LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0, x)", *lines, ""]))
-    with pytest.raises((failures.BlowUp, failures.BeadsLost)):
-        judge(deck, tmp_path, log)
-
-
-def test_what_a_line_of_the_log_shows_is_not_undone_by_the_next(tmp_path: Path) -> None:
-    """A bead at 1 km/s, and a calm line after it, both read in one look."""
-    deck = render_deck(make_case(run=SHORT), whole(make_case(run=SHORT)))
-    speeds = {100: 0.01, 200: 1000.0, 300: 0.01}
-    lines = [f" {step} {deck.layout.atoms} {speed} -1e-3 1e-3 -1e-3 1e-3 0 1e-3" for step, speed in speeds.items()]
-    (tmp_path / "engine.log").write_text("\n".join(["LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0, x)", *lines, ""]))
-    with pytest.raises(failures.BlowUp, match=r"moves at 1e\+03 m/s after step 200"):
-        judge(deck, tmp_path, tmp_path / "engine.log")
 
 
 def test_a_file_can_be_written_by_many_threads_at_once(tmp_path: Path) -> None:
@@ -493,15 +558,6 @@ def test_a_file_can_be_written_by_many_threads_at_once(tmp_path: Path) -> None:
         list(pool.map(write, ("a", "b")))
     assert (tmp_path / "file").read_text() in ("a", "b")
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
-
-
-def test_a_failed_run_is_reported_and_the_next_one_goes_on(in_folder: Path) -> None:
-    (in_folder / "hot.toml").write_text(to_toml(document(**UNSTABLE)))
-    (in_folder / "good.toml").write_text(to_toml(document(run=SHORT)))
-    done = call("run", "hot.toml", "good.toml", "--json")
-    assert done.returncode == 1
-    assert "walkers: hot: blow-up" in done.stderr
-    assert json.loads(done.stdout)["case"] == "good"
 
 
 def test_a_failed_run_is_remembered_when_the_spread_of_the_next_one_succeeds(in_folder: Path) -> None:
@@ -552,9 +608,82 @@ def test_an_engine_that_never_started_is_tried_twice_again(
     assert births.read_text().count("born") == 3
 
 
-def test_an_engine_starts_where_nothing_temporary_can_be_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+# --- surroundings -----------------------------------------------------------------------------------------------------
+
+
+MPI = ("btl=tcp", "pml=cm", "mtl=no", "rmaps=no", "oob=no", "ess=singleton", "orte_default_hostfile=/none")
+SURROUNDINGS = {
+    "settings of Open MPI": {f"OMPI_MCA_{one.partition('=')[0]}": one.partition("=")[2] for one in MPI},
+    "a library to preload that is not there": {"LD_PRELOAD": "/no/such/library.so"},
+    "no place for temporary files": {"TMPDIR": "/proc"},
+}
+
+
+@pytest.mark.parametrize("name", SURROUNDINGS)
+def test_what_a_user_has_set_in_the_environment_does_not_matter(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plugin_of(find_engine())  # is there: a compiler needs such files
-    monkeypatch.setenv("TMPDIR", "/proc")
+    plugin_of(find_engine())  # is there: a compiler needs temporary files
+    for variable, value in SURROUNDINGS[name].items():
+        monkeypatch.setenv(variable, value)
     assert not run_case(make_case(run=SHORT), tmp_path).cached
+    if "MPI" in name:
+        assert not run_case(brief_pile(ranks=2), tmp_path, time_limit=PATIENCE).cached
+
+
+def test_a_launcher_that_was_stopped_does_not_take_that_for_silence(tmp_path: Path) -> None:
+    """As a job is that SLURM suspends: launcher and engine stop, and go on together."""
+    child = os.fork()
+    if not child:
+        with suppress(BaseException):
+            _launch(make_case(run=LONG), tmp_path, silence=3.0)
+        os._exit(0)
+    try:
+        everybody = [child, *wait_for_engines(tmp_path)]
+        for number, seconds in ((signal.SIGSTOP, 4.0), (signal.SIGCONT, 1.0)):
+            for process in everybody:
+                os.kill(process, number)
+            time.sleep(seconds)
+        assert os.waitpid(child, os.WNOHANG) == (0, 0)
+    finally:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        wait_for(lambda: not engines_in(tmp_path))
+
+
+LOGS: dict[str, tuple[list[tuple[int, int, float]], type[failures.EngineFailure], str]] = {
+    # Step, lost beads and speed (m/s) of lines that are read in one look.
+    "a step that is printed twice": ([(100, 0, 0.01), (100, 1, 0.01)], failures.EngineFailure, "bead"),
+    "a calm line after a failure": (
+        [(100, 0, 0.01), (200, 0, 1000.0), (300, 0, 0.01)],
+        *(failures.BlowUp, r"moves at 1e\+03 m/s after step 200"),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_lines_of_a_log_are_judged(name: str, tmp_path: Path) -> None:
+    deck = render_deck(make_case(run=SHORT), whole(make_case(run=SHORT)))
+    rows, kind, told = LOGS[name]
+    lines = [f" {step} {deck.layout.atoms - lost} {speed} -1e-3 1e-3 -1e-3 1e-3 0 1e-3" for step, lost, speed in rows]
+    log = tmp_path / "engine.log"
+    log.write_text("\n".join(["LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0, x)", *lines, ""]))
+    with pytest.raises(kind, match=told):
+        judge(deck, tmp_path, log)
+
+
+def test_limits_of_restitution_and_modulus_are_the_engines(tmp_path: Path) -> None:
+    """The last values that the engine takes run. Beyond its largest modulus a deck has to say that beads are hard."""
+    quick = {"time_step": "0.4 us", "cycles": 2, "settling_cycles": 0, "samples_per_cycle": 1, "allow_unstable": True}
+    last = {"restitution": 0.0501, "youngs_modulus": "1 GPa"}
+    case = make_case(contact=last, run=quick, drive={"frequency": "2 kHz"})
+    assert not run_case(case, tmp_path).cached
+    with pytest.raises(failures.EngineError, match="coefficientRestitution <= 1 required"):
+        run_case(case.put("contact.restitution", 0.05), tmp_path)
+    assert "hard_particles" not in render_deck(case).text
+    with pytest.raises(failures.EngineError, match="youngsModulus <= 1e9 required"):
+        _launch(
+            case.put("contact.youngs_modulus", 1.001e9),
+            tmp_path / "hard",
+            lambda text: text.replace("hard_particles  yes", ""),
+        )
