@@ -178,10 +178,28 @@ def _calibrated() -> list[Case]:
     return [load_case(read.file.case, {**base, **values}) for values in read.experiments.values()]
 
 
-def _make_trays(out: Path, docs: Path) -> None:
-    make_figures(out, docs / "figures", Options(cores_here()), only=["tray-phases"], formats=("png",))
-    rows = tables.means_of_trays(sweep("tray-phases", out).table())
-    write_text(docs / "figures" / "tray-phases.md", tables.page("walkers list tray-phases", rows))
+_AS_SLOPES = {"y": "axial_velocity", "hue": "liquid.viscosity_ratio", "panels": "clusters[0].arrangement"}
+_SWEEPS: Mapping[str, Mapping[str, str]] = {
+    "climb-friction": {"x": "contact.friction.bead_wall", **_AS_SLOPES},
+    "climb-tilt": {"x": "boundary.tilt", **_AS_SLOPES},
+    "zoo": {"y": "axial_velocity", "hue": "none"},
+    "zoo-corner": {"y": "axial_velocity"},
+    "tray-phases": {"x": "drive.peak_acceleration", "y": "clustered_share", "hue": "walkers", "panels": "coverage"},
+}
+"""Sweeps and how their figures show them."""
+
+
+def _of_sweep(name: str, options: Mapping[str, Any]) -> Illustration:
+    """The figure of a sweep; of trays also the table."""
+    files = [f"figures/{name}.png", *(["figures/tray-phases.md"] if name == "tray-phases" else [])]
+
+    def make(out: Path, docs: Path) -> None:
+        done = sweep(name, out)
+        save_figure(done.figure(**options), docs / files[0], [one.directory.name for one in done.runs])
+        for file in files[1:]:
+            write_text(docs / file, tables.page(f"walkers list {name}", tables.means_of_trays(done.table())))
+
+    return Illustration(tuple(files), lambda: load_sweep(name).cases(), make)
 
 
 def _shipped(*names: str) -> Callable[[], list[Case]]:
@@ -217,11 +235,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     ),
     "pile": _of_run("pile", "pile-small", {"run.duration": "10 s"}),
     **{name: _of_figure(name, f"figures/{name}.png", sweeps=one.sweeps) for name, one in FIGURES.items()},
-    "tray-phases": Illustration(
-        ("figures/tray-phases.png", "figures/tray-phases.md"),
-        lambda: load_sweep("tray-phases").cases(),
-        _make_trays,
-    ),
+    **{name: _of_sweep(name, options) for name, options in _SWEEPS.items()},
     "comparison": _of_figure("comparison", "figures/comparison.md", "figures/comparison.json", sweeps=COMPARED),
     "validation": Illustration(
         (CHECKED.as_posix(), "figures/benchmarks.png"),

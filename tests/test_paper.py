@@ -23,7 +23,7 @@ from walkers.paper import published
 from walkers.paper.comparison import Value, _row, as_dict, as_markdown, compare, count, evaluate
 from walkers.paper.figures import OBSERVED, PARAMETERS, sensitivities, theory_of_cycles
 from walkers.paper.make import FIGURES, make_figures
-from walkers.paper.maps import MODES, POSTURES, classify, climber, paper_drives, postures, sliding_share
+from walkers.paper.maps import MODES, classify, climber, paper_drives, sliding_share
 from walkers.paper.published import OBSERVATIONS, NothingFinishedError, Observation, Point, Sources
 from walkers.postprocess.drawing import save_figure
 from walkers.postprocess.gait import gait, steady_walkers
@@ -46,13 +46,6 @@ FEWER: dict[str, dict[str, Any]] = {
     "alignment": {"dimers.angle": ["0 deg", "15 deg"]},
     "modes": {"dimers.sin_delta": [0.0, 0.2], "drive.gamma0": [0.05, 0.15, 0.5]},
 }
-BRIEF = {"clusters[0].replicates": 1, "run.cycles": 2, "run.settling_cycles": 0, "run.samples_per_cycle": 1}
-ON_A_WALL: dict[str, dict[str, Any]] = {
-    "climb-friction": {"liquid.viscosity_ratio": [1, 2]},
-    "climb-tilt": {"boundary.tilt": ["20 deg", "90 deg"], "liquid.viscosity_ratio": [1]},
-    "zoo": {},
-    "zoo-corner": {"clusters[0].radii": [["0.545 mm", "0.3075 mm"], ["0.545 mm", "0.3075 mm", "0.3075 mm"]]},
-}
 COMPARED = [number for number in OBSERVATIONS.values() if number.compared]
 
 
@@ -68,15 +61,6 @@ def sources(once: Callable[[str, Callable[[Path], object]], Path]) -> Sources:
             if "descend" in given:
                 given["descend"] |= {"from": "1.4 g", "to": "0.4 g", "step": "0.2 g"}
             run_shipped(name, given, out)
-        for name, axes in ON_A_WALL.items():
-            given = shipped_sweep(name, BRIEF, axes)
-            if name == "climb-friction":
-                given["zip"][0] = {f"contact.friction.bead_{other}": [0.3, 0.5] for other in ("wall", "bead")}
-            run_shipped(name, given, out)
-        few = {"drive.peak_acceleration": ["2 g", "8 g"], "run.seed": [1, 2]}
-        given = shipped_sweep("tray-phases", {"run.duration": "0.1 s"}, few)
-        given["zip"] = [{key: values[:4] for key, values in flatten(given["zip"][0], is_axis).items()}]
-        run_shipped("tray-phases", given, out)
 
     return Sources(once("paper", run))
 
@@ -177,20 +161,16 @@ PANELS = {
     "fig4": 2,
     "alignment": 4,
     "modes": 2,
-    "climbing": 6,
-    "zoo": 15,
-    "tray-phases": 10,
 }
 
 
 @pytest.mark.parametrize("name", PANELS)
 def test_figures_can_be_printed_and_say_what_they_were_made_from(sources: Sources, tmp_path: Path, name: str) -> None:
     drawing = FIGURES[name]
-    assert drawing.only_asked == (name in ("climbing", "zoo", "tray-phases"))
     runs = sources.runs(*drawing.sweeps)
     figure = drawing.draw(sources)
     assert spoilt(figure) == []
-    assert letters(figure) == list("abcdefghijklmno")[: PANELS[name]]
+    assert letters(figure) == list("abcd")[: PANELS[name]]
     if name != "fig4":
         return
     paths = save_figure(figure, tmp_path / name, runs, ("png", "svg", "pdf"), drawing.title)
@@ -257,20 +237,6 @@ def test_figures_and_comparison_do_without_what_failed(sources: Sources, tmp_pat
                 assert "missing" in row["why"]
 
 
-def test_a_descent_of_which_only_its_ends_are_left_is_drawn_without_a_threshold(
-    sources: Sources, tmp_path: Path
-) -> None:
-    """Steps below the end are made together with those above: they may be there when all others have failed."""
-    out = tmp_path / "runs"
-    shutil.copytree(sources.out, out)
-    for run in Sources(out).table("fig2-threshold")["run"]:
-        shutil.rmtree(run)
-    left = Sources(out)
-    assert len(left.finished("fig2-threshold"))
-    assert FIGURES["fig2"].draw(left).axes
-    assert len(compare(left)) == len(COMPARED)
-
-
 def test_the_theory_of_fig4_goes_through_the_cycle_as_the_engine_does(sources: Sources) -> None:
     """Phase and sign: curves lie on the engine's samples within a tenth of their range, where contacts stay closed."""
     table = sources.finished("fig4").set_index("liquid.name")
@@ -300,7 +266,7 @@ def test_dimers_turn_as_the_pendulum_does_but_as_much_faster_as_their_beads_are_
         assert turned == pytest.approx(free["rate"] / free["rolling_rate"], rel=0.3)
 
 
-def test_modes_and_postures_are_told_apart(sources: Sources) -> None:
+def test_modes_are_told_apart(sources: Sources) -> None:
     rolling = {"velocity": 1e-3, "sliding_1": 0.0, "open_1": 0.0, "open_2": 0.0, "open_pair_1": 0.0}
     rolling |= {"steady": 2, "walkers": 2, "turned_round": 0}
     changes = [{"velocity": 0.0}, {}, {}, {"steady": 1}, {"open_pair_1": 0.1}, {"turned_round": 1}]
@@ -310,9 +276,6 @@ def test_modes_and_postures_are_told_apart(sources: Sources) -> None:
     found = classify(table, [sliding_share(sources.trajectory(run)) for run in table["run"]])
     assert (found[np.isclose(table["drive.gamma0"], 0.05)] == 0).all()
     assert (found[(table["drive.gamma0"] > 0.4) & (table["sin_delta"] > 0.1)] > 0).all()
-    columns = {"turned_round": [0, 0, 0, 0, 1], "upright": [4, 4, 4, 3, 3], "walkers": 4}
-    on_a_wall = pd.DataFrame({**columns, "axial_velocity": [1e-3, 1e-5, -1e-3, 1e-3, 0.0]})
-    assert [list(POSTURES)[posture] for posture in postures(on_a_wall)] == list(POSTURES)
 
 
 def test_the_program_draws_what_is_asked_for(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

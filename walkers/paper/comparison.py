@@ -25,7 +25,7 @@ from walkers.paper.published import (
 from walkers.postprocess.gait import on_axis, steady_walkers
 from walkers.postprocess.results import read
 from walkers.postprocess.tables import read_table
-from walkers.sweeps.table import load, thresholds
+from walkers.sweeps.table import thresholds
 from walkers.text import rendered
 from walkers.theory.mathieu import largest_stable_v
 from walkers.theory.prediction import motion_of, threshold
@@ -154,7 +154,7 @@ def _value(number: Observation, sources: Sources) -> Value:
 def _threshold(sources: Sources, *, by_frequency: bool) -> Value:
     """Γc between the last drive with motion and the first without; or its ratio at two frequencies, with errors."""
     sources.finished("fig2-threshold")
-    ends = thresholds(load(sources.out / "fig2-threshold")).sort_values("drive.frequency")
+    ends = thresholds(sources.table("fig2-threshold")).sort_values("drive.frequency")
     low, high = ends["gamma0_at_rest"].to_numpy(), ends["gamma0_moving"].to_numpy()
     slow, fast = (float(ends["drive.frequency"].iloc[end]) for end in (0, -1))
     first, last = (threshold(driven(shipped(), frequency, [GRAVITY])[0]) for frequency in (slow, fast))

@@ -11,7 +11,7 @@ from walkers.extras import require
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.comparison import as_dict, as_markdown, compare, count
 from walkers.paper.figures import fig1b, fig2, fig3, fig4, fig_sensitivity
-from walkers.paper.maps import fig_alignment, fig_climbing, fig_modes, fig_trays, fig_zoo
+from walkers.paper.maps import fig_alignment, fig_modes
 from walkers.paper.published import NothingFinishedError, Sources
 from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.progress import progress_of
@@ -26,12 +26,11 @@ FORMATS = ("png", "svg")
 
 
 class Drawing(NamedTuple):
-    """A figure: function, sweeps, title, and whether it is drawn only on request."""
+    """A figure: function, sweeps and title."""
 
     draw: Callable[[Sources], Figure]
     sweeps: tuple[str, ...]
     title: str
-    only_asked: bool = False
 
 
 FIGURES = {
@@ -42,9 +41,6 @@ FIGURES = {
     "alignment": Drawing(fig_alignment, ("alignment",), "Alignment with the shaking axis and across it"),
     "modes": Drawing(fig_modes, ("modes",), "Modes of motion"),
     "sensitivity": Drawing(fig_sensitivity, ("sensitivity",), "Sensitivity of six observations to the parameters"),
-    "climbing": Drawing(fig_climbing, ("climb-friction", "climb-tilt"), "Stability and climbing on a wall", True),
-    "zoo": Drawing(fig_zoo, ("zoo", "zoo-corner"), "Clusters on a wall and in a corner", True),
-    "tray-phases": Drawing(fig_trays, ("tray-phases",), "Clustering, alignment and jamming on trays", True),
 }
 COMPARISON = "comparison"
 COMPARED = ("fig2", "fig2-threshold", "fig3", "fig4", "alignment")
@@ -82,7 +78,7 @@ def make_figures(
     options, how
         As for `walkers.sweeps.scheduler.run_sweep`.
     only
-        Names of `FIGURES`, or ``comparison``; if empty, all except those that are drawn only on request.
+        Names of `FIGURES`, or ``comparison``; if empty, all.
     formats
         Formats of the figures, from `walkers.postprocess.drawing.FORMATS`.
     progress
@@ -97,7 +93,7 @@ def make_figures(
     import joblib
 
     known = (*FIGURES, COMPARISON)
-    chosen = list(only) or [name for name in known if name == COMPARISON or not FIGURES[name].only_asked]
+    chosen = list(only) or list(known)
     for name in chosen:
         if name not in known:
             raise refused("only", f'no figure "{name}"; expected one of {", ".join(known)}')

@@ -1,4 +1,4 @@
-"""Figures beyond the paper: alignment of dimers, modes of motion, climbing, trays."""
+"""Figures beyond the paper: alignment of dimers, modes of motion."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ from walkers.theory.quasistatic import FloatArray, detachment, translation
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
-    from matplotlib.collections import PathCollection
     from matplotlib.figure import Figure
 
     from walkers.postprocess.motion import Group
@@ -38,28 +37,6 @@ MODES = {
     "detached": ("*", "#c4473a"),
 }
 """Modes with their markers and colours."""
-POSTURES = {"climbs upright": "^", "stays, upright": "o", "slides down upright": "v", "leans": "D", "turns over": "X"}
-"""Postures on a wall with their markers."""
-STAYS = 5e-5
-"""m/s; slower clusters count as at rest (a tenth of a radius per second)."""
-_SHAPES = {"chain": "dimer", "fan": "fan: large, two small", "diamond": "diamond: large, two small, small"}
-_MAPS = (
-    ("climb-friction", "contact.friction.bead_wall", "friction, on a wall"),
-    ("climb-tilt", "boundary.tilt", "tilt (°), friction 0.5"),
-)
-"""Rows of maps: sweep, key along x, and its label."""
-_SPEEDS = (-10.0, -3.0, -1.0, 0.0, 1.0, 3.0, 10.0)
-"""mm/s; ticks of the colour scale."""
-_SIDE_BY_SIDE = 5
-"""Number of clusters in a row."""
-_OF_TRAYS = {
-    "share in clusters": ("clustered_share",),
-    "share in the largest cluster": ("largest_share",),
-    "order": ("nematic_order", "polar_order"),
-    "speed, joined / free": ("speed_ratio",),
-    "share of slow walkers": ("slow_share",),
-}
-"""Columns of a sweep's table (solid and dashed lines) by the label of their panel."""
 _LARGEST_DRIVE = 10.0
 """Peak acceleration in g up to which the paper shakes."""
 _BEGINNINGS, _SMALL = (15.0, 45.0), 0.15
@@ -229,139 +206,3 @@ def _draw_borders(axes: Axes, top: float) -> None:
         axes.plot(sines, smallest, style, color="0.1", lw=1.3, label=f"theory: {name}{nowhere}")
     end = np.sqrt(2.0) * detachment(sines).gamma
     axes.plot(sines, end, ":", color="0.1", lw=1.6, label="paper's model, quasi-static ±Γ0/√2: detaches")
-
-
-# --- on a wall --------------------------------------------------------------------------------------------------------
-
-
-def postures(table: pd.DataFrame) -> npt.NDArray[np.int64]:
-    """Posture of the walkers of each point of a sweep, an index in `POSTURES`.
-
-    Turns over if any walker does; leans if any walker does not end upright; else climbs, slides down, or stays (slower
-    than `STAYS`).
-    """
-    turned, leaning, speed = table["turned_round"] > 0, table["upright"] < table["walkers"], table["axial_velocity"]
-    found: npt.NDArray[np.int64] = np.select([turned, leaning, speed < -STAYS, speed < STAYS], [4, 3, 2, 1], 0)
-    return found
-
-
-@styled
-def fig_climbing(sources: Sources) -> Figure:
-    """Dimer, fan and diamond: viscosity of the bridges against friction on a wall, and against tilt."""
-    from matplotlib.lines import Line2D
-
-    figure, rows = new_figure(TWO_COLUMNS, 4.8, nrows=2, ncols=3, sharey=True)
-    for axes, (sweep, key, label) in zip(rows, _MAPS, strict=True):
-        table = sources.finished(sweep)
-        for one, (shape, name) in zip(axes, _SHAPES.items(), strict=True):
-            drawn = _draw_map(one, table[table["clusters[0].arrangement"] == shape], key)
-            one.set(xlabel=label, title=name if sweep == "climb-friction" else "")
-        axes[0].set(ylabel="bridges' viscosity over the liquid's", yscale="log")
-    letter_panels(rows.flat)
-    figure.colorbar(drawn, ax=rows, label="up the slope (mm/s)", shrink=0.6, extend="both", ticks=_SPEEDS, format="%g")
-    handles = [
-        Line2D([], [], ls="", marker=marker, color="0.2", mfc="0.85", ms=5.5, mew=0.5, label=name)
-        for name, marker in POSTURES.items()
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=5)
-    return figure
-
-
-def _draw_map(axes: Axes, table: pd.DataFrame, key: str) -> PathCollection:
-    """Draw the points of a sweep by posture; return points with the common colour scale."""
-    from matplotlib.colors import SymLogNorm
-
-    found = postures(table)
-    shades = SymLogNorm(1.0, vmin=_SPEEDS[0], vmax=_SPEEDS[-1])  # a few fast ones must not set the scale
-    for posture, marker in enumerate(POSTURES.values()):
-        here = table[found == posture]
-        drawn = axes.scatter(
-            here[key], here["liquid.viscosity_ratio"], c=here["axial_velocity"] * 1e3, marker=marker, s=26, cmap="RdBu",
-            norm=shades, ec="0.2", lw=0.4,
-        )  # fmt: skip
-    return drawn
-
-
-@styled
-def fig_zoo(sources: Sources) -> Figure:
-    """Each cluster after one second, with its velocity and posture."""
-    entries = []
-    for sweep in ("zoo", "zoo-corner"):
-        table = sources.finished(sweep)
-        entries += [(table.iloc[[number]], sweep == "zoo-corner") for number in range(len(table))]
-    rows = -(-len(entries) // _SIDE_BY_SIDE)
-    figure, axes = new_figure(TWO_COLUMNS, 1.74 * rows, nrows=rows, ncols=_SIDE_BY_SIDE, squeeze=False)
-    for one in axes.flat:
-        one.set_axis_off()
-    for one, (row, corner) in zip(axes.flat, entries, strict=False):
-        _draw_cluster(one, sources.trajectory(row["run"].iloc[0]))
-        speed = round(float(row["axial_velocity"].iloc[0]) * 1e3, 2) + 0.0  # not -0.00
-        does = list(POSTURES)[int(postures(row)[0])]
-        one.set_title(f"{does}{chr(10) + 'in a corner' if corner else ''}\n{speed:.2f} mm/s", size=7)
-        if corner:
-            one.axvline(0.0, color="0.8", lw=0.8, zorder=0)
-    letter_panels(axes.flat[: len(entries)])
-    first = axes.flat[0]
-    first.plot([-0.5, 0.5], [-1.75, -1.75], color="0.1", lw=1.5, solid_capstyle="butt")
-    first.annotate("1 mm", (0.0, -1.75), (0, -3), textcoords="offset points", ha="center", va="top", fontsize=7)
-    first.annotate("g", (-1.3, 0.0), (-1.3, 1.4), ha="center", fontsize=8, arrowprops={"arrowstyle": "-|>", "fc": "k"})
-    tilted = sources.trajectory(entries[0][0]["run"].iloc[0]).case.boundary.tilted
-    figure.suptitle(f"{tilted}: up is against gravity, speeds are positive upward; dotted: at the start")
-    return figure
-
-
-def _draw_cluster(axes: Axes, group: Group) -> None:
-    """The beads of the first walker in front of the wall, uphill is up; dotted at the start."""
-    from matplotlib.patches import Circle
-
-    for frame, style in ((0, {"ls": ":", "fc": "none", "ec": "0.6"}), (-1, {"fc": "#c9d2d8", "ec": "0.2"})):
-        place = group.position[frame, 0] * 1e3
-        place = place - place.mean(axis=0)
-        for (x, y, _), radius in zip(place, group.radii * 1e3, strict=True):
-            large = frame and radius > group.case.border * 1e3
-            axes.add_patch(Circle((-y, x), radius, lw=0.8, **{**style, **({"fc": "#e0566c"} if large else {})}))
-    axes.set(xlim=(-1.5, 1.5), ylim=(-2.15, 2.15), aspect="equal")
-
-
-# --- trays ------------------------------------------------------------------------------------------------------------
-
-
-@styled
-def fig_trays(sources: Sources) -> Figure:
-    """Clustering, alignment and jamming of walkers on closed trays against acceleration; one column per coverage."""
-    from matplotlib.lines import Line2D
-
-    table = sources.finished("tray-phases")
-    shares = {"largest_share": table["largest_cluster"] / table["walkers"], "percent": (100.0 * table["coverage"])}
-    table = table.assign(**shares).round({"percent": 0})
-    coverages, numbers = sorted(table["percent"].unique()), sorted(table["walkers"].unique())
-    size = {"nrows": len(_OF_TRAYS), "ncols": len(coverages), "sharex": True, "sharey": "row", "squeeze": False}
-    figure, rows = new_figure(TWO_COLUMNS, 7.6, **size)
-    for panels, (label, columns) in zip(rows, _OF_TRAYS.items(), strict=True):
-        panels[0].set_ylabel(label)
-        for panel, coverage in zip(panels, coverages, strict=True):
-            for place, number in enumerate(numbers):
-                here = table[(table["percent"] == coverage) & (table["walkers"] == number)]
-                for column, style in zip(columns, ("-", "--"), strict=False):
-                    seeds = here.groupby("drive.peak_acceleration")[column]
-                    mean = seeds.mean()
-                    errors = [mean - seeds.min(), seeds.max() - mean]
-                    x = mean.index * 1.06 ** (place - 1)
-                    panel.errorbar(x, mean, errors, fmt="os^D"[place], ls=style, color=f"C{place}", ms=3.5, capsize=2)
-            panel.set_xscale("log")
-            panel.set_xticks(ticks := sorted(table["drive.peak_acceleration"].unique()), [f"{one:g}" for one in ticks])
-            panel.set_xticks([], minor=True)
-    for panel, coverage in zip(rows[0], coverages, strict=True):
-        panel.set_title(f"{coverage:g} % covered")
-    for panel in rows[-1]:
-        panel.set_xlabel("peak acceleration (g)")
-    letter_panels(rows.flat)
-    handles = [
-        Line2D([], [], label=f"{number} walkers", marker="os^D"[place], color=f"C{place}")
-        for place, number in enumerate(numbers)
-    ]
-    handles += [
-        Line2D([], [], color="0.3", ls=style, label=name) for name, style in (("nematic", "-"), ("polar", "--"))
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-    return figure

@@ -81,7 +81,8 @@ def _signed(value: float, unit: str) -> str:
 
 
 def _two_digits(value: float, unit: str) -> str:
-    return rounded(float(f"{value:.2g}"), unit)
+    text = rounded(float(f"{value:.2g}"), unit)
+    return f"{value:.1g}" if text == "0" else text
 
 
 def compare_runs(first: Side, second: Side) -> Comparison:
