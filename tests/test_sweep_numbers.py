@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
-import shutil
-from collections.abc import Callable, Sequence
-from math import hypot
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +10,10 @@ import pandas as pd
 import pytest
 from scipy.stats import spearmanr
 
-from tests.conftest import call, document, make_case, to_toml
+from tests.conftest import make_case
 from walkers.inputs.loads import dimer_of
-from walkers.inputs.sweep import expand
-from walkers.postprocess.uncertainty import ACCURACY_NAME
-from walkers.runner.directory import case_of
-from walkers.runner.files import read_json, write_json
-from walkers.runner.manifest import MANIFEST_NAME, checksums
-from walkers.sweeps.comparison import Side, compare_runs
-from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.spread import spread_in
-from walkers.sweeps.table import groups, load, thresholds
+from walkers.sweeps.table import groups, thresholds
 
 # --- spread -----------------------------------------------------------------------------------------------------------
 
@@ -110,54 +98,3 @@ def test_a_descents_thresholds_have_the_gamma0_of_their_own_drives() -> None:
         expected = [mass * 9.80665 * g / force for g in (moving, at_rest)]
         assert [row["gamma0_moving"], row["gamma0_at_rest"]] == pytest.approx(expected, rel=0.05)
         assert row["gamma0_moving"] / row["gamma0_at_rest"] == pytest.approx(moving / at_rest)
-
-
-# --- comparisons ------------------------------------------------------------------------------------------------------
-
-
-def _changed(run: Path, to: Path, name: str, speed: float, error: float) -> Side:
-    """A copy of a run whose result has another velocity and numerical error (m/s), as if measured so."""
-    shutil.copytree(run, to / name)
-    result = read_json(to / name / "result.json")
-    result["numbers"]["velocity"] = speed
-    write_json(to / name / "result.json", result)
-    write_json(to / name / ACCURACY_NAME, {"errors": {"velocity": {"total": error}}})
-    manifest = read_json(to / name / MANIFEST_NAME)
-    manifest["sha256"] |= checksums(to / name, ["result.json", ACCURACY_NAME])
-    write_json(to / name / MANIFEST_NAME, manifest)
-    return Side(name, case_of(run), to / name)
-
-
-def test_compared_runs_differ_by_so_many_times_both_their_numerical_errors(
-    run_directory: Callable[..., Path], tmp_path: Path
-) -> None:
-    """Errors of 3 and 4 µm/s make 5 µm/s of a difference of -50 µm/s."""
-    run = run_directory(run={"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5})
-    fast, slow = _changed(run, tmp_path, "fast", 1.05e-3, 3e-6), _changed(run, tmp_path, "slow", 1e-3, 4e-6)
-    found = compare_runs(fast, slow)
-    (velocity,) = (one for one in found.contents["results"] if one["quantity"] == "velocity")
-    assert velocity["difference"] == pytest.approx(-5e-5)
-    assert velocity["numerical_error"] == pytest.approx(hypot(3e-6, 4e-6))
-    assert "velocity: differs by 10 times its numerical error" in found.text
-    assert re.search(r"\nvelocity \(mm/s\) +1\.05 +1 +-0\.05 ", found.text)
-
-
-def test_compared_sweeps_differ_most_at_the_largest_change_of_either_sign(tmp_path: Path) -> None:
-    """With more friction the walker is faster under a weak drive, and slower by more under a strong one."""
-    run = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
-    tables = {"case": "base.toml", "axes": {"drive.peak_acceleration": ["3 g", "6 g"]}}
-    speeds: list[Sequence[float]] = []
-    for friction in (0.05, 0.2):
-        contact = {"friction": {"bead_bead": 0.1, "bead_wall": friction}}
-        (tmp_path / "base.toml").write_text(to_toml(document(run=run, contact=contact)))
-        name = f"rough-{friction}"
-        record, _ = run_sweep(expand(tables, source="t", name=name, folder=tmp_path), tmp_path / "runs", Options(1))
-        speeds.append(load(record.directory)["velocity"])
-    sides = [str(tmp_path / "runs" / f"rough-{friction}") for friction in (0.05, 0.2)]
-    found = json.loads(call("compare", *sides, "--json", check=True).stdout)
-    away = [one["difference"] for one in found["points"]]
-    assert away == pytest.approx(list(speeds[1] - speeds[0]))
-    assert away[0] > 1e-4
-    assert away[1] < -2.0 * away[0]
-    told = call("compare", *sides, check=True).stdout
-    assert f"2 points in both; largest difference {1e3 * away[1]:.4g} mm/s" in told

@@ -14,6 +14,7 @@ from walkers.inputs.toml import read_toml
 from walkers.inputs.units import TEMPERATURE, quantity_text
 from walkers.physics.laws import LAWS
 from walkers.physics.mixtures import MIXTURES
+from walkers.text import aligned
 
 _COLUMNS: Mapping[str, tuple[str, ...]] = {
     "materials": ("density", "youngs_modulus", "poissons_ratio"),
@@ -85,9 +86,7 @@ def describe(found: Sequence[Entry]) -> str:
             if one.kind == kind:
                 note = f"{one.text} [{one.place}]" if one.place else one.text
                 rows.append([f"  {one.name}", *(_cell(one.numbers, column) for column in columns), note.strip()])
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        lines.append("")
-        lines += ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+        lines += ["", aligned(rows)]
     return "\n".join(lines[1:])
 
 

@@ -109,15 +109,14 @@ def _export_deck(what: str, at: At, output: Path | None) -> None:
 def clean(
     *runs: RunOrSweep,
     out: Out = DEFAULT_OUT,
-    finished: bool = False,
     yes: Annotated[bool, Parameter(("--yes", "-y"))] = False,
 ) -> int:
     """Remove interrupted and failed runs, or the given runs and sweeps. Asks first. Runs in progress stay.
 
+    With a sweep go the runs that no other sweep has, with a run its spread and its accuracy.
+
     Parameters
     ----------
-    finished
-        Also remove finished runs, except those of sweeps.
     yes
         Do not ask for confirmation.
     """
@@ -126,16 +125,14 @@ def clean(
     from walkers.runner.directory import UNFINISHED
     from walkers.sweeps.folder import clean, plan_cleaning
 
-    refuse("--finished", finished and bool(runs), "has no meaning with given runs")
-
     def place_of(name: str) -> Path:
         if Path(name).suffix != UNFINISHED:
             return directory_of(name, out)
         return Path(name) if Path(name).is_dir() else out / name
 
-    plan = plan_cleaning(out, each(place_of, runs), finished=finished)
+    plan = plan_cleaning(out, each(place_of, runs))
     print(plan.as_text())
-    if not (plan.remove or plan.locks):
+    if plan.remove.empty and not plan.locks:
         return 0
     if not yes:
         refuse("--yes", not sys.stdin.isatty(), "expected, because there is no terminal to ask for confirmation")

@@ -55,10 +55,15 @@ def list_(
         _list_points(sweep, out, to, as_json)
         return
     refuse("--to", to is not None, "expected a sweep, whose table is written")
-    entries = folder.inventory(out)
-    hidden = [] if every or where else folder.members(entries)
-    shown = [one for one in folder.select(entries, where or ()) if one not in hidden]
-    print_as(as_json, lambda: folder.as_json(shown), lambda: folder.as_text(shown, hidden=len(hidden)))
+    contents = folder.inventory(out)
+    shown = folder.select(contents, where or ())
+    if not (every or where):
+        shown = contents[~folder.members(contents)]
+    print_as(
+        as_json,
+        lambda: folder.as_json(shown),
+        lambda: folder.as_text(shown, 0 if where else len(contents) - len(shown)),
+    )
 
 
 def _list_points(name: str, out: Path, to: Path | None, as_json: bool) -> None:

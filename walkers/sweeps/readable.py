@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from math import inf, isclose
@@ -11,6 +10,7 @@ from typing import Any
 
 from pydantic_core import to_jsonable_python
 
+from walkers.errors import InputError, Problem, refused
 from walkers.inputs import units
 from walkers.inputs.case import Case
 from walkers.inputs.table import keys_of
@@ -94,43 +94,34 @@ def _comparable(value: Any) -> Hashable:
     return float(f"{value:.12g}") if isinstance(value, float) else value
 
 
-def agrees(case: Mapping[str, Any], key: str, wanted: str) -> bool:
-    """Whether a flattened case has a value, as a user writes both.
+def chosen(cases: Sequence[Mapping[str, Any]], condition: str) -> list[bool]:
+    """Which flattened cases have a value, ``KEY=VALUE`` as a user writes it: ``frequency=80 Hz``.
 
-    The key may be the end of one, such as ``frequency``, the value a number with its unit if it has one, a text, or a
-    list as `readable` writes it.
+    The key may be the end of a key, the value a number with its unit if it has one, a text, or a list as `readable`
+    writes it. `InputError` if the condition cannot be read, or no case has such a key.
     """
-    return any(_is(one, value, wanted.strip().strip('"')) for one, value in case.items() if _ends(one, key))
-
-
-def check_wanted(case: Mapping[str, Any], key: str, wanted: str) -> None:
-    """Refuse what cannot be a value of a key, whose values in a flattened case are numbers: ValueError, what could."""
-    found = [(one, value) for one, value in case.items() if _ends(one, key)]
-    numbers = [one for one, value in found if isinstance(value, (int, float)) and not isinstance(value, bool)]
-    if not found or len(numbers) < len(found):
-        return
-    kind = kind_of(numbers[0])
+    key, _, wanted = (part.strip() for part in condition.partition("="))
+    if not (key and wanted):
+        raise refused("where", f'"{condition}": expected KEY=VALUE, such as "drive.frequency=80 Hz"')
+    values = [{name: value for name, value in case.items() if f".{name}".endswith(f".{key}")} for case in cases]
+    if cases and not any(values):
+        known = ", ".join(dict.fromkeys(name for case in cases for name in case))
+        raise InputError("where", [Problem(key, None, f"no run has such a key; they have {known}")])
     try:
-        units.parse_quantity(wanted.strip().strip('"'), kind) if kind else float(wanted.strip().strip('"'))
+        return [any(_is(name, value, wanted.strip('"')) for name, value in named.items()) for named in values]
     except ValueError as error:
-        raise ValueError(str(error) if kind else "expected a number without a unit") from error
-
-
-def has_key(case: Mapping[str, Any], key: str) -> bool:
-    """Whether a flattened case has a key, or one that ends so."""
-    return any(_ends(one, key) for one in case)
-
-
-def _ends(key: str, given: str) -> bool:
-    return f".{key}".endswith(f".{given}")
+        raise refused("where", f'"{condition}": {error}') from error
 
 
 def _is(key: str, value: Any, wanted: str) -> bool:
+    """Whether a value is the wanted one; ValueError if that can be no value of its kind."""
     if wanted in (readable(key, value), str(value)):
         return True
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return str(value).lower() == wanted.lower()
-    kind = kind_of(key)
-    with suppress(ValueError):
-        return isclose(units.parse_quantity(wanted, kind) if kind else float(wanted), value, rel_tol=1e-6)
-    return False
+    if kind := kind_of(key):
+        return isclose(units.parse_quantity(wanted, kind), value, rel_tol=1e-6)
+    try:
+        return isclose(float(wanted), value, rel_tol=1e-6)
+    except ValueError as error:
+        raise ValueError("expected a number without a unit") from error
