@@ -10,8 +10,11 @@ import pandas as pd
 import pytest
 from scipy.stats import spearmanr
 
-from tests.conftest import make_case
+import walkers
+from tests.conftest import document, make_case, to_toml
 from walkers.inputs.loads import dimer_of
+from walkers.postprocess.uncertainty import SPREAD_NAME, spread_of
+from walkers.runner.files import read_json
 from walkers.sweeps.spread import spread_in
 from walkers.sweeps.table import groups, thresholds
 
@@ -55,6 +58,20 @@ def test_a_spread_has_the_quantiles_and_the_signed_ranks_of_its_draws() -> None:
         (FRICTION, pytest.approx(-1.0)),
         (RESTITUTION, pytest.approx(spearmanr(strong, speeds).statistic)),
     ]
+
+
+def test_bands_along_a_sweep_are_those_of_each_points_spread(tmp_path: Path) -> None:
+    run = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
+    case = tmp_path / "base.toml"
+    case.write_text(to_toml(document(run=run, uncertain={FRICTION: [0.05, 0.3]})))
+    tables = {"case": str(case), "axes": {"drive.peak_acceleration": ["3 g", "6 g"]}}
+    table = walkers.sweep(tables, tmp_path, spread=4).table()
+    for row in table.itertuples():
+        spread = read_json(spread_of(tmp_path / Path(row.run).name) / SPREAD_NAME)["bands"]["velocity"]
+        assert row.velocity_low == min(spread["low"], row.velocity)
+        assert row.velocity_high == max(spread["high"], row.velocity)
+        assert row.velocity_low < row.velocity_high
+    assert table["velocity_high"].is_monotonic_increasing
 
 
 # --- groups -----------------------------------------------------------------------------------------------------------

@@ -707,6 +707,7 @@ def sweep(
     executor: Executor | None = None,
     retries: int = 0,
     time_limit: float | None = None,
+    spread: int = 0,
     **how: Any,
 ) -> Sweep:
     """Run the missing points of a sweep on this machine or a cluster.
@@ -731,6 +732,9 @@ def sweep(
         Number of retries for a failed point.
     time_limit
         Limit of the wall time in s for each deck.
+    spread
+        Number of runs of each finished point with its uncertain values drawn from their ranges, for bands along the
+        sweep (columns such as ``velocity_low``); 0: none.
     how
         ``engine`` and ``allow_failed_audit`` of `run`.
 
@@ -752,12 +756,18 @@ def sweep(
     from walkers.inputs.sweep import load_sweep
     from walkers.sweeps.scheduler import Options, run_sweep
     from walkers.sweeps.site import load_site
+    from walkers.sweeps.spread import run_spread
 
     points = load_sweep(sweep, changes)
     options = Options(jobs or cores_here(), load_site(Path(site)) if site else None, executor, retries, time_limit)
     folder = Path(out).resolve() if site else Path(out)
     with progress_of(points.name, progress) as advance:
         record, failures = run_sweep(points, folder, options, on_progress=advance, **how)
+    failed = {failure.point for failure in failures}
+    for number, case in enumerate(points.cases()) if spread else ():
+        if number not in failed:
+            with progress_of(f"{points.name}, spread of point {number}", progress) as advance:
+                failures += run_spread(case, folder, options, points=spread, on_progress=advance, **how).failures
     return Sweep(record.directory, tuple(failures))
 
 

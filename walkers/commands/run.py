@@ -150,6 +150,8 @@ def sweep(
     dry_run: bool = False,
     retries: Annotated[int, Parameter(validator=NOT_NEGATIVE)] = 0,
     limit: Annotated[float | None, Parameter(validator=NOT_NEGATIVE)] = None,
+    spread: bool = False,
+    points: int | None = None,
     by: By = By(),
 ) -> int:
     """Run the missing points of a sweep on all cores or on a cluster. Exit status 1 if a point fails.
@@ -166,13 +168,19 @@ def sweep(
         Number of retries for a failed point.
     limit
         Time limit in s for each deck.
+    spread
+        Also run each point with its unmeasured values drawn from their ranges: plots of the sweep show the bands.
+    points
+        Number of runs of each point for --spread; default: 32.
     """
     from walkers.inputs.sweep import load_sweep
     from walkers.postprocess.uncertainty import lines_of_rest, rests_on
     from walkers.runner.launch import cores_here
     from walkers.sweeps.scheduler import Options, plan_sweep
     from walkers.sweeps.site import load_site
+    from walkers.sweeps.spread import POINTS
 
+    refuse("--points", points is not None and not spread, "is for --spread")
     loaded = load_sweep(sweep, at.values)
     refuse("--jobs", jobs is not None and site is not None, "the site file sets how many decks run at once")
     if len(loaded.rows) > _MANY:
@@ -182,6 +190,7 @@ def sweep(
         print(plan_sweep(loaded, at.out, options, by.engine).as_text())
         return 0
     how = {"jobs": jobs, "site": site, "retries": retries, "time_limit": limit, **vars(by)}
+    how["spread"] = (POINTS if points is None else points) if spread else 0
     done = walkers.sweep(sweep, at.out, changes=at.values, progress=True, **how)
     tell(*(f"point {failure.point}, {failure.run}: {failure.message}" for failure in done.failures))
     print(f"{done.summary()}\n  table      walkers list {done.directory}")

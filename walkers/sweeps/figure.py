@@ -339,10 +339,17 @@ def _points(done: pd.DataFrame, column: str, down: str | None) -> tuple[str, pd.
     if column in ERRORS:
         errors = done[ERRORS[column]].to_numpy(dtype=float, na_value=np.nan)
         points["error"] = unit_shown(done.attrs["units"][column])[1] * errors
+    if f"{column}_low" in done:  # the band of a spread at each point
+        for end in ("low", "high"):
+            points[end] = _numbers(done, f"{column}_{end}", "y").values
     if down and done[down].notna().any():
         points["down"] = _numbers(done, down, "y").values
         label = label.replace(", facing right (up)", "")
     return label, points
+
+
+_ALSO = ("down", "low", "high")
+"""Columns of `_points` that are drawn beside the values and their errors."""
 
 
 @styled
@@ -382,8 +389,11 @@ def _draw(
         axes.set_axis_off()
     _legend(figure, grid, hue, looks, scale, list(theory.values) if theory else [], down="down" in points)
     said = [done.attrs["title"]]
+    if "low" in points:
+        said.append("bands: 5 to 95 % over the uncertain values")
     if points["error"].notna().any():
-        bars = SCATTER.partition(" (")[0] if {*unmeasured()} & {*done.attrs["varied"]} else SCATTER
+        banded = "low" in points or {*unmeasured()} & {*done.attrs["varied"]}
+        bars = SCATTER.partition(" (")[0] if banded else SCATTER
         said.append(bars + ("" if errors_seen(points["error"], points["value"]) else ", smaller than the symbols"))
     figure.suptitle(plain_text("\n".join(line for one in said for line in wrap(one, round(14.0 * width)))))
     return figure
@@ -434,6 +444,10 @@ def _series(
     line = "-" if is_line and not theory else "none"
     bars = shown["error"] if errors_seen(points["error"], points["value"]) else None
     axes.errorbar(at, shown["value"].to_numpy(), yerr=bars, capsize=2, lw=0.9, ls=line, **look)
+    if "low" in shown:
+        ends = at, shown["low"].to_numpy(), shown["high"].to_numpy()
+        wide = axes.fill_between if is_line else axes.vlines
+        wide(*ends, color=look["color"], alpha=0.25, zorder=0.5, lw=0.0 if is_line else 4.0)
     if "down" in shown:
         shape = {"marker": _DOWN["marker"], "mfc": "none", "ls": "--" if is_line else "none"}
         axes.plot(at, shown["down"], lw=0.9, **{**look, **shape})
@@ -479,7 +493,9 @@ def _scale_y(axes: Axes, points: pd.DataFrame, theory: Sequence[FloatArray], log
         axes.set_yscale("log", nonpositive="mask")
         return
     values, errors = points["value"], points["error"].fillna(0.0)
-    shown = np.concatenate([values - errors, values + errors, *theory, points.get("down", values)])
+    shown = np.concatenate(
+        [values - errors, values + errors, *theory, *(points[one] for one in _ALSO if one in points)]
+    )
     low, high = float(np.nanmin(shown)), float(np.nanmax(shown))
     if (values.dropna() % 1.0 == 0.0).all():  # counts
         axes.yaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
