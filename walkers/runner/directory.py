@@ -231,7 +231,8 @@ def room_on_disk(incomplete: Path, needed: int | None = None) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.errno == errno.ENOENT and not incomplete.exists():
+        # Whoever removes the directory may not have come to the end.
+        if error.errno == errno.ENOENT and Path(error.filename).absolute().is_relative_to(incomplete.absolute()):
             raise OutputGone(incomplete) from error
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
