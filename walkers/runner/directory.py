@@ -232,7 +232,7 @@ def room_on_disk(incomplete: Path, needed: int | None = None) -> Iterator[None]:
         yield
     except OSError as error:
         # Whoever removes the directory may not have come to the end.
-        if error.errno == errno.ENOENT and Path(error.filename).absolute().is_relative_to(incomplete.absolute()):
+        if error.errno == errno.ENOENT and Path(error.filename or "").absolute().is_relative_to(incomplete.absolute()):
             raise OutputGone(incomplete) from error
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
