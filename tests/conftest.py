@@ -80,7 +80,7 @@ BRIEF = {"time_step": "2 us", "cycles": 3, "settling_cycles": 1, "samples_per_cy
 LONG = {"time_step": "2 us", "cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
 
 
-LONGEST = ("known_parameters", "audit.py", "pilots", "browser.py", "printed", "stopped", "slurm", "failed")
+LONGEST = ("known_parameters", "audit.py", "pilots", "report.py", "printed", "stopped", "slurm", "failed")
 """In the names of tests that take seconds."""
 
 

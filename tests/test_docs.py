@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import doctest
 import re
-import shutil
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
@@ -20,20 +19,15 @@ import walkers
 from docs import tables
 from docs._ext import generated
 from docs.illustrations import (
-    ILLUSTRATIONS,
-    RECORD,
-    digest,
     facts,
     facts_in,
     output_of,
     outputs_in,
     pages_of,
-    refresh_pages,
     stale,
     without_hashes,
 )
-from walkers.inputs.reading import load_case
-from walkers.runner.files import read_json, write_json
+from walkers.runner.files import read_json
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -150,40 +144,12 @@ def test_names_of_the_package_on_pages_and_in_templates_are_there() -> None:
     assert not sorted(f"{file.relative_to(ROOT)}: {name}" for file, name in named if not is_there(name))
 
 
-@pytest.mark.parametrize(
-    ("name", "there"),
-    [
-        ("walkers.load", True),
-        ("walkers.postprocess.motion.Motion.select", True),
-        ("walkers.api.Run.cached", True),
-        ("walkers.api.Run.origin", False),
-        ("walkers.check.comparisons", False),
-        ("walkers.inputs.case.Run.run", False),
-    ],
-)
-def test_a_name_that_is_not_there_is_seen(name: str, there: bool) -> None:
-    assert is_there(name) is there
-
-
 # --- pictures, outputs, numbers ---------------------------------------------------------------------------------------
 
 
 def test_no_picture_or_table_is_of_other_parameters_than_todays() -> None:
     """If this fails, run ``make docs-pictures``."""
     assert stale(DOCS) == {}
-
-
-def test_a_picture_of_another_case_is_stale(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("docs.illustrations.ILLUSTRATIONS", {one: ILLUSTRATIONS[one] for one in ("walker", "fig4")})
-    record = read_json(DOCS / RECORD)
-    other = {"pictures/walker.png": digest([load_case("fig1b", {"run.cycles": 59})])}
-    for file in record:
-        place = tmp_path / file
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.touch()
-    write_json(tmp_path / RECORD, {**record, **other})
-    (tmp_path / "figures" / "fig4.png").unlink()
-    assert stale(tmp_path) == {"walker": ["pictures/walker.png"], "fig4": ["figures/fig4.png"]}
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if outputs_in(page)], ids=lambda page: page.name)
@@ -212,21 +178,6 @@ def test_numbers_in_sentences_are_the_comparisons() -> None:
     assert [(page, name, known[name]) for page, name, _ in quoted] == quoted
 
 
-def test_pages_are_written_anew(tmp_path: Path) -> None:
-    page = tmp_path / "page.md"
-    page.write_text(
-        "Walks at <!--fact fig4b_velocity-->9.99<!--/fact--> mm/s.\n\n<!--output-->\n```console\n"
-        "$ walkers list\nsomething old\n```\n\n```console\n$ walkers show --theory fig1b\n...\n```\n"
-    )
-    other = shutil.copy(DOCS / "index.md", tmp_path)
-    assert refresh_pages([page, Path(other)], facts(DOCS), tmp_path) == [page]
-    text = page.read_text()
-    assert f"<!--fact fig4b_velocity-->{facts(DOCS)['fig4b_velocity']}<!--/fact--> mm/s" in text
-    assert "something old" not in text
-    assert "0 runs, 0 B\n" in text
-    assert "$ walkers show --theory fig1b\n...\n" in text  # not marked
-
-
 # --- examples and keys ------------------------------------------------------------------------------------------------
 
 
@@ -242,18 +193,11 @@ def test_examples_give_what_they_say(module: str, runs_folder: Path, monkeypatch
 
 def test_each_key_of_a_case_file_has_its_meaning_and_says_what_it_expects() -> None:
     tables = dict(generated.tables_of_keys())
-    rows = {
-        (place, cells[0]): cells[1:]
-        for place, text in tables.items()
-        for cells in (line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| `"))
-    }
-    assert {("[[clusters]]", "`at`"), ("[contact.friction]", "`bead_wall`"), ("[environment]", "`gravity`")} <= {*rows}
-    assert not {key for key, (meaning, *_) in rows.items() if not meaning.endswith((".", ")", "`"))}
-    assert {key for key, (_, expected, *_) in rows.items() if expected.startswith("a table")} == {
-        ("Top level", "`uncertain`")
-    }
-    assert "a list of 2, each a length with its unit; 0.001 to 20 mm; such as" in rows["[dimers]", "`radii`"][1]
-    assert 'a time with its unit; 1e-06 to 1e+06 us, or `"auto"`; such as "2 us"' in rows["[run]", "`time_step`"][1]
+    rows = [
+        line.strip("| ").split(" | ") for text in tables.values() for line in text.splitlines() if line[:3] == "| `"
+    ]
+    assert len(rows) > 60
+    assert not {key for key, meaning, *_ in rows if not meaning.endswith((".", ")", "`"))}
     assert "Exactly one of: `radii`; `diameters`; `mean_radius` and `sin_delta`." in tables["[dimers]"]
     assert "At most one of: `dynamic_viscosity`; `kinematic_viscosity`." in tables["[liquid]"]  # the library has them
 

@@ -20,21 +20,8 @@ from walkers import DEFAULT_OUT, RECORDS
 from walkers.errors import InputError, Problem, WalkersError, check_utf8, expected_of, refused
 from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped
 from walkers.progress import Progress, progress_of
+from walkers.runner import directory as on_disk
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import (
-    CASE_NAME,
-    FAILURE_NAME,
-    UNFINISHED,
-    case_of,
-    is_deck_folder,
-    is_finished,
-    is_locked,
-    is_run_name,
-    layout_of,
-    run_place,
-    segment_directories,
-    unfinished,
-)
 from walkers.runner.failures import EngineMissing, RunBusy
 from walkers.runner.files import read_json
 from walkers.runner.launch import cores_here
@@ -107,10 +94,10 @@ def _meanings(path: Path, out: Path) -> Iterator[Found]:
     is_shipped = str(path) in shipped("case")
     for place in (path, out / path):
         yield from (Found(kind, place) for kind, file in RECORDS.items() if (place / file).is_file())
-        bare = place.parent / place.name.removesuffix(UNFINISHED)
-        if is_run_name(bare.name) and _is_begun(bare):
+        bare = place.parent / place.name.removesuffix(on_disk.UNFINISHED)
+        if on_disk.is_run_name(bare.name) and _is_begun(bare):
             yield Found("run", bare)
-        if is_deck_folder(place) and not is_shipped:
+        if on_disk.is_deck_folder(place) and not is_shipped:
             yield Found("deck", place)
     if (out / path.stem / RECORDS["sweep"]).is_file() and is_sweep_file(path):
         yield Found("sweep", out / path.stem)
@@ -121,7 +108,7 @@ def _meanings(path: Path, out: Path) -> Iterator[Found]:
 
 def _is_begun(place: Path) -> bool:
     """Whether a place belongs to a running or interrupted run."""
-    return (unfinished(place) / CASE_NAME).is_file() or is_locked(place)
+    return (on_disk.unfinished(place) / on_disk.CASE_NAME).is_file() or on_disk.is_locked(place)
 
 
 def case_at(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> tuple[Case, Path]:
@@ -145,10 +132,10 @@ def case_and_run(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = 
     kind, place = find(what, out, changes)
     if kind != "run":
         try:
-            place = run_place(case, find_engine(), folder)
+            place = on_disk.run_place(case, find_engine(), folder)
         except EngineMissing:
             return case, None
-    return case, place if is_finished(place) else None
+    return case, place if on_disk.is_finished(place) else None
 
 
 def load(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Run | Sweep:
@@ -184,8 +171,8 @@ def load(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) ->
     if kind != "case":
         raise refused(what, NOT_A_RUN[kind].format(what))
     case, folder = case_at(what, out, changes)
-    run = Run(run_place(case, find_engine(), folder), asked=case)
-    if is_finished(run.directory) or _is_begun(run.directory):
+    run = Run(on_disk.run_place(case, find_engine(), folder), asked=case)
+    if on_disk.is_finished(run.directory) or _is_begun(run.directory):
         return _checked(run)
     settings = [f"--set {shlex.quote(f'{key}={value}')}" for key, value in (changes or {}).items()]
     name = str(what) if isinstance(what, (str, Path)) else case.name
@@ -232,13 +219,13 @@ class Run:
 
     def check(self) -> Run:
         """The run itself; `InputError` if a file that describes it cannot be read."""
-        done = is_finished(self.directory)
+        done = on_disk.is_finished(self.directory)
         with _refusing(self.directory, "the run's manifest.json"):
             _ = done and read_manifest(self.directory)
         with _refusing(self.directory, "the run's case.json"):
             _ = self.case
         with _refusing(self.directory, "the run's layout.json"):
-            _ = done and layout_of(segment_directories(self.directory)[0])
+            _ = done and on_disk.layout_of(on_disk.segment_directories(self.directory)[0])
         return self
 
     @property
@@ -253,33 +240,33 @@ class Run:
         """Progress of a running run, in any process; None between segments, and if it is not running."""
         from walkers.sweeps.making import progress_at
 
-        return progress_at(self.directory) if is_locked(self.directory) else None
+        return progress_at(self.directory) if on_disk.is_locked(self.directory) else None
 
     @property
     def finished_directory(self) -> Path:
         """The directory of a finished run; otherwise `InputError`."""
-        if not is_finished(self.directory):
+        if not on_disk.is_finished(self.directory):
             raise refused(self.directory, f"the run is {self._state}")
         return self.directory
 
     @property
     def _files(self) -> Path:
         """The directory that holds the files now."""
-        return self.directory if is_finished(self.directory) else unfinished(self.directory)
+        return self.directory if on_disk.is_finished(self.directory) else on_disk.unfinished(self.directory)
 
     @property
     def _state(self) -> str:
         """The status of an unfinished run, and what to do."""
         if (status := self.status) == "running":
             return f"running{f': {progress.text}' if (progress := self.progress) else ''}"
-        failure = self._files / FAILURE_NAME
+        failure = self._files / on_disk.FAILURE_NAME
         text = f": {read_json(failure).get('message')}" if failure.is_file() else ""
         return f"{status}{text}; continue it with: walkers run {self.directory}"
 
     @cached_property
     def case(self) -> Case:
         """The resolved case."""
-        return case_of(self._files)
+        return on_disk.case_of(self._files)
 
     @property
     def origins(self) -> tuple[Origin, ...] | None:
@@ -320,7 +307,7 @@ class Run:
         """The result as text in mm, mm/s and degrees; of an unfinished run, its progress."""
         from walkers.postprocess.results import text
 
-        if not is_finished(self.directory):
+        if not on_disk.is_finished(self.directory):
             return f"{self.directory.name}: {self._state}"
         return text(self.result, cached=self.cached)
 
@@ -328,7 +315,7 @@ class Run:
         """The result in a notebook: a table with errors, units and warnings, and the parameters."""
         from walkers.postprocess.report.run import result_html
 
-        if not is_finished(self.directory):
+        if not on_disk.is_finished(self.directory):
             return f"<p>{escape(self.describe())}</p>"
         return result_html(self.result, self.origins)
 
@@ -339,25 +326,13 @@ class Run:
         return plot_run(self.finished_directory, _path(to), formats)
 
     def render(self, to: str | Path | None = None, *, images: int = 6, walker: int | None = None) -> list[Path]:
-        """Render the first of independent walkers, all beads, or the walker with a number.
-
-        See `walkers.postprocess.series.render_series`.
-        """
+        """Render pictures at several times; see `walkers.postprocess.series.render_series`."""
         from walkers.postprocess.series import render_series
 
         return render_series(self.finished_directory, _path(to), images=images, walker=walker)
 
-    def film(
-        self,
-        to: str | Path | None = None,
-        *,
-        progress: bool | None = None,
-        **options: Any,
-    ) -> Path:
-        """Render a film with `walkers.postprocess.film_options.FilmOptions`, such as ``slowdown``.
-
-        See `walkers.postprocess.films.render_film`.
-        """
+    def film(self, to: str | Path | None = None, *, progress: bool | None = None, **options: Any) -> Path:
+        """Render a film with `walkers.postprocess.film_options.FilmOptions`, such as ``slowdown``."""
         from walkers.postprocess.film_options import FilmOptions
         from walkers.postprocess.films import render_film
 
@@ -536,8 +511,8 @@ def run(
         message = f"time step and sampling are of {1.0 / case.run.period:g} Hz: use case.changed(changes)"
         raise InputError(case.name, [Problem("drive.frequency", f"{case.excitation.frequency:g} Hz", message)])
     binary = find_engine(engine)
-    place = run_place(case, binary, out)
-    if is_finished(place) and not force:
+    place = on_disk.run_place(case, binary, out)
+    if on_disk.is_finished(place) and not force:
         return _measured(Run(place, asked=case))
     check_audit(binary, allow_failed_audit)
     # Numpy and pyarrow are loaded while the engine works and the interpreter is idle.
@@ -545,7 +520,7 @@ def run(
     with progress_of(case.name, progress) as advance:
         runs = make_runs([case], out, binary, force=force, on_progress=advance, time_limit=time_limit)
     if not runs:
-        raise RunBusy("another process is still running this case", unfinished(place))
+        raise RunBusy("another process is still running this case", on_disk.unfinished(place))
     return Run(place, cached=False, asked=case)
 
 
@@ -554,18 +529,18 @@ def finished_at(what: Named, out: str | Path) -> Run | None:
     kind, path = find(what, out)
     if kind not in ("run", "deck"):
         return None
-    if is_deck_folder(path):
+    if on_disk.is_deck_folder(path):
         from walkers.sweeps.by_hand import take_in
 
         take_in(path)
-    return _measured(Run(path)) if is_finished(path) else None
+    return _measured(Run(path)) if on_disk.is_finished(path) else None
 
 
 def _measured(run: Run) -> Run:
     """The run; that of a finished run is measured again if its result or a table cannot be read."""
     from walkers.postprocess.results import ensure_measured
 
-    if is_finished(run.check().directory):
+    if on_disk.is_finished(run.check().directory):
         with _refusing(run.directory, "the run"):
             ensure_measured(run.directory)
     return run
@@ -573,7 +548,7 @@ def _measured(run: Run) -> Run:
 
 def _checked(run: Run) -> Run:
     """The run; `InputError` if it cannot be read."""
-    if is_finished(run.check().directory):
+    if on_disk.is_finished(run.check().directory):
         _ = run.result
     return run
 
