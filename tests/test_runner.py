@@ -197,8 +197,8 @@ def test_a_run_that_somebody_else_finished_meanwhile_is_taken(tmp_path: Path, mo
     case = make_case(run=SHORT)
     written = (run_case(case, tmp_path).directory / "manifest.json").stat().st_mtime_ns
     # It is not there at the first look, but at the second, after the run has been locked.
-    answers = iter([False])
-    monkeypatch.setattr("walkers.api.is_finished", lambda place: next(answers, is_finished(place)))
+    answers, at_last = iter([False]), is_finished
+    monkeypatch.setattr("walkers.runner.directory.is_finished", lambda place: next(answers, at_last(place)))
     outcome = run_case(case, tmp_path)
     assert not list(answers)  # the first look has been
     assert (outcome.directory / "manifest.json").stat().st_mtime_ns == written
