@@ -66,7 +66,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
 
 def _status(tokens: list[str]) -> int:
     """Run the program and return its exit status. Unexpected errors are raised."""
-    walkers.inputs.chosen_library, words = None, tokens
+    words = tokens
     if words and words[0].startswith("--library="):
         words = [*words[0].split("=", 1), *words[1:]]
     try:
@@ -83,6 +83,8 @@ def _status(tokens: list[str]) -> int:
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt, SystemExit, _Terminated) as stop:
         return _report_stop(stop, words)
+    finally:
+        walkers.inputs.chosen_library = None  # whoever calls `main` goes on in the same process
     return outcome if isinstance(outcome, int) else 0
 
 
