@@ -18,11 +18,12 @@ from tests.printed import spoilt
 from walkers.calibration.calibrate import BEST, FINAL, HELD_OUT, Outcome, calibrate, ranking
 from walkers.calibration.emulator import LARGEST, Emulator, Posterior
 from walkers.calibration.file import Calibration, Parameter, load_calibration, read_calibration
-from walkers.calibration.observations import NO_NUMBERS, FloatArray, Observation, misalignment, numbers_of
+from walkers.calibration.observations import NO_NUMBERS, FloatArray, Observation, numbers_of
 from walkers.calibration.report import draw_corners, draw_predictions, record_of, words_of
 from walkers.errors import InputError
 from walkers.inputs.axes import unit_cube
 from walkers.inputs.reading import shipped
+from walkers.postprocess.gait import misalignment
 from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import load
 
@@ -261,7 +262,7 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
         assert middle == pytest.approx(true, rel=0.25), name
         assert said["sets"][BEST][name] == pytest.approx(true, rel=0.25), name
     assert said["agree"]["guess"] < said["agree"][BEST]
-    assert said["emulators_within_two_errors"] >= 0.6
+    assert said["agree"][BEST] == 5
     samples = pd.read_parquet(tmp_path / "here" / "posterior.parquet")
     assert list(samples.columns) == ["friction", "drag"]
     for row in said["observations"]:
@@ -300,13 +301,13 @@ def test_beads_that_came_apart_are_no_walker(tmp_path: Path) -> None:
         numbers(found, values, tmp_path / "runs", Options(2))["slow"] for values in ([0.1, 0.5], [0.2, 9.9])
     )
     assert whole["velocity"] > 1e-3
-    assert np.isnan([apart[name] for name in ("velocity", "slip_1", "largest_angle")]).all()
+    assert np.isnan([apart[name] for name in ("velocity", "slip_1")]).all()
 
 
 def test_a_set_that_loses_its_beads_is_told_and_not_run_again(tmp_path: Path) -> None:
     """A step ten times beyond the viscous limit; whoever goes on finds what is left of it, and the rest finished."""
     step = {**REDUCED["set"]["run"], "time_step": "40 us", "allow_unstable": True}
-    settings = {**REDUCED["set"], "run": step, "contact": {"minimum_separation_ratio": 1e-3}}
+    settings = {**REDUCED["set"], "run": step, "contact": {"roughness": {"bead_bead": "0.3 um", "bead_wall": "0.3 um"}}}
     found, runs = small(tmp_path, set=settings), tmp_path / "runs"
     seen = numbers(found, [0.1, 9.0], runs, Options(2, final=FINAL))
     assert all(np.isnan(one["velocity"]) for one in seen.values())

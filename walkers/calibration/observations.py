@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import degrees, inf, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -18,13 +18,10 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from walkers.inputs.table import Table
 from walkers.inputs.units import ANGLE, SPEED, WRITTEN, Kind, Number, parse_quantity
-from walkers.postprocess.gait import gait, settled_samples, steady_walkers, together
+from walkers.postprocess.gait import gait, misalignment, settled_samples, steady_walkers, together
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.results import read
 from walkers.postprocess.tables import read_table
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 FloatArray = npt.NDArray[np.float64]
 Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_pair_1"]
@@ -156,9 +153,3 @@ def numbers_of(run: str | Path) -> dict[str, float]:
     angles = misalignment(walkers[together(walkers)])
     reduced = (angles.max(), angles.min()) if len(angles) else (nan, nan)
     return numbers | dict(zip(get_args(Angle), map(float, reduced), strict=True))
-
-
-def misalignment(walkers: pd.DataFrame) -> FloatArray:
-    """Angles of walkers of a table ``walkers`` to the drive axis at the end, in either direction, 0 to 90 degrees."""
-    ends = np.degrees(walkers["orientation_end"].to_numpy())
-    return np.asarray(np.abs((ends + 90.0) % 180.0 - 90.0))
