@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from math import hypot
 from pathlib import Path
 
@@ -36,35 +36,21 @@ def out(looked_through: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 def test_compare_tells_parameters_and_results_of_two_runs(out: Path) -> None:
     table = walkers.load(out / "beads").table().set_index(["liquid.name", "dimers.radii[0]"])
     rows = [table.loc[("Si AK5", 0.3)], table.loc[("Si AK10", 0.3)]]
-    names = [Path(row["run"]).name for row in rows]
-    found = json.loads(call("compare", *names, "--json", check=True).stdout)
+    found = json.loads(call("compare", *(Path(row["run"]).name for row in rows), "--json", check=True).stdout)
     assert found["parameters"] == {"liquid.name": ["Si AK5", "Si AK10"]}
     results = {one["quantity"]: one for one in found["results"]}
-    velocity = results["velocity"]
-    assert (velocity["first"], velocity["second"]) == (rows[0]["velocity"], rows[1]["velocity"])
-    assert (velocity["first_scatter"], velocity["second_scatter"]) == (rows[0]["scatter"], rows[1]["scatter"])
-    assert velocity["numerical_error"] is None
-    of_first = walkers.load(rows[0]["run"]).walkers["sliding_2"]
-    assert results["sliding_2"]["first_scatter"] == pytest.approx(of_first.std())
-    text = call("compare", *names, check=True).stdout
-    assert "liquid.name" in text
-    assert "velocity (mm/s)" in text
-
-
-def test_compare_takes_cases_and_says_what_was_not_run(out: Path) -> None:
-    text = call("compare", "base.toml", "fig4a", check=True).stdout
-    assert "0.6/0.3 mm" in text
-    assert "fig4a: no finished run" in text
-    same = call("compare", "base.toml", "base.toml", check=True).stdout
-    assert "the cases are the same" in same
-    assert "all results are the same" in same
-
-
-@pytest.mark.parametrize("sides", [["base.toml"], ["base.toml", "base.toml"]])
-def test_compare_changes_the_second_case_alone(out: Path, sides: list[str]) -> None:
-    found = json.loads(call("compare", *sides, "--set", "drive.frequency=90Hz", "--json", check=True).stdout)
-    assert {key: values[1] for key, values in found["parameters"].items()} == {"drive.frequency": 90.0}
-    assert (found["second"], found["not_run"]) == ("base.toml drive.frequency=90Hz", ["base.toml drive.frequency=90Hz"])
+    for name, number in {"": "velocity", "_scatter": "scatter"}.items():
+        sides = [results["velocity"][f"{side}{name}"] for side in ("first", "second")]
+        assert sides == [row[number] for row in rows]
+    assert results["velocity"]["numerical_error"] is None
+    # Cases may be named, and one that was not run; changes are of the second side.
+    told = call("compare", "base.toml", "fig4a", check=True).stdout
+    assert "0.6/0.3 mm" in told and "fig4a: no finished run" in told
+    assert "all results are the same" in call("compare", "base.toml", "base.toml", check=True).stdout
+    for sides in (["base.toml"], ["base.toml", "base.toml"]):
+        found = json.loads(call("compare", *sides, "--set", "drive.frequency=90Hz", "--json", check=True).stdout)
+        assert {key: values[1] for key, values in found["parameters"].items()} == {"drive.frequency": 90.0}
+        assert found["second"] == "base.toml drive.frequency=90Hz" == found["not_run"][0]
 
 
 def test_compare_matches_the_points_of_two_sweeps(out: Path) -> None:
@@ -112,16 +98,15 @@ def test_compared_sweeps_differ_most_at_the_largest_change_of_either_sign(tmp_pa
     """With more friction the walker is faster under a weak drive, and slower by more under a strong one."""
     run = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
     tables = {"case": "base.toml", "axes": {"drive.peak_acceleration": ["3 g", "6 g"]}}
-    speeds: list[Sequence[float]] = []
+    sides: list[str] = []
     for friction in (0.05, 0.2):
         contact = {"friction": {"bead_bead": 0.1, "bead_wall": friction}}
         (tmp_path / "base.toml").write_text(to_toml(document(run=run, contact=contact)))
-        name = f"rough-{friction}"
-        record, _ = run_sweep(expand(tables, source="t", name=name, folder=tmp_path), tmp_path / "runs", Options(1))
-        speeds.append(load(record.directory)["velocity"])
-    sides = [str(tmp_path / "runs" / f"rough-{friction}") for friction in (0.05, 0.2)]
+        sweep = expand(tables, source="t", name=f"rough-{friction}", folder=tmp_path)
+        sides.append(str(run_sweep(sweep, tmp_path / "runs", Options(1))[0].directory))
     found = json.loads(call("compare", *sides, "--json", check=True).stdout)
     away = [one["difference"] for one in found["points"]]
+    speeds = [load(Path(side))["velocity"] for side in sides]
     assert away == pytest.approx(list(speeds[1] - speeds[0]))
     assert away[0] > 1e-4
     assert away[1] < -2.0 * away[0]

@@ -34,44 +34,35 @@ def _cases(sweep: Sweep) -> list[Case]:
 
 
 def test_axes_multiply_and_the_last_runs_fastest(make: Make) -> None:
+    """Zips and what varies one at a time are axes too, and so is a descent, the last one."""
     sweep = make(axes={"drive": {"frequency": ["60 Hz", "80 Hz"], "peak_acceleration": ["1 g", "2 g", "4 g"]}})
     found = [(case.excitation.frequency, case.excitation.peak_acceleration) for case in _cases(sweep)]
     assert found == [(f, pytest.approx(9.8 * a)) for f in (60.0, 80.0) for a in (1, 2, 4)]
     assert [*sweep.units.values()] == ["Hz", "g"]
     assert _cases(sweep)[1].title == "test: drive.frequency = 60 Hz, drive.peak_acceleration = 2 g"
-    dotted = make(axes={"drive.frequency": ["60 Hz", "80 Hz"], "drive.peak_acceleration": ["1 g", "2 g", "4 g"]})
-    assert (dotted.keys, dotted.rows) == (sweep.keys, sweep.rows)
+    alone = make(one_at_a_time={"run.seed": [3, 4], "drive": {"frequency": ["60 Hz", "90 Hz", "70 Hz"]}})
+    assert alone.rows == [(3, "60 Hz"), (4, "60 Hz"), (3, "90 Hz"), (3, "70 Hz")]
+    radii = [["0.3 mm", "0.2 mm"], ["0.4 mm", "0.2 mm"]]
+    pairs = make(zip=[{"dimers.radii": radii, "run": {"seed": [3, 4]}}], axes={"drive.frequency": ["60 Hz", "90 Hz"]})
+    cases = [(case.excitation.frequency, case.walkers[0].radii, case.run.seed) for case in _cases(pairs)]
+    assert cases == [(f, r, s) for f in (60.0, 90.0) for r, s in (((3e-4, 2e-4), 3), ((4e-4, 2e-4), 4))]
+    down = {"from": "0.5 g", "to": "0.2 g", "step": "0.1 g", "until_below": "1 um/s"}
+    falls = make(axes={"drive.frequency": ["60 Hz", "80 Hz"]}, descend={"key": "drive.peak_acceleration", **down})
+    assert [row[1] for row in falls.rows] == ["0.5 g", "0.4 g", "0.3 g", "0.2 g"] * 2
+    assert falls.until_below == pytest.approx(1e-6)
 
 
 def test_linspace_and_geomspace_are_numpys(make: Make) -> None:
-    sweep = make(
-        axes={
-            "drive.peak_acceleration": {"linspace": ["0.5 g", "10 g", 20]},
-            "liquid.volume_fraction": {"geomspace": [1e-3, 1e-1, 5]},
-        }
-    )
+    linear, geometric = {"linspace": ["0.5 g", "10 g", 20]}, {"geomspace": [1e-3, 1e-1, 5]}
+    sweep = make(axes={"drive.peak_acceleration": linear, "liquid.volume_fraction": geometric})
     cases = _cases(sweep)
-    assert len(cases) == 100
-    assert sweep.rows[1][0] == "0.5 g"
+    assert (len(cases), sweep.rows[1][0]) == (100, "0.5 g")
     accelerations = np.array([case.excitation.peak_acceleration for case in cases[::5]]) / 9.8
     np.testing.assert_allclose(accelerations, np.linspace(0.5, 10, 20), rtol=1e-12)
     fractions = [case.liquid.volume_fraction for case in cases[:5]]
     np.testing.assert_allclose(fractions, np.geomspace(1e-3, 1e-1, 5), rtol=1e-11)
     whole = make(axes={"run.seed": {"linspace": [1, 4, 4]}, "run.cycles": {"geomspace": [10, 40, 3]}})
     assert whole.rows == [(seed, cycles) for seed in (1, 2, 3, 4) for cycles in (10, 20, 40)]
-
-
-def test_one_key_at_a_time(make: Make) -> None:
-    sweep = make(one_at_a_time={"run.seed": [3, 4], "drive": {"frequency": ["60 Hz", "90 Hz", "70 Hz"]}})
-    assert sweep.keys == ("run.seed", "drive.frequency")
-    assert sweep.rows == [(3, "60 Hz"), (4, "60 Hz"), (3, "90 Hz"), (3, "70 Hz")]
-
-
-def test_zipped_keys_go_together(make: Make) -> None:
-    pairs = [["0.3 mm", "0.2 mm"], ["0.4 mm", "0.2 mm"]]
-    sweep = make(zip=[{"dimers.radii": pairs, "run": {"seed": [3, 4]}}], axes={"drive.frequency": ["60 Hz", "90 Hz"]})
-    found = [(case.excitation.frequency, case.walkers[0].radii, case.run.seed) for case in _cases(sweep)]
-    assert found == [(f, r, s) for f in (60.0, 90.0) for r, s in (((3e-4, 2e-4), 3), ((4e-4, 2e-4), 4))]
 
 
 @pytest.mark.parametrize(
@@ -99,19 +90,6 @@ def test_a_key_that_says_the_same_in_other_words_gives_way(make: Make) -> None:
     assert case.walkers[0].radii == (3e-4, 2e-4)
 
 
-def test_a_descent_is_the_last_axis_downward(make: Make) -> None:
-    descend = {
-        "key": "drive.peak_acceleration",
-        "from": "0.5 g",
-        "to": "0.2 g",
-        "step": "0.1 g",
-        "until_below": "1 um/s",
-    }
-    sweep = make(axes={"drive.frequency": ["60 Hz", "80 Hz"]}, descend=descend)
-    assert [row[1] for row in sweep.rows] == ["0.5 g", "0.4 g", "0.3 g", "0.2 g"] * 2
-    assert sweep.until_below == pytest.approx(1e-6)
-
-
 def test_shipped_sweeps_are_the_papers() -> None:
     fig2 = _cases(load_sweep("fig2"))
     assert len(fig2) == 80
@@ -135,40 +113,24 @@ def test_shipped_sweeps_are_the_papers() -> None:
 
 BAD: list[tuple[dict[str, Any], str]] = [
     ({"axes": {"drive.frequncy": ["60 Hz"]}}, 'drive.frequncy: unknown key; .*did you mean "frequency"'),
-    ({"axes": {"drive": ["60 Hz"]}}, "drive: is a table of a case"),
     ({"axes": {"drive.frequency": []}}, "drive.frequency = \\[\\]: expected at least one value"),
     ({"axes": {"drive.frequency": {"linspace": ["60 Hz", "90 Hz", 2.5]}}}, "first value, last value and number"),
-    ({"axes": {"drive.frequency": {"linspace": ["60 Hz", "9 kHz", 3]}}}, "one unit throughout"),
-    ({"axes": {"drive.frequency": {"linspace": ["fast", "90 Hz", 3]}}}, "expected a number"),
     ({"axes": {"liquid.volume_fraction": {"geomspace": [0, 1, 3]}}}, "above zero"),
     ({"axes": {"drive.frequency": ["60 Hz", "60 mHz"]}}, "one unit throughout"),
-    ({"axes": {"dimers.radii[2]": ["1 mm"]}}, "no dimers.radii of that length"),
     ({"axes": {"run.seed": {"linspace": [1, 1000, 2000]}, "drive.frequency": {"linspace": ["60 Hz", "90 Hz", 999]}}},
      "1998000 points"),
     ({"axes": {"run.seed": [1]}, "zip": [{"run.seed": [1]}]}, "varies on two axes"),
     ({"zip": [{"run.seed": [1, 2], "dimers.angle": ["0 deg"]}]}, "as many values .*seed has 2, dimers.angle has 1"),
     ({"sample": [{"points": 4, "method": "sobbol", "ranges": {}}]}, 'did you mean "sobol"'),
     ({"sample": [{"points": 4, "ranges": {"run.seed": [1, 2]}}]}, "uniform"),
-    ({"sample": [{"points": 4, "ranges": {}}]}, "keys and their ranges"),
     ({"sample": [{"points": 0, "ranges": {"contact.restitution": {"uniform": [0.1, 0.2]}}}]}, "at least 1"),
     ({"descend": {"from": "1 g", "to": "2 g", "step": "0.1 g", "until_below": "1 um/s"}}, "must not be below"),
-    ({"descend": {"from": "1 g", "to": "0 g", "step": "fast", "until_below": "1 um/s"}}, "descend.step"),
-    ({"descend": {"from": "1 g", "to": "0 g", "step": "0.1 g", "until_below": "1 um"}}, "descend.until_below.*speed"),
     ({"descend": {"from": float("inf"), "to": 0, "step": 1, "until_below": "1 um/s"}}, "descend.from = .*a number"),
-    ({"descend": {"from": "1 g", "to": "0 g", "step": "1e-320 g", "until_below": "1 um/s"}}, "must not be below"),
     ({"axes": {"drive": {"frequency": ["60 Hz"]}, "drive.frequency": ["70 Hz"]}}, "drive.frequency: is given twice"),
-    ({"axes": {"dimers.radii": [["0.3 mm", "0.2 mm"]], "dimers.radii[1]": ["0.1 mm"]}}, "radii.*varies on two axes"),
-    ({"axes": {".": [1]}}, "is not a key of a case"),
     ({"case": ""}, 'case = "": no such file'),
-    ({"sample": {"points": 4}}, r"sample = .*expected tables \[\[sample\]\]"),
     ({"axis": {}}, 'unknown key; a sweep takes .*did you mean "axes"'),
-    ({"case": "fig1c"}, 'case = "fig1c": no such file, run or sweep, nor a shipped case .*did you mean "fig1b"'),
     ({"set": {"drive.frequncy": "60 Hz"}}, "drive.frequncy: unknown key"),
     ({"case": "."}, r'case = "\.": expected a case file, or the name of a shipped case'),
-    ({"case": "./"}, r'case = "\./": expected a case file, or the name of a shipped case'),
-    ({"set": {"dimers.radii[-1]": {}}}, r"dimers\.radii\[-1\]: unknown key"),
-    ({"set": {"dimers": {}}}, "dimers: is a table of a case"),
-    ({"axes": {"run.seed": {}}}, r"run\.seed = {}: expected a list of values"),
     *(({"axes": axes}, f"{key}: expected one of {key} and {other}, which replace each other") for axes, key, other in (
         ({"drive.peak_acceleration": ["1 g"], "drive.gamma0": [0.5]}, "drive.peak_acceleration", "drive.gamma0"),
         ({"dimers.sin_delta": [0.1], "dimers.radii": [["3 mm", "2 mm"]]}, "dimers.sin_delta", "dimers.radii"),
@@ -178,7 +140,6 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"axes": {"drive.frequency": {"linspace": ["80 Hz", "80 Hz", 3]}}}, "expected different values"),
     ({"sample": [{"points": 4, "ranges": {"contact.restitution": {"uniform": [0.3, 0.2]}}}]}, "smaller value first"),
     ({"axes": {"run.silence": ["1 s", "2 s"]}}, r"run\.silence: expected none: this key has ended"),
-    ({"set": {"run.log_limit": "2 MB"}}, r"run\.log_limit.*: expected none: this key has ended"),
     ({"axes": {"title": ["a", "b"]}}, "title: expected another key"),
 ]  # fmt: skip
 
@@ -197,9 +158,3 @@ def test_the_base_case_beside_a_sweep_comes_before_that_of_the_working_directory
         (in_folder / place).write_text(to_toml(document(drive={"peak_acceleration": acceleration})))
     (in_folder / "below" / "sweep.toml").write_text(f'case = "{case}"\naxes.run.seed = [1]\n')
     assert [point.drive.peak_acceleration for point in load_sweep("below/sweep.toml").cases()] == [pytest.approx(29.4)]
-
-
-def test_a_point_that_makes_no_sense_is_named(make: Make) -> None:
-    sweep = make(axes={"drive.frequency": ["60 Hz", "-80 Hz"]})
-    with pytest.raises(InputError, match=r"test.toml: point 1 \(drive.frequency = -80 Hz\): drive.frequency = "):
-        _cases(sweep)
