@@ -102,7 +102,7 @@ def _minimal(deck: Deck, case: Case) -> str:
     walls += "fix push all gravity v_push vector 0.0 0.0 1.0\n"
     walls += "fix gravity all gravity ${gravity} vector 0.0 0.0 -1.0\n"
     text = re.sub(r"(?m)^fix +walls all .*\n", "", text)
-    ratio = case.contact.minimum_separation_ratio
+    ratio = case.contact.roughness.bead_wall / case.radii[0]
     model = f"pair_style {_STOCK_MODEL}\n" + _STOCK_LIQUID.format(liquid=case.liquid.of_bridges, ratio=ratio)
     text = re.sub(r"(?m)^pair_style .*\n", lambda _: model, text)
     return re.sub(r"(?m)^fix +motion ", lambda found: walls + found[0], text)

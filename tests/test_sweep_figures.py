@@ -98,13 +98,11 @@ def test_what_goes_where_can_be_chosen(looked_through: Path) -> None:
 
 
 def test_pairs_of_beads_can_be_shown_by_their_asymmetry_and_texts_as_categories(looked_through: Path) -> None:
-    """Without lines of a theory: each pair of radii has bridges of its own."""
-    figure = walkers.load(looked_through / "beads").figure(x="sin_delta", theory=True)
+    figure = walkers.load(looked_through / "beads").figure(x="sin_delta")
     (axes,) = _panels(figure)
     assert axes.get_xlabel() == "sin δ"
     assert _drawn(axes)[0][0] == pytest.approx([0.05 / 0.45, 0.2, 0.15 / 0.55])
-    assert _legend(figure)[:2] == ["Si AK5", "Si AK10"]
-    assert not [line for line in axes.lines if line.get_linestyle() in ("--", ":")]
+    assert _legend(figure) == ["Si AK5", "Si AK10"]
     figure = walkers.load(looked_through / "beads").figure(x="liquid.name")
     (axes,) = _panels(figure)
     assert [label.get_text() for label in axes.get_xticklabels()] == ["Si AK5", "Si AK10"]
