@@ -79,16 +79,6 @@ BRIEF = {"time_step": "2 us", "cycles": 3, "settling_cycles": 1, "samples_per_cy
 LONG = {"time_step": "2 us", "cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
 
 
-LONGEST = ("known_parameters", "audit.py", "pilots", "report.py", "printed", "stopped", "slurm", "failed")
-"""In the names of tests that take seconds."""
-
-
-@pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Those first, so that no worker is left alone with one of them at the end."""
-    items.sort(key=lambda item: not any(name in item.nodeid for name in LONGEST))
-
-
 def document(**changes: Any) -> dict[str, Any]:
     """The reference case with changes such as ``drive={"frequency": "60 Hz"}`` merged into its tables."""
     merged = copy.deepcopy(REFERENCE)

@@ -16,7 +16,6 @@ import walkers
 from tests.conftest import REFERENCE, make_case
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
-from walkers.inputs.drive import common_frequency
 from walkers.inputs.loads import contact_loads, dimer_of, resistances_at_rest
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.standing import standing
@@ -191,14 +190,6 @@ def test_a_mixture_is_poured_from_above_the_walkers() -> None:
 
 
 # --- drives and slopes ------------------------------------------------------------------------------------------------
-
-
-def test_a_cycle_is_the_common_period() -> None:
-    for tones, common in (([80.0, 160.0], 80.0), ([90.0, 60.0, 40.0], 10.0), ([0.1, 0.3], 0.1)):
-        assert common_frequency(tones) == pytest.approx(common, rel=1e-12)
-    for others in ([80.0 * 25], [80.0 * 2**0.5], [80.0 * ratio for ratio in (23 / 24, 22 / 23, 21 / 22, 19 / 20)]):
-        with pytest.raises(ValueError, match=r"not a ratio of whole numbers|common period"):
-            common_frequency([80.0, *others])
 
 
 @pytest.mark.parametrize(("frequency", "step", "samples"), [("60 Hz", "auto", 7), ("83.7 Hz", "1.7 us", 20)])

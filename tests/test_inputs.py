@@ -15,7 +15,6 @@ from tests.conftest import REFERENCE, call, document, make_case, origins, to_tom
 from walkers.errors import InputError
 from walkers.inputs import units
 from walkers.inputs.case import Case
-from walkers.inputs.keys import settings_of
 from walkers.inputs.library import library_of, unmeasured
 from walkers.inputs.origins import Origin
 from walkers.inputs.reading import load_case, shipped
@@ -100,20 +99,6 @@ def test_values_know_where_they_come_from() -> None:
     guessed = {key: one.text for key, one in origins(Case.read(GLASS)).items() if one.guessed}
     unknown = {"contact.restitution": "0.3", "liquid.volume_fraction": "0.01", "liquid.contact_angle": "0 deg"}
     assert guessed == {**unknown, "contact.friction.bead_wall": "0.3"}
-
-
-@pytest.mark.parametrize("name", sorted(shipped("case")))
-def test_the_origins_tell_the_numbers_of_the_case(name: str) -> None:
-    """Each text, read as a file's, gives the same case: nothing is told that is not so."""
-    case = load_case(name)
-    matter = [one for one in case.origins if one.origin not in ("given", "derived")]
-    matter = [one for one in matter if one.key.split(".")[0] in ("beads", "liquid", "contact")]
-    assert len(matter) >= 10
-    told = settings_of(f"{one.key} = {one.text}" for one in matter)
-    again = load_case(name, told)
-    assert (again.contact, again.beads) == (case.contact, case.beads)
-    assert again.liquid.of_bridges == case.liquid.of_bridges
-    assert {one.origin for one in again.origins if one.key in told} == {"given"}
 
 
 def test_what_is_called_uncertain_keeps_where_it_comes_from(tmp_path: Path) -> None:

@@ -1,7 +1,6 @@
 """The program, the Makefile and the package, as a user meets them: at a shell and from Python."""
 
 import json
-import os
 import re
 import subprocess
 import sys
@@ -12,12 +11,11 @@ from pathlib import Path
 import pytest
 
 import walkers
-from tests.conftest import PROGRAM, SHORT, call, document, to_toml
+from tests.conftest import SHORT, call, document, to_toml
 from walkers import load_case
 from walkers.errors import InputError
 from walkers.inputs.reading import shipped
 from walkers.main import program
-from walkers.physics.time_step import WALKER_FRACTIONS
 from walkers.postprocess.results import read
 from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
@@ -38,19 +36,6 @@ def test_two_beads_walk_toward_the_large_one(run_directory: Callable[..., Path])
 
 
 # --- what a newcomer does ---------------------------------------------------------------------------------------------
-
-
-def test_show_tells_what_follows_from_a_case() -> None:
-    shown = call("show", "fig1b", check=True).stdout
-    for part in ("Γ0 = 0.3811", "sin δ = 0.2", "mass asymmetry (m1 - m2)/M = 0.5429", "4πγR limit", "rayleigh"):
-        assert part in shown
-    summary = json.loads(call("show", "fig1b", "--json", check=True).stdout)
-    assert summary["dimer"]["gamma0"] == pytest.approx(0.3811, abs=1e-4)
-    shares = summary["time_step"]["share"]
-    assert shares.keys() == WALKER_FRACTIONS.keys()
-    assert all(0.0 < share <= WALKER_FRACTIONS[limit] for limit, share in shares.items())
-    walls = summary["contacts"][:2]
-    assert all(0.5 < contact["capillary_force"] / contact["capillary_force_limit"] < 0.9 for contact in walls)
 
 
 def test_from_a_case_file_to_a_deck_and_pictures(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -135,26 +120,6 @@ def test_the_library_lists_what_can_be_named_and_says_where_each_number_is_from(
     assert "PLEXIGLAS GS data sheet" in call("library", "pmma", check=True).stdout
     done = call("library", "steel")
     assert (done.returncode, "expected one of stainless steel, chrome steel" in done.stderr) == (2, True)
-
-
-def test_bash_completes_commands_options_and_names_of_runs(looked_through: Path, tmp_path: Path) -> None:
-    (tmp_path / "runs").symlink_to(looked_through)
-    (tmp_path / "walkers.bash").write_text(program().generate_completion(shell="bash"))
-    path = {"PATH": f"{Path(PROGRAM).parent}:{os.environ['PATH']}"}
-
-    def completed(*words: str) -> list[str]:
-        """What bash offers for the last word of a line."""
-        script = f'. ./walkers.bash; COMP_WORDS=("$@"); COMP_CWORD={len(words)}; _walkers; echo "${{COMPREPLY[@]}}"'
-        command = ["bash", "-c", script, "bash", "walkers", *words]
-        done = subprocess.run(command, cwd=tmp_path, env=os.environ | path, capture_output=True, text=True, check=True)
-        return done.stdout.split()
-
-    runs = {Path(run).name for run in walkers.load(looked_through / "three").table()["run"]}
-    assert completed("comp") == ["compare"]
-    assert completed("export", "--to", "ar") == ["archive"]
-    assert completed("run", "fig") == [name for name in shipped("case") if name[:3] == "fig"]
-    assert set(completed("plot", "")) >= runs | {"grid", "fig1b"}
-    assert completed("run", "--out", "elsewhere", "base-") == []
 
 
 # --- what a word names ------------------------------------------------------------------------------------------------

@@ -138,19 +138,20 @@ def test_a_sweep_through_slurm(cluster: dict[str, str], in_folder: Path, front: 
         told = subprocess.run(["squeue", "-h", "-o", "%A", *options], env=cluster, capture_output=True, check=True)
         return told.stdout.decode().split()
 
+    def has(least: int) -> bool:
+        assert first.poll() is None
+        return len(contents_of(in_folder / "cluster")) >= least
+
     first = start()
-    for least in (2, 6):
-        wait_for(lambda least=least: first.poll() is not None or len(contents_of(in_folder / "cluster")) >= least)
-        if least == 2:
-            pilot, *_ = jobs("-t", "running")
-            subprocess.run(["scancel", pilot], env=cluster, check=True)
-    assert first.poll() is None
+    wait_for(lambda: has(2))
+    pilot, *_ = jobs("-t", "running")
+    subprocess.run(["scancel", pilot], env=cluster, check=True)
+    wait_for(lambda: has(6))
     assert pilot not in jobs()
     first.send_signal(signal.SIGINT)
     _, errors = first.communicate(timeout=PATIENCE)
     assert (first.returncode, "Traceback" in errors) == (130, False)
     wait_for(lambda: not jobs())
-    assert 6 <= len(contents_of(in_folder / "cluster")) < 11
     go.touch()
     second = start()
     _, errors = second.communicate(timeout=PATIENCE)
@@ -158,8 +159,7 @@ def test_a_sweep_through_slurm(cluster: dict[str, str], in_folder: Path, front: 
     wait_for(lambda: not jobs())
     assert list(load("cluster/test")["status"]) == ["finished"] * 4 + ["failed"] + ["finished"] * 7
     assert call(*command, "local").returncode == 1
-    assert contents_of(in_folder / "cluster") == contents_of(in_folder / "local")
-    assert len(contents_of(in_folder / "local")) == 11
+    assert contents_of(in_folder / "cluster") == contents_of(in_folder / "local") != {}
 
 
 def test_ranks_take_cores_of_this_machine_and_of_a_cluster() -> None:

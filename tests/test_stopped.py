@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import os
-import random
 import shutil
 import signal
 import subprocess
-import time
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -177,31 +174,6 @@ def _listens_to_nobody(program: int) -> None:
     ports = [port for each in family for port in each.net_connections()]
     assert not [port for port in ports if port.status == psutil.CONN_LISTEN]
     assert all(each.environ().items() >= ALONE.items() for each in engines)
-
-
-def test_after_each_kill_no_engine_stays_and_the_next_call_runs(
-    stopping: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The launcher is killed before, at and after the birth of its engine."""
-    (stopping / "first").mkdir()
-    draw = random.Random(14)
-    for kill in range(8):
-        child = os.fork()
-        if not child:
-            with suppress(BaseException):
-                run_case("walker.toml", "runs", engine="./engine")
-            os._exit(0)
-        if kill % 2:
-            wait_for(lambda: engines_in(stopping))
-            time.sleep(draw.uniform(0.0, 0.02))  # setpriv, sh and the engine follow each other within that time
-        else:
-            time.sleep(draw.uniform(0.0, 0.4))
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
-        wait_for(lambda: not engines_in(stopping))
-    monkeypatch.delenv("HALT")
-    assert not run_case("walker.toml", "runs", engine="./engine").cached
-    assert [path.suffix for path in Path("runs").iterdir()] == [""]
 
 
 def test_an_engine_that_outlives_its_launcher_keeps_others_away(
