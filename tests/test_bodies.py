@@ -83,9 +83,6 @@ def fig1b(**changes: Any) -> Case:
     return load_case("fig1b", {**start, "run.cycles": 20, "run.settling_cycles": 8, **changes})
 
 
-# --- how beads stand --------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     "shape", ["chain Lss", "fan Lsss", "ring Lsss", "diamond LsLs", "diamond LsLL", "raft sssssss"]
 )
@@ -189,9 +186,6 @@ def test_a_mixture_is_poured_from_above_the_walkers() -> None:
     assert min(bead.z - bead.radius for bead in kinds[1]) > 1e-3
 
 
-# --- drives and slopes ------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("frequency", "step", "samples"), [("60 Hz", "auto", 7), ("83.7 Hz", "1.7 us", 20)])
 def test_a_cycle_is_a_whole_multiple_of_the_sampling_interval(frequency: str, step: str, samples: int) -> None:
     case = make_case(drive={"frequency": frequency}, run={"time_step": step, "samples_per_cycle": samples})
@@ -279,9 +273,6 @@ def test_a_rest_before_the_drive_is_one(tmp_path: Path, frequency: str) -> None:
     assert done.trajectory["time"].min() == 0.0
     assert np.abs(done.motion.velocity[resting]).max() < 1e-4
     assert speeds[1] == pytest.approx(speeds[0], rel=0.01)
-
-
-# --- how fast they walk -----------------------------------------------------------------------------------------------
 
 
 ALIKE = {"dimers.radii": ["0.25 mm", "0.25 mm"]}
@@ -390,9 +381,6 @@ def test_reporting_bridges_does_not_disturb_the_walkers(tmp_path: Path) -> None:
     assert dumps[0] == dumps[1]
 
 
-# --- many walkers -----------------------------------------------------------------------------------------------------
-
-
 def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
     """A dimer beside trimers walks as it does alone, and each make has its part of the result."""
     tables = cluster("fan", "Lss"), cluster("chain", "Lss", replicates=1)
@@ -452,9 +440,6 @@ def test_what_walkers_do_as_many_is_counted() -> None:
     speeds = {"free_speed": 1e-3, "joined_speed": joined * 1e-3, "speed_ratio": joined}
     others = {"meeting_rate": 2 * 2 / (4 * 10.0), "largest_cluster": 2, "polar_order": np.sqrt(2.0) / 4}
     assert found == pytest.approx({**shares, **speeds, **others})
-
-
-# --- climbers on a wall -----------------------------------------------------------------------------------------------
 
 
 FRICTIONS = {0.1: -9.57e-3, 0.2: -3.33e-3, 0.3: 4.77e-3}

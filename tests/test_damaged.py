@@ -64,9 +64,6 @@ def short_case(in_folder: Path) -> Path:
     return file
 
 
-# --- damaged runs -----------------------------------------------------------------------------------------------------
-
-
 @pytest.fixture
 def parts(in_folder: Path, once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
     """A copy of a run of three segments, to be damaged."""
@@ -213,9 +210,6 @@ def test_a_result_whose_making_was_killed_is_made_anew(parts: Path) -> None:
     assert json.loads((run / "manifest.json").read_text())["sha256"].keys() >= set(names)
 
 
-# --- dumps ------------------------------------------------------------------------------------------------------------
-
-
 def test_a_dump_of_beads_is_read_but_for_a_last_frame_that_was_cut(
     run_directory: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -254,9 +248,6 @@ def test_a_local_dump_is_read_whole_or_not_at_all(run_directory: Callable[..., P
         path.write_bytes(contents)
         with pytest.raises(DumpError, match=r"bridges\.pairs\.txt"):
             list(local_frames(path, columns))
-
-
-# --- full disks -------------------------------------------------------------------------------------------------------
 
 
 FULL = {
@@ -318,9 +309,6 @@ def test_a_run_goes_on_when_a_full_disk_has_room_again(tmp_path: Path) -> None:
         assert done.result == run_case(case, tmp_path / "runs").result
 
 
-# --- streams and files -----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("command", ["run short.toml", "--help"])
 def test_a_reader_may_have_had_enough(command: str, short_case: Path) -> None:
     script = ["bash", "-c", f'{PROGRAM} {command} | true; exit "${{PIPESTATUS[0]}}"']
@@ -356,9 +344,6 @@ def test_an_edit_of_a_calibrations_design_is_told_and_not_dropped(tmp_path: Path
         with pytest.raises(InputError, match=rf"wave-1\.json: {key}: was drawn with other {key}"):
             kept({key: value}, unit)
     np.testing.assert_array_equal(kept({"waves": [*design["waves"], 8]}, 1.0 - unit), unit)
-
-
-# --- texts ------------------------------------------------------------------------------------------------------------
 
 
 HOSTILE: dict[str, str] = {
@@ -443,9 +428,6 @@ def test_a_text_changes_nothing_but_itself(
         (folder := tmp_path / f"folder {len(told)}").mkdir()
         told.append(where(text, stranger, folder))
     assert told[0] == told[1]
-
-
-# --- paths ------------------------------------------------------------------------------------------------------------
 
 
 ODD = '--sp ace; it\'s "so" $(touch executed)`touch executed`;touch executed;&& ${HOME}\\ [a]*?äγ走\ntwo' + "x" * 120

@@ -24,8 +24,6 @@ ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 PAGES = [page for page in pages_of(DOCS) if not page.is_relative_to(DOCS / "gallery")]
 
-# --- links ------------------------------------------------------------------------------------------------------------
-
 _FENCE = re.compile(r"^(\s*)(```+|~~~+).*?^\1\2\s*$", re.MULTILINE | re.DOTALL)
 _CODE = re.compile(r"`[^`\n]*`")
 _LINK = re.compile(r"\]\(\s*<?([^)\s>]+)>?[^)]*\)|<img[^>]*\ssrc=\"([^\"]+)\"")
@@ -54,8 +52,6 @@ def test_links_of_a_page_lead_somewhere(page: Path) -> None:
         missing += [] if known else [link]
     assert not missing
 
-
-# --- names ------------------------------------------------------------------------------------------------------------
 
 _NAME = re.compile(r"(?<!`)`([A-Za-z_][\w.]*)`(?!`)")
 _OF_PACKAGE = re.compile(r"(?<![\w./-])walkers(?:\.[A-Za-z_]\w*)+")
@@ -127,9 +123,6 @@ def test_names_of_the_package_on_pages_and_in_templates_are_there() -> None:
     assert not sorted(f"{file.relative_to(ROOT)}: {name}" for file, name in named if not is_there(name))
 
 
-# --- pictures, outputs, numbers ---------------------------------------------------------------------------------------
-
-
 def test_no_picture_or_table_is_of_other_parameters_than_todays() -> None:
     """If this fails, run ``make docs-pictures``."""
     assert stale(DOCS) == {}
@@ -152,9 +145,6 @@ def test_numbers_in_sentences_are_the_comparisons() -> None:
     quoted = [(page.name, name, text) for page in PAGES for name, text in facts_in(page)]
     assert len(quoted) >= 5
     assert [(page, name, known[name]) for page, name, _ in quoted] == quoted
-
-
-# --- examples and keys ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("module", ["walkers.api", "walkers.inputs.reading", "walkers.postprocess.motion"])

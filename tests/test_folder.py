@@ -1,4 +1,4 @@
-"""Runs and sweeps of a folder: listed and removed; values of their cases as text."""
+"""Runs and sweeps of a folder: listed, removed, and compared."""
 
 from __future__ import annotations
 

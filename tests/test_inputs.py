@@ -26,9 +26,6 @@ from walkers.postprocess.uncertainty import lines_of_rest, rests_on
 from walkers.show import describe, summarise
 from walkers.sweeps.spread import spread_sweep
 
-# --- quantities -------------------------------------------------------------------------------------------------------
-
-
 QUANTITIES = {
     units.LENGTH: {"0.3 mm": 3e-4, "300 µm": 3e-4, "300um": 3e-4, "3e-4 m": 3e-4},
     units.FREQUENCY: {"80 Hz": 80.0, "0.08 kHz": 80.0, "80 s^-1": 80.0},
@@ -59,9 +56,6 @@ def test_quantities_are_read_in_si_and_nothing_else_is() -> None:
         for text in wrong:
             with pytest.raises(ValueError, match=f"expected an? {kind.name} with its unit"):
                 parse_quantity(text, kind)
-
-
-# --- sources of values ------------------------------------------------------------------------------------------------
 
 
 # Glass beads on polystyrene in glycol, materials that the paper names: nobody has measured how they touch.
@@ -133,9 +127,6 @@ def test_names_and_what_no_law_asks_for_do_not_determine_a_run() -> None:
     assert named != case
     assert named.determinants() == case.determinants()
     assert make_case(run={"seed": 2}).determinants() != make_case().determinants()
-
-
-# --- changes, JSON, schema --------------------------------------------------------------------------------------------
 
 
 def test_a_case_is_changed_as_its_file_would_be(tmp_path: Path) -> None:
@@ -211,9 +202,6 @@ def test_the_schema_refuses_what_the_program_refuses(in_folder: Path) -> None:
         assert ".".join(map(str, error.absolute_path)) == place
         with pytest.raises(InputError):
             load_case(wrong)
-
-
-# --- the library ------------------------------------------------------------------------------------------------------
 
 
 # Mass fraction, °C, viscosity (mPa s; Segur and Oberstar 1951), density (g/cm³; Bosart and Snoddy 1928), both as in the

@@ -197,8 +197,6 @@ def test_words_and_numbers() -> None:
     assert caption(aside).endswith("plane tilted by 60°, up is at 90° from x toward y")
 
 
-# --- in a browser -----------------------------------------------------------------------------------------------------
-
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 MILLISECONDS = 1e3 * PATIENCE
 

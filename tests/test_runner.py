@@ -60,9 +60,6 @@ def _toml(folder: Path, **run: object) -> str:
     return str(file)
 
 
-# --- what is there ----------------------------------------------------------------------------------------------------
-
-
 def test_the_name_depends_on_what_determines_the_run() -> None:
     def name(**changes: object) -> str:
         return run_place(make_case(**changes), find_engine(), Path()).name
@@ -128,9 +125,6 @@ def test_a_running_simulation_is_looked_at_stopped_and_continued(in_folder: Path
     assert (run.status, "time limit of 0.2 s" in run.describe()) == ("failed", True)
 
 
-# --- again, and on ----------------------------------------------------------------------------------------------------
-
-
 def test_a_finished_run_is_run_again_by_force_only(tmp_path: Path) -> None:
     """One by force that fails leaves the old one."""
     case = make_case(run=SHORT)
@@ -165,9 +159,6 @@ def test_a_crash_within_a_replacement_leaves_no_trace(tmp_path: Path) -> None:
     assert run_case(case, tmp_path).cached
     assert run_case(case, tmp_path, force=True).directory == place
     assert not left.exists()
-
-
-# --- locks and kills --------------------------------------------------------------------------------------------------
 
 
 def test_a_lock_that_somebody_has_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -206,9 +197,6 @@ def _reason(out: Path) -> str:
     (part,) = out.glob("*.incomplete")
     assert not list(out.glob("*/manifest.json"))
     return str(json.loads((part / "failure.json").read_text())["reason"])
-
-
-# --- before the engine starts -----------------------------------------------------------------------------------------
 
 
 def test_engine_missing(tmp_path: Path) -> None:
@@ -291,9 +279,6 @@ def test_another_version_of_the_forces_is_another_engine(tmp_path: Path, monkeyp
         assert (find_engine() == before) == same
 
 
-# --- decks and engines that fail --------------------------------------------------------------------------------------
-
-
 def _half(text: str) -> str:
     return re.sub(r"(?m)^(run +|variable +cycles string )(\d+)", lambda one: f"{one[1]}{int(one[2]) // 2}", text)
 
@@ -371,9 +356,6 @@ def test_strange_engines_are_ended_and_told(front: Front, tmp_path: Path, name: 
     assert _reason(tmp_path / "runs") == type(failure.value).__name__
     (log,) = tmp_path.glob("runs/*/segments/*/engine.log")
     assert log.stat().st_size <= 2_000_000
-
-
-# --- surroundings -----------------------------------------------------------------------------------------------------
 
 
 def test_a_failed_run_is_remembered_when_the_spread_of_the_next_one_succeeds(in_folder: Path) -> None:

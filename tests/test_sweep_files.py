@@ -1,4 +1,4 @@
-"""Sweep files: what may be varied and how, and what is said of one that makes no sense."""
+"""Sweeps: what may be varied and how; and their numbers by a second formula: bands of spreads, groups, thresholds."""
 
 from __future__ import annotations
 
@@ -111,16 +111,10 @@ def test_shipped_sweeps_are_the_papers() -> None:
     fig3 = [(dimer_of(case), case.excitation.peak_acceleration) for case in load_sweep("fig3").cases()]
     assert [round(dimer.sin_delta, 3) for dimer, _ in fig3] == [0.0, 0.111, 0.143, 0.2, 0.273, 0.333]
     assert all(dimer.gamma0(peak) == pytest.approx(0.5) for dimer, peak in fig3)
-    turned = _cases(load_sweep("alignment"))
-    assert {round(np.degrees(case.walkers[0].angle)) for case in turned} == set(range(0, 91, 15))
     trays = [
         (one.walkers[0].replicates, meetings.derived(one)["coverage"]) for one in _cases(load_sweep("tray-phases"))
     ]
-    assert len(trays) == 96
-    assert {number for number, _ in trays} == {2, 16, 64}
-    assert {coverage for _, coverage in trays} == {0.05, 0.14, 0.25}
-    modes = _cases(load_sweep("modes"))
-    assert {round(dimer_of(case).sin_delta, 6) for case in modes} == {step / 20 for step in range(9)}
+    assert {*trays} == {(number, coverage) for number in (2, 16, 64) for coverage in (0.05, 0.14, 0.25)}
 
 
 BAD: list[tuple[dict[str, Any], str]] = [
@@ -171,8 +165,6 @@ def test_the_base_case_beside_a_sweep_comes_before_that_of_the_working_directory
     (in_folder / "below" / "sweep.toml").write_text(f'case = "{case}"\naxes.run.seed = [1]\n')
     assert [point.drive.peak_acceleration for point in load_sweep("below/sweep.toml").cases()] == [pytest.approx(29.4)]
 
-
-# --- spread -----------------------------------------------------------------------------------------------------------
 
 FRICTION, RESTITUTION, ROLLING = "contact.friction.bead_wall", "contact.restitution", "contact.rolling_friction"
 UNCERTAIN = {FRICTION: [0.05, 0.3], RESTITUTION: [0.2, 0.8], ROLLING: [0.0, 0.01]}
@@ -228,9 +220,6 @@ def test_bands_along_a_sweep_are_those_of_each_points_spread(tmp_path: Path) -> 
     assert table["velocity_high"].is_monotonic_increasing
 
 
-# --- groups -----------------------------------------------------------------------------------------------------------
-
-
 def test_points_that_differ_in_their_seed_alone_are_a_group() -> None:
     """A law that a case may leave to the program ("auto", none) is a value as others."""
     values = {"drive.frequency": [90.0, 60.0] * 3, "contact.law": ["auto", 1.0, "auto", None, "auto", None]}
@@ -241,9 +230,6 @@ def test_points_that_differ_in_their_seed_alone_are_a_group() -> None:
     assert found[1][0] == {"drive.frequency": 60.0, "contact.law": 1.0}
     ((named, rows),) = groups(table.loc[[0, 2, 4]])
     assert (named, list(rows.index), rows.attrs["varied"]) == ({}, [0, 2, 4], list(table))
-
-
-# --- descents ---------------------------------------------------------------------------------------------------------
 
 
 def test_a_descents_thresholds_have_the_gamma0_of_their_own_drives() -> None:

@@ -1,4 +1,4 @@
-"""What a velocity is uncertain by: ranges about what is guessed, scatter of copies; and what is printed."""
+"""What a velocity is uncertain by: guesses, scatter of copies, numerical errors; and what is printed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The second engine and the laws of bridges against the literature."""
+"""Verdicts of checks, which must be able to fail; laws of bridges, benchmarks and reports of the engine."""
 
 from __future__ import annotations
 
@@ -26,8 +26,6 @@ from walkers.postprocess.motion import Motion
 from walkers.runner.failures import EngineFailure
 from walkers.runner.launch import ALONE
 
-# --- Impacts --------------------------------------------------------------------------------------------------------
-
 
 def test_a_point_off_the_curve_is_found_and_judged_by_the_axis() -> None:
     points = np.array([(0.0, 0.0), (1.0, 1.3), (2.0, 2.0)])
@@ -46,9 +44,6 @@ def test_the_published_points_are_those_of_the_tests() -> None:
     assert steep[:, 1] == pytest.approx(1.0 - 0.092 * 1.98 / np.tan(np.radians(steep[:, 0])), abs=5e-3)
 
 
-# --- Published laws of bridges --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("law", ["Rabinovich 2005", "Lambert 2008"])
 @pytest.mark.parametrize("radius_2", [1.0, 0.5, inf])
 def test_laws_have_derjaguins_limit(law: str, radius_2: float) -> None:
@@ -64,9 +59,6 @@ def test_published_laws_beside_young_laplace() -> None:
     assert [count(lines.values(), verdict) for verdict in (Verdict.PASS, Verdict.NOT_JUDGED)] == [4, 44]
     assert lines["Soulié 2006, fig1b, wall: work over Young–Laplace"].measured == pytest.approx(1.37, abs=0.01)
     assert lines["Soulié 2006, fig1b, beads: work over Young–Laplace"].measured == pytest.approx(0.96, abs=0.01)
-
-
-# --- The command ------------------------------------------------------------------------------------------------------
 
 
 def test_benchmarks_pass_and_a_check_that_cannot_be_computed_leaves_the_others(

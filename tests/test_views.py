@@ -52,9 +52,6 @@ def moved(directory: Path) -> Group:
     return read_motion(directory).groups[0]
 
 
-# --- files for other programs -----------------------------------------------------------------------------------------
-
-
 def test_beads_and_floor_are_where_the_engine_put_them(moved: Group, collection: Path) -> None:
     sets = ElementTree.parse(collection).getroot().findall("Collection/DataSet")
     for kind, every in {"beads": 1, "boundary": 1, "bridges": 5}.items():
@@ -157,9 +154,6 @@ def test_a_lammps_dump_holds_the_motion(filmed: Path, motion: Motion, tmp_path: 
         np.testing.assert_allclose(rows[..., first : first + 3], values, rtol=1e-9, atol=1e-12)
 
 
-# --- figures ----------------------------------------------------------------------------------------------------------
-
-
 def test_figures_of_runs_come_in_other_formats_and_can_be_printed(directory: Path, tmp_path: Path) -> None:
     paths = plot_run(directory, tmp_path, "pdf,svg,png")
     names = [f"{name}.{form}" for name in ("walk", "gait") for form in ("pdf", "svg", "png")]
@@ -181,9 +175,6 @@ def test_gaits_are_smooth_and_go_through_the_samples(directory: Path) -> None:
         assert len(cycle) == 10 * (len(samples) - 1) + 1
         np.testing.assert_allclose(values[::10], 1e3 * samples[name], atol=1e-9)
         assert np.abs(np.diff(values, 2)).max() < 0.5 * np.abs(np.diff(values[::10], 2)).max()
-
-
-# --- pictures and films -----------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Walkers as measured: velocities, means of rotation and sliding, work, results; runs that end when they are steady."""
+"""Walkers as measured: velocities, means, work, results, tables; runs that end when they are steady."""
 
 from __future__ import annotations
 
@@ -52,9 +52,6 @@ def directory(run_directory: RunDirectory) -> Path:
 @pytest.fixture(scope="module")
 def moved(directory: Path) -> Group:
     return read_motion(directory).groups[0]
-
-
-# --- velocities and results -------------------------------------------------------------------------------------------
 
 
 def test_velocity_is_the_strobed_displacement_over_time(moved: Group) -> None:
@@ -193,9 +190,6 @@ def test_the_drive_pays_for_what_slides(run_directory: RunDirectory) -> None:
     assert works[50:].mean() == pytest.approx(result["work"])
 
 
-# --- means of rotation, sliding and open contacts ---------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def groups(trajectory: Callable[..., Group]) -> dict[int, Group]:
     return {samples: trajectory(_hopping(samples)) for samples in (20, 200)}
@@ -243,9 +237,6 @@ def test_a_run_in_parts_has_the_same_means(groups: dict[int, Group], trajectory:
     scale = float(np.abs(whole.sliding).max())
     np.testing.assert_allclose(found.rotation, whole.rotation, atol=1e-2 * scale)
     np.testing.assert_allclose(found.sliding, whole.sliding, atol=1e-2 * scale)
-
-
-# --- runs that end when velocities are constant -----------------------------------------------------------------------
 
 
 def _shipped(angle: float = 0.0, **drive: Any) -> Case:
