@@ -33,11 +33,8 @@ from tests.conftest import (
     to_toml,
     wait_for,
 )
-from tests.test_calibration import reduced
 from walkers import run as run_case
 from walkers.archive.writing import write_archive
-from walkers.calibration.calibrate import _determinants, _kept
-from walkers.calibration.file import read_calibration
 from walkers.errors import InputError
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
@@ -327,23 +324,6 @@ def test_what_is_no_file_to_read_is_refused_at_once(tmp_path: Path) -> None:
             read_toml(path)
     (tmp_path / "windows.toml").write_text(to_toml(document()), encoding="utf-8-sig")
     assert load_case(tmp_path / "windows.toml") == make_case().but(name="windows")
-
-
-def test_an_edit_of_a_calibrations_design_is_told_and_not_dropped(tmp_path: Path) -> None:
-    """Another wave at the end is welcome."""
-    calibration = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
-    design, unit, file = calibration["design"], np.full((4, 2), 0.5), tmp_path / "wave-1.json"
-
-    def kept(changes: dict[str, Any], make: np.ndarray) -> np.ndarray:
-        changed = {**calibration, "design": {**design, **changes}}
-        found = read_calibration(changed, source="test", name="test", folder=tmp_path)
-        return _kept(file, _determinants(found, 1), lambda: make)
-
-    assert kept({}, unit) is unit
-    for key, value in (("seed", 3), ("waves", [20, 8])):
-        with pytest.raises(InputError, match=rf"wave-1\.json: {key}: was drawn with other {key}"):
-            kept({key: value}, unit)
-    np.testing.assert_array_equal(kept({"waves": [*design["waves"], 8]}, 1.0 - unit), unit)
 
 
 HOSTILE: dict[str, str] = {
