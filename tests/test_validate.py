@@ -164,7 +164,7 @@ def test_deck_gives_the_number_of_its_report(
     assert all(f"({deck.stem}.lig)" in (REPORTS / "index.md").read_text("utf-8") for deck in REPORTS.glob("*.lig"))
     environment = {name: value for name, value in os.environ.items() if name != "LD_PRELOAD"} | ALONE
     command = ["stdbuf", "-oL", "liggghts", "-log", "none", *options, "-in", f"{name}.lig"]
-    how = {"env": environment, "capture_output": True, "text": True, "errors": "replace", "timeout": 60}
+    how = {"env": environment, "capture_output": True, "text": True, "errors": "replace"}
     done = subprocess.run(command, cwd=tmp_path, check=False, **how)
     assert done.returncode == 0, done.stdout[-500:]
     measured = [float(number) for line in _RESULT.findall(done.stdout) for number in _NUMBER.findall(line)]
