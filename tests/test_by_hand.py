@@ -72,7 +72,7 @@ EDITED: dict[str, tuple[dict[str, Any], dict[str, str], dict[str, Any]]] = {
         {"friction_bead_wall": "0.2", "restitution": "0.5"},
         {"contact.friction.bead_wall": 0.2, "contact.restitution": 0.5},
     ),
-    "tension": ({}, {"surface_tension": "0.03"}, {"liquid.surface_tension": "30 mN/m"}),
+    "viscosity": ({}, {"viscosity": "0.0092"}, {"liquid.dynamic_viscosity": "9.2 mPa*s"}),
     "length": ({}, {"cycles": "9"}, {"run.cycles": 9, "run.settling_cycles": 3}),
     "frequency": ({}, {"frequency": "70.0"}, {"drive.frequency": "70 Hz"}),
     "two tones and their cycle": (
