@@ -19,7 +19,6 @@ from walkers.inputs.axes import ranges_of
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
 from walkers.inputs.units import parse_quantity
-from walkers.paper.published import outside_of_the_paper
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.numbers import fell, headline, rows
 from walkers.postprocess.results import headlines, text
@@ -31,7 +30,7 @@ from walkers.runner.files import write_json
 from walkers.sweeps.folder import as_text, inventory
 from walkers.sweeps.readable import kind_of
 from walkers.sweeps.table import default_column
-from walkers.theory.prediction import describe, predict
+from walkers.theory.prediction import describe, outside_of_the_paper, predict
 
 
 def test_what_is_usual_lies_within_its_range() -> None:
