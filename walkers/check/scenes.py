@@ -54,12 +54,12 @@ WAY, SPIN = (0.031, -0.023, 0.053), (61.0, -83.0, 47.0)
 
 def dry(surfaces: Surfaces) -> Curve:
     """A law without forces."""
-    return Curve(lambda gaps: Forces(*[np.zeros_like(gaps)] * 5), rupture=surfaces.closest)
+    return Curve(lambda gaps: Forces(*[np.zeros_like(gaps)] * 5), rupture=surfaces.roughness)
 
 
 def law(surfaces: Surfaces) -> Curve:
     """A bridge that forms before surfaces touch, with a kink near contact, and resistances of all kinds."""
-    size, scale = surfaces.reduced_radius, surfaces.closest
+    size, scale = surfaces.reduced_radius, surfaces.roughness
     uneven = 1.0 - surfaces.radius / surfaces.other_radius  # none of equal beads, which have no order
     drag = 6.0 * pi * 0.03 * size
 
@@ -67,7 +67,7 @@ def law(surfaces: Surfaces) -> Curve:
         near = 1.0 / np.maximum(gaps / scale, 1.0)
         return Forces(
             pull=0.05 * size * np.exp(-12.0 * gaps / size),
-            normal=drag * near / surfaces.minimum_separation_ratio,
+            normal=drag * near * size / surfaces.roughness,
             sliding=drag * (4.0 + np.log(near)),
             coupling=-0.7 * uneven * drag * size * (1.0 + near),
             rolling=drag * size**2 * (4.0 + 2.0 * near),
@@ -352,7 +352,7 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
     bare = bench_case({**liquid, "contact.restitution": 0.5})
     scene = standing(pair(-DEEP, 0.05, STILL, (STILL, STILL)))
     deck = compose(prescribed(bare, scene))
-    meeting = Surfaces.of(S, R, bare.liquid.of_bridges, bare.contact.minimum_separation_ratio)
+    meeting = Surfaces.of(S, R, bare.liquid.of_bridges, bare.contact.roughness)
     fine = tabulated(by_name(bare.liquid.law), meeting, tolerance=1e-10).text()
     tables = deck.files[BRIDGES_NAME].split("bridge ")
     tables = [f"1 1 {S!r} {R!r}\n{fine}" if table.startswith(f"1 1 {S!r} {R!r}") else table for table in tables]

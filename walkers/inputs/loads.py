@@ -41,7 +41,7 @@ def bridge_at_rest(case: Case, radius: float, other_radius: float) -> Load:
 def _surfaces(case: Case, radius: float, other_radius: float) -> Surfaces:
     from walkers.physics.bridge import Surfaces
 
-    return Surfaces.of(radius, other_radius, case.liquid.of_bridges, case.contact.minimum_separation_ratio)
+    return Surfaces.of(radius, other_radius, case.liquid.of_bridges, case.contact.roughness)
 
 
 @lru_cache(maxsize=1024)  # points of a sweep have the same few bridges

@@ -20,9 +20,9 @@ from walkers.inputs.loads import bridge_at_rest, contact_loads, dimer_of, reach
 from walkers.inputs.origins import Source
 from walkers.inputs.run import with_run
 from walkers.inputs.standing import OVERLAP, check_bodies, overlaps
-from walkers.inputs.table import changed
+from walkers.inputs.table import alternatives, changed
 from walkers.inputs.units import TEMPERATURE, parse_quantity
-from walkers.physics.capillary import DEFAULT_LAW
+from walkers.physics.capillary import DEFAULT_LAW, bridge_volume
 from walkers.physics.laws import LAWS
 from walkers.physics.mixtures import MIXTURES
 
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 _PACKING = 0.55
 """Packing fraction of a settled wet pile, for the count that fills a height."""
+_ROUGHEST = 0.01
+"""Largest roughness over the radius of a bead: the wedge of liquid between smooth spheres is then no model."""
 _FACING = {"up": "right", "down": "left"}
 """The words for climbers."""
 NAMES = ("beads.material", "boundary.material", "liquid.name")
@@ -42,14 +44,15 @@ GIVEN_BY: Mapping[str, tuple[str, ...]] = {
 """Begins of the keys that the library gives to a case by a key."""
 _FRICTION = ("contact.friction.bead_bead", "contact.friction.bead_wall", "contact.rolling_friction")
 _OF_SURFACES = (
-    *("liquid.viscosity_ratio", "liquid.volume_fraction", "liquid.contact_angle"),
-    *("contact.rolling_friction", "contact.restitution", "contact.minimum_separation_ratio"),
+    *("liquid.meniscus_radius", "liquid.volume_fraction", "liquid.contact_angle"),
+    *("contact.rolling_friction", "contact.restitution"),
 )
+_ROUGHNESS = ("contact.roughness.bead_bead", "contact.roughness.bead_wall")
 _VISCOSITIES = ("liquid.kinematic_viscosity", "liquid.dynamic_viscosity")
 _OF_LIQUIDS = ("liquid.surface_tension", "liquid.density", *_VISCOSITIES)
 _LIQUIDS = ((_OF_LIQUIDS[0], _VISCOSITIES[1]), _OF_LIQUIDS[:3])
 """What a liquid of its own says: its surface tension, and its dynamic viscosity or density and kinematic viscosity."""
-SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_OF_SURFACES)
+SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_ROUGHNESS, *_OF_SURFACES)
 """Keys that a case may leave out because the library has values or defaults."""
 
 
@@ -75,10 +78,10 @@ def supplied(
     calibrated = liquid if said["liquid.law"] in (MISSING, DEFAULT_LAW) else None
     tables = {name: value for name, value in document.items() if name != "library"}
     tables.setdefault("contact", {})
-    written = {}
+    written: dict[str, Any] = {}
     for key in SUPPLIED:
-        instead = key in _VISCOSITIES and not given.isdisjoint(_VISCOSITIES)
-        if key in values and not (key in given or instead) and isinstance(tables.get(key.split(".")[0]), Mapping):
+        said_already = {key, *alternatives(model, key)} & {*given, *written}
+        if key in values and not said_already and isinstance(tables.get(key.split(".")[0]), Mapping):
             written[key], sources[key] = values[key].written, _source_of(key, values[key], calibrated)
     return changed(model, tables, written), sources, problems
 
@@ -134,6 +137,7 @@ def _values(
         "beads.density": library.numbers("materials", bead or "").get("density"),
         "contact.friction.bead_bead": on_bead.get("friction"),
         "contact.friction.bead_wall": on_wall.get("friction"),
+        **{key: library.roughness(bead, other) for key, other in zip(_ROUGHNESS, (bead, wall), strict=True)},
         **{key: on_wall.get(key.split(".")[1]) for key in _OF_SURFACES},
         **{f"liquid.{key}": known for key, known in of_liquid.items()},
     }
@@ -281,6 +285,24 @@ def _drive(case: Case) -> Case:
     return case
 
 
+def _surfaces(case: Case) -> Case:
+    """Roughness is small compared with the beads, and menisci fit between them and at walls."""
+    contact, liquid, smallest = case.contact, case.liquid.of_bridges, min(case.radii)
+    for name, rough in vars(contact.roughness).items():
+        if rough > _ROUGHEST * smallest:
+            most = 1e6 * _ROUGHEST * smallest
+            raise unusable(
+                f"contact.roughness.{name}", f"expected {most:.3g} um or less, a hundredth of a bead's radius"
+            )
+    try:
+        for radius in case.radii if liquid.meniscus_radius else ():
+            for other in (*case.radii, inf):
+                bridge_volume(*sorted((radius, other)), liquid)
+    except ValueError as error:
+        raise unusable("liquid.meniscus_radius", f"expected menisci that fit between the surfaces: {error}") from error
+    return case
+
+
 def _law(case: Case) -> Case:
     """A user's law can be used for the beads of the case."""
     if case.liquid.law not in LAWS:
@@ -351,5 +373,18 @@ def _gravity(case: Case) -> Case:
 
 
 STEPS: Sequence[Callable[[Case], Case]] = (
-    *(_radii, _viscosity, _count, _walkers, _drive, _law, with_run, _uphill, _spacing, check_bodies, _gravity),
+    *(
+        _radii,
+        _viscosity,
+        _count,
+        _walkers,
+        _drive,
+        _surfaces,
+        _law,
+        with_run,
+        _uphill,
+        _spacing,
+        check_bodies,
+        _gravity,
+    ),
 )
