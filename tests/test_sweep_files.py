@@ -129,8 +129,6 @@ def test_shipped_sweeps_are_the_papers() -> None:
     assert len(trays) == 96
     assert {number for number, _ in trays} == {2, 16, 64}
     assert {coverage for _, coverage in trays} == {0.05, 0.14, 0.25}
-    modes = _cases(load_sweep("modes"))
-    assert {round(dimer_of(case).sin_delta, 6) for case in modes} == {step / 20 for step in range(9)}
 
 
 BAD: list[tuple[dict[str, Any], str]] = [

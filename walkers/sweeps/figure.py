@@ -361,7 +361,7 @@ def _draw(
     if "x" in log and not all(one.is_number for one in along):
         raise refused("log", f"{along[0].label} has no numbers")
     label, points = _points(done, column, down)
-    parts = [(x, np.ones(len(points), dtype=bool), "") for x in along]
+    parts = [(x, _with_usual_others(x, along), "") for x in along]
     if panels is not None:
         parts = [(along[0], _where(panels, one), panels.text(one, by_name=True)) for one in panels.levels]
     looks, scale = _looks(hue, hollow=theory is not None)
@@ -397,6 +397,14 @@ def _draw(
         said.append(bars + ("" if errors_seen(points["error"], points["value"]) else ", smaller than the symbols"))
     figure.suptitle(plain_text("\n".join(line for one in said for line in wrap(one, round(14.0 * width)))))
     return figure
+
+
+def _with_usual_others(x: Factor, along: Sequence[Factor]) -> npt.NDArray[np.bool_]:
+    """Which points a panel shows: all, or of keys that vary one at a time those with the usual values of the others."""
+    usual = {one.keys: Counter(one.values).most_common(1)[0][0] for one in along}
+    changed = {one.keys: np.array([value != usual[one.keys] for value in one.values]) for one in along}
+    number = np.sum([*changed.values()], axis=0)
+    return np.array((number > 1).any() | changed[x.keys] | (number == 0))
 
 
 def _where(factor: Factor | None, level: Any) -> npt.NDArray[np.bool_]:
