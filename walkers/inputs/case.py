@@ -43,6 +43,9 @@ STIFFEST = 1e11
 """Largest Young's modulus of the contacts of a case, Pa: as hard as glass or steel; runs take a day."""
 
 
+_SOFTENED = Annotated[float, replace(units.MODULUS, smallest=5e6, largest=STIFFEST)]
+
+
 class Beads(Table):
     """``[beads]``: what all beads are made of."""
 
@@ -117,16 +120,17 @@ class Roughness(Table):
 class Contact(Table):
     """``[contact]``: the model of the contacts; the Young's modulus is that of the softened beads and walls.
 
-    The engine requires a restitution above 0.05. A modulus below 5 MPa changes velocities; ``walkers run CASE
-    --accuracy`` measures by how much a larger one changes them, up to 100 GPa.
+    The engine requires a restitution above 0.05. The modulus of ``"auto"`` is 50 MPa for loose beads; for walkers it is
+    the lowest of 50, 200, 800, ... MPa at which bridges hardly delay the contacts (`walkers.inputs.loads.delay`).
+    ``walkers run CASE --accuracy`` measures by how much a larger one changes velocities, up to 100 GPa.
     """
 
     friction: Friction = key("")
     roughness: Roughness = key("")
     rolling_friction: Coefficient = key("Coefficient of rolling friction (constant directional torque).", example=0.01)
     restitution: Number = key("Coefficient of restitution of the dry contact.", example=0.5, gt=0.05, le=1)
-    youngs_modulus: Annotated[float, replace(units.MODULUS, smallest=5e6, largest=STIFFEST)] = key(
-        "Young's modulus of beads and boundary: lower than the real one, so that the time step can be longer.", 5e7
+    youngs_modulus: Annotated[Filled[_SOFTENED], units.AUTO] = key(
+        "Young's modulus of beads and boundary: lower than the real one, so that the time step can be longer.", None
     )
     poissons_ratio: Number = key("Poisson's ratio.", 0.3, ge=0, lt=0.5)
 

@@ -16,7 +16,7 @@ from walkers.inputs.bodies import ARRANGEMENTS, MOST_BEADS, Cluster, Walkers, to
 from walkers.inputs.drive import common_frequency
 from walkers.inputs.keys import MISSING, parts_of, value_at
 from walkers.inputs.library import Known, Library, unmeasured
-from walkers.inputs.loads import bridge_at_rest, contact_loads, dimer_of, reach
+from walkers.inputs.loads import bridge_at_rest, contact_loads, delay, dimer_of, reach
 from walkers.inputs.origins import Source
 from walkers.inputs.run import with_run
 from walkers.inputs.standing import OVERLAP, check_bodies, overlaps
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 _PACKING = 0.55
 """Packing fraction of a settled wet pile, for the count that fills a height."""
+_SOFTEST, _LATEST = 5e7, 0.025
+"""Lowest Young's modulus of ``"auto"``, Pa, and the largest `delay`, rad: velocities are then within 2 %."""
 _ROUGHEST = 0.01
 """Largest roughness over the radius of a bead: the wedge of liquid between smooth spheres is then no model."""
 _FACING = {"up": "right", "down": "left"}
@@ -314,6 +316,19 @@ def _law(case: Case) -> Case:
     return case
 
 
+def _modulus(case: Case) -> Case:
+    """Young's modulus of ``"auto"``: walkers depend on it by the delay of their contacts."""
+    if case.contact.youngs_modulus is not None:
+        return case
+    modulus, late = _SOFTEST, inf
+    while late > _LATEST:
+        softened = case.put("contact.youngs_modulus", modulus)
+        late = max((delay(softened, walkers) for walkers in case.walkers), default=0.0)
+        modulus *= 4.0
+    why = f"auto: bridges delay contacts by {late:.1g} rad" if case.walkers else "auto"
+    return case.filled("contact.youngs_modulus", softened.contact.youngs_modulus, why)
+
+
 def _uphill(case: Case) -> Case:
     """The direction of the steepest way up, from the x axis toward y."""
     boundary = case.boundary
@@ -381,6 +396,7 @@ STEPS: Sequence[Callable[[Case], Case]] = (
         _drive,
         _surfaces,
         _law,
+        _modulus,
         with_run,
         _uphill,
         _spacing,

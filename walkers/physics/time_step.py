@@ -23,8 +23,9 @@ from dataclasses import dataclass
 from math import ceil, inf, pi, sqrt
 
 from walkers.physics.bridge import Roughness
-from walkers.physics.capillary import BridgeLiquid, bead_volume, cavitation_gap
+from walkers.physics.capillary import BridgeLiquid, bead_volume
 from walkers.physics.contact import reduced_modulus
+from walkers.physics.reynolds import largest_normal
 
 AUTO_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.2, "hertz": 0.1, "viscous": 0.4}
 """Largest share of each limit for ``"auto"`` with loose beads. At 0.4 of the viscous limit (2 µs for glycerol), the
@@ -77,9 +78,10 @@ def time_step_limits(
 
     def drag(reduced_radius: float, rough: float) -> float:
         """Largest normal lubrication resistance of a bridge between surfaces of this roughness, N s/m."""
-        return 6.0 * pi * liquid.viscosity * reduced_radius**2 / (rough + cavitation)
+        if liquid.law == "soulie":
+            return 6.0 * pi * liquid.viscosity * reduced_radius**2 / rough
+        return largest_normal(reduced_radius, rough, liquid)
 
-    cavitation = 0.0 if liquid.law == "soulie" else cavitation_gap(liquid)
     modulus = reduced_modulus(youngs_modulus, poissons_ratio)
     impacts, rates = [], []
     for radius, neighbours, walls in bridged:
