@@ -55,7 +55,7 @@ def compare(sources: Sources) -> dict[str, Any]:
     }
 
 
-def _known(numbers: Mapping[str, float]) -> dict[str, float | None]:
+def _known(numbers: Mapping[Any, Any]) -> dict[str, float | None]:
     return {name: float(one) if isfinite(one) else None for name, one in numbers.items()}
 
 
@@ -96,7 +96,9 @@ def _curve(sources: Sources, sweep: str, column: str, label: Callable[[float], s
     table = table[table["status"] == "finished"]
     models = predicted_column([case_of(Path(run)) for run in table["run"]], "velocity")[0] if len(table) else {}
     found = {"engine": table["velocity"], "theory": models.get(MODEL, nan), "curve": models.get(PAPER, nan)}
-    means = (table[[column]].assign(**found).astype(float) * 1e3).groupby(table[column].astype(float).round(_PLACES))
+    numbers = table[[column]].astype(float).round(_PLACES).assign(**found).astype(float)
+    means = numbers.groupby(column, as_index=False).mean()
     return [
-        {"of": f"{sweep}, {label(float(value))}", **_known(row[list(found)])} for value, row in means.mean().iterrows()
+        {"of": f"{sweep}, {label(float(row[column]))}", **_known({name: row[name] * 1e3 for name in found})}
+        for row in means.to_dict("records")
     ]
