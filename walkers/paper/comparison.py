@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.calibration.observations import Observation, numbers_of
+from walkers.inputs.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
-from walkers.paper.sources import SETS, Sources, ruby, sweep_of, thresholds_with_theory
+from walkers.paper.sources import Sources, of_facts, ruby, sets, sweep_of, thresholds_with_theory
 from walkers.runner.directory import case_of
 from walkers.theory.prediction import MODEL, PAPER, predicted_column
 
@@ -33,18 +34,19 @@ def compare(sources: Sources) -> dict[str, Any]:
     dict
         ``sets``: for each parameter set how many facts ``agree``, ``of`` how many, and its ``parameters``. ``facts``:
         what the paper ``says`` and where (``source``), what is ``expected``, our ``values`` and whether they ``agree``
-        by set, the ``theory`` of the first set, and whether the fact is ``derived`` from others and not counted.
+        by set, the ``theory`` of the shipped set, and whether the fact is ``derived`` from others and not counted.
         ``thresholds``: Γc as from `thresholds_with_theory`. ``curve``: engine and theory beside the one-parameter curve
         of Figs. 2 and 3, which is no measurement, mm/s.
     """
-    file, theory = ruby().file, _by_theory()
-    numbers = _by_engine(sources.table(SETS))
-    facts = [_fact(one, numbers, theory) for one in file.observations]
+    experiments = list(ruby().experiments)
+    cases = {name: dict(zip(experiments, sweep_of(of_facts(name)).cases(), strict=True)) for name in sets()}
+    numbers, theory = {name: _by_engine(sources.table(of_facts(name))) for name in sets()}, _by_theory(cases["shipped"])
+    facts = [_fact(one, numbers, theory) for one in ruby().file.observations]
     counted = [fact["agree"] for fact in facts if not fact["derived"]]
     return {
         "sets": {
-            name: {"agree": sum(one[name] for one in counted), "of": len(counted), "parameters": parameters}
-            for name, parameters in file.sets.items()
+            name: {"agree": sum(one[name] for one in counted), "of": len(counted), "parameters": _parameters(of)}
+            for name, of in cases.items()
         },
         "facts": facts,
         "thresholds": [_known(row) for row in thresholds_with_theory(sources).to_dict("records")],
@@ -59,22 +61,29 @@ def _known(numbers: Mapping[Any, Any]) -> dict[str, float | None]:
     return {name: float(one) if isfinite(one) else None for name, one in numbers.items()}
 
 
-def _by_engine(table: pd.DataFrame) -> dict[str, Numbers]:
-    """Numbers of the runs of `SETS` by set; NaN for those that are not finished."""
+def _parameters(cases: Mapping[str, Case]) -> dict[str, str]:
+    """What the calibration varies, by its symbol, as a case file says it."""
+    shown = {}
+    for name, one in ruby().file.parameters.items():
+        case = cases[one.experiments[0] if one.experiments else next(iter(cases))]
+        texts = {origin.key: origin.text for origin in case.origins}
+        shown[one.symbol or name] = " and ".join(dict.fromkeys(texts[key] for key in one.keys))
+    return shown
+
+
+def _by_engine(table: pd.DataFrame) -> Numbers:
+    """Numbers of the runs of a sweep of all experiments; NaN for those that are not finished."""
     nothing: Mapping[str, float] = defaultdict(lambda: nan)
-    done = zip(table["run"], table["status"] == "finished", strict=True)
-    each = iter([numbers_of(run) if finished else nothing for run, finished in done])
-    return {name: {label: next(each) for label in ruby().experiments} for name in ruby().file.sets}
+    runs = zip(ruby().experiments, table["run"], table["status"] == "finished", strict=True)
+    return {label: numbers_of(run) if finished else nothing for label, run, finished in runs}
 
 
-def _by_theory() -> Numbers:
-    """Speeds of the first set by Coulomb friction and drag; NaN for other quantities, and where contacts open."""
-    labels = list(ruby().experiments)
-    cases = [case for case, _ in zip(sweep_of(SETS).cases(), labels, strict=False)]
-    numbers: dict[str, dict[str, float]] = {label: defaultdict(lambda: nan) for label in labels}
+def _by_theory(cases: Mapping[str, Case]) -> Numbers:
+    """Speeds by Coulomb friction and drag; NaN for other quantities, and where contacts open."""
+    numbers: dict[str, dict[str, float]] = {label: defaultdict(lambda: nan) for label in cases}
     for quantity in {one.quantity for one in ruby().file.observations}:
-        values = predicted_column(cases, quantity)[0].get(MODEL, np.full(len(labels), nan))
-        for label, value in zip(labels, values, strict=True):
+        values = predicted_column(list(cases.values()), quantity)[0].get(MODEL, np.full(len(cases), nan))
+        for label, value in zip(cases, values, strict=True):
             numbers[label][quantity] = float(value)
     return numbers
 

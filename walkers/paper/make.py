@@ -12,7 +12,7 @@ from walkers.errors import refused
 from walkers.extras import require
 from walkers.paper.comparison import compare
 from walkers.paper.figures import fig1b, fig2_threshold, fig3, fig4, fig_alignment, of_sweep
-from walkers.paper.sources import SETS, NothingFinishedError, Sources, sweep_of
+from walkers.paper.sources import NothingFinishedError, Sources, of_facts, sets, sweep_of
 from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.progress import progress_of
 from walkers.runner.files import write_json, write_text
@@ -47,7 +47,7 @@ FIGURES = {
     ),
 }
 COMPARISON = "comparison"
-COMPARED = (SETS, "fig2-threshold", "fig2", "fig3")
+COMPARED = (*map(of_facts, sets()), "fig2-threshold", "fig2", "fig3")
 """Sweeps of the comparison."""
 
 

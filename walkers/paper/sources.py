@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from walkers.calibration.file import Calibration, load_calibration
 from walkers.errors import WalkersError
@@ -21,19 +23,37 @@ from walkers.theory.prediction import threshold
 if TYPE_CHECKING:
     import pandas as pd
 
-SETS = "ruby-sets"
-"""The sweep of all named sets of the calibration ``ruby`` in all of its experiments, set by set."""
+_FRICTION_ONLY = {
+    **{"friction_wall": 0.311, "friction_slide": 0.311, "friction_bead": 0.083, "rolling_friction": 0.0035},
+    **{"roughness": 2000.0, "meniscus_radius": 40.0},
+}
+"""Surfaces so rough that bridges drag little: outside of what the calibration searches, in the units of its file."""
 
 
 @cache
 def ruby() -> Calibration:
-    """The calibration with what the paper measured and states; the first of its sets is the shipped one."""
+    """The calibration with what the paper measured and states."""
     return load_calibration("ruby")
 
 
+@cache
+def sets() -> dict[str, Mapping[str, float] | None]:
+    """Parameter sets to compare: the cases as they are, the sets of the calibration, and one of friction alone."""
+    return {"shipped": None, **ruby().file.sets, "friction only": _FRICTION_ONLY}
+
+
+def of_facts(name: str) -> str:
+    """The name of the sweep of all experiments of the calibration with a parameter set."""
+    return f"facts-{name.replace(' ', '-')}"
+
+
 def sweep_of(name: str) -> Sweep:
-    """A shipped sweep, or `SETS`."""
-    return ruby().sweep(SETS, ruby().values(ruby().sets)) if name == SETS else load_sweep(name)
+    """A shipped sweep, or one of `of_facts`."""
+    for label, values in sets().items():
+        if name == of_facts(label):
+            row = None if values is None else np.array([[values[one] for one in ruby().file.parameters]])
+            return ruby().sweep(name, row)
+    return load_sweep(name)
 
 
 def described(case: Case) -> str:
