@@ -81,7 +81,10 @@ _BARE = {
     "dimers": {"radii": ["0.3 mm", "0.2 mm"]},
     "liquid": {"surface_tension": "19.2 mN/m", "dynamic_viscosity": "0 Pa*s"},
     "boundary": {"material": "glass"},
-    "contact": {"friction": {"bead_bead": 0.0, "bead_wall": 0.0}, "rolling_friction": 0.0, "restitution": 1.0},
+    "contact": {
+        **{"friction": {"bead_bead": 0.0, "bead_wall": 0.0}, "rolling_friction": 0.0, "restitution": 1.0},
+        **{"roughness": {"bead_bead": "2 um", "bead_wall": "2 um"}, "youngs_modulus": "50 MPa"},
+    },
     "drive": {"frequency": "80 Hz", "peak_acceleration": "0 g", "frame": "container"},
     "run": {"time_step": "1 us", "samples_per_cycle": 1},
     "environment": {"gravity": "0 m/s^2"},
@@ -358,7 +361,9 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
     tables = [f"1 1 {S!r} {R!r}\n{fine}" if table.startswith(f"1 1 {S!r} {R!r}") else table for table in tables]
     ours = bench.run(replace(deck, files={**deck.files, BRIDGES_NAME: "bridge ".join(tables)}))
     angle = degrees(sqrt(2.0 * bare.liquid.contact_angle))
-    text = rendered("walkers.check", "stock.lig.j2", case=bare, scene=scene, layout=deck.layout, angle=angle)
+    closest = meeting.roughness / meeting.reduced_radius
+    given = {"case": bare, "scene": scene, "layout": deck.layout, "angle": angle, "closest": closest}
+    text = rendered("walkers.check", "stock.lig.j2", **given)
     theirs = bench.run(replace(deck, text=text))
     error = farthest(ours.forces[..., :3], theirs.forces[..., :3])
     yield Line("two beads separate: force, Debian's own bridge model", 0.0, error, 1e-9)

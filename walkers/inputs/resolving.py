@@ -143,7 +143,9 @@ def _values(
         **{key: on_wall.get(key.split(".")[1]) for key in _OF_SURFACES},
         **{f"liquid.{key}": known for key, known in of_liquid.items()},
     }
-    return {**unmeasured()} | {key: known for key, known in values.items() if known}
+    # Of the two that give the liquid, the library's own is taken; without one it is a volume.
+    usual = {key: known for key, known in unmeasured().items() if key != "liquid.meniscus_radius"}
+    return usual | {key: known for key, known in values.items() if known}
 
 
 def _source_of(key: str, known: Known, liquid: str | None) -> Source:
