@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from PIL import Image
-from walkers.calibration.observations import numbers_of
 
 from tests.conftest import call, run_shipped, shipped_sweep
 from tests.printed import letters, spoilt
+from walkers.calibration.observations import numbers_of
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case
 from walkers.inputs.sweep import expand
@@ -21,7 +21,7 @@ from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.paper.comparison import compare
 from walkers.paper.figures import theory_of_cycles
 from walkers.paper.make import FIGURES, make_figures
-from walkers.paper.sources import SETS, NothingFinishedError, Sources, ruby, sweep_of
+from walkers.paper.sources import NothingFinishedError, Sources, of_facts, ruby, sets, sweep_of
 from walkers.postprocess.drawing import save_figure
 from walkers.postprocess.gait import gait
 from walkers.sweeps.scheduler import Options, run_sweep
@@ -38,6 +38,7 @@ FEWER: dict[str, dict[str, Any]] = {
     "fig4": {},
     "alignment": {"dimers.angle": ["0 deg", "15 deg"]},
 }
+FACTS = [*map(of_facts, sets())]
 
 
 @pytest.fixture(scope="session")
@@ -52,11 +53,12 @@ def sources(once: Callable[[str, Callable[[Path], object]], Path]) -> Sources:
             if "descend" in given:
                 given["descend"] |= {"from": "1.4 g", "to": "0.4 g", "step": "0.2 g"}
             run_shipped(name, given, out)
-        sets = sweep_of(SETS)
-        columns = dict(zip(sweep_of(SETS).keys, map(list, zip(*sets.rows, strict=True)), strict=True))
-        del columns["run.most_cycles"]
-        given = {"case": "fig1b", "set": SHORT, "zip": [columns]}
-        assert not run_sweep(expand(given, source=SETS, name=SETS, folder=out), out, Options(2))[1]
+        for name in FACTS:
+            whole = sweep_of(name)
+            columns = dict(zip(whole.keys, map(list, zip(*whole.rows, strict=True)), strict=True))
+            del columns["run.most_cycles"]
+            given = {"case": "fig1b", "set": SHORT, "zip": [columns]}
+            assert not run_sweep(expand(given, source=name, name=name, folder=out), out, Options(2))[1]
 
     return Sources(once("paper", run))
 
@@ -77,21 +79,22 @@ def test_peak_forces_are_the_papers(case: str, g: int, gamma0: float) -> None:
     assert dimer_of(load_case(case)).gamma0(g * ACCELERATION_OF_ONE_G) == pytest.approx(gamma0, rel=3e-3)
 
 
-def test_the_first_set_and_the_first_values_of_the_sensitivities_are_the_shipped_ones() -> None:
-    cases = dict(zip(ruby().experiments, sweep_of(SETS).cases(), strict=False))
-    pairs = [
-        (cases[name], load_case(case)) for name, case in {"walks": "fig1b", "fig4a": "fig4a", "fig4b": "fig4b"}.items()
-    ]
+def test_what_is_called_shipped_is_that_of_the_shipped_cases() -> None:
+    cases = dict(zip(ruby().experiments, sweep_of(of_facts("shipped")).cases(), strict=True))
+    names = {"walks": "fig1b", "fig4a": "fig4a", "fig4b": "fig4b"}
+    pairs = [(cases[name], load_case(case)) for name, case in names.items()]
     pairs.append((next(sweep_of("sensitivity").cases()), load_case("fig1b")))
     for ours, shipped in pairs:
         assert ours.contact == shipped.contact
         assert ours.liquid == shipped.liquid
-        assert (ours.radii[:2], ours.excitation) == (shipped.radii[:2], shipped.excitation)
+        assert ours.excitation == shipped.excitation
+        assert ours.walkers[0].radii == shipped.walkers[0].radii
 
 
 def test_facts_are_judged_by_the_runs_of_each_set(sources: Sources, compared: dict[str, Any]) -> None:
-    facts, runs = {one["name"]: one for one in compared["facts"]}, iter(sources.table(SETS)["run"])
-    numbers = {name: {label: numbers_of(next(runs)) for label in ruby().experiments} for name in ruby().file.sets}
+    facts = {one["name"]: one for one in compared["facts"]}
+    runs = {name: dict(zip(ruby().experiments, sources.table(of_facts(name))["run"], strict=True)) for name in sets()}
+    numbers = {name: {label: numbers_of(run) for label, run in of.items()} for name, of in runs.items()}
     assert list(facts) == [one.name for one in ruby().file.observations]
     assert list(compared["sets"]) == list(numbers)
     for name, found in numbers.items():
@@ -166,7 +169,7 @@ def test_figures_and_comparison_do_without_what_failed(sources: Sources, tmp_pat
     """A copy of the sweeps of which each has lost its first run, and then all."""
     out = tmp_path / "runs"
     shutil.copytree(sources.out, out)
-    runs = {sweep: [out / run for run in read_record(out / sweep).runs] for sweep in (*FEWER, SETS)}
+    runs = {sweep: [out / run for run in read_record(out / sweep).runs] for sweep in (*FEWER, *FACTS)}
     drawings = [drawing for drawing in FIGURES.values() if runs.keys() & set(drawing.sweeps)]
     for lost in (1, None):
         for run in [run for each in runs.values() for run in each[:lost]]:
@@ -179,11 +182,10 @@ def test_figures_and_comparison_do_without_what_failed(sources: Sources, tmp_pat
                 with pytest.raises(NothingFinishedError):
                     drawing.draw(left)
         found = compare(left)
-        first = next(iter(found["sets"]))
-        missing = {one["name"]: one["values"][first] is None for one in found["facts"]}
+        missing = {one["name"]: one["values"]["shipped"] is None for one in found["facts"]}
         assert missing["walks"]
         assert missing["fig4a_velocity"] is (lost is None)
-        assert not any(one["agree"][first] for one in found["facts"] if missing[one["name"]])
+        assert not any(one["agree"]["shipped"] for one in found["facts"] if missing[one["name"]])
         assert rendered("walkers.paper", "comparison.md.j2", **found).count("no walker") >= sum(missing.values())
 
 

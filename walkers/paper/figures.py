@@ -122,7 +122,9 @@ def fig4(sources: Sources) -> Figure:
             trajectory = sources.trajectory(row["run"])
             _draw_cycles(panel, trajectory, row, letter)
             panel.set_title(f"{described(trajectory.case)}\n$\\Gamma_0$ = {row['gamma0']:.3g}")
-        legend_below(panel, title="means in mm/s; lines: theory; dashes: measured mean")
+        panel.plot([], [], color="0.3", lw=0.9, label=MODEL)
+        panel.plot([], [], color="0.3", lw=1.0, ls=_MEASURED_DASHES, label="measured mean")
+        legend_below(panel, title="means in mm/s")
     letter_panels(axes)
     return figure
 
@@ -199,4 +201,4 @@ def _draw_chart(axes: Axes) -> None:
         axes.plot(points, np.zeros(len(points)), marker, mfc="none", ms=4, label=f"Fig. {name[3:]}")
     axes.axvline(_LARGEST_V, color="0.45", ls="-.", lw=0.8, label="paper's bound, 0.4")
     axes.set(xlabel="V", ylabel="U", title="grey: small angles\nstay small")
-    axes.legend(loc="upper right")
+    legend_below(axes, ncols=2, columnspacing=1.0, handlelength=1.8)

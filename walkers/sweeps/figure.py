@@ -18,7 +18,7 @@ import numpy.typing as npt
 from walkers.errors import InputError, refused
 from walkers.inputs.case import Case
 from walkers.inputs.library import unmeasured
-from walkers.postprocess.drawing import errors_seen, letter_panels, new_figure, plain_text, styled
+from walkers.postprocess.drawing import TWO_COLUMNS, errors_seen, letter_panels, new_figure, plain_text, styled
 from walkers.postprocess.numbers import declared, is_declared
 from walkers.postprocess.quantities import unit_shown
 from walkers.postprocess.results import derived
@@ -367,7 +367,7 @@ def _draw(
     looks, scale = _looks(hue, hollow=theory is not None)
     columns = min(len(parts), 2 if len(parts) in (2, 4) else 3)
     rows = ceil(len(parts) / columns)
-    width, height = (5.6, 3.8) if len(parts) == 1 else (7.0, 6.0 / columns * rows + 0.9)
+    width, height = TWO_COLUMNS, 4.2 if len(parts) == 1 else 6.0 / columns * rows + 0.9
     shared = {"sharey": True, "sharex": len(along) == 1}
     figure, grid = new_figure(width, height, nrows=rows, ncols=columns, squeeze=False, **shared)
     for axes, (number, (x, here, name)) in zip(grid.flat, enumerate(parts), strict=False):
