@@ -125,6 +125,7 @@ def test_the_papers_curve_stands_beside_ours_uncounted(sources: Sources, compare
     at_four = table[np.isclose(table["drive.peak_acceleration"], 4.0)]["velocity"] * 1e3
     assert len(at_four) == 2
     assert rows["fig2, 4 g"]["engine"] == pytest.approx(at_four.mean())
+    assert rows["fig2, 4 g"]["by_frequency"] == pytest.approx(at_four.iloc[1] / at_four.iloc[0])
 
 
 def test_the_table_is_of_all_of_it(compared: dict[str, Any]) -> None:

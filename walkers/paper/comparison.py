@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkers.calibration.observations import Observation, numbers_of
+from walkers.calibration.observations import LEAST_SPEED, Observation, numbers_of
 from walkers.inputs.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.paper.sources import Sources, of_facts, ruby, sets, sweep_of, thresholds_with_theory
@@ -100,14 +100,21 @@ def _fact(one: Observation, numbers: Mapping[str, Numbers], theory: Numbers) -> 
 
 
 def _curve(sources: Sources, sweep: str, column: str, label: Callable[[float], str]) -> list[dict[str, Any]]:
-    """The rows of a sweep, means over what else varies: label, engine, theory and the paper's curve, mm/s."""
+    """Rows of a sweep: label, and means over the frequencies by engine, theory and the paper's curve, mm/s.
+
+    ``by_frequency`` is the engine's velocity at the highest frequency over that at the lowest.
+    """
     table = sources.table(sweep)
-    table = table[table["status"] == "finished"]
+    table = table[table["status"] == "finished"].sort_values("frequency")
     models = predicted_column([case_of(Path(run)) for run in table["run"]], "velocity")[0] if len(table) else {}
     found = {"engine": table["velocity"], "theory": models.get(MODEL, nan), "curve": models.get(PAPER, nan)}
-    numbers = table[[column]].astype(float).round(_PLACES).assign(**found).astype(float)
-    means = numbers.groupby(column, as_index=False).mean()
-    return [
-        {"of": f"{sweep}, {label(float(row[column]))}", **_known({name: row[name] * 1e3 for name in found})}
-        for row in means.to_dict("records")
-    ]
+    numbers = table[[column]].astype(float).round(_PLACES).assign(**found)
+    rows = []
+    for _, group in numbers.groupby(column):
+        slow, fast = (float(group["engine"].iloc[end]) for end in (0, -1))
+        ratio = fast / slow if len(group) > 1 and abs(slow) > LEAST_SPEED else nan
+        means = {name: float(group[name].mean()) * 1e3 for name in found}
+        rows.append(
+            {"of": f"{sweep}, {label(float(group[column].iloc[0]))}", **_known({**means, "by_frequency": ratio})}
+        )
+    return rows
