@@ -153,7 +153,7 @@ def test_the_origins_tell_the_numbers_of_the_case(name: str) -> None:
 
 
 def test_what_is_called_uncertain_keeps_where_it_comes_from(tmp_path: Path) -> None:
-    ranges = {"liquid.surface_tension": ["15 mN/m", "25 mN/m"], "contact.friction.bead_wall": [0.2, 0.4]}
+    ranges = {"liquid.surface_tension": ["15 mN/m", "25 mN/m"], "contact.friction.bead_wall": [0.1, 0.4]}
     ranges["dimers.radii[1]"] = ["0.19 mm", "0.2 mm"]  # an end may be the value of the case
     (file := tmp_path / "ranges.toml").write_text(to_toml({**load_case("fig1b").document, "uncertain": ranges}))
     found = origins(case := load_case(file))

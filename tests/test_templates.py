@@ -52,7 +52,7 @@ def test_bridges_may_push_loose_beads_and_have_no_viscosity() -> None:
     assert not any(map(any, resistances))
 
 
-CONTENT = {8: "29bebb5b15f61619"}
+CONTENT = {9: "b5bc9e772130d902"}
 """Digest of all that the engine reads of some cases, for the version of the decks' content."""
 
 
@@ -108,7 +108,7 @@ def test_the_engine_reads_the_law_out_of_its_table(name: str, other: float) -> N
     expected = law(given).forces(gaps).columns()
     scale = np.maximum(np.abs(expected), 1e-3 * np.abs(expected).max(axis=0))
     read = RecordedLaw(f"\nbridge 1 1 {given.radius!r} {given.other_radius!r}\n{table.text()}", None)(given)
-    np.testing.assert_array_less(np.abs(read.forces(gaps).columns() - expected), 10 * TOLERANCE * scale + 1e-30)
+    np.testing.assert_array_less(np.abs(read.forces(gaps).columns() - expected), 20 * TOLERANCE * scale + 1e-30)
 
 
 def numbers_of(folder: Path) -> list[list[float]]:
