@@ -159,12 +159,12 @@ def test_what_is_called_uncertain_keeps_where_it_comes_from(tmp_path: Path) -> N
     found = origins(case := load_case(file))
     tension, friction, radius = (found[key] for key in ranges)
     assert (tension.origin, tension.text, tension.range) == ("library", "19.2 mN/m", ("15 mN/m", "25 mN/m"))
-    assert (friction.origin, friction.guessed, friction.range) == ("calibrated", True, (0.2, 0.4))
+    assert (friction.origin, friction.guessed, friction.range) == ("calibrated", True, (0.1, 0.4))
     assert (radius.text, radius.guessed) == ("0.2 mm", True)
     # In the same words wherever it is shown.
     words = [f"{one}, uncertain" for one in ("library", "calibrated", "given")]
     assert [one.word for one in (tension, friction, radius)] == words
-    assert ", uncertain, range 0.2 to 0.4" in call("show", str(file), check=True).stdout
+    assert ", uncertain, range 0.1 to 0.4" in call("show", str(file), check=True).stdout
     assert "uncertain  surface_tension 19.2 mN/m, friction.bead_wall" in "\n".join(
         lines_of_rest(rests_on(case.origins))
     )
@@ -376,6 +376,14 @@ def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(own: Pat
     assert "weighed" in call("--library", "other.toml", "show", "mine.toml", check=True).stdout
     assert "my beads  " in call("--library=other.toml", "library", check=True).stdout
     assert "my beads  " not in call("library", check=True).stdout
+
+
+def test_ranges_of_roughness_end_where_a_case_is_refused() -> None:
+    """At a hundredth of the radius of the smallest bead, 0.2 mm; the spread of such a case can be drawn."""
+    case = load_case("fig1b", {"boundary.material": "polystyrene"})
+    assert origins(case)["contact.roughness.bead_wall"].range == ("22.4 nm", "2000 nm")
+    assert origins(load_case("fig1b"))["contact.roughness.bead_wall"].range == ("14.1 nm", "141 nm")
+    assert len(list(spread_sweep(case, 32).cases())) == 32
 
 
 def test_what_a_case_describes_itself_needs_no_library() -> None:

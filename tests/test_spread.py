@@ -21,12 +21,13 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     """Glass on polystyrene at 10 g walks or not as one guesses; the single number, exact to 1e-5, does not say so."""
     case = Case.read({**GLASS, "run": {"cycles": 6}}, name="guessed")
     spread = run_spread(case, runs_folder, Options(2), points=4)
-    assert {one.key for one in spread.varied} == {one.key for one in case.origins if one.guessed}
+    rough = {"contact.roughness.bead_bead", "contact.roughness.bead_wall"}  # of the library, for these materials
+    assert {one.key for one in spread.varied} == {one.key for one in case.origins if one.guessed} | rough
     assert {one.key for one in spread.held} == {"contact.friction.bead_bead", "contact.rolling_friction"}
     assert "contact_angle 0 deg (0 deg to 60 deg; half of the draws at 0 deg)" in describe(spread)
     table = walkers.load(spread.directory).table()
     assert table["contact.friction.bead_wall"].between(0.1, 0.6).all()
-    assert (table["liquid.viscosity_ratio"] > 1.0).sum() == 2  # half of the draws: the case's own is the median
+    assert (table["liquid.volume_fraction"] > 0.01).sum() == 2  # half of the draws: the case's own is the median
     assert (table["liquid.contact_angle"] == 0.0).sum() == 2  # its own is the end of what is possible
     assert sum(spread.counts.values()) == 4
     # The headline has the band from now on, which holds it.
@@ -37,7 +38,7 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     assert f"band {band_text(*ends, 'm/s')}" in done.describe()
     told = {one["key"]: one["origin"] for one in done.result.about["rests_on"]}
     assert told["contact.friction.bead_wall"] == "given"
-    assert told.keys() == unmeasured().keys()
+    assert told.keys() == unmeasured().keys() - {"liquid.meniscus_radius"}  # in place of which there is a fraction
     # It is for its ranges alone, with which a run does not change its name.
     done = walkers.run(
         Case.read({**case.document, "uncertain": {"contact.friction.bead_wall": [0.2, 0.6]}}), runs_folder
