@@ -16,8 +16,6 @@ from scipy.stats import t as student
 from walkers.calibration.observations import FloatArray, Observation
 from walkers.inputs.axes import unit_cube
 
-LEAST_SAMPLES = 400.0
-"""Smallest effective sample size of a converged posterior."""
 LARGEST = 10.0
 """Deviations at which distances from a fact end, so that sets that are far off do not shape the emulators."""
 _FREEDOM = 4.0
@@ -97,7 +95,6 @@ class Posterior:
 
     points: FloatArray  # of a Sobol sequence in the unit cube of the prior, shape (N, D)
     log_weight: FloatArray  # normalised, shape (N,)
-    log_evidence: float  # of the mean likelihood over the prior
     seed: int
 
     @classmethod
@@ -107,8 +104,7 @@ class Posterior:
         unit = unit_cube("sobol", used[0].process.n_features_in_, points, seed)
         parts = [unit[at : at + _AT_ONCE] for at in range(0, points, _AT_ONCE)]
         total = np.concatenate([np.sum([one.log_likelihood(part) for one in used], axis=0) for part in parts])
-        whole = float(logsumexp(total))
-        return cls(unit, total - whole, whole - float(np.log(points)), seed)
+        return cls(unit, total - logsumexp(total), seed)
 
     @property
     def effective_samples(self) -> float:

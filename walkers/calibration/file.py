@@ -51,6 +51,11 @@ class Parameter(Table):
             raise ValueError("expected numbers above zero: log is that of magnitudes")
         return value
 
+    @property
+    def label(self) -> str:
+        """Symbol and unit, if it has them."""
+        return f"{self.symbol}{f' ({self.unit})' if self.symbol and self.unit else ''}"
+
     @cached_property
     def _prior(self) -> Any:
         """The prior of the value, or of its logarithm (scipy)."""

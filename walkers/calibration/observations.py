@@ -35,7 +35,7 @@ Angle = Literal["largest_angle", "smallest_angle"]
 """Of all walkers to the drive axis at the end of the run, in either direction, 0 to 90 degrees."""
 NO_NUMBERS: dict[str, float] = dict.fromkeys((*get_args(Speed), *get_args(Slip), *get_args(Angle)), nan)
 """Quantities of a run that failed."""
-_LEAST_SPEED = 5e-5
+LEAST_SPEED = 5e-5
 """m/s; a ratio to a smaller speed has no meaning."""
 Names = Annotated[list[str], Field(min_length=1)]
 
@@ -120,7 +120,7 @@ class Observation(Table):
         if not self.over:
             return mean
         below = float(np.mean([numbers[label][self.quantity] for label in self.over]))
-        return nan if kind_of(self.quantity) is SPEED and abs(below) < _LEAST_SPEED else mean / below
+        return nan if kind_of(self.quantity) is SPEED and abs(below) < LEAST_SPEED else mean / below
 
     def residual(self, number: float) -> float:
         """How far a number is from what the fact allows, in deviations; NaN for NaN."""
