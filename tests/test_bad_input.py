@@ -316,9 +316,7 @@ COMMANDS: list[tuple[str, str]] = [
     ("report {run} --to nowhere/a.html", "nowhere: there is no such folder"),
     ("plot {run} --to out.png", "out.png: expected a folder"),
     ("export {run} --to lammps -o walk.dcd", "expected the name of a .lammpstrj file"),
-    ("export {run} --to vtk --open", "--open: is for --to paraview"),
     ("export {run} --to deck --every 2", "--every: is for --to vtk, paraview, lammps"),
-    ("export {run} --to paraview -o vtk --colour beauty", "expected one of bead, large, omega, radius"),
     *((f"export {{run}} --to archive {words}", told) for words, told in (
         ("-o run.tar", "-o: expected the name of a .zip file"),
         ("-o nowhere/run.zip", "No such file"),
@@ -341,10 +339,6 @@ COMMANDS: list[tuple[str, str]] = [
         ("--begin '0.05 s' --end '0.05 s'", "expected times within the drive, 0 to 0.1 s"),
     )),
     ("--library own.toml render --film {run} --size wide", "--size: 'wide': expected 360p, 480p, 720p, 1080p"),
-    *(
-        (f"export {{pile}} --to {form} --as-placed", "--as-placed: is for independent walkers")
-        for form in ("vtk", "paraview")
-    ),
 ]  # fmt: skip
 
 

@@ -51,10 +51,9 @@ from walkers.postprocess.dump import BinaryDump, DumpError, local_frames
 from walkers.postprocess.paraview import write_vtk
 from walkers.postprocess.report.run import result_html
 from walkers.postprocess.results import measure, read
-from walkers.runner.directory import CASE_NAME, FIRST_SEGMENT, case_of
+from walkers.runner.directory import CASE_NAME, FIRST_SEGMENT, case_of, recomputed
 from walkers.runner.failures import DiskFull
 from walkers.runner.files import write_json
-from walkers.runner.manifest import recomputed
 from walkers.show import describe, summarise
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.table import load as load_table

@@ -109,7 +109,7 @@ def make_figures(
         failed |= {sweep: failures} if failures else {}
     figures = [name for name in chosen if name in FIGURES]
     # Processes of loky do not import the caller's script, unlike those of `multiprocessing`.
-    draw = joblib.Parallel(n_jobs=min(options.workers, len(figures) or 1))
+    draw = joblib.Parallel(n_jobs=min(options.decks_at_once, len(figures) or 1))
     outcomes = draw(joblib.delayed(draw_figure)(name, out, to, formats) for name in figures)
     files = [path for outcome in outcomes if isinstance(outcome, list) for path in outcome]
     left_out = {name: one for name, one in zip(figures, outcomes, strict=True) if isinstance(one, str)}

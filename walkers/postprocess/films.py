@@ -38,18 +38,15 @@ def render_film(
 ) -> Path:
     """Render a film of one walker if walkers are independent or one is chosen, otherwise of all beads.
 
+    `InputError` and `WalkersError` if the format cannot hold the film, the walker does not exist, or no frame is
+    between begin and end; if ffmpeg fails.
+
     Parameters
     ----------
     directory, to
         A run directory, and the MP4 or GIF file to write; None: ``film.mp4`` in the run directory.
     options, on_progress
         Options; a function that is called after each frame.
-
-    Raises
-    ------
-    InputError, WalkersError
-        If the format cannot hold the film, the walker does not exist, or no frame is between begin and end; if ffmpeg
-        fails.
     """
     path, (wide, tall) = to or directory / "film.mp4", options.size
     check_place(path, ".mp4", ".gif")

@@ -72,7 +72,7 @@ ASIDE = frozenset(
 )
 """Numbers that are not shown by themselves: errors of others, values of the case, conditions."""
 _HIDDEN = ASIDE | {
-    *("axial_velocity", "axial_left_facing", "walkers_met", "turned_first", "turned_last", "ended_early", "duration"),
+    *("axial_velocity", "axial_left_facing", "walkers_met", "turned_first", "turned_last", "ended_early", "duration")
 }
 """Numbers that rows leave out, because others count."""
 _OF_UP = "on a slope of those that started facing up"

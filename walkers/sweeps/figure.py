@@ -105,6 +105,8 @@ class LeftOutWarning(UserWarning):
 def figure_of(table: pd.DataFrame, options: FigureOptions = FigureOptions(), predict: Predict | None = None) -> Figure:
     """Figure of the table of a sweep.
 
+    `InputError` if no point is finished, or there is no such column.
+
     Parameters
     ----------
     table
@@ -120,11 +122,6 @@ def figure_of(table: pd.DataFrame, options: FigureOptions = FigureOptions(), pre
     Figure
         Means; bars are the scatter over copies where the table has it. The axis of a key has the unit of the sweep
         file; other columns are in mm, mm/s, g (9.8 m/s²) and degrees. A `LeftOutWarning` reports what is left out.
-
-    Raises
-    ------
-    InputError
-        If no point is finished, or there is no such column.
     """
     column = column_of(table, options.y)
     done = table[table["status"] == "finished"]

@@ -25,13 +25,7 @@ import numpy.typing as npt
 from walkers.extras import require
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of, resistances_at_rest
-from walkers.theory.quasistatic import (
-    FloatArray,
-    inertia_matrix,
-    normal_force_matrix,
-    rolling_matrix,
-    translation,
-)
+from walkers.theory.quasistatic import FloatArray, inertia_matrix, normal_force_matrix, rolling_matrix, translation
 
 STEPS_PER_CYCLE = 64
 """Velocities differ from those with 1024 steps by up to 0.01 mm/s, 0.07 without bridge drag (80 Hz, up to 11 g)."""

@@ -139,13 +139,7 @@ def _differ(a: FloatArray, b: FloatArray) -> bool:
 
 @njit(cache=True)
 def _stage(
-    table: FloatArray,
-    mu: FloatArray,
-    drive: FloatArray,
-    end: float,
-    length: float,
-    start: Three,
-    work: FloatArray,
+    table: FloatArray, mu: FloatArray, drive: FloatArray, end: float, length: float, start: Three, work: FloatArray
 ) -> bool:
     """An implicit Euler step from the velocities ``start``, in place; returns whether forces were found."""
     seconds, state = length / drive[0], work[:4]
