@@ -51,7 +51,7 @@ fix tension all property/global surfaceTension scalar {liquid.surface_tension!r}
 fix angle all property/global contactAngle peratomtype 0.0 0.0
 fix content all property/global surfaceLiquidContentInitial scalar {liquid.volume_fraction!r}
 fix viscosity all property/global fluidViscosity scalar {liquid.viscosity!r}
-fix nearest all property/global minSeparationDistanceRatio scalar {contact.minimum_separation_ratio!r}
+fix nearest all property/global minSeparationDistanceRatio scalar {contact.roughness.bead_wall / case.radii[0]!r}
 fix farthest all property/global maxSeparationDistanceRatio scalar 1.2
 """
 

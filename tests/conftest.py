@@ -53,7 +53,7 @@ REFERENCE: dict[str, Any] = {
         "rolling_friction": 0.0,
         "restitution": 0.3,
         "youngs_modulus": "50 MPa",
-        "minimum_separation_ratio": 0.01,
+        "roughness": {"bead_bead": "1 um", "bead_wall": "1 um"},
     },
     "drive": {"frequency": "80 Hz", "peak_acceleration": "4 g"},
     # Its speed is that of 60 cycles, 20 of them to settle, to nine digits.

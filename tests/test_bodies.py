@@ -394,7 +394,11 @@ def test_laboratory_and_container_frame_agree(run_directory: Ran) -> None:
 def test_rolling_friction_turns_a_walker_to_the_axis_and_a_symmetric_dimer_away(trajectory: Moved) -> None:
     friction = {"bead_bead": 0.2, "bead_wall": 0.2}
     common: dict[str, Any] = {
-        "contact": {"friction": friction, "rolling_friction": 0.003, "minimum_separation_ratio": 1.0},
+        "contact": {
+            "friction": friction,
+            "rolling_friction": 0.003,
+            "roughness": {"bead_bead": "2 um", "bead_wall": "2 um"},
+        },
         "liquid": {"dynamic_viscosity": "100 mPa*s"},
         "run": {"cycles": 40, "settling_cycles": 20},
     }

@@ -117,15 +117,14 @@ def test_values_know_where_they_come_from() -> None:
     assert found["run.time_step"].source.startswith("auto: 0.4 of the rayleigh limit, ")
     assert not any(one.guessed for one in found.values())
     # What was calibrated with other liquids, or another law, is a guess.
-    assert origins(load_case("fig1b", {"liquid.name": "Si AK10"}))["liquid.volume_fraction"].origin == "calibrated"
-    fraction = origins(load_case("fig1b", {"liquid.name": "glycerol 87 %"}))["liquid.volume_fraction"]
-    assert (fraction.origin, fraction.text, fraction.guessed) == ("default", "0.022", True)
-    assert fraction.range == unmeasured()["liquid.volume_fraction"].range
-    assert origins(load_case("fig1b", {"liquid.law": "willett"}))["liquid.viscosity_ratio"].guessed
+    assert origins(load_case("fig1b", {"liquid.name": "Si AK10"}))["liquid.meniscus_radius"].origin == "calibrated"
+    menisci = origins(load_case("fig1b", {"liquid.name": "glycerol 87 %"}))["liquid.meniscus_radius"]
+    assert (menisci.origin, menisci.text, menisci.guessed) == ("default", "70 um", True)
+    assert menisci.range == unmeasured()["liquid.meniscus_radius"].range
+    assert origins(load_case("fig1b", {"liquid.law": "willett"}))["contact.rolling_friction"].guessed
     # What a case gives is guessed if it is called uncertain.
     guessed = {key: one.text for key, one in origins(Case.read(GLASS)).items() if one.guessed}
-    unknown = {"contact.restitution": "0.3", "contact.minimum_separation_ratio": "0.01"}
-    unknown |= {"liquid.volume_fraction": "0.01", "liquid.viscosity_ratio": "1", "liquid.contact_angle": "0 deg"}
+    unknown = {"contact.restitution": "0.3", "liquid.volume_fraction": "0.01", "liquid.contact_angle": "0 deg"}
     assert guessed == {**unknown, "contact.friction.bead_wall": "0.3"}
 
 

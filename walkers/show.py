@@ -68,16 +68,14 @@ def predicted_overhead(cases: Iterable[Case]) -> float:
     from walkers.physics.laws.young_laplace import unsolved
 
     cases = list(cases)
-    kinds = {
-        (one.liquid.of_bridges, one.contact.minimum_separation_ratio, tuple(sorted(set(one.radii)))) for one in cases
-    }
+    kinds = {(one.liquid.of_bridges, one.contact.roughness, tuple(sorted(set(one.radii)))) for one in cases}
     bridges = [
         bridge
-        for liquid, ratio, radii in kinds
+        for liquid, roughness, radii in kinds
         if liquid.law.startswith("young-laplace")
         for place, radius in enumerate(radii)
         for other in (inf, *radii[place:])
-        for bridge in Surfaces.of(radius, other, liquid, ratio).volumes
+        for bridge in Surfaces.of(radius, other, liquid, roughness).volumes
     ]
     return _SOLVING_SECONDS * unsolved(bridges) + _MEASURING_SECONDS * len(cases)
 
@@ -147,7 +145,7 @@ def summarise(case: Case) -> dict[str, Any]:
             "large": case.large,
             "mass": volume * case.beads.density,
             "volume": volume,
-            "liquid": volume * case.liquid.volume_fraction,
+            "liquid": _liquid(case, volume),
             "stiffness_ratio": case.contact.youngs_modulus / modulus if modulus else None,
         },
         "notes": notes(case),
@@ -174,6 +172,13 @@ def summarise(case: Case) -> dict[str, Any]:
         summary["dimer"] = {name: getattr(dimer, name) for name in numbers}
         summary["dimer"] |= {"masses": list(dimer.masses), "gamma0": dimer.gamma0(drive.peak_acceleration)}
     return summary
+
+
+def _liquid(case: Case, volume: float) -> float:
+    """Volume of the liquid on all beads, or, if their menisci give it, in the bridges of the walkers, m³."""
+    if case.liquid.meniscus_radius is None:
+        return volume * case.liquid.volume_fraction
+    return sum(load.volume * one.replicates for one in case.walkers for load in contact_loads(case, one))
 
 
 def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:

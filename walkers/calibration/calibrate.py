@@ -21,8 +21,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.keys import flatten
 from walkers.inputs.sweep import Sweep, expand
 from walkers.inputs.table import alternatives
-from walkers.paper.comparison import misalignment
-from walkers.postprocess.gait import steady_walkers, together
+from walkers.postprocess.gait import misalignment, steady_walkers, together
 from walkers.postprocess.results import read
 from walkers.postprocess.tables import read_table
 from walkers.progress import progress_of
@@ -122,8 +121,9 @@ def _seen(table: pd.DataFrame, experiments: int) -> dict[str, FloatArray]:
         if status == "finished":
             kept = steady_walkers(read(run))
             rows[-1] |= {name: float(kept[name].mean()) for name in get_args(Speed)}
-            if together(read_table(run, "walkers")).all():
-                rows[-1]["misalignment"] = float(misalignment(run).max())
+            walkers = read_table(run, "walkers")
+            if together(walkers).all():
+                rows[-1]["misalignment"] = float(misalignment(walkers).max())
     return {name: np.reshape([row[name] for row in rows], (-1, experiments)) for name in QUANTITIES}
 
 

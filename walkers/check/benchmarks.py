@@ -20,7 +20,7 @@ from walkers.check.engine import SecondEngine
 from walkers.check.kernels import FloatArray
 from walkers.check.lines import Line
 from walkers.check.scenes import DRY, FLOOR, bench_case
-from walkers.inputs.case import Friction
+from walkers.inputs.case import Friction, Roughness
 from walkers.physics.contact import Impact, reduced_modulus
 
 READING, STEP, SLIDING = 0.02, 2e-3, 4e-3
@@ -97,7 +97,7 @@ class Benchmark:
             restitution=self.restitution,
             youngs_modulus=(1.0 if self.like else 2.0) * self.sphere.youngs_modulus,  # the other side of a rigid plane
             poissons_ratio=self.sphere.poissons_ratio,
-            minimum_separation_ratio=0.01,
+            roughness=Roughness(bead_bead=0.01 * radius, bead_wall=0.01 * radius),
         )
         engine = SecondEngine(case.but(contact=contact), np.full(len(start), radius), start, walls=[FLOOR])
         every = 1 if count == 1 else steps

@@ -54,7 +54,7 @@ def pulls() -> Iterator[Line]:
         case = load_case(name)
         large, small = dimer_of(case).radii
         for place, radius in (("beads", small), ("wall", inf)):
-            surfaces = Surfaces.of(large, radius, case.liquid.of_bridges, case.contact.minimum_separation_ratio)
+            surfaces = Surfaces.of(large, radius, case.liquid.of_bridges, case.contact.roughness)
             shape = (surfaces.radius, surfaces.other_radius, surfaces.volume, surfaces.liquid.contact_angle)
             exact = young_laplace.law(surfaces)
             distances = _even(exact.rupture)

@@ -99,7 +99,7 @@ class SecondEngine:
 def _splined(law: BridgeLaw, surfaces: Surfaces) -> tuple[FloatArray, FloatArray]:
     """A bridge's row of `Bridges.spans` and its splines; a kink may be at the scale."""
     curve = law(surfaces)
-    end, scale = curve.rupture, curve.scale or surfaces.closest
+    end, scale = curve.rupture, curve.scale or surfaces.roughness
     scale = scale if scale < end else 0.4 * end
     middle = max(0.5 * end, 0.5 * (scale + end))
     t = np.linspace(0.0, 1.0, CELLS + 1)
@@ -115,7 +115,7 @@ def _bridges(case: Case, radius: FloatArray, without: Collection[str]) -> Bridge
     for row, small in enumerate(sizes.tolist()):
         between[row, :row], full[row, :row] = between[:row, row], full[:row, row, ::-1]
         for column, large in list(enumerate([*sizes.tolist(), inf]))[row:]:
-            surfaces = Surfaces.of(small, large, case.liquid.of_bridges, case.contact.minimum_separation_ratio)
+            surfaces = Surfaces.of(small, large, case.liquid.of_bridges, case.contact.roughness)
             between[row, column], full[row, column] = len(tables), surfaces.films[0]
             tables += [(*_splined(case.law, meeting), meeting.volume) for meeting in surfaces.volumes]
     acts = np.array(["capillary" not in without, *["lubrication" not in without] * 4], dtype=np.float64)

@@ -54,12 +54,12 @@ WAY, SPIN = (0.031, -0.023, 0.053), (61.0, -83.0, 47.0)
 
 def dry(surfaces: Surfaces) -> Curve:
     """A law without forces."""
-    return Curve(lambda gaps: Forces(*[np.zeros_like(gaps)] * 5), rupture=surfaces.closest)
+    return Curve(lambda gaps: Forces(*[np.zeros_like(gaps)] * 5), rupture=surfaces.roughness)
 
 
 def law(surfaces: Surfaces) -> Curve:
     """A bridge that forms before surfaces touch, with a kink near contact, and resistances of all kinds."""
-    size, scale = surfaces.reduced_radius, surfaces.closest
+    size, scale = surfaces.reduced_radius, surfaces.roughness
     uneven = 1.0 - surfaces.radius / surfaces.other_radius  # none of equal beads, which have no order
     drag = 6.0 * pi * 0.03 * size
 
@@ -67,7 +67,7 @@ def law(surfaces: Surfaces) -> Curve:
         near = 1.0 / np.maximum(gaps / scale, 1.0)
         return Forces(
             pull=0.05 * size * np.exp(-12.0 * gaps / size),
-            normal=drag * near / surfaces.minimum_separation_ratio,
+            normal=drag * near * size / surfaces.roughness,
             sliding=drag * (4.0 + np.log(near)),
             coupling=-0.7 * uneven * drag * size * (1.0 + near),
             rolling=drag * size**2 * (4.0 + 2.0 * near),
@@ -81,7 +81,10 @@ _BARE = {
     "dimers": {"radii": ["0.3 mm", "0.2 mm"]},
     "liquid": {"surface_tension": "19.2 mN/m", "dynamic_viscosity": "0 Pa*s"},
     "boundary": {"material": "glass"},
-    "contact": {"friction": {"bead_bead": 0.0, "bead_wall": 0.0}, "rolling_friction": 0.0, "restitution": 1.0},
+    "contact": {
+        **{"friction": {"bead_bead": 0.0, "bead_wall": 0.0}, "rolling_friction": 0.0, "restitution": 1.0},
+        **{"roughness": {"bead_bead": "2 um", "bead_wall": "2 um"}, "youngs_modulus": "50 MPa"},
+    },
     "drive": {"frequency": "80 Hz", "peak_acceleration": "0 g", "frame": "container"},
     "run": {"time_step": "1 us", "samples_per_cycle": 1},
     "environment": {"gravity": "0 m/s^2"},
@@ -352,13 +355,15 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
     bare = bench_case({**liquid, "contact.restitution": 0.5})
     scene = standing(pair(-DEEP, 0.05, STILL, (STILL, STILL)))
     deck = compose(prescribed(bare, scene))
-    meeting = Surfaces.of(S, R, bare.liquid.of_bridges, bare.contact.minimum_separation_ratio)
+    meeting = Surfaces.of(S, R, bare.liquid.of_bridges, bare.contact.roughness)
     fine = tabulated(by_name(bare.liquid.law), meeting, tolerance=1e-10).text()
     tables = deck.files[BRIDGES_NAME].split("bridge ")
     tables = [f"1 1 {S!r} {R!r}\n{fine}" if table.startswith(f"1 1 {S!r} {R!r}") else table for table in tables]
     ours = bench.run(replace(deck, files={**deck.files, BRIDGES_NAME: "bridge ".join(tables)}))
     angle = degrees(sqrt(2.0 * bare.liquid.contact_angle))
-    text = rendered("walkers.check", "stock.lig.j2", case=bare, scene=scene, layout=deck.layout, angle=angle)
+    closest = meeting.roughness / meeting.reduced_radius
+    given = {"case": bare, "scene": scene, "layout": deck.layout, "angle": angle, "closest": closest}
+    text = rendered("walkers.check", "stock.lig.j2", **given)
     theirs = bench.run(replace(deck, text=text))
     error = farthest(ours.forces[..., :3], theirs.forces[..., :3])
     yield Line("two beads separate: force, Debian's own bridge model", 0.0, error, 1e-9)

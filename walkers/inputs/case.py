@@ -43,6 +43,9 @@ STIFFEST = 1e11
 """Largest Young's modulus of the contacts of a case, Pa: as hard as glass or steel; runs take a day."""
 
 
+_SOFTENED = Annotated[float, replace(units.MODULUS, smallest=5e6, largest=STIFFEST)]
+
+
 class Beads(Table):
     """``[beads]``: what all beads are made of."""
 
@@ -58,7 +61,10 @@ class Liquid(Table):
     `walkers.physics.laws`, or your own function, ``file.py:function``.
     """
 
-    choices: ClassVar = (Choice((("dynamic_viscosity",), ("kinematic_viscosity",)), instead="a liquid of the library"),)
+    choices: ClassVar = (
+        Choice((("dynamic_viscosity",), ("kinematic_viscosity",)), instead="a liquid of the library"),
+        Choice((("volume_fraction",), ("meniscus_radius",))),
+    )
     name: Indirect[str] = key("Liquid from the library. The other keys override its values.", None, "Si AK5")
     mass_fraction: Indirect[Number] = key("Mass fraction of glycerol in `water-glycerol`.", None, 0.87, ge=0, le=1)
     temperature: Indirect[units.Temperature] = key("Temperature of `water-glycerol`. Default: 20 °C.", None)
@@ -66,7 +72,12 @@ class Liquid(Table):
     density: Indirect[units.Density] = key("Density of the liquid.", None)
     kinematic_viscosity: Indirect[units.KinematicViscosity] = key("Kinematic viscosity.", None)
     dynamic_viscosity: Filled[units.DynamicViscosity] = key("Dynamic viscosity, instead of the kinematic one.", None)
-    volume_fraction: Number = key("Volume of liquid on a bead over that of the bead.", example=0.01, ge=1e-9, le=0.5)
+    volume_fraction: Filled[Number] = key(
+        "Volume of liquid on a bead over that of the bead; the bridges share it.", None, 0.01, ge=1e-9, le=0.5
+    )
+    meniscus_radius: units.Length | None = key(
+        "Radius of the menisci of all bridges, which exchange liquid through the film on a wetted plate.", None, "70 um"
+    )
     viscosity_ratio: Number = key(
         "Viscosity of the bridges over that of the liquid. It scales the drag of the bridges.", 1.0, ge=0, le=1e4
     )
@@ -85,6 +96,7 @@ class Liquid(Table):
             surface_tension=self.surface_tension,
             viscosity=float(f"{self.dynamic_viscosity * self.viscosity_ratio:.15g}"),
             volume_fraction=self.volume_fraction,
+            meniscus_radius=self.meniscus_radius or 0.0,
             contact_angle=self.contact_angle,
             conserved=self.conserved,
             law=self.law,
@@ -98,23 +110,29 @@ class Friction(Table):
     bead_wall: Coefficient = key("Coulomb coefficient between a bead and the boundary.", example=0.25)
 
 
+class Roughness(Table):
+    """``[contact.roughness]``: gap that remains for the liquid between surfaces that touch at their asperities."""
+
+    bead_bead: units.Length = key("Roughness of a contact of two beads: the root of both squares.", example="30 nm")
+    bead_wall: units.Length = key("Roughness of a contact of a bead and the boundary.", example="30 nm")
+
+
 class Contact(Table):
     """``[contact]``: the model of the contacts; the Young's modulus is that of the softened beads and walls.
 
-    The engine requires a restitution above 0.05. A modulus below 5 MPa changes velocities; ``walkers run CASE
-    --accuracy`` measures by how much a larger one changes them, up to 100 GPa.
+    The engine requires a restitution above 0.05. The modulus of ``"auto"`` is 50 MPa for loose beads; for walkers it is
+    the lowest of 50, 200, 800, ... MPa at which bridges hardly delay the contacts (`walkers.inputs.loads.delay`).
+    ``walkers run CASE --accuracy`` measures by how much a larger one changes velocities, up to 100 GPa.
     """
 
     friction: Friction = key("")
+    roughness: Roughness = key("")
     rolling_friction: Coefficient = key("Coefficient of rolling friction (constant directional torque).", example=0.01)
     restitution: Number = key("Coefficient of restitution of the dry contact.", example=0.5, gt=0.05, le=1)
-    youngs_modulus: Annotated[float, replace(units.MODULUS, smallest=5e6, largest=STIFFEST)] = key(
-        "Young's modulus of beads and boundary: lower than the real one, so that the time step can be longer.", 5e7
+    youngs_modulus: Annotated[Filled[_SOFTENED], units.AUTO] = key(
+        "Young's modulus of beads and boundary: lower than the real one, so that the time step can be longer.", None
     )
     poissons_ratio: Number = key("Poisson's ratio.", 0.3, ge=0, lt=0.5)
-    minimum_separation_ratio: Number = key(
-        "Gap over the reduced radius below which the drag of the bridges stops growing.", example=0.05, ge=1e-6, le=1
-    )
 
 
 class Environment(Table):

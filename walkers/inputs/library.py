@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from importlib import resources
+from math import sqrt
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,7 +20,7 @@ from walkers.inputs import units
 from walkers.inputs.messages import validated
 from walkers.inputs.origins import Whence
 from walkers.inputs.toml import read_toml
-from walkers.inputs.units import quantity_text
+from walkers.inputs.units import LENGTH, parse_quantity, quantity_text
 from walkers.physics.mixtures import MIXTURES
 
 FILE_NAME = "library.toml"
@@ -84,8 +85,8 @@ class Library:
     def surface_pair(self, first: str | None, second: str | None) -> Mapping[str, Known]:
         """Contact parameters of two wet surfaces; empty if there are none.
 
-        ``friction``, ``rolling_friction`` and, where they are known, ``minimum_separation_ratio``, ``viscosity_ratio``,
-        ``contact_angle`` (rad), ``volume_fraction`` and ``restitution``.
+        ``friction``, ``rolling_friction`` and, where known, ``contact_angle`` (rad), ``meniscus_radius`` (m) or
+        ``volume_fraction``, and ``restitution``.
         """
         for one in self.collections:
             for pair in one.tables.get("surface_pairs", ()):
@@ -94,6 +95,19 @@ class Library:
                     numbers = {key: entry for key, entry in pair.items() if isinstance(entry, Mapping)}
                     return {key: _known(entry, one, liquids) for key, entry in numbers.items()}
         return {}
+
+    def roughness(self, first: str | None, second: str | None) -> Known | None:
+        """Roughness of the contact of two materials, the root of the sum of both squares; None if one is unknown."""
+        both = [self.numbers("materials", name or "").get("roughness") for name in (first, second)]
+        one, other = both
+        if one is None or other is None:
+            return None
+        parts = zip(*((known.written, *(known.range or (known.written,) * 2)) for known in (one, other)), strict=True)
+        squares = [sum(parse_quantity(text, LENGTH) ** 2 for text in pair) for pair in parts]
+        value, *ends = (f"{1e9 * sqrt(square):.3g} nm" for square in squares)
+        sources = dict.fromkeys(f"{name}: {known.source}" for name, known in ((first, one), (second, other)))
+        own = one if one.origin != "library" else other
+        return own._replace(written=value, range=(ends[0], ends[1]), source="; ".join(sources))
 
 
 @cache

@@ -46,6 +46,7 @@ class MaterialTable(Table):
     density: Sourced[units.Density]
     youngs_modulus: Sourced[Annotated[float, units.MODULUS]] | None = None
     poissons_ratio: Sourced[Annotated[Number, Field(ge=-1, le=0.5)]] | None = None
+    roughness: Sourced[units.Length] | None = None
 
 
 class LiquidTable(Table):
@@ -70,9 +71,8 @@ class SurfacePairTable(Table):
     friction: Sourced[Coefficient] | None = None
     rolling_friction: Sourced[Coefficient] | None = None
     restitution: Sourced[Number] | None = None
-    minimum_separation_ratio: Sourced[Number] | None = None
-    viscosity_ratio: Sourced[Number] | None = None
     volume_fraction: Sourced[Number] | None = None
+    meniscus_radius: Sourced[units.Length] | None = None
     contact_angle: Sourced[units.UpToRightAngle] | None = None
 
 

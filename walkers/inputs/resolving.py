@@ -16,13 +16,13 @@ from walkers.inputs.bodies import ARRANGEMENTS, MOST_BEADS, Cluster, Walkers, to
 from walkers.inputs.drive import common_frequency
 from walkers.inputs.keys import MISSING, parts_of, value_at
 from walkers.inputs.library import Known, Library, unmeasured
-from walkers.inputs.loads import bridge_at_rest, contact_loads, dimer_of, reach
+from walkers.inputs.loads import bridge_at_rest, contact_loads, delay, dimer_of, reach
 from walkers.inputs.origins import Source
 from walkers.inputs.run import with_run
 from walkers.inputs.standing import OVERLAP, check_bodies, overlaps
-from walkers.inputs.table import changed
+from walkers.inputs.table import alternatives, changed
 from walkers.inputs.units import TEMPERATURE, parse_quantity
-from walkers.physics.capillary import DEFAULT_LAW
+from walkers.physics.capillary import DEFAULT_LAW, bridge_volume
 from walkers.physics.laws import LAWS
 from walkers.physics.mixtures import MIXTURES
 
@@ -31,6 +31,10 @@ if TYPE_CHECKING:
 
 _PACKING = 0.55
 """Packing fraction of a settled wet pile, for the count that fills a height."""
+_SOFTEST, _LATEST = 5e7, 0.025
+"""Lowest Young's modulus of ``"auto"``, Pa, and the largest `delay`, rad: velocities are then within 2 %."""
+_ROUGHEST = 0.01
+"""Largest roughness over the radius of a bead: the wedge of liquid between smooth spheres is then no model."""
 _FACING = {"up": "right", "down": "left"}
 """The words for climbers."""
 NAMES = ("beads.material", "boundary.material", "liquid.name")
@@ -42,14 +46,15 @@ GIVEN_BY: Mapping[str, tuple[str, ...]] = {
 """Begins of the keys that the library gives to a case by a key."""
 _FRICTION = ("contact.friction.bead_bead", "contact.friction.bead_wall", "contact.rolling_friction")
 _OF_SURFACES = (
-    *("liquid.viscosity_ratio", "liquid.volume_fraction", "liquid.contact_angle"),
-    *("contact.rolling_friction", "contact.restitution", "contact.minimum_separation_ratio"),
+    *("liquid.meniscus_radius", "liquid.volume_fraction", "liquid.contact_angle"),
+    *("contact.rolling_friction", "contact.restitution"),
 )
+_ROUGHNESS = ("contact.roughness.bead_bead", "contact.roughness.bead_wall")
 _VISCOSITIES = ("liquid.kinematic_viscosity", "liquid.dynamic_viscosity")
 _OF_LIQUIDS = ("liquid.surface_tension", "liquid.density", *_VISCOSITIES)
 _LIQUIDS = ((_OF_LIQUIDS[0], _VISCOSITIES[1]), _OF_LIQUIDS[:3])
 """What a liquid of its own says: its surface tension, and its dynamic viscosity or density and kinematic viscosity."""
-SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_OF_SURFACES)
+SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_ROUGHNESS, *_OF_SURFACES)
 """Keys that a case may leave out because the library has values or defaults."""
 
 
@@ -75,10 +80,10 @@ def supplied(
     calibrated = liquid if said["liquid.law"] in (MISSING, DEFAULT_LAW) else None
     tables = {name: value for name, value in document.items() if name != "library"}
     tables.setdefault("contact", {})
-    written = {}
+    written: dict[str, Any] = {}
     for key in SUPPLIED:
-        instead = key in _VISCOSITIES and not given.isdisjoint(_VISCOSITIES)
-        if key in values and not (key in given or instead) and isinstance(tables.get(key.split(".")[0]), Mapping):
+        said_already = {key, *alternatives(model, key)} & {*given, *written}
+        if key in values and not said_already and isinstance(tables.get(key.split(".")[0]), Mapping):
             written[key], sources[key] = values[key].written, _source_of(key, values[key], calibrated)
     return changed(model, tables, written), sources, problems
 
@@ -134,10 +139,13 @@ def _values(
         "beads.density": library.numbers("materials", bead or "").get("density"),
         "contact.friction.bead_bead": on_bead.get("friction"),
         "contact.friction.bead_wall": on_wall.get("friction"),
+        **{key: library.roughness(bead, other) for key, other in zip(_ROUGHNESS, (bead, wall), strict=True)},
         **{key: on_wall.get(key.split(".")[1]) for key in _OF_SURFACES},
         **{f"liquid.{key}": known for key, known in of_liquid.items()},
     }
-    return {**unmeasured()} | {key: known for key, known in values.items() if known}
+    # Of the two that give the liquid, the library's own is taken; without one it is a volume.
+    usual = {key: known for key, known in unmeasured().items() if key != "liquid.meniscus_radius"}
+    return usual | {key: known for key, known in values.items() if known}
 
 
 def _source_of(key: str, known: Known, liquid: str | None) -> Source:
@@ -281,6 +289,24 @@ def _drive(case: Case) -> Case:
     return case
 
 
+def _surfaces(case: Case) -> Case:
+    """Roughness is small compared with the beads, and menisci fit between them and at walls."""
+    contact, liquid, smallest = case.contact, case.liquid.of_bridges, min(case.radii)
+    for name, rough in vars(contact.roughness).items():
+        if rough > _ROUGHEST * smallest:
+            most = 1e6 * _ROUGHEST * smallest
+            raise unusable(
+                f"contact.roughness.{name}", f"expected {most:.3g} um or less, a hundredth of a bead's radius"
+            )
+    try:
+        for radius in case.radii if liquid.meniscus_radius else ():
+            for other in (*case.radii, inf):
+                bridge_volume(*sorted((radius, other)), liquid)
+    except ValueError as error:
+        raise unusable("liquid.meniscus_radius", f"expected menisci that fit between the surfaces: {error}") from error
+    return case
+
+
 def _law(case: Case) -> Case:
     """A user's law can be used for the beads of the case."""
     if case.liquid.law not in LAWS:
@@ -290,6 +316,19 @@ def _law(case: Case) -> Case:
         except ValueError as error:
             raise unusable("liquid.law", str(error)) from error
     return case
+
+
+def _modulus(case: Case) -> Case:
+    """Young's modulus of ``"auto"``: walkers depend on it by the delay of their contacts."""
+    if case.contact.youngs_modulus is not None:
+        return case
+    modulus, late = _SOFTEST, inf
+    while late > _LATEST:
+        softened = case.put("contact.youngs_modulus", modulus)
+        late = max((delay(softened, walkers) for walkers in case.walkers), default=0.0)
+        modulus *= 4.0
+    why = f"auto: bridges delay contacts by {late:.1g} rad" if case.walkers else "auto"
+    return case.filled("contact.youngs_modulus", softened.contact.youngs_modulus, why)
 
 
 def _uphill(case: Case) -> Case:
@@ -351,5 +390,19 @@ def _gravity(case: Case) -> Case:
 
 
 STEPS: Sequence[Callable[[Case], Case]] = (
-    *(_radii, _viscosity, _count, _walkers, _drive, _law, with_run, _uphill, _spacing, check_bodies, _gravity),
+    *(
+        _radii,
+        _viscosity,
+        _count,
+        _walkers,
+        _drive,
+        _surfaces,
+        _law,
+        _modulus,
+        with_run,
+        _uphill,
+        _spacing,
+        check_bodies,
+        _gravity,
+    ),
 )

@@ -153,8 +153,8 @@ def limits_of(case: Case) -> TimeStepLimits:
         density=case.beads.density,
         youngs_modulus=contact.youngs_modulus,
         poissons_ratio=contact.poissons_ratio,
-        viscosity=case.liquid.of_bridges.viscosity,
-        minimum_separation_ratio=contact.minimum_separation_ratio,
+        liquid=case.liquid.of_bridges,
+        roughness=contact.roughness,
         peak_velocity=case.excitation.peak_velocity,
     )
 

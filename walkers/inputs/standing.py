@@ -119,6 +119,8 @@ def check_bodies(case: Case) -> Case:
         raise unusable("run.ranks", "expected 1: walkers on a plane run slower on several processes")
     if not case.walkers and mixture is None and "seed" in case.document.get("run", {}):
         raise unusable("run.seed", "expected none with placed beads: every start would be the same")
+    if case.liquid.conserved and case.liquid.meniscus_radius is not None:
+        raise unusable("liquid.conserved", "expected false: menisci of one radius exchange liquid through a film")
     if case.liquid.conserved and (case.walkers or not boundary.closed):
         raise unusable("liquid.conserved", "expected false: only loose beads in a container share their liquid")
     if mixture is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import isfinite, nan
-from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,14 +21,13 @@ from walkers.paper.published import (
     driven,
     shipped,
 )
-from walkers.postprocess.gait import on_axis, steady_walkers
+from walkers.postprocess.gait import misalignment, on_axis, steady_walkers
 from walkers.postprocess.results import read
 from walkers.postprocess.tables import read_table
 from walkers.sweeps.table import thresholds
 from walkers.text import rendered
 from walkers.theory.mathieu import largest_stable_v
 from walkers.theory.prediction import motion_of, threshold
-from walkers.theory.quasistatic import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,13 +50,6 @@ class Value(NamedTuple):
     high: float = nan
     theory: float = nan
     left_out: int = 0
-
-
-def misalignment(run: str | Path) -> FloatArray:
-    """Angles of the walkers of a run to the drive axis at the end, in either direction, 0 to 90 degrees."""
-    ends = np.degrees(read_table(run, "walkers")["orientation_end"].to_numpy())
-    angles: FloatArray = np.abs((ends + 90.0) % 180.0 - 90.0)
-    return angles
 
 
 def evaluate(number: Observation, table: pd.DataFrame) -> Value:
@@ -98,7 +89,7 @@ def _of_walkers(point: Point, quantity: str, table: pd.DataFrame) -> Value | Non
         mean, low, high = (float(rows[name].mean()) * 1e3 for name in ("velocity", "smallest", "largest"))
         return Value(mean, low, high, _theory(point, quantity))
     if quantity.endswith("angle"):
-        angles = np.concatenate([misalignment(run) for run in rows["run"]])
+        angles = np.concatenate([misalignment(read_table(run, "walkers")) for run in rows["run"]])
         low, high = float(angles.min()), float(angles.max())
         return Value(high if quantity == "largest_angle" else low, low, high)
     run = rows["run"].iloc[0]

@@ -25,11 +25,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from walkers.physics.capillary import BridgeLiquid, film_volume, share_of_bead
+from walkers.physics.capillary import BridgeLiquid, bridge_volume, film_volume, share_of_bead
 
 FloatArray = npt.NDArray[np.float64]
 _COLUMNS = ("pull", "normal resistance", "sliding resistance", "coupling", "rolling resistance")
@@ -37,6 +38,18 @@ _COLUMNS = ("pull", "normal resistance", "sliding resistance", "coupling", "roll
 
 class UnusableLawError(ValueError):
     """A law cannot be used; the message says why."""
+
+
+class Roughness(Protocol):
+    """Roughness of a case's contacts, m."""
+
+    @property
+    def bead_bead(self) -> float:
+        """Between two beads."""
+
+    @property
+    def bead_wall(self) -> float:
+        """Between a bead and the boundary."""
 
 
 @dataclass(frozen=True)
@@ -51,23 +64,22 @@ class Surfaces:
         Volume of the bridge, m³.
     liquid
         Liquid of the bridge.
-    minimum_separation_ratio
-        Gap, divided by the reduced radius, below which the resistances stop growing (roughness).
+    roughness
+        Gap that remains for the liquid between surfaces that touch at their asperities, m.
     """
 
     radius: float
     other_radius: float
     volume: float
     liquid: BridgeLiquid
-    minimum_separation_ratio: float
+    roughness: float
 
     @classmethod
-    def of(cls, radius: float, other_radius: float, liquid: BridgeLiquid, minimum_separation_ratio: float) -> Surfaces:
+    def of(cls, radius: float, other_radius: float, liquid: BridgeLiquid, roughness: Roughness) -> Surfaces:
         """Make the surfaces of a bead and another bead or a plane (infinite radius), and the volume of their bridge."""
         small, large = sorted((radius, other_radius))
-        fraction = liquid.volume_fraction
-        volume = share_of_bead(small, large, fraction) + share_of_bead(large, small, fraction)
-        return cls(small, large, volume, liquid, minimum_separation_ratio)
+        rough = roughness.bead_wall if large == inf else roughness.bead_bead
+        return cls(small, large, bridge_volume(small, large, liquid), liquid, rough)
 
     @property
     def volumes(self) -> list[Surfaces]:
@@ -95,11 +107,6 @@ class Surfaces:
     def reduced_radius(self) -> float:
         """Reduced radius R1 R2/(R1 + R2); at a plane, the radius of the bead; m."""
         return self.radius if self.at_wall else self.radius * self.other_radius / (self.radius + self.other_radius)
-
-    @property
-    def closest(self) -> float:
-        """Gap below which the resistances stop growing, m."""
-        return self.minimum_separation_ratio * self.reduced_radius
 
 
 @dataclass(frozen=True)
@@ -132,7 +139,7 @@ class Curve:
     rupture, formation
         Gap at which the bridge breaks, and gap below which it forms (0: the surfaces must touch), m.
     scale
-        Gap over which the forces vary near contact, m. A kink may be there. 0 stands for `Surfaces.closest`.
+        Gap over which the forces vary near contact, m. A kink may be there. 0 stands for `Surfaces.roughness`.
     pull
         Function that gives the pull alone, N, for laws whose resistances are expensive to compute.
     """

@@ -9,9 +9,19 @@ G. Lian, C. Thornton, M. J. Adams, J. Colloid Interface Sci. 161 (1993) 138–14
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cbrt, inf, pi, sqrt
+from functools import cache, lru_cache
+from math import cbrt, cos, inf, pi, sqrt
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from walkers.cache import kept_numbers, place_of_numbers
+
+if TYPE_CHECKING:
+    from walkers.physics.bridge import FloatArray
 
 DEFAULT_LAW = "young-laplace"
+_AIR_PRESSURE = 101_325.0
+"""Standard atmosphere, Pa."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,6 +29,7 @@ class BridgeLiquid:
     """Numbers of the liquid of bridges, SI units; ``law`` is the name of their law (`walkers.physics.laws`).
 
     ``viscosity`` is that of the bridges, ``volume_fraction`` the volume of the liquid on a bead over that of the bead.
+    If ``meniscus_radius`` (m) is not zero, it gives the volumes of bridges instead (`bridge_volume`).
     Bridges take ``conserved`` liquid from the films of their beads.
     """
 
@@ -26,6 +37,7 @@ class BridgeLiquid:
     viscosity: float
     contact_angle: float
     volume_fraction: float
+    meniscus_radius: float = 0.0
     conserved: bool = False
     law: str = DEFAULT_LAW
 
@@ -33,6 +45,41 @@ class BridgeLiquid:
 def derjaguin_radius(radius_1: float, radius_2: float) -> float:
     """Derjaguin radius 2 R1 R2 / (R1 + R2): radius of equal spheres with the same gap profile; plane: infinity."""
     return 2.0 / (1.0 / radius_1 + 1.0 / radius_2)
+
+
+@lru_cache(maxsize=4096)
+def bridge_volume(radius: float, other_radius: float, liquid: BridgeLiquid) -> float:
+    """Volume of a bridge of a bead to a bead or a plane (infinite radius), m³; raises `ValueError` if there is none.
+
+    It is what both surfaces give (`share_of_bead`). Beads on a wetted plate exchange liquid through its film instead,
+    until all menisci have the suction γ/r of one ``meniscus_radius`` r: the volume is that of the touching bridge with
+    this suction, by the Young–Laplace equation.
+    """
+    if liquid.meniscus_radius:
+        shape = (radius, other_radius, liquid.contact_angle, liquid.meniscus_radius)
+        place = place_of_numbers("menisci", solver() + repr(shape).encode())
+        return float(kept_numbers(place, lambda: _volume_by_suction(*shape))[0])
+    fraction = liquid.volume_fraction
+    return share_of_bead(radius, other_radius, fraction) + share_of_bead(other_radius, radius, fraction)
+
+
+def _volume_by_suction(*shape: float) -> FloatArray:
+    import numpy as np
+
+    from walkers.physics.laplace import volume_at_contact  # which imports scipy
+
+    return np.array([volume_at_contact(*shape)])
+
+
+@cache
+def solver() -> bytes:
+    """Identifier of the solver of the Young–Laplace equation, for kept solutions."""
+    return Path(__file__).with_name("laplace.py").read_bytes()
+
+
+def cavitation_gap(liquid: BridgeLiquid) -> float:
+    """Gap 2γ cos θ/p in which a meniscus has the suction p of the air's pressure, m (`walkers.physics.reynolds`)."""
+    return 2.0 * liquid.surface_tension * cos(liquid.contact_angle) / _AIR_PRESSURE
 
 
 def share_of_bead(radius: float, other_radius: float, volume_fraction: float) -> float:

@@ -30,6 +30,11 @@ def hertz_overlap(force: float, reduced_radius: float, reduced_modulus: float) -
     return float((3.0 * max(force, 0.0) / (4.0 * reduced_modulus * sqrt(reduced_radius))) ** (2.0 / 3.0))
 
 
+def hertz_stiffness(overlap: float, reduced_radius: float, reduced_modulus: float) -> float:
+    """Increase of the repulsion with the overlap, N/m; lengths in m, E* in Pa."""
+    return 2.0 * reduced_modulus * sqrt(reduced_radius * overlap)
+
+
 class Impact(NamedTuple):
     """Impact of two bodies: reduced mass (kg), radius (m) and modulus (Pa); methods take the normal velocity, m/s."""
 

@@ -37,7 +37,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import cbrt, inf, pi, sin, sqrt
+from math import cbrt, exp, inf, log, pi, sin, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -381,3 +381,35 @@ def rupture_distance(
     """Largest gap at which a bridge of this volume exists; parameters and errors as for `force_curve`."""
     family = _family_of((radius_1, radius_2), volume, contact_angle)
     return cbrt(volume) * float(_branch(family).bridges[-1, 4])
+
+
+def volume_at_contact(radius_1: float, radius_2: float, contact_angle: float, meniscus_radius: float) -> float:
+    """Volume of a bridge between touching solids whose pressure is that of the air minus γ/``meniscus_radius``.
+
+    Parameters
+    ----------
+    radius_1, radius_2
+        Radii of the spheres; infinity for a plane.
+    contact_angle
+        rad.
+    meniscus_radius
+        Inverse of the suction over the surface tension, in the unit of the radii.
+
+    Raises
+    ------
+    NoBridgeError
+        If bridges up to half of the smaller sphere have more suction, or bridges as small as 1e-9 of it have less.
+    """
+    ends = [log(share * 4.0 / 3.0 * pi * min(radius_1, radius_2) ** 3) for share in (1e-9, 0.5)]
+
+    def missing(log_volume: float) -> float:
+        """Suction that is missing, over the wanted one."""
+        volume = exp(log_volume)
+        pressure = _touching(_family_of((radius_1, radius_2), volume, contact_angle))[2] / cbrt(volume)
+        return float(1.0 + pressure * meniscus_radius)
+
+    if not missing(ends[0]) < 0.0 < missing(ends[1]):
+        raise NoBridgeError(
+            f"no bridge between touching surfaces has a meniscus radius of {1e6 * meniscus_radius:g} um"
+        )
+    return exp(brentq(missing, *ends, xtol=1e-12))

@@ -28,8 +28,17 @@ The matrix of S, C, Q is symmetric (Onsager), and S Q - C² = 2πηR* ln(1 + y) 
 rigid body has w = s = q = 0. If the disc is wide compared with the gap, all three are proportional to ln(H_w/h). At a
 plane, S = 6πηR 8/15, C = -6πηR² 2/5 and Q = 6πηR³ 4/5 times this logarithm: a translating sphere has the force 8/15 and
 the torque 2/15, a rotating sphere 2/5 · 4/3 (Goldman et al.). Between spheres, the coefficients are those of Jeffrey
-and Onishi (1984). For a thin bridge, r_w → 0, all vanish: N as y², S as y, C and Q as y³. Gaps below
-`Surfaces.closest` count as that gap, because surfaces are rough (Adams and Perchard 1985).
+and Onishi (1984). For a thin bridge, r_w → 0, all vanish: N as y², S as y, C and Q as y³.
+
+Surfaces are rough: they touch at asperities of height σ (`Surfaces.roughness`), and liquid fills the gap between them.
+S, C and Q are those of smooth surfaces at the gap h + σ (Smart and Leighton 1989). N is bounded by the liquid too. When
+surfaces separate, the suction in the gap cannot exceed the pressure p of the air: the liquid cavitates. A gas-filled
+gap h is held by the suction 2γ cos θ/h of the meniscus across it, which exceeds p where h < h_c,
+
+    h_c = 2γ cos θ/p          (0.4 µm for silicone oil, 1.2 µm for glycerol: `cavitation_gap`).
+
+Gas that asperities trap opens no gap that is narrower, and the liquid there passes on no more than p. N is therefore
+that at h + σ + h_c. This is an estimate, and it is also used for approach, where liquid does not cavitate.
 
 Left out are the shear of liquid outside the wedge (for immersed spheres 0.9588 in addition to 8/15 ln; a small bridge
 has no such liquid); moving contact lines; a pressure at the edge other than that of the air (the capillary pressure is
@@ -41,7 +50,7 @@ O. Pitois, P. Moucheront, X. Chateau, J. Colloid Interface Sci. 231 (2000) 26-31
 A. J. Goldman, R. G. Cox, H. Brenner, Chem. Eng. Sci. 22 (1967) 637-651, doi 10.1016/0009-2509(67)80047-2.
 M. E. O'Neill, K. Stewartson, J. Fluid Mech. 27 (1967) 705-724, doi 10.1017/S0022112067002551.
 D. J. Jeffrey, Y. Onishi, J. Fluid Mech. 139 (1984) 261-290, doi 10.1017/S0022112084000355.
-M. J. Adams, V. Perchard, I. Chem. E. Symp. Ser. 91 (1985) 147-160.
+J. R. Smart, D. T. Leighton, Phys. Fluids A 1 (1989) 52-60, doi 10.1063/1.857523 (roughness as the smallest gap).
 """
 
 from __future__ import annotations
@@ -52,6 +61,7 @@ from math import pi, sqrt
 import numpy as np
 
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
+from walkers.physics.capillary import BridgeLiquid, cavitation_gap
 
 _A, _B = 2.0 - sqrt(2.5), 2.0 + sqrt(2.5)
 _THIN = 1e-5
@@ -75,14 +85,20 @@ def curve(surfaces: Surfaces, pull: Callable[[FloatArray], FloatArray], rupture:
 def resistances(surfaces: Surfaces, gaps: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """N and S (N s/m), C (N s), Q (N m s) of a bridge at gaps, m, each of shape (n,)."""
     viscosity, reduced = surfaces.liquid.viscosity, surfaces.reduced_radius
-    gaps = np.maximum(gaps, surfaces.closest)
-    edge = np.sqrt(gaps**2 + surfaces.volume / (pi * reduced))  # H_w
-    deep = edge / gaps - 1.0
+    liquid_gaps = np.maximum(gaps, 0.0) + surfaces.roughness
+    wide = liquid_gaps + cavitation_gap(surfaces.liquid)
+    spread = surfaces.volume / (pi * reduced)
+    normal = 6.0 * pi * viscosity * reduced**2 / wide * (1.0 - wide / np.sqrt(wide**2 + spread)) ** 2
+    deep = np.sqrt(liquid_gaps**2 + spread) / liquid_gaps - 1.0  # y
     bend = 0.5 * (1.0 / surfaces.radius - 1.0 / surfaces.other_radius)
     tilting = 96.0 * pi * viscosity * reduced**3 * _tilted(deep)
-    normal = 6.0 * pi * viscosity * reduced**2 / gaps * (1.0 - gaps / edge) ** 2
     shear = 2.0 * pi * viscosity * reduced * np.log1p(deep)
     return normal, shear + bend**2 * tilting, -bend * tilting, tilting
+
+
+def largest_normal(reduced_radius: float, roughness: float, liquid: BridgeLiquid) -> float:
+    """Upper bound of N, that of much liquid between surfaces in contact, N s/m; radius and roughness in m."""
+    return 6.0 * pi * liquid.viscosity * reduced_radius**2 / (roughness + cavitation_gap(liquid))
 
 
 def _tilted(deep: FloatArray) -> FloatArray:

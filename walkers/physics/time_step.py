@@ -5,8 +5,9 @@ third, velocities are wrong without any warning (a glycerol climber: 10.9 mm/s a
 
     Rayleigh    π R √(ρ/G)/(0.1631 ν + 0.8766) of the smallest bead
     Hertz       2.87 (m*²/(R* E*² v))^(1/5) for an impact at the substrate's peak velocity v
-    viscous     2/Σ(c/m) over the bridges of a bead, c = 6πηR*/ε the largest normal drag and m the mass that it slows
-                (the bead's own at a wall, the reduced mass between beads); two walls at an angle φ count as 1 + |cos φ|
+    viscous     2/Σ(c/m) over the bridges of a bead, c = 6πηR*²/(σ + h_c) the largest normal drag, of surfaces in
+                contact (`walkers.physics.reynolds`), and m the mass that it slows (the bead's own at a wall, the
+                reduced mass between beads); two walls at an angle φ count as 1 + |cos φ|
 
 The sum takes the bridges to other beads as parallel, which is safe for clusters: the shipped climber, at 0.86 of its
 limit, has the velocity (within 0.02 %) and the kinetic energy (0.05 %) of a quarter of that step. In a groove of 60° a
@@ -21,8 +22,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, inf, pi, sqrt
 
-from walkers.physics.capillary import bead_volume
+from walkers.physics.bridge import Roughness
+from walkers.physics.capillary import BridgeLiquid, bead_volume
 from walkers.physics.contact import reduced_modulus
+from walkers.physics.reynolds import largest_normal
 
 AUTO_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.2, "hertz": 0.1, "viscous": 0.4}
 """Largest share of each limit for ``"auto"`` with loose beads. At 0.4 of the viscous limit (2 µs for glycerol), the
@@ -67,26 +70,28 @@ def time_step_limits(
     density: float,
     youngs_modulus: float,
     poissons_ratio: float,
-    viscosity: float,
-    minimum_separation_ratio: float,
+    liquid: BridgeLiquid,
+    roughness: Roughness,
     peak_velocity: float,
 ) -> TimeStepLimits:
     """Limits of the time step for beads on a substrate of this peak velocity; SI units; see the module."""
 
-    def drag(reduced_radius: float) -> float:
-        """Largest normal lubrication resistance of a bridge, N s/m."""
-        return 6.0 * pi * viscosity * reduced_radius / minimum_separation_ratio
+    def drag(reduced_radius: float, rough: float) -> float:
+        """Largest normal lubrication resistance of a bridge between surfaces of this roughness, N s/m."""
+        if liquid.law == "soulie":
+            return 6.0 * pi * liquid.viscosity * reduced_radius**2 / rough
+        return largest_normal(reduced_radius, rough, liquid)
 
     modulus = reduced_modulus(youngs_modulus, poissons_ratio)
     impacts, rates = [], []
     for radius, neighbours, walls in bridged:
         mass = bead_volume(radius) * density
         impacts.append((mass, radius))
-        rates.append(walls * drag(radius) / mass)
+        rates.append(walls * drag(radius, roughness.bead_wall) / mass)
         for other in neighbours:
             other_mass, reduced = bead_volume(other) * density, radius * other / (radius + other)
             impacts.append((mass * other_mass / (mass + other_mass), reduced))
-            rates[-1] += drag(reduced) * (1.0 / mass + 1.0 / other_mass)
+            rates[-1] += drag(reduced, roughness.bead_bead) * (1.0 / mass + 1.0 / other_mass)
     shear_modulus = youngs_modulus / (2.0 * (1.0 + poissons_ratio))
     slowest = pi * min(radius for radius, *_ in bridged) * sqrt(density / shear_modulus)
     return TimeStepLimits(

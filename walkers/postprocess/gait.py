@@ -257,6 +257,13 @@ def on_axis(walkers: pd.DataFrame) -> pd.Series[bool]:
     return walkers["orientation_end"].abs() < ASTRAY
 
 
+def misalignment(walkers: pd.DataFrame) -> FloatArray:
+    """Angles to the drive axis at the end, in either direction, 0 to 90 degrees, of a table ``walkers``."""
+    ends = np.degrees(walkers["orientation_end"].to_numpy())
+    angles: FloatArray = np.abs((ends + 90.0) % 180.0 - 90.0)
+    return angles
+
+
 def together(walkers: pd.DataFrame) -> pd.Series[bool]:
     """Whether the beads of walkers of a table ``walkers`` stay together."""
     return walkers["separated_fraction"] < SEPARATED

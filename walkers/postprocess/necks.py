@@ -2,8 +2,8 @@
 
 A neck is as wide as the liquid of its bridge fills it. With the parabolic profile of the gap h(r) = s + r²/2R between
 two spheres, R = R₁R₂/(R₁ + R₂), or between a sphere and a plane, R = R₁, and a straight meniscus, its volume is
-V = πb²s + πb⁴/4R, hence b² = 2R (√(s² + V/πR) − s). Necks of longer gaps are thinner. V is the volume that two
-beads without other bridges give to a bridge (`walkers.physics.capillary.share_of_bead`).
+V = πb²s + πb⁴/4R, hence b² = 2R (√(s² + V/πR) − s). Necks of longer gaps are thinner. V is the volume of the
+bridges of the case (`walkers.physics.capillary.bridge_volume`).
 
 Y. I. Rabinovich, M. S. Esayanur, B. M. Moudgil, Langmuir 21 (2005) 10992–10997, doi 10.1021/la0517639 (volume).
 """
@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.inputs.case import Case
-from walkers.physics.capillary import share_of_bead
+from walkers.physics.capillary import bridge_volume
 from walkers.postprocess.dump import FloatArray, IntArray
 from walkers.postprocess.motion import Motion, frames_with_bridges, read_bridges
 
@@ -67,9 +67,10 @@ def necks_of(
     """
     begins, ends = between
     radius, other = motion.radius[contacts[:, 0]], np.where(contacts[:, 1] < 0, np.inf, motion.radius[contacts[:, 1]])
-    given = np.vectorize(share_of_bead, otypes=[float])
-    fraction = motion.case.liquid.volume_fraction
-    volume = given(radius, other, fraction) + given(other, radius, fraction)
+    liquid = motion.case.liquid.of_bridges
+    volume = np.vectorize(bridge_volume, otypes=[float], excluded=[2])(
+        np.minimum(radius, other), np.maximum(radius, other), liquid
+    )
     reduced = 1.0 / (1.0 / radius + 1.0 / other)
     length = np.linalg.norm(ends - begins, axis=1)
     beyond = np.where(np.isfinite(other), other, 0.0)

@@ -80,7 +80,7 @@ def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) 
     Raises `UnusableLawError` if the curve is unusable (`walkers.physics.bridge.columns_at`), or no table is fine.
     """
     curve = law(surfaces)
-    scale = curve.scale or surfaces.closest
+    scale = curve.scale or surfaces.roughness
     octaves = max(int(log2(1.0 + 0.5 * curve.rupture / scale)), int(curve.rupture > scale))
     cells = _COARSEST
     while cells <= _FINEST:
@@ -122,7 +122,7 @@ def bridge_tables(
         radii = sorted(radius for of, radius in sizes if of == kind)
         for number, radius in enumerate(radii):
             for other_kind, other in [(len(surfaces) + 1, inf), *((kind, size) for size in radii[number:])]:
-                for meeting in Surfaces.of(radius, other, liquid, contact.minimum_separation_ratio).volumes:
+                for meeting in Surfaces.of(radius, other, liquid, contact.roughness).volumes:
                     parts.append(f'# law "{liquid.law}"\nbridge {kind} {other_kind} {radius!r} {other!r}\n')
                     if liquid.conserved:
                         numbers = " ".join(map(repr, (meeting.volume, *chain(*meeting.films))))

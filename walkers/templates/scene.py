@@ -77,7 +77,7 @@ def sharing_key(case: Case) -> Hashable:
     crowded = case if min(one.spacing for one in case.walkers) < 2.0 * reach(case) else None
     # The model of rolling friction is in the deck or not.
     rolling = float(case.contact.rolling_friction > 0.0)
-    contact = case.contact.but(friction=None, restitution=0.0, rolling_friction=rolling)
+    contact = case.contact.but(friction=None, roughness=None, restitution=0.0, rolling_friction=rolling)
     boundary = case.boundary.but(material="", tilt=0.0, uphill=0.0)
     times: Hashable = tuple((one.frequency, one.phase) for one in case.excitation.harmonics)
     driven = (case.excitation, loading_of(case)) if case.drive.frame == "lab" else times

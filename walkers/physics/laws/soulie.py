@@ -3,10 +3,9 @@
     F = πγ √(R1 R2) (exp(A h/R2 + B) + C),        R2 the larger radius, h the gap
     N = 6πηR*/x,        S = 6πηR* (8/15 ln(1/x) + 0.9588),        x = max(ε, h/R*)
 
-At a wall, the pull is twice that of two equal spheres, and the resistances are those of a plane (R* = R). ε is the gap
-over R* below which the resistances stop growing (roughness). Only the sliding force causes a torque. At gaps above εR/2
-from a wall, decks of standard LIGGGHTS have about a fifth less tangential resistance than this law. The bridge breaks
-at (1 + θ/2) V^(1/3).
+At a wall, the pull is twice that of two equal spheres, and the resistances are those of a plane (R* = R). ε is the
+roughness over R*. Only the sliding force causes a torque. At gaps above εR/2 from a wall, decks of standard LIGGGHTS
+have about a fifth less tangential resistance than this law. The bridge breaks at (1 + θ/2) V^(1/3).
 
 References
 ----------
@@ -44,7 +43,7 @@ def law(surfaces: Surfaces) -> Curve:
     stokes = 6.0 * pi * liquid.viscosity * reduced
 
     def forces(gaps: FloatArray) -> Forces:
-        near, none = np.maximum(surfaces.minimum_separation_ratio, gaps / reduced), np.zeros_like(gaps)
+        near, none = np.maximum(surfaces.roughness, gaps) / reduced, np.zeros_like(gaps)
         pulled = liquid.surface_tension * pull(*shape, surfaces.volume, liquid.contact_angle, gaps)
         return Forces(pulled, stokes / near, stokes * (8.0 / 15.0 * np.log(1.0 / near) + 0.9588), none, none)
 

@@ -11,19 +11,17 @@ The resistances are those of `walkers.physics.reynolds`.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterable
-from contextlib import suppress
-from functools import cache, lru_cache
-from hashlib import sha256
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 from numpy.polynomial import Chebyshev
 
-from walkers.cache import cache_folder, make_cache_folder
+from walkers.cache import kept_numbers, place_of_numbers
 from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Surfaces
+from walkers.physics.capillary import solver
 
 NODES = (24, 48, 96)
 """Numbers of gaps at which the equation is solved, increased until the last coefficients are small; the largest one
@@ -63,43 +61,14 @@ def _shape(surfaces: Surfaces) -> _Shape:
 
 def _place(shape: _Shape) -> Path:
     """Path of the cached solution of a shape."""
-    name = sha256(_solver() + repr((NODES, _SMALL, shape)).encode()).hexdigest()[:24]
-    return cache_folder() / "young-laplace" / f"{name}.bin"
-
-
-@cache
-def _solver() -> bytes:
-    """Identifier of the solver for cached solutions."""
-    return Path(__file__).parents[1].joinpath("laplace.py").read_bytes()
+    return place_of_numbers("young-laplace", solver() + repr((NODES, _SMALL, shape)).encode())
 
 
 @lru_cache(maxsize=4096)
 def _solved(shape: _Shape) -> tuple[float, Chebyshev]:
     """Rupture distance, and F/γ as a polynomial in √(1 - h/rupture), in units of the bead's radius."""
-    numbers = _kept(place := _place(shape))
-    if numbers is None:
-        numbers = _solve(shape)
-        with suppress(OSError):  # renamed, because other processes may write it too
-            make_cache_folder(place.parent.name)
-            with tempfile.NamedTemporaryFile(dir=place.parent, suffix=".part", delete=False) as file:
-                file.write(_checksum(place, numbers.tobytes()) + numbers.tobytes())
-            Path(file.name).replace(place)
+    numbers = kept_numbers(_place(shape), lambda: _solve(shape))
     return float(numbers[0]), Chebyshev(numbers[1:], domain=[0.0, 1.0])
-
-
-def _kept(place: Path) -> FloatArray | None:
-    """The numbers of a cached solution; None if there are none, or they are not those that were written."""
-    with suppress(OSError):
-        contents = place.read_bytes()
-        sum_, numbers = contents[:32], contents[32:]
-        if sum_ == _checksum(place, numbers):
-            return np.frombuffer(numbers)
-    return None
-
-
-def _checksum(place: Path, numbers: bytes) -> bytes:
-    """SHA-256 of the numbers of a solution and of its name."""
-    return sha256(place.stem.encode() + numbers).digest()
 
 
 def _solve(shape: _Shape) -> FloatArray:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from walkers.physics.bridge import Curve, Surfaces
+from walkers.physics.bridge import Curve, Surfaces, UnusableLawError
 from walkers.physics.laws import young_laplace
 
 
@@ -19,6 +19,8 @@ def film(radius: float, volume_fraction: float) -> float:
 
 def law(surfaces: Surfaces) -> Curve:
     """Pull and rupture of the Young–Laplace equation, Reynolds resistances; the bridge forms when the films touch."""
+    if surfaces.liquid.meniscus_radius:
+        raise UnusableLawError("a meniscus radius says nothing of films on beads; expected a volume_fraction")
     curve = young_laplace.law(surfaces)
     beads = [surfaces.radius] if surfaces.at_wall else [surfaces.radius, surfaces.other_radius]
     films = sum(film(radius, surfaces.liquid.volume_fraction) for radius in beads)
