@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 import walkers
-from tests.conftest import call, document, make_case, mounted, to_toml
-from walkers.runner.directory import finished_places, locked
+from tests.conftest import call, document, finished_places, make_case, mounted, to_toml
+from walkers.runner.directory import locked
 from walkers.runner.files import read_json, write_json
 from walkers.sweeps.folder import weigh
 from walkers.sweeps.readable import chosen, differing, flattened, readable
@@ -134,7 +134,7 @@ def test_values_of_all_kinds_are_shown_as_they_can_be_written() -> None:
         assert chosen([{key: value}], f"{key}={readable(key, value)}") == [True], key
     values = {"boundary.opening": 1.0, "environment.temperature": 293.15, "environment.gravity": 9.81}
     shown = [readable(key, value) for key, value in values.items()]
-    assert shown == ["57.2958 deg", "293.15 K", "9.81 m/s^2"]
+    assert shown == ["57.2958 deg", "20 degC", "9.81 m/s^2"]
     assert readable("liquid.kinematic_viscosity", 5e-6) == "5 mm^2/s"
 
 

@@ -101,6 +101,11 @@ def is_declared(name: str) -> bool:
     return False
 
 
+def scatter_of(name: str) -> str:
+    """Name of the number that is the scatter or the error of another; empty if there is none."""
+    return declared(name).error if is_declared(name) else ""
+
+
 def ordered(names: Iterable[str]) -> list[str]:
     """Names of numbers in the order of their declarations; both ends of a band follow the number."""
     places = {name: place for place, name in enumerate(_DECLARED)}

@@ -174,12 +174,6 @@ def is_finished(directory: Path) -> bool:
     return (directory / MANIFEST_NAME).is_file()
 
 
-def finished_places(out: Path) -> dict[str, Path]:
-    """Directories of all finished runs of a folder, by name."""
-    places = [path.parent for path in sorted(out.glob(f"*/{MANIFEST_NAME}"))]
-    return {place.name: place for place in places if not place.name.endswith((UNFINISHED, REPLACED))}
-
-
 def drive_from(case: Case, done: Iterable[Mapping[str, Any]]) -> int | None:
     """Step at which the drive begins, from the records of the complete segments; None if it is not known yet.
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.errors import refused
-from walkers.postprocess.numbers import ASIDE, declared, headline, is_error
+from walkers.postprocess.numbers import ASIDE, headline, is_error, scatter_of
 from walkers.postprocess.quantities import unit_shown
 from walkers.postprocess.results import Results, read
 from walkers.postprocess.sides import alike
@@ -128,7 +128,7 @@ def _scatters(result: Results) -> dict[str, float]:
     """Standard deviations of columns over copies, from the result or from the table of the walkers."""
     if "velocity" not in result:
         return {}
-    scatters = {name: float(result[declared(name).error]) for name in _VELOCITIES}
+    scatters = {name: float(result[scatter_of(name)]) for name in _VELOCITIES}
     walkers = result.table("walkers")
     walkers = walkers[alike(walkers, uphill=result["goes_uphill"])]
     for name in walkers.columns:
@@ -167,7 +167,7 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
     unit, points, lines = tables[0].attrs["units"][column], [], []
     for row in both.to_dict("records"):
         numbers, errors = (
-            [row.get(f"{name}_{side}") for side in ("first", "second")] for name in (column, sweeps.ERRORS.get(column))
+            [row.get(f"{name}_{side}") for side in ("first", "second")] for name in (column, scatter_of(column))
         )
         one, (_, *cells) = _pair(column, unit, numbers, errors)
         point = {key: of_key[row["point_first"]] for key, (of_key, _) in values.items()}

@@ -29,7 +29,7 @@ from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.sweeps.making import progress_at
 from walkers.sweeps.readable import FlatCase, chosen, differing, flattened, readable, short_keys
-from walkers.sweeps.table import RECORD_NAME, read_record, state_at, states, worst_status
+from walkers.sweeps.table import RECORD_NAME, read_record, state_at, states, status_text, worst_status
 from walkers.text import aligned
 
 if TYPE_CHECKING:
@@ -209,7 +209,7 @@ def as_text(contents: pd.DataFrame, hidden: int = 0) -> str:
     The last line states the number of ``hidden`` runs of sweeps.
     """
     sweeps = contents[contents["kind"] == "sweep"]
-    points = sweeps["points"].map(lambda points: ", ".join(f"{number} {status}" for status, number in points.items()))
+    points = sweeps["points"].map(status_text)
     varied = sweeps["parameters"].map(lambda keys: ", ".join(f"{key} ({number})" for key, number in keys.items()))
     columns = {"sweep": sweeps["name"], "points": points, **_weight(sweeps), "case": sweeps["case"]}
     blocks = [_lines({**columns, "varies (values)": varied})] if len(sweeps) else []

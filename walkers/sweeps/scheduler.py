@@ -204,12 +204,11 @@ class SweepPlan:
         apart = sum(predicted_seconds(self.cases[point]) * self.cases[point].run.ranks for point in missing)
         # Python works for one deck at a time, while other engines run.
         until = max(makespan((deck.seconds for deck in self.decks), at_once) + PROGRAM_SECONDS, besides)
-        text = ", ".join(f"{count} {status}" for status, count in sorted(Counter(self.statuses).items()))
         keys = ", ".join(table.with_unit(key, unit) for key, unit in record.sweep.units.items())
         lines = [
             f"{record.sweep.name}: {record.sweep.title}".rstrip(": "),
             f"  varied     {keys or 'nothing'}",
-            f"  points     {len(record.runs)}: {text}",
+            f"  points     {len(record.runs)}: {table.status_text(Counter(self.statuses))}",
             f"  to do      {counted(len(missing), 'point')} in {counted(len(self.decks), 'deck')}",
             f"  predicted  {seconds + besides:.0f} core-seconds ({apart + besides:.0f} without shared decks), "
             f"{duration_text(until)} with {counted(at_once, 'deck')} in parallel",

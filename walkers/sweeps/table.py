@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, Problem, refused, suggestion
 from walkers.inputs.case import Case
+from walkers.inputs.origins import text_of
 from walkers.postprocess.numbers import declared, headline, is_declared, ordered
 from walkers.postprocess.quantities import GROUPS, unit_shown
 from walkers.postprocess.results import Results, modules_of, read
@@ -55,8 +56,6 @@ SIDES = ("right_facing", "left_facing")
 """Velocity columns that replace the mean if `sides_differ`."""
 FACING_DOWN = {"right_facing": "left_facing", "axial_velocity": "axial_left_facing"}
 """Columns of walkers that face down, by the columns of those that face up (`main_columns`)."""
-ERRORS = {"velocity": "scatter"}
-"""Columns that contain the scatter of other columns over copies."""
 SEEDS = ("run.seed", "seed")
 """Keys of the random numbers of a start: points that differ in nothing else repeat an experiment."""
 FORMATS = ("csv", "parquet", "json")
@@ -294,12 +293,7 @@ def with_unit(words: str, unit: str | None) -> str:
 
 def value_text(value: Any, unit: str | None = None) -> str:
     """A value of a key as text, with its unit unless it is a word such as auto; several are separated by slashes."""
-    if isinstance(value, list):
-        text = "/".join(map(value_text, value))
-    elif isinstance(value, bool):
-        text = str(value).lower()
-    else:
-        text = f"{value:g}" if isinstance(value, float) else str(value)
+    text = "/".join(map(text_of, value)) if isinstance(value, list) else text_of(value)
     return f"{text} {unit}" if unit and not isinstance(value, str) else text
 
 
@@ -427,11 +421,16 @@ def thresholds(frame: pd.DataFrame) -> pd.DataFrame:
     return table
 
 
+def status_text(numbers: Mapping[str, int]) -> str:
+    """Numbers of points by status as text: ``8 finished, 2 failed``."""
+    return ", ".join(f"{numbers[status]} {status}" for status in _STATUSES if numbers.get(status))
+
+
 def describe_status(frame: pd.DataFrame) -> str:
     """Numbers of points by status, failures with their messages, and the thresholds of descents."""
-    count = Counter(frame["status"])
-    text = ", ".join(f"{count[status]} {status}" for status in _STATUSES if count[status])
-    lines = [f"{frame.attrs['sweep']}: {counted(len(frame), 'point')}, {text or 'none'}"]
+    lines = [
+        f"{frame.attrs['sweep']}: {counted(len(frame), 'point')}, {status_text(Counter(frame['status'])) or 'none'}"
+    ]
     failed = frame[frame["status"] == "failed"]
     lines += [f"  failed     point {row.point}: {row.message}" for row in failed[:_MOST_FAILURES].itertuples()]
     if len(failed) > _MOST_FAILURES:
