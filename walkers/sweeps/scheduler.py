@@ -438,8 +438,8 @@ class _Loop:
 
     def _take_in(self, deck: PlannedDeck, report: Report) -> None:
         """Count finished points, and submit the others again: in halves if the deck failed."""
-        failure = report if isinstance(report, Failure) else None
-        left = [point for point in deck.points if failure or self.record.runs[point] not in report]
+        failure, finished = (report, []) if isinstance(report, Failure) else (None, report)
+        left = [point for point in deck.points if self.record.runs[point] not in finished]
         self.done += len(deck.points) - len(left)
         if failure:
             self._check_hits(failure, alone=len(left) == 1)
