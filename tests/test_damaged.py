@@ -36,11 +36,8 @@ from tests.conftest import (
     to_toml,
     wait_for,
 )
-from tests.test_calibration import reduced
 from walkers import run as run_case
 from walkers.archive.writing import write_archive
-from walkers.calibration.calibrate import _determinants, _kept, calibrate
-from walkers.calibration.file import read_calibration
 from walkers.errors import InputError
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
@@ -55,7 +52,6 @@ from walkers.runner.directory import CASE_NAME, FIRST_SEGMENT, case_of, recomput
 from walkers.runner.failures import DiskFull
 from walkers.runner.files import write_json
 from walkers.show import describe, summarise
-from walkers.sweeps.scheduler import Options
 from walkers.sweeps.table import load as load_table
 from walkers.templates.deck import render_deck
 from walkers.templates.layout import BEAD_COLUMNS, MEAN_SPIN_COLUMNS
@@ -432,45 +428,6 @@ def test_what_is_no_file_to_read_is_refused_at_once(tmp_path: Path) -> None:
     assert load_case(tmp_path / "windows.toml") == make_case().but(name="windows")
 
 
-# --- calibrations -----------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def calibration() -> dict[str, Any]:
-    return reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
-
-
-def test_an_edit_of_the_design_is_told_and_not_dropped(calibration: dict[str, Any], tmp_path: Path) -> None:
-    """Another wave at the end is welcome."""
-    design, unit, file = calibration["design"], np.full((4, 2), 0.5), tmp_path / "wave-1.json"
-
-    def kept(changed: dict[str, Any], make: np.ndarray) -> np.ndarray:
-        read = read_calibration(changed, source="test", name="test", folder=tmp_path)
-        return _kept(file, _determinants(read, 1), lambda: make)
-
-    assert kept(calibration, unit) is unit
-    for key, value in (("seed", 3), ("waves", [20, 8])):
-        with pytest.raises(InputError, match=rf"wave-1\.json: {key}: was drawn with other {key}"):
-            kept({**calibration, "design": {**design, key: value}}, unit)
-    with pytest.raises(InputError, match=r"wave-1\.json: guesses: was drawn with other guesses"):
-        kept({**calibration, "guesses": [{"friction": 0.1, "drag": 1.0}]}, unit)
-    longer = {**calibration, "design": {**design, "waves": [*design["waves"], 8]}}
-    np.testing.assert_array_equal(kept(longer, 1.0 - unit), unit)
-    file.write_text(json.dumps({**json.loads(file.read_text()), "unit": [[0.5]]}))
-    with pytest.raises(InputError, match=r"wave-1\.json: cannot be read"):
-        kept(calibration, unit)
-
-
-def test_calibrations_that_make_no_sense_are_refused_before_anything_is_written(
-    calibration: dict[str, Any], tmp_path: Path
-) -> None:
-    calibration["parameters"]["drag"] = {"keys": ["contact.restitution"], "range": [0.01, 0.9]}
-    found = read_calibration(calibration, source="bad.toml", name="bad", folder=tmp_path)
-    with pytest.raises(InputError, match=r"bad\.toml: parameters\.drag\.range = \[0\.01, 0\.9\]: contact\.restitution"):
-        calibrate(found, tmp_path / "runs", Options(1))
-    assert not (tmp_path / "runs").exists()
-
-
 # --- texts ------------------------------------------------------------------------------------------------------------
 
 
@@ -546,18 +503,19 @@ def stranger(run_directory: Callable[..., Path], tmp_path: Path) -> Callable[[st
 
 def _calibration(text: str) -> str:
     """The report of a calibration whose texts are all the same."""
-    row = {"title": text, "value": 1.0, "deviation": 0.1, "unit": "", "engine": 1.0, "low": None, "emulator": 1.0}
-    row |= {"error": 0.1, "agrees": True, "derived": False, "held_out": {text: (1.0, 0.1)}}
+    row = {"title": text, "expected": text, "numbers": {text: 1.0}, "agrees": {text: True}, "derived": False}
+    row |= {"predicted": (0.0, 1.0, 2.0), "emulator_error": 0.1}
     weights = {"points": 1, "effective_samples": 1.0, "converged": True}
     found = {
-        "title": text, "calibration": text, "agree": 1, "of": 1, "sets": 1, "parameters": {"a": text},
-        "best": {"a": 1.0}, "intervals": {"a": (0.0, 1.0, 2.0)}, "words": {"a": ""}, "observations": [row],
-        "discrepancies": {text: 1.0}, "emulators_within_two_errors": 1.0, "emulators_checked": 1,
-        "feasible": {"seen": 1.0, "expected": 1.0}, "posterior": weights, "held_out_posteriors": {text: weights},
-        "settings": {"parameters": {"a": {"range": (0.0, 1.0)}}},
+        "title": text, "calibration": text, "number": 1, "of": 1, "observed": "measured", "parameters": {"a": text},
+        "sets": {text: {"a": 1.0}}, "agree": {text: 1}, "intervals": {"a": (0.0, 1.0, 2.0)}, "words": {"a": ""},
+        "ratios": {text: (0.0, 1.0, 2.0)}, "observations": [row], "emulators_within_two_errors": 1.0,
+        "posterior": weights, "held_out": weights,
+        "settings": {
+            "parameters": {"a": {"range": (0.0, 1.0)}}, "experiments": {text: {}}, "design": {"held_out": [text]},
+        },
     }  # fmt: skip
-    given = {"samples": 1, "least": 1.0, "narrow": 0.5, "observed": "measured"}
-    return rendered("walkers.calibration", "report.md.j2", found=found, discrepancies=[(0.0, 1.0, 2.0)], **given)
+    return rendered("walkers.calibration", "report.md.j2", found=found, least=1.0, narrow=0.5)
 
 
 Stranger = Callable[[str], Path]

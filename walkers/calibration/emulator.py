@@ -1,259 +1,99 @@
-"""Emulators of the engine between parameter sets: predictions with errors, and probabilities of feasibility."""
+"""Emulators of the engine between parameter sets, and the posterior of the parameters from them."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-from scipy.spatial.distance import cdist
-from scipy.special import log_expit
-from scipy.stats import truncnorm, uniform
+from scipy.linalg import cho_solve
+from scipy.special import logsumexp
+from scipy.stats import t as student
 
-from walkers.calibration.file import Observation, Parameter
+from walkers.calibration.observations import FloatArray, Observation
 from walkers.inputs.axes import unit_cube
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
-_FOLDS = 10
-_FEW = 20
-_LEAST = 5
-_UNKNOWN = 3.0
-"""Standard deviation of the transformed residual of an observation with fewer than five values: ten deviations."""
-_EXTREME = 3.0
-LARGEST = 12.0
-"""Largest transformed residual; sinh overflows beyond."""
-
-
-@dataclass(frozen=True)
-class Space:
-    """D free parameters as coordinates of the unit cube, on a logarithmic scale where the parameter demands it."""
-
-    parameters: tuple[Parameter, ...]
-
-    @property
-    def dimensions(self) -> int:
-        """D."""
-        return len(self.parameters)
-
-    @cached_property
-    def logarithmic(self) -> BoolArray:
-        """Which parameters are scaled by their logarithms, shape (D,)."""
-        return np.array([one.log for one in self.parameters])
-
-    @cached_property
-    def _ends(self) -> FloatArray:
-        return self._scaled(np.array([one.range for one in self.parameters], np.float64).T)
-
-    def _scaled(self, values: FloatArray) -> FloatArray:
-        return np.asarray(np.log(values, out=np.array(values, np.float64), where=self.logarithmic))
-
-    def values(self, unit: FloatArray) -> FloatArray:
-        """Values of the parameters at points of the unit cube, shape (..., D)."""
-        scaled = self._ends[0] + np.asarray(unit) * (self._ends[1] - self._ends[0])
-        return np.asarray(np.exp(scaled, out=scaled, where=self.logarithmic))
-
-    def unit(self, values: FloatArray) -> FloatArray:
-        """Points of the unit cube at values of the parameters, shape (..., D)."""
-        return np.asarray((self._scaled(values) - self._ends[0]) / (self._ends[1] - self._ends[0]))
-
-    @cached_property
-    def priors(self) -> list[Any]:
-        """Prior distributions (scipy) of each coordinate on the unit interval."""
-        found = []
-        for one, low, width in zip(self.parameters, self._ends[0], self._ends[1] - self._ends[0], strict=True):
-            if one.normal is None:
-                found.append(uniform())
-                continue
-            mean, deviation = one.normal
-            middle, scale = ((np.log(mean) if one.log else mean) - low) / width, deviation / width
-            found.append(truncnorm(-middle / scale, (1.0 - middle) / scale, middle, scale))
-        return found
-
-    def log_prior(self, unit: FloatArray) -> FloatArray:
-        """Logarithm of the prior density at points of the unit cube, shape (...); -inf outside."""
-        return np.asarray(np.sum([one.logpdf(unit[..., place]) for place, one in enumerate(self.priors)], axis=0))
-
-    def design(self, points: int, seed: int) -> FloatArray:
-        """A space-filling first wave, shape (points, D): a scrambled Sobol sequence."""
-        return unit_cube("sobol", self.dimensions, points, seed)
-
-
-def spread_out(candidates: FloatArray, points: int, taken: FloatArray) -> FloatArray:
-    """Choose candidates (C, D), each one farthest from the earlier ones and from the points ``taken``."""
-    distance = cdist(candidates, taken).min(axis=1, initial=np.inf)
-    chosen: list[int] = []
-    for _ in range(min(points, len(candidates))):
-        chosen.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.linalg.norm(candidates - candidates[chosen[-1]], axis=1))
-    return candidates[chosen]
-
-
-def transformed(outcome: FloatArray, observation: Observation) -> FloatArray:
-    """Arsinh of the residual in standard deviations, so that walkers that are far too fast do not dominate the fit."""
-    return np.asarray(np.arcsinh((outcome - observation.value) / observation.deviation))
+LEAST_SAMPLES = 400.0
+"""Smallest effective sample size of a converged posterior."""
+LARGEST = 10.0
+"""Deviations at which distances from a fact end, so that sets that are far off do not shape the emulators."""
+_FREEDOM = 4.0
+"""Degrees of freedom of Student's t: a fact that no set reproduces does not outweigh all others."""
+_KEPT = 4000
+_AT_ONCE = 8192
 
 
 @dataclass(frozen=True)
 class Emulator:
-    """One observation as a function of the parameters: a Gaussian process of the transformed residual.
+    """One observation as a function of the parameters: a Gaussian process of its distance from the fact.
 
-    Its errors are from cross-validation.
+    The distance is in deviations from the value, or from the only limit or the middle of both. Errors are those of
+    leaving out one set after the other.
     """
 
     observation: Observation
-    sets: int  # number of sets with this observation
-    process: Any = None  # fitted, of scikit-learn; None if there are too few sets
-    error_inflation: float = 1.0  # factor by which its standard deviations are too small in later waves; at least 1
-    error: float = np.nan  # root mean square, of the transformed residual
-    explained: float = np.nan  # share of the variance
+    process: Any  # of scikit-learn, fitted
+    error: float  # root mean square of the errors, in deviations
+    inflation: float  # factor by which the process takes them for smaller; at least 1
+
+    @classmethod
+    def of(cls, observation: Observation, unit: FloatArray, numbers: FloatArray, seed: int) -> Emulator:
+        """Fit sets (P, D) of the unit cube and the numbers of the engine there (P,); NaN where there is none."""
+        from sklearn.gaussian_process import GaussianProcessRegressor
+        from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+
+        away = distances(observation, numbers)
+        kernel = ConstantKernel(1.0, (1e-2, 1e2)) * Matern(np.ones(unit.shape[1]), (5e-2, 2e1), nu=2.5)
+        process = GaussianProcessRegressor(
+            kernel + WhiteKernel(1e-2, (1e-6, 1.0)), normalize_y=True, n_restarts_optimizer=2, random_state=seed
+        )
+        with _quietly():
+            process.fit(unit, away)
+        # Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), eqs. 5.10 to 5.12.
+        inverse = np.diag(cho_solve((process.L_, True), np.eye(len(unit))))
+        miss, scale = process.alpha_ / inverse, float(np.std(away)) or 1.0
+        inflation = max(1.0, float(np.sqrt(np.mean((miss * np.sqrt(inverse)) ** 2))))
+        return cls(observation, process, scale * float(np.sqrt(np.mean(miss**2))), inflation)
 
     def predict(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Transformed residual and its standard deviation, widened by ``error_inflation``, at points (N, D)."""
-        if self.process is None:
-            return np.zeros(len(unit)), np.full(len(unit), _UNKNOWN)
+        """Distance from the fact and its standard error at points (N, D), in deviations."""
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Predicted variances")  # rounding errors of zero, at sets that were run
             mean, deviation = self.process.predict(unit, return_std=True)
-        return mean, deviation * self.error_inflation
+        return mean, deviation * self.inflation
 
-    def draw(self, unit: FloatArray, normal: FloatArray) -> FloatArray:
-        """Samples of the observation at points (N, D), SI units and degrees; ``normal``: N standard normal numbers."""
-        mean, deviation = self.predict(unit)
-        residual = np.sinh(np.clip(mean + deviation * normal, -LARGEST, LARGEST))
-        return np.asarray(self.observation.value + self.observation.deviation * residual)
+    def log_likelihood(self, unit: FloatArray) -> FloatArray:
+        """Logarithm of the probability (density) of the fact at points (N, D)."""
+        mean, error = self.predict(unit)
+        width = np.hypot(1.0, error)
+        if self.observation.value is not None:
+            return np.asarray(student.logpdf(mean / width, _FREEDOM) - np.log(width))
+        low, high = ((one - middle(self.observation)) / self.observation.deviation for one in self.observation.limits)
+        within = student.cdf((high - mean) / width, _FREEDOM) - student.cdf((low - mean) / width, _FREEDOM)
+        return np.asarray(np.log(np.maximum(within, 1e-300)))
+
+    def numbers(self, unit: FloatArray, normal: FloatArray) -> FloatArray:
+        """Samples of the number at points (N, D), given N standard normal numbers."""
+        mean, error = self.predict(unit)
+        return np.asarray(middle(self.observation) + self.observation.deviation * (mean + error * normal))
 
 
-@dataclass(frozen=True)
-class Emulators:
-    """Emulators of K observations, and of their feasibility.
+def middle(observation: Observation) -> float:
+    """The value of a fact, its only limit, or the middle of both."""
+    return float(np.mean([one for one in observation.limits if np.isfinite(one)]))
 
-    Observations that are missing in the same sets form one of E events: they need the same walkers.
+
+def distances(observation: Observation, numbers: FloatArray) -> FloatArray:
+    """What an emulator learns: distances of numbers from the `middle` in deviations, at most `LARGEST`.
+
+    A number that does not exist is as far off as one can be, on the side where no limit allows it.
     """
-
-    each: tuple[Emulator, ...]  # one an observation
-    correlation: FloatArray  # of their errors, shape (K, K), since observations share runs and sets; shrunk toward zero
-    event: npt.NDArray[np.int64]  # event that each observation needs, shape (K,)
-    missing: BoolArray  # sets in which an event did not occur, shape (P, E)
-    classifiers: tuple[Any, ...]  # E Gaussian processes; None for an event that occurred in all sets, or in none
-
-    def predict(self, unit: FloatArray, places: Sequence[int] | None = None) -> tuple[FloatArray, FloatArray]:
-        """Transformed residuals of all observations (or those at ``places``) and their standard deviations, (N, K)."""
-        chosen = range(len(self.each)) if places is None else places
-        mean, deviation = zip(*(self.each[one].predict(unit) for one in chosen), strict=True)
-        return np.stack(mean, axis=1), np.stack(deviation, axis=1)
-
-    def log_probabilities(self, unit: FloatArray) -> FloatArray:
-        """Logarithms of the probabilities of the events at points (N, D), shape (N, E).
-
-        Mean of the logistic function over the normal latent function, in MacKay's approximation
-        (doi 10.1162/neco.1992.4.5.720).
-        """
-        latent = np.empty((len(unit), len(self.classifiers)))
-        for place, (one, missing) in enumerate(zip(self.classifiers, self.missing.T, strict=True)):
-            if one is None:  # Laplace's rule of succession
-                latent[:, place] = np.log(((~missing).sum() + 1.0) / (missing.sum() + 1.0))
-            else:
-                mean, variance = one.latent_mean_and_variance(unit)
-                latent[:, place] = mean / np.sqrt(1.0 + np.pi / 8.0 * np.maximum(variance, 0.0))
-        return np.asarray(log_expit(latent))
-
-    def feasible(self, unit: FloatArray) -> FloatArray:
-        """Probabilities that each observation exists, at points (N, D), shape (N, K)."""
-        return np.asarray(np.exp(self.log_probabilities(unit))[:, self.event])
-
-    def needed(self, places: Sequence[int]) -> list[int]:
-        """Events that observations need, without events that others imply.
-
-        An event is implied if it is missing exactly where others are (a ratio needs the walkers of both its speeds).
-        """
-        events, kept = dict.fromkeys(self.event[list(places)].tolist()), []
-        for one in events:
-            own, others = self.missing[:, one], [self.missing[:, other] for other in events if other != one]
-            within = [other for other in others if not (other & ~own).any()]
-            if not within or not np.array_equal(np.any(within, axis=0), own):
-                kept.append(one)
-        return kept
-
-
-def fit_emulators(
-    unit: FloatArray, outcome: FloatArray, observations: Sequence[Observation], seed: int, filling: int = 0
-) -> Emulators:
-    """Fit emulators to the values, and classifiers to their existence.
-
-    Parameters
-    ----------
-    unit, outcome : ndarray, shape (P, D) and (P, K)
-        Sets that were run, in the unit cube, and their observations; NaN where there is none.
-    observations, seed
-        K observations; seed of the restarts of the fit.
-    filling
-        Number of space-filling sets. Errors are estimated from the later sets, if there are enough: these are near the
-        posterior, where walkers are more often close to a transition.
-    """
-    from sklearn.covariance import LedoitWolf
-
-    fitted = [_fitted(unit, outcome[:, k], one, seed, filling) for k, one in enumerate(observations)]
-    # Unknown errors count as zero, which keeps the matrix positive; large ones are limited, so that no set dominates.
-    errors = np.clip(np.stack([errors for _, errors in fitted], axis=1), -_EXTREME, _EXTREME)
-    size = np.sqrt(np.mean(errors**2, axis=0))
-    correlation = LedoitWolf(assume_centered=True).fit(errors / np.where(size > 0.0, size, 1.0)).covariance_
-    np.fill_diagonal(correlation, 1.0)
-    missing, event = np.unique(np.isnan(outcome), axis=1, return_inverse=True)
-    classifiers = tuple(_classifier(unit, ~column, seed) for column in missing.T)
-    return Emulators(tuple(one for one, _ in fitted), correlation, event.reshape(-1), missing, classifiers)
-
-
-def _fitted(
-    unit: FloatArray, outcome: FloatArray, observation: Observation, seed: int, filling: int
-) -> tuple[Emulator, FloatArray]:
-    """An emulator, and its cross-validated errors divided by the predicted ones, shape (P,); 0 without a value."""
-    from sklearn.base import clone
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
-    from sklearn.model_selection import KFold
-
-    made, errors = np.isfinite(outcome), np.zeros(len(outcome))
-    sets = int(made.sum())
-    if sets < _LEAST:
-        return Emulator(observation, sets), errors
-    wanted, known = transformed(outcome[made], observation), unit[made]
-    scales = np.full(unit.shape[1], 0.7)
-    kernel = ConstantKernel(1.0, (1e-2, 1e2)) * Matern(scales, (5e-2, 2e1), nu=2.5) + WhiteKernel(1e-2, (1e-6, 1.0))
-    process = GaussianProcessRegressor(kernel, normalize_y=True, n_restarts_optimizer=1, random_state=seed)
-    predicted, deviation = np.zeros(sets), np.zeros(sets)
-    with _quietly():
-        process.fit(known, wanted)
-        for others, fold in KFold(min(_FOLDS, sets), shuffle=True, random_state=seed).split(known):
-            partial = clone(process).set_params(kernel=process.kernel_, optimizer=None)
-            partial.fit(known[others], wanted[others])
-            predicted[fold], deviation[fold] = partial.predict(known[fold], return_std=True)
-    miss = wanted - predicted
-    errors[made] = miss / deviation
-    later = made & (np.arange(len(unit)) >= filling)
-    judged = later if later.sum() >= _FEW else made
-    inflation = max(1.0, float(np.sqrt(np.mean(errors[judged] ** 2))))
-    square, spread = float(np.mean(miss**2)), float(np.var(wanted))
-    explained = 1.0 - square / spread if spread > 0.0 else 1.0
-    return Emulator(observation, sets, process, inflation, float(np.sqrt(square)), explained), errors
-
-
-def _classifier(unit: FloatArray, made: BoolArray, seed: int) -> Any:
-    from sklearn.gaussian_process import GaussianProcessClassifier
-    from sklearn.gaussian_process.kernels import ConstantKernel, Matern
-
-    if made.all() or not made.any():
-        return None
-    # The constant kernel is the uncertainty of the share of feasible sets over the whole range: with few failures,
-    # most of the range is feasible; without it, half. Scales below a tenth of the range cannot be learned.
-    kernel = ConstantKernel(4.0, (1e-1, 1e2)) * Matern(np.full(unit.shape[1], 1.0), (1e-1, 2e1), nu=2.5)
-    with _quietly():
-        return GaussianProcessClassifier(kernel + ConstantKernel(4.0, "fixed"), random_state=seed).fit(unit, made)
+    away = np.clip((numbers - middle(observation)) / observation.deviation, -LARGEST, LARGEST)
+    return np.where(np.isnan(numbers), -LARGEST if observation.most is None else LARGEST, away)
 
 
 @contextmanager
@@ -265,3 +105,45 @@ def _quietly() -> Iterator[None]:
     with warnings.catch_warnings(), threadpool_limits(1):
         warnings.simplefilter("ignore", ConvergenceWarning)
         yield
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Points of the prior, weighted by the likelihood of the observations that were used."""
+
+    points: FloatArray  # of a Sobol sequence in the unit cube of the prior, shape (N, D)
+    log_weight: FloatArray  # normalised, shape (N,)
+    log_evidence: float  # mean likelihood over the prior
+    seed: int
+
+    @classmethod
+    def of(cls, emulators: Sequence[Emulator], points: int, seed: int, without: Collection[str] = ()) -> Posterior:
+        """Weigh points of the prior by the observations that are neither derived nor of the groups ``without``."""
+        used = [one for one in emulators if not one.observation.derived and one.observation.group not in without]
+        unit = unit_cube("sobol", used[0].process.n_features_in_, points, seed)
+        parts = [unit[at : at + _AT_ONCE] for at in range(0, points, _AT_ONCE)]
+        total = np.concatenate([np.sum([one.log_likelihood(part) for one in used], axis=0) for part in parts])
+        whole = float(logsumexp(total))
+        return cls(unit, total - whole, whole - float(np.log(points)), seed)
+
+    @property
+    def effective_samples(self) -> float:
+        """1/Σ w²."""
+        return float(np.exp(-logsumexp(2.0 * self.log_weight)))
+
+    @property
+    def converged(self) -> bool:
+        """Whether the effective sample size is large enough."""
+        return self.effective_samples > LEAST_SAMPLES
+
+    @property
+    def best(self) -> FloatArray:
+        """The point of the largest weight, shape (D,)."""
+        return np.asarray(self.points[np.argmax(self.log_weight)])
+
+    @cached_property
+    def samples(self) -> FloatArray:
+        """Points of equal weight, shape (S, D): each in proportion to its weight."""
+        steps = (np.arange(_KEPT) + np.random.default_rng(self.seed).random()) / _KEPT
+        chosen = np.searchsorted(np.cumsum(np.exp(self.log_weight)), steps)
+        return np.asarray(self.points[np.minimum(chosen, len(self.points) - 1)])

@@ -1,4 +1,4 @@
-"""Calibration files: free parameters of a case, and the published numbers to reproduce.
+"""Calibration files: free parameters of a case, and the observations that weigh them.
 
 case = "fig1b"
 
@@ -12,7 +12,7 @@ drive.peak_acceleration = "4 g"
 
 [[observations]]
 name      = "v_4g"
-group     = "fig2"
+group     = "speeds"
 of        = ["slow"]
 value     = "1.23 mm/s"
 deviation = "0.18 mm/s"
@@ -22,32 +22,32 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from math import degrees
+from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any
 
+import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
+from scipy.stats import truncnorm, uniform
 
+from walkers.calibration.observations import FloatArray, Names, Observation
 from walkers.errors import InputError, Problem, suggestion
 from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import validated
 from walkers.inputs.reading import find_input
+from walkers.inputs.sweep import Sweep, expand
 from walkers.inputs.table import Table
 from walkers.inputs.toml import read_toml
-from walkers.inputs.units import ANGLE, SPEED, WRITTEN, Kind, Number, Whole, parse_quantity
+from walkers.inputs.units import Number, Whole
 
-_MOST = 10_000
-Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_pair_1"]
-"""A column of a sweep's table that is a speed."""
-QUANTITIES: dict[str, Kind] = {**dict.fromkeys(get_args(Speed), SPEED), "misalignment": ANGLE}
-"""Quantities of observations: columns of the table of a sweep, or the largest angle to the drive axis."""
-Names = Annotated[list[str], Field(min_length=1)]
+_DIGITS = 6
 
 
-class ParameterTable(Table):
-    """``[parameters.NAME]``: keys of the case that take the value, range, and prior.
+class Parameter(Table):
+    """``[parameters.NAME]``: keys of the case that take the value in some experiments (default: all), and the prior.
 
-    Numbers are in its ``unit``, if it has one; those of a ``log`` range, and its median, are above zero.
+    The prior is even over the ``range``, or over its logarithm (``log``), or the part of a ``normal`` distribution in
+    it: mean and deviation; with ``log`` the median, and the deviation of the logarithm. Numbers have the ``unit``.
     """
 
     keys: Names
@@ -68,64 +68,35 @@ class ParameterTable(Table):
             raise ValueError("expected numbers above zero: log is that of magnitudes")
         return value
 
+    @cached_property
+    def _prior(self) -> Any:
+        """The prior of the value, or of its logarithm (scipy)."""
+        low, high = np.log(self.range) if self.log else self.range
+        if self.normal is None:
+            return uniform(low, high - low)
+        middle, scale = np.log(self.normal[0]) if self.log else self.normal[0], self.normal[1]
+        return truncnorm((low - middle) / scale, (high - middle) / scale, middle, scale)
 
-class Parameter(ParameterTable):
-    """A free parameter: its table, its name, and the experiments that it belongs to."""
+    def values(self, unit: FloatArray) -> FloatArray:
+        """The values below which these shares of the prior lie."""
+        scaled = np.asarray(self._prior.ppf(unit))
+        return np.exp(scaled) if self.log else scaled
 
-    name: str
-    experiments: list[str]
-
-
-class Observation(Table):
-    """``[[observations]]``: a mean over experiments, or its ratio to the mean over others.
-
-    A ``derived`` observation follows from others: it is reported, but has no weight in the posterior.
-    ``value`` and ``deviation`` are in SI units, angles in degrees; a file has them with their unit, but of a ratio.
-    """
-
-    name: str
-    group: str
-    title: str = Field(default_factory=lambda given: str(given.get("name", "")))
-    quantity: Literal[Speed, "misalignment"] = "velocity"
-    of: Names
-    over: list[str] = Field([])
-    value: Number
-    deviation: Annotated[Number, Field(gt=0)]
-    derived: bool = False
-
-    @field_validator("value", "deviation", mode="before")
-    @classmethod
-    def _number(cls, value: Any, info: ValidationInfo) -> Any:
-        if info.context != WRITTEN:
-            return value
-        if info.data.get("over"):
-            if isinstance(value, str):
-                raise ValueError("expected a plain number: a ratio has no unit")
-            return value
-        kind = QUANTITIES[info.data.get("quantity", "velocity")]
-        if not isinstance(value, str):
-            raise ValueError(kind.expectation)
-        number = parse_quantity(value, kind)
-        return degrees(number) if kind is ANGLE else number
-
-
-class SharedError(Table):
-    """``[shared_errors.NAME]``: observations with correlated errors, and the shared part of the variance.
-
-    ``share`` of the variance of each is shared: so large is the correlation of any two of them.
-    """
-
-    observations: Annotated[list[str], Field(min_length=2)]
-    share: Annotated[Number, Field(gt=0, lt=1)]
+    def unit_of(self, values: FloatArray | float) -> FloatArray:
+        """The shares of the prior below these values."""
+        return np.asarray(self._prior.cdf(np.log(values) if self.log else values))
 
 
 class DesignTable(Table):
-    """``[design]``: sizes of the waves and of the predictive check, and how many points of the prior are weighed."""
+    """``[design]``: numbers of parameter sets for the emulators and of points for the posterior; what is held out.
+
+    The groups of observations in ``held_out`` are predicted from all others.
+    """
 
     seed: Annotated[Whole, Field(ge=0)] = 1
-    waves: Annotated[list[Annotated[Whole, Field(ge=4, le=_MOST)]], Field(min_length=1)] = Field([64])
-    predictive: Annotated[Whole, Field(ge=2, le=1000)] = 8
-    points: Annotated[Whole, Field(ge=100, le=1_000_000)] = 20_000
+    points: Annotated[Whole, Field(ge=4, le=10_000)] = 64
+    posterior: Annotated[Whole, Field(ge=256, le=1 << 20)] = 1 << 16
+    held_out: list[str] = Field([])
 
 
 class CalibrationFile(Table):
@@ -135,12 +106,10 @@ class CalibrationFile(Table):
     published: bool = False
     case: str
     set: dict[str, Any] = Field({})
-    parameters: Annotated[dict[str, ParameterTable], Field(min_length=1)]
+    parameters: Annotated[dict[str, Parameter], Field(min_length=1)]
     experiments: Annotated[dict[str, dict[str, Any]], Field(min_length=1)]
     observations: Annotated[list[Observation], Field(min_length=1)]
-    shared_errors: dict[str, SharedError] = Field({})
-    guesses: list[dict[str, Number]] = Field([])
-    held_out: dict[str, list[str]] = Field({})
+    sets: dict[str, dict[str, Number]] = Field({})
     design: DesignTable = DesignTable()
 
 
@@ -154,33 +123,60 @@ class Calibration:
         Of the file.
     file
         What it says.
-    parameters
-        What is free, with the experiments that each belongs to.
     experiments
-        Values of the same keys for each.
+        For each, the values of the same keys: those that any experiment changes.
     """
 
     name: str
     source: str
     folder: Path
     file: CalibrationFile
-    parameters: tuple[Parameter, ...]
     experiments: Mapping[str, Mapping[str, Value]]
 
-    @property
-    def observations(self) -> tuple[Observation, ...]:
-        """The observations to reproduce."""
-        return tuple(self.file.observations)
+    def values(self, unit: FloatArray) -> FloatArray:
+        """Values of the D parameters at points of the unit cube, shape (N, D)."""
+        each = zip(self.file.parameters.values(), unit.T, strict=True)
+        return np.stack([parameter.values(shares) for parameter, shares in each], axis=1)
 
-    @property
-    def guesses(self) -> tuple[tuple[float, ...], ...]:
-        """Sets that the first wave has beside those that fill the ranges: values in the order of the parameters."""
-        return tuple(tuple(guess[label] for label in self.file.parameters) for guess in self.file.guesses)
+    @cached_property
+    def sets(self) -> FloatArray:
+        """The named sets as points of the unit cube, shape (S, D)."""
+        known = self.file.parameters.items()
+        rows = [[parameter.unit_of(given[label]) for label, parameter in known] for given in self.file.sets.values()]
+        return np.reshape(np.array(rows, np.float64), (-1, len(self.file.parameters)))
 
-    @property
-    def design(self) -> DesignTable:
-        """Sizes of the waves and of the posterior."""
-        return self.file.design
+    def sweep(self, name: str, values: FloatArray | None = None) -> Sweep:
+        """The sweep of all experiments, for every parameter set (N, D) or, without sets, with the case's own values.
+
+        `InputError` if a key of the file is no key of a case, or its case has no dimers.
+        """
+        points = [
+            {**keys, **self._changes(label, row)}
+            for row in ([None] if values is None else values)
+            for label, keys in self.experiments.items()
+        ]
+        varied = set(points[0])
+        document = {
+            "title": self.file.title,
+            "case": self.file.case,
+            "set": {key: value for key, value in flatten(self.file.set).items() if key not in varied},
+            "zip": [{key: [point[key] for point in points] for key in points[0]}],
+        }
+        sweep = expand(document, source=self.source, name=name, folder=self.folder)
+        if "dimers" not in sweep.document:
+            problem = Problem("case", f'"{self.file.case}"', "expected a case of dimers")
+            raise InputError(self.source, [problem])
+        return sweep
+
+    def _changes(self, label: str, row: FloatArray | None) -> dict[str, Value]:
+        """Values of the keys of parameters in an experiment, for one parameter set (D,)."""
+        changes: dict[str, Value] = {}
+        for parameter, value in zip(self.file.parameters.values(), [] if row is None else row, strict=row is not None):
+            digits = f"{value:.{_DIGITS}g}"
+            if label in (parameter.experiments or [label]):
+                given = f"{digits} {parameter.unit}" if parameter.unit else float(digits)
+                changes |= dict.fromkeys(parameter.keys, given)
+        return changes
 
 
 def load_calibration(calibration: str | Path) -> Calibration:
@@ -195,99 +191,85 @@ def load_calibration(calibration: str | Path) -> Calibration:
 def read_calibration(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Calibration:
     """A calibration given as nested tables; parameters and errors as for `walkers.inputs.sweep.expand`."""
     file = validated(CalibrationFile, document, source, "a calibration")
-    problems = [*_unknown_names(file), *_contradictions(file), *_problems_of_guesses(file), *_problems_of_keys(file)]
-    if problems:
+    usual, own = flatten(file.set), {label: flatten(table) for label, table in file.experiments.items()}
+    varied = list(dict.fromkeys(key for keys in own.values() for key in keys))
+    experiments = {
+        label: {key: {**usual, **keys}[key] for key in varied if key in usual or key in keys}
+        for label, keys in own.items()
+    }
+    lacking = [
+        Problem(
+            f"experiments.{label}.{key}", None, "missing; expected it here or in [set]: other experiments change it"
+        )
+        for label, keys in experiments.items()
+        for key in varied
+        if key not in keys
+    ]
+    if problems := [*_unknown_names(file), *_contradictions(file), *_doubly_set(file), *lacking]:
         raise InputError(source, problems)
-    parameters = []
-    for label, table in file.parameters.items():
-        filled = {"symbol": table.symbol or label, "experiments": table.experiments or list(file.experiments)}
-        parameters.append(Parameter(**{**vars(table), **filled}, name=label))
-    return Calibration(
-        name=name,
-        source=source,
-        folder=folder,
-        file=file,
-        parameters=tuple(parameters),
-        experiments={label: flatten(table) for label, table in file.experiments.items()},
-    )
+    return Calibration(name, source, folder, file, experiments)
 
 
 def _unknown_names(file: CalibrationFile) -> Iterator[Problem]:
     """References to names that the file does not define."""
-    observations, groups = ([getattr(one, key) for one in file.observations] for key in ("name", "group"))
-    named: list[tuple[str, Collection[str], Collection[str], str]] = []
-    for label, parameter in file.parameters.items():
-        place = f"parameters.{label}.experiments"
-        named.append((place, parameter.experiments or file.experiments, file.experiments, "an experiment"))
+    named: list[tuple[str, Collection[str], Collection[str], str]] = [
+        (f"parameters.{label}.experiments", parameter.experiments or [], file.experiments, "an experiment")
+        for label, parameter in file.parameters.items()
+    ]
     for number, one in enumerate(file.observations):
-        place = f"observations[{number}]"
-        named.append((f"{place}.of", one.of, file.experiments, "an experiment"))
-        named.append((f"{place}.over", one.over, file.experiments, "an experiment"))
-    for label, error in file.shared_errors.items():
-        named.append((f"shared_errors.{label}.observations", error.observations, observations, "an observation"))
-    for number, guess in enumerate(file.guesses):
-        named += [(f"guesses[{number}].{label}", [label], file.parameters, "a parameter") for label in guess]
-    for label, held in file.held_out.items():
-        named.append((f"held_out.{label}", held, groups, "a group of observations"))
+        named += [
+            (f"observations[{number}].{key}", getattr(one, key), file.experiments, "an experiment")
+            for key in ("of", "over")
+        ]
+    named += [
+        (f"sets.{label}.{name}", [name], file.parameters, "a parameter")
+        for label in file.sets
+        for name in file.sets[label]
+    ]
+    groups = dict.fromkeys(one.group for one in file.observations)
+    named.append(("design.held_out", file.design.held_out, groups, "a group of observations"))
     for place, given, known, what in named:
         for name in given:
             if name not in known:
-                expected = f"expected {what}: one of {', '.join(sorted(set(known)))}{suggestion(name, known)}"
+                expected = f"expected {what}: one of {', '.join(sorted(known))}{suggestion(name, known)}"
                 yield Problem(place, f'"{name}"', expected)
 
 
 def _contradictions(file: CalibrationFile) -> Iterator[Problem]:
     names = [one.name for one in file.observations]
     for number, one in enumerate(file.observations):
+        place, limits = f"observations[{number}]", [one.least, one.most]
         if names.index(one.name) != number:
-            yield Problem(f"observations[{number}].name", f'"{one.name}"', "expected a name of its own")
+            yield Problem(f"{place}.name", f'"{one.name}"', "expected a name of its own")
         if one.over and set(one.over) == set(one.of):
-            text = "expected other experiments than in of: the ratio would be 1"
-            yield Problem(f"observations[{number}].over", None, text)
-    if all(one.derived for one in file.observations):
-        yield Problem("observations", None, "expected one that is not derived")
-    for label, error in file.shared_errors.items():
-        for name in sorted({name for name in error.observations if error.observations.count(name) > 1}):
-            yield Problem(f"shared_errors.{label}.observations", f'"{name}"', "expected each observation once")
-    for name in names:
-        having = {label: error.share for label, error in file.shared_errors.items() if name in error.observations}
-        if (whole := sum(having.values())) >= 1.0:
-            text = f"expected {name} to have an error of its own: the shares of {', '.join(having)} are {whole:g} of it"
-            yield Problem("shared_errors", None, text)
-    weighed = {one.group for one in file.observations if not one.derived}
-    for label, held in file.held_out.items():
-        if set(held) >= weighed:
-            yield Problem(f"held_out.{label}", None, "expected to leave a group to calibrate on")
+            yield Problem(f"{place}.over", None, "expected other experiments than in of: the ratio would be 1")
+        if (one.value is None) == (limits == [None, None]):
+            yield Problem(f"{place}.value", None, "expected either value or limits (least, most)")
+        if None not in limits and one.limits[0] >= one.limits[1]:
+            yield Problem(f"{place}.most", f"{one.most:g}", "expected more than least")
+    if not any(one.group not in file.design.held_out and not one.derived for one in file.observations):
+        yield Problem("observations", None, "expected one that is neither derived nor held out")
+    for label, given in file.sets.items():
+        for name, parameter in file.parameters.items():
+            place, (low, high) = f"sets.{label}.{name}", parameter.range
+            if name not in given:
+                yield Problem(place, None, "missing; a set has all parameters")
+            elif not low <= given[name] <= high:
+                expected = f"expected a number within the parameter's range, {low:g} to {high:g}"
+                yield Problem(place, f"{given[name]:g}", expected)
 
 
-def _problems_of_guesses(file: CalibrationFile) -> Iterator[Problem]:
-    """A guess has all parameters, each within its range."""
-    for number, guess in enumerate(file.guesses):
-        for label, table in file.parameters.items():
-            place, (low, high) = f"guesses[{number}].{label}", table.range
-            if label not in guess:
-                yield Problem(place, None, "missing; a guess has all parameters")
-            elif not low <= guess[label] <= high:
-                text = f"expected a number within the parameter's range, {low:g} to {high:g}"
-                yield Problem(place, f"{guess[label]:g}", text)
-
-
-def _problems_of_keys(file: CalibrationFile) -> Iterator[Problem]:
-    """All experiments have the same keys, each of a parameter too, and of one parameter alone."""
-    first, *others = [(label, set(flatten(table))) for label, table in file.experiments.items()]
-    for label, keys in others:
-        for key in sorted(keys ^ first[1]):
-            text = f"expected the same keys in every experiment; {first[0]} and {label} differ in {key}"
-            yield Problem(f"experiments.{label}", None, text)
+def _doubly_set(file: CalibrationFile) -> Iterator[Problem]:
+    """A key of a parameter is that of one parameter in every experiment, or in none."""
     taken: dict[str, dict[str, str]] = {}
-    for name, table in file.parameters.items():
-        for key in table.keys:
-            for experiment in table.experiments or file.experiments:
+    for name, parameter in file.parameters.items():
+        for key in parameter.keys:
+            for experiment in parameter.experiments or file.experiments:
                 other = taken.setdefault(key, {}).setdefault(experiment, name)
                 if other != name:
-                    text = f"{key} of the experiment {experiment} is set by {other} already"
-                    yield Problem(f"parameters.{name}.keys", None, text)
+                    expected = f"{key} of the experiment {experiment} is set by {other} already"
+                    yield Problem(f"parameters.{name}.keys", None, expected)
     for key, having in taken.items():
         if lacking := [experiment for experiment in file.experiments if experiment not in having]:
-            text = f"no parameter sets {key} for {', '.join(lacking)}: expected it for all experiments or none"
-            yield Problem("parameters", None, text)
+            expected = f"no parameter sets {key} for {', '.join(lacking)}: expected it for all experiments or none"
+            yield Problem("parameters", None, expected)

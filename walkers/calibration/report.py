@@ -1,18 +1,18 @@
-"""Tables and figures of a calibration: observations, predictions and the posterior."""
+"""Tables and figures of a calibration: facts beside the engine's numbers, and what is known of the parameters."""
 
 from __future__ import annotations
 
+from itertools import combinations
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkers.calibration.calibrate import Outcome
-from walkers.calibration.emulator import FloatArray, Space, transformed
-from walkers.calibration.file import QUANTITIES, Parameter
-from walkers.calibration.posterior import LEAST_SAMPLES, Posterior
-from walkers.inputs.units import SPEED
+from walkers.calibration.calibrate import BEST, Outcome
+from walkers.calibration.emulator import LEAST_SAMPLES, Posterior, distances
+from walkers.calibration.file import Parameter
+from walkers.calibration.observations import FloatArray
 from walkers.postprocess.drawing import TWO_COLUMNS, new_figure, save_figure, styled
 from walkers.runner.files import write_bytes, write_json, write_text
 from walkers.text import rendered
@@ -21,144 +21,121 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 RECORD_NAME = "calibration.json"
-_SIGMAS = 2.0
 _NARROW, _NARROWER = 1.0 / 3.0, 2.0 / 3.0
 """A parameter is identified if its posterior interval is below a third of the prior's (narrowed: two thirds)."""
 
-# --- tables -----------------------------------------------------------------------------------------------------------
-
 
 def write_outcome(found: Outcome, to: Path) -> list[Path]:
-    """Write ``posterior.parquet``, ``calibration.json`` and ``.md``, and figures (`figures_of`); return their paths.
+    """Write ``posterior.parquet``, ``calibration.json`` and ``.md``, and figures; return their paths.
 
-    Columns of the samples are the parameters (in their units), ``discrepancy_GROUP`` (in standard deviations) and
-    ``log_density``.
+    Rows of the first are samples of equal weight, columns are the parameters in their units.
     """
     import pandas as pd
 
     to.mkdir(parents=True, exist_ok=True)
-    record, posterior = record_of(found), found.posterior
-    samples = pd.DataFrame(found.space.values(posterior.unit), columns=[one.name for one in found.space.parameters])
-    for place, group in enumerate(posterior.groups):
-        samples[f"discrepancy_{group}"] = posterior.discrepancy[:, place]
-    samples["log_density"] = posterior.log_density
+    calibration, record = found.calibration, record_of(found)
+    samples = pd.DataFrame(calibration.values(found.posterior.samples), columns=[*calibration.file.parameters])
     files = [to / name for name in ("posterior.parquet", RECORD_NAME, "calibration.md")]
     write_bytes(files[0], samples.to_parquet(index=False))
     write_json(files[1], record)
-    discrepancies = np.percentile(posterior.discrepancy, (5.0, 50.0, 95.0), axis=0).T.tolist()
-    more: dict[str, Any] = {"observed": _observed(found)}
-    more |= {"samples": len(found.predictive.unit), "least": LEAST_SAMPLES, "narrow": _NARROW}
-    page = rendered("walkers.calibration", "report.md.j2", found=record, discrepancies=discrepancies, **more)
-    write_text(files[2], page)
-    sources = [Path(run).name for run in found.predictive.table["run"]]
-    for name, figure in figures_of(found, record["observations"]).items():
-        files += save_figure(figure, to / f"{name}.png", sources, title=f"{found.calibration.file.title}: {name}")
+    more = {"least": LEAST_SAMPLES, "narrow": _NARROW}
+    write_text(files[2], rendered("walkers.calibration", "report.md.j2", found=record, **more))
+    sources = [f"{calibration.name}-{part}" for part in ("sets", "proposed")]
+    for name, figure in {"corner": draw_corners(found), "predictions": draw_predictions(record)}.items():
+        files += save_figure(figure, to / f"{name}.png", sources, title=f"{calibration.file.title}: {name}")
     return files
-
-
-def _observed(found: Outcome) -> str:
-    """What the observations are called."""
-    return "published" if found.calibration.file.published else "measured"
 
 
 def record_of(found: Outcome) -> dict[str, Any]:
     """Contents of ``calibration.json``; observations in mm/s and degrees."""
-    calibration, posterior, emulators = found.calibration, found.posterior, found.emulators
-    names = [one.name for one in found.space.parameters]
-    rows = [_row(found, place) for place in range(len(emulators.each))]
-    own = [row["agrees"] for row in rows if not row["derived"]]
-    values = np.percentile(found.space.values(posterior.unit), (5.0, 50.0, 95.0), axis=0).T.tolist()
+    calibration, names = found.calibration, [*found.calibration.file.parameters]
+    posterior, values = found.posterior, calibration.values(found.unit)
+    samples = calibration.values(posterior.samples)
+    chosen = {**found.names, "most facts": found.best}
+    rows = [_row(found, place, chosen) for place in range(len(found.emulators))]
+    own = [row for row in rows if not row["derived"]]
     # Width of the 5 to 95 % interval over that of the prior: 1 if nothing was learned.
-    widths = np.ptp(np.percentile(posterior.unit, (5.0, 95.0), axis=0), axis=0)
-    priors = np.array([np.ptp(one.ppf((0.05, 0.95))) for one in found.space.priors])
-    narrowed = dict(zip(names, (widths / priors).tolist(), strict=True))
-    mean, deviation = emulators.predict(found.predictive.unit)
-    seen = [
-        transformed(values, one.observation)
-        for values, one in zip(found.predictive.outcome.T, emulators.each, strict=True)
-    ]
-    errors = np.abs(np.stack(seen, axis=1) - mean) / deviation
-    errors = errors[np.isfinite(errors)]
+    narrowing = dict(zip(names, np.ptp(np.percentile(posterior.samples, (5, 95), axis=0), axis=0) / 0.9, strict=True))
+    proposed = found.unit[found.names[BEST] :]
     return {
         "calibration": calibration.name,
         "title": calibration.file.title,
+        "observed": "published" if calibration.file.published else "measured",
         "settings": calibration.file.model_dump(mode="json"),
-        "parameters": {one.name: _labelled(one) for one in found.space.parameters},
-        "sets": len(found.unit),
-        "best": dict(zip(names, found.space.values(found.checks["best"].unit[0]).tolist(), strict=True)),
-        "intervals": dict(zip(names, values, strict=True)),
-        "discrepancies": dict(zip(posterior.groups, np.median(posterior.discrepancy, axis=0).tolist(), strict=True)),
-        "narrowing": narrowed,
-        "words": {name: words_of(share, converged=posterior.converged) for name, share in narrowed.items()},
-        "posterior": _worth(posterior),
-        "held_out_posteriors": {name: _worth(one) for name, one in found.held_out.items()},
-        "emulators": {
-            one.observation.name: {
-                key: _finite(getattr(one, key)) for key in ("explained", "error", "error_inflation", "sets")
-            }
-            for one in emulators.each
-        },
-        "emulators_checked": len(errors),
-        "emulators_within_two_errors": float(np.mean(errors <= _SIGMAS)) if len(errors) else None,
-        "feasible": {
-            "seen": float(np.mean(~np.isnan(found.predictive.outcome))),
-            "expected": float(emulators.feasible(found.predictive.unit).mean()),
-        },
-        "agree": sum(own),
+        "parameters": {name: _label(name, one) for name, one in calibration.file.parameters.items()},
+        "number": len(found.unit),
+        "sets": {name: dict(zip(names, values[place].tolist(), strict=True)) for name, place in chosen.items()},
+        "agree": {name: sum(row["agrees"][name] for row in own) for name in chosen},
         "of": len(own),
+        "intervals": _intervals(dict(zip(names, samples.T, strict=True))),
+        "narrowing": {name: float(share) for name, share in narrowing.items()},
+        "words": {name: words_of(share, converged=posterior.converged) for name, share in narrowing.items()},
+        "ratios": _intervals(_ratios(calibration.file.parameters, samples)),
+        "posterior": _worth(posterior),
+        "held_out": None if found.held_out is None else _worth(found.held_out),
+        "emulators_within_two_errors": _accuracy(found, proposed),
         "observations": rows,
     }
 
 
-def _row(found: Outcome, place: int) -> dict[str, Any]:
-    """An observation, and its predictions by engine and emulator, at the best set and over samples."""
-    emulator = found.emulators.each[place]
-    observation, best = emulator.observation, found.checks["best"].unit
-    speed = QUANTITIES[observation.quantity] is SPEED
-    unit, scale = ("", 1.0) if observation.over else ("mm/s", 1e3) if speed else ("°", 1.0)
-    seen = found.predictive.outcome[:, place] * scale
-    seen = seen[np.isfinite(seen)]
-    engine, finer, longer = (_finite(float(wave.outcome[0, place]) * scale) for wave in found.checks.values())
-    below, emulated, above = (float(emulator.draw(best, np.full(1, sigmas))[0]) * scale for sigmas in (-1.0, 0.0, 1.0))
-    held_out = {}
-    for name, posterior in found.held_out.items():
-        if observation.group in found.calibration.file.held_out[name]:
-            normal = np.random.default_rng(0).standard_normal(len(posterior.unit))
-            low, middle, high = np.percentile(emulator.draw(posterior.unit, normal), (16.0, 50.0, 84.0)) * scale
-            held_out[name] = (float(middle), float(high - low) / 2.0)
-    value, deviation = observation.value * scale, observation.deviation * scale
+def _row(found: Outcome, place: int, chosen: dict[str, int]) -> dict[str, Any]:
+    """A fact, and its number at the chosen sets; of a group that is held out also the prediction from the others."""
+    emulator = found.emulators[place]
+    one, (unit, scale) = emulator.observation, emulator.observation.unit
+    numbers = {name: float(found.numbers[row, place]) for name, row in chosen.items()}
+    predicted = None
+    if found.held_out is not None and one.group in found.calibration.file.design.held_out:
+        samples = found.held_out.samples
+        normal = np.random.default_rng(found.held_out.seed).standard_normal(len(samples))
+        predicted = [float(end) * scale for end in np.percentile(emulator.numbers(samples, normal), (5, 50, 95))]
     return {
-        "name": observation.name,
-        "group": observation.group,
-        "title": observation.title,
+        **{name: getattr(one, name) for name in ("name", "group", "title", "says", "source", "derived")},
+        "expected": one.text,
         "unit": unit,
-        "value": value,
-        "deviation": deviation,
-        "engine": engine,
-        "low": float(seen.min()) if len(seen) else None,
-        "high": float(seen.max()) if len(seen) else None,
-        "samples": len(seen),
-        "emulator": emulated,
-        "error": (above - below) / 2.0,
-        "feasible": float(found.emulators.feasible(best)[0, place]),
-        "agrees": engine is not None and abs(engine - value) <= deviation,
-        "derived": observation.derived,
-        "half_step": finer,
-        "twice_as_long": longer,
-        "held_out": held_out,
+        "numbers": {name: number * scale if isfinite(number) else None for name, number in numbers.items()},
+        "away": {name: one.residual(number) if isfinite(number) else None for name, number in numbers.items()},
+        "agrees": {name: one.agrees(number) for name, number in numbers.items()},
+        "emulator_error": emulator.error,
+        "missing": int(np.isnan(found.numbers[:, place]).sum()),
+        "predicted": predicted,
+        "predicted_away": predicted and [one.residual(end / scale) for end in predicted],
     }
 
 
-def _finite(value: float) -> float | None:
-    return value if isfinite(value) else None
+def _accuracy(found: Outcome, proposed: FloatArray) -> float | None:
+    """Share of the engine's numbers at sets that no emulator has seen within two errors of the emulators."""
+    away = []
+    for place, emulator in enumerate(found.emulators):
+        mean, error = emulator.predict(proposed)
+        seen = distances(emulator.observation, found.numbers[-len(proposed) :, place])
+        away += [float(one) for one in np.abs(seen - mean) / error]
+    return float(np.mean(np.array(away) <= 2.0))
+
+
+def _ratios(parameters: dict[str, Parameter], samples: FloatArray) -> dict[str, FloatArray]:
+    """Ratios of parameters that set the same keys in different experiments: where 1 is likely, one value would do."""
+    columns = dict(zip(parameters, samples.T, strict=True))
+    alike = [
+        (one, other) for one, other in combinations(parameters, 2) if parameters[one].keys == parameters[other].keys
+    ]
+    return {
+        f"{_label(other, parameters[other])} / {_label(one, parameters[one])}": columns[other] / columns[one]
+        for one, other in alike
+    }
+
+
+def _intervals(samples: dict[str, FloatArray]) -> dict[str, list[float]]:
+    """5 %, median and 95 %."""
+    return {name: np.percentile(column, (5.0, 50.0, 95.0)).tolist() for name, column in samples.items()}
 
 
 def _worth(posterior: Posterior) -> dict[str, Any]:
-    return {name: getattr(posterior, name) for name in ("converged", "points", "effective_samples")}
+    names = ("converged", "effective_samples", "log_evidence")
+    return {"points": len(posterior.points), **{name: getattr(posterior, name) for name in names}}
 
 
-def _labelled(parameter: Parameter) -> str:
-    return f"{parameter.symbol} ({parameter.unit})" if parameter.unit else parameter.symbol
+def _label(name: str, parameter: Parameter) -> str:
+    return f"{parameter.symbol or name}{f' ({parameter.unit})' if parameter.unit else ''}"
 
 
 def words_of(share: float, *, converged: bool) -> str:
@@ -168,85 +145,53 @@ def words_of(share: float, *, converged: bool) -> str:
     return "identified" if share < _NARROW else "narrowed" if share < _NARROWER else "not identified"
 
 
-# --- figures ----------------------------------------------------------------------------------------------------------
-
-
-def figures_of(found: Outcome, rows: list[dict[str, Any]]) -> dict[str, Figure]:
-    """``corner`` and ``predictions``; rows are the record's observations."""
-    corners = draw_corners(found.space, found.posterior.unit, found.checks["best"].unit[0])
-    return {"corner": corners, "predictions": _predictions(rows, _observed(found))}
-
-
 @styled
-def draw_corners(space: Space, sets: FloatArray, best: FloatArray) -> Figure:
-    """The distributions of D parameters over sets (N, D) of the unit cube, of each pair of them, and the best set."""
+def draw_corners(found: Outcome) -> Figure:
+    """The posterior of each parameter and of each pair; lines: the set with most facts."""
     import corner
-    from matplotlib.ticker import MaxNLocator
-    from matplotlib.transforms import ScaledTranslation
+
+    parameters, values = found.calibration.file.parameters, found.calibration.values
+    logarithmic = np.array([one.log for one in parameters.values()])
 
     def drawn(unit: FloatArray) -> FloatArray:
-        values = space.values(unit)
-        return np.asarray(np.log10(values, out=values, where=space.logarithmic))
+        scaled = values(unit)
+        return np.asarray(np.log10(scaled, out=scaled, where=logarithmic))
 
-    count, words = space.dimensions, [("log " if one.log else "") + _labelled(one) for one in space.parameters]
+    count = len(parameters)
     figure, _ = new_figure(TWO_COLUMNS, TWO_COLUMNS, nrows=count, ncols=count)
-    # corner places its panels itself, which the constrained layout engine refuses.
-    figure.set_layout_engine("tight")
-    figure.set_layout_engine("none")
+    figure.set_layout_engine("none")  # corner places its panels itself
     corner.corner(
-        drawn(sets),
+        drawn(found.posterior.samples),
         fig=figure,
-        labels=["\n".join(label.split()) for label in words],  # panels may be as narrow as a word
+        labels=["\n".join([*("log",) * one.log, *_label(name, one).split()]) for name, one in parameters.items()],
         range=drawn(np.array([np.zeros(count), np.ones(count)])).T.tolist(),
-        truths=None if count == 1 else drawn(best),  # corner cannot mark a value in a single panel
+        truths=drawn(found.unit[[found.best]])[0],
         truth_color="C1",
         quantiles=[0.05, 0.5, 0.95],
         label_kwargs={"fontsize": 7},
+        max_n_ticks=3,
         plot_datapoints=False,
         smooth=1.0,
         bins=24,
-        hist_kwargs={"linewidth": 0.8},
-        contour_kwargs={"linewidths": 0.6},
     )
-    if count == 1:
-        figure.axes[0].axvline(float(drawn(best)[0]), color="C1")
-    # Few ticks, none at a corner; the distance of labels depends on the ticks, not on the width of panels.
-    edge, away = 1.0 / TWO_COLUMNS, -26.0 / 72.0
-    figure.subplots_adjust(left=edge, bottom=edge, right=0.99, top=0.99, wspace=0.1, hspace=0.1)
-    beneath, beside = (ScaledTranslation(*way, figure.dpi_scale_trans) for way in ((0.0, away), (away, 0.0)))
-    for panel in figure.axes:
-        panel.grid(visible=False)
-        panel.xaxis.set_label_coords(0.5, 0.0, transform=panel.transAxes + beneath)
-        panel.yaxis.set_label_coords(0.0, 0.5, transform=panel.transAxes + beside)
-        for axis in (panel.xaxis, panel.yaxis):
-            locator = axis.get_major_locator()
-            if isinstance(locator, MaxNLocator):
-                locator.set_params(nbins=3, prune="both")
     return figure
 
 
 @styled
-def _predictions(rows: list[dict[str, Any]], observed: str) -> Figure:
-    """Residuals in standard deviations: the engine at the best set and over the posterior, and what was held out."""
-    figure, axes = new_figure(TWO_COLUMNS, 0.3 * len(rows) + 1.2)
+def draw_predictions(record: dict[str, Any]) -> Figure:
+    """Distances from the facts in deviations: of the named sets, and predicted for what is held out."""
+    rows = record["observations"]
+    figure, axes = new_figure(TWO_COLUMNS, 0.25 * len(rows) + 1.5)
     places = np.arange(len(rows))[::-1]
     axes.axvspan(-1.0, 1.0, color="0.9", lw=0)
-    axes.axvline(0.0, color="0.4", lw=0.8)
-    value, deviation, low, high, best = (
-        np.array([row[name] for row in rows], dtype=np.float64)  # None is NaN
-        for name in ("value", "deviation", "low", "high", "engine")
-    )
-    ends = ((one - value) / deviation for one in (low, high))
-    axes.hlines(places, *ends, color="C0", lw=4.0, alpha=0.5, label="engine over the posterior")
-    axes.plot((best - value) / deviation, places, "o", ms=5, color="C1", label="engine at the best set")
-    for number, trial in enumerate(dict.fromkeys(trial for row in rows for trial in row["held_out"])):
-        seen = [place for place, row in enumerate(rows) if trial in row["held_out"]]
-        middle, width = np.array([rows[place]["held_out"][trial] for place in seen]).T
-        residual, error = (middle - value[seen]) / deviation[seen], width / deviation[seen]
-        look = {"fmt": "s", "ms": 4, "color": f"C{number + 2}", "lw": 1.0}
-        axes.errorbar(residual, places[seen] - 0.22, xerr=error, label=trial, **look)
+    for number, name in enumerate(record["agree"]):
+        away = [np.nan if row["away"][name] is None else row["away"][name] for row in rows]
+        axes.plot(away, places, "os^Dv"[number % 5], ms=4, color=f"C{number}", mfc="none", label=name)
+    for row, place in zip(rows, places, strict=True):
+        if row["predicted_away"]:
+            axes.hlines(place - 0.25, row["predicted_away"][0], row["predicted_away"][2], color="k", lw=1.0)
     axes.set_yticks(places, [row["title"] for row in rows], fontsize=7)
-    axes.set(xlabel=f"(predicted - {observed})/standard deviation", ylim=(-0.8, len(rows) - 0.2))
+    axes.set(xlabel="distance from the fact/deviation (lines: predicted from the others)", ylim=(-0.8, len(rows) - 0.2))
     axes.set_xscale("symlog", linthresh=3.0)
-    figure.legend(loc="outside upper center", ncols=2)
+    figure.legend(loc="outside upper center", ncols=3)
     return figure

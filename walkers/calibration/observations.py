@@ -1,0 +1,155 @@
+"""Observations: facts about walkers, measured or stated, and the numbers of simulations to compare them with.
+
+A calibration weighs its free parameters with them, and the comparison with the paper judges the shipped ones. An
+observation knows no run: `Observation.of_numbers` takes the numbers of each experiment, which `numbers_of` reads from a
+run, and which a theory may give as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import degrees, inf, nan
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field, ValidationInfo, field_validator
+
+from walkers.inputs.table import Table
+from walkers.inputs.units import ANGLE, SPEED, WRITTEN, Kind, Number, parse_quantity
+from walkers.postprocess.gait import gait, misalignment, settled_samples, steady_walkers, together
+from walkers.postprocess.motion import read_motion
+from walkers.postprocess.results import read
+from walkers.postprocess.tables import read_table
+
+FloatArray = npt.NDArray[np.float64]
+Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_pair_1"]
+"""Means over the cycles and over steady walkers (`walkers.postprocess.gait`), m/s."""
+Slip = Literal["slip_1", "slip_2"]
+"""How much a bead slides within a cycle: root mean square of its sliding velocity over that of the walker's velocity.
+
+A bead that only rolls has 0, one that is dragged without rolling has 1.
+"""
+Angle = Literal["largest_angle", "smallest_angle"]
+"""Of all walkers to the drive axis at the end of the run, in either direction, 0 to 90 degrees."""
+_LEAST_SPEED = 5e-5
+"""m/s; a ratio to a smaller speed has no meaning."""
+NO_NUMBERS: dict[str, float] = dict.fromkeys((*get_args(Speed), *get_args(Slip), *get_args(Angle)), nan)
+"""Quantities of a run that failed."""
+Names = Annotated[list[str], Field(min_length=1)]
+
+
+class Observation(Table):
+    """``[[observations]]``: a fact, where it was found, and the number that it is about.
+
+    The number is the mean of a quantity over the experiments ``of``, or its ratio to the mean over those ``over``. The
+    fact gives its ``value``, or that it is at ``least`` or at ``most`` so large, and the ``deviation`` within which a
+    number agrees: one standard deviation of the value, the tolerance of a limit. They are in SI units, angles in
+    degrees; a file gives speeds and angles with their unit, shares and ratios as plain numbers.
+
+    Attributes
+    ----------
+    name, group, title
+        Own name; that of what is held out together; short text for tables and figures, the name by default.
+    says, source
+        The fact as it was said, and where.
+    quantity
+        A `Speed`, `Slip` or `Angle`.
+    derived
+        Whether it follows from other observations: it is reported, and has no weight in a calibration.
+    """
+
+    name: str
+    group: str
+    title: str = Field(default_factory=lambda given: str(given.get("name", "")))
+    says: str = ""
+    source: str = ""
+    quantity: Literal[Speed, Slip, Angle] = "velocity"
+    of: Names
+    over: list[str] = Field([])
+    value: Number | None = None
+    least: Number | None = None
+    most: Number | None = None
+    deviation: Annotated[Number, Field(gt=0)]
+    derived: bool = False
+
+    @field_validator("value", "least", "most", "deviation", mode="before")
+    @classmethod
+    def _number(cls, value: Any, info: ValidationInfo) -> Any:
+        if info.context != WRITTEN:
+            return value
+        kind = None if info.data.get("over") else kind_of(info.data.get("quantity", "velocity"))
+        if kind is None and isinstance(value, str):
+            raise ValueError("expected a plain number: a ratio or a share has no unit")
+        if kind is None:
+            return value
+        if not isinstance(value, str):
+            raise ValueError(kind.expectation)
+        number = parse_quantity(value, kind)
+        return degrees(number) if kind is ANGLE else number
+
+    @property
+    def unit(self) -> tuple[str, float]:
+        """Unit for tables, and the factor to it."""
+        kind = None if self.over else kind_of(self.quantity)
+        return ("mm/s", 1e3) if kind is SPEED else ("°" if kind is ANGLE else "", 1.0)
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Smallest and largest number that the fact allows, without its deviation; both are the value if it has one."""
+        if self.value is not None:
+            return self.value, self.value
+        return (-inf if self.least is None else self.least), (inf if self.most is None else self.most)
+
+    @property
+    def text(self) -> str:
+        """What is expected, such as ``2.3 ± 0.35 mm/s`` or ``at least 0.3 ± 0.1``."""
+        unit, scale = self.unit
+        named = {"": self.value, "at least ": self.least, "at most ": self.most}
+        limits = " and ".join(f"{word}{number * scale:.4g}" for word, number in named.items() if number is not None)
+        return f"{limits} ± {self.deviation * scale:.2g} {unit}".strip()
+
+    def of_numbers(self, numbers: Mapping[str, Mapping[str, float]]) -> float:
+        """The number of this observation; NaN if one that it needs is NaN or its ratio is to walkers at rest.
+
+        Parameters
+        ----------
+        numbers
+            Quantities by experiment, as from `numbers_of`.
+        """
+        above, below = (
+            float(np.mean([numbers[label][self.quantity] for label in each])) if each else 1.0
+            for each in (self.of, self.over)
+        )
+        if self.over and kind_of(self.quantity) is SPEED and abs(below) < _LEAST_SPEED:
+            return nan
+        return above / below if self.over else above
+
+    def residual(self, number: float) -> float:
+        """How far a number is from what the fact allows, in deviations; NaN for NaN."""
+        low, high = self.limits
+        return (number - float(np.clip(number, low, high))) / self.deviation
+
+    def agrees(self, number: float) -> bool:
+        """Whether a number is within a deviation of what the fact allows; NaN is not."""
+        return abs(self.residual(number)) <= 1.0
+
+
+def kind_of(quantity: str) -> Kind | None:
+    """The kind of a quantity; None if it is a plain number."""
+    return SPEED if quantity in get_args(Speed) else ANGLE if quantity in get_args(Angle) else None
+
+
+def numbers_of(run: str | Path) -> dict[str, float]:
+    """All quantities of the finished run of a dimer; NaN where no walker is steady and keeps its beads together."""
+    walkers, kept = read_table(run, "walkers"), steady_walkers(read(run))
+    numbers = {name: float(kept[name].mean()) for name in get_args(Speed)}
+    group = read_motion(run).groups[0]
+    seen, samples, chosen = gait(group), settled_samples(group), kept.index.to_numpy()
+    size = np.sqrt(np.mean(seen.velocity[samples][:, chosen] ** 2)) if len(chosen) else nan
+    for name, sliding in zip(get_args(Slip), np.moveaxis(seen.sliding[samples], -1, 0), strict=False):
+        numbers[name] = float(np.sqrt(np.mean(sliding[:, chosen] ** 2)) / size) if len(chosen) else nan
+    angles = misalignment(walkers[together(walkers)])
+    reduced = (angles.max(), angles.min()) if len(angles) else (nan, nan)
+    return numbers | dict(zip(get_args(Angle), map(float, reduced), strict=True))
