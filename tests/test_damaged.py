@@ -215,6 +215,13 @@ def test_a_result_whose_making_was_killed_is_made_anew(parts: Path) -> None:
     assert json.loads((run / "manifest.json").read_text())["sha256"].keys() >= set(names)
 
 
+def test_a_run_is_measured_by_one_process_at_a_time(parts: Path) -> None:
+    before = (parts / "manifest.json").read_bytes()
+    with locked([parts]), pytest.raises(RunBusy, match="measuring"):
+        measure(parts)
+    assert (parts / "manifest.json").read_bytes() == before
+
+
 def test_a_blow_up_that_the_engine_did_not_notice_is_told(parts: Path) -> None:
     DAMAGES["no number in a dump"][0](parts)
     (parts / "manifest.json").unlink()

@@ -23,7 +23,7 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     spread = run_spread(case, runs_folder, Options(2), points=4)
     assert {one.key for one in spread.varied} == {one.key for one in case.origins if one.guessed}
     assert {one.key for one in spread.held} == {"contact.friction.bead_bead", "contact.rolling_friction"}
-    assert "contact_angle 0 deg (0 deg to 60 deg; half of the draws at 0 deg)" in describe(spread)
+    assert "contact_angle 0 deg (0 deg to 60 deg)" in describe(spread)
     table = walkers.load(spread.directory).table()
     assert table["contact.friction.bead_wall"].between(0.1, 0.6).all()
     assert (table["liquid.viscosity_ratio"] > 1.0).sum() == 2  # half of the draws: the case's own is the median
@@ -31,9 +31,9 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     assert sum(spread.counts.values()) == 4
     # The headline has the band from now on, which holds it.
     done, band = walkers.run(case, runs_folder), spread.bands["velocity"]
-    assert band.high - band.low > 1e-4  # m/s
+    assert band["high"] - band["low"] > 1e-4  # m/s
     own, ends = done.result["velocity"], (done.result["velocity_low"], done.result["velocity_high"])
-    assert ends == (min(band.low, own), max(band.high, own))
+    assert ends == (min(band["low"], own), max(band["high"], own))
     assert f"band {band_text(*ends, 'm/s')}" in done.describe()
     told = {one["key"]: one["origin"] for one in done.result.about["rests_on"]}
     assert told["contact.friction.bead_wall"] == "given"

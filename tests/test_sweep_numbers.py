@@ -46,10 +46,10 @@ def test_a_spread_has_the_quantiles_and_the_signed_ranks_of_its_draws() -> None:
     spread = spread_in(table, make_case(uncertain=UNCERTAIN), Path())
     band = spread.bands["velocity"]
     # Of 32 sorted numbers, from 0 to 31, 5 and 95 % are at 1.55 and 29.45, the median between the two in the middle.
-    assert band.low == pytest.approx(speeds[1] + 0.55 * (speeds[2] - speeds[1]))
-    assert band.median == pytest.approx((speeds[15] + speeds[16]) / 2.0)
-    assert band.high == pytest.approx(speeds[29] + 0.45 * (speeds[30] - speeds[29]))
-    assert (band.smallest, band.largest, band.points) == (speeds[0], speeds[31], 32)
+    assert band["low"] == pytest.approx(speeds[1] + 0.55 * (speeds[2] - speeds[1]))
+    assert band["median"] == pytest.approx((speeds[15] + speeds[16]) / 2.0)
+    assert band["high"] == pytest.approx(speeds[29] + 0.45 * (speeds[30] - speeds[29]))
+    assert (band["smallest"], band["largest"], band["points"]) == (speeds[0], speeds[31], 32)
     # 0.1 × 1.2ⁿ is below 0.5 up to n = 8.
     assert spread.counts == {"forward": 23, "backward": 9, "at_rest": 0, "separated": 2}
     # Two standard errors are 0.36: rolling friction is left out.
