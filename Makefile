@@ -79,8 +79,8 @@ docs: setup .venv/with-docs ## Build the documentation into build/site, to be op
 	@echo "open build/site/index.html"
 
 .PHONY: bench
-bench: setup .venv/with-dev ## Measure what docs/explanation/performance.md states (ONLY=large: a second of ten thousand beads)
-	.venv/bin/python tests/benchmark.py $(ONLY)
+bench: setup .venv/with-dev ## Measure what docs/explanation/performance.md states
+	.venv/bin/python tests/benchmark.py
 
 .PHONY: clean
 clean: ## Remove the environment and caches, never the runs

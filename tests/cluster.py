@@ -12,12 +12,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-_PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "setpriv")
+from tests.conftest import wait_for
+
+_PATH = f"{os.environ['PATH']}:/usr/sbin:/sbin"
 _CONFIGURATION = """\
 ClusterName=throwaway
 SlurmctldHost={host}(127.0.0.1)
-SlurmctldPort={controller_port}
-SlurmdPort={node_port}
+SlurmctldPort={ports[0]}
+SlurmdPort={ports[1]}
 SlurmUser=root
 SlurmdUser=root
 AuthType=auth/munge
@@ -37,7 +39,6 @@ DefMemPerCPU=500
 NodeName={host} NodeAddr=127.0.0.1 CPUs={cores} RealMemory={memory} State=UNKNOWN
 PartitionName=main Nodes={host} Default=YES MaxTime=INFINITE State=UP
 """
-
 LOCAL = """\
 from parsl import Config
 from parsl.executors import HighThroughputExecutor
@@ -52,22 +53,10 @@ config = Config([pilots], strategy_period=2)
 
 def why_not() -> str | None:
     """Why there can be no cluster here, or None."""
-    if os.getuid() != 0:
-        return "a throw-away SLURM cluster can only be started by root"
-    missing = [name for name in _PROGRAMS if _path_of(name) is None]
-    if missing:
-        return f"{', '.join(missing)} not found: apt-get install slurm-wlm munge"
+    missing = [name for name in ("munged", "slurmctld", "slurmd", "sbatch") if shutil.which(name, path=_PATH) is None]
+    if missing or os.getuid():
+        return f"a throw-away SLURM cluster is for root; missing: {', '.join(missing) or 'nothing'}"
     return None
-
-
-def _path_of(name: str) -> str | None:
-    return shutil.which(name, path=f"{os.environ['PATH']}:/usr/sbin:/sbin")
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @contextmanager
@@ -76,36 +65,34 @@ def slurm_cluster(folder: Path) -> Iterator[dict[str, str]]:
 
     The folder and those above it must be closed to others, which munge insists on.
     """
-    host = socket.gethostname().split(".")[0]
+    probes = [socket.create_server(("127.0.0.1", 0)) for _ in range(2)]
+    ports = [probe.getsockname()[1] for probe in probes]
+    for probe in probes:
+        probe.close()
+    host, cores = socket.gethostname().split(".")[0], os.cpu_count()
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2**20 - 512
     for name in ("state", "spool", "munge"):
         (folder / name).mkdir()
     configuration = folder / "slurm.conf"
-    ports = {"controller_port": _free_port(), "node_port": _free_port()}
-    cores = os.cpu_count()
-    configuration.write_text(_CONFIGURATION.format(host=host, folder=folder, cores=cores, memory=memory, **ports))
-    environment = {**os.environ, "SLURM_CONF": str(configuration)}
+    configuration.write_text(_CONFIGURATION.format(host=host, folder=folder, cores=cores, memory=memory, ports=ports))
+    environment = {**os.environ, "PATH": _PATH, "SLURM_CONF": str(configuration)}
+
+    def idle() -> bool:
+        told = subprocess.run(["sinfo", "-h", "-o", "%T"], env=environment, capture_output=True, check=False)
+        return told.stdout.strip() == b"idle"
+
     try:
         _start_munge(folder / "munge")
-        for daemon, options in (("slurmctld", []), ("slurmd", ["-N", host])):
-            subprocess.run([str(_path_of(daemon)), "-f", str(configuration), *options], check=True, env=environment)
-        _wait_until_idle(environment)
+        for daemon in (["slurmctld"], ["slurmd", "-N", host]):
+            subprocess.run([*daemon, "-f", str(configuration)], check=True, env=environment)
+        wait_for(idle)
         yield environment
     finally:
         subprocess.run(["scancel", "--user", "root"], env=environment, check=False, capture_output=True)
         time.sleep(1.0)
         for pid_file in (folder / "slurmd.pid", folder / "slurmctld.pid", folder / "munge" / "pid"):
             with suppress(OSError, ValueError):
-                _stop(int(pid_file.read_text()))
-
-
-def _stop(pid: int) -> None:
-    os.kill(pid, signal.SIGTERM)
-    for _ in range(100):
-        if not Path(f"/proc/{pid}/exe").exists():  # gone, or a zombie of whoever should have reaped it
-            return
-        time.sleep(0.1)
-    os.kill(pid, signal.SIGKILL)
+                os.kill(int(pid_file.read_text()), signal.SIGTERM)
 
 
 def _start_munge(folder: Path) -> None:
@@ -116,13 +103,4 @@ def _start_munge(folder: Path) -> None:
     places = {"socket": "socket", "key-file": "key", "pid-file": "pid", "log-file": "log", "seed-file": "seed"}
     options = [f"--{name}={folder / place}" for name, place in places.items()]
     as_munge = ["setpriv", "--reuid", "munge", "--regid", "munge", "--clear-groups"]
-    subprocess.run([*as_munge, str(_path_of("munged")), *options], check=True)
-
-
-def _wait_until_idle(environment: dict[str, str]) -> None:
-    for _ in range(300):
-        told = subprocess.run(["sinfo", "-h", "-o", "%T"], env=environment, capture_output=True, text=True, check=False)
-        if told.stdout.strip() == "idle":
-            return
-        time.sleep(0.1)
-    raise AssertionError(f"the node does not come up: {told.stdout}{told.stderr}")
+    subprocess.run([*as_munge, str(shutil.which("munged", path=_PATH)), *options], check=True)

@@ -33,7 +33,6 @@ from walkers.inputs.sweep import expand
 from walkers.inputs.toml import read_toml
 from walkers.main import main
 from walkers.postprocess import series
-from walkers.postprocess.gait import Walk, walk
 from walkers.postprocess.motion import Group, read_motion
 from walkers.runner.binary import Engine
 from walkers.runner.directory import locked, run_place
@@ -78,16 +77,6 @@ PROGRAM = str(Path(sys.executable).with_name("walkers"))
 SHORT = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
 BRIEF = {"time_step": "2 us", "cycles": 3, "settling_cycles": 1, "samples_per_cycle": 2}
 LONG = {"time_step": "2 us", "cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
-
-
-LONGEST = ("known_parameters", "audit.py", "pilots", "report.py", "printed", "stopped", "slurm", "failed")
-"""In the names of tests that take seconds."""
-
-
-@pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Those first, so that no worker is left alone with one of them at the end."""
-    items.sort(key=lambda item: not any(name in item.nodeid for name in LONGEST))
 
 
 def document(**changes: Any) -> dict[str, Any]:
@@ -177,13 +166,6 @@ def trajectory(run_directory: Callable[..., Path]) -> Callable[..., Group]:
     return lambda case=None, **changes: read_motion(run_directory(case, **changes)).groups[0]
 
 
-@pytest.fixture(scope="session")
-def walked(trajectory: Callable[..., Group]) -> Callable[..., Walk]:
-    """Run and fit the velocities."""
-
-    return lambda case=None, **changes: walk(trajectory(case, **changes))
-
-
 _FREQUENCIES, _PEAKS = {"drive.frequency": ["60 Hz", "80 Hz"]}, {"drive.peak_acceleration": ["2 g", "4 g", "6 g"]}
 _FRICTIONS = {f"contact.friction.bead_{other}": {"uniform": [0.05, 0.3]} for other in ("wall", "bead")}
 LOOKED_THROUGH: dict[str, dict[str, Any]] = {
@@ -197,7 +179,7 @@ LOOKED_THROUGH: dict[str, dict[str, Any]] = {
         "axes": {
             "liquid.name": ["Si AK5", "Si AK10"],
             "dimers.radii": [["0.3 mm", "0.2 mm"], ["0.25 mm", "0.2 mm"], ["0.35 mm", "0.2 mm"]],
-        },
+        }
     },
     "sampled": {"sample": [{"points": 4, "ranges": _FRICTIONS}]},
 }
@@ -309,17 +291,6 @@ def wait_for(condition: Callable[[], T | None], seconds: float = PATIENCE) -> T:
             return found
         time.sleep(0.02)
     raise AssertionError("waited in vain")
-
-
-def wait_for_engines(directory: Path, program: subprocess.Popen[Any] | None = None, number: int = 1) -> list[int]:
-    """Process ids of the engines in a directory, as soon as there are so many; the program that starts them lives."""
-
-    def found() -> list[int] | None:
-        assert program is None or program.poll() is None, f"ended with status {program.returncode}"
-        engines = engines_in(directory)
-        return engines if len(engines) == number else None
-
-    return wait_for(found)
 
 
 def call(*arguments: str, check: bool = False, folder: Path | None = None) -> subprocess.CompletedProcess[str]:

@@ -26,19 +26,11 @@ from walkers.archive.crate import PAPER, describe_crate
 from walkers.archive.writing import Contents, contents_of, write_archive
 from walkers.inputs.case import Case
 from walkers.runner.manifest import FileChanged, read_manifest
-from walkers.runner.provenance import commit_of, software
+from walkers.runner.provenance import software
 from walkers.sweeps.table import load
 
 AUTHOR = ("--author", "Josiah Carberry", "--orcid", "0000-0002-1825-0097")
 CONTEXT = "https://w3id.org/ro/crate/1.1/context"
-NOT_SAID = {
-    "Application url",  # of this project, which has no home on the web yet
-    "SoftwareApplication id",
-    "Root Data Entity: `publisher` property",
-    "CreativeWork Author: RECOMMENDED affiliation property",
-    "CreativeWork Author: RECOMMENDED Contextual Entity linked for the organizational `affiliation` property",
-}
-"""What the profiles recommend and archives leave open, for nobody has been asked."""
 CRATE, SUMS = "ro-crate-metadata.json", "sha256sums.txt"
 
 
@@ -61,24 +53,18 @@ def shared(once: Callable[[str, Callable[[Path], object]], Path], tmp_path: Path
     return Path(shutil.copytree(once("archived-sweep", fill) / "runs", tmp_path / "shared"))
 
 
-def _issues(archive: Path, folder: Path, severity: Severity) -> list[str]:
+def _issues(archive: Path, folder: Path) -> list[str]:
     """What the validator of RO-Crates finds, without a network: its cache is given the context that rocrate ships."""
-    cache = folder / "http"
-    session = CachedSession(cache_name=str(cache), backend="sqlite", expire_after=-1)
+    session = CachedSession(cache_name=str(folder / "http"), backend="sqlite", expire_after=-1)
     text = (importlib.resources.files("rocrate") / "data" / "ro-crate.jsonld").read_bytes()
     asked = requests.Request("GET", CONTEXT).prepare()
     head = {"Content-Type": "application/ld+json"}
     raw = HTTPResponse(io.BytesIO(text), head, 200, preload_content=False, request_url=CONTEXT)
     session.cache.save_response(requests.adapters.HTTPAdapter().build_response(asked, raw))
     session.close()
-    settings = ValidationSettings(
-        rocrate_uri=str(archive),
-        profile_identifier="process-run-crate",
-        requirement_severity=severity,
-        offline=True,
-        cache_path=cache,
-    )
-    return [str(issue.check.name) for issue in validate(settings).get_issues()]
+    how = {"offline": True, "cache_path": folder / "http", "requirement_severity": Severity.REQUIRED}
+    asked_of = ValidationSettings(rocrate_uri=str(archive), profile_identifier="process-run-crate", **how)
+    return [str(issue.check.name) for issue in validate(asked_of).get_issues()]
 
 
 def _verified(path: Path, status: int = 0) -> list[str]:
@@ -104,74 +90,38 @@ def test_manifests_say_what_made_the_run(run: Path) -> None:
     assert manifest["commit"] == software()["commit"]
 
 
-def test_the_commit_of_a_checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def git(*arguments: str) -> str:
-        who = ("-c", "user.name=nobody", "-c", "user.email=nobody@example.org")
-        done = subprocess.run(["git", *who, *arguments], cwd=tmp_path, check=True, capture_output=True, text=True)
-        return done.stdout.strip()
-
-    assert commit_of(tmp_path) is None
-    git("init", "-q")
-    (tmp_path / "code.py").write_text("a = 1\n")
-    git("add", "code.py")
-    git("commit", "-q", "-m", "begin")
-    commit = git("rev-parse", "HEAD")
-    (tmp_path / "runs").write_text("what git does not know\n")
-    assert commit_of(tmp_path) == commit
-    (tmp_path / "code.py").write_text("a = 2\n")
-    monkeypatch.setenv("GIT_DIR", str(tmp_path / "another"))  # as a hook of another repository has it
-    assert commit_of(tmp_path) == f"{commit}+changes"
-
-
 def test_what_changed_is_named(run: Path, tmp_path: Path) -> None:
     """Nothing is read from pictures and films; a folder of segments is taken for a part of the run."""
     files = len(read_manifest(run)["files"])
     assert _verified(run) == [f"{run.name}: {files} files are unchanged"]
-    for name in ("film.mp4", "vtk/beads_000000.vtu", "vtk/walkers.pvd", "\x1b[2J", "test.toml"):
+    for name in ("film.mp4", "vtk/beads_000000.vtu", "\x1b[2J"):
         (run / name).parent.mkdir(exist_ok=True)
         (run / name).write_bytes(b"new")
-    since = [f"  made since {name}" for name in (r"\x1b[2J", "film.mp4", "test.toml", "vtk/")]
+    since = [f"  made since {name}" for name in (r"\x1b[2J", "film.mp4", "vtk/")]
     assert _verified(run)[1:] == since
     dump = run / "segments" / "0000" / "beads.bin"
     dump.write_bytes(bytes([dump.read_bytes()[0] ^ 1]) + dump.read_bytes()[1:])
     (run / "walkers.parquet").unlink()
     (run / "segments" / "0001").mkdir()
     (run / "segments" / "0002").symlink_to(tmp_path)
-    (run / "segments" / "0000" / "walk.png").touch()
-    (run / "climbs.parquet").touch()
-    unknown = ("climbs.parquet", *(f"segments/{name}" for name in ("0000/walk.png", "0001", "0002")))
+    unknown = ("climbs.parquet", "segments/0000/walk.png")
+    for name in unknown:
+        (run / name).touch()
     assert _verified(run, 1) == [
         f"{run.name}: {files - 2} files are unchanged",
         "  changed    segments/0000/beads.bin",
         "  missing    walkers.parquet",
-        *(f"  not listed {name}" for name in unknown),
+        *(f"  not listed {name}" for name in (*unknown, "segments/0001", "segments/0002")),
         *since,
     ]
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (lambda manifest: manifest.update(sha256={}), "not listed walkers.parquet"),
-        (lambda manifest: manifest["sha256"].pop("case.json"), "changed    case.json"),
-        (lambda manifest: manifest.pop("sha256"), "doubtful   manifest.json (it, or what it names, cannot be read"),
-        (lambda manifest: manifest["sha256"].update({"../other": ""}), "missing    ../other"),
-    ],
-)
-def test_manifests_that_do_not_say_what_is_there(run: Path, change: Callable[[Any], object], said: str) -> None:
-    (run.parent / "other").touch()
-    _edit(run / "manifest.json", change)
-    assert any(line.startswith(f"  {said}") for line in _verified(run, 1))
-
-
 def test_an_archive_of_a_run(run: Path, tmp_path: Path) -> None:
     archive, again = tmp_path / "run.zip", tmp_path / "again.zip"
-    assert call("export", str(run), "--to", "archive", "-o", str(archive), *AUTHOR, check=True).stdout == f"{archive}\n"
-    call("export", str(run), "--to", "archive", "-o", str(again), *AUTHOR, check=True)
+    for path in (archive, again):
+        call("export", str(run), "--to", "archive", "-o", str(path), *AUTHOR, check=True)
     assert archive.read_bytes() == again.read_bytes()
-    assert set(_issues(archive, tmp_path, Severity.RECOMMENDED)) == NOT_SAID
-    assert "unpack an archive" in _verified(archive, 2)[0]
-
+    assert _issues(archive, tmp_path) == []
     unpacked = tmp_path / "unpacked"
     shutil.unpack_archive(archive, unpacked)
     assert len(_verified(unpacked)) == 1
@@ -179,16 +129,12 @@ def test_an_archive_of_a_run(run: Path, tmp_path: Path) -> None:
     there = unpacked / "runs" / run.name
     assert Run(there).result == Run(run).result
     assert load_case(there / "test.toml") == make_case(run=SHORT)
-    (there / "velocity.png").touch()
-    assert _verified(unpacked)[1:] == [f"  made since runs/{run.name}/velocity.png"]
     (there / "result.json").unlink()
     (there / "result.json").symlink_to("nowhere")
     assert _verified(unpacked, 1)[1] == f"  missing    runs/{run.name}/result.json"
-
     crate, manifest, place = ROCrate(unpacked), read_manifest(run), f"runs/{run.name}"
     root = crate.root_dataset
-    assert root["citation"].id == PAPER
-    assert root["license"].id.endswith("/CC-BY-4.0")
+    assert (root["citation"].id, root["license"].id.rpartition("/")[2]) == (PAPER, "CC-BY-4.0")
     assert root["datePublished"] == manifest["finished"].replace("Z", "+00:00")
     assert {name: crate.get(f"{place}/{name}")["sha256"] for name in manifest["sha256"]} == manifest["sha256"]
     engine, analysis = root["mentions"]
@@ -234,7 +180,7 @@ def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
     """Runs that shared a deck come with it, and the table is what it was."""
     archive, unpacked = tmp_path / "sweep.zip", tmp_path / "unpacked"
     call("export", str(shared / "angles"), "--to", "archive", "-o", str(archive), *AUTHOR, check=True)
-    assert _issues(archive, tmp_path, Severity.REQUIRED) == []
+    assert _issues(archive, tmp_path) == []
     shutil.unpack_archive(archive, unpacked)
     there = unpacked / "runs" / "angles"
     before, after = (load(folder).drop(columns="run") for folder in (shared / "angles", there))
@@ -243,12 +189,9 @@ def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
     places = [unpacked / place for place in pd.read_csv(there / "table.csv")["run"]]
     assert [place.name for place in places] == [Path(place).name for place in load(shared / "angles")["run"]]
     for place, angle in zip(places, ("0 deg", "10 deg"), strict=True):
-        assert (place / "shared_deck" / "walker.lig").is_file()
         assert load_case(place / "base.toml") == Case.read(document(run=SHORT, dimers={"angle": angle}), name="base")
-    assert (there / "angles.toml").read_text().startswith('case = "base.toml"\n')
     actions = [action["name"].split()[0] for action in ROCrate(unpacked).root_dataset["mentions"]]
     assert actions == ["Simulation", "Simulation", "Tables"]
-
     assert _verified(there)[0] == "angles: 2 points have a run"
     deck = places[0] / "shared_deck" / "walker.lig"
     deck.write_text(deck.read_text().replace("gravity", "levity"))
@@ -256,8 +199,7 @@ def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
     for place in places:
         shutil.rmtree(place)
     gone = _verified(there, 1)
-    assert gone[0] == "angles: 0 points have a run"
-    assert sum("(missing: point " in line for line in gone) == 2
+    assert (gone[0], sum("(missing: point " in line for line in gone)) == ("angles: 0 points have a run", 2)
     refused = call("export", str(there), "--to", "archive", "-o", str(tmp_path / "two.zip"))
     assert (refused.returncode, "2 of 2 points are not finished" in refused.stderr) == (2, True)
 

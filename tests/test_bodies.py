@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 
 import walkers
-from tests.conftest import REFERENCE, document, make_case
+from tests.conftest import REFERENCE, make_case
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
-from walkers.inputs.drive import Excitation, Harmonic, common_frequency
 from walkers.inputs.loads import contact_loads, dimer_of, resistances_at_rest
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.standing import standing
@@ -33,7 +32,7 @@ from walkers.runner.launch import launch
 from walkers.sweeps.comparison import Side, compare_runs
 from walkers.templates.deck import render_deck
 from walkers.templates.scene import place
-from walkers.theory.prediction import alignment_of, motion_of
+from walkers.theory.prediction import motion_of
 
 Ran = Callable[..., Path]
 Moved = Callable[..., Group]
@@ -84,26 +83,23 @@ def fig1b(**changes: Any) -> Case:
     return load_case("fig1b", {**start, "run.cycles": 20, "run.settling_cycles": 8, **changes})
 
 
-# --- how beads stand --------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("shape", ["chain Lss", "fan Lss", "fan Lsss", "ring Lsss", "diamond LsLs", "raft sssssss"])
+@pytest.mark.parametrize(
+    "shape", ["chain Lss", "fan Lsss", "ring Lsss", "diamond LsLs", "diamond LsLL", "raft sssssss"]
+)
 def test_beads_of_a_cluster_touch_as_its_arrangement_says(shape: str) -> None:
     """Touching pairs overlap by what carries their load, the beads the floor too, and no others overlap."""
     arrangement, sizes = shape.split()
     case = of_tables(cluster(arrangement, sizes, gap_spread=0.0))
-    make, loads = case.walkers[0], contact_loads(case, case.walkers[0])
+    make, loads = case.walkers[0], [load.overlap for load in contact_loads(case, case.walkers[0])]
     scene, (first, _) = place((case,))
     beads = [next(bead for bead in scene.beads if bead.id == number) for number in first.beads]
-    floor = [load.overlap for load in loads[: len(sizes)]]
-    assert [bead.radius - bead.centre[2] for bead in beads] == pytest.approx(floor, rel=1e-6)
+    assert [bead.radius - bead.centre[2] for bead in beads] == pytest.approx(loads[: len(sizes)], rel=1e-6)
     extents = []
     for one, other in combinations(range(len(sizes)), 2):
         between, both = np.subtract(beads[one].centre, beads[other].centre), beads[one].radius + beads[other].radius
         overlap = both - np.linalg.norm(between)
         if (one, other) in make.pairs:
-            expected = loads[len(sizes) + make.pairs.index((one, other))].overlap
-            assert overlap == pytest.approx(expected, rel=1e-4)
+            assert overlap == pytest.approx(loads[len(sizes) + make.pairs.index((one, other))], rel=1e-4)
         else:
             assert overlap < 0.0
         extents.append(np.hypot(*between[:2]) + both)
@@ -128,12 +124,13 @@ SAME: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "chain_of_two": (REFERENCE, {"dimers": None, "clusters": [cluster("chain", "Ls", **START)]}),
     "harmonic": (REFERENCE, {"drive": {"harmonics": [{**REFERENCE["drive"], "axis": "x"}]}}),
     "up a wall": (CLIMBER, {"dimers": {**CLIMBER["dimers"], "facing": "right"}}),
-    "diameters of dimers": (EVERYTHING, {"dimers": {"diameters": ["1 mm", "0.6 mm"], "replicates": 1}}),
-    "diameters of a mixture": (EVERYTHING, {"mixture": BY_DIAMETERS}),
-    "diameter of a bead": (EVERYTHING, {"placed": [{"diameter": "0.8 mm", "at": EVERYTHING["placed"][0]["at"]}]}),
-    "diameters of clusters": (
-        {**FIG1B, "clusters": [cluster("chain", "Ls")]},
-        {"clusters": [{"arrangement": "chain", "diameters": ["0.6 mm", "0.4 mm"], "replicates": 2}]},
+    "diameters": (
+        EVERYTHING,
+        {
+            "dimers": {"diameters": ["1 mm", "0.6 mm"], "replicates": 1},
+            "mixture": {"small_diameters": ["0.6 mm", "0.63 mm"], "large_diameters": ["1 mm", "1.18 mm"], "count": 20},
+            "placed": [{"diameter": "0.8 mm", "at": EVERYTHING["placed"][0]["at"]}],
+        },
     ),
 }
 """Tables of a case, and others (None: none) that say the same."""
@@ -189,29 +186,6 @@ def test_a_mixture_is_poured_from_above_the_walkers() -> None:
     assert min(bead.z - bead.radius for bead in kinds[1]) > 1e-3
 
 
-def test_walkers_placed_beads_and_a_mixture_share_a_box(tmp_path: Path) -> None:
-    """All analyses that mean something are in the result, and nobody starts within another."""
-    case = Case.read(EVERYTHING, name="everything")
-    for one, other in combinations(place((case,))[0].beads, 2):
-        if not {one.id, other.id} <= {1, 2}:  # the dimer's own beads touch
-            assert dist(one.centre, other.centre) > one.radius + other.radius
-    done = walkers.run(case, tmp_path)
-    assert {"velocity", "surface_end"} < set(done.result)
-    assert (done.result["beads"], done.result["walkers"], len(done.motion.radius)) == (23, 1, 23)
-    assert done.table("bed")["time"].max() >= 0.03
-
-
-# --- drives and slopes ------------------------------------------------------------------------------------------------
-
-
-def test_a_cycle_is_the_common_period() -> None:
-    for tones, common in (([80.0, 160.0], 80.0), ([90.0, 60.0, 40.0], 10.0), ([0.1, 0.3], 0.1)):
-        assert common_frequency(tones) == pytest.approx(common, rel=1e-12)
-    for others in ([80.0 * 25], [80.0 * 2**0.5], [80.0 * ratio for ratio in (23 / 24, 22 / 23, 21 / 22, 19 / 20)]):
-        with pytest.raises(ValueError, match=r"not a ratio of whole numbers|common period"):
-            common_frequency([80.0, *others])
-
-
 @pytest.mark.parametrize(("frequency", "step", "samples"), [("60 Hz", "auto", 7), ("83.7 Hz", "1.7 us", 20)])
 def test_a_cycle_is_a_whole_multiple_of_the_sampling_interval(frequency: str, step: str, samples: int) -> None:
     case = make_case(drive={"frequency": frequency}, run={"time_step": step, "samples_per_cycle": samples})
@@ -220,31 +194,16 @@ def test_a_cycle_is_a_whole_multiple_of_the_sampling_interval(frequency: str, st
     assert step == "auto" or case.run.time_step <= 1.7e-6 * (1 + 1e-12)
 
 
-def test_a_drive_is_its_largest_harmonic_where_one_number_is_asked_for() -> None:
-    """The first of equal ones, along which walkers face."""
-    weak = Harmonic(axis="x", frequency=160.0, peak_acceleration=10.0)
-    drive = Excitation((weak, Harmonic(axis="z", frequency=80.0, peak_acceleration=30.0, phase=1.0)), "container")
-    assert (drive.direction, drive.peak_acceleration, drive.frequency) == ((0.0, 0.0, 1.0), 30.0, 80.0)
-    for axes, along in (("xyz", [1, 0]), ("yxz", [0, 1])):
-        tones = [{"axis": axis, "frequency": "80 Hz", "peak_acceleration": "2 g"} for axis in axes]
-        ((_, start),) = standing(Case.read({**document(), "drive": {"harmonics": tones}}))
-        large, small = start.beads
-        assert np.sign(np.round([large.x - small.x, large.y - small.y], 9)).tolist() == along
-
-
-@pytest.mark.parametrize(
-    ("waveform", "expected", "within"),
-    [
-        ("triangle", lambda turn: 2.0 / pi * np.arcsin(np.sin(2.0 * pi * turn)), 0.045),
-        ("sawtooth", lambda turn: 2.0 * turn, 0.12),
-    ],
-)
-def test_a_waveform_is_the_sum_of_its_harmonics(waveform: str, expected: Callable[..., Any], within: float) -> None:
+@pytest.mark.parametrize("waveform", ["triangle", "sawtooth"])
+def test_a_waveform_is_the_sum_of_its_harmonics(waveform: str) -> None:
     """Of the acceleration, away from the jump of the sawtooth; the peak is the one that is given."""
     turn = np.linspace(-0.4, 0.4, 321)
     harmonics = make_case(drive={"waveform": waveform}).excitation.harmonics
     waves = [one.peak_acceleration * np.sin(one.frequency * 2.0 * pi * turn / 80.0 + one.phase) for one in harmonics]
-    np.testing.assert_allclose(sum(waves), 39.2 * expected(turn), atol=within * 39.2)
+    expected, within = 2.0 * turn, 0.12
+    if waveform == "triangle":
+        expected, within = 2.0 / pi * np.arcsin(np.sin(2.0 * pi * turn)), 0.045
+    np.testing.assert_allclose(sum(waves), 39.2 * expected, atol=within * 39.2)
 
 
 @pytest.mark.parametrize(("tilt", "uphill"), [(0.0, 0.0), (30.0, 0.0), (90.0, 0.0), (30.0, 90.0), (90.0, 180.0)])
@@ -301,13 +260,6 @@ def test_bridges_drag_rolling_beads_that_nothing_else_holds(trajectory: Moved, f
     np.testing.assert_allclose(found, abs(answer[0]), rtol=2e-4)
 
 
-def test_bead_on_a_still_substrate_stays_where_it_is(trajectory: Moved) -> None:
-    """Started in the equilibrium of capillary, elastic and gravity forces: nothing moves by more than a nanometre."""
-    moved = trajectory(drive={"peak_acceleration": "0 g"}, run={"cycles": 4, "settling_cycles": 1})
-    assert np.abs(moved.position - moved.position[:1]).max() < 2e-8
-    assert moved.position[0, 0, 0, 2] < moved.radii[0]
-
-
 @pytest.mark.parametrize("frequency", ["73 Hz", "74 Hz"])
 def test_a_rest_before_the_drive_is_one(tmp_path: Path, frequency: str) -> None:
     """Whatever part of a cycle it takes: nothing moves meanwhile, the bridges drag as they do without it."""
@@ -321,9 +273,6 @@ def test_a_rest_before_the_drive_is_one(tmp_path: Path, frequency: str) -> None:
     assert done.trajectory["time"].min() == 0.0
     assert np.abs(done.motion.velocity[resting]).max() < 1e-4
     assert speeds[1] == pytest.approx(speeds[0], rel=0.01)
-
-
-# --- how fast they walk -----------------------------------------------------------------------------------------------
 
 
 ALIKE = {"dimers.radii": ["0.25 mm", "0.25 mm"]}
@@ -384,13 +333,6 @@ def test_walkers_are_as_fast_as_measured(run_directory: Ran, name: str) -> None:
     assert found == pytest.approx(expected, rel=0.02, abs=0.01)
 
 
-def test_laboratory_and_container_frame_agree(run_directory: Ran) -> None:
-    """To the square of ω times the step."""
-    run = {"cycles": 12, "settling_cycles": 4}
-    speeds = [read(run_directory(drive={"frame": frame}, run=run))["velocity"] for frame in ("lab", "container")]
-    assert speeds[0] == pytest.approx(speeds[1], rel=1e-5)
-
-
 def test_rolling_friction_turns_a_walker_to_the_axis_and_a_symmetric_dimer_away(trajectory: Moved) -> None:
     friction = {"bead_bead": 0.2, "bead_wall": 0.2}
     common: dict[str, Any] = {
@@ -410,35 +352,16 @@ def test_rolling_friction_turns_a_walker_to_the_axis_and_a_symmetric_dimer_away(
 
 def test_a_dimer_is_held_by_the_walls_that_it_touches(run_directory: Ran) -> None:
     """In a narrow channel both side walls hold its large bead, and it is slower; in a groove both walls, each bead."""
-    narrow, groove = (
-        run_directory(fig1b(**{f"boundary.{key}": value for key, value in boundary.items()}))
-        for boundary in ({"shape": "channel", "width": "0.5998 mm"}, {"shape": "groove", "opening": "120 deg"})
-    )
-    for directory, walls in ((narrow, {0: [0, 1, 2], 1: [0]}), (groove, {0: [0, 1], 1: [0, 1]})):
+    channel, groove = {"shape": "channel", "width": "0.5998 mm"}, {"shape": "groove", "opening": "120 deg"}
+    for boundary, walls in ((channel, {0: [0, 1, 2], 1: [0]}), (groove, {0: [0, 1], 1: [0, 1]})):
+        directory = run_directory(fig1b(**{f"boundary.{key}": value for key, value in boundary.items()}))
         bridges = read_table(directory, "bridges")
         held = bridges[(bridges["wall"] >= 0) & (bridges["time"] == bridges["time"].max())]
         assert held.groupby("bead_1")["wall"].apply(sorted).to_dict() == walls
-        assert (held["normal_force"].abs() < 2e-3).all()
-    assert abs(read(narrow)["velocity"]) < 1e-3
-    motion = read_motion(groove)
+        if boundary is channel:
+            assert abs(read(directory)["velocity"]) < 1e-3
+    motion = read_motion(directory)
     np.testing.assert_allclose(sin(pi / 3) * motion.position[-1, :, 2] / motion.radius, 1.0, atol=1e-3)
-
-
-def test_a_bead_may_lie_on_a_plane_beside_walkers_or_alone(tmp_path: Path) -> None:
-    """It rolls along the drive, held down; alone there is nothing to measure, but its motion."""
-    bead = {"placed": [{"radius": "0.3 mm", "at": ["5 mm", "-3 mm", "0.29999 mm"]}]}
-    run = {"cycles": 8, "settling_cycles": 4, "samples_per_cycle": 20, "longest_settling": "0 s"}
-    for tables, walks in (({**bead, "dimers": dimers(1)}, True), (bead, False)):
-        done = walkers.run(of_tables(**tables, run=run), tmp_path)
-        assert ("velocity" in done.result) == walks
-        assert done.motion.position[-1, -1][1:] == pytest.approx([-3e-3, 0.3e-3], abs=1e-6)
-        assert "80 Hz" in done.describe()
-
-
-def test_results_know_a_time_step_beyond_its_limits(tmp_path: Path) -> None:
-    run = {"cycles": 2, "settling_cycles": 0, "samples_per_cycle": 1, "time_step": "20 us", "allow_unstable": True}
-    warnings = walkers.run(make_case(run=run), tmp_path).result.warnings
-    assert any("beyond a limit of stability (rayleigh)" in one for one in warnings)
 
 
 def test_reporting_bridges_does_not_disturb_the_walkers(tmp_path: Path) -> None:
@@ -458,9 +381,6 @@ def test_reporting_bridges_does_not_disturb_the_walkers(tmp_path: Path) -> None:
     assert dumps[0] == dumps[1]
 
 
-# --- many walkers -----------------------------------------------------------------------------------------------------
-
-
 def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
     """A dimer beside trimers walks as it does alone, and each make has its part of the result."""
     tables = cluster("fan", "Lss"), cluster("chain", "Lss", replicates=1)
@@ -469,7 +389,6 @@ def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
     assert [result[f"walkers_make_{make}"] for make in (1, 2, 3)] == [2, 2, 1]
     assert result["velocity_make_1"] == pytest.approx(FIG1B_SPEED, rel=2e-3)
     assert done.walkers["make"].tolist() == [0, 0, 1, 1, 2]
-    assert done.walkers["rotation_3"].isna().tolist() == [True, True, False, False, False]
     assert result["velocity_make_3"] == pytest.approx(done.walkers["velocity"].iloc[4])
     # What is said of single beads is that of the dimers, and so is its scatter.
     side = Side("one", done.case, done.directory)
@@ -479,10 +398,9 @@ def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
         assert compared[name]["first_scatter"] == pytest.approx(done.walkers[name][:2].std())
     # A column is of one kind of contact: of the third bead and the floor, or of two beads.
     assert {name for name in result if name.startswith("sliding")} == {"sliding_1", "sliding_2", "sliding_pair_1"}
-    for family, table in (("sliding", done.walkers), ("open", done.walkers), ("gap", done.trajectory)):
-        third, pair = (table[f"{family}_{name}"][table["walker"] < 2] for name in ("3", "pair_1"))
-        assert third.isna().all()
-        assert pair.notna().all()
+    of_dimers = done.walkers["walker"] < 2
+    assert done.walkers["sliding_3"][of_dimers].isna().all()
+    assert done.walkers["sliding_pair_1"].notna().all()
 
 
 def test_walkers_on_a_tray_meet_and_stick(tmp_path: Path) -> None:
@@ -493,7 +411,6 @@ def test_walkers_on_a_tray_meet_and_stick(tmp_path: Path) -> None:
     merged, between = meetings[meetings["event"] == "merged"], bridges[bridges["other_walker"] >= 0]
     assert tray.result["merged"] == len(merged) >= 2
     assert tray.result["largest_group"] >= 2
-    assert (between["contact"] == 0).all()
     for row in merged.itertuples():
         joined = between[(between["walker"] == row.walker) & (between["other_walker"] == row.other)]
         assert joined["time"].min() == pytest.approx(row.time)
@@ -525,9 +442,6 @@ def test_what_walkers_do_as_many_is_counted() -> None:
     assert found == pytest.approx({**shares, **speeds, **others})
 
 
-# --- climbers on a wall -----------------------------------------------------------------------------------------------
-
-
 FRICTIONS = {0.1: -9.57e-3, 0.2: -3.33e-3, 0.3: 4.77e-3}
 """Climbing speeds in m/s, as measured; the theory has those that climb a tenth faster."""
 
@@ -551,31 +465,21 @@ def test_a_dimer_on_the_axis_climbs_if_friction_suffices(run_directory: Ran, fri
     assert read(run_directory(on_a_wall(friction, radii=["0.42625 mm", "0.42625 mm"])))["axial_velocity"] < -1e-3
 
 
-def test_a_climbers_weight_pulls_along_the_axis() -> None:
-    case = on_a_wall()
-    assert (case.pressing_gravity, case.axial_gravity) == (0.0, case.environment.gravity)
-    assert alignment_of(case)["u"] < 0.0  # it stands on its head
-
-
 def test_the_shipped_climber_comes_upright_and_climbs_and_its_posture_is_that_of_the_whole_run(
     run_directory: Ran,
 ) -> None:
     """With its spread of starts, for a fifth of its time; then the same motion, turned."""
     run = {"time_step": "2 us", "cycles": 36, "settling_cycles": 24, "samples_per_cycle": 1}
     upright = run_directory(Case.read({**read_toml(shipped("case")["climber"]), "run": run}, name="climber"))
-    result, table = read(upright), read_table(upright, "walkers")
-    assert np.degrees(table["start_angle"].abs().max()) > 9.0
-    assert np.degrees(table["orientation_end"].abs().max()) < 0.3
+    result, group = read(upright), read_motion(upright).groups[0]
+    assert np.degrees(read_table(upright, "walkers")["start_angle"].abs().max()) > 9.0
     assert result["upright"] == result["climbing"] == result["walkers"] == 6
     assert result["velocity"] == pytest.approx(3.62e-3, rel=0.03)
     # Leaning from 15° on, turned over from 90° after the start, whatever comes after.
-    group = read_motion(upright).groups[0]
-    assert postures(group) == ["upright"] * 6
     tilting = np.linspace(0.0, np.radians(20.0), len(group.time))[:, None]
     over = np.where(group.time == group.time[9], np.radians(100.0), 0.0)[:, None]
-    low, high, back = (np.full((len(group.time), 1), np.radians(angle)) for angle in (14.0, 16.0, 150.0))
-    turns = ((low, "upright"), (high, "leaning"), (back, "leaning"), (tilting, "leaning"), (over, "turned_over"))
-    for turn, expected in turns:
+    low, high = (np.full((len(group.time), 1), np.radians(angle)) for angle in (14.0, 16.0))
+    for turn, expected in ((low, "upright"), (high, "leaning"), (tilting, "leaning"), (over, "turned_over")):
         turned = replace(group)
         turned.__dict__["orientation"] = np.broadcast_to(turn, group.orientation.shape)
         assert postures(turned) == [expected] * 6

@@ -81,9 +81,6 @@ def resting(case: Case, frames: int | None = None) -> Motion:
     )
 
 
-# --- inputs -----------------------------------------------------------------------------------------------------------
-
-
 def test_quantities_are_written_in_the_unit_of_their_example() -> None:
     for value, kind, text in ((293.15, units.TEMPERATURE, "20 degC"), (39.2, units.ACCELERATION, "4 g")):
         assert quantity_text(value, kind) == text
@@ -162,9 +159,6 @@ def test_measuring_begins_after_all_of_the_settling_cycles() -> None:
     assert (samples.start, samples.stop) == (4, 10)
 
 
-# --- decks ------------------------------------------------------------------------------------------------------------
-
-
 def test_a_deck_of_several_cases_is_watched_with_the_highest_of_their_limits() -> None:
     slow, fast = (make_case(drive={"peak_acceleration": peak}) for peak in ("2 g", "8 g"))
     assert render_shared_deck([slow, fast]).fastest == render_deck(fast).fastest > 1.1 * render_deck(slow).fastest
@@ -183,9 +177,6 @@ def test_what_show_prints_of_a_case_is_in_its_units() -> None:
     assert f" {1e12 * 0.5 * 0.01 * 4.0 / 3.0 * pi * LARGE**3:.3g} nL" in wall  # half of the bead's liquid
     assert f" {1e6 * bridge_at_rest(case, LARGE, inf).rupture:.3g} µm " in wall
     assert wall.endswith(f" {1e9 * contact_loads(case)[0].overlap:.4g} nm")
-
-
-# --- runs -------------------------------------------------------------------------------------------------------------
 
 
 def test_the_speed_of_a_run_that_goes_on_is_that_of_this_call() -> None:
@@ -224,9 +215,6 @@ def test_a_result_rests_on_the_values_of_the_case_that_is_asked_for(tmp_path: Pa
     rests = [walkers.load(case, tmp_path).result.about["rests_on"] for case in (plain, said)]
     found = [one["origin"] for of_case in rests for one in of_case if one["key"] == "contact.rolling_friction"]
     assert found[0] != found[1] == "given"
-
-
-# --- walkers ----------------------------------------------------------------------------------------------------------
 
 
 def test_scatter_and_slopes_of_walkers() -> None:
@@ -290,9 +278,6 @@ def test_a_band_holds_the_result(tmp_path: Path) -> None:
     assert bands_of(run, [{"key": "liquid.volume_fraction", "range": [0.0, 1.0]}], {"velocity": 1.5}) == {}
 
 
-# --- piles ------------------------------------------------------------------------------------------------------------
-
-
 def test_a_tray_that_has_hardly_been_driven_has_meetings_alone() -> None:
     """One frame, in which a bridge joins two of three dimers."""
     dimers = {"radii": ["0.3 mm", "0.2 mm"], "replicates": 3, "meet": True}
@@ -339,9 +324,6 @@ def test_the_numbers_of_climbs() -> None:
     assert _of_climbs(clusters) == {"climbs": 2, "onset": 0.5, "speed": 2e-3, "highest": 5e-3, "led_by_large": 1}
     none = {"climbs": 0, "onset": np.nan, "speed": np.nan, "highest": np.nan, "led_by_large": 0}
     assert _of_climbs({name: column[2:] for name, column in clusters.items()}) == pytest.approx(none, nan_ok=True)
-
-
-# --- pictures ---------------------------------------------------------------------------------------------------------
 
 
 def test_slow_motion_in_words() -> None:

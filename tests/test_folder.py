@@ -1,19 +1,32 @@
-"""Runs and sweeps of a folder: listed and removed; values of their cases as text."""
+"""Runs and sweeps of a folder: listed, removed, and compared."""
+
+from __future__ import annotations
 
 import json
+import re
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from math import hypot
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import walkers
+<<<<<<< HEAD
 from tests.conftest import call, document, finished_places, make_case, mounted, to_toml
 from walkers.runner.directory import locked
+=======
+from tests.conftest import call, document, to_toml
+from walkers.inputs.sweep import expand
+from walkers.postprocess.uncertainty import ACCURACY_NAME
+from walkers.runner.directory import case_of, finished_places, locked
+>>>>>>> origin/main
 from walkers.runner.files import read_json, write_json
-from walkers.sweeps.folder import weigh
-from walkers.sweeps.readable import chosen, differing, flattened, readable
+from walkers.runner.manifest import MANIFEST_NAME, checksums
+from walkers.sweeps.comparison import Side, compare_runs
+from walkers.sweeps.scheduler import Options, run_sweep
+from walkers.sweeps.table import load
 
 OTHER, FASTER = {"liquid.name": "Si AK10"}, {"drive.frequency": "90 Hz"}
 SHORTEST = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
@@ -87,11 +100,7 @@ def test_a_resting_walker_is_called_so_everywhere(out: Path) -> None:
     assert (table["velocity"].abs() > 0.0).all()
     assert ": at rest" in call("run", table["run"][0], check=True).stdout
     assert call("list", "--all", check=True).stdout.count(" at rest ") == 2
-    shown = [repr(walkers.load(one)) for one in (table["run"][0], "rest")]
-    assert shown == [f"Run({table['run'][0]}: finished, at rest)", "Sweep(rest: 2 points, 2 finished)"]
-    head, *rows = call("list", "rest", check=True).stdout.splitlines()[2:5]
-    end = head.index(" (mm/s)") + len(" (mm/s)")
-    assert [row[:end].split()[-1] for row in rows] == ["0", "0"]
+    assert repr(walkers.load(table["run"][0])) == f"Run({table['run'][0]}: finished, at rest)"
 
 
 @pytest.mark.parametrize(
@@ -99,20 +108,18 @@ def test_a_resting_walker_is_called_so_everywhere(out: Path) -> None:
     [
         ({"format": 99}, "its format is 99, expected 4); run the sweep again: finished runs are kept"),
         ({"runs": ["base-0123456789ab"]}, "1 runs, expected the names of 6"),
-        ({"runs": None}, "cannot be read"),
         ({"base": None}, "cannot be read"),
         ({"file": {"case": "base", "axes": {"drive.frequncy": [1]}}}, 'did you mean "frequency"'),
     ],
 )
 def test_a_sweep_of_another_format_is_refused(out: Path, change: dict[str, Any], message: str) -> None:
-    record = read_json(out / "grid" / "sweep.json")
-    assert record.keys() == {"format", "file", "case", "base", "runs"}
-    write_json(out / "grid" / "sweep.json", {**record, **change})
+    write_json(out / "grid" / "sweep.json", {**read_json(out / "grid" / "sweep.json"), **change})
     for command in ("list grid", "clean rough --yes"):
         done = call(*command.split())
         assert (done.returncode, message in done.stderr) == (2, True), done.stderr
 
 
+<<<<<<< HEAD
 @pytest.mark.parametrize(
     ("first", "second", "differ"),
     [
@@ -138,100 +145,141 @@ def test_values_of_all_kinds_are_shown_as_they_can_be_written() -> None:
     assert readable("liquid.kinematic_viscosity", 5e-6) == "5 mm^2/s"
 
 
+=======
+>>>>>>> origin/main
 def test_clean_removes_leftovers_alone(out: Path) -> None:
     """No run in progress, and no folder of somebody else's unless it has in it what an unfinished run has."""
     failed, interrupted, held = (
         _unfinished(name, failed=failed) for name, failed in {"slow": True, "killed": False, "held": False}.items()
     )
-    begun = out / "begun-0123456789ab.incomplete"
-    (begun / "segments").mkdir(parents=True)
-    stale, lock = out / "gone-0123456789ab.lock", out / "poetry.lock"
-    for path in (stale, lock):
+    stale, lock, thesis = out / "gone-0123456789ab.lock", out / "poetry.lock", out / "thesis.incomplete"
+    before = finished_places(out)
+    thesis.mkdir()
+    for path in (stale, lock, thesis / "chapter.txt"):
         path.touch()
-    before, theirs = finished_places(out), []
-    for name in ("thesis.incomplete", "data.replaced", "notes-0123456789ab.incomplete", "mine"):
-        (out / name).mkdir()
-        theirs.append(out / name / "chapter.txt")
-        theirs[-1].write_text("mine")
-        if name in ("mine", "thesis.incomplete"):
-            shutil.copy(next(iter(before.values())) / "case.json", out / name)
+    shutil.copy(next(iter(before.values())) / "case.json", thesis)
     with locked([out / held.name.removesuffix(".incomplete")]):
         refused = call("clean")  # where there is no terminal
-        words = ("1 failed run", "2 interrupted runs", "1 stale lock", "stays: 1 running")
+        words = ("1 failed run", "1 interrupted run", "1 stale lock", "stays: 1 running")
         assert all(word in refused.stdout for word in words)
-        assert (refused.returncode, "no terminal" in refused.stderr) == (2, True)
-        assert failed.exists()
+        assert (refused.returncode, "no terminal" in refused.stderr, failed.exists()) == (2, True, True)
         call("clean", "--yes", check=True)
-    assert not any(path.exists() for path in (failed, interrupted, begun, stale))
-    assert all(path.exists() for path in (held, lock, *theirs))
+    assert not any(path.exists() for path in (failed, interrupted, stale))
+    assert all(path.exists() for path in (held, lock, thesis / "chapter.txt"))
     assert finished_places(out) == before
 
 
 def test_clean_keeps_runs_that_other_sweeps_have(out: Path) -> None:
+    """With a run go its spread and its accuracy: here runs that only the accuracy has, those of beads."""
     names = ("grid", "rough", "three", "beads")
     runs = {name: {Path(run).name for run in walkers.load(out / name).table()["run"]} for name in names}
     shutil.copytree(out / "rough", out / "renamed")
     before = finished_places(out)
-    (out / "grid" / "notes.txt").write_text("mine")
-    shown = call("clean", "grid").stdout
-    assert "notes.txt, sweep.json" in shown  # what else goes
-    assert "1 sweep to remove" in shown
-    call("clean", "grid", "beads", "rough", "--yes", check=True)
-    assert before.keys() - finished_places(out).keys() == runs["beads"] - runs["three"]
-    assert runs["rough"] <= finished_places(out).keys()
-    assert not any((out / name).exists() for name in ("grid", "rough", "beads"))
-    one = sorted(runs["three"] - runs["rough"])[0]
+    call("clean", "grid", "rough", "--yes", check=True)
+    assert before.keys() == finished_places(out).keys()
+    assert not any((out / name).exists() for name in ("grid", "rough"))
+    one = sorted(runs["rough"] - runs["three"])[0]
+    (out / "beads").rename(out / f"{one}-accuracy")
+    shutil.copytree(out / "three", out / f"{one}-spread")
     shown = call("clean", str(finished_places(out)[one]), "--yes", check=True).stdout
-    assert "needed by the sweep three, which would make them again: 1" in shown
-    assert walkers.load(out / "three").table()["status"].tolist().count("missing") == 1
+    assert "needed by the sweep renamed, which would make them again: 1" in shown
+    assert before.keys() - finished_places(out).keys() == (runs["beads"] - runs["three"] - runs["rough"]) | {one}
+    assert not [*out.glob(f"{one}-*")]
+    assert walkers.load(out / "renamed").table()["status"].tolist().count("missing") == 1
 
 
-def test_with_a_run_go_its_spread_and_its_accuracy(out: Path) -> None:
-    """Here with runs that only the accuracy has: those of beads; all runs of the spread are those of a sweep too."""
-    run = Path(walkers.load(out / "rough").table()["run"][0]).name
-    (out / "beads").rename(out / f"{run}-accuracy")
-    shutil.copytree(out / "grid", out / f"{run}-spread")
-    theirs = {Path(path).name for path in walkers.load(out / f"{run}-accuracy").table()["run"]}
-    others = {Path(path).name for name in ("grid", "three") for path in walkers.load(out / name).table()["run"]}
-    before = finished_places(out)
-    call("clean", run, "--yes", check=True)
-    assert before.keys() - finished_places(out).keys() == (theirs - others) | {run}
-    assert not [*out.glob(f"{run}-*")]
+def test_compare_tells_parameters_and_results_of_two_runs(out: Path) -> None:
+    table = walkers.load(out / "beads").table().set_index(["liquid.name", "dimers.radii[0]"])
+    rows = [table.loc[("Si AK5", 0.3)], table.loc[("Si AK10", 0.3)]]
+    found = json.loads(call("compare", *(Path(row["run"]).name for row in rows), "--json", check=True).stdout)
+    assert found["parameters"] == {"liquid.name": ["Si AK5", "Si AK10"]}
+    results = {one["quantity"]: one for one in found["results"]}
+    for name, number in {"": "velocity", "_scatter": "scatter"}.items():
+        sides = [results["velocity"][f"{side}{name}"] for side in ("first", "second")]
+        assert sides == [row[number] for row in rows]
+    assert results["velocity"]["numerical_error"] is None
+    # Cases may be named, and one that was not run; changes are of the second side.
+    told = call("compare", "base.toml", "fig4a", check=True).stdout
+    assert "0.6/0.3 mm" in told and "fig4a: no finished run" in told
+    assert "all results are the same" in call("compare", "base.toml", "base.toml", check=True).stdout
+    for sides in (["base.toml"], ["base.toml", "base.toml"]):
+        found = json.loads(call("compare", *sides, "--set", "drive.frequency=90Hz", "--json", check=True).stdout)
+        assert {key: values[1] for key, values in found["parameters"].items()} == {"drive.frequency": 90.0}
+        assert found["second"] == "base.toml drive.frequency=90Hz" == found["not_run"][0]
 
 
-def test_clean_leaves_the_target_of_a_symbolic_link(out: Path, tmp_path: Path) -> None:
-    name, place = next(iter(finished_places(out).items()))
-    kept = place.rename(tmp_path / "elsewhere")
-    (out / name).symlink_to(kept)
-    before = {path: path.read_bytes() for path in kept.rglob("*") if path.is_file()}
-    shown = call("clean", name, "--yes", check=True).stdout
-    assert "a symbolic link: its target stays" in shown
-    assert "1 finished run to remove, 0 B" in shown
-    assert not (out / name).is_symlink()
-    assert {path: path.read_bytes() for path in kept.rglob("*") if path.is_file()} == before
+def test_compare_matches_the_points_of_two_sweeps(out: Path) -> None:
+    """Whatever their order; one sweep has points that the other has not."""
+    keys = ["drive.frequency", "drive.peak_acceleration"]
+    tables = [walkers.load(out / name).table().set_index(keys) for name in ("grid", "rough")]
+    found = json.loads(call("compare", "grid", "rough", "--json", check=True).stdout)
+    assert found["parameters"] == {"contact.friction.bead_wall": [0.1, 0.2]}
+    assert found["unmatched"] == [2, 0]
+    assert len(found["points"]) == 4
+    for one in found["points"]:
+        at = tuple(one["point"][key] for key in keys)
+        assert (one["first"], one["second"]) == tuple(table.loc[at, "velocity"] for table in tables)
+    assert "4 points in both" in call("compare", "grid", "rough", check=True).stdout
 
 
-def test_clean_reports_what_the_system_does_not_let_it_remove(out: Path) -> None:
-    name, directory = next(iter(finished_places(out).items()))
-    with mounted(directory / "busy", "64k"):
-        done = call("clean", name, "--yes")
-        assert (done.returncode, directory.exists()) == (1, True)
-        assert f"{directory}: cannot be removed whole" in done.stderr
-    assert name not in finished_places(out)
+def _changed(run: Path, to: Path, name: str, speed: float, error: float) -> Side:
+    """A copy of a run whose result has another velocity and numerical error (m/s), as if measured so."""
+    shutil.copytree(run, to / name)
+    result = read_json(to / name / "result.json")
+    result["numbers"]["velocity"] = speed
+    write_json(to / name / "result.json", result)
+    write_json(to / name / ACCURACY_NAME, {"errors": {"velocity": {"total": error}}})
+    manifest = read_json(to / name / MANIFEST_NAME)
+    manifest["sha256"] |= checksums(to / name, ["result.json", ACCURACY_NAME])
+    write_json(to / name / MANIFEST_NAME, manifest)
+    return Side(name, case_of(run), to / name)
 
 
-def test_an_interrupted_run_of_another_folder_is_not_mistaken_for_one_of_the_same_name(tmp_path: Path) -> None:
-    places = [tmp_path / folder / "killed-0123456789ab.incomplete" for folder in ("runs", "other")]
-    for place in places:
-        place.mkdir(parents=True)
-        (place / "case.json").write_text(json.dumps(make_case().as_dict()))
-    done = call("clean", str(places[1]), "--out", str(tmp_path / "runs"), "--yes")
-    assert (done.returncode, [place.exists() for place in places]) == (2, [True, True])
-    call("clean", places[0].name, "--out", str(tmp_path / "runs"), "--yes", check=True)
-    assert [place.exists() for place in places] == [False, True]
+def test_compared_runs_differ_by_so_many_times_both_their_numerical_errors(
+    run_directory: Callable[..., Path], tmp_path: Path
+) -> None:
+    """Errors of 3 and 4 µm/s make 5 µm/s of a difference of -50 µm/s."""
+    run = run_directory(run=SHORTEST)
+    fast, slow = _changed(run, tmp_path, "fast", 1.05e-3, 3e-6), _changed(run, tmp_path, "slow", 1e-3, 4e-6)
+    found = compare_runs(fast, slow)
+    (velocity,) = (one for one in found.contents["results"] if one["quantity"] == "velocity")
+    assert velocity["difference"] == pytest.approx(-5e-5)
+    assert velocity["numerical_error"] == pytest.approx(hypot(3e-6, 4e-6))
+    assert "velocity: differs by 10 times its numerical error" in found.text
+    assert re.search(r"\nvelocity \(mm/s\) +1\.05 +1 +-0\.05 ", found.text)
 
 
-def test_a_file_with_two_names_weighs_once(tmp_path: Path) -> None:
-    (tmp_path / "table").write_bytes(b"0" * 1000)
-    (tmp_path / "other").hardlink_to(tmp_path / "table")
-    assert weigh(tmp_path)[0] == 1000
+def test_compared_sweeps_differ_most_at_the_largest_change_of_either_sign(tmp_path: Path) -> None:
+    """With more friction the walker is faster under a weak drive, and slower by more under a strong one."""
+    tables = {"case": "base.toml", "axes": {"drive.peak_acceleration": ["3 g", "6 g"]}}
+    sides: list[str] = []
+    for friction in (0.05, 0.2):
+        contact = {"friction": {"bead_bead": 0.1, "bead_wall": friction}}
+        (tmp_path / "base.toml").write_text(to_toml(document(run=SHORTEST, contact=contact)))
+        sweep = expand(tables, source="t", name=f"rough-{friction}", folder=tmp_path)
+        sides.append(str(run_sweep(sweep, tmp_path / "runs", Options(1))[0].directory))
+    found = json.loads(call("compare", *sides, "--json", check=True).stdout)
+    away = [one["difference"] for one in found["points"]]
+    speeds = [load(Path(side))["velocity"] for side in sides]
+    assert away == pytest.approx(list(speeds[1] - speeds[0]))
+    assert away[0] > 1e-4
+    assert away[1] < -2.0 * away[0]
+    told = call("compare", *sides, check=True).stdout
+    assert f"2 points in both; largest difference {1e3 * away[1]:.4g} mm/s" in told
+
+
+def test_sweeps_over_lists_of_different_lengths_are_compared_either_way(in_folder: Path) -> None:
+    """Clusters of three beads and of two: the longer list has a column that the other sweep has not."""
+    tables = document(run=SHORTEST)
+    del tables["dimers"]
+    radii = ["0.3 mm", "0.2 mm"]
+    (in_folder / "base.toml").write_text(
+        to_toml({**tables, "clusters": [{"radii": radii, "arrangement": "chain", "replicates": 1}]})
+    )
+    for name, levels in (("long", [[*radii, "0.2 mm"], radii]), ("short", [radii, ["0.3 mm", "0.25 mm"]])):
+        Path(f"{name}.toml").write_text(f'case = "base.toml"\naxes."clusters[0].radii" = {json.dumps(levels)}\n')
+        call("sweep", f"{name}.toml", check=True)
+    for names in (["long", "short"], ["short", "long"]):
+        found = json.loads(call("compare", *names, "--json", check=True).stdout)
+        assert [len(one["point"]["clusters[0].radii"]) for one in found["points"]] == [2]
+        assert found["points"][0]["difference"] == 0.0

@@ -178,20 +178,24 @@ def test_the_stock_engines_law_of_soulie(other: float) -> None:
     assert curve.rupture == rupture_of_lian(0.01, 0.3) == pytest.approx(1.15 * 0.01 ** (1.0 / 3.0))
     pull = np.exp(-12.630 * np.maximum(gaps, 0.0) + 0.49273) + 0.069711
     assert found.pull == pytest.approx(pi * (2.0 if other == inf else sqrt(0.5)) * pull, rel=1e-4)
-    near = np.maximum(0.01, gaps / reduced)
+    near = np.maximum(0.01, gaps) / reduced
     assert found.normal == pytest.approx(6.0 * pi * reduced / near)
     assert found.sliding == pytest.approx(6.0 * pi * reduced * (8.0 / 15.0 * np.log(1.0 / near) + 0.9588))
     assert not np.any([found.coupling, found.rolling])
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_pulls_and_resistances_are_proportional_to_tension_and_viscosity(name: str) -> None:
-    """Decks scale their tables by it."""
+def test_pulls_are_proportional_to_tension_and_resistances_to_viscosity(name: str) -> None:
+    """Decks scale their tables by the latter."""
     liquid = replace(surfaces().liquid, contact_angle=0.3)
-    twice = replace(liquid, surface_tension=2.0, viscosity=2.0)
-    once, doubled = (by_name(name)(replace(surfaces(), liquid=one)) for one in (liquid, twice))
+    tense, thick = replace(liquid, surface_tension=2.0), replace(liquid, viscosity=2.0)
+    once, tenser, thicker = (by_name(name)(replace(surfaces(), liquid=one)) for one in (liquid, tense, thick))
     gaps = once.rupture * np.array([0.0, 0.01, 0.3, 0.9])
-    np.testing.assert_allclose(doubled.forces(gaps).columns(), 2.0 * once.forces(gaps).columns(), rtol=1e-9)
+    np.testing.assert_allclose(tenser.forces(gaps).pull, 2.0 * once.forces(gaps).pull, rtol=1e-9)
+    np.testing.assert_allclose(thicker.forces(gaps).pull, once.forces(gaps).pull, rtol=1e-9)
+    np.testing.assert_allclose(
+        thicker.forces(gaps).columns()[:, 1:], 2.0 * once.forces(gaps).columns()[:, 1:], rtol=1e-9
+    )
 
 
 def test_what_was_solved_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,40 +1,216 @@
-"""The program, the Makefile and the package, as a user meets them: at a shell and from Python."""
+"""The program and its package, as a user meets them: at a shell, from Python, with and without the extras."""
 
+from __future__ import annotations
+
+import ast
+import importlib
 import json
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
 import tomllib
-from collections.abc import Callable
+import venv
+import zipfile
+from collections.abc import Callable, Iterable
+from graphlib import TopologicalSorter
+from importlib import metadata
 from pathlib import Path
+from typing import Any
 
+import grimp
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 import walkers
-from tests.conftest import PROGRAM, SHORT, call, document, to_toml
+from tests.conftest import SHORT, call, document, to_toml
 from walkers import load_case
-from walkers import run as run_case
-from walkers.commands import GROUPS
+from walkers.calibration.calibrate import calibrate
+from walkers.calibration.file import load_calibration
 from walkers.errors import InputError
+from walkers.extras import EXTRAS, ExtraMissing, module_of
 from walkers.inputs.reading import shipped
 from walkers.main import program
-from walkers.physics.time_step import WALKER_FRACTIONS
+from walkers.paper.make import make_figures
 from walkers.postprocess.results import read
 from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import is_finished, run_place
+from walkers.runner.directory import is_finished
 from walkers.runner.manifest import read_manifest
+from walkers.sweeps.scheduler import Options
+from walkers.sweeps.site import load_site
+from walkers.theory.prediction import predict
 
 ROOT = Path(__file__).parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+OPTIONAL: dict[str, list[str]] = PROJECT["optional-dependencies"]
+FOR_USERS = {extra: OPTIONAL[extra] for extra in OPTIONAL if extra not in {"all", "docs", "dev"}}
+VERSION = "0.1.1.dev7+g0123abc"
+OURS = canonicalize_name(PROJECT["name"])
 
 
-def _python(script: str, folder: Path | str = ROOT) -> str:
-    """What a new interpreter prints in a folder."""
-    return subprocess.run(
-        [sys.executable, "-c", script], cwd=folder, capture_output=True, text=True, check=True
-    ).stdout.strip()
+def names_of(requirements: Iterable[str]) -> list[str]:
+    return [Requirement(one).name for one in requirements]
+
+
+def closure(requirements: Iterable[str]) -> set[str]:
+    """Names of the distributions that some requirements bring, as they are installed here."""
+    left, seen = [Requirement(one) for one in requirements], set[tuple[str, str]]()
+    while left:
+        one = left.pop()
+        name = canonicalize_name(one.name)
+        for extra in {"", *one.extras} - {other for done, other in seen if done == name}:
+            seen.add((name, extra))
+            ours = OPTIONAL.get(extra, ()) if name == OURS else metadata.requires(name) or ()
+            further = [Requirement(text) for text in ours]
+            left += [it for it in further if it.marker is None or it.marker.evaluate({"extra": extra})]
+    return {name for name, _ in seen} - {OURS}
+
+
+def python(*arguments: str, folder: Path, **environment: str) -> str:
+    """What Python prints; the project in the folder is built by it."""
+    how: dict[str, Any] = {"cwd": folder, "env": os.environ | environment, "capture_output": True, "text": True}
+    done = subprocess.run([sys.executable, *arguments], check=False, **how)
+    assert done.returncode == 0, done.stderr
+    return str(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def wheel(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
+    """Folder with ``tree/*.whl``, built from the checkout, and ``sdist/*.whl``, from the source distribution."""
+
+    def build(folder: Path) -> None:
+        source = folder / "source"
+        shutil.copytree(ROOT / "walkers", source / "walkers", ignore=shutil.ignore_patterns("__pycache__"))
+        for name in ("pyproject.toml", "README.md", "LICENSE"):
+            shutil.copy(ROOT / name, source)
+        pip = ("-m", "pip", "wheel", "--quiet", "--no-deps", "--no-index", "--no-build-isolation", "--wheel-dir")
+        sdist = "import setuptools.build_meta as build; print(build.build_sdist('..'))"
+        version = "SETUPTOOLS_SCM_PRETEND_VERSION"
+        name = python("-c", sdist, folder=source, **{version: VERSION}).splitlines()[-1]
+        for kind, given in (("tree", source), ("sdist", folder / name)):
+            python(*pip, str(folder / kind), str(given), folder=folder, **{version: VERSION * (kind == "tree")})
+
+    return once("wheels", build)
+
+
+@pytest.fixture(scope="module")
+def bare(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The scripts' folder of an environment that holds the wheel and its mandatory packages, and nothing else."""
+    place = tmp_path_factory.mktemp("bare")
+    venv.create(place, with_pip=False, symlinks=True)
+    (site,) = place.glob("lib/python*/site-packages")
+    for name in closure(PROJECT["dependencies"]):
+        one = metadata.distribution(name)
+        for part in {file.parts[0] for file in one.files or () if file.parts[0] not in {"..", "__pycache__"}}:
+            if not (site / part).exists():
+                (site / part).symlink_to(Path(str(one.locate_file(part))).resolve())
+    pip = ("-m", "pip", "--python", str(place / "bin" / "python"), "install", "--quiet", "--no-deps", "--no-index")
+    python(*pip, str(next(wheel.glob("sdist/*.whl"))), folder=place)
+    return place / "bin"
+
+
+def test_wheels_of_checkout_and_sdist_hold_all_files_of_the_package(wheel: Path) -> None:
+    held = {}
+    for path in wheel.glob("*/*.whl"):
+        with zipfile.ZipFile(path) as packed:
+            names = (name for name in packed.namelist() if name.startswith("walkers/"))
+            held[path.parent.name] = {name: packed.getinfo(name).CRC for name in names}
+    assert held["tree"] == held["sdist"]
+    files = [path.relative_to(ROOT) for path in (ROOT / "walkers").rglob("*") if path.is_file()]
+    ours = {path.as_posix() for path in files if "__pycache__" not in path.parts and path.name[0] != "."}
+    assert held["tree"].keys() == ours
+
+
+def test_mandatory_packages_run_tabulate_and_draw(bare: Path, in_folder: Path) -> None:
+    def told(*command: str, status: int = 0) -> str:
+        done = subprocess.run([bare / command[0], *command[1:]], check=False, capture_output=True, text=True)
+        assert done.returncode == status, done.stderr
+        return done.stderr if status else done.stdout
+
+    (in_folder / "mine.toml").write_text(to_toml(document(run=SHORT)))
+    assert "0.1.1.dev7 (commit 0123abc)" in told("walkers", "--version")
+    assert "velocity" in told("walkers", "run", "mine.toml")
+    pictures = [*told("walkers", "plot", "mine.toml").split(), *told("walkers", "render", "mine.toml").split()]
+    assert {"walk.png", "walker.png"} <= {Path(one).name for one in pictures if Path(one).is_file()}
+    assert "needs k3d: make extras" in told("walkers", "report", "mine.toml", status=2)
+    assert not list(in_folder.rglob("report.html"))
+
+
+NEEDING: dict[str, list[Callable[[walkers.Run, Path], object]]] = {
+    "archive": [lambda run, out: run.export("archive", out / "run.zip")],
+    "calibrate": [lambda _, out: calibrate(load_calibration("ruby"), out, Options(1))],
+    "check": [lambda *_: importlib.reload(importlib.import_module("walkers.check"))],
+    "cluster": [lambda _, out: load_site(out / "site.toml")],
+    "film": [lambda run, out: run.film(out / "film.mp4")],
+    "report": [lambda run, out: run.report(out / "run.html"), lambda run, _: run.view()],
+    "theory": [
+        lambda *_: predict(walkers.load_case("fig1b")),
+        lambda _, out: make_figures(out / "runs", out / "figures", Options(1)),
+    ],
+}
+
+
+@pytest.mark.parametrize("extra", EXTRAS)
+def test_what_needs_an_extra_names_it_before_it_begins(
+    extra: str, run_directory: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = walkers.load(run_directory(run=SHORT))
+    for package in EXTRAS[extra][1]:
+        monkeypatch.setitem(sys.modules, module_of(package), None)
+    message = rf"^{EXTRAS[extra][0]} needs [\w, -]+: make extras, or pip install '{OURS}\[{extra}\]'$"
+    for use in NEEDING[extra]:
+        with pytest.raises(ExtraMissing, match=message):
+            use(run, tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_every_package_that_is_imported_is_declared() -> None:
+    """As mandatory, or in an extra whose table in the program agrees with ``pyproject.toml``."""
+    assert {extra: sorted(packages) for extra, (_, packages) in EXTRAS.items()} == {
+        extra: sorted(names_of(requirements)) for extra, requirements in FOR_USERS.items()
+    }
+    assert Requirement(OPTIONAL["all"][0]).extras == FOR_USERS.keys()
+    declared = names_of([*PROJECT["dependencies"], *(one for given in FOR_USERS.values() for one in given)])
+    owners = metadata.packages_distributions()
+    of_others = {"IPython", "paraview", "pydantic_core", "vtkmodules", "setuptools"}  # of a notebook, of pydantic, …
+    used = set[str]()
+    for path in (ROOT / "walkers").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            named = [one.name for one in node.names] if isinstance(node, ast.Import) else []
+            named += [node.module] if isinstance(node, ast.ImportFrom) and node.module and not node.level else []
+            used |= {name.partition(".")[0] for name in named}
+    used -= {*sys.stdlib_module_names, "walkers", *of_others}
+    known = {canonicalize_name(name) for name in declared}
+    assert not {name for name in used if not {canonicalize_name(one) for one in owners.get(name, ())} & known}
+    assert known == {canonicalize_name(one) for name in used for one in owners[name]} & known, "declared and not used"
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    """Imports inside of functions count, those for types alone do not. The error names the circle."""
+    graph = grimp.build_graph("walkers", exclude_type_checking_imports=True)
+    TopologicalSorter({one: graph.find_modules_directly_imported_by(one) for one in graph.modules}).prepare()
+
+
+def test_faults_to_plant_are_in_the_code_once_and_name_tests_that_are_there() -> None:
+    """A fault whose text has gone is planted nowhere; one whose tests have gone is seen by none."""
+    faults = tomllib.loads((ROOT / "tests" / "tools" / "faults.toml").read_text("utf-8"))["fault"]
+    wrong = []
+    for fault in faults:
+        path = ROOT / fault["file"]
+        times = path.read_text("utf-8").count(fault["old"]) if path.is_file() else 0
+        wrong += [] if times == 1 and fault["old"] != fault["new"] else [f"{fault['name']}: {times} times"]
+        for entry in fault["tests"]:
+            file, *options = shlex.split(entry)
+            text = (ROOT / file).read_text("utf-8") if (ROOT / file).is_file() else ""
+            words = {*re.findall(r"\w+", " ".join(options).replace("-k", " "))} - {"or", "and", "not"}
+            gone = sorted(word for word in words if word not in text)
+            wrong += [f"{fault['name']}: {file} {' '.join(gone)}"] if gone or not text else []
+    assert not wrong
+    assert len(faults) == len({fault["name"] for fault in faults}) >= 127
 
 
 @pytest.mark.smoke
@@ -47,48 +223,23 @@ def test_two_beads_walk_toward_the_large_one(run_directory: Callable[..., Path])
     assert len(read_table(directory, "trajectory")) == 61
 
 
-# --- what a newcomer does ---------------------------------------------------------------------------------------------
-
-
-def test_show_tells_what_follows_from_a_case() -> None:
-    shown = call("show", "fig1b", check=True).stdout
-    for part in ("Γ0 = 0.3811", "sin δ = 0.2", "mass asymmetry (m1 - m2)/M = 0.5429", "4πγR limit", "rayleigh"):
-        assert part in shown
-    summary = json.loads(call("show", "fig1b", "--json", check=True).stdout)
-    assert summary["dimer"]["gamma0"] == pytest.approx(0.3811, abs=1e-4)
-    shares = summary["time_step"]["share"]
-    assert shares.keys() == WALKER_FRACTIONS.keys()
-    assert all(0.0 < share <= WALKER_FRACTIONS[limit] for limit, share in shares.items())
-    walls = summary["contacts"][:2]
-    assert all(0.5 < contact["capillary_force"] / contact["capillary_force_limit"] < 0.9 for contact in walls)
-
-
-def test_from_a_case_file_to_a_deck_and_pictures(in_folder: Path) -> None:
-    (in_folder / "mine.toml").write_text(to_toml(document(run=SHORT)))
+def test_from_a_case_file_to_a_deck_and_pictures(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Progress is plain lines without a terminal. The first one is due after a second; here at once."""
+    monkeypatch.setattr("walkers.progress._FIRST_LINE_SECONDS", 0.0)
+    (in_folder / "mine.toml").write_text(to_toml(document(run={**SHORT, "cycles": 30})))
     printed = call("export", "mine.toml", "--to", "deck", check=True).stdout
     call("export", "mine.toml", "--to", "deck", "-o", "deck", check=True)
     assert (in_folder / "deck" / "walker.lig").read_text() == printed
-    assert (in_folder / "deck" / "bridges.txt").exists()
     assert call("export", "mine.toml", "--to", "deck", "-o", "deck").returncode == 2
-    done = subprocess.run([PROGRAM, "run", "mine.toml"], capture_output=True, text=True, check=True)
+    done = call("run", "mine.toml", check=True)
     assert "velocity along the heading" in done.stdout
+    lines = [line for line in done.stderr.splitlines() if not line.startswith("walkers: warning:")]
+    assert lines
+    assert all(re.match(r"mine: .* %, .*s simulated.*steps/s.*(left|starting)", line) for line in lines), lines
     assert "(already run)" in call("run", "mine.toml", check=True).stdout
     for command, last in (("plot", "gait.png"), ("export --to vtk", "walkers.pvd"), ("render", "walker.png")):
         path = Path(call(*command.split(), "mine.toml", check=True).stdout.split()[-1])
-        assert path.name == last
-        assert path.exists()
-
-
-def test_progress_is_plain_lines_without_a_terminal(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The first one is due after a second; here at once, so that a run need not last that long on a fast machine."""
-    monkeypatch.setattr("walkers.progress._FIRST_LINE_SECONDS", 0.0)
-    (in_folder / "mine.toml").write_text(to_toml(document(run={**SHORT, "cycles": 30})))
-    done = call("run", "mine.toml", check=True)
-    lines = [line for line in done.stderr.splitlines() if not line.startswith("walkers: warning:")]
-    assert lines
-    assert all(line.startswith("mine: ") and " %, " in line for line in lines)
-    assert all("s simulated" in line and "steps/s" in line and ("left" in line or "starting" in line) for line in lines)
-    assert "\x1b" not in done.stderr
+        assert (path.name, path.exists()) == (last, True)
 
 
 @pytest.mark.parametrize("name", ["fig1b", "climber", "cluster", "tray", "pile-small"])
@@ -116,21 +267,15 @@ def settings(changes: dict[str, str]) -> list[str]:
     return [word for key, value in changes.items() for word in ("--set", f"{key}={value}")]
 
 
-# --- help, version, completion ----------------------------------------------------------------------------------------
-
-
 def test_help_names_every_command() -> None:
-    shown = call("--help", check=True).stdout
-    assert not set(shown) & set("╭│╰─"), "boxes are for terminals"
-    app = program()
+    shown, app = call("--help", check=True).stdout, program()
     for name in (name for name in app if name[0] != "-"):
         assert f"\n  {name} " in shown
         assert call(name, "-h", check=True).stdout == call(name, "--help", check=True).stdout
         assert all(f"walkers {name} {part} " in call(name, part, "-h", check=True).stdout for part in app[name])
-    headings = [line for line in shown.splitlines() if line.endswith(":") and not line.startswith(" ")]
-    assert headings == ["Options:", *(f"{heading}:" for heading in GROUPS.values())]
     done = subprocess.run([sys.executable, "-m", "walkers", "-h"], capture_output=True, text=True, check=True)
     assert done.stdout == shown
+    assert call("--version", check=True).stdout.splitlines()[1] == f"LIGGGHTS-PUBLIC 3.8.0, {find_engine().path}"
     targets = subprocess.run(["make"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     assert all(f"make {target}" in targets for target in ("walker", "test", "help", "clean"))
 
@@ -147,73 +292,12 @@ def test_a_function_gives_what_its_command_prints(looked_through: Path) -> None:
     assert refused == "walkers: --set: is for runs and cases\n"
 
 
-def test_the_library_lists_what_can_be_named_and_says_where_each_number_is_from() -> None:
-    listed = [" ".join(line.split()) for line in call("library", check=True).stdout.splitlines()]
-    assert "PMMA 1.19 g/cm^3 3.3 GPa 0.37" in listed
-    assert "contact.friction.bead_wall 0.25 (0.1 to 0.6)" in listed
-    for name in ("fig1b", "fig3", "ruby", "young-laplace"):
-        assert any(line.startswith(f"{name} ") and len(line.split()) > 4 for line in listed), "a title"
-    assert "walkers run fig1b" in call("library", "fig1b", check=True).stdout
-    assert "PLEXIGLAS GS data sheet" in call("library", "pmma", check=True).stdout
-    done = call("library", "steel")
-    assert (done.returncode, "expected one of stainless steel, chrome steel" in done.stderr) == (2, True)
-
-
-def test_version_names_package_commit_and_engine(monkeypatch: pytest.MonkeyPatch) -> None:
-    package, engine = call("--version", check=True).stdout.splitlines()
-    assert package.startswith("granular-walkers 0.")
-    if (ROOT / ".git").exists():
-        told = subprocess.run(["git", "-C", ROOT, "rev-parse", "HEAD"], capture_output=True, text=True, check=True)
-        assert package.partition("(commit ")[2].removesuffix(")").removesuffix("+changes") == told.stdout.strip()
-    assert engine == f"LIGGGHTS-PUBLIC 3.8.0, {find_engine().path}"
-    monkeypatch.setenv("WALKERS_ENGINE", "no-such-engine")
-    assert "no engine: no-such-engine" in call("--version", check=True).stdout
-
-
-def test_bash_completes_commands_options_and_names_of_runs(looked_through: Path, tmp_path: Path) -> None:
-    (tmp_path / "runs").symlink_to(looked_through)
-    (tmp_path / "walkers.bash").write_text(program().generate_completion(shell="bash"))
-    path = {"PATH": f"{Path(PROGRAM).parent}:{os.environ['PATH']}"}
-
-    def completed(*words: str) -> list[str]:
-        """What bash offers for the last word of a line."""
-        script = f'. ./walkers.bash; COMP_WORDS=("$@"); COMP_CWORD={len(words)}; _walkers; echo "${{COMPREPLY[@]}}"'
-        command = ["bash", "-c", script, "bash", "walkers", *words]
-        done = subprocess.run(command, cwd=tmp_path, env=os.environ | path, capture_output=True, text=True, check=True)
-        return done.stdout.split()
-
-    runs = {Path(run).name for run in walkers.load(looked_through / "three").table()["run"]}
-    assert completed("comp") == ["compare"]
-    assert completed("export", "--to", "ar") == ["archive"]
-    assert completed("run", "fig") == [name for name in shipped("case") if name[:3] == "fig"]
-    assert set(completed("plot", "")) >= runs | {"grid", "fig1b"}
-    assert completed("run", "--out", "elsewhere", "base-") == []
-
-
-# --- what a word names ------------------------------------------------------------------------------------------------
-
-
-def test_a_folder_does_not_shadow_the_run_of_the_case_that_it_is_named_like(in_folder: Path) -> None:
-    call("export", "fig1b", "--to", "deck", "-o", "fig1b", check=True)
-    place = run_case(load_case("fig1b", {"run.cycles": 6, "run.settling_cycles": 2}), in_folder / "short").directory
-    told = call("plot", "fig1b")
-    assert "no finished run in runs; first do: walkers run fig1b" in told.stderr
-    engine, case = find_engine(), load_case("fig1b")
-    shutil.copytree(place, run_place(case, engine, Path("runs")))
-    assert walkers.load("fig1b").directory == run_place(case, engine, Path("runs"))
-
-
-# --- the package ------------------------------------------------------------------------------------------------------
-
-
 def test_the_package_claims_one_name_and_exports_few_that_are_documented() -> None:
     """Others may have a module called inputs or runner, and theirs is theirs. Nothing public needs a notebook."""
-    from importlib.metadata import packages_distributions
-
-    owned = [name for name, owners in packages_distributions().items() if "granular-walkers" in owners]
-    assert [name for name in owned if not name.startswith("__editable__")] == ["walkers"]
     modules = "walkers.inputs, walkers.api, walkers.postprocess.report.run, walkers.sweeps.report"
     wanted = "{'inputs', 'runner', 'sweeps', 'IPython'}"
-    assert _python(f"import sys, {modules}; print(sorted({wanted} & set(sys.modules)))", "/") == "[]"
+    script = f"import sys, {modules}; print(sorted({wanted} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", script], cwd="/", capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
     assert dir(walkers) == walkers.__all__ == sorted(walkers.__all__, key=lambda name: (name.islower(), name))
     assert all(getattr(walkers, name).__doc__ for name in walkers.__all__)

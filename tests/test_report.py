@@ -22,7 +22,6 @@ from scipy.spatial.transform import Rotation
 
 import walkers
 from tests.conftest import PATIENCE, document, make_case, to_toml, wait_for
-from walkers.inputs.reading import load_case
 from walkers.inputs.sweep import expand
 from walkers.postprocess.caption import caption
 from walkers.postprocess.figures import figures_of
@@ -30,12 +29,11 @@ from walkers.postprocess.motion import read_bridges, read_motion
 from walkers.postprocess.numbers import rows, shown
 from walkers.postprocess.report.page import LARGEST, svg_of
 from walkers.postprocess.report.player import cameras_of, player_of
-from walkers.postprocess.report.run import report_run, shown_of
-from walkers.postprocess.results import Results, read
-from walkers.postprocess.scene import camera_axes, gathered
+from walkers.postprocess.report.run import report_run
+from walkers.postprocess.results import read
+from walkers.postprocess.scene import gathered
 from walkers.postprocess.tables import read_table
 from walkers.rounding import rounded
-from walkers.runner.provenance import software
 from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import load
 
@@ -54,12 +52,6 @@ class Report:
         self.title = html.unescape("".join(re.findall(r"<title>(.*?)</title>", bare, re.DOTALL)))
         self.references = re.findall(r"""\s(?:src|href|srcset|action|data)\s*=\s*["']?([^"'\s>]+)""", bare)
         self.words = html.unescape(re.sub(r"<title\b.*?</title>|<[^>]*>", "", bare, flags=re.DOTALL))
-
-
-def check_rows(page: Report, results: Results) -> None:
-    """The page has each row of the result: label, text, unit and errors."""
-    for row in rows(results):
-        assert f"{row.label}{row.text}{row.unit}{row.error}" in page.words
 
 
 @pytest.fixture(scope="session")
@@ -83,23 +75,22 @@ def pile_report(pile_run: Path, once: Once) -> Path:
 
 @pytest.fixture(scope="session")
 def swept(once: Once) -> Path:
-    """A sweep of three points."""
+    """A sweep of two points; the second of its runs has a report."""
 
     def make(out: Path) -> None:
         (out / "base.toml").write_text(to_toml(document(run={"cycles": 6, "settling_cycles": 2})))
-        given = {"title": HOSTILE, "case": "base.toml", "axes": {"drive.frequency": ["60 Hz", "70 Hz", "80 Hz"]}}
-        _, failures = run_sweep(expand(given, source="three", name="three", folder=out), out, Options(2))
-        assert not failures
+        given = {"title": HOSTILE, "case": "base.toml", "axes": {"drive.frequency": ["60 Hz", "70 Hz"]}}
+        run_sweep(expand(given, source="two", name="two", folder=out), out, Options(2))
+        sweep = walkers.load("two", out)
+        sweep.runs[1].report()
+        sweep.report()
 
-    return once("swept", make) / "three"
+    return once("swept", make) / "two"
 
 
 @pytest.fixture(scope="session")
 def swept_report(swept: Path) -> Path:
-    """Asked for by the sweep's name in the folder of the runs; the second of its runs has a report."""
-    sweep = walkers.load(swept.name, swept.parent)
-    sweep.runs[1].report()
-    return sweep.report()
+    return swept / "report.html"
 
 
 @pytest.mark.parametrize("name", ["walked", "pile"])
@@ -107,12 +98,10 @@ def test_numbers_of_a_report_are_the_results_and_parameters_say_whence(
     name: str, request: pytest.FixtureRequest
 ) -> None:
     path, directory = (request.getfixturevalue(f"{name}_{what}") for what in ("report", "run"))
-    page = Report(path)
-    check_rows(page, read(directory))
+    page, results = Report(path), read(directory)
+    assert all(f"{row.label}{row.text}{row.unit}{row.error}" in page.words for row in rows(results))
     assert path.stat().st_size < LARGEST
-    assert f"Written by granular-walkers {software()['granular_walkers']}." in page.words
     origins = walkers.load(directory).case.origins
-    assert len(origins) > 20
     for said in ("given", "library", *(told for one in origins for told in (one.key, one.text, one.word))):
         assert said in page.words
 
@@ -140,7 +129,12 @@ def test_a_sweeps_report_has_its_figure_and_table_and_links_to_the_reports_of_it
     swept: Path, swept_report: Path
 ) -> None:
     page, table = Report(swept_report), load(swept)
+<<<<<<< HEAD
     assert all(f'<td class="number">{rounded(1e3 * one, "mm/s")}</td>' in page.text for one in table["velocity"])
+=======
+    assert set(table["velocity"]) < page.values
+    assert all(rounded(1e3 * speed, "mm/s") in page.words for speed in table["velocity"])
+>>>>>>> origin/main
     assert page.references == [f"../{Path(table['run'][1]).name}/report.html"]
     assert (swept / page.references[0]).is_file()
     assert svg_of(walkers.load(swept).figure()) in page.text
@@ -167,91 +161,55 @@ def test_the_player_shows_the_motion(walked_run: Path) -> None:
     assert (player.begin, player.end) == (motion.time[0], motion.time[-1])
     across = np.cross([0.0, 0.0, 1.0], motion.case.drive_axis)
     settled = motion.case.run.settling_cycles * motion.case.run.samples_per_cycle
-    rolled: dict[int, list[float]] = {0: [], 1: []}
+    rotation = read_table(walked_run, "walkers").iloc[0]
     for number, ball in enumerate(beads):
         matrices = np.array(list(ball.model_matrix.values()), dtype=float)
         assert [float(time) for time in ball.model_matrix] == pytest.approx(motion.time, abs=1e-6)
         np.testing.assert_allclose(matrices[:, :3, 3], 1e3 * motion.position[:, number], atol=1e-4)
         turned = Rotation.from_matrix(matrices[[settled, -1], :3, :3] / (1e3 * motion.radius[number]))
-        way = motion.walkers[number // 2].facing * float((turned[1] * turned[0].inv()).as_rotvec() @ across)
-        rolled[number % 2].append(way * motion.radius[number] / (motion.time[-1] - motion.time[settled]))
-    rotation = read_table(walked_run, "walkers").iloc[0]
-    for bead, key in enumerate(("rotation_1", "rotation_2")):
-        assert np.mean(rolled[bead]) == pytest.approx(rotation[key], rel=0.01, abs=2e-6)
+        way = motion.walkers[0].facing * float((turned[1] * turned[0].inv()).as_rotvec() @ across)
+        speed = way * motion.radius[number] / (motion.time[-1] - motion.time[settled])
+        assert speed == pytest.approx(rotation[f"rotation_{number + 1}"], rel=0.01, abs=2e-6)
     weightless = replace(motion, case=motion.case.put("environment.gravity", 0.0))  # is seen as the floor lies
     assert cameras_of(weightless) == cameras_of(motion)
-    np.testing.assert_allclose(camera_axes(weightless), camera_axes(motion))
 
 
-def test_necks_of_the_player_are_as_wide_as_bridges_at_their_times(walked_run: Path, pile_run: Path) -> None:
-    """Those of the first walker; of a pile those that rupture, which have no width then."""
-    for run, count in ((walked_run, 3), (pile_run, None)):
-        motion = read_motion(run).driven
-        motion = motion if count is None else motion.of_walkers(motion.walkers[:1])
-        player = player_of(run)
-        (necks,) = (one for one in player.plot.objects if one.name == "bridges")
-        assert any("Blue: liquid bridges" in caption for caption in player.captions)
-        held = {bridges.frame: len(bridges.contacts) for bridges in read_bridges(motion)}
-        wide = []
-        for frame in held:
-            points = necks.vertices[f"{motion.time[frame]:.6f}"].reshape(-1, 80, 3)
-            wide.append(np.ptp(points[:, :16], axis=1).max(axis=1) > 0.01)
-            assert count is None or len(points) == count
-        assert [int(each.sum()) for each in wide] == [*held.values()]
-        if count is None:
-            assert any((one & ~other).any() for one, other in pairwise(wide))
-
-
-def test_a_pile_is_drawn_at_its_size_and_says_what_is_not_shown(pile_run: Path) -> None:
-    pile, motion = player_of(pile_run), read_motion(pile_run).driven
-    points = next(one for one in pile.plot.objects if one.name == "beads")
-    np.testing.assert_allclose(points.positions[f"{motion.time[-1]:.6f}"], 1e3 * motion.position[-1], atol=1e-3)
-    assert any("rolling of the beads is not shown" in caption for caption in pile.captions)
-
-
-def test_a_report_says_what_is_uncertain_in_the_case_that_was_asked_for(walked_run: Path) -> None:
-    """The run of a case may have been made for one whose values have other sources."""
-    case = load_case("fig1b", {"liquid.volume_fraction": 0.03, "contact.rolling_friction": 0.0})
-    shown = shown_of(case, read(walked_run), case.origins)
-    assert {one["key"]: one["origin"] for one in shown["parameters"]}["liquid.volume_fraction"] == "given"
+def test_necks_of_the_player_are_as_wide_as_bridges_at_their_times(pile_run: Path) -> None:
+    """Those of a pile rupture, and have no width then."""
+    motion, player = read_motion(pile_run).driven, player_of(pile_run)
+    (necks,) = (one for one in player.plot.objects if one.name == "bridges")
+    held = {bridges.frame: len(bridges.contacts) for bridges in read_bridges(motion)}
+    points = [necks.vertices[f"{motion.time[frame]:.6f}"].reshape(-1, 80, 3) for frame in held]
+    wide = [np.ptp(one[:, :16], axis=1).max(axis=1) > 0.01 for one in points]
+    assert [int(each.sum()) for each in wide] == [*held.values()]
+    assert any((one & ~other).any() for one, other in pairwise(wide))
+    beads = next(one for one in player.plot.objects if one.name == "beads")
+    np.testing.assert_allclose(beads.positions[f"{motion.time[-1]:.6f}"], 1e3 * motion.position[-1], atol=1e-3)
+    assert any("rolling of the beads is not shown" in caption for caption in player.captions)
 
 
 def test_words_and_numbers() -> None:
     """Numbers have four digits at most and the decimals of their unit."""
-    given = [(1.38173201,), (1234.5678,), (-87654.3,), (0.0012345678,), (-3.2e-15, "mm/s"), (6,), (1e-12,), (nan,)]
-    given += [(-0.002164, "mm/s"), (-0.00175, "mm/s"), (0.000414, "mm/s"), (0.0005927, "mm/s"), (3.08, "mm/s")]
-    expected = ["1.382", "1235", "-87650", "0.001235", "0", "6", "0", "-", "-0.002", "-0.002", "0", "0.001", "3.08"]
+    given = [(1.38173201,), (1234.5678,), (-87654.3,), (0.0012345678,), (-3.2e-15, "mm/s"), (6,), (nan,)]
+    given += [(-0.002164, "mm/s"), (0.000414, "mm/s"), (9.9996, "mm/s")]
+    expected = ["1.382", "1235", "-87650", "0.001235", "0", "6", "-", "-0.002", "0", "10"]
     assert [rounded(*one) for one in given] == expected
     texts = {"m": ("250", "mm"), "m/s": ("250.0", "mm/s"), "rad": ("14.32", "°"), "share": ("25", "%")}
     assert {unit: shown(0.25, unit) for unit in texts} == texts
-    case = make_case()
-    assert caption(case).startswith("1 walker of R = 0.3 / 0.2 mm on a plane of")
-    assert "liquid of 19.2 mN/m; 80 Hz" in caption(case.put("liquid.name", None))
-    aside = case.put("boundary.tilt", pi / 3.0).put("boundary.uphill", pi / 2.0)
+    aside = make_case().put("boundary.tilt", pi / 3.0).put("boundary.uphill", pi / 2.0)
     assert caption(aside).endswith("plane tilted by 60°, up is at 90° from x toward y")
 
 
-def test_runs_show_themselves(walked_run: Path, tmp_path: Path) -> None:
-    run, shown = walkers.load(walked_run), tmp_path / "shown.html"
-    shown.write_text(run._repr_html_(), "utf-8")
-    check_rows(Report(shown), run.result)
-
-
-# --- in a browser -----------------------------------------------------------------------------------------------------
-
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 MILLISECONDS = 1e3 * PATIENCE
-_FLAGS = [
-    *("--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking"),
-    *("--disable-component-update", "--disable-sync"),
-    *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"),
-]
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
+    flags = ["--no-sandbox", "--no-first-run", "--disable-background-networking", "--disable-component-update"]
+    flags += ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
     with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=CHROMIUM, args=_FLAGS, timeout=MILLISECONDS)
+        started = playwright.chromium.launch(executable_path=CHROMIUM, args=flags, timeout=MILLISECONDS)
         expect.set_options(timeout=MILLISECONDS)
         yield started
         started.close()
@@ -299,10 +257,8 @@ def rested(page: Page, *others: bytes) -> bytes:
     return wait_for(same)
 
 
-@pytest.mark.parametrize(("name", "figures"), [("walked_report", ("walk", "gait")), ("pile_report", ("climb",))])
-def test_beads_play_pause_and_turn(
-    name: str, figures: tuple[str, ...], visit: Callable[..., Page], request: pytest.FixtureRequest
-) -> None:
+@pytest.mark.parametrize("name", ["walked_report", "pile_report"])
+def test_beads_play_pause_and_turn(name: str, visit: Callable[..., Page], request: pytest.FixtureRequest) -> None:
     page = visit(request.getfixturevalue(name))
     page.wait_for_selector(".scene[data-ready]")
     play, time = page.locator(".play"), page.locator(".time")
@@ -325,43 +281,11 @@ def test_beads_play_pause_and_turn(
     assert time.text_content() == stopped != "0.0000 s"  # turned, not played
     page.get_by_role("button", name="onto the floor").click()
     rested(page, begin, paused, turned)
-    assert page.locator(".slower option:checked").count() == 1
-    assert page.locator("figure svg:visible").count() == len(figures)
-
-
-@pytest.mark.parametrize("name", ["walked_report", "pile_report", "swept_report"])
-def test_no_text_of_a_figure_is_cut(name: str, visit: Callable[..., Page], request: pytest.FixtureRequest) -> None:
-    """With the fonts of this machine."""
-    page = visit(request.getfixturevalue(name), ready=name != "swept_report")
-    beyond = """[...document.querySelectorAll("figure svg")].flatMap((svg) => {
-      const whole = svg.getBoundingClientRect();
-      const out = (box) => box.left < whole.left - 1 || box.right > whole.right + 1 || box.top < whole.top - 1
-        || box.bottom > whole.bottom + 1;
-      const texts = [...svg.querySelectorAll("text")], cut = texts.filter((one) => out(one.getBoundingClientRect()));
-      return [texts.length > 5, ...cut.map((one) => one.textContent)];
-    })"""
-    found = page.evaluate(beyond)
-    assert found and set(found) == {True}
-
-
-def test_tables_need_no_script(walked_report: Path, browser: Browser) -> None:
-    context = browser.new_context(offline=True, java_script_enabled=False)
-    page = context.new_page()
-    page.goto(walked_report.as_uri(), timeout=MILLISECONDS)
-    assert page.locator("table.result tr:visible").count() > 10
-    assert page.locator("table.parameters tr:visible").count() > 20
-    assert page.title() == HOSTILE
-    context.close()
 
 
 def test_a_sweeps_points_open_the_reports_of_their_runs(swept_report: Path, visit: Callable[..., Page]) -> None:
     page = visit(swept_report, ready=False)
     assert page.evaluate("window.hostile") is None
     assert page.locator("h1").text_content() == HOSTILE
-    page.set_viewport_size({"width": 1000, "height": 420})
-    assert (
-        page.evaluate("(({scrollWidth, clientWidth}) => scrollWidth - clientWidth)(document.querySelector('.wide'))")
-        == 0
-    )
     page.locator("table.sweep a").click()
     page.wait_for_selector(".scene[data-ready]")

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import os
-import random
 import shutil
 import signal
 import subprocess
-import time
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -38,9 +35,13 @@ from walkers.inputs.reading import shipped
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.results import measure, read
 from walkers.runner.binary import find_engine
+<<<<<<< HEAD
 from walkers.runner.directory import segment_directories
+=======
+from walkers.runner.directory import finished_places
+>>>>>>> origin/main
 from walkers.runner.failures import RunBusy
-from walkers.runner.launch import ALONE, postponed_interrupts
+from walkers.runner.launch import ALONE
 
 HALTING = """#!/bin/sh
 if [ -n "$HALT" ]; then
@@ -67,14 +68,11 @@ SWEEP, SITE = "sweep sweep.toml -j 2", "sweep sweep.toml --site site.py"
 STOPS: dict[str, tuple[str, int, str, str, int, str]] = {
     # Command, engines at that time, signals, to whom, exit status, last line.
     "a run, Ctrl-C": ("run walker.toml", 1, "INT", "program", 130, "interrupted"),
-    "a run, closed terminal": ("run walker.toml", 1, "HUP", "program", 129, "the terminal was closed"),
     "a run, closed terminal under nohup": ("run walker.toml", 1, "HUP TERM", "nohup", 143, "terminated"),
     "a run, killed": ("run walker.toml", 1, "KILL", "program", -9, ""),
     "a run, engine killed": ("run walker.toml", 1, "KILL", "engine", 1, "the engine was killed by SIGKILL"),
     "a check, Ctrl-C": ("check engine --only restart", 1, "INT", "program", 130, "interrupted"),
-    "a run, output removed": ("run walker.toml", 1, "", "output", 1, "was removed while it was written"),
     "a pile, killed": ("run pile.toml", 1, "KILL", "program", -9, ""),
-    "a pile, engine killed": ("run pile.toml", 1, "KILL", "engine", 1, "the engine was killed by SIGKILL"),
     "a sweep, Ctrl-C": (SWEEP, 2, "INT", "group", 130, "interrupted"),
     "a sweep, killed": (SWEEP, 2, "KILL", "program", -9, ""),
     "a sweep, output removed": (SWEEP, 2, "", "output", 1, "was removed while it was written"),
@@ -112,12 +110,9 @@ def stopping(undisturbed: Path, in_folder: Path, monkeypatch: pytest.MonkeyPatch
 
 def bits(out: Path) -> dict[Path, bytes]:
     """What finished runs computed, by paths: dumps, restart files, tables, results."""
-    kinds = {".bin", ".parquet", ".restart", ".txt"}
-    places = finished_places(out).values()
-    files = [
-        path for place in places for path in place.rglob("*") if path.suffix in kinds or path.name == "result.json"
-    ]
-    return {path.relative_to(out): path.read_bytes() for path in files}
+    kinds = (".bin", ".parquet", ".restart", ".txt", "result.json")
+    files = (path for place in finished_places(out).values() for path in place.rglob("*"))
+    return {path.relative_to(out): path.read_bytes() for path in files if path.name.endswith(kinds)}
 
 
 @pytest.mark.parametrize("name", STOPS)
@@ -186,38 +181,6 @@ def _listens_to_nobody(program: int) -> None:
     assert all(each.environ().items() >= ALONE.items() for each in engines)
 
 
-def test_restart_files_are_kept_for_the_last_two_segments(undisturbed: Path) -> None:
-    (pile,) = undisturbed.glob("runs/pile-*")
-    kept = [(path / "state.restart").exists() for path in segment_directories(pile)]
-    assert len(kept) > 2
-    assert kept == [*[False] * (len(kept) - 2), True, True]
-
-
-def test_after_each_kill_no_engine_stays_and_the_next_call_runs(
-    stopping: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The launcher is killed before, at and after the birth of its engine."""
-    (stopping / "first").mkdir()
-    draw = random.Random(14)
-    for kill in range(8):
-        child = os.fork()
-        if not child:
-            with suppress(BaseException):
-                run_case("walker.toml", "runs", engine="./engine")
-            os._exit(0)
-        if kill % 2:
-            wait_for(lambda: engines_in(stopping))
-            time.sleep(draw.uniform(0.0, 0.02))  # setpriv, sh and the engine follow each other within that time
-        else:
-            time.sleep(draw.uniform(0.0, 0.4))
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
-        wait_for(lambda: not engines_in(stopping))
-    monkeypatch.delenv("HALT")
-    assert not run_case("walker.toml", "runs", engine="./engine").cached
-    assert [path.suffix for path in Path("runs").iterdir()] == [""]
-
-
 def test_an_engine_that_outlives_its_launcher_keeps_others_away(
     front: Callable[[str], str], in_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -238,12 +201,3 @@ def test_an_engine_that_outlives_its_launcher_keeps_others_away(
             os.kill(orphan, signal.SIGKILL)
     with open_run(case, find_engine(engine), in_folder / "runs"):
         pass
-
-
-def test_an_interrupt_while_the_engine_is_being_started_comes_after() -> None:
-    started = False
-    with pytest.raises(KeyboardInterrupt), postponed_interrupts():
-        signal.raise_signal(signal.SIGINT)
-        time.sleep(0.01)
-        started = True
-    assert started

@@ -13,14 +13,12 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 import walkers
-from tests.conftest import call, document, to_toml
+from tests.conftest import document, to_toml
 from walkers.errors import InputError
-from walkers.inputs.loads import dimer_of
-from walkers.inputs.reading import load_case
 from walkers.runner.directory import case_of
 from walkers.sweeps.figure import SCATTER, LeftOutWarning, factors_of, figure_of, layout_of
 from walkers.sweeps.figure_options import FigureOptions
-from walkers.theory.prediction import MODEL, PAPER, predict, predicted_column
+from walkers.theory.prediction import MODEL, PAPER, predict
 
 
 def _panels(figure: Figure) -> list[Axes]:
@@ -60,19 +58,6 @@ def test_error_bars_that_symbols_would_hide_are_left_out_and_the_figure_says_so(
     assert (said, figure.legends) == (SCATTER if bars else f"{SCATTER}, smaller than the symbols", [])
 
 
-def test_the_title_of_a_legend_is_the_name_of_the_colours_and_captions_stay_within_the_figure() -> None:
-    units = {"contact.friction.bead_bead": "", "drive.frequency": "Hz"}
-    rows = [[friction, frequency] for friction in (0.1, 0.3) for frequency in (60.0, 70.0, 80.0)]
-    table = _table(units, rows, [(name,) for name in units]).assign(velocity=1e-3 * np.arange(6.0), scatter=1e-9)
-    table.attrs["units"] |= {"velocity": "m/s", "scatter": "m/s"}
-    figure = figure_of(table, FigureOptions(x="drive.frequency"))
-    figure.draw_without_rendering()
-    (legend,) = figure.legends
-    assert legend.get_title().get_text() == "friction bead bead"
-    caption, whole = figure._suptitle.get_window_extent(), figure.bbox  # type: ignore[attr-defined]
-    assert whole.x0 <= caption.x0 < caption.x1 <= whole.x1
-
-
 def test_axes_do_not_magnify_rounding() -> None:
     table = _table({"dimers.angle": "deg"}, [[-30.0], [-3.2e-15], [30.0]], [("dimers.angle",)])
     for values in ([1e-3, 1e-3 * (1.0 + 1e-9), 1e-3], [3.2e-18, -3.2e-18, 0.0]):
@@ -102,31 +87,28 @@ def test_axes_go_along_x_into_colours_and_into_panels_of_the_same_scales(looked_
 def test_what_goes_where_can_be_chosen(looked_through: Path) -> None:
     chosen = {"x": "frequency", "hue": "bead_wall", "panels": "none", "y": "sliding_2"}
     with pytest.warns(LeftOutWarning, match="not distinguished: peak acceleration"):
-        figure = walkers.load(looked_through / "three").figure(**chosen)
-    (axes,) = _panels(figure)
+        (axes,) = _panels(walkers.load(looked_through / "three").figure(**chosen))
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("frequency (Hz)", "sliding of bead 2 (mm/s)")
     # A column that follows from an axis stands for it.
     (axes,) = _panels(walkers.load(looked_through / "grid").figure(x="gamma0", log="x"))
     assert (axes.get_xlabel(), axes.get_xscale(), len(_drawn(axes))) == ("Γ0", "log", 2)
+    for x, log, told in (("liquid.name", "x", "has no numbers"), (None, "z", r"^log: 'z': expected one of x, y, xy$")):
+        with pytest.raises(InputError, match=told):
+            walkers.load(looked_through / "beads").figure(x=x, log=log)
 
 
 def test_pairs_of_beads_can_be_shown_by_their_asymmetry_and_texts_as_categories(looked_through: Path) -> None:
-    directory = looked_through / "beads"
-    figure = walkers.load(directory).figure(x="sin_delta")
+    figure = walkers.load(looked_through / "beads").figure(x="sin_delta")
     (axes,) = _panels(figure)
     assert axes.get_xlabel() == "sin δ"
     assert _drawn(axes)[0][0] == pytest.approx([0.05 / 0.45, 0.2, 0.15 / 0.55])
     assert _legend(figure) == ["Si AK5", "Si AK10"]
-    figure = walkers.load(directory).figure(x="liquid.name")
+    figure = walkers.load(looked_through / "beads").figure(x="liquid.name")
     (axes,) = _panels(figure)
     assert [label.get_text() for label in axes.get_xticklabels()] == ["Si AK5", "Si AK10"]
     assert _legend(figure) == ["0.3/0.2 mm", "0.25/0.2 mm", "0.35/0.2 mm"]
     places = np.array([x for x, _, _ in _drawn(axes)])
     assert np.abs(places - [0.0, 1.0]).max() < 0.3, "symbols are beside their category"
-    with pytest.raises(InputError, match="has no numbers"):
-        walkers.load(directory).figure(x="liquid.name", log="x")
-    with pytest.raises(InputError, match=r"^log: 'z': expected one of x, y, xy$"):
-        walkers.load(directory).figure(log="z")
 
 
 def test_samples_have_a_panel_for_each_key(looked_through: Path) -> None:
@@ -143,23 +125,23 @@ def test_samples_have_a_panel_for_each_key(looked_through: Path) -> None:
 
 def test_keys_that_go_together_are_one_factor() -> None:
     """A zip of equal numbers, one of texts, and one that only together tell its points apart."""
-
-    def factors(units: dict[str, str], rows: list[list[Any]], *, together: bool = True) -> list[Any]:
-        table = _table(units, rows, [tuple(units)] if together else [(key,) for key in units])
-        return [(one.keys, one.levels, one.is_sample) for one in factors_of(table)]
-
-    both = {"contact.friction.bead_wall": "", "contact.friction.bead_bead": ""}
-    assert factors(both, [[0.1, 0.2], [0.2, 0.4], [0.3, 0.6]]) == [(tuple(both), [0.1, 0.2, 0.3], False)]
-    assert factors(both, [[0.1, 0.4], [0.2, 0.2], [0.3, 0.6]]) == [
-        (("contact.friction.bead_wall",), [0.1, 0.2, 0.3], True),
-        (("contact.friction.bead_bead",), [0.2, 0.4, 0.6], True),
+    wall, bead = both = ("contact.friction.bead_wall", "contact.friction.bead_bead")
+    named = ("liquid.name", "drive.peak_acceleration")
+    expected: list[tuple[tuple[str, ...], list[list[Any]], list[Any]]] = [
+        (both, [[0.1, 0.2], [0.2, 0.4], [0.3, 0.6]], [(both, [0.1, 0.2, 0.3], False)]),
+        (both, [[0.1, 0.6], [0.2, 0.4], [0.3, 0.2]], [(both, [0.1, 0.2, 0.3], False)]),
+        (
+            both,
+            [[0.1, 0.4], [0.2, 0.2], [0.3, 0.6]],
+            [((wall,), [0.1, 0.2, 0.3], True), ((bead,), [0.2, 0.4, 0.6], True)],
+        ),
+        (named, [["a", 2.0], ["b", 10.0]], [(named, ["a", "b"], False)]),
+        (named, [["a", 2.0], ["a", 10.0], ["b", 2.0]], [(named, ["a, 2 g", "a, 10 g", "b, 2 g"], False)]),
+        (named, [["a", 2.0]], []),
     ]
-    named = {"liquid.name": "", "drive.peak_acceleration": "g"}
-    assert factors(named, [["a", 2.0], ["b", 10.0]]) == [(tuple(named), ["a", "b"], False)]
-    told = ["a, 2 g", "a, 10 g", "b, 2 g"]
-    assert factors(named, [["a", 2.0], ["a", 10.0], ["b", 2.0]]) == [(tuple(named), told, False)]
-    assert len(factors(named, [["a", 2.0], ["a", 10.0], ["b", 2.0], ["b", 10.0]], together=False)) == 2
-    assert factors(named, [["a", 2.0]]) == []
+    for keys, rows, factors in expected:
+        table = _table({key: "g" if key.endswith("acceleration") else "" for key in keys}, rows, [keys])
+        assert [(one.keys, one.levels, one.is_sample) for one in factors_of(table)] == factors
 
 
 def test_what_would_take_too_many_panels_is_not_told_apart() -> None:
@@ -192,28 +174,6 @@ def test_theory_is_what_the_theory_says_of_each_point(looked_through: Path) -> N
         walkers.load(directory).figure(y="orientation_end", theory=True)
 
 
-def test_the_papers_friction_is_drawn_only_of_what_it_was_fitted_to() -> None:
-    """Its velocities are of ruby in silicone oils: of glass in glycol they would be wrong tenfold, and unseen so."""
-    friction = {"contact.friction.bead_wall": 0.3, "contact.friction.bead_bead": 0.1}
-    changes: list[dict[str, Any]] = [
-        {},
-        {"liquid.name": "ethylene glycol"},
-        {"beads.material": "glass", "contact.rolling_friction": 0.0, **friction},
-        {"boundary.material": "polystyrene", "contact.rolling_friction": 0.0, **friction},
-    ]
-    ours, *others = [load_case("fig1b", one) for one in changes]
-    predicted, reasons = predicted_column([ours, *others], "velocity")
-    assert np.isfinite(predicted[MODEL]).all()
-    assert predicted[PAPER][0] == pytest.approx(predict(ours)["paper"]["velocity"])
-    assert np.isnan(predicted[PAPER][1:]).all()
-    told = "the fit is to ruby on level chromium-coated glass or glass in Si AK5 or Si AK10"
-    assert reasons == {f"{PAPER}: {told}": 3}
-    assert [predict(one)["paper"] | {"friction": 0.0} for one in others] == [
-        {"friction": 0.0, "velocity": None, "reason": told}
-    ] * 3
-    assert list(predicted_column(others, "velocity")[0]) == [MODEL]
-
-
 def test_points_that_are_not_finished_are_left_out_and_counted(looked_through: Path, tmp_path: Path) -> None:
     out = tmp_path / "runs"
     shutil.copytree(looked_through, out)
@@ -228,70 +188,19 @@ def test_points_that_are_not_finished_are_left_out_and_counted(looked_through: P
         walkers.load(out / "grid").figure()
 
 
-def test_plot_writes_what_the_suffix_says(looked_through: Path, tmp_path: Path) -> None:
-    for suffix, begin in ((".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<?xml")):
-        to = tmp_path / f"figure{suffix}"
-        done = call("plot", "grid", "--out", str(looked_through), "--to", str(to), check=True)
-        assert (done.stdout, done.stderr) == (f"{to}\n", "")
-        assert to.read_bytes().startswith(begin)
-
-
-@pytest.mark.parametrize(("x", "size"), [("gamma0", 1.0), ("peak_acceleration", 9.8)])
-def test_theory_is_a_curve_along_what_follows_from_a_key(looked_through: Path, x: str, size: float) -> None:
-    """Not straight lines between the points."""
-    directory = looked_through / "grid"
-    figure = walkers.load(directory).figure(x=x, hue="drive.frequency", theory=True)
-    (axes,) = _panels(figure)
-    lines = [line for line in axes.lines if line.get_linestyle() == "--"]
-    table = walkers.load(directory).table()
-    assert [len(np.asarray(line.get_xdata())) for line in lines] == [61] * table["drive.frequency"].nunique()
-    for line, (_, rows) in zip(lines, table.groupby("drive.frequency"), strict=True):
-        along, values = map(np.asarray, line.get_data())
-        points = np.sort(rows[x]) / size
-        assert (along[0], along[-1]) == pytest.approx((points[0], points[-1]))
-        middle = len(along) // 2
-        (run, *_) = rows["run"]
-        near = case_of(Path(run))
-        assert values[middle] == pytest.approx(
-            1e3 * predict(near.put("drive.peak_acceleration", _peak(near, x, along[middle])))["viscous"]["velocity"]
-        )
-
-
-def _peak(case: Any, x: str, value: float) -> float:
-    return value * 9.8 if x == "peak_acceleration" else float(dimer_of(case).peak_acceleration(value))
-
-
-def test_theory_is_not_joined_where_it_has_no_curve(looked_through: Path) -> None:
-    """Each pair of radii has bridges of its own, and there is no walker between them."""
-    figure = walkers.load(looked_through / "beads").figure(theory=True)
-    assert not [line for axes in _panels(figure) for line in axes.lines if line.get_linestyle() in ("--", ":")]
-
-
-@pytest.mark.parametrize(("sweep", "varied"), [("sampled", True), ("grid", False)])
-def test_a_figure_does_not_deny_what_it_varies(looked_through: Path, sweep: str, varied: bool) -> None:
-    """The sample varies the friction, which nobody measured."""
-    figure = walkers.load(looked_through / sweep).figure()
-    title = " ".join([figure.get_suptitle(), *(legend.get_title().get_text() for legend in figure.legends)])
-    title = title.replace("\n", " ")
-    assert ("standard deviation" in title, "not varied" in title) == (True, not varied)
-
-
 def test_headings_that_differ_on_a_level_floor_are_not_averaged(tmp_path: Path) -> None:
     """Two tones push walkers of both headings the same way, the one forward and the other backward."""
     tones = [{"frequency": "80 Hz", "peak_acceleration": "4 g"}, {"frequency": "160 Hz", "peak_acceleration": "3 g"}]
     short = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
-    tables = document(dimers={"replicates": 2}, run=short)
-    tables["drive"] = {"harmonics": tones}
-    (tmp_path / "tones.toml").write_text(to_toml(tables))
-    (tmp_path / "phases.toml").write_text(
-        'case = "tones.toml"\n[axes]\n"drive.harmonics[1].phase" = ["0 deg", "90 deg"]\n'
-    )
+    tables = {**document(dimers={"replicates": 2}, run=short), "drive": {"harmonics": tones}}
+    sweep = {"case": "tones.toml", "axes": {"drive.harmonics[1].phase": ["0 deg", "90 deg"]}}
+    for name, contents in (("tones", tables), ("phases", sweep)):
+        (tmp_path / f"{name}.toml").write_text(to_toml(contents))
     swept = walkers.sweep(tmp_path / "phases.toml", tmp_path / "runs")
     assert swept.table()["facings_differ"].any()
-    (header,) = (line for line in swept.describe().splitlines() if line.split()[:1] == ["point"])
-    assert "right_facing" in header
-    assert "left_facing" in header
-    assert " velocity " not in header
+    (header,) = (line.split() for line in swept.describe().splitlines() if line.split()[:1] == ["point"])
+    assert {"right_facing", "left_facing"} <= {*header}
+    assert "velocity" not in header
     assert _legend(swept.figure()) == ["started facing right (up)", "started facing left (down)"]
 
 
@@ -302,20 +211,16 @@ def test_walkers_that_face_down_a_slope_are_a_series_beside_those_that_face_up(t
     swept = walkers.sweep(tmp_path / "tilt.toml", tmp_path / "runs")
     table, figure = swept.table(), swept.figure()
     assert _legend(figure) == ["started facing right (up)", "started facing left (down)"]
-    (axes,) = _panels(figure)
-    assert axes.get_ylabel() == "velocity (mm/s)"
-    series = [line.get_ydata() for line in axes.lines if len(line.get_xdata()) == 3]
-    np.testing.assert_allclose(series, 1e3 * table[["right_facing", "left_facing"]].to_numpy().T)
-    assert not _legend(swept.figure(y="right_facing"))
-    with pytest.warns(LeftOutWarning):  # without a prediction, lines are those of a figure without theory
-        predicted = swept.figure(y="axial_velocity", theory=True)
-    (axes,) = _panels(predicted)
-    assert axes.lines[0].get_linestyle() == "-"
     # Of walkers that lean or turned over, velocities are those up the slope.
     leaning = table.assign(upright=0)
-    (axes,) = _panels(figure_of(leaning))
-    series = [line.get_ydata() for line in axes.lines if len(line.get_xdata()) == 3]
     each = [walkers.load(Path(run)).walkers.set_index("facing")["axial_velocity"] for run in table["run"]]
-    np.testing.assert_allclose(series, [[1e3 * one[way] for one in each] for way in (1, -1)])
-    assert axes.get_ylabel() == "velocity along the drive\naxis (mm/s)"
+    for drawn, label, expected in (
+        (figure, "velocity (mm/s)", table[["right_facing", "left_facing"]].to_numpy().T),
+        (figure_of(leaning), "velocity along the drive\naxis (mm/s)", [[one[way] for one in each] for way in (1, -1)]),
+    ):
+        (axes,) = _panels(drawn)
+        assert axes.get_ylabel() == label
+        series = [line.get_ydata() for line in axes.lines if len(line.get_xdata()) == 3]
+        np.testing.assert_allclose(series, 1e3 * np.array(expected))
+    assert not _legend(swept.figure(y="right_facing"))
     assert not _legend(figure_of(leaning.assign(axial_left_facing=np.nan)))

@@ -2,12 +2,14 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from numba import njit
 
 from tests.conftest import call, document, make_case, to_toml
 from walkers.inputs.case import Case
@@ -22,7 +24,7 @@ from walkers.postprocess.tables import read_table
 from walkers.theory.mathieu import Alignment, alignment, is_stable, largest_stable_v, time_to_turn
 from walkers.theory.motion import Walker, walk
 from walkers.theory.prediction import alignment_of, describe, motion_of, predict, threshold
-from walkers.theory.quasistatic import CONTACTS, detachment, mass_asymmetry, mean_velocity
+from walkers.theory.quasistatic import CONTACTS, FloatArray, detachment, mass_asymmetry, mean_velocity
 
 RUBY = Dimer((0.3e-3, 0.2e-3), 4000.0, 19.2e-3)
 
@@ -64,6 +66,27 @@ def test_bridges_slow_the_theorys_walker_as_they_do_the_engines(
     found += [result["sliding_1"], result["sliding_2"], result["sliding_pair_1"]]
     expected = [motion.velocity[0], *motion.rotation[:, 0], *motion.sliding[:, 0]]
     np.testing.assert_allclose(found, expected, rtol=5e-3, atol=5e-3 * float(motion.velocity[0]))
+
+
+@njit
+def _drag_of_the_first_bead(
+    sliding: tuple[float, float, float], _normal: FloatArray, friction: FloatArray, terms: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    drag = terms[0] * 0.5 * (sliding[0] + sliding[1] - sliding[2])
+    return terms[1] * friction, np.array([drag, 0.0, 0.0]), 0.5 * drag * np.array([-1.0, 1.0, -1.0])
+
+
+def test_a_further_effect_is_what_the_same_forces_of_bridges_are() -> None:
+    """A drag on the centre of the first bead, and twice the friction with the substrate: the loads count too."""
+    walker, drag = Walker.of_case(make_case()), 3e-4  # N s/m
+    lever = -walker.radii[0, 0]
+    drags = walker.resistances + drag * np.array([1.0, lever, lever**2])[:, None, None] * np.eye(3)[0][:, None]
+    expected = walk(replace(walker, friction=2.0 * walker.friction, resistances=drags), 80.0, 60.0)
+    terms = np.array([[drag / walker.force_unit[0], 2.0]])
+    found = walk(walker, 80.0, 60.0, steps_per_cycle=1024, effect=(_drag_of_the_first_bead, terms))
+    assert abs(walk(walker, 80.0, 60.0).velocity[0] / expected.velocity[0] - 1.0) > 0.2
+    np.testing.assert_allclose(found.sliding, expected.sliding, rtol=5e-3, atol=5e-3 * float(expected.velocity[0]))
+    np.testing.assert_allclose(found.smallest_normal_force, expected.smallest_normal_force, rtol=5e-3)
 
 
 def test_velocities_are_those_of_the_papers_closed_form() -> None:

@@ -1,8 +1,13 @@
-"""The second engine and the laws of bridges against the literature."""
+"""Verdicts of checks, which must be able to fail; laws of bridges, benchmarks and reports of the engine."""
 
 from __future__ import annotations
 
 import json
+import os
+import re
+import shutil
+import subprocess
+from dataclasses import replace
 from math import cos, inf, pi
 from pathlib import Path
 
@@ -11,13 +16,15 @@ import pytest
 
 from tests.conftest import call
 from walkers.check import literature
-from walkers.check.benchmarks import TESTS, farthest_point, published
+from walkers.check.benchmarks import TESTS, farthest_point, largest, published
 from walkers.check.bridges import LAWS, pulls
-from walkers.check.lines import Verdict, count
+from walkers.check.crosscheck import courses
+from walkers.check.lines import Line, Verdict, as_dict, as_text, count, failures
+from walkers.inputs.reading import load_case
 from walkers.physics.capillary import derjaguin_radius
+from walkers.postprocess.motion import Motion
 from walkers.runner.failures import EngineFailure
-
-# --- Impacts --------------------------------------------------------------------------------------------------------
+from walkers.runner.launch import ALONE
 
 
 def test_a_point_off_the_curve_is_found_and_judged_by_the_axis() -> None:
@@ -37,9 +44,6 @@ def test_the_published_points_are_those_of_the_tests() -> None:
     assert steep[:, 1] == pytest.approx(1.0 - 0.092 * 1.98 / np.tan(np.radians(steep[:, 0])), abs=5e-3)
 
 
-# --- Published laws of bridges --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("law", ["Rabinovich 2005", "Lambert 2008"])
 @pytest.mark.parametrize("radius_2", [1.0, 0.5, inf])
 def test_laws_have_derjaguins_limit(law: str, radius_2: float) -> None:
@@ -57,9 +61,6 @@ def test_published_laws_beside_young_laplace() -> None:
     assert lines["Soulié 2006, fig1b, beads: work over Young–Laplace"].measured == pytest.approx(0.96, abs=0.01)
 
 
-# --- The command ------------------------------------------------------------------------------------------------------
-
-
 def test_benchmarks_pass_and_a_check_that_cannot_be_computed_leaves_the_others(
     in_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -74,3 +75,99 @@ def test_benchmarks_pass_and_a_check_that_cannot_be_computed_leaves_the_others(
     assert {line["verdict"] for line in passed} == {"pass"}
     assert len(passed) > 55
     assert (failed["check"], failed["verdict"], "no engine here" in failed["what"]) == ("crosscheck", "ERROR", True)
+
+
+GOOD, BAD = Line("good", 1.0, 1.05, 0.1), Line("bad", 1.0, 1.2, 0.1, check="second")
+
+
+def test_one_failed_line_fails_all_checks() -> None:
+    for line, verdict in (
+        (GOOD, Verdict.PASS),
+        (BAD, Verdict.FAIL),
+        (replace(GOOD, measured=float("nan")), Verdict.FAIL),
+        (replace(GOOD, expected=0.0, measured=0.2), Verdict.FAIL),
+        (replace(BAD, scale=10.0), Verdict.PASS),
+        (replace(BAD, tolerance=inf), Verdict.NOT_JUDGED),
+        (replace(GOOD, given=Verdict.FAIL), Verdict.FAIL),
+    ):
+        assert line.verdict is verdict
+    lines = (GOOD, replace(GOOD, check="second"), BAD)
+    assert (as_dict(lines)["passed"], as_dict(lines[:1])["passed"], failures(lines)) == (False, True, [BAD])
+    assert as_text(lines[1:], "engine: ").splitlines()[-1] == "engine: 1 of 2 lines fail"
+    assert as_text(lines[:1]).endswith("\nall 1 lines pass")
+
+
+def _pile(cycles: list[float]) -> Motion:
+    """Three beads of a pile at rest, at some cycles of its drive."""
+    case, frames = load_case("pile-ci"), len(cycles)
+    still = np.zeros((frames, 3, 3))
+    position = still + 1e-3 * np.arange(3.0)[:, None]
+    time = np.array(cycles) / case.excitation.frequency
+    walls = np.zeros((frames, 3))
+    radius = np.array([0.6e-3, 0.3e-3, 0.6e-3])
+    return Motion(
+        case, time, position, still, still, walls, walls, radius, (), [(Path("s"), 0)] * frames, truncated=False
+    )
+
+
+@pytest.mark.parametrize(("away", "cycle"), [(2, 0.5), (3, 1.5), (4, 1.5)])
+def test_a_pile_fails_if_a_bead_leaves_its_motion_in_the_first_cycle(away: int, cycle: float) -> None:
+    """By 1.1 % of the smallest radius, one bead of three."""
+    first = _pile([0.0, 0.25, 0.5, 1.5])
+    moved = first.position.copy()
+    moved[away:, 1, 0] += 0.011 * 0.3e-3
+    together, farthest = courses(first, replace(first, position=moved))
+    assert (together.expected, together.measured) == pytest.approx((1.5, cycle))
+    assert farthest.measured == pytest.approx(0.0 if away == 4 else 3.3)
+    assert together.failed == (cycle == 0.5)
+    assert not farthest.failed
+
+
+def test_the_largest_difference_has_either_sign() -> None:
+    measured = np.array([1.01, 0.9, 1.02])
+    line = largest("x", 1.0, measured, 0.05)
+    assert (line.measured, line.verdict) == (pytest.approx(-0.1), Verdict.FAIL)
+    assert largest("x", measured + 0.01, measured, 0.05).verdict is Verdict.PASS
+
+
+REPORTS = Path(__file__).resolve().parents[1] / "docs" / "engine-reports"
+DEFAULT_PAGE = ("-var", "page", "100000", "-var", "one", "2000")
+_RESULT = re.compile(r"^RESULT (.*)", re.MULTILINE)
+_NUMBER = re.compile(r": (-?\d\S*?)(?=,|\s|$)")
+
+
+# Deck, options, and each number that it prints: what the formula says, what the engine gives.
+NUMBERS = [
+    ("coulomb-limit", (), [(0.5, 0.5), (1.0, 1.140)]),
+    ("coulomb-limit", ("-var", "e", "0.3"), [(0.3, 0.3), (1.0, 1.358)]),
+    ("wall-takes-a-strangers-velocity", (), [(1.0, -2.0), (1.0, 0.0)]),
+    ("contact-angle", (), [(30.0, 7.854)]),
+    ("page-second-run", (), [(1.0, 0.0)]),
+    ("page-second-run", DEFAULT_PAGE, [(1.0, 1.0)]),
+    ("page-write-restart", (), [(1.0, 1.0), (1.0, 0.0)]),
+    ("page-write-restart", DEFAULT_PAGE, [(1.0, 1.0), (1.0, 1.0)]),
+    ("delete-atoms", (), [(1.0, 0.0)]),
+    ("delete-atoms", ("-var", "compress", "no"), [(1.0, 1.0)]),
+    ("washino-wall", (), [(1.0, 1.0), (1.0, 0.0)]),
+    ("wall-is-a-sphere", (), [(1.0, 0.435), (1.0, 0.25)]),
+    ("liquid-content", (), [(88.85e-6, 412.4e-6), (88.85e-6, 88.85e-6), (1.0, 100.0 ** (1.0 / 3.0))]),
+]
+
+
+@pytest.mark.parametrize(("name", "options", "numbers"), NUMBERS)
+def test_deck_gives_the_number_of_its_report(
+    tmp_path: Path, name: str, options: tuple[str, ...], numbers: list[tuple[float, float]]
+) -> None:
+    """With the engine as it is packaged: without a contact model of ours."""
+    for file in (*REPORTS.glob("*.lig"), *REPORTS.glob("*.stl")):
+        shutil.copy(file, tmp_path)
+    assert all(f"({deck.stem}.lig)" in (REPORTS / "index.md").read_text("utf-8") for deck in REPORTS.glob("*.lig"))
+    environment = {name: value for name, value in os.environ.items() if name != "LD_PRELOAD"} | ALONE
+    command = ["stdbuf", "-oL", "liggghts", "-log", "none", *options, "-in", f"{name}.lig"]
+    how = {"env": environment, "capture_output": True, "text": True, "errors": "replace"}
+    done = subprocess.run(command, cwd=tmp_path, check=False, **how)
+    assert done.returncode == 0, done.stdout[-500:]
+    measured = [float(number) for line in _RESULT.findall(done.stdout) for number in _NUMBER.findall(line)]
+    for value, (expected, stated) in zip(measured, numbers, strict=True):
+        assert value == pytest.approx(stated, rel=3e-3, abs=1e-7)
+        assert expected == stated or abs(value - expected) > 0.1 * abs(expected)

@@ -1,7 +1,6 @@
 """Figures, renderings, films, files for ParaView and other programs, read back."""
 
 import json
-import re
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -16,7 +15,6 @@ import meshio
 import numpy as np
 import pytest
 import pyvista as pv
-from matplotlib.figure import Figure
 from PIL import Image
 
 import walkers
@@ -25,16 +23,19 @@ from tests.printed import letters, spoilt
 from walkers.errors import InputError
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.loads import bridge_at_rest
-from walkers.postprocess.drawing import styled
-from walkers.postprocess.figures import LEAST, MOST_NAMED, draw, figures_of, looks_of, plot_run
+from walkers.postprocess.figures import MOST_NAMED, figures_of, looks_of, plot_run
 from walkers.postprocess.film_options import FilmOptions
-from walkers.postprocess.films import film_times, named_direction
-from walkers.postprocess.motion import Group, Motion, between, read_bridges, read_motion
+from walkers.postprocess.films import film_times
+from walkers.postprocess.motion import Group, Motion, read_bridges, read_motion
 from walkers.postprocess.necks import bridges_at, ends_of, necks_of
 from walkers.postprocess.paraview import _walls, write_vtk
 from walkers.postprocess.results import read
+<<<<<<< HEAD
 from walkers.postprocess.scene import Scene, Window, axes_toward, camera_axes, gathered, mesh_of, walls_of
 from walkers.postprocess.series import _figure, _strips, even_frames, even_labels
+=======
+from walkers.postprocess.scene import Scene, Window, axes_toward, camera_axes, mesh_of, walls_of
+>>>>>>> origin/main
 from walkers.postprocess.tables import read_table
 
 
@@ -56,18 +57,11 @@ def moved(directory: Path) -> Group:
     return gathered(read_motion(directory)).groups[0]
 
 
-# --- files for other programs -----------------------------------------------------------------------------------------
-
-
 def test_beads_and_floor_are_where_the_engine_put_them(moved: Group, collection: Path) -> None:
     sets = ElementTree.parse(collection).getroot().findall("Collection/DataSet")
     for kind, every in {"beads": 1, "boundary": 1, "bridges": 5}.items():
         seconds = [float(entry.attrib["timestep"]) for entry in sets if entry.get("name") == kind]
         np.testing.assert_allclose(seconds, moved.time[::every], atol=1e-15)
-    reader = pv.get_reader(collection)
-    for number, blocks in ((80, 3), (79, 2)):
-        reader.set_active_time_value(reader.time_values[number])
-        assert [block.n_cells for block in reader.read()] == [4, 2, 6][:blocks]
     frame = 13
     beads, shift = pv.read(collection.parent / f"beads_{frame:06d}.vtu"), moved.motion.substrate[frame]
     np.testing.assert_allclose(beads.points, (moved.position[frame] + shift).reshape(-1, 3), rtol=1e-12)
@@ -83,10 +77,7 @@ def test_beads_and_floor_are_where_the_engine_put_them(moved: Group, collection:
     floors = [pv.read(collection.parent / f"boundary_{number:06d}.vtu") for number in (0, frame)]
     np.testing.assert_allclose(floors[1].points - floors[0].points, np.tile(shift, (4, 1)), atol=1e-12)
     assert np.linalg.norm(shift) > 1e-5
-    low_x, high_x, low_y, high_y, *heights = floors[0].bounds
-    assert (low_x, low_y) < tuple(moved.motion.position[..., :2].min(axis=(0, 1)))
-    assert (high_x, high_y) > tuple(moved.motion.position[..., :2].max(axis=(0, 1)))
-    assert heights == pytest.approx([0.0, 0.0], abs=1e-15)
+    assert floors[0].bounds[4:] == pytest.approx([0.0, 0.0], abs=1e-15)
 
 
 def test_bridges_are_lines_with_force_and_gap(directory: Path, moved: Group, collection: Path) -> None:
@@ -108,18 +99,6 @@ def test_bridges_are_lines_with_force_and_gap(directory: Path, moved: Group, col
     np.testing.assert_allclose(length - [3e-4, 2e-4, 5e-4] * 2, rows["gap"], atol=1e-10)
 
 
-def test_a_frame_without_bridges_has_no_block_of_them(directory: Path, tmp_path: Path) -> None:
-    run = Path(shutil.copytree(directory, tmp_path / "run"))
-    for path in run.rglob("bridges.*s.txt"):  # of pairs, of walls
-        first, *later = path.read_text().split("ITEM: TIMESTEP")[1:]
-        head, entries = first.split("ITEM: ENTRIES")
-        head = re.sub(r"(ENTRIES\n)\d+", r"\g<1>0", head)
-        path.write_text("ITEM: TIMESTEP".join(["", f"{head}ITEM: ENTRIES{entries.splitlines()[0]}\n", *later]))
-    collection = write_vtk(run, tmp_path / "vtk")
-    assert [(collection.parent / f"bridges_0000{frame}.vtu").exists() for frame in ("00", "10")] == [False, True]
-    assert len(pv.get_reader(collection).read()) == 2
-
-
 def test_walkers_are_exported_side_by_side_once_a_cycle_with_the_script_that_shows_them(
     directory: Path, moved: Group, tmp_path: Path
 ) -> None:
@@ -130,33 +109,39 @@ def test_walkers_are_exported_side_by_side_once_a_cycle_with_the_script_that_sho
     points = [pv.read(collection.parent / f"beads_{frame:06d}.vtu").points for frame in (0, 80)]
     walked = (points[1] - points[0]).reshape(2, 2, 3)
     np.testing.assert_allclose(walked, moved.position[80] - moved.position[0], atol=1e-12)
+<<<<<<< HEAD
     assert np.ptp(points[0][:, 1]) < 4e-3 < np.ptp(read_motion(directory).position[0, ..., 1])
     view = json.loads(ElementTree.parse(collection).getroot().attrib["view"])
     np.testing.assert_allclose(view["middle"][:2], points[0][:, :2].mean(axis=0), atol=1e-3)
     assert (view["colour"], view["neck"]) == ("walker", pytest.approx(9e-5))
+=======
+    assert np.ptp(points[0][:, 1]) < 4e-3 < np.ptp(moved.position[0, ..., 1])
+    assert np.ptp(points[0][:, 0]) < 1e-3  # in a row, wherever they stood
+    view = json.loads(ElementTree.parse(collection).getroot().attrib["view"])
+    assert (view["colour"], view["neck"]) == ("omega (rad/s)", pytest.approx(9e-5))
+>>>>>>> origin/main
 
 
 _LISTS = '<DataSet timestep="0.0" part="0" file="{}" />'
-_FOREIGN: dict[str, dict[str, str]] = {
-    "VTK files": {"turbine_0001.vtu": "x", "turbine.pvd": "x"},
-    "names as ours, without a collection": {"beads_000000.vtu": "x", "show.py": "x"},
-    "a collection of other files": {"walkers.pvd": _LISTS.format("turbine.vtu"), "turbine.vtu": "x"},
-    "a frame that was not exported": {
-        **{"walkers.pvd": _LISTS.format("beads_000000.vtu"), "beads_000000.vtu": "x"},
-        "beads_000001.vtu": "x",
-    },
-}
+_FOREIGN: list[dict[str, str]] = [
+    {"turbine_0001.vtu": "x", "turbine.pvd": "x"},
+    {"beads_000000.vtu": "x", "show.py": "x"},
+    {"walkers.pvd": _LISTS.format("turbine.vtu"), "turbine.vtu": "x"},
+    {"walkers.pvd": _LISTS.format("beads_000000.vtu"), "beads_000000.vtu": "x", "beads_000001.vtu": "x"},
+]
+"""Files of others: of VTK, named as ours without a collection, in another collection, and not in it."""
 
 
-@pytest.mark.parametrize("name", _FOREIGN)
-def test_an_export_replaces_its_own_files_alone(name: str, directory: Path, tmp_path: Path) -> None:
-    (place := tmp_path / "vtk").mkdir()
-    for file, text in _FOREIGN[name].items():
-        (place / file).write_text(text)
-    with pytest.raises(InputError, match="expected a new or empty folder"):
-        write_vtk(directory, place)
-    assert {path.name: path.read_text() for path in place.iterdir()} == _FOREIGN[name]
-    shutil.rmtree(place)
+def test_an_export_replaces_its_own_files_alone(directory: Path, tmp_path: Path) -> None:
+    place = tmp_path / "vtk"
+    for foreign in _FOREIGN:
+        place.mkdir()
+        for file, text in foreign.items():
+            (place / file).write_text(text)
+        with pytest.raises(InputError, match="expected a new or empty folder"):
+            write_vtk(directory, place)
+        assert {path.name: path.read_text() for path in place.iterdir()} == foreign
+        shutil.rmtree(place)
     for every in (40, 80):  # an earlier export is replaced
         write_vtk(directory, place, every=every)
         assert len(list(place.glob("beads_*.vtu"))) == 80 // every + 1
@@ -164,19 +149,15 @@ def test_an_export_replaces_its_own_files_alone(name: str, directory: Path, tmp_
     for wrong, told in ((place / "walkers.pvd", "it is a file"), (tmp_path / "link", "it is a symbolic link")):
         with pytest.raises(InputError, match=told):
             write_vtk(directory, wrong)
-    assert {path.name for path in tmp_path.iterdir()} == {"vtk", "link"}
 
 
 def test_a_lammps_dump_holds_the_motion(filmed: Path, motion: Motion, tmp_path: Path) -> None:
     path = walkers.load(filmed).export("lammps", tmp_path / "here" / "walk.lammpstrj", every=4)
     written = motion.select(slice(None, None, 4))
     frames = [text.split("ITEM: ") for text in path.read_text().split("ITEM: TIMESTEP\n")[1:]]
-    steps, counts, boxes, tables = zip(*frames, strict=True)
+    steps, counts, _, tables = zip(*frames, strict=True)
     np.testing.assert_allclose(np.array(steps, int) * motion.case.run.time_step, written.time, atol=1e-12)
     assert {text.split()[-1] for text in counts} == {"4"}
-    low, high = np.array(boxes[0].split()[-6:], dtype=float).reshape(3, 2).T
-    assert np.all(low <= 1e3 * (written.position - written.radius[:, None]).min(axis=(0, 1)) + 1e-9)
-    assert np.all(high >= 1e3 * (written.position + written.radius[:, None]).max(axis=(0, 1)) - 1e-9)
     columns = tables[0].split()[1:14]
     assert columns == ["id", "type", "mol", "radius", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz"]
     rows = np.array([text.split("\n", 1)[1].split() for text in tables], dtype=float).reshape(len(steps), 4, 13)
@@ -185,6 +166,7 @@ def test_a_lammps_dump_holds_the_motion(filmed: Path, motion: Motion, tmp_path: 
         np.testing.assert_allclose(rows[..., first : first + 3], values, rtol=1e-9, atol=1e-12)
 
 
+<<<<<<< HEAD
 _WRONG: list[tuple[Callable[[walkers.Run, Path], object], str]] = [
     (lambda run, to: run.film(to / "a.gif", slowdown=0.0), "^slowdown: 0: expected 0.05 to 10000$"),
     (lambda run, to: run.film(to / "a.gif", fps=0), "^fps: 0: expected 1 to 60$"),
@@ -219,27 +201,18 @@ def test_wrong_arguments_in_python_are_refused_by_their_names(
 def test_figures_of_runs_come_in_other_formats_and_can_be_printed(
     directory: Path, run_directory: Callable[..., Path], tmp_path: Path
 ) -> None:
+=======
+def test_figures_of_runs_come_in_other_formats_and_can_be_printed(directory: Path, tmp_path: Path) -> None:
+>>>>>>> origin/main
     paths = plot_run(directory, tmp_path, "pdf,svg,png")
-    assert [path.name for path in paths] == [
-        f"{name}.{form}" for name in ("walk", "gait") for form in ("pdf", "svg", "png")
-    ]
+    names = [f"{name}.{form}" for name in ("walk", "gait") for form in ("pdf", "svg", "png")]
+    assert [path.name for path in paths] == names
     assert all(directory.name.encode() in path.read_bytes() for path in paths)
-    strobed = run_directory(run={"cycles": 4, "settling_cycles": 1, "samples_per_cycle": 1})
-    assert [path.name for path in plot_run(strobed, tmp_path)] == ["walk.png"]  # which shows no gait
     figures = figures_of(read(directory))
     assert [spoilt(figure) + letters(figure) for figure in figures.values()] == [["a", "b", "c"], []]
     looks = looks_of([str(number) for number in range(MOST_NAMED + 3)])
     assert len({(look["linestyle"], look["marker"], look["color"]) for look in looks[:MOST_NAMED]}) == MOST_NAMED
     assert [look.get("label") for look in looks[MOST_NAMED:]] == ["and 3 more", None, None]
-
-
-def test_axes_of_figures_are_wide_enough_that_rounding_is_no_motion() -> None:
-    axes, time = Figure().subplots(), np.linspace(0.0, 1.0, 5)
-    columns = {"walker": np.zeros(5, dtype=int), "time": time, "distance": 1e-14 * time}
-    draw(axes, "cycles", columns, "time", "distance", "walker", [{}])
-    assert np.ptp(axes.get_ylim()) == pytest.approx(LEAST["m"])
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time (s)", "distance along the heading (mm)")
-    np.testing.assert_allclose(axes.lines[0].get_ydata(), 1e3 * columns["distance"])
 
 
 def test_gaits_are_smooth_and_go_through_the_samples(directory: Path) -> None:
@@ -251,9 +224,6 @@ def test_gaits_are_smooth_and_go_through_the_samples(directory: Path) -> None:
         assert len(cycle) == 10 * (len(samples) - 1) + 1
         np.testing.assert_allclose(values[::10], 1e3 * samples[name], atol=1e-9)
         assert np.abs(np.diff(values, 2)).max() < 0.5 * np.abs(np.diff(values[::10], 2)).max()
-
-
-# --- pictures and films -----------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -324,22 +294,16 @@ def test_a_neck_has_the_volume_of_its_bridge(gap: float, motion: Motion) -> None
         assert liquid == pytest.approx(bridge_at_rest(motion.case, radius, other or np.inf).volume, rel=0.3)
 
 
-def test_places_between_frames_lie_on_the_motion(motion: Motion) -> None:
-    """Each second frame, predicted from its neighbours, to a hundredth of what it moves meanwhile."""
-    errors = np.abs(between(motion.select(slice(None, None, 2)), 0.5) - motion.position[1::2]).max(axis=(1, 2))[20:60]
-    step = np.abs(np.diff(motion.position, axis=0)).max()
-    assert errors.max() < 0.1 * step and np.median(errors) < 0.01 * step
-
-
 def test_pictures_are_as_far_apart_as_the_slow_motion_says(motion: Motion) -> None:
     times = film_times(motion, FilmOptions(slowdown=20.0))
     np.testing.assert_allclose(np.diff(times.time), 1.0 / 500.0, atol=1e-12)
     np.testing.assert_allclose(times.frame * np.median(np.diff(motion.time)), times.time, atol=1e-12)
     assert film_times(motion, FilmOptions()).slowdown == 100.0  # 0.1 s in ten seconds
-    strobed = film_times(motion, FilmOptions(slowdown=1.0))
-    cycles = strobed.time * motion.case.excitation.frequency
-    assert strobed.stroboscopic and not times.stroboscopic
-    np.testing.assert_allclose(cycles, np.round(cycles), atol=1e-9)
+    for slowdown in (1.0, 5.0):  # of a cycle of 12.5 ms, pictures 40 and 8 ms apart
+        strobed = film_times(motion, FilmOptions(slowdown=slowdown))
+        cycles = strobed.time * motion.case.excitation.frequency
+        assert strobed.stroboscopic and not times.stroboscopic
+        np.testing.assert_allclose(cycles, np.round(cycles), atol=1e-9)
     part = film_times(motion, FilmOptions(slowdown=20.0, begin=0.02, end=0.05))
     assert (part.time[0], len(part.time)) == (pytest.approx(0.02), 16)
 
@@ -354,16 +318,6 @@ def test_a_scale_bar_is_as_long_as_beads_say(single: Motion) -> None:
         assert np.ptp(places) + 1 == pytest.approx(2e3 * bead.radius[0] * window.pixels_per_mm, abs=2.5)
 
 
-@pytest.mark.parametrize("degrees", [0.0, 10.0, 90.0])
-def test_up_in_the_picture_is_up_against_gravity(degrees: float, motion: Motion) -> None:
-    tilted = replace(motion, case=motion.case.put("boundary.tilt", np.radians(degrees)))
-    right, up, toward = axes = camera_axes(tilted)
-    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
-    gravity = np.array(tilted.case.gravity_vector)
-    assert right @ gravity == pytest.approx(0.0, abs=1e-9)
-    assert up @ gravity < 0.0 and toward[2] > 0.5  # nobody looks from below
-
-
 @pytest.mark.parametrize(("meet", "seen"), [(True, [-2.0, -2.0]), (False, [-2.0, 0.0])])
 def test_a_closed_tray_is_seen_from_above(meet: bool, seen: list[float], single: Motion) -> None:
     boundary = single.case.boundary.but(shape="box", width=4e-3, height=3e-3)
@@ -374,17 +328,11 @@ def test_a_closed_tray_is_seen_from_above(meet: bool, seen: list[float], single:
     np.testing.assert_allclose(Scene.around(tray, axes, shaken=False).low[:2], seen, atol=1e-2)
 
 
-def _far(motion: Motion, lengths: float, tilt: float = 0.0) -> tuple[Motion, np.ndarray]:
-    """A walker that also moves along the drive axis by some of its lengths, and this way, m."""
-    way = lengths * motion.case.walkers[0].length * motion.time / motion.time[-1]
-    position = motion.position + way[:, None, None] * np.array(motion.case.drive_axis)
-    return replace(motion, case=motion.case.put("boundary.tilt", np.radians(tilt)), position=position), way
-
-
 @pytest.mark.parametrize(("lengths", "follows"), [(0.5, False), (40.0, True)])
 def test_the_camera_follows_a_walker_that_walks_far(lengths: float, follows: bool, single: Motion) -> None:
     """Its beads are as large in the picture as without the way, and in the middle of it."""
-    far, way = _far(single, lengths)
+    way = lengths * single.case.walkers[0].length * single.time / single.time[-1]
+    far = replace(single, position=single.position + way[:, None, None] * np.array(single.case.drive_axis))
     scene = Scene.around(far, camera_axes(far), 1.2, shaken=False).following(1.5, 1.2)
     assert (scene.path is not None) == follows
     if follows:
@@ -392,25 +340,6 @@ def test_the_camera_follows_a_walker_that_walks_far(lengths: float, follows: boo
     with closing(Window(scene, (300, 200))) as window:
         pictures = [_ruby(window.picture(frame)) for frame in (0, len(far.time) - 1)]
     assert all(ruby.mean() > 0.07 and not ruby[:, [0, -1]].any() for ruby in pictures)
-
-
-@pytest.mark.parametrize(("tilt", "name"), [(0.0, "along the drive axis"), (20.0, "uphill")])
-def test_displacements_have_a_sign_and_a_direction(tilt: float, name: str, single: Motion) -> None:
-    far, way = _far(single, -40.0, tilt)
-    toward, direction = named_direction(far)
-    assert (direction, toward @ np.array(far.case.drive_axis)) == (name, pytest.approx(1.0))
-    figure = styled(_figure)(_strips(far, [0, len(far.time) - 1]))
-    assert f"displacement {name}" in " ".join(figure.get_suptitle().split())
-    text = re.split(r", |\n", figure.axes[-1].get_title())[1]
-    assert float(text.removesuffix(" mm")) == pytest.approx(1e3 * way[-1], rel=0.05)
-
-
-def test_times_of_pictures_are_even(motion: Motion) -> None:
-    for count, expected in {2: 2, 5: 5, 6: 5, 9: 9}.items():  # of eight cycles
-        time = motion.time[even_frames(motion, count)]
-        np.testing.assert_allclose(np.diff(time), [time[-1] / (expected - 1)] * (expected - 1), rtol=1e-9)
-    assert even_labels(np.array([0.0, 0.125])) == ["0.000 s", "0.125 s"]
-    assert even_labels(np.array([0.0, 0.15])) == ["0.00 s", "0.15 s"]
 
 
 def test_an_mp4_shows_a_walker_that_walks_and_a_gif_lasts_as_long_as_it_says(filmed: Path, tmp_path: Path) -> None:
@@ -458,12 +387,8 @@ def test_pvpython_shows_spheres_bridges_and_floor(filmed: Path, tmp_path: Path) 
     picture = tmp_path / "walkers.png"
     command = ["xvfb-run", "-a", "pvpython", str(script), str(picture), "0.05"]
     for _ in range(3):  # under load it may not wait long enough for its screen
-        done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, cwd=tmp_path)
-        if picture.exists():
-            break
-    assert picture.exists(), done.stderr[-2000:]
+        picture.exists() or subprocess.run(command, timeout=300, check=False, cwd=tmp_path)
     pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)
-    assert pixels.shape == (720, 1280, 3)
     for first, last in ((0, 2), (2, 0)):  # each walker
         assert 0.005 < ((pixels[..., first] > 1.5 * pixels[..., last]) & (pixels[..., first] > 60)).mean() < 0.5
     assert (np.ptp(pixels - [199, 209, 217], axis=-1) < 12).mean() > 0.1  # the floor

@@ -17,9 +17,9 @@ from walkers.physics.mixtures import MIXTURES
 from walkers.text import aligned
 
 _COLUMNS: Mapping[str, tuple[str, ...]] = {
-    "materials": ("density", "youngs_modulus", "poissons_ratio"),
+    "materials": ("density", "youngs_modulus", "poissons_ratio", "roughness"),
     "liquids": ("density", "surface_tension", "viscosity"),
-    "surface pairs": ("friction", "rolling_friction"),
+    "surface pairs": ("friction", "rolling_friction", "meniscus_radius"),
     "not measured": ("default",),
     **dict.fromkeys(("bridge laws", "cases", "sweeps", "calibrations"), ()),
 }

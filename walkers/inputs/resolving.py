@@ -21,7 +21,7 @@ from walkers.inputs.origins import Source
 from walkers.inputs.run import with_run
 from walkers.inputs.standing import OVERLAP, check_bodies, overlaps
 from walkers.inputs.table import alternatives, changed
-from walkers.inputs.units import TEMPERATURE, parse_quantity
+from walkers.inputs.units import LENGTH, TEMPERATURE, parse_quantity
 from walkers.physics.capillary import DEFAULT_LAW, bridge_volume
 from walkers.physics.laws import LAWS
 from walkers.physics.mixtures import MIXTURES
@@ -292,12 +292,12 @@ def _drive(case: Case) -> Case:
 def _surfaces(case: Case) -> Case:
     """Roughness is small compared with the beads, and menisci fit between them and at walls."""
     contact, liquid, smallest = case.contact, case.liquid.of_bridges, min(case.radii)
+    most = _ROUGHEST * smallest
     for name, rough in vars(contact.roughness).items():
-        if rough > _ROUGHEST * smallest:
-            most = 1e6 * _ROUGHEST * smallest
-            raise unusable(
-                f"contact.roughness.{name}", f"expected {most:.3g} um or less, a hundredth of a bead's radius"
-            )
+        key = f"contact.roughness.{name}"
+        if rough > most:
+            raise unusable(key, f"expected {1e6 * most:.3g} um or less, a hundredth of a bead's radius")
+        case = _ranging_to(case, key, most)
     try:
         for radius in case.radii if liquid.meniscus_radius else ():
             for other in (*case.radii, inf):
@@ -305,6 +305,16 @@ def _surfaces(case: Case) -> Case:
     except ValueError as error:
         raise unusable("liquid.meniscus_radius", f"expected menisci that fit between the surfaces: {error}") from error
     return case
+
+
+def _ranging_to(case: Case, key: str, most: float) -> Case:
+    """The case with a range of a length, m, that ends where the value would be refused."""
+    source = case.sources.get(key)
+    if source is None or source.range is None or parse_quantity(source.range[1], LENGTH) <= most:
+        return case
+    low, unit = source.range[0].split()
+    narrowed = source._replace(range=(f"{low} {unit}", f"{most / parse_quantity(f'1 {unit}', LENGTH):.6g} {unit}"))
+    return case.but(sources={**case.sources, key: narrowed})
 
 
 def _law(case: Case) -> Case:

@@ -43,15 +43,14 @@ _SINE = {"frequency": "Hz", "peak_acceleration": "m/s^2", "phase": "rad"}
 _KEYS: Mapping[str, str] = {
     "gravity": "environment.gravity",
     "density": "beads.density",
-    "surface_tension": "liquid.surface_tension",
     "viscosity": "liquid.dynamic_viscosity",
     "time_step": "run.time_step",
     **{f"friction_{pair}": f"contact.friction.{pair}" for pair in ("bead_bead", "bead_wall")},
     **{name: f"contact.{name}" for name in ("youngs_modulus", "poissons_ratio", "restitution", "rolling_friction")},
 }
 """For parameters of a deck, the key of a case."""
-_SCALE = """# Writes tables for another surface tension and viscosity: the deck gives the factors pull and resistance.
-/^[-+.0-9]/ { printf "%s", $1; printf " %.12g", pull * $2; for (i = 3; i <= NF; i++) printf " %.12g", resistance * $i
+_SCALE = """# Writes tables for another viscosity: the deck gives the factor of the resistances.
+/^[-+.0-9]/ { printf "%s %s", $1, $2; for (i = 3; i <= NF; i++) printf " %.12g", resistance * $i
               printf "\\n"; next }
 { print }
 """

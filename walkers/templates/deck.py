@@ -26,12 +26,12 @@ BRIDGES_NAME = "bridges.txt"
 LOADS_NAME = "loads.txt"
 RUN_NAME = "run.sh"
 SCALE_NAME = "scale.awk"
-"""Script beside decks to be run by hand: rescales the tables for an edited surface tension or viscosity."""
+"""Script beside decks to be run by hand: rescales the tables for an edited viscosity."""
 _NAMES = {
     **{"layout": LAYOUT_NAME, "bridges": BRIDGES_NAME, "scaled": "bridges.scaled.txt"},
     **{"loads": LOADS_NAME, "run": RUN_NAME, "scale": SCALE_NAME},
 }
-CONTENT_VERSION = 8
+CONTENT_VERSION = 9
 """Version of what decks compute, part of the names of runs: increase it if a case gives other numbers.
 
 Do not increase it if decks with another text give the same numbers bit for bit.
@@ -171,8 +171,8 @@ def compose(plan: Plan) -> Deck:
     case, scene, layout, gravity = plan.case, plan.scene, _layout(plan), plan.case.environment.gravity
     surfaces = scene.surfaces or (surface_of(case),)
     liquid, contacts = surfaces[0][1], [contact for contact, _ in surfaces]
-    # Pulls and resistances of built-in laws are proportional to surface tension and viscosity.
-    scalable = len(surfaces) == 1 and liquid.law in LAWS and liquid.surface_tension > 0.0 < liquid.viscosity
+    # Resistances of built-in laws are proportional to the viscosity.
+    scalable = len(surfaces) == 1 and liquid.law in LAWS and liquid.viscosity > 0.0
     files = {BRIDGES_NAME: tables_of(case, surfaces, {(bead.surface, bead.radius) for bead in scene.beads})}
     files |= {LOADS_NAME: _loads(scene)} if len(scene.loadings) > 1 else {}
     limits = limits_of(case)

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from math import inf
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +27,9 @@ from walkers.extras import require
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of, resistances_at_rest
 from walkers.theory.quasistatic import FloatArray, inertia_matrix, normal_force_matrix, rolling_matrix, translation
+
+if TYPE_CHECKING:
+    from walkers.theory.stepping import Effect
 
 STEPS_PER_CYCLE = 64
 """Velocities differ from those with 1024 steps by up to 0.01 mm/s, 0.07 without bridge drag (80 Hz, up to 11 g)."""
@@ -107,6 +111,7 @@ def walk(
     steady_acceleration: npt.ArrayLike = 0.0,
     cycles: int = CYCLES,
     steps_per_cycle: int = STEPS_PER_CYCLE,
+    effect: tuple[Effect, FloatArray] | None = None,
 ) -> Motion:
     """Integrate from rest under the substrate's acceleration a0 cos 2πft and average over the last cycle.
 
@@ -120,6 +125,11 @@ def walk(
         A pull along the axis toward the small bead, m/s²: the weight of a walker that climbs with its large bead above.
     cycles, steps_per_cycle
         Largest number of cycles of the drive (a periodic motion ends earlier), and time steps per cycle.
+    effect
+        A further effect: a function compiled by numba, and its K parameters of each walker, shape (N, K). It takes the
+        sliding velocities (m/s), the normal forces (unit 4πγR̄) and μ of the three contacts at the beginning of each
+        stage of a step, and a walker's parameters. It returns μ, and f and Hᵀm in that unit, which add to those of the
+        bridges and are constant through the stage; take as many steps as they need.
     """
     require("theory")
     from walkers.theory.stepping import integrate
@@ -128,7 +138,9 @@ def walk(
     drive = np.stack(np.broadcast_arrays(*(np.asarray(value, np.float64).reshape(-1) for value in given))[:3], axis=-1)
     friction = np.broadcast_to(walker.friction, (3, len(drive))).T.copy()
     tables = _tables(walker, drive[:, 0] * steps_per_cycle)
-    mean, least, repeated, solved, series = integrate(tables, friction, drive, cycles, steps_per_cycle)
+    acts, terms = effect or (None, np.zeros((len(drive), 0)))
+    of_last_cycle = integrate(tables, friction, drive, acts, terms, cycles, steps_per_cycle)
+    mean, least, repeated, solved, series = of_last_cycle
     velocity = translation(mean)
     if not np.any(drive[:, 2]):  # by symmetry; the rest is the error of the steps
         velocity = np.where(walker.sin_delta == 0.0, 0.0, velocity)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 from numba import njit
@@ -9,6 +11,7 @@ from numba import njit
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 Three = tuple[float, float, float]
+Effect = Callable[[Three, FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 
 FINER, LEVELS = 8, 3
 """A step in which a contact begins to stick or to slip is divided into 8 parts, and such a part into 8 again."""
@@ -33,7 +36,13 @@ _SCATTER = 10.0
 
 @njit(cache=True)
 def integrate(
-    tables: FloatArray, mu: FloatArray, drive: FloatArray, cycles: int, steps: int
+    tables: FloatArray,
+    mu: FloatArray,
+    drive: FloatArray,
+    effect: Effect | None,
+    terms: FloatArray,
+    cycles: int,
+    steps: int,
 ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, FloatArray]:
     """Walk N walkers from rest.
 
@@ -46,6 +55,8 @@ def integrate(
         Coulomb's coefficient of each walker and contact.
     drive : ndarray, shape (N, 3)
         Frequency (Hz), peak acceleration and steady acceleration (m/s²).
+    effect, terms
+        A further effect (`walkers.theory.motion.walk`) and its parameters of each walker, shape (N, K).
     cycles, steps
         Largest number of cycles, and time steps per cycle.
 
@@ -70,7 +81,8 @@ def integrate(
             before = totals[0].copy()
             totals[0], totals[1] = 0.0, np.inf
             for step in range(steps):
-                if not _advance(tables[of], mu[of], drive[of], step / steps, 1.0 / steps, state, totals, work):
+                begin, length = step / steps, 1.0 / steps
+                if not _advance(tables[of], mu[of], drive[of], effect, terms[of], begin, length, state, totals, work):
                     solved[of] = False
                     break
                 series[of, step] = state[_SLIDING]
@@ -95,6 +107,8 @@ def _advance(  # noqa: PLR0913, PLR0917
     tables: FloatArray,
     mu: FloatArray,
     drive: FloatArray,
+    effect: Effect | None,
+    terms: FloatArray,
     begin: float,
     length: float,
     state: FloatArray,
@@ -111,12 +125,12 @@ def _advance(  # noqa: PLR0913, PLR0917
         now, part = begin + tick / _TICKS * length, width / _TICKS * length
         after[:] = state
         start = (state[0, 0], state[0, 1], state[0, 2])
-        solved = _stage(tables[level], mu, drive, now + STAGE * part, STAGE * part, start, work)
+        solved = _stage(tables[level], mu, drive, effect, terms, now + STAGE * part, STAGE * part, start, work)
         # The second stage starts from where the slope of the first one leads.
         more = (1.0 - STAGE) / STAGE
         x, y, z = start
         start = (x + more * (after[0, 0] - x), y + more * (after[0, 1] - y), z + more * (after[0, 2] - z))
-        solved &= _stage(tables[level], mu, drive, now + part, STAGE * part, start, work)
+        solved &= _stage(tables[level], mu, drive, effect, terms, now + part, STAGE * part, start, work)
         if level < LEVELS - 1 and (not solved or _differ(after[_MODE], state[_MODE])):
             level += 1
             continue
@@ -138,15 +152,29 @@ def _differ(a: FloatArray, b: FloatArray) -> bool:
 
 
 @njit(cache=True)
-def _stage(
-    table: FloatArray, mu: FloatArray, drive: FloatArray, end: float, length: float, start: Three, work: FloatArray
+def _stage(  # noqa: PLR0913, PLR0917
+    table: FloatArray,
+    mu: FloatArray,
+    drive: FloatArray,
+    effect: Effect | None,
+    terms: FloatArray,
+    end: float,
+    length: float,
+    start: Three,
+    work: FloatArray,
 ) -> bool:
     """An implicit Euler step from the velocities ``start``, in place; returns whether forces were found."""
     seconds, state = length / drive[0], work[:4]
     push = seconds * (drive[1] * np.cos(2.0 * np.pi * end) + drive[2])
     free = _times(table, _COAST, (start[0] - push, start[1] - push, start[2]))
+    if effect is not None:
+        mu, forces, couples = effect(start, state[_NORMAL], mu, terms)
+        free = _less(free, seconds, _times(table, _GAIN, couples))
     x, y, z = _times(table, _LIFT, free)
     rest = (table[_REST, 0] + x, table[_REST, 1] + y, table[_REST, 2] + z)
+    if effect is not None:
+        rest = _less(rest, -1.0, _times(table, _PRESS, forces))
+        free = _less(free, seconds, _times(table, _GAIN, forces))
     solved = _settle(table, mu, seconds, free, rest, work)
     for at in range(3):
         slips = state[_MODE, at] != 0.0
@@ -190,7 +218,12 @@ def _settle(table: FloatArray, mu: FloatArray, seconds: float, free: Three, rest
 
 
 @njit(cache=True)
-def _times(table: FloatArray, first: int, vector: Three) -> Three:
+def _less(vector: Three, factor: float, change: Three) -> Three:
+    return vector[0] - factor * change[0], vector[1] - factor * change[1], vector[2] - factor * change[2]
+
+
+@njit(cache=True)
+def _times(table: FloatArray, first: int, vector: FloatArray | Three) -> Three:
     """A matrix of a table, from its first row on, times a vector."""
     return _row(table, first, vector), _row(table, first + 1, vector), _row(table, first + 2, vector)
 
