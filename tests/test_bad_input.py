@@ -227,13 +227,6 @@ COMMANDS: list[tuple[str, str]] = [
     ("plot {sweep} --to figure.jpg", "figure.jpg: expected the name of a .png or .svg or .pdf file"),
     ("report {run} --to a.txt", "expected the name of a .html or .htm file"),
     ("plot {run} --to out.png", "out.png: expected a folder"),
-<<<<<<< HEAD
-    ("export {run} --to lammps -o walk.dcd", "expected the name of a .lammpstrj file"),
-    ("export {run} --to deck --every 2", "--every: is for --to vtk, paraview, lammps"),
-=======
-    ("export {run} --to vtk --open", "--open: is for --to paraview"),
-    ("export {run} --to paraview -o vtk --colour beauty", "expected one of bead, large, omega, radius"),
->>>>>>> origin/main
     *((f"export {{run}} --to archive {words}", told) for words, told in (
         ("-o run.tar", "-o: expected the name of a .zip file"),
         ("--licence 'the public'", "licence: expected an SPDX identifier such as CC-BY-4.0"),

@@ -42,19 +42,10 @@ from walkers.inputs.toml import read_toml
 from walkers.postprocess.dump import BinaryDump, DumpError, local_frames
 from walkers.postprocess.paraview import write_vtk
 from walkers.postprocess.report.run import result_html
-<<<<<<< HEAD
 from walkers.postprocess.results import measure, read
 from walkers.runner.directory import CASE_NAME, FIRST_SEGMENT, case_of, locked, recomputed
 from walkers.runner.failures import DiskFull, RunBusy
 from walkers.runner.files import write_json
-from walkers.show import describe, summarise
-=======
-from walkers.postprocess.results import read
-from walkers.runner.directory import CASE_NAME, FIRST_SEGMENT, case_of
-from walkers.runner.failures import DiskFull, RunBusy
-from walkers.runner.files import write_json
-from walkers.runner.manifest import recomputed
->>>>>>> origin/main
 from walkers.sweeps.table import load as load_table
 from walkers.templates.deck import render_deck
 from walkers.templates.layout import BEAD_COLUMNS, MEAN_SPIN_COLUMNS
@@ -215,7 +206,6 @@ def test_a_result_whose_making_was_killed_is_made_anew(parts: Path) -> None:
     assert json.loads((run / "manifest.json").read_text())["sha256"].keys() >= set(names)
 
 
-<<<<<<< HEAD
 def test_a_run_is_measured_by_one_process_at_a_time(parts: Path) -> None:
     before = (parts / "manifest.json").read_bytes()
     with locked([parts]), pytest.raises(RunBusy, match="measuring"):
@@ -223,22 +213,6 @@ def test_a_run_is_measured_by_one_process_at_a_time(parts: Path) -> None:
     assert (parts / "manifest.json").read_bytes() == before
 
 
-def test_a_blow_up_that_the_engine_did_not_notice_is_told(parts: Path) -> None:
-    DAMAGES["no number in a dump"][0](parts)
-    (parts / "manifest.json").unlink()
-    with pytest.raises(DumpError, match=r"beads\.bin: .* is not a number at step .*: the simulation blew up"):
-        measure(parts)
-
-
-# --- dumps ------------------------------------------------------------------------------------------------------------
-
-
-COLUMNS = (*BEAD_COLUMNS, *MEAN_SPIN_COLUMNS)
-NO_DUMP = (b"no dump at all, but text that is long enough for a header" * 5, b"\xff" * 500)
-
-
-=======
->>>>>>> origin/main
 def test_a_dump_of_beads_is_read_but_for_a_last_frame_that_was_cut(
     run_directory: Callable[..., Path], tmp_path: Path
 ) -> None:

@@ -13,15 +13,10 @@ from typing import Any
 import pytest
 
 import walkers
-<<<<<<< HEAD
-from tests.conftest import call, document, finished_places, make_case, mounted, to_toml
-from walkers.runner.directory import locked
-=======
-from tests.conftest import call, document, to_toml
+from tests.conftest import call, document, finished_places, to_toml
 from walkers.inputs.sweep import expand
 from walkers.postprocess.uncertainty import ACCURACY_NAME
-from walkers.runner.directory import case_of, finished_places, locked
->>>>>>> origin/main
+from walkers.runner.directory import case_of, locked
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.sweeps.comparison import Side, compare_runs
@@ -119,34 +114,6 @@ def test_a_sweep_of_another_format_is_refused(out: Path, change: dict[str, Any],
         assert (done.returncode, message in done.stderr) == (2, True), done.stderr
 
 
-<<<<<<< HEAD
-@pytest.mark.parametrize(
-    ("first", "second", "differ"),
-    [
-        ({}, OTHER, {"liquid.name"}),
-        ({}, {"liquid.viscosity_ratio": 2.0}, {"liquid.viscosity_ratio"}),
-        ({}, {**FASTER, "run.time_step": "2 us"}, {"drive.frequency", "run.time_step"}),
-        ({"run.time_step": "2 us"}, {**FASTER, "run.time_step": "2 us"}, {"drive.frequency"}),
-        ({}, {**OTHER, "liquid.kinematic_viscosity": "20 mm^2/s"}, {"liquid.name", "liquid.kinematic_viscosity"}),
-    ],
-)
-def test_what_a_case_gives_is_a_difference_and_what_follows_is_none(
-    first: dict[str, Any], second: dict[str, Any], differ: set[str]
-) -> None:
-    assert set(differing([flattened(walkers.load_case("fig1b", one)) for one in (first, second)])) == differ
-
-
-def test_values_of_all_kinds_are_shown_as_they_can_be_written() -> None:
-    for key, value in flattened(walkers.load_case("fig1b")).items():
-        assert chosen([{key: value}], f"{key}={readable(key, value)}") == [True], key
-    values = {"boundary.opening": 1.0, "environment.temperature": 293.15, "environment.gravity": 9.81}
-    shown = [readable(key, value) for key, value in values.items()]
-    assert shown == ["57.2958 deg", "20 degC", "9.81 m/s^2"]
-    assert readable("liquid.kinematic_viscosity", 5e-6) == "5 mm^2/s"
-
-
-=======
->>>>>>> origin/main
 def test_clean_removes_leftovers_alone(out: Path) -> None:
     """No run in progress, and no folder of somebody else's unless it has in it what an unfinished run has."""
     failed, interrupted, held = (

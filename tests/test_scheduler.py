@@ -95,17 +95,10 @@ def test_points_of_a_shared_deck_are_what_they_are_alone(tmp_path: Path) -> None
         make_case(run=run, clusters=[fan]),  # dimers and clusters
         make_case(run=run, drive={"peak_acceleration": "3 g", "axis": "y"}, dimers={"radii": ["0.25 mm", "0.25 mm"]}),
     ]
-<<<<<<< HEAD
-    engine = find_engine()
-    together = make_runs(cases, tmp_path / "together", engine)
-    for case, name in zip(cases, together, strict=True):
-        assert [make_runs([case], tmp_path / "alone", engine) for _ in range(2)] == [{name: True}, {name: False}]
-        there, alone = tmp_path / "together" / name, tmp_path / "alone" / name
-=======
     together = make_runs(cases, tmp_path / "together", find_engine())
-    for case, (name, there) in zip(cases, together.items(), strict=True):
-        alone = make_runs([case], tmp_path / "alone", find_engine())[name]
->>>>>>> origin/main
+    for case, name in zip(cases, together, strict=True):
+        assert [make_runs([case], tmp_path / "alone", find_engine()) for _ in range(2)] == [{name: True}, {name: False}]
+        there, alone = tmp_path / "together" / name, tmp_path / "alone" / name
         motion, motion_alone = read_motion(there), read_motion(alone)
         assert motion.case == motion_alone.case == case
         for one, other in zip(motion.groups, motion_alone.groups, strict=True):
@@ -272,14 +265,9 @@ def test_a_failing_point_does_not_stop_the_others(
     assert (failed / "failure.json").exists()
     assert "5 points, 4 finished, 1 failed" in call("list", "runs/test", check=True).stdout
     log.unlink()
-<<<<<<< HEAD
     assert _sweep("test.toml", "--engine", engine).returncode == 1
-    assert [made_in(place) for place in log.read_text().split()] == [failed.name.removesuffix(".incomplete")]
-=======
-    assert _sweep("test.toml", "--engine", engine, "--retries", "2").returncode == 1
     launched = [part for place in log.read_text().split() for part in Path(place).parts if "incomplete" in part]
-    assert launched == 3 * [failed.name]
->>>>>>> origin/main
+    assert launched == [failed.name]
 
 
 SIXTEEN = "[axes]\ncontact.restitution = { linspace = [0.3, 0.6, 16] }"
@@ -304,52 +292,6 @@ def test_a_failure_of_every_point_stops_the_sweep(
     assert _sweep("test.toml", "-j", "1").returncode == 0  # the next call makes all points
 
 
-<<<<<<< HEAD
-def test_a_program_that_is_missing_or_wrong_stops_the_sweep(
-    sweep_file: Callable[..., str], in_folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Without mpirun; with an error of the program itself, which is raised as it is."""
-    (in_folder / "piles.toml").write_text('case = "pile-ci"\nset.run.ranks = 2\naxes."run.seed" = [1, 2, 3, 4]\n')
-    engine = str(find_engine().path)
-    with monkeypatch.context() as patch:
-        patch.setenv("PATH", "/nothing")
-        with pytest.raises(SweepStopped, match="mpirun"):
-            run_sweep(load_sweep("piles.toml"), in_folder / "runs", Options(2), engine=engine)
-    monkeypatch.delattr("walkers.sweeps.scheduler.make_runs")
-    with pytest.raises(NameError, match="make_runs"):
-        run_sweep(load_sweep(sweep_file(SIXTEEN)), in_folder / "runs", Options(1))
-
-
-def test_a_worker_of_another_version_refuses(tmp_path: Path) -> None:
-    engine, names, cases = find_engine(), ["test-0123456789ab"], [make_case(run=TINY)]
-    assert work(None, names, cases, tmp_path, engine, None).reason == "ProgramDiffers"
-    assert work(None, names, cases, tmp_path, replace(engine, sha256="0" * 64), None).reason == "EngineDiffers"
-    assert not list(tmp_path.iterdir())
-
-
-# --- several processes and sweeps -------------------------------------------------------------------------------------
-
-
-def test_what_somebody_else_is_making_is_waited_for(
-    sweep_file: Callable[..., str], in_folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("walkers.runner.directory._PATIENCE_SECONDS", 0.2)
-    sweep, out = load_sweep(sweep_file('[axes]\ndrive.peak_acceleration = ["2 g"]')), in_folder / "runs"
-    out.mkdir()
-    (place,) = plan_sweep(sweep, out, Options(2)).record.runs
-    with ThreadPoolExecutor(1) as pool:
-        with locked([out / place]):
-            made = pool.submit(run_sweep, sweep, out, Options(2))
-            time.sleep(1.2)  # several times as long as a sweep waits for a lock
-            assert not made.done()
-            assert not list(out.glob("base-*/"))
-            assert "1 running" in call("list", "runs/test", check=True).stdout
-        assert made.result(PATIENCE)[1] == []
-    assert set(load("runs/test")["status"]) == {DONE}
-
-
-=======
->>>>>>> origin/main
 def test_two_sweeps_over_the_same_points_share_them(
     sweep_file: Callable[..., str], in_folder: Path, front: Callable[[str], str]
 ) -> None:

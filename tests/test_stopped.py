@@ -35,11 +35,6 @@ from walkers.inputs.reading import shipped
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.results import measure, read
 from walkers.runner.binary import find_engine
-<<<<<<< HEAD
-from walkers.runner.directory import segment_directories
-=======
-from walkers.runner.directory import finished_places
->>>>>>> origin/main
 from walkers.runner.failures import RunBusy
 from walkers.runner.launch import ALONE
 

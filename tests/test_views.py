@@ -30,12 +30,7 @@ from walkers.postprocess.motion import Group, Motion, read_bridges, read_motion
 from walkers.postprocess.necks import bridges_at, ends_of, necks_of
 from walkers.postprocess.paraview import _walls, write_vtk
 from walkers.postprocess.results import read
-<<<<<<< HEAD
 from walkers.postprocess.scene import Scene, Window, axes_toward, camera_axes, gathered, mesh_of, walls_of
-from walkers.postprocess.series import _figure, _strips, even_frames, even_labels
-=======
-from walkers.postprocess.scene import Scene, Window, axes_toward, camera_axes, mesh_of, walls_of
->>>>>>> origin/main
 from walkers.postprocess.tables import read_table
 
 
@@ -109,17 +104,10 @@ def test_walkers_are_exported_side_by_side_once_a_cycle_with_the_script_that_sho
     points = [pv.read(collection.parent / f"beads_{frame:06d}.vtu").points for frame in (0, 80)]
     walked = (points[1] - points[0]).reshape(2, 2, 3)
     np.testing.assert_allclose(walked, moved.position[80] - moved.position[0], atol=1e-12)
-<<<<<<< HEAD
     assert np.ptp(points[0][:, 1]) < 4e-3 < np.ptp(read_motion(directory).position[0, ..., 1])
-    view = json.loads(ElementTree.parse(collection).getroot().attrib["view"])
-    np.testing.assert_allclose(view["middle"][:2], points[0][:, :2].mean(axis=0), atol=1e-3)
-    assert (view["colour"], view["neck"]) == ("walker", pytest.approx(9e-5))
-=======
-    assert np.ptp(points[0][:, 1]) < 4e-3 < np.ptp(moved.position[0, ..., 1])
     assert np.ptp(points[0][:, 0]) < 1e-3  # in a row, wherever they stood
     view = json.loads(ElementTree.parse(collection).getroot().attrib["view"])
-    assert (view["colour"], view["neck"]) == ("omega (rad/s)", pytest.approx(9e-5))
->>>>>>> origin/main
+    assert (view["colour"], view["neck"]) == ("walker", pytest.approx(9e-5))
 
 
 _LISTS = '<DataSet timestep="0.0" part="0" file="{}" />'
@@ -166,44 +154,7 @@ def test_a_lammps_dump_holds_the_motion(filmed: Path, motion: Motion, tmp_path: 
         np.testing.assert_allclose(rows[..., first : first + 3], values, rtol=1e-9, atol=1e-12)
 
 
-<<<<<<< HEAD
-_WRONG: list[tuple[Callable[[walkers.Run, Path], object], str]] = [
-    (lambda run, to: run.film(to / "a.gif", slowdown=0.0), "^slowdown: 0: expected 0.05 to 10000$"),
-    (lambda run, to: run.film(to / "a.gif", fps=0), "^fps: 0: expected 1 to 60$"),
-    (lambda run, to: run.film(to / "a.gif", size=(0, 64)), "^size: 0: expected 64 or more$"),
-    (lambda run, to: run.film(to / "a.gif", walker=-1), "^walker: -1: expected 0 to 1$"),
-    (lambda run, to: run.film(to / "a.gif", begin=1.0), "^begin, end: nothing to show"),
-    (lambda run, to: run.render(to / "a.png", walker=2), "^walker: 2: expected 0 to 1$"),
-    (lambda run, to: run.render(to / "a.png", images=0), "^images: 0: expected 1 to 20$"),
-    (lambda run, to: run.export("lammps", to / "a.lammpstrj", every=0), "^every: 0: expected 1 or more$"),
-    (lambda run, to: run.export("xyz", to / "a.xyz"), "^form: 'xyz': expected one of deck, vtk, paraview, "),
-    (lambda run, to: run.export("vtk", to / "vtk", every=0), "^every: 0: expected 1 or more$"),
-    (lambda run, to: run.export("lammps", to / "a", dumps=False), "^dumps: is for --to archive$"),
-    (lambda run, to: run.accuracy(share=0), "^share: 0: expected 1e-06 to 1$"),
-    (lambda run, to: run.spread(points=1), "^points: 1: expected 2 to 4096$"),
-    (lambda run, to: run.plot(to / "a.png"), r"a\.png: expected a folder"),
-    (lambda run, to: run.plot(to, "png,jpeg"), "^format: 'jpeg': expected one of png, svg, pdf$"),
-]
-
-
-@pytest.mark.parametrize(("use", "told"), _WRONG)
-def test_wrong_arguments_in_python_are_refused_by_their_names(
-    use: Callable[[walkers.Run, Path], object], told: str, directory: Path, tmp_path: Path
-) -> None:
-    with pytest.raises(InputError, match=told):
-        use(walkers.load(directory), tmp_path)
-    assert not list(tmp_path.iterdir())
-
-
-# --- figures ----------------------------------------------------------------------------------------------------------
-
-
-def test_figures_of_runs_come_in_other_formats_and_can_be_printed(
-    directory: Path, run_directory: Callable[..., Path], tmp_path: Path
-) -> None:
-=======
 def test_figures_of_runs_come_in_other_formats_and_can_be_printed(directory: Path, tmp_path: Path) -> None:
->>>>>>> origin/main
     paths = plot_run(directory, tmp_path, "pdf,svg,png")
     names = [f"{name}.{form}" for name in ("walk", "gait") for form in ("pdf", "svg", "png")]
     assert [path.name for path in paths] == names

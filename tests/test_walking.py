@@ -23,11 +23,7 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.dump import DumpError
 from walkers.postprocess.figures import figures_of
-<<<<<<< HEAD
-from walkers.postprocess.gait import are_constant, averages, gait, settled_samples, walk
-=======
 from walkers.postprocess.gait import averages, gait, settled_samples, walk
->>>>>>> origin/main
 from walkers.postprocess.motion import Group, read_bridges, read_motion
 from walkers.postprocess.numbers import declared, rows
 from walkers.postprocess.quantities import TABLES, axis
@@ -231,17 +227,6 @@ def test_mean_spins_are_those_of_all_steps_between_two_samples(groups: dict[int,
     assert sampled > 0.1
 
 
-<<<<<<< HEAD
-def test_with_few_samples_a_cycle_gaps_are_looked_at_there_alone(groups: dict[int, Group]) -> None:
-    """A cubic over a quarter of a cycle or more is no way of a bead that hops."""
-    motion = groups[20].motion.select(slice(None, None, 5), case=groups[20].case.put("run.samples_per_cycle", 4))
-    (thinned,) = motion.groups
-    samples = settled_samples(thinned)
-    np.testing.assert_array_equal(averages(thinned).open, (thinned.gap[samples] > 0.0).mean(axis=0))
-
-
-=======
->>>>>>> origin/main
 def test_a_run_in_parts_has_the_same_means(groups: dict[int, Group], trajectory: Callable[..., Group]) -> None:
     """The first frame of a part, of which nothing is averaged yet, is the last one of the part before."""
     parts = trajectory(_hopping(20, segment="0.05 s"))
@@ -330,28 +315,16 @@ def test_company_does_not_matter_whatever_forces_it_feels(tmp_path: Path) -> Non
     }
     cases = [case.put(*change).but(name=name) for name, change in changes.items()]
     cases.insert(1, _turning().but(name="turning"))
-<<<<<<< HEAD
-    assert len({sharing_key(one) for one in cases}) == 1
-    together = make_runs(cases, tmp_path / "together", engine)
+    together = make_runs(cases, tmp_path / "together", find_engine())
     assert {*together.values()} == {True}
     decks = [read_manifest(tmp_path / "together" / name).get("shared_deck") for name in together]
     assert len({deck["first"] if deck else None for deck in decks}) == 2  # the second has the one that went on
     cycles = {}
     for one in cases:
-        (name,) = make_runs([one], tmp_path / "alone", engine)
+        (name,) = make_runs([one], tmp_path / "alone", find_engine())
         places = [tmp_path / folder / name for folder in ("together", "alone")]
         velocities = [read(place).table("walkers")["velocity"][0] for place in places]
         ways = [(motion := read_motion(place)).position - motion.position[0] for place in places]
-=======
-    together = make_runs(cases, tmp_path / "together", find_engine())
-    decks = [read_manifest(run).get("shared_deck") for run in together.values()]
-    assert len({deck["first"] if deck else None for deck in decks}) == 2  # the second has the one that went on
-    cycles = {}
-    for one in cases:
-        ((name, run),) = make_runs([one], tmp_path / "alone", find_engine()).items()
-        velocities = [read(place).table("walkers")["velocity"][0] for place in (together[name], run)]
-        ways = [(motion := read_motion(place)).position - motion.position[0] for place in (together[name], run)]
->>>>>>> origin/main
         assert ways[0].shape == ways[1].shape
         assert np.abs(ways[0] - ways[1]).max() < 2e-5 * np.abs(ways[1]).max(), one.name
         assert velocities[0] == pytest.approx(velocities[1], rel=1e-6, abs=1e-12), one.name
