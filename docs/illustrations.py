@@ -22,9 +22,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
-from docs import tables
+from docs import effects, tables
 from walkers import load_case, run, sweep
 from walkers.api import Run, climb
 from walkers.calibration.calibrate import calibrate
@@ -38,6 +39,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.keys import flatten
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.make import COMPARED, FIGURES, make_figures
+from walkers.paper.sources import sweep_of
 from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, save_figure, styled
 from walkers.postprocess.film_options import FilmOptions
 from walkers.postprocess.results import VERSION
@@ -75,7 +77,7 @@ def _of_figure(name: str, *files: str, sweeps: Iterable[str]) -> Illustration:
     def make(out: Path, docs: Path) -> None:
         make_figures(out, docs / "figures", Options(), only=[name], formats=("png",))
 
-    return Illustration(files, lambda: [case for sweep in sweeps for case in load_sweep(sweep).cases()], make)
+    return Illustration(files, lambda: [case for sweep in sweeps for case in sweep_of(sweep).cases()], make)
 
 
 def _of_run(name: str, case: str, changes: Mapping[str, Any] | None = None, film: Any = None) -> Illustration:
@@ -236,6 +238,11 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     **{name: _of_figure(name, f"figures/{name}.png", sweeps=one.sweeps) for name, one in FIGURES.items()},
     **{name: _of_sweep(name, options) for name, options in _SWEEPS.items()},
     "comparison": _of_figure("comparison", "figures/comparison.md", "figures/comparison.json", sweeps=COMPARED),
+    "unexplained": Illustration(
+        ("figures/unexplained.md",),
+        _shipped("fig1b", "fig4a", "fig4b"),
+        lambda _, docs: write_text(docs / "figures" / "unexplained.md", effects.table()),
+    ),
     "validation": Illustration(
         (CHECKED.as_posix(), "figures/benchmarks.png"),
         _shipped("fig1b", "fig4a", "fig4b", "climber", "climber-dimer", "pile-ci"),
@@ -300,10 +307,13 @@ def pages_of(docs: Path) -> list[Path]:
 def facts(docs: Path) -> dict[str, str]:
     """Numbers that sentences may quote: of the comparison with the paper, of `CHECKED`, of the tables of climbs."""
     compared: dict[str, Any] = read_json(docs / "figures" / "comparison.json")
-    numbers = {one["key"]: f"{one['engine']:.3g}" for one in compared["numbers"] if one["engine"] is not None}
+    shipped, counted = next(iter(compared["sets"].items()))
+    values = {one["name"]: one["values"][shipped] for one in compared["facts"]}
+    numbers = {name: f"{value:.3g}" for name, value in values.items() if value is not None}
+    numbers["agree"] = f"{counted['agree']} of {counted['of']}"
+    numbers["threshold"] = f"{np.mean([list(one.values())[1:3] for one in compared['thresholds']]):.2f}"
     checked = read_json(docs / CHECKED)["lines"]
-    agree = f"{compared['agree']} of {compared['of']}"
-    return {**numbers, "agree": agree, **_of_checks(checked), **dict(tables.cells(docs / "figures"))}
+    return {**numbers, **_of_checks(checked), **dict(tables.cells(docs / "figures"))}
 
 
 def _of_checks(lines: Sequence[Mapping[str, Any]]) -> dict[str, str]:

@@ -123,6 +123,18 @@ def test_samples_have_a_panel_for_each_key(looked_through: Path) -> None:
         assert axes.containers[0][0].get_linestyle() == "None"  # type: ignore[index]
 
 
+def test_keys_that_vary_one_at_a_time_are_each_shown_with_the_usual_others() -> None:
+    keys = ("contact.friction.bead_wall", "contact.restitution")
+    rows = [[0.2, 0.5], [0.1, 0.5], [0.3, 0.5], [0.2, 0.9]]
+    for more, shown in (([], [(0.1, 0.2, 0.3), (0.5, 0.9)]), ([[0.1, 0.9]], [(0.1, 0.1, 0.2, 0.2, 0.3)] * 2)):
+        table = _table(dict.fromkeys(keys, ""), rows + more, [keys])
+        table = table.assign(velocity=np.arange(len(table)) * 1e-3, scatter=1e-4)
+        table.attrs["units"] |= {"velocity": "m/s", "scatter": "m/s"}
+        along = [_drawn(axes)[0][0] for axes in _panels(figure_of(table))]
+        assert [*map(len, along)] == [*map(len, shown)]
+        assert tuple(along[0]) == shown[0]
+
+
 def test_keys_that_go_together_are_one_factor() -> None:
     """A zip of equal numbers, one of texts, and one that only together tell its points apart."""
     wall, bead = both = ("contact.friction.bead_wall", "contact.friction.bead_bead")

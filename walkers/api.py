@@ -652,12 +652,12 @@ class Sweep:
 
 def _figure(table: pd.DataFrame, options: Mapping[str, Any]) -> Figure:
     """The figure of the table of a sweep."""
-    from walkers.paper.published import predicted
     from walkers.sweeps.figure import figure_of
     from walkers.sweeps.figure_options import FigureOptions
+    from walkers.theory.prediction import predicted_column
 
     chosen = FigureOptions(**options)
-    return figure_of(table, chosen, predicted if chosen.theory else None)
+    return figure_of(table, chosen, predicted_column if chosen.theory else None)
 
 
 def sweep(
@@ -849,12 +849,11 @@ def predict(case: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None)
 
     See `walkers.theory.prediction.predict`.
     """
-    from walkers.paper.published import outside_of_the_paper
     from walkers.theory import prediction
 
     named, directory = case_and_run(case, out, changes)
     try:
-        predicted = {**prediction.predict(named), "outside": outside_of_the_paper(named), "engine": None}
+        predicted = {**prediction.predict(named), "outside": prediction.outside_of_the_paper(named), "engine": None}
     except ValueError as error:
         key, _, why = str(error).partition(": ")
         raise InputError(named.name, [Problem(key, None, why)]) from error

@@ -12,11 +12,11 @@ from walkers.errors import InputError, Problem
 EXTRAS = {
     "archive": ("an archive", ("tomli-w",)),
     "calibrate": ("a calibration", ("corner", "scikit-learn", "threadpoolctl")),
-    "check": ("a check of the engine", ("joblib", "numba")),
+    "check": ("a check of the engine", ("numba",)),
     "cluster": ("a sweep on a cluster", ("parsl",)),
     "film": ("an MP4", ("imageio-ffmpeg",)),
     "report": ("a report or an interactive view", ("k3d",)),
-    "theory": ("the theory", ("joblib", "numba")),
+    "theory": ("the theory", ("numba",)),
 }
 """For each extra: what needs it, and its packages as PyPI names them."""
 

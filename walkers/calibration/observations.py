@@ -33,7 +33,7 @@ A bead that only rolls has 0, one that is dragged without rolling has 1.
 """
 Angle = Literal["largest_angle", "smallest_angle"]
 """Of all walkers to the drive axis at the end of the run, in either direction, 0 to 90 degrees."""
-_LEAST_SPEED = 5e-5
+LEAST_SPEED = 5e-5
 """m/s; a ratio to a smaller speed has no meaning."""
 NO_NUMBERS: dict[str, float] = dict.fromkeys((*get_args(Speed), *get_args(Slip), *get_args(Angle)), nan)
 """Quantities of a run that failed."""
@@ -122,7 +122,7 @@ class Observation(Table):
             float(np.mean([numbers[label][self.quantity] for label in each])) if each else 1.0
             for each in (self.of, self.over)
         )
-        if self.over and kind_of(self.quantity) is SPEED and abs(below) < _LEAST_SPEED:
+        if self.over and kind_of(self.quantity) is SPEED and abs(below) < LEAST_SPEED:
             return nan
         return above / below if self.over else above
 

@@ -165,7 +165,7 @@ def figures(
     jobs: Jobs = None,
     by: By = By(),
 ) -> int:
-    """Draw the paper's figures with simulation, theory and published values. Missing runs are made first.
+    """Draw the paper's figures, and write what it measured or states beside ours. Missing runs are made first.
 
     Parameters
     ----------
@@ -182,8 +182,7 @@ def figures(
         tell(*(f"{name}: point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
     tell(*(f"{figure} is left out: {reason}" for figure, reason in made.left_out.items()))
     print_lines(made.files)
-    if made.compared:
-        print(f"{made.agree} of {made.compared} published numbers agree: {to / 'comparison.md'}")
+    print_lines(f"{agree} of {of} facts agree: {name}" for name, (agree, of) in made.counts.items())
     return 1 if made.failures or made.left_out else 0
 
 

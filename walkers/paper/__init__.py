@@ -1,4 +1,4 @@
-"""Comparison with the paper: its figures with engine, theory and published values, and the deviation of each number.
+"""The paper's figures with engine and theory, and the facts that it measured or states beside ours.
 
-Uses finished sweeps (the numbers of the engine) and `walkers.theory`.
+Uses finished sweeps (the numbers of the engine), `walkers.theory`, and the observations of the calibration ``ruby``.
 """

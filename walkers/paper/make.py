@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.errors import refused
 from walkers.extras import require
-from walkers.inputs.sweep import load_sweep
-from walkers.paper.comparison import as_dict, as_markdown, compare, count
-from walkers.paper.figures import fig1b, fig2, fig3, fig4, fig_sensitivity
-from walkers.paper.maps import fig_alignment, fig_modes
-from walkers.paper.published import NothingFinishedError, Sources
+from walkers.paper.comparison import compare
+from walkers.paper.figures import fig1b, fig2_threshold, fig3, fig4, fig_alignment, of_sweep
+from walkers.paper.sources import NothingFinishedError, Sources, of_facts, sets, sweep_of
 from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.progress import progress_of
 from walkers.runner.files import write_json, write_text
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
+from walkers.text import rendered
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,30 +34,33 @@ class Drawing(NamedTuple):
     title: str
 
 
+_FIG2 = partial(of_sweep, name="fig2", x="drive.peak_acceleration", hue="drive.frequency", theory=True)
 FIGURES = {
     "fig1b": Drawing(fig1b, ("alignment",), "Fig. 1b: strobed top views of a walker"),
-    "fig2": Drawing(fig2, ("fig2", "fig2-threshold"), "Fig. 2: velocity against peak acceleration"),
+    "fig2": Drawing(_FIG2, ("fig2",), "Fig. 2: velocity against peak acceleration"),
+    "fig2-threshold": Drawing(fig2_threshold, ("fig2-threshold",), "Fig. 2, inset: the threshold of motion"),
     "fig3": Drawing(fig3, ("fig3",), "Fig. 3: velocity against asymmetry"),
     "fig4": Drawing(fig4, ("fig4",), "Fig. 4: rotation of the beads through two cycles"),
     "alignment": Drawing(fig_alignment, ("alignment",), "Alignment with the shaking axis and across it"),
-    "modes": Drawing(fig_modes, ("modes",), "Modes of motion"),
-    "sensitivity": Drawing(fig_sensitivity, ("sensitivity",), "Sensitivity of six observations to the parameters"),
+    "sensitivity": Drawing(
+        partial(of_sweep, name="sensitivity"), ("sensitivity",), "Velocities with one parameter changed at a time"
+    ),
 }
 COMPARISON = "comparison"
-COMPARED = ("fig2", "fig2-threshold", "fig3", "fig4", "alignment")
+COMPARED = (*map(of_facts, sets()), "fig2-threshold", "fig2", "fig3")
+"""Sweeps of the comparison."""
 
 
 class Made(NamedTuple):
-    """Written files, failed points by sweep, and figures that could not be drawn with the reasons.
+    """Written files, failed points by sweep, figures that could not be drawn with the reasons, and facts that agree.
 
-    ``agree`` of ``compared`` published numbers that test the engine agree; both are 0 without a comparison.
+    Facts are counted for each parameter set: those that agree, and all; there are none without a comparison.
     """
 
     files: list[Path]
     failures: dict[str, list[Failure]]
     left_out: dict[str, str]
-    agree: int = 0
-    compared: int = 0
+    counts: Mapping[str, tuple[int, int]] = MappingProxyType({})
 
 
 def make_figures(
@@ -90,8 +94,6 @@ def make_figures(
         If a figure or format does not exist, or a folder is a file.
     """
     require("theory")
-    import joblib
-
     known = (*FIGURES, COMPARISON)
     chosen = list(only) or list(known)
     for name in chosen:
@@ -105,29 +107,27 @@ def make_figures(
     failed: dict[str, list[Failure]] = {}
     for sweep in dict.fromkeys(sweep for sweeps in needed for sweep in sweeps):
         with progress_of(sweep, progress) as advance:
-            _, failures = run_sweep(load_sweep(sweep), out, options, on_progress=advance, **how)
+            _, failures = run_sweep(sweep_of(sweep), out, options, on_progress=advance, **how)
         failed |= {sweep: failures} if failures else {}
-    figures = [name for name in chosen if name in FIGURES]
-    # Processes of loky do not import the caller's script, unlike those of `multiprocessing`.
-    draw = joblib.Parallel(n_jobs=min(options.decks_at_once, len(figures) or 1))
-    outcomes = draw(joblib.delayed(draw_figure)(name, out, to, formats) for name in figures)
-    files = [path for outcome in outcomes if isinstance(outcome, list) for path in outcome]
-    left_out = {name: one for name, one in zip(figures, outcomes, strict=True) if isinstance(one, str)}
+    files: list[Path] = []
+    left_out: dict[str, str] = {}
+    for name in (name for name in chosen if name in FIGURES):
+        drawing, sources = FIGURES[name], Sources(out)
+        try:
+            runs = sources.runs(drawing.sweeps)
+            files += save_figure(drawing.draw(sources), to / name, runs, formats, drawing.title)
+        except NothingFinishedError as missing:
+            left_out[name] = str(missing)
     if COMPARISON not in chosen:
         return Made(files, failed, left_out)
-    rows = compare(Sources(out))
+    found = compare(Sources(out))
     page, record = to / f"{COMPARISON}.md", to / f"{COMPARISON}.json"
     to.mkdir(parents=True, exist_ok=True)
-    write_text(page, as_markdown(rows))
-    write_json(record, as_dict(rows))
-    return Made([*files, page, record], failed, left_out, *count(rows, measured=True))
-
-
-def draw_figure(name: str, out: Path, to: Path, formats: Sequence[str]) -> list[Path] | str:
-    """Draw one of `FIGURES` from finished sweeps; return the files, or the reason why it cannot be drawn."""
-    drawing, sources = FIGURES[name], Sources(out)
-    try:
-        runs = sources.runs(*drawing.sweeps)
-        return save_figure(drawing.draw(sources), to / name, runs, formats, drawing.title)
-    except NothingFinishedError as missing:
-        return str(missing)
+    write_text(page, rendered("walkers.paper", "comparison.md.j2", **found))
+    write_json(record, found)
+    return Made(
+        [*files, page, record],
+        failed,
+        left_out,
+        {name: (one["agree"], one["of"]) for name, one in found["sets"].items()},
+    )

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from walkers.errors import InputError, refused
 from walkers.inputs.case import Case
 from walkers.inputs.library import unmeasured
-from walkers.postprocess.drawing import errors_seen, letter_panels, new_figure, plain_text, styled
+from walkers.postprocess.drawing import TWO_COLUMNS, errors_seen, letter_panels, new_figure, plain_text, styled
 from walkers.postprocess.numbers import declared, is_declared, scatter_of
 from walkers.postprocess.quantities import unit_shown
 from walkers.postprocess.results import derived
@@ -358,13 +358,13 @@ def _draw(
     if "x" in log and not all(one.is_number for one in along):
         raise refused("log", f"{along[0].label} has no numbers")
     label, points = _points(done, column, down)
-    parts = [(x, np.ones(len(points), dtype=bool), "") for x in along]
+    parts = [(x, _with_usual_others(x, along), "") for x in along]
     if panels is not None:
         parts = [(along[0], _where(panels, one), panels.text(one, by_name=True)) for one in panels.levels]
     looks, scale = _looks(hue, hollow=theory is not None)
     columns = min(len(parts), 2 if len(parts) in (2, 4) else 3)
     rows = ceil(len(parts) / columns)
-    width, height = (5.6, 3.8) if len(parts) == 1 else (7.0, 6.0 / columns * rows + 0.9)
+    width, height = TWO_COLUMNS, 4.2 if len(parts) == 1 else 6.0 / columns * rows + 0.9
     shared = {"sharey": True, "sharex": len(along) == 1}
     figure, grid = new_figure(width, height, nrows=rows, ncols=columns, squeeze=False, **shared)
     for axes, (number, (x, here, name)) in zip(grid.flat, enumerate(parts), strict=False):
@@ -394,6 +394,14 @@ def _draw(
         said.append(bars + ("" if errors_seen(points["error"], points["value"]) else ", smaller than the symbols"))
     figure.suptitle(plain_text("\n".join(line for one in said for line in wrap(one, round(14.0 * width)))))
     return figure
+
+
+def _with_usual_others(x: Factor, along: Sequence[Factor]) -> npt.NDArray[np.bool_]:
+    """Which points a panel shows: all, or of keys that vary one at a time those with the usual values of the others."""
+    usual = {one.keys: Counter(one.values).most_common(1)[0][0] for one in along}
+    changed = {one.keys: np.array([value != usual[one.keys] for value in one.values]) for one in along}
+    number = np.sum([*changed.values()], axis=0)
+    return np.array((number > 1).any() | changed[x.keys] | (number == 0))
 
 
 def _where(factor: Factor | None, level: Any) -> npt.NDArray[np.bool_]:

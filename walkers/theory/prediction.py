@@ -11,6 +11,7 @@ import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
+from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.rounding import with_decimals
 from walkers.text import aligned
 from walkers.theory.mathieu import Alignment, alignment, largest_stable_v, time_to_turn, turning_rate
@@ -29,6 +30,8 @@ PAPER = f"theory: paper's fit, κ = {FRICTION_OF_THE_PAPER * 1e-3:g} s/mm"
 friction was fitted (`walkers.theory.quasistatic.mean_velocity`)."""
 _BEADS, _BOUNDARIES, _LIQUIDS = "ruby", ("chromium-coated glass", "glass"), ("Si AK5", "Si AK10")
 """Beads, boundaries and liquids of the paper's walkers on a level substrate (Figs. 2 to 4)."""
+_FREQUENCIES, _LARGEST_PEAK, _LARGEST_GAMMA0 = (60.0, 90.0), 10.0, 3.5
+"""Their drives: Hz, g of 9.8 m/s² (both Fig. 2), and Γ0 (Fig. 4b)."""
 
 
 def motion_of(*cases: Case, viscous: bool = True) -> Motion:
@@ -111,6 +114,20 @@ def why_not_the_paper(case: Case) -> str | None:
     if same and case.axial_gravity == 0.0:
         return None
     return f"the fit is to {_BEADS} on level {' or '.join(_BOUNDARIES)} in {' or '.join(_LIQUIDS)}"
+
+
+def outside_of_the_paper(case: Case) -> str | None:
+    """How a case of a dimer lies outside the range of the paper's velocities; None if it is within, or no dimer."""
+    if not case.walkers or len(case.walkers[0].radii) != 2:
+        return None
+    drive, (slow, fast) = case.excitation, _FREQUENCIES
+    peak, gamma0 = drive.peak_acceleration / ACCELERATION_OF_ONE_G, dimer_of(case).gamma0(drive.peak_acceleration)
+    beyond = [
+        *([f"Γ0 = {gamma0:.3g} (measured up to {_LARGEST_GAMMA0:g})"] if gamma0 > _LARGEST_GAMMA0 else []),
+        *([f"{peak:.3g} g (up to {_LARGEST_PEAK:g} g)"] if peak > (1.0 + 1e-9) * _LARGEST_PEAK else []),
+        *([] if slow <= drive.frequency <= fast else [f"{drive.frequency:g} Hz ({slow:g} to {fast:g} Hz)"]),
+    ]
+    return f"outside the paper's measurements: {', '.join(beyond)}; no model is tested there" if beyond else None
 
 
 def _predicted(case: Case, *, viscous: bool) -> dict[str, Any]:
@@ -237,7 +254,8 @@ def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, Floa
         Values of each model by its name, m/s, shape (N,); NaN where it does not apply. Empty if no model has the column
         or applies to any point.
     reasons
-        Reasons why points lack a value of `MODEL`, or velocities one of `PAPER`, with the number of points.
+        Reasons why points lack a value of `MODEL`, or velocities one of `PAPER`, and how points are outside of the
+        paper's measurements, where no model is tested, with the number of points.
     """
     family, _, number = column.replace("_pair_1", "_3").rpartition("_")  # contact 3 of the theory
     is_velocity = column in ("velocity", "right_facing", "left_facing")
@@ -261,6 +279,8 @@ def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, Floa
         else:
             paper[place] = mean_velocity(dimer.gamma0(case.excitation.peak_acceleration), dimer.sin_delta)
     models = {MODEL: model, PAPER: paper}
+    if beyond := [sentence for case in cases if (sentence := outside_of_the_paper(case))]:
+        reasons[beyond[0] + (", …" if len(beyond) > 1 else "")] = len(beyond)
     return {name: values for name, values in models.items() if np.isfinite(values).any()}, dict(reasons)
 
 

@@ -1,0 +1,95 @@
+"""The sweeps that figures and comparison are made from, and the walkers of the paper as cases."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from walkers.calibration.file import Calibration, load_calibration
+from walkers.errors import WalkersError
+from walkers.inputs.case import Case
+from walkers.inputs.reading import load_case
+from walkers.inputs.sweep import Sweep, load_sweep
+from walkers.inputs.units import ACCELERATION_OF_ONE_G
+from walkers.postprocess.caption import liquid_text, radii_text
+from walkers.postprocess.motion import Group, read_motion
+from walkers.sweeps.table import load, thresholds
+from walkers.theory.prediction import threshold
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_FRICTION_ONLY = {
+    **{"friction_wall": 0.311, "friction_slide": 0.311, "friction_bead": 0.083, "rolling_friction": 0.0035},
+    **{"roughness": 2000.0, "meniscus_radius": 40.0},
+}
+"""Surfaces so rough that bridges drag little: outside of what the calibration searches, in the units of its file."""
+
+
+@cache
+def ruby() -> Calibration:
+    """The calibration with what the paper measured and states."""
+    return load_calibration("ruby")
+
+
+@cache
+def sets() -> dict[str, Mapping[str, float] | None]:
+    """Parameter sets to compare: the cases as they are, the sets of the calibration, and one of friction alone."""
+    return {"shipped": None, **ruby().file.sets, "friction only": _FRICTION_ONLY}
+
+
+def of_facts(name: str) -> str:
+    """The name of the sweep of all experiments of the calibration with a parameter set."""
+    return f"facts-{name.replace(' ', '-')}"
+
+
+def sweep_of(name: str) -> Sweep:
+    """A shipped sweep, or one of `of_facts`."""
+    for label, values in sets().items():
+        if name == of_facts(label):
+            row = None if values is None else np.array([[values[one] for one in ruby().file.parameters]])
+            return ruby().sweep(name, row)
+    return load_sweep(name)
+
+
+def described(case: Case) -> str:
+    """Radii, drive and liquid of a case in a few words, for titles."""
+    drive = f"{case.excitation.frequency:g} Hz, {case.excitation.peak_acceleration / ACCELERATION_OF_ONE_G:.3g} g"
+    return f"R = {radii_text(case.walkers[0].radii)} mm, {drive}, {liquid_text(case)}"
+
+
+class NothingFinishedError(WalkersError):
+    """A sweep has no finished points."""
+
+
+class Sources:
+    """Sweeps in a folder: ``table`` gives the table of one by its name, ``trajectory`` the first make of a run."""
+
+    def __init__(self, out: Path) -> None:
+        self.out = out
+        self.table: Callable[[str], pd.DataFrame] = lru_cache(maxsize=None)(lambda sweep: load(out / sweep))
+        self.trajectory: Callable[[str], Group] = lru_cache(maxsize=32)(lambda run: read_motion(run).groups[0])
+
+    def finished(self, sweep: str) -> pd.DataFrame:
+        """The finished points of a sweep; raises `NothingFinishedError` if there is none."""
+        table = self.table(sweep)
+        done = table[table["status"] == "finished"]
+        if done.empty:
+            raise NothingFinishedError(f"no point of the sweep {sweep} is finished")
+        return done
+
+    def runs(self, sweeps: Sequence[str]) -> list[str]:
+        """Names of the finished runs of sweeps."""
+        return [Path(run).name for sweep in sweeps for run in self.finished(sweep)["run"]]
+
+
+def thresholds_with_theory(sources: Sources) -> pd.DataFrame:
+    """Γc of the sweep ``fig2-threshold``: the Γ0 at which walkers rest and move, and that of the ``theory``."""
+    ends = thresholds(sources.table("fig2-threshold"))
+    cases = [load_case("fig1b", {"drive.frequency": f"{one} Hz"}) for one in ends["drive.frequency"]]
+    shown = ends[["drive.frequency", "gamma0_at_rest", "gamma0_moving"]]
+    return shown.assign(theory=[threshold(case) for case in cases])
