@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from docs import tables
+from docs import effects, tables
 from walkers import load_case, run, sweep
 from walkers.api import Run, climb
 from walkers.calibration.calibrate import calibrate
@@ -239,6 +239,11 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     **{name: _of_figure(name, f"figures/{name}.png", sweeps=one.sweeps) for name, one in FIGURES.items()},
     **{name: _of_sweep(name, options) for name, options in _SWEEPS.items()},
     "comparison": _of_figure("comparison", "figures/comparison.md", "figures/comparison.json", sweeps=COMPARED),
+    "unexplained": Illustration(
+        ("figures/unexplained.md",),
+        _shipped("fig1b", "fig4a", "fig4b"),
+        lambda _, docs: write_text(docs / "figures" / "unexplained.md", effects.table()),
+    ),
     "validation": Illustration(
         (CHECKED.as_posix(), "figures/benchmarks.png"),
         _shipped("fig1b", "fig4a", "fig4b", "climber", "climber-dimer", "pile-ci"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
@@ -52,14 +51,20 @@ def readable(key: str, value: Any) -> str:
 
 def kind_of(key: str) -> Kind | None:
     """What kind of quantity the numbers of a key of a case are, such as ``dimers.radii[0]``; None for pure numbers."""
-    return _kinds().get(re.sub(r"\[\d+\]", "", key))
+    return _kinds().get(_ending(key))
 
 
 @cache
 def _kinds() -> Mapping[str, Kind]:
-    """What the numbers of a case are, by their keys; the others are pure numbers."""
-    kinds = {key: units.kind_in([*field.metadata, field.annotation]) for key, field in keys_of(Case).items()}
-    return {key: kind for key, kind in kinds.items() if kind is not None}
+    """What the numbers of a case are, by the ends of their keys; the others are pure numbers."""
+    fields = [(_ending(key), field) for key, field in keys_of(Case).items()]
+    kinds = {name: units.kind_in([*field.metadata, field.annotation]) for name, field in fields}
+    return {name: kind for name, kind in kinds.items() if kind is not None}
+
+
+def _ending(key: str) -> str:
+    """The last two parts of a key, without places in lists: ``bead_wall`` is a friction or a roughness."""
+    return ".".join(part.partition("[")[0] for part in key.split(".")[-2:])
 
 
 def _number(value: Any, size: float) -> str:
