@@ -43,15 +43,20 @@ def readable(key: str, value: Any) -> str:
 
 def kind_of(key: str) -> Kind | None:
     """What kind of quantity the numbers of a key of a case are, such as ``dimers.radii[0]``; None for pure numbers."""
-    return _kinds().get(key.rpartition(".")[2].partition("[")[0])
+    return _kinds().get(_ending(key))
 
 
 @cache
 def _kinds() -> Mapping[str, Kind]:
-    """What the numbers of a case are, by the last part of their keys; the others are pure numbers."""
-    fields = [(key.rpartition(".")[2], field) for key, field in keys_of(Case).items()]
+    """What the numbers of a case are, by the ends of their keys; the others are pure numbers."""
+    fields = [(_ending(key), field) for key, field in keys_of(Case).items()]
     kinds = {name: units.kind_in([*field.metadata, field.annotation]) for name, field in fields}
     return {name: kind for name, kind in kinds.items() if kind is not None}
+
+
+def _ending(key: str) -> str:
+    """The last two parts of a key, without places in lists: ``bead_wall`` is a friction or a roughness."""
+    return ".".join(part.partition("[")[0] for part in key.split(".")[-2:])
 
 
 def differing(cases: Sequence[FlatCase]) -> list[str]:
