@@ -59,6 +59,7 @@ EFFECTS = (
     Effect("the law"),
     Effect("(a) lift above 40 nm", lifted_above=40e-9),
     Effect("(a) lift above 0.3 µm", lifted_above=0.3e-6),
+    Effect("(a) lift above 3 µm", lifted_above=3e-6),
     Effect("(b) merged bridges", merged=True),
     Effect("(b) merged bridges, 150 µm", merged=True, changes=_WIDE),
     Effect("(c) hysteresis of 20°", hysteresis=0.06),

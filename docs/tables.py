@@ -35,7 +35,7 @@ def cells(folder: Path) -> Iterator[tuple[str, str]]:
         lines = [
             line.strip("| ").split(" | ") for line in file.read_text("utf-8").splitlines() if line.startswith("| ")
         ]
-        for row in lines[2:] if file.read_text("utf-8").startswith("# walkers ") else ():
+        for row in lines[2:] if file.read_text("utf-8").startswith(("# walkers ", "# python ")) else ():
             yield from ((_name(file.stem, row[0], column), text) for column, text in zip(lines[0], row, strict=True))
 
 
