@@ -203,18 +203,16 @@ def _contradictions(file: CalibrationFile) -> Iterator[Problem]:
             yield Problem(f"{place}.name", f'"{one.name}"', "expected a name of its own")
         if one.over and set(one.over) == set(one.of):
             yield Problem(f"{place}.over", None, "expected other experiments than in of: the ratio would be 1")
-        if (one.value is None) == (limits == [None, None]) or (None not in limits and one.limits[0] >= one.limits[1]):
+        if (one.value is None) == (limits == [None, None]) or one.limits[0] > one.limits[1]:
             yield Problem(place, None, "expected either a value or limits: least, most, or both in this order")
     if not any(one.weighed and one.group not in file.design.held_out for one in file.observations):
         yield Problem("observations", None, "expected one that is neither derived, costly nor held out")
     for label, given in file.sets.items():
         for name, parameter in file.parameters.items():
-            low, high = parameter.range
-            if name not in given:
-                yield Problem(f"sets.{label}.{name}", None, "missing; a set has all parameters")
-            elif not low <= given[name] <= high:
-                expected = f"expected a number within the parameter's range, {low:g} to {high:g}"
-                yield Problem(f"sets.{label}.{name}", f"{given[name]:g}", expected)
+            value, (low, high) = given.get(name), parameter.range
+            if value is None or not low <= value <= high:
+                expected = f"expected a number in the range of the parameter, {low:g} to {high:g}"
+                yield Problem(f"sets.{label}.{name}", None if value is None else f"{value:g}", expected)
 
 
 def _problems_of_keys(file: CalibrationFile, varied: Collection[str]) -> Iterator[Problem]:
@@ -225,9 +223,9 @@ def _problems_of_keys(file: CalibrationFile, varied: Collection[str]) -> Iterato
             expected = "missing; expected it here or in [set]: other experiments change it"
             yield Problem(f"experiments.{label}.{key}", None, expected)
         own = [one.keys for one in file.parameters.values() if label in (one.experiments or [label])]
-        for key in every:
-            if (number := sum(key in keys for keys in own)) != 1:
+        for key, number in ((key, sum(key in keys for keys in own)) for key in every):
+            if number != 1:
                 expected = (
-                    f"{key} is set by {number} parameters for the experiment {label}; expected one, or none for all"
+                    f"expected one parameter that sets {key} for {label}, or none for any experiment; {number} do"
                 )
                 yield Problem("parameters", None, expected)
