@@ -36,7 +36,6 @@ from walkers.check.lines import as_dict, failures, run_checks
 from walkers.check.literature import LITERATURE
 from walkers.errors import InputError, Problem
 from walkers.inputs.case import Case
-from walkers.inputs.keys import flatten
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.make import COMPARED, FIGURES, make_figures
 from walkers.paper.sources import sweep_of
@@ -61,7 +60,7 @@ _ASSEMBLES = {"run.duration": "10 s", "run.seed": 10}
 """The pile whose first climber the page follows: it climbs a plain wall, and its beads were no neighbours at rest."""
 _PAPERS = {"run.ranks": 1, "run.seed": 1}
 """Of the paper's pile, as the sweep pile-paper runs it."""
-_OF_CALIBRATION = ("corner", "predictions")
+_OF_CALIBRATION = ("calibration.md", "calibration.json", "predictions.png")
 
 
 @dataclass(frozen=True)
@@ -168,15 +167,12 @@ def _make_calibration(out: Path, docs: Path) -> None:
     found = calibrate(load_calibration("ruby"), out, Options())
     write_outcome(found, out / "ruby")
     for name in _OF_CALIBRATION:
-        shutil.copy(out / "ruby" / f"{name}.png", docs / "figures" / f"calibration-{name}.png")
-    shutil.copy(out / "ruby" / "calibration.md", docs / "figures" / "calibration.md")
+        shutil.copy(out / "ruby" / name, docs / "figures" / name.replace("predictions", "calibration"))
 
 
 def _calibrated() -> list[Case]:
     """The experiments of the calibration with the shipped values of its parameters."""
-    read = load_calibration("ruby")
-    base = flatten(read.file.set, lambda _: False)
-    return [load_case(read.file.case, {**base, **values}) for values in read.experiments.values()]
+    return list(load_calibration("ruby").sweep("ruby").cases())
 
 
 _AS_SLOPES = {"y": "axial_velocity", "hue": "liquid.viscosity_ratio", "panels": "clusters[0].arrangement"}
@@ -249,7 +245,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
         _make_validation,
     ),
     "calibration": Illustration(
-        tuple(f"figures/calibration-{name}.png" for name in _OF_CALIBRATION), _calibrated, _make_calibration
+        tuple(f"figures/calibration.{ending}" for ending in ("md", "json", "png")), _calibrated, _make_calibration
     ),
 }
 
@@ -305,7 +301,7 @@ def pages_of(docs: Path) -> list[Path]:
 
 
 def facts(docs: Path) -> dict[str, str]:
-    """Numbers that sentences may quote: of the comparison with the paper, of `CHECKED`, of the tables of climbs."""
+    """Numbers that sentences may quote: of comparison and calibration, of `CHECKED`, of the tables of climbs."""
     compared: dict[str, Any] = read_json(docs / "figures" / "comparison.json")
     shipped, counted = next(iter(compared["sets"].items()))
     values = {one["name"]: one["values"][shipped] for one in compared["facts"]}
@@ -313,6 +309,7 @@ def facts(docs: Path) -> dict[str, str]:
     numbers["agree"] = f"{counted['agree']} of {counted['of']}"
     numbers["threshold"] = f"{np.mean([list(one.values())[1:3] for one in compared['thresholds']]):.2f}"
     checked = read_json(docs / CHECKED)["lines"]
+    numbers |= tables.of_calibration(read_json(docs / "figures" / "calibration.json"))
     return {**numbers, **_of_checks(checked), **dict(tables.cells(docs / "figures"))}
 
 

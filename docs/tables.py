@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -41,3 +42,20 @@ def cells(folder: Path) -> Iterator[tuple[str, str]]:
 
 def _name(*words: str) -> str:
     return "_".join(re.findall(r"\w+", " ".join(words).lower()))
+
+
+def of_calibration(record: Mapping[str, Any]) -> dict[str, str]:
+    """Numbers of ``calibration.json``: agreeing facts and values by set, intervals, and what was predicted."""
+    numbers = {"calibration_sets": str(record["number"])}
+    for name, agree in record["agree"].items():
+        numbers[_name("calibration", name)] = f"{agree} of {record['of']}"
+        for row in record["observations"]:
+            numbers[_name("calibration", name, row["name"])] = _short(row["numbers"][name])
+    intervals = {f"posterior {name}": ends for name, ends in record["posterior"].items()}
+    intervals |= {f"predicted {row['name']}": row["predicted"] for row in record["observations"] if row["predicted"]}
+    texts = {name: "{1} ({0} to {2})".format(*map(_short, ends)) for name, ends in intervals.items()}
+    return numbers | {_name("calibration", name): text for name, text in texts.items()}
+
+
+def _short(number: float | None) -> str:
+    return "no number" if number is None else f"{number:.3g}"
