@@ -28,7 +28,7 @@ from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import read_record
 from walkers.text import rendered
 from walkers.theory.mathieu import turning
-from walkers.theory.prediction import alignment_of, motion_of, pendulum_of
+from walkers.theory.prediction import alignment_of, motion_of, outside_of_the_paper, pendulum_of, predicted_column
 
 SHORT = {"dimers.replicates": 2, "run.cycles": 8, "run.settling_cycles": 4}
 FEWER: dict[str, dict[str, Any]] = {
@@ -77,6 +77,20 @@ def compared(sources: Sources) -> dict[str, Any]:
 )  # fmt: skip
 def test_peak_forces_are_the_papers(case: str, g: int, gamma0: float) -> None:
     assert dimer_of(load_case(case)).gamma0(g * ACCELERATION_OF_ONE_G) == pytest.approx(gamma0, rel=3e-3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [({}, None),
+     ({"drive.peak_acceleration": "40 g"}, "Γ0 = 3.81 (measured up to 3.5), 40 g (up to 10 g)"),
+     ({"drive.frequency": "170 Hz"}, "170 Hz (60 to 90 Hz)")],
+)  # fmt: skip
+def test_theory_says_where_the_paper_measured_nothing(changes: dict[str, str], told: str | None) -> None:
+    found = outside_of_the_paper(load_case("fig1b", changes))
+    assert found is None if told is None else told in (found or "")
+    assert [one for one in predicted_column([load_case("fig1b", changes)], "velocity")[1] if one == found] == [
+        one for one in [found] if one
+    ]
 
 
 def test_what_is_called_shipped_is_that_of_the_shipped_cases() -> None:
