@@ -32,8 +32,8 @@ from walkers.calibration.calibrate import calibrate
 from walkers.calibration.file import load_calibration
 from walkers.calibration.report import write_outcome
 from walkers.check.benchmarks import curve_of, published
-from walkers.check.lines import as_dict, failures
-from walkers.check.literature import LITERATURE, literature
+from walkers.check.lines import as_dict, failures, run_checks
+from walkers.check.literature import LITERATURE
 from walkers.errors import InputError, Problem
 from walkers.inputs.case import Case
 from walkers.inputs.keys import flatten
@@ -44,7 +44,6 @@ from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels
 from walkers.postprocess.film_options import FilmOptions
 from walkers.postprocess.results import VERSION
 from walkers.runner.files import read_json, write_json, write_text
-from walkers.runner.launch import cores_here
 from walkers.sweeps.climbing import texts_of
 from walkers.sweeps.scheduler import Options
 from walkers.templates.deck import CONTENT_VERSION
@@ -76,7 +75,7 @@ class Illustration:
 
 def _of_figure(name: str, *files: str, sweeps: Iterable[str]) -> Illustration:
     def make(out: Path, docs: Path) -> None:
-        make_figures(out, docs / "figures", Options(cores_here()), only=[name], formats=("png",))
+        make_figures(out, docs / "figures", Options(), only=[name], formats=("png",))
 
     return Illustration(files, lambda: [case for sweep in sweeps for case in sweep_of(sweep).cases()], make)
 
@@ -142,7 +141,7 @@ def _assembly(done: Run) -> Figure:
 
 
 def _make_validation(out: Path, docs: Path) -> None:
-    lines = literature(out)
+    lines = run_checks(LITERATURE, out)
     write_json(docs / CHECKED, as_dict(lines))
     save_figure(_benchmarks(), docs / "figures" / "benchmarks.png", (), title="Published benchmarks of impacts")
     for line in failures(lines):
@@ -166,7 +165,7 @@ def _benchmarks() -> Figure:
 
 
 def _make_calibration(out: Path, docs: Path) -> None:
-    found = calibrate(load_calibration("ruby"), out, Options(cores_here()))
+    found = calibrate(load_calibration("ruby"), out, Options())
     write_outcome(found, out / "ruby")
     for name in _OF_CALIBRATION:
         shutil.copy(out / "ruby" / f"{name}.png", docs / "figures" / f"calibration-{name}.png")

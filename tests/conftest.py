@@ -257,6 +257,12 @@ def front(tmp_path: Path) -> Callable[[str], str]:
     return made
 
 
+def finished_places(out: Path) -> dict[str, Path]:
+    """Directories of all finished runs of a folder, by name."""
+    places = (path.parent for path in sorted(out.glob("*/manifest.json")))
+    return {place.name: place for place in places if place.suffix not in (".incomplete", ".replaced")}
+
+
 def engines_in(directory: Path) -> list[int]:
     """Process ids of the engines that work in a directory or below."""
     return processes_in(directory, b"liggghts", b"\0-in\0")  # not ldd, which asks what the engine is linked to

@@ -227,8 +227,6 @@ COMMANDS: list[tuple[str, str]] = [
     ("plot {sweep} --to figure.jpg", "figure.jpg: expected the name of a .png or .svg or .pdf file"),
     ("report {run} --to a.txt", "expected the name of a .html or .htm file"),
     ("plot {run} --to out.png", "out.png: expected a folder"),
-    ("export {run} --to vtk --open", "--open: is for --to paraview"),
-    ("export {run} --to paraview -o vtk --colour beauty", "expected one of bead, large, omega, radius"),
     *((f"export {{run}} --to archive {words}", told) for words, told in (
         ("-o run.tar", "-o: expected the name of a .zip file"),
         ("--licence 'the public'", "licence: expected an SPDX identifier such as CC-BY-4.0"),
@@ -243,10 +241,6 @@ COMMANDS: list[tuple[str, str]] = [
         ("--begin '0.2 s'", "expected times within the drive, 0 to 0.1 s"),
     )),
     ("--library own.toml render --film {run} --size wide", "--size: 'wide': expected 360p, 480p, 720p, 1080p"),
-    *(
-        (f"export {{pile}} --to {form} --as-placed", "--as-placed: is for independent walkers")
-        for form in ("vtk", "paraview")
-    ),
 ]  # fmt: skip
 
 

@@ -32,7 +32,7 @@ from walkers.postprocess.scene import Scene, rotations_at, turned_in
 from walkers.postprocess.uncertainty import SPREAD_NAME, bands_of, spread_of
 from walkers.postprocess.walking import _scatter, tables_of
 from walkers.runner.files import write_json
-from walkers.runner.manifest import _iso
+from walkers.runner.manifest import iso_time
 from walkers.show import describe, summarise
 from walkers.sweeps.making import progress_in
 from walkers.templates.deck import Segment, render_deck, render_shared_deck
@@ -197,7 +197,7 @@ def test_times_of_a_manifest_are_utc(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TZ", "Asia/Tokyo")
     try:
         time.tzset()
-        assert _iso(1e9) == "2001-09-09T01:46:40Z"
+        assert iso_time(1e9) == "2001-09-09T01:46:40Z"
     finally:
         monkeypatch.undo()
         time.tzset()

@@ -19,8 +19,7 @@ import walkers
 from tests.conftest import call, to_toml
 from walkers.inputs.reading import shipped
 from walkers.runner.files import read_json
-from walkers.sweeps.climbing import PARTS, conditions_in, leaders, summary, survival, texts_of
-from walkers.sweeps.climbing_figure import table_of
+from walkers.sweeps.climbing import PARTS, conditions_in, leaders, summary, survival, table_of, texts_of
 
 BEADS, LARGE, LENGTH = 20, 4, 10.0
 CLIMB: dict[str, Any] = {"speed": 2e-3, "height": 0.01, "out_of_pile": True, "large": 1, "leader_large": True}

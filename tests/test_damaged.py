@@ -42,11 +42,10 @@ from walkers.inputs.toml import read_toml
 from walkers.postprocess.dump import BinaryDump, DumpError, local_frames
 from walkers.postprocess.paraview import write_vtk
 from walkers.postprocess.report.run import result_html
-from walkers.postprocess.results import read
-from walkers.runner.directory import CASE_NAME, FIRST_SEGMENT, case_of
-from walkers.runner.failures import DiskFull
+from walkers.postprocess.results import measure, read
+from walkers.runner.directory import CASE_NAME, FIRST_SEGMENT, case_of, locked, recomputed
+from walkers.runner.failures import DiskFull, RunBusy
 from walkers.runner.files import write_json
-from walkers.runner.manifest import recomputed
 from walkers.sweeps.table import load as load_table
 from walkers.templates.deck import render_deck
 from walkers.templates.layout import BEAD_COLUMNS, MEAN_SPIN_COLUMNS
@@ -205,6 +204,13 @@ def test_a_result_whose_making_was_killed_is_made_anew(parts: Path) -> None:
         raise KeyboardInterrupt
     assert walkers.run(run).result.as_dict() == right
     assert json.loads((run / "manifest.json").read_text())["sha256"].keys() >= set(names)
+
+
+def test_a_run_is_measured_by_one_process_at_a_time(parts: Path) -> None:
+    before = (parts / "manifest.json").read_bytes()
+    with locked([parts]), pytest.raises(RunBusy, match="measuring"):
+        measure(parts)
+    assert (parts / "manifest.json").read_bytes() == before
 
 
 def test_a_dump_of_beads_is_read_but_for_a_last_frame_that_was_cut(

@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 
 import walkers
-from tests.conftest import call, document, to_toml
+from tests.conftest import call, document, finished_places, to_toml
 from walkers.inputs.sweep import expand
 from walkers.postprocess.uncertainty import ACCURACY_NAME
-from walkers.runner.directory import case_of, finished_places, locked
+from walkers.runner.directory import case_of, locked
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.sweeps.comparison import Side, compare_runs
@@ -259,4 +259,4 @@ def test_values_of_all_kinds_are_shown_as_they_can_be_written() -> None:
     for key, value in flattened(walkers.load_case("fig1b")).items():
         assert chosen([{key: value}], f"{key}={readable(key, value)}") == [True], key
     values = {"boundary.opening": 1.0, "liquid.temperature": 293.15, "contact.friction.bead_wall": 0.2}
-    assert [readable(key, value) for key, value in values.items()] == ["57.2958 deg", "293.15 K", "0.2"]
+    assert [readable(key, value) for key, value in values.items()] == ["57.2958 deg", "20 degC", "0.2"]

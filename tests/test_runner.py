@@ -25,6 +25,7 @@ from tests.conftest import (
     call,
     document,
     engines_in,
+    finished_places,
     make_case,
     open_run,
     processes_in,
@@ -38,7 +39,6 @@ from walkers.runner.binary import find_engine, plugin_of
 from walkers.runner.directory import (
     FIRST_SEGMENT,
     case_of,
-    finished_places,
     is_finished,
     is_locked,
     layout_of,

@@ -23,6 +23,7 @@ from tests.conftest import (
     call,
     document,
     engines_in,
+    finished_places,
     make_case,
     open_run,
     processes_in,
@@ -34,7 +35,6 @@ from walkers.inputs.reading import shipped
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.results import measure, read
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import finished_places
 from walkers.runner.failures import RunBusy
 from walkers.runner.launch import ALONE
 

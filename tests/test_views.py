@@ -30,7 +30,7 @@ from walkers.postprocess.motion import Group, Motion, read_bridges, read_motion
 from walkers.postprocess.necks import bridges_at, ends_of, necks_of
 from walkers.postprocess.paraview import _walls, write_vtk
 from walkers.postprocess.results import read
-from walkers.postprocess.scene import Scene, Window, axes_toward, camera_axes, mesh_of, walls_of
+from walkers.postprocess.scene import Scene, Window, axes_toward, camera_axes, gathered, mesh_of, walls_of
 from walkers.postprocess.tables import read_table
 
 
@@ -44,12 +44,12 @@ def directory(run_directory: Callable[..., Path]) -> Path:
 
 @pytest.fixture(scope="module")
 def collection(directory: Path) -> Path:
-    return write_vtk(directory, every=1, as_placed=True)
+    return write_vtk(directory, directory / "all", every=1)
 
 
 @pytest.fixture(scope="module")
 def moved(directory: Path) -> Group:
-    return read_motion(directory).groups[0]
+    return gathered(read_motion(directory)).groups[0]
 
 
 def test_beads_and_floor_are_where_the_engine_put_them(moved: Group, collection: Path) -> None:
@@ -97,17 +97,17 @@ def test_bridges_are_lines_with_force_and_gap(directory: Path, moved: Group, col
 def test_walkers_are_exported_side_by_side_once_a_cycle_with_the_script_that_shows_them(
     directory: Path, moved: Group, tmp_path: Path
 ) -> None:
-    script = walkers.load(directory).export("paraview", tmp_path / "vtk", colour="omega")
+    script = walkers.load(directory).export("paraview", tmp_path / "vtk")
     assert script.read_bytes() == files("walkers.postprocess").joinpath("show.py.txt").read_bytes()
     collection = script.with_name("walkers.pvd")
     np.testing.assert_allclose(pv.get_reader(collection).time_values, np.arange(9) / 80.0)
     points = [pv.read(collection.parent / f"beads_{frame:06d}.vtu").points for frame in (0, 80)]
     walked = (points[1] - points[0]).reshape(2, 2, 3)
     np.testing.assert_allclose(walked, moved.position[80] - moved.position[0], atol=1e-12)
-    assert np.ptp(points[0][:, 1]) < 4e-3 < np.ptp(moved.position[0, ..., 1])
+    assert np.ptp(points[0][:, 1]) < 4e-3 < np.ptp(read_motion(directory).position[0, ..., 1])
     assert np.ptp(points[0][:, 0]) < 1e-3  # in a row, wherever they stood
     view = json.loads(ElementTree.parse(collection).getroot().attrib["view"])
-    assert (view["colour"], view["neck"]) == ("omega (rad/s)", pytest.approx(9e-5))
+    assert (view["colour"], view["neck"]) == ("walker", pytest.approx(9e-5))
 
 
 _LISTS = '<DataSet timestep="0.0" part="0" file="{}" />'

@@ -316,13 +316,15 @@ def test_company_does_not_matter_whatever_forces_it_feels(tmp_path: Path) -> Non
     cases = [case.put(*change).but(name=name) for name, change in changes.items()]
     cases.insert(1, _turning().but(name="turning"))
     together = make_runs(cases, tmp_path / "together", find_engine())
-    decks = [read_manifest(run).get("shared_deck") for run in together.values()]
+    assert {*together.values()} == {True}
+    decks = [read_manifest(tmp_path / "together" / name).get("shared_deck") for name in together]
     assert len({deck["first"] if deck else None for deck in decks}) == 2  # the second has the one that went on
     cycles = {}
     for one in cases:
-        ((name, run),) = make_runs([one], tmp_path / "alone", find_engine()).items()
-        velocities = [read(place).table("walkers")["velocity"][0] for place in (together[name], run)]
-        ways = [(motion := read_motion(place)).position - motion.position[0] for place in (together[name], run)]
+        (name,) = make_runs([one], tmp_path / "alone", find_engine())
+        places = [tmp_path / folder / name for folder in ("together", "alone")]
+        velocities = [read(place).table("walkers")["velocity"][0] for place in places]
+        ways = [(motion := read_motion(place)).position - motion.position[0] for place in places]
         assert ways[0].shape == ways[1].shape
         assert np.abs(ways[0] - ways[1]).max() < 2e-5 * np.abs(ways[1]).max(), one.name
         assert velocities[0] == pytest.approx(velocities[1], rel=1e-6, abs=1e-12), one.name

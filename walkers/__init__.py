@@ -15,19 +15,7 @@ if TYPE_CHECKING:
     from walkers.case_file import new
     from walkers.inputs.reading import load_case
 
-__all__ = [
-    "Run",
-    "Sweep",
-    "calibrate",
-    "climb",
-    "compare",
-    "load",
-    "load_case",
-    "new",
-    "predict",
-    "run",
-    "sweep",
-]
+__all__ = ["Run", "Sweep", "calibrate", "climb", "compare", "load", "load_case", "new", "predict", "run", "sweep"]
 
 DEFAULT_OUT = Path("runs")
 RECORDS = {"run": "manifest.json", "sweep": "sweep.json", "calibration": "calibration.json"}
@@ -36,10 +24,7 @@ _PACKAGES = (
     *("physics", "inputs", "templates", "runner", "postprocess"),
     *("sweeps", "archive", "check", "theory", "paper", "calibration"),
 )
-_MODULES = {
-    **dict.fromkeys(__all__, "api"),
-    **{"load_case": "inputs.reading", "new": "case_file"},
-}
+_MODULES = {**dict.fromkeys(__all__, "api"), **{"load_case": "inputs.reading", "new": "case_file"}}
 """Modules of the public names."""
 
 

@@ -24,7 +24,6 @@ from walkers.runner import directory as on_disk
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import EngineMissing, RunBusy
 from walkers.runner.files import read_json
-from walkers.runner.launch import cores_here
 from walkers.runner.manifest import read_manifest
 
 if TYPE_CHECKING:
@@ -141,6 +140,9 @@ def case_and_run(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = 
 def load(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Run | Sweep:
     """Find a sweep, or a run, finished or not.
 
+    `InputError` if it does not exist or cannot be read; `EngineFailure` if a case is given and no engine is
+    installed.
+
     Parameters
     ----------
     what
@@ -150,13 +152,6 @@ def load(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) ->
         Folder of the run directories.
     changes
         Values that replace those of the case, by dotted keys.
-
-    Raises
-    ------
-    InputError
-        If it does not exist or cannot be read.
-    runner.EngineFailure
-        If a case is given and no engine is installed.
 
     Examples
     --------
@@ -368,7 +363,7 @@ class Run:
         from walkers.sweeps.scheduler import Options
         from walkers.sweeps.spread import run_spread
 
-        case, options = self.asked or self.case, Options(cores_here())
+        case, options = self.asked or self.case, Options()
         with progress_of(f"{case.name}, spread", progress) as advance:
             return run_spread(case, self.directory.parent, options, points=points, on_progress=advance, **how)
 
@@ -394,8 +389,7 @@ class Run:
         from walkers.sweeps.scheduler import Options
 
         with progress_of(f"{self.case.name}, accuracy", progress) as advance:
-            options = Options(cores_here())
-            return measure_accuracy(self.finished_directory, options, share=share, on_progress=advance, **how)
+            return measure_accuracy(self.finished_directory, Options(), share=share, on_progress=advance, **how)
 
     def export(self, form: Export, to: str | Path | None = None, **options: Any) -> Path:
         """Write the run for other programs; the functions of `EXPORTS` take the options, such as ``every``.
@@ -462,6 +456,8 @@ def run(
 ) -> Run:
     """Run a case unless a finished run exists. An interrupted run continues; a deck run by hand becomes a run.
 
+    `InputError` if the case cannot be used; `EngineFailure` if the engine fails.
+
     Parameters
     ----------
     case
@@ -479,13 +475,6 @@ def run(
         Limit of the wall time in s for each segment of the run.
     allow_failed_audit
         Use an engine that failed ``walkers check engine``.
-
-    Raises
-    ------
-    InputError
-        If the case cannot be used.
-    runner.EngineFailure
-        If the engine fails.
 
     Examples
     --------
@@ -521,7 +510,7 @@ def run(
         runs = make_runs([case], out, binary, force=force, on_progress=advance, time_limit=time_limit)
     if not runs:
         raise RunBusy("another process is still running this case", on_disk.unfinished(place))
-    return Run(place, cached=False, asked=case)
+    return Run(place, cached=not runs[place.name], asked=case)
 
 
 def finished_at(what: Named, out: str | Path) -> Run | None:
@@ -680,12 +669,13 @@ def sweep(
     progress: bool | None = None,
     site: str | Path | None = None,
     executor: Executor | None = None,
-    retries: int = 0,
     time_limit: float | None = None,
     spread: int = 0,
     **how: Any,
 ) -> Sweep:
     """Run the missing points of a sweep on this machine or a cluster.
+
+    `InputError` if the sweep or one of its points cannot be used.
 
     Parameters
     ----------
@@ -703,8 +693,6 @@ def sweep(
         The site file of a cluster, TOML or Python; see `walkers.sweeps.site.load_site`.
     executor
         Runs the decks instead of threads of this process, ``jobs`` at once; all of its workers must see the folder.
-    retries
-        Number of retries for a failed point.
     time_limit
         Limit of the wall time in s for each deck.
     spread
@@ -718,11 +706,6 @@ def sweep(
     Sweep
         The column ``status`` of its table marks failed points.
 
-    Raises
-    ------
-    InputError
-        If the sweep or one of its points cannot be used.
-
     Examples
     --------
     >>> walkers.sweep("fig4", tmp).table()[["liquid.name", "status"]].to_dict("list")
@@ -734,7 +717,7 @@ def sweep(
     from walkers.sweeps.spread import run_spread
 
     points = load_sweep(sweep, changes)
-    options = Options(jobs or cores_here(), load_site(Path(site)) if site else None, executor, retries, time_limit)
+    options = Options(jobs, load_site(Path(site)) if site else None, executor, time_limit)
     folder = Path(out).resolve() if site else Path(out)
     with progress_of(points.name, progress) as advance:
         record, failures = run_sweep(points, folder, options, on_progress=advance, **how)
@@ -819,8 +802,7 @@ def climb(
     """
     from walkers.errors import each
     from walkers.postprocess.drawing import FORMATS, check_place
-    from walkers.sweeps.climbing import conditions_in, summarise_climbs
-    from walkers.sweeps.climbing_figure import write_climbs
+    from walkers.sweeps.climbing import conditions_in, summarise_climbs, write_climbs
 
     if to is not None:
         check_place(Path(to), *(f".{form}" for form in FORMATS), ".csv")
@@ -859,8 +841,7 @@ def calibrate(
     from walkers.calibration.file import load_calibration
     from walkers.sweeps.scheduler import Options
 
-    options = Options(jobs or cores_here())
-    return calibrate.calibrate(load_calibration(calibration), Path(out), options, progress=progress, **how)
+    return calibrate.calibrate(load_calibration(calibration), Path(out), Options(jobs), progress=progress, **how)
 
 
 def predict(case: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> dict[str, Any]:

@@ -14,6 +14,8 @@ _SCHEMA = "case.schema.json"
 def new(path: str | Path, case: str = "fig1b", *, schema: bool = False) -> list[Path]:
     """Write a new case file, a copy of a shipped case, whose comments explain its keys.
 
+    `InputError` if there is such a file already, or no such shipped case.
+
     Parameters
     ----------
     path
@@ -27,11 +29,6 @@ def new(path: str | Path, case: str = "fig1b", *, schema: bool = False) -> list[
     -------
     list of Path
         The files.
-
-    Raises
-    ------
-    InputError
-        If there is such a file already, or no such shipped case.
     """
     path = Path(path)
     check_utf8(path)

@@ -22,7 +22,7 @@ from walkers.physics.time_step import auto_fractions
 from walkers.rounding import counted, percent
 from walkers.runner.launch import cores_here
 from walkers.templates.deck import RESTING_SEGMENTS, settling_steps
-from walkers.text import printable
+from walkers.text import aligned, printable
 
 START_UP_SECONDS = 0.04
 _STEP_MICROSECONDS = 0.9
@@ -222,15 +222,13 @@ def describe(summary: dict[str, Any]) -> str:
         f"(g = {ACCELERATION_OF_ONE_G:g} m/s², as in the paper; gravity is {gravity:g} m/s²), "
         f"amplitude {drive['amplitude'] * 1e3:.4g} mm, peak velocity {drive['peak_velocity'] * 1e3:.4g} mm/s"
     )
-    if summary["contacts"]:
-        lines.append("contact                capillary force   4πγR limit   bridge    rupture   overlap at rest")
-    for contact in summary["contacts"]:
-        limit = contact["capillary_force_limit"]
-        lines.append(
-            f"  {contact['contact']:20} {contact['capillary_force'] * 1e6:11.4g} µN "
-            f"{f'{limit * 1e6:.4g} µN' if limit else 'planes only':>12} {contact['bridge_volume'] * 1e12:8.3g} nL "
-            f"{contact['rupture_distance'] * 1e6:6.3g} µm {contact['overlap_at_rest'] * 1e9:10.4g} nm"
-        )
+    rows = [["contact", "capillary force", "4πγR limit", "bridge", "rupture", "overlap at rest"]]
+    for one in summary["contacts"]:
+        limit = one["capillary_force_limit"]
+        cells = [f"{one['capillary_force'] * 1e6:.4g} µN", f"{limit * 1e6:.4g} µN" if limit else "planes only"]
+        cells += [f"{one['bridge_volume'] * 1e12:.3g} nL", f"{one['rupture_distance'] * 1e6:.3g} µm"]
+        rows.append([f"  {one['contact']}", *cells, f"{one['overlap_at_rest'] * 1e9:.4g} nm"])
+    lines += [aligned(rows, right=range(1, 6))] if summary["contacts"] else []
     notes = [f"note       {note}" for note in summary["notes"]]
     return "\n".join([*lines, *_text_of_run(summary["time_step"], summary["run"]), *notes])
 

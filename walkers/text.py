@@ -17,12 +17,7 @@ def rendered(package: str, template: str, **values: Any) -> str:
 
     Filters: ``number`` (shortest text that reads back as the same double) and ``numbers`` of several, ``format`` as
     Python's for numbers, a dash for what is none, ``cell`` for a table's, ``code`` of Python for a value, ``plain`` for
-    a user's text in Markdown.
-
-    Raises
-    ------
-    jinja2.UndefinedError
-        If it names a value that is not given.
+    a user's text in Markdown. `jinja2.UndefinedError` if it names a value that is not given.
     """
     return environment(package).get_template(template).render(**values)
 

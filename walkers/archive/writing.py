@@ -100,6 +100,9 @@ def write_archive(
 ) -> Path:
     """Pack a finished run, or a sweep whose runs are all finished, into an RO-Crate.
 
+    `InputError` if the directory is no run or sweep, is not finished, or an option is invalid; `FileChanged` if a file
+    differs from its manifest.
+
     Parameters
     ----------
     to
@@ -108,13 +111,6 @@ def write_archive(
         Include the dumps of the engine; tables and results are always included.
     licence
         An SPDX identifier.
-
-    Raises
-    ------
-    InputError
-        If the directory is no run or sweep, is not finished, or an option is invalid.
-    FileChanged
-        If a file differs from its manifest.
     """
     require("archive")
     _check(authors, licence)

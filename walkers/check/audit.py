@@ -7,11 +7,9 @@ import time
 from collections.abc import Callable, Collection
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
-from itertools import chain
 from pathlib import Path
 
-from walkers.check.lines import Line, Verdict, chosen, computed, count, failures
+from walkers.check.lines import Line, Verdict, count, failures, run_checks
 from walkers.check.scenes import CHECKS, Bench
 from walkers.runner.binary import AuditRecord, Engine, find_engine, model_sha256, write_audit
 
@@ -30,17 +28,15 @@ def run_audit(
     only: Collection[str] = (), *, engine: Engine | None = None, on_done: Callable[[str], None] | None = None
 ) -> Audit:
     """Run all `CHECKS` or some on an engine, the installed one if None is given; ``on_done`` is told each name."""
-    names, binary = chosen(only, CHECKS), engine or find_engine()
+    binary = engine or find_engine()
     with tempfile.TemporaryDirectory(prefix="walkers-audit-") as folder:
-        bench = Bench(binary, Path(folder))
-        pool = ThreadPoolExecutor(2)
+        bench, pool = Bench(binary, Path(folder)), ThreadPoolExecutor(2)
         try:
-            parts = pool.map(lambda name: computed(name, partial(CHECKS[name], bench), on_done), names)
-            lines = tuple(chain.from_iterable(parts))
+            lines = run_checks(CHECKS, bench, only, on_done, pool.map)
         finally:
             bench.stop.set()
             pool.shutdown(cancel_futures=True)
-    return Audit(binary, model_sha256(binary) or "", bench.version, lines)
+    return Audit(binary, model_sha256(binary) or "", bench.version, tuple(lines))
 
 
 def record(audit: Audit) -> AuditRecord | None:

@@ -8,9 +8,12 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import groupby
 from math import inf, isfinite, nan
-from typing import Any
+from typing import Any, TypeVar
 
 from walkers.errors import expected_of, refused
+from walkers.text import aligned
+
+T = TypeVar("T")
 
 
 class Verdict(StrEnum):
@@ -70,24 +73,33 @@ class Line:
         return {"check": self.check, "what": self.what, "unit": self.unit, **finite, "verdict": str(self.verdict)}
 
 
-def chosen(only: Collection[str], checks: Mapping[str, object]) -> list[str]:
-    """Names of checks: the given ones, or all; `InputError` for unknown names."""
+def run_checks(
+    checks: Mapping[str, Callable[[T], Iterable[Line]]],
+    given: T,
+    only: Collection[str] = (),
+    on_done: Callable[[str], None] | None = None,
+    each: Callable[[Callable[[str], list[Line]], Iterable[str]], Iterable[list[Line]]] = map,
+) -> list[Line]:
+    """Lines of checks of something, such as a folder of runs; a check that cannot be computed is a line.
+
+    ``only`` are names, default all; `InputError` for unknown ones. ``on_done`` is told each name. ``each`` is `map`, or
+    that of a pool.
+    """
     for name in only:
         if name not in checks:
             raise refused("check", f"no check {name!r}; {expected_of(name, checks)}")
-    return [name for name in checks if name in only or not only]
 
+    def lines_of(name: str) -> list[Line]:
+        try:
+            lines = list(checks[name](given))
+        except Exception as failure:  # another build of the engine may fail in any way
+            reason = str(failure).split(" (see ", 1)[0] or type(failure).__name__
+            lines = [Line.without_number(f"could not be computed: {reason}", Verdict.ERROR)]
+        if on_done:
+            on_done(name)
+        return [replace(line, check=name) for line in lines]
 
-def computed(name: str, check: Callable[[], Iterable[Line]], on_done: Callable[[str], None] | None) -> list[Line]:
-    """Lines of a check, of which ``on_done`` is told; a check that cannot be computed is a line."""
-    try:
-        lines = list(check())
-    except Exception as failure:  # another build of the engine may fail in any way
-        reason = str(failure).split(" (see ", 1)[0] or type(failure).__name__
-        lines = [Line.without_number(f"could not be computed: {reason}", Verdict.ERROR)]
-    if on_done:
-        on_done(name)
-    return [replace(line, check=name) for line in lines]
+    return [line for lines in each(lines_of, [name for name in checks if name in only or not only]) for line in lines]
 
 
 def failures(lines: Iterable[Line]) -> list[Line]:
@@ -102,7 +114,7 @@ def count(lines: Iterable[Line], verdict: Verdict) -> int:
 
 def as_text(lines: Sequence[Line], of: str = "") -> str:
     """A table below the name of each check, and how many lines pass, after the words ``of``."""
-    tables = ["\n".join([check, *_rows(list(rows)), ""]) for check, rows in groupby(lines, lambda line: line.check)]
+    tables = [f"{check}\n{_table(rows)}\n" for check, rows in groupby(lines, lambda line: line.check)]
     passed, failed = count(lines, Verdict.PASS), count(lines, Verdict.FAIL)
     outcome = f"{failed} of {passed + failed} lines fail" if failed else f"all {passed} lines pass"
     for verdict, words in ((Verdict.ERROR, "could not be measured"), (Verdict.SKIPPED, "skipped")):
@@ -110,14 +122,13 @@ def as_text(lines: Sequence[Line], of: str = "") -> str:
     return "\n".join([*tables, of + outcome])
 
 
-def _rows(lines: Sequence[Line]) -> Iterable[str]:
-    width = max(len(line.what) for line in lines)
-    yield f"{'':7} {'':{width}} {'expected':>11} {'measured':>11}"
+def _table(lines: Iterable[Line]) -> str:
+    rows = [["", "", "expected", "measured"]]
     for line in lines:
         judged = f"error {line.error:.1e} of {line.tolerance:.0e}" if isfinite(line.error + line.tolerance) else ""
-        pair = (line.expected, line.measured)
-        numbers = " ".join(f"{value:>11.6g}" if isfinite(value) else f"{'-':>11}" for value in pair)
-        yield f"{line.verdict:7} {line.what:{width}} {numbers} {line.unit:4} {judged}".rstrip()
+        pair = [f"{value:.6g}" if isfinite(value) else "-" for value in (line.expected, line.measured)]
+        rows.append([line.verdict, line.what, *pair, line.unit, judged])
+    return aligned([[*row, "", ""][:6] for row in rows], right=(2, 3))
 
 
 def as_dict(lines: Sequence[Line], **more: Any) -> dict[str, Any]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
-from functools import partial
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from walkers.check.benchmarks import benchmarks
 from walkers.check.bridges import pulls, velocities
 from walkers.check.crosscheck import crosschecks
-from walkers.check.lines import Line, chosen, computed
+from walkers.check.lines import Line
 
 LITERATURE: Mapping[str, Callable[[Path], Iterable[Line]]] = {
     "benchmarks": lambda _: benchmarks(),
@@ -17,9 +16,3 @@ LITERATURE: Mapping[str, Callable[[Path], Iterable[Line]]] = {
     "crosscheck": crosschecks,
 }
 """Checks by name, from the folder of runs."""
-
-
-def literature(out: Path, only: Collection[str] = (), *, on_done: Callable[[str], None] | None = None) -> list[Line]:
-    """Lines of the named checks, default all; ``out`` is the folder of the runs, ``on_done`` is told each name."""
-    names = chosen(only, LITERATURE)
-    return [line for name in names for line in computed(name, partial(LITERATURE[name], out), on_done)]

@@ -85,9 +85,10 @@ def literature(*only: Annotated[str, Parameter(name="CHECK")], out: Out = DEFAUL
     only
         benchmarks, bridges or crosscheck; default: all.
     """
-    from walkers.check.literature import literature
+    from walkers.check.lines import run_checks
+    from walkers.check.literature import LITERATURE
 
-    return _print_checked(literature(out, only, on_done=tell), as_json)
+    return _print_checked(run_checks(LITERATURE, out, only, tell), as_json)
 
 
 @check.command
@@ -174,11 +175,9 @@ def figures(
         Draw only the figure with this name, or comparison. Repeatable.
     """
     from walkers.paper.make import FORMATS, make_figures
-    from walkers.runner.launch import cores_here
     from walkers.sweeps.scheduler import Options
 
-    options, wanted = Options(jobs or cores_here()), formats or FORMATS
-    made = make_figures(out, to, options, only=only or (), formats=wanted, progress=True, **vars(by))
+    made = make_figures(out, to, Options(jobs), only=only or (), formats=formats or FORMATS, progress=True, **vars(by))
     for name, failures in made.failures.items():
         tell(*(f"{name}: point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
     tell(*(f"{figure} is left out: {reason}" for figure, reason in made.left_out.items()))

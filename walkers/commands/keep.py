@@ -24,12 +24,6 @@ class Options:
     ----------
     every
         vtk, paraview, lammps: write every Nth sample; default: one per cycle; for lammps and piles all.
-    as_placed
-        vtk, paraview: keep independent walkers at their positions in the deck, not side by side.
-    colour
-        vtk, paraview: array that colours the beads in the script; default: walker, for piles speed.
-    open
-        paraview: start ParaView with the script.
     dumps
         archive: leave out the engine's dumps; tables and results are included.
     authors
@@ -41,9 +35,6 @@ class Options:
     """
 
     every: int | None = None
-    as_placed: bool = False
-    colour: str | None = None
-    open: bool = False
     dumps: Annotated[bool, Parameter("--without-dumps")] = False
     authors: Annotated[list[str] | None, Parameter("--author")] = None
     orcid: list[str] | None = None
@@ -71,8 +62,7 @@ def export(
         File or folder to write; default: in the run's folder, archives in the current folder. Decks are printed.
     """
     given = {name: value for name, value in vars(options).items() if value not in (None, False)}
-    shown, orcids = given.pop("open", False), given.pop("orcid", [])
-    refuse("--open", shown and form != "paraview", "is for --to paraview")
+    orcids = given.pop("orcid", [])
     refuse("--orcid", len(orcids) > len(given.get("authors", [])), "expected an --author for each")
     if "authors" in given:
         from walkers.archive.crate import Author
@@ -84,12 +74,7 @@ def export(
         writer_of(form, given)
         _export_deck(what, at, to)
         return
-    written = at.load(what).export(form, to, **given)
-    print(written)
-    if shown:
-        from walkers.postprocess.paraview import open_paraview
-
-        open_paraview(written)
+    print(at.load(what).export(form, to, **given))
 
 
 def _export_deck(what: str, at: At, output: Path | None) -> None:
@@ -106,11 +91,7 @@ def _export_deck(what: str, at: At, output: Path | None) -> None:
         tell(f"{case.run.attempts[0]} cycles; {case.run.continuation}")
 
 
-def clean(
-    *runs: RunOrSweep,
-    out: Out = DEFAULT_OUT,
-    yes: Annotated[bool, Parameter(("--yes", "-y"))] = False,
-) -> int:
+def clean(*runs: RunOrSweep, out: Out = DEFAULT_OUT, yes: Annotated[bool, Parameter(("--yes", "-y"))] = False) -> int:
     """Remove interrupted and failed runs, or the given runs and sweeps. Asks first. Runs in progress stay.
 
     With a sweep go the runs that no other sweep has, with a run its spread and its accuracy.

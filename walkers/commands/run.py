@@ -10,18 +10,7 @@ from cyclopts import Parameter
 from cyclopts.validators import Number
 
 import walkers
-from walkers.commands.options import (
-    NOT_NEGATIVE,
-    At,
-    By,
-    Case,
-    Jobs,
-    Json,
-    print_as,
-    print_lines,
-    refuse,
-    tell,
-)
+from walkers.commands.options import NOT_NEGATIVE, At, By, Case, Jobs, Json, print_as, print_lines, refuse, tell
 from walkers.errors import each, refused
 
 _MANY = 10_000
@@ -148,7 +137,6 @@ def sweep(
     jobs: Jobs = None,
     site: Path | None = None,
     dry_run: bool = False,
-    retries: Annotated[int, Parameter(validator=NOT_NEGATIVE)] = 0,
     limit: Annotated[float | None, Parameter(validator=NOT_NEGATIVE)] = None,
     spread: bool = False,
     points: int | None = None,
@@ -164,8 +152,6 @@ def sweep(
         Site file of a cluster to run on: TOML for SLURM, or Python with a configuration of Parsl.
     dry_run
         Print the plan and its predicted cost, and run nothing.
-    retries
-        Number of retries for a failed point.
     limit
         Time limit in s for each deck.
     spread
@@ -175,7 +161,6 @@ def sweep(
     """
     from walkers.inputs.sweep import load_sweep
     from walkers.postprocess.uncertainty import lines_of_rest, rests_on
-    from walkers.runner.launch import cores_here
     from walkers.sweeps.scheduler import Options, plan_sweep
     from walkers.sweeps.site import load_site
     from walkers.sweeps.spread import POINTS
@@ -186,10 +171,10 @@ def sweep(
     if len(loaded.rows) > _MANY:
         tell(f"{loaded.name}: resolving {len(loaded.rows)} points, about 2,000 per second")
     if dry_run:
-        options = Options(jobs or cores_here(), load_site(site) if site else None)
+        options = Options(jobs, load_site(site) if site else None)
         print(plan_sweep(loaded, at.out, options, by.engine).as_text())
         return 0
-    how = {"jobs": jobs, "site": site, "retries": retries, "time_limit": limit, **vars(by)}
+    how = {"jobs": jobs, "site": site, "time_limit": limit, **vars(by)}
     how["spread"] = (POINTS if points is None else points) if spread else 0
     done = walkers.sweep(sweep, at.out, changes=at.values, progress=True, **how)
     tell(*(f"point {failure.point}, {failure.run}: {failure.message}" for failure in done.failures))

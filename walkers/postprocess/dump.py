@@ -46,17 +46,14 @@ class _Frame(NamedTuple):
 class BinaryDump:
     """Frames of a binary dump with named columns.
 
+    `DumpError` if the file is not such a dump.
+
     Attributes
     ----------
     steps : ndarray of int64, shape (frames,)
         The engine's step of each complete frame.
     truncated : bool
         Whether the file ends within a frame; the incomplete frame is left out.
-
-    Raises
-    ------
-    DumpError
-        If the file is not such a dump.
     """
 
     def __init__(self, path: Path, columns: tuple[str, ...]) -> None:
@@ -92,12 +89,7 @@ class BinaryDump:
     def stack(self) -> FloatArray:
         """All frames, shape (frames, rows, columns).
 
-        Raises
-        ------
-        DumpError
-            If the number of rows changes.
-        NoNumberError
-            If there is a NaN or an infinity.
+        `DumpError` if the number of rows changes; `NoNumberError` if there is a NaN or an infinity.
         """
         sizes = {sum(count for _, count in frame.parts) for frame in self._frames}
         if len(sizes) > 1:
@@ -126,10 +118,7 @@ class BinaryDump:
 def local_frames(path: Path, columns: tuple[str, ...]) -> Iterator[tuple[int, FloatArray]]:
     """Step and rows, shape (rows, columns), of each frame of a text dump of bridges (``dump local``), one by one.
 
-    Raises
-    ------
-    DumpError
-        If the file is not such a dump, ends within a frame, or holds a NaN or an infinity.
+    `DumpError` if the file is not such a dump, ends within a frame, or holds a NaN or an infinity.
     """
     try:
         file = path.open("rb")

@@ -38,18 +38,15 @@ def render_film(
 ) -> Path:
     """Render a film of one walker if walkers are independent or one is chosen, otherwise of all beads.
 
+    `InputError` and `WalkersError` if the format cannot hold the film, the walker does not exist, or no frame is
+    between begin and end; if ffmpeg fails.
+
     Parameters
     ----------
     directory, to
         A run directory, and the MP4 or GIF file to write; None: ``film.mp4`` in the run directory.
     options, on_progress
         Options; a function that is called after each frame.
-
-    Raises
-    ------
-    InputError, WalkersError
-        If the format cannot hold the film, the walker does not exist, or no frame is between begin and end; if ffmpeg
-        fails.
     """
     path, (wide, tall) = to or directory / "film.mp4", options.size
     check_place(path, ".mp4", ".gif")
@@ -144,7 +141,6 @@ def _captions(
     # All pictures may show the same frame.
     decimals = max(0, ceil(-log10(float(np.diff(times.time).max(initial=0.0)) or 1.0) - 1e-9))
     speed = speed_text(times.slowdown) + (", stroboscopic" if times.stroboscopic else "")
-    drive = f"{case.excitation.frequency:g} Hz, {case.excitation.peak_acceleration:.3g} m/s²"
     bar = view.round_below(wide / 5.0 / pixels_per_mm)
     toward, direction = named_direction(scene.motion)
     left, right, level, thick = wide - edge - bar * pixels_per_mm, wide - edge, tall - edge, max(2, edge // 8)
@@ -164,7 +160,7 @@ def _captions(
         else:
             for row, text in enumerate(said):
                 draw.text((edge, (2.8 + 1.5 * row) * edge), text, "#333333", small, anchor="lt")
-        draw.text((edge, level), drive, "#333333", small, anchor="ls")
+        draw.text((edge, level), case.excitation.described(), "#333333", small, anchor="ls")
         if case.boundary.tilted and case.environment.gravity:
             tip = 5.5 * edge
             draw.line([right, edge, right, tip - edge], "black", thick)

@@ -16,8 +16,7 @@ per cycle, the work with 20 samples is within 0.01 %, with 10 samples within 0.2
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import reduce
-from itertools import pairwise
+from itertools import chain, pairwise
 from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -55,18 +54,16 @@ class Gait(NamedTuple):
     """Time series of F frames and W walkers of n beads; SI units.
 
     Velocity of the mass centre along the heading, shape (F, W); rotation velocity of the beads, shape (F, W, n);
-    sliding velocity and gap (negative for overlap) at the contacts of the beads with walls, then of their pairs, shape
-    (F, W, n + pairs).
+    sliding velocity at the contacts of the beads with walls, then of their pairs, shape (F, W, n + pairs).
     """
 
     velocity: FloatArray
     rotation: FloatArray
     sliding: FloatArray
-    gap: FloatArray
 
 
 def gait(group: Group) -> Gait:
-    """Rotation, sliding and gaps through the run."""
+    """Velocity, rotation and sliding through the run."""
     radii, heading, upward = group.radii, group.heading, np.array([0.0, 0.0, 1.0])
     along = np.einsum("fwbx,fwx->fwb", group.velocity, heading)
     rotation = radii * np.einsum("fwbx,fwx->fwb", group.spin, np.cross(upward, heading))
@@ -82,18 +79,7 @@ def gait(group: Group) -> Gait:
         spin = radii[one] * group.spin[:, :, one] + radii[other] * group.spin[:, :, other]
         sliding.append(-np.einsum("fwx,fwx->fw", spin, np.cross(upward, arm))[..., None])
     velocity = along @ (radii**3 / np.sum(radii**3))
-    return Gait(velocity, rotation, np.concatenate(sliding, axis=-1), gaps(group))
-
-
-def gaps(group: Group) -> FloatArray:
-    """Gaps at the contacts (as in `Gait`), m, shape (F, W, n + pairs)."""
-    radii, position, boundary = group.radii, group.position, group.case.boundary
-    heights = [position[..., 2]] if boundary.bare else [wall.distances(position) for wall in boundary.walls]
-    gap = [reduce(np.minimum, heights) - radii]
-    for one, other in group.make.pairs:
-        distance = np.linalg.norm(position[:, :, one] - position[:, :, other], axis=-1)
-        gap.append((distance - (radii[one] + radii[other]))[..., None])
-    return np.concatenate(gap, axis=-1)
+    return Gait(velocity, rotation, np.concatenate(sliding, axis=-1))
 
 
 def _normals(group: Group) -> FloatArray:
@@ -130,13 +116,17 @@ def averages(group: Group) -> Averages:
     parts = _PARTS if group.motion.follows_cycles else 1
     opened, begin, interval = [], group.time[:-1], np.diff(group.time)
     work = np.full((len(interval), len(group.walkers)), 0.0 if parts > 1 else np.nan)
-    looks = (replace(group, position=between(group, share)) for share in np.linspace(0.0, 1.0, parts + 1).tolist())
+    shares = np.linspace(0.0, 1.0, parts + 1).tolist()[1:]
+    looks = chain([group], (replace(group, position=between(group, share)) for share in shares))
     for part, (before, after) in enumerate(pairwise(looks)):
-        opened.append((gaps(before)[samples] > 0.0).mean(axis=0))
+        opened.append((before.gap[samples] > 0.0).mean(axis=0))
         for harmonic in group.case.excitation.harmonics:
             phase = harmonic.angular_frequency * (begin + (part + 0.5) / parts * interval) + harmonic.phase
-            pull = harmonic.peak_acceleration * np.sin(phase)
-            work += pull[:, None] * ((after.mass_centre - before.mass_centre) @ np.array(harmonic.direction))
+            pull, way = (
+                harmonic.peak_acceleration * np.sin(phase),
+                after.mass_centre - before.mass_centre[: len(interval)],
+            )
+            work += pull[:, None] * (way @ np.array(harmonic.direction))
     cycles = len(work) // run.samples_per_cycle
     of_cycles = work[: cycles * run.samples_per_cycle].reshape(cycles, run.samples_per_cycle, -1).sum(axis=1)
     mean = gait(group.motion.averaged.group(group.walkers[0].make))
@@ -183,10 +173,7 @@ def distance_walked(group: Group) -> tuple[FloatArray, FloatArray]:
 def walk(group: Group) -> Walk:
     """Fit the velocities of a run's walkers.
 
-    Raises
-    ------
-    postprocess.dump.DumpError
-        If the dump was cut short within the settling cycles.
+    `DumpError` if the dump was cut short within the settling cycles.
     """
     settled = group.case.run.settled_strobes
     time, distance = distance_walked(group)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from pathlib import Path
 from typing import Any
 
@@ -215,6 +215,17 @@ class Group:
         return heading
 
     @cached_property
+    def gap(self) -> FloatArray:
+        """Gaps of beads to their nearest walls, then of pairs, m, negative for overlap, shape (F, W, n + pairs)."""
+        position, boundary = self.position, self.case.boundary
+        heights = [position[..., 2]] if boundary.bare else [wall.distances(position) for wall in boundary.walls]
+        gaps = [reduce(np.minimum, heights) - self.radii]
+        for one, other in self.make.pairs:
+            distance = np.linalg.norm(position[:, :, one] - position[:, :, other], axis=-1)
+            gaps.append((distance - (self.radii[one] + self.radii[other]))[..., None])
+        return np.concatenate(gaps, axis=-1)
+
+    @cached_property
     def orientation(self) -> FloatArray:
         """ψ, rad, shape (F, W): by how much walkers are turned from the direction that they face, unwrapped.
 
@@ -248,12 +259,8 @@ def came_near(centre: FloatArray, near: float) -> bool:
 def read_motion(directory: str | Path) -> Motion:
     """Read the beads of a run directory with its segments, finished or not.
 
-    Raises
-    ------
-    postprocess.dump.DumpError
-        If there is no segment, or a segment cannot be read.
-    FileNotFoundError
-        If the directory is not a run directory.
+    `DumpError` if there is no segment, or a segment cannot be read; `FileNotFoundError` if the
+    directory is not a run directory.
 
     Examples
     --------

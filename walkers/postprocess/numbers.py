@@ -72,7 +72,7 @@ ASIDE = frozenset(
 )
 """Numbers that are not shown by themselves: errors of others, values of the case, conditions."""
 _HIDDEN = ASIDE | {
-    *("axial_velocity", "axial_left_facing", "walkers_met", "turned_first", "turned_last", "ended_early", "duration"),
+    *("axial_velocity", "axial_left_facing", "walkers_met", "turned_first", "turned_last", "ended_early", "duration")
 }
 """Numbers that rows leave out, because others count."""
 _OF_UP = "on a slope of those that started facing up"
@@ -99,6 +99,11 @@ def is_declared(name: str) -> bool:
     with suppress(KeyError):
         return bool(declared(name))
     return False
+
+
+def scatter_of(name: str) -> str:
+    """Name of the number that is the scatter or the error of another; empty if there is none."""
+    return declared(name).error if is_declared(name) else ""
 
 
 def ordered(names: Iterable[str]) -> list[str]:

@@ -9,8 +9,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
-import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -36,15 +35,8 @@ _WIDE, _AROUND = 16.0 / 9.0, 1.15  # width over height of the view; its extent o
 _NECK = 0.45  # radius of what is drawn of a bridge over that of the smallest bead
 
 
-def write_vtk(
-    directory: Path,
-    destination: Path | None = None,
-    *,
-    colour: str | None = None,
-    every: int | None = None,
-    as_placed: bool = False,
-) -> Path:
-    """Write a run for ParaView, with a script that shows it.
+def write_vtk(directory: Path, destination: Path | None = None, *, every: int | None = None) -> Path:
+    """Write a run for ParaView, with a script that shows it; independent walkers are side by side.
 
     Parameters
     ----------
@@ -52,14 +44,9 @@ def write_vtk(
         A run directory; the folder to write, ``vtk`` in the run directory if None. A folder is replaced if it is
         empty, or if it has no files but those of an earlier export, which its ``walkers.pvd`` lists. A folder with any
         other file, a file, or a symbolic link raises an InputError.
-    colour
-        The array that colours the beads in the script, by default ``walker`` if there are walkers, else ``speed``; an
-        unknown array raises an InputError.
     every
         Write every ``every``-th sample of the drive; None: one per cycle, or all samples if they are further apart.
         Bridges are in the frames that recorded them.
-    as_placed
-        Leave independent walkers at their places in the deck, centimetres apart, instead of side by side.
 
     Returns
     -------
@@ -71,10 +58,7 @@ def write_vtk(
     destination = destination or directory / "vtk"
     earlier, place = _earlier(destination), destination.absolute()
     motion = read_motion(directory)
-    if as_placed and not motion.case.apart:
-        raise refused("as_placed", "is for independent walkers: these stand where they are")
-    if motion.case.boundary.bare and not as_placed:
-        motion = gathered(motion)
+    motion = gathered(motion) if motion.case.boundary.bare else motion
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
     entries = ElementTree.SubElement(root, "Collection")
     place.parent.mkdir(parents=True, exist_ok=True)
@@ -84,7 +68,7 @@ def write_vtk(
             new.mkdir()
             for frame, meshes in _frames(motion, every or motion.case.run.samples_per_cycle):
                 if not len(entries):
-                    root.set("view", json.dumps(_view(motion.driven, colour, [*meshes["beads"].point_data])))
+                    root.set("view", json.dumps(_view(motion.driven)))
                 for part, (kind, mesh) in enumerate(meshes.items()):
                     entry = {"timestep": repr(float(motion.time[frame])), "part": str(part), "name": kind}
                     entry["file"] = f"{kind}_{frame:06d}.vtu"
@@ -101,14 +85,6 @@ def write_vtk(
             error.filename = str(destination)
         raise
     return destination / _COLLECTION
-
-
-def open_paraview(script: Path) -> None:
-    """Start ParaView with a script without waiting for its end; InputError if ParaView is not installed."""
-    program = shutil.which("paraview")
-    if program is None:
-        raise refused("paraview", f"is not installed; open {script} in ParaView to show the run")
-    subprocess.Popen([program, f"--script={script}"], start_new_session=True)
 
 
 def _earlier(place: Path) -> list[Path]:
@@ -193,20 +169,15 @@ def _walls(motion: Motion) -> meshio.Mesh:
     return meshio.Mesh(np.concatenate(faces), {"triangle": fans_of(faces)})
 
 
-def _view(motion: Motion, colour: str | None, arrays: Sequence[str]) -> dict[str, Any]:
-    """What the script shows: the array of colours and its scale, sizes (m), tilt and camera."""
-    named = {name.partition(" (")[0]: name for name in arrays}
-    colour = colour or ("walker" if motion.walkers else "speed")
-    if colour not in named:
-        raise refused("colour", f"{colour!r}: expected one of {', '.join(sorted(named))}")
+def _view(motion: Motion) -> dict[str, Any]:
+    """What the script shows: colours by walker, without walkers by speed, sizes (m), tilt and camera."""
     scene = Scene.around(motion, camera_axes(motion), _AROUND)
     tall = scene.height(_WIDE)
     camera, middle, up = scene.camera(10.0 * tall)
-    # The scale of values that change in time ends at their 99th percentile.
-    vectors = {"speed": motion.velocity, "velocity": motion.velocity, "omega": motion.spin}.get(colour)
+    # The scale of speeds ends at their 99th percentile.
+    fast = None if motion.walkers else float(np.percentile(np.linalg.norm(motion.velocity, axis=-1), 99.0))
     return {
-        "colour": named[colour],
-        "largest": None if vectors is None else float(np.percentile(np.linalg.norm(vectors, axis=-1), 99.0)),
+        **{"colour": "walker" if motion.walkers else "speed (m/s)", "largest": fast},
         **{"neck": _NECK * float(motion.radius.min()), "rounds": 48 if len(motion.radius) < 100 else 24},
         **{"closed": motion.case.boundary.closed, "tilted": motion.case.boundary.tilted},
         **{"camera": [*(1e-3 * camera)], "middle": [*(1e-3 * middle)], "up": [*up], "half": 1e-3 * tall / 2.0},

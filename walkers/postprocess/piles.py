@@ -10,20 +10,8 @@ import numpy as np
 
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
-from walkers.postprocess.clusters import (
-    EVENTS,
-    Beads,
-    Cluster,
-    Joined,
-    assembly_of,
-    bulk_of,
-    climbs_of,
-    connected,
-    events_of,
-    follow,
-    held_clusters,
-    members_of,
-)
+from walkers.postprocess import clusters
+from walkers.postprocess.clusters import Beads, Cluster, Joined
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import FLOOR, Bridges, Motion, read_bridges
 from walkers.postprocess.numbers import Measured
@@ -52,11 +40,11 @@ def measure(motion: Motion) -> Measured:
     case = motion.case
     rows, bulks, held, joined = [], [], [], []
     for bridges in read_bridges(motion):
-        labels = connected(len(motion.radius), bridges.beads)
-        bulks.append(bulk_of(labels, bridges, heap=case.mixture is not None))
+        labels = clusters.connected(len(motion.radius), bridges.beads)
+        bulks.append(clusters.bulk_of(labels, bridges, heap=case.mixture is not None))
         # While the pile settles, most beads are free of the bulk.
         driven = motion.time[bridges.frame] >= 0.0
-        held.append(list(held_clusters(labels, bridges, bulks[-1])) if driven else [])
+        held.append(list(clusters.held_clusters(labels, bridges, bulks[-1])) if driven else [])
         joined.append(_joined(bridges, len(motion.radius)))
         rows.append(_state_of(motion, bridges, joined[-1], bulks[-1], held[-1]))
     bed, walls = {name: np.array([row[name] for row in rows]) for name in rows[0]}, case.boundary.walls
@@ -69,18 +57,18 @@ def measure(motion: Motion) -> Measured:
         first=motion.first_driven,
         wall_names=[wall.name for wall in walls],
     )
-    tracks = follow(motion.time, held)
-    clusters = climbs_of(tracks, beads)
-    events = events_of(tracks, clusters, beads)
+    tracks = clusters.follow(motion.time, held)
+    climbs = clusters.climbs_of(tracks, beads)
+    events = clusters.events_of(tracks, climbs, beads)
     tables = {
         "bed": bed,
-        "clusters": clusters,
+        "clusters": climbs,
         "events": events,
-        "members": members_of(tracks, beads),
-        "assembly": assembly_of(tracks, clusters, beads, joined),
+        "members": clusters.members_of(tracks, beads),
+        "assembly": clusters.assembly_of(tracks, climbs, beads, joined),
     }
-    counts = {f"events_{event}": int(np.sum(events["event"] == event)) for event in EVENTS}
-    numbers = {"clusters": len(tracks), **counts, **_of_climbs(clusters), **_of_bed(motion, bed)}
+    counts = {f"events_{event}": int(np.sum(events["event"] == event)) for event in clusters.EVENTS}
+    numbers = {"clusters": len(tracks), **counts, **_of_climbs(climbs), **_of_bed(motion, bed)}
     if numbers["driven"] < _WHOLE * case.duration:
         early = f"shaken for {numbers['driven']:.3g} s of {case.duration:.3g} s: climbers left the container"
         return Measured(tables, numbers, (early,))

@@ -84,10 +84,7 @@ NUMBERS: Mapping[str, Quantity] = {quantity.name: quantity for group in GROUPS.v
 def declared(name: str, known: Iterable[Quantity]) -> Quantity:
     """The quantity of a name; ``rotation_2`` is found as ``rotation_*``, and its label has the number.
 
-    Raises
-    ------
-    KeyError
-        If there is none.
+    `KeyError` if there is none.
 
     Examples
     --------

@@ -18,9 +18,9 @@ from walkers.postprocess.caption import conditions
 from walkers.postprocess.numbers import headline, rows, state
 from walkers.postprocess.uncertainty import accuracy_of, bands_of, lines_of_rest, rests_on
 from walkers.rounding import percent
-from walkers.runner.directory import SEGMENT_NAME, files_of_segments, segment_directories
+from walkers.runner.directory import SEGMENT_NAME, files_of_segments, recomputed, segment_directories
 from walkers.runner.files import read_json, write_json
-from walkers.runner.manifest import RESULT_NAME, check_unchanged, recomputed
+from walkers.runner.manifest import RESULT_NAME, check_unchanged
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -105,12 +105,8 @@ def derived(case: Case) -> dict[str, Any]:
 def measure(directory: Path) -> None:
     """Measure a run, finished or not; write its tables and, last, ``result.json``.
 
-    Raises
-    ------
-    postprocess.dump.DumpError
-        If a dump cannot be read.
-    runner.manifest.FileChanged
-        If a dump of a finished run is not what it was.
+    `DumpError` if a dump cannot be read; `FileChanged` if a dump of a finished run is
+    not what it was.
     """
     from walkers.postprocess.motion import read_motion
     from walkers.postprocess.tables import write_table

@@ -63,13 +63,11 @@ class _Views(NamedTuple):
 
 @styled
 def render_series(
-    directory: Path,
-    destination: Path | None = None,
-    *,
-    images: int = SHOWN,
-    walker: int | None = None,
+    directory: Path, destination: Path | None = None, *, images: int = SHOWN, walker: int | None = None
 ) -> list[Path]:
     """Render views of a run in rows, with times and scales; walkers, climbers and liquid bridges are coloured.
+
+    `InputError` if the destination is no PNG, or the run has no walker with this number.
 
     Parameters
     ----------
@@ -81,11 +79,6 @@ def render_series(
         Largest number of pictures, evenly spaced through the drive; fewer if the last is then nearer to its end.
     walker
         Number of a walker to show by itself; None: the first of independent walkers, otherwise all beads.
-
-    Raises
-    ------
-    InputError
-        If the destination is no PNG, or the run has no walker with this number.
     """
     check_limits("images", images, 1, 20)
     if destination is not None:

@@ -20,7 +20,8 @@ from walkers.templates.layout import Layout
 def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) -> None:
     """Write the dumps and the layout of each case into its directory, and remove those of the shared deck.
 
-    Beads and walkers are renumbered; their positions are those in the shared deck.
+    Beads and walkers are renumbered; their positions are those in the shared deck. `WalkersMet` if two
+    walkers came so close that they are not independent; `DumpError` if a dump cannot be read.
 
     Parameters
     ----------
@@ -28,13 +29,6 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) ->
         Directory and layout of the deck.
     cases
         Cases by directory, in the order of the deck.
-
-    Raises
-    ------
-    runner.failures.WalkersMet
-        If two walkers came so close that they are not independent.
-    postprocess.dump.DumpError
-        If a dump cannot be read.
     """
     dump = BinaryDump(directory / layout.bead_dump, layout.bead_columns)
     frames, x = dump.stack(), dump.column("x")

@@ -84,6 +84,8 @@ def _arrow(values: npt.NDArray[Any]) -> Any:
 def read_table(directory: str | Path, name: str) -> pd.DataFrame:
     """Read a table of a run directory into pandas, SI units.
 
+    `InputError` if the directory has no such table, or it is damaged.
+
     Parameters
     ----------
     directory
@@ -95,11 +97,6 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
     -------
     DataFrame
         ``attrs["units"]`` and ``attrs["long_name"]`` map columns to units and labels.
-
-    Raises
-    ------
-    InputError
-        If the directory has no such table, or it is damaged.
     """
     table = _read(Path(directory), name)
     frame: pd.DataFrame = table.to_pandas()

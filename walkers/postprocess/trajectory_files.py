@@ -25,12 +25,8 @@ def write_trajectory(directory: Path, destination: Path | None = None, *, every:
     """Write the motion of the beads during the drive, every ``every``-th sample (None: all).
 
     The box of all frames contains the beads and the inner width of a container. ``destination`` is the file to write,
-    ``trajectory.lammpstrj`` in the run directory if None.
-
-    Raises
-    ------
-    InputError
-        If the file has another suffix, or ``every`` is less than 1.
+    ``trajectory.lammpstrj`` in the run directory if None. `InputError` if the file has another suffix, or ``every`` is
+    less than 1.
     """
     path = destination or directory / f"trajectory{SUFFIX}"
     check_place(path, SUFFIX)

@@ -63,18 +63,6 @@ def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
     return [line for text in texts for line in wrapper.wrap(text)]
 
 
-def not_known(rests: Sequence[Mapping[str, Any]]) -> list[str]:
-    """A sentence with the values of a result (`rests_on`) that have a range, if there are any."""
-    names = [
-        one["key"].partition(".")[2].partition(".bead_")[0].replace("_", " ")
-        for one in rests
-        if one["range"] is not None
-    ]
-    if not names:
-        return []
-    return [f"uncertain parameters: {', '.join(dict.fromkeys(names))}; run with --spread to compute the resulting band"]
-
-
 def spread_of(directory: Path) -> Path:
     """The directory of the spread of a run (`walkers.sweeps.spread`); it need not exist."""
     return directory.with_name(f"{directory.name}{SPREAD}")

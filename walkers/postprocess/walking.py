@@ -108,7 +108,7 @@ def tables_of(group: Group) -> dict[str, Columns]:
         "orientation_mean": group.orientation[samples].mean(axis=0),
         "orientation_end": group.orientation[-1],
         "turned_at": gait.turned_over_at(group),
-        "separated_fraction": (seen.gap[samples, :, beads:] > reach).any(axis=-1).mean(axis=0),
+        "separated_fraction": (group.gap[samples, :, beads:] > reach).any(axis=-1).mean(axis=0),
         **numbered("rotation", mean.rotation),
         **_by_kind(beads, sliding=mean.sliding, open=mean.open),
     }
@@ -119,7 +119,7 @@ def tables_of(group: Group) -> dict[str, Columns]:
         "orientation": group.orientation,
         "velocity": seen.velocity,
         **numbered("rotation", seen.rotation),
-        **_by_kind(beads, sliding=seen.sliding, gap=seen.gap),
+        **_by_kind(beads, sliding=seen.sliding, gap=group.gap),
     }
     strobe = run.samples_per_cycle
     time, distance = gait.distance_walked(group)

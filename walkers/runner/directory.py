@@ -21,7 +21,7 @@ import os
 import re
 import shutil
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
@@ -30,10 +30,11 @@ from typing import Any
 from walkers.inputs.case import Case
 from walkers.physics.laws import LAWS, source_of, source_sha256
 from walkers.runner.binary import Engine
-from walkers.runner.failures import DiskFull, OutputGone
+from walkers.runner.failures import DiskFull, OutputGone, RunBusy
 from walkers.runner.files import fsync_path, link_or_copy, read_json, write_bytes, write_json
 from walkers.runner.launch import EngineReport
-from walkers.runner.manifest import FORMAT, MANIFEST_NAME, check_unchanged
+from walkers.runner.manifest import FORMAT, MANIFEST_NAME, check_unchanged, checksums, iso_time, read_manifest, sums_of
+from walkers.runner.provenance import software
 from walkers.templates.deck import BRIDGES_NAME, CONTENT_VERSION, DECK_NAME, LAYOUT_NAME, Deck, Segment, tables_of
 from walkers.templates.layout import Layout
 
@@ -173,12 +174,6 @@ def is_finished(directory: Path) -> bool:
     return (directory / MANIFEST_NAME).is_file()
 
 
-def finished_places(out: Path) -> dict[str, Path]:
-    """Directories of all finished runs of a folder, by name."""
-    places = [path.parent for path in sorted(out.glob(f"*/{MANIFEST_NAME}"))]
-    return {place.name: place for place in places if not place.name.endswith((UNFINISHED, REPLACED))}
-
-
 def drive_from(case: Case, done: Iterable[Mapping[str, Any]]) -> int | None:
     """Step at which the drive begins, from the records of the complete segments; None if it is not known yet.
 
@@ -284,6 +279,31 @@ def locked(places: Iterable[Path]) -> Iterator[Mapping[Path, int]]:
         for place, descriptor in ours.items():
             _lock_file(place).unlink(missing_ok=True)
             os.close(descriptor)
+
+
+@contextmanager
+def recomputed(directory: Path, names: Collection[str]) -> Iterator[None]:
+    """Record in the manifest of a finished run that the block recomputes files: program, time, checksums.
+
+    During the block the run is locked, and the manifest does not list the files, so that a kill gives no false alarm.
+    An unfinished run has no manifest: nothing is recorded. `RunBusy` if another process recomputes or makes the run.
+    """
+    if not is_finished(directory):
+        yield
+        return
+    place = directory.resolve()
+    with locked([place]) as ours:
+        if not ours:
+            raise RunBusy("another process is measuring this run", directory)
+        contents = read_manifest(directory)
+        sums = sums_of(contents, directory)
+        if [name for name in names if sums.pop(name, None)]:
+            write_json(directory / MANIFEST_NAME, contents)
+        yield
+        sums |= checksums(directory, names)
+        contents.setdefault("files", {}).update({name: (directory / name).stat().st_size for name in names})
+        contents["tabulated"] = {**software(), "date": iso_time(time.time()), "files": list(names)}
+        write_json(directory / MANIFEST_NAME, contents)
 
 
 def _lock(file: Path, end: float) -> int | None:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -56,8 +55,8 @@ def write_manifest(
         **software(),
         "host": platform.node(),
         "platform": platform.platform(),
-        "started": _iso(started),
-        "finished": _iso(finished),
+        "started": iso_time(started),
+        "finished": iso_time(finished),
         "seconds": {
             "total": max(finished - started, report.wall_seconds),
             "engine": report.wall_seconds,
@@ -77,7 +76,8 @@ def read_manifest(directory: Path) -> dict[str, Any]:
     return read_json(directory / MANIFEST_NAME)
 
 
-def _iso(seconds: float) -> str:
+def iso_time(seconds: float) -> str:
+    """A time in seconds after the epoch, ISO 8601."""
     return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(seconds))
 
 
@@ -101,7 +101,7 @@ def check_unchanged(directory: Path, names: Collection[str]) -> bool:
     unfinished run, which has no manifest.
     """
     try:
-        sums = _sums(read_manifest(directory), directory)
+        sums = sums_of(read_manifest(directory), directory)
     except FileNotFoundError:
         return True
     wanted = {name: sums[name] for name in names if name in sums}
@@ -114,28 +114,8 @@ def check_unchanged(directory: Path, names: Collection[str]) -> bool:
     return len(wanted) == len(names)
 
 
-def _sums(contents: dict[str, Any], directory: Path) -> dict[str, str]:
+def sums_of(contents: dict[str, Any], directory: Path) -> dict[str, str]:
+    """The checksums in a manifest of a directory; `ValueError` if it has none."""
     if not isinstance(sums := contents.get("sha256"), dict):
         raise ValueError(f"{directory / MANIFEST_NAME}: expected a table sha256")
     return sums
-
-
-@contextmanager
-def recomputed(directory: Path, names: Collection[str]) -> Iterator[None]:
-    """Record in the manifest of a finished run that the block recomputes files: program, time, checksums.
-
-    During the block the manifest does not list the files, so that a kill gives no false alarm. An unfinished run has no
-    manifest: nothing is recorded.
-    """
-    if not (directory / MANIFEST_NAME).is_file():
-        yield
-        return
-    contents = read_manifest(directory)
-    sums = _sums(contents, directory)
-    if [name for name in names if sums.pop(name, None)]:
-        write_json(directory / MANIFEST_NAME, contents)
-    yield
-    sums |= checksums(directory, names)
-    contents.setdefault("files", {}).update({name: (directory / name).stat().st_size for name in names})
-    contents["tabulated"] = {**software(), "date": _iso(time.time()), "files": list(names)}
-    write_json(directory / MANIFEST_NAME, contents)

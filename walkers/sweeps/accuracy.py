@@ -20,9 +20,8 @@ from walkers.postprocess.results import recorded
 from walkers.postprocess.sides import STEADY_SPEED
 from walkers.postprocess.uncertainty import ACCURACY, ACCURACY_NAME
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import case_of, run_place
+from walkers.runner.directory import case_of, recomputed, run_place
 from walkers.runner.files import write_json
-from walkers.runner.manifest import recomputed
 from walkers.sweeps.scheduler import Options, SweepStopped, run_sweep
 from walkers.sweeps.table import SIDES, load, main_columns, sides_differ
 

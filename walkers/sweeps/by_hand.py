@@ -23,34 +23,18 @@ from walkers.physics.laws import source_of
 from walkers.postprocess.dump import DumpError
 from walkers.postprocess.results import measure
 from walkers.rounding import percent
+from walkers.runner import directory as on_disk
 from walkers.runner.binary import find_engine, plugin_of, write_run_script
-from walkers.runner.directory import (
-    CASE_NAME,
-    DECK_RECORD_NAME,
-    LAW_NAME,
-    with_recorded_law,
-    write_deck,
-    write_segment_record,
-)
 from walkers.runner.failures import EngineFailure, MissingFrames
 from walkers.runner.files import read_json, write_json
 from walkers.runner.launch import EngineReport, judge
 from walkers.runner.manifest import MANIFEST_NAME, read_manifest, write_manifest
 from walkers.sweeps.readable import kind_of
-from walkers.templates.deck import (
-    DECK_NAME,
-    LAYOUT_NAME,
-    OUTPUT_NAME,
-    RUN_NAME,
-    SCALE_NAME,
-    Deck,
-    Segment,
-    render_deck,
-    whole,
-)
+from walkers.templates import deck as decks
+from walkers.templates.deck import Deck, Segment
 from walkers.templates.parameters import PRINTED, suffixes
 
-_LOGS = (OUTPUT_NAME, "log.liggghts")
+_LOGS = (decks.OUTPUT_NAME, "log.liggghts")
 """Output of the engine by `write_run_script`, and the default log of LIGGGHTS."""
 _PRINTED = re.compile(rf"^{PRINTED} (.+)$", re.MULTILINE)
 _LINE = re.compile(r"^variable +(\w+) string (\S+)", re.MULTILINE)
@@ -77,24 +61,24 @@ def write_folder(case: Case, folder: Path) -> Path:
 
     `InputError` if the folder exists or cannot be made; errors of `find_engine` and `plugin_of`.
     """
-    deck, engine = render_deck(case, whole(case)), find_engine()
+    deck, engine = decks.render_deck(case, decks.whole(case)), find_engine()
     plugin = plugin_of(engine)
     try:
         folder.mkdir(parents=True)
     except OSError as error:
         raise refused(folder, f"cannot make the folder ({error.strerror}): expected the name of a new one") from error
     try:
-        write_deck(deck, folder)
-        (folder / SCALE_NAME).write_text(_SCALE, encoding="utf-8")
+        on_disk.write_deck(deck, folder)
+        (folder / decks.SCALE_NAME).write_text(_SCALE, encoding="utf-8")
         write_run_script(folder, engine, plugin, deck.layout.ranks)
         if law := source_of(case.liquid.law):
-            shutil.copyfile(law, folder / LAW_NAME)
-        write_json(folder / DECK_RECORD_NAME, {"case": case.as_dict(), "deck": deck.text})
+            shutil.copyfile(law, folder / on_disk.LAW_NAME)
+        write_json(folder / on_disk.DECK_RECORD_NAME, {"case": case.as_dict(), "deck": deck.text})
     except OSError as error:  # a disk that is full names no file
         error.filename = str(folder)
         shutil.rmtree(folder, ignore_errors=True)
         raise
-    return folder / DECK_NAME
+    return folder / decks.DECK_NAME
 
 
 def as_run(case: Case, directory: Path | None) -> Case:
@@ -116,25 +100,25 @@ def take_in(folder: Path) -> None:
     """
     logs = [folder / name for name in _LOGS if (folder / name).is_file()]
     try:
-        ages = {path: path.stat().st_mtime_ns for path in [folder / DECK_NAME, *logs, folder / MANIFEST_NAME]}
+        ages = {path: path.stat().st_mtime_ns for path in [folder / decks.DECK_NAME, *logs, folder / MANIFEST_NAME]}
         if max(ages.values()) == ages[folder / MANIFEST_NAME]:
             return
     except OSError:  # it is no run directory yet
         pass
     if not logs:
         expected = f"expected a log of the engine, {' or '.join(_LOGS)}"
-        raise refused(folder, f"the deck was not run ({expected}); do: cd {folder} && sh {RUN_NAME}")
+        raise refused(folder, f"the deck was not run ({expected}); do: cd {folder} && sh {decks.RUN_NAME}")
     log = max(logs, key=lambda path: path.stat().st_mtime_ns)
     try:
-        record, deck = read_json(folder / DECK_RECORD_NAME), folder / DECK_NAME
-        case, written = with_recorded_law(Case.from_dict(record["case"]), folder), str(record["deck"])
+        record, deck = read_json(folder / on_disk.DECK_RECORD_NAME), folder / decks.DECK_NAME
+        case, written = on_disk.with_recorded_law(Case.from_dict(record["case"]), folder), str(record["deck"])
         now = deck.read_text(encoding="utf-8", errors="surrogateescape")
         said = log.read_text(encoding="utf-8", errors="replace")
         ran, segment, changes = _as_run(case, written, now, said, f"{folder}: the edited deck")
         notes = ["run by hand", *([f"the deck was edited: {'; '.join(changes)}"] if changes else [])]
         if deck.stat().st_mtime_ns > log.stat().st_mtime_ns:
-            notes.append(f"{DECK_NAME} is newer than {log.name}: if it was edited since, run it again")
-        rendered = render_deck(ran, segment)
+            notes.append(f"{decks.DECK_NAME} is newer than {log.name}: if it was edited since, run it again")
+        rendered = decks.render_deck(ran, segment)
         report = judge(rendered, folder, log)
         _write(folder, ran, rendered, segment, replace(report, wall_seconds=report.loop_seconds), notes, case)
     except MissingFrames as failure:
@@ -241,9 +225,9 @@ def _write(
     from walkers.postprocess.gait import are_constant
 
     (folder / MANIFEST_NAME).unlink(missing_ok=True)
-    write_json(folder / CASE_NAME, case.as_dict(), at_once=False)
-    write_json(folder / LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
-    write_segment_record(folder, segment, report, by_hand=notes)
+    write_json(folder / on_disk.CASE_NAME, case.as_dict(), at_once=False)
+    write_json(folder / decks.LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
+    on_disk.write_segment_record(folder, segment, report, by_hand=notes)
     wanted = before.run
     # Cycles that were enough for the finished run of a case may be too few for an edited deck.
     doubtful = case.run.cycles < wanted.cycles if wanted.until_steady else case.apart and case != before
@@ -251,7 +235,7 @@ def _write(
         reached = f"the velocities are not constant within {percent(CONSTANT)} after {case.run.cycles} cycles"
         further = f"walkers run continues to {wanted.cycles}: set cycles to {wanted.cycles} and run the deck again"
         notes.append(f"{reached}; {further if wanted.until_steady else 'set cycles to more and run the deck again'}")
-        write_segment_record(folder, segment, report, by_hand=notes)
+        on_disk.write_segment_record(folder, segment, report, by_hand=notes)
     measure(folder)
     about: dict[str, Any] = {"drive_from": segment.drive_from, "segments": 1, "by_hand": notes}
     write_manifest(case, folder.name, None, report, started=time.time(), directory=folder, **about)

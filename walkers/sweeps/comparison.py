@@ -9,25 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.errors import refused
-from walkers.postprocess.numbers import ASIDE, declared, headline, is_error
+from walkers.postprocess.numbers import ASIDE, headline, is_error, scatter_of
 from walkers.postprocess.quantities import unit_shown
 from walkers.postprocess.results import Results, read
 from walkers.postprocess.sides import alike
 from walkers.rounding import rounded
 from walkers.runner.directory import case_of
+from walkers.sweeps import table as sweeps
 from walkers.sweeps.readable import differing, flattened, readable
-from walkers.sweeps.table import (
-    ERRORS,
-    columns_of,
-    default_column,
-    find_name,
-    key_texts,
-    key_values,
-    load,
-    sides_differ,
-    value_text,
-    with_unit,
-)
 from walkers.text import aligned
 
 if TYPE_CHECKING:
@@ -72,7 +61,7 @@ def _pair(
         difference = (float(printed[1]) - float(printed[0])) / size
     both = " and ".join(_two_digits(one * size, usual) for one in errors if isfinite(one)) or "-"
     cells = [*printed, _signed(difference * size, usual), both, _two_digits(numerical * size, usual)]
-    return contents, [with_unit(quantity, usual), *cells]
+    return contents, [sweeps.with_unit(quantity, usual), *cells]
 
 
 def _signed(value: float, unit: str) -> str:
@@ -126,7 +115,7 @@ def _pairs(results: Sequence[Results]) -> list[tuple[dict[str, Any], list[str]]]
     little = _VELOCITIES if "axial_velocity" in heads else ("velocity",) if "right_facing" in heads else ()
     names = {name for result in results for name in result if not is_error(name)}
     pairs = []
-    for name, (unit, _) in columns_of(names.difference(ASIDE, little, ["coverage"])).items():
+    for name, (unit, _) in sweeps.columns_of(names.difference(ASIDE, little, ["coverage"])).items():
         error = hypot(*(result.get(f"{name}_error", nan) for result in results))
         both = [result.get(name) for result in results], [scatter.get(name) for scatter in scatters]
         one, cells = _pair(name, unit, *both, error)
@@ -139,7 +128,7 @@ def _scatters(result: Results) -> dict[str, float]:
     """Standard deviations of columns over copies, from the result or from the table of the walkers."""
     if "velocity" not in result:
         return {}
-    scatters = {name: float(result[declared(name).error]) for name in _VELOCITIES}
+    scatters = {name: float(result[scatter_of(name)]) for name in _VELOCITIES}
     walkers = result.table("walkers")
     walkers = walkers[alike(walkers, uphill=result["goes_uphill"])]
     for name in walkers.columns:
@@ -155,18 +144,20 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
 
     `InputError` if the varied keys differ, no finished point is common, or a sweep has no such column.
     """
-    tables, source = [load(directory) for directory in (first, second)], f"{first}, {second}"
+    tables, source = [sweeps.load(directory) for directory in (first, second)], f"{first}, {second}"
     names = [str(table.attrs["sweep"]) for table in tables]
     names = [str(first), str(second)] if names[0] == names[1] else names
-    values, others = ({key: key_values(table, key) for axis in table.attrs["axes"] for key in axis} for table in tables)
+    values, others = (
+        {key: sweeps.key_values(table, key) for axis in table.attrs["axes"] for key in axis} for table in tables
+    )
     units = [{key: unit for key, (_, unit) in one.items()} for one in (values, others)]
-    heads = [[*map(with_unit, one, one.values())] for one in units]
+    heads = [[*map(sweeps.with_unit, one, one.values())] for one in units]
     if units[0] != units[1]:
         differences = " and ".join(", ".join(one) or "nothing" for one in heads)
         raise refused(source, f"expected sweeps that vary the same keys in the same units: {differences}")
     known = [name for name in tables[0].columns if name in tables[1] and tables[0][name].dtype.kind in "fiu"]
-    column = find_name("column", column or default_column(max(tables, key=sides_differ)), known)
-    at = [table.assign(at=[", ".join(row) for row in key_texts(table).to_numpy()]) for table in tables]
+    column = sweeps.find_name("column", column or sweeps.default_column(max(tables, key=sweeps.sides_differ)), known)
+    at = [table.assign(at=[", ".join(row) for row in sweeps.key_texts(table).to_numpy()]) for table in tables]
     done = [table[table["status"] == "finished"] for table in at]
     both = done[0].merge(done[1], on="at", suffixes=("_first", "_second"))
     if both.empty:
@@ -176,19 +167,24 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
     unit, points, lines = tables[0].attrs["units"][column], [], []
     for row in both.to_dict("records"):
         numbers, errors = (
-            [row.get(f"{name}_{side}") for side in ("first", "second")] for name in (column, ERRORS.get(column))
+            [row.get(f"{name}_{side}") for side in ("first", "second")] for name in (column, scatter_of(column))
         )
         one, (_, *cells) = _pair(column, unit, numbers, errors)
         point = {key: of_key[row["point_first"]] for key, (of_key, _) in values.items()}
         points.append({"point": point, **one})
-        lines.append([*map(value_text, point.values()), *cells[:-1]])
+        lines.append([*map(sweeps.value_text, point.values()), *cells[:-1]])
     usual, size = unit_shown(unit)
     largest = max((one["difference"] or 0.0 for one in points), key=abs)
     line = f"{len(both)} points in both; largest difference {_signed(largest * size, usual)} {usual}".rstrip()
     unmatched = [len(table) - len(both) for table in tables]
     if any(unmatched):
         line += f"; left out: {unmatched[0]} of {names[0]}, {unmatched[1]} of {names[1]}"
-    head = [*heads[0], *(f"{name}: {with_unit(column, usual)}" for name in names), "difference", "scatter of copies"]
+    head = [
+        *heads[0],
+        *(f"{name}: {sweeps.with_unit(column, usual)}" for name in names),
+        "difference",
+        "scatter of copies",
+    ]
     contents = {"first": names[0], "second": names[1], "keys": units[0], "parameters": parameters}
     text = "\n\n".join(filter(None, [differences, aligned([head, *lines]), line]))
     return Comparison({**contents, "points": points, "unmatched": unmatched}, text)

@@ -19,18 +19,18 @@ from walkers.errors import InputError, refused
 from walkers.inputs.case import Case
 from walkers.inputs.library import unmeasured
 from walkers.postprocess.drawing import TWO_COLUMNS, errors_seen, letter_panels, new_figure, plain_text, styled
-from walkers.postprocess.numbers import declared, is_declared
+from walkers.postprocess.numbers import declared, is_declared, scatter_of
 from walkers.postprocess.quantities import unit_shown
 from walkers.postprocess.results import derived
 from walkers.runner.directory import case_of
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.table import (
-    ERRORS,
     FACING_DOWN,
     SEEDS,
     default_column,
     find_name,
     key_values,
+    status_text,
     value_text,
     with_unit,
 )
@@ -105,6 +105,8 @@ class LeftOutWarning(UserWarning):
 def figure_of(table: pd.DataFrame, options: FigureOptions = FigureOptions(), predict: Predict | None = None) -> Figure:
     """Figure of the table of a sweep.
 
+    `InputError` if no point is finished, or there is no such column.
+
     Parameters
     ----------
     table
@@ -120,16 +122,11 @@ def figure_of(table: pd.DataFrame, options: FigureOptions = FigureOptions(), pre
     Figure
         Means; bars are the scatter over copies where the table has it. The axis of a key has the unit of the sweep
         file; other columns are in mm, mm/s, g (9.8 m/s²) and degrees. A `LeftOutWarning` reports what is left out.
-
-    Raises
-    ------
-    InputError
-        If no point is finished, or there is no such column.
     """
     column = column_of(table, options.y)
     done = table[table["status"] == "finished"]
     counts = Counter(table["status"][table["status"] != "finished"])
-    others = ", ".join(f"{number} {status}" for status, number in counts.items())
+    others = status_text(counts)
     if done.empty:
         raise refused(str(table.attrs["sweep"]), f"no point is finished ({others or 'there is none'})")
     if counts:
@@ -336,8 +333,8 @@ def _points(done: pd.DataFrame, column: str, down: str | None) -> tuple[str, pd.
 
     values = _numbers(done, column, "y")
     points, label = pd.DataFrame({"value": values.values, "error": np.nan}), values.label
-    if column in ERRORS:
-        errors = done[ERRORS[column]].to_numpy(dtype=float, na_value=np.nan)
+    if (scatter := scatter_of(column)) in done:
+        errors = done[scatter].to_numpy(dtype=float, na_value=np.nan)
         points["error"] = unit_shown(done.attrs["units"][column])[1] * errors
     if f"{column}_low" in done:  # the band of a spread at each point
         for end in ("low", "high"):

@@ -17,6 +17,8 @@ _LOG = Literal["x", "y", "xy"]
 class FigureOptions:
     """What the figure of a sweep shows.
 
+    `InputError` if ``log`` is no choice.
+
     Parameters
     ----------
     x
@@ -31,11 +33,6 @@ class FigureOptions:
         Sweeps: which axes are logarithmic.
     theory
         Sweeps: also draw the theory.
-
-    Raises
-    ------
-    InputError
-        If ``log`` is no choice.
     """
 
     x: str | None = None

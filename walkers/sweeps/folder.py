@@ -20,25 +20,16 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, refused
 from walkers.inputs.case import Case
-from walkers.postprocess.numbers import in_short
+from walkers.postprocess.numbers import headline, in_short
 from walkers.postprocess.results import plain, read
 from walkers.postprocess.uncertainty import ACCURACY, SPREAD
 from walkers.rounding import counted, duration_text
-from walkers.runner.directory import (
-    CASE_NAME,
-    REPLACED,
-    UNFINISHED,
-    holds_unfinished,
-    is_locked,
-    is_run_name,
-    locked,
-    recover,
-)
+from walkers.runner import directory as on_disk
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.sweeps.making import progress_at
 from walkers.sweeps.readable import FlatCase, chosen, differing, flattened, readable, short_keys
-from walkers.sweeps.table import RECORD_NAME, read_record, state_at, states, worst_status
+from walkers.sweeps.table import RECORD_NAME, read_record, state_at, states, status_text, worst_status
 from walkers.text import aligned
 
 if TYPE_CHECKING:
@@ -62,9 +53,9 @@ def inventory(out: Path) -> pd.DataFrame:
         ``case``, ``status`` (finished, running, failed, or interrupted: a run can be continued, or points of a sweep
         are missing), ``directory``, ``age`` (s, since the end of the run or the last change), ``size`` (bytes of the
         files, for a sweep of its runs), ``reason`` and ``message`` of a failure. A finished run has the ``numbers`` of
-        its result (SI units), the main ones as text in ``result``, and for walkers the ``velocity`` (m/s; on a slope
-        up). A sweep has numbers of ``points`` by status and the names of its ``runs``. ``parameters`` are the values of
-        the case (`walkers.sweeps.readable.flattened`), for a sweep the number of values of each varied key.
+        its result (SI units), the main ones as text in ``result``, and for walkers the main ``velocity`` (m/s). A sweep
+        has numbers of ``points`` by status and the names of its ``runs``. ``parameters`` are the values of the case
+        (`walkers.sweeps.readable.flattened`), for a sweep the number of values of each varied key.
     """
     import pandas as pd
 
@@ -76,7 +67,7 @@ def inventory(out: Path) -> pd.DataFrame:
     listed = {_place(run["directory"]) for run in runs}
     for lock in out.glob("*.lock"):  # runs in shared decks, and runs whose directory does not exist yet
         place = lock.with_suffix("")
-        if place not in listed and is_locked(place):
+        if place not in listed and on_disk.is_locked(place):
             runs.append(_row("run", place.name, place, "running", age=0.0, size=0))
     sweeps = [sweep for path in folders if (sweep := _sweep(path, runs, now)) is not None]
     runs.sort(key=lambda run: (run["name"], run["status"] != "finished"))
@@ -90,20 +81,20 @@ def _row(kind: str, name: str, directory: Path, status: str, **values: Any) -> d
 
 def _place(directory: Path) -> Path:
     """Where a run belongs; beside it is its lock."""
-    return directory.with_name(directory.name.removesuffix(UNFINISHED).removesuffix(REPLACED))
+    return directory.with_name(directory.name.removesuffix(on_disk.UNFINISHED).removesuffix(on_disk.REPLACED))
 
 
 def _run(path: Path, now: float) -> dict[str, Any] | None:
     place = _place(path)
     finished = place == path and (path / MANIFEST_NAME).is_file()
-    if not (finished or is_run_name(place.name)):  # a user's folder
+    if not (finished or on_disk.is_run_name(place.name)):  # a user's folder
         return None
     values: dict[str, Any] = {}
     try:
-        case = Case.from_dict(read_json(path / CASE_NAME))
+        case = Case.from_dict(read_json(path / on_disk.CASE_NAME))
         values = {"case": case.name, "parameters": flattened(case)}
     except (OSError, ValueError, KeyError, TypeError):
-        if not is_run_name(place.name) or not (finished or (place != path and holds_unfinished(path))):
+        if not on_disk.is_run_name(place.name) or not (finished or (place != path and on_disk.holds_unfinished(path))):
             return None
     values["size"], newest = weigh(path)
     if finished:
@@ -123,11 +114,11 @@ def _result(path: Path) -> dict[str, Any]:
         results = read(path)
     except InputError as error:
         return {"reason": error.problems[0].expected}
-    notes, numbers = results.about["by_hand"], plain(results.numbers)
+    notes, numbers, main = results.about["by_hand"], plain(results.numbers), headline(results)
     return {
         "numbers": numbers,
         "result": in_short(results),
-        "velocity": numbers.get("axial_velocity" if results["goes_uphill"] else "velocity"),
+        "velocity": None if main == "climbs" else numbers.get(main),
         "reason": "edited and run by hand" if "edited" in " ".join(notes) else next(iter(notes), None),
     }
 
@@ -218,7 +209,7 @@ def as_text(contents: pd.DataFrame, hidden: int = 0) -> str:
     The last line states the number of ``hidden`` runs of sweeps.
     """
     sweeps = contents[contents["kind"] == "sweep"]
-    points = sweeps["points"].map(lambda points: ", ".join(f"{number} {status}" for status, number in points.items()))
+    points = sweeps["points"].map(status_text)
     varied = sweeps["parameters"].map(lambda keys: ", ".join(f"{key} ({number})" for key, number in keys.items()))
     columns = {"sweep": sweeps["name"], "points": points, **_weight(sweeps), "case": sweeps["case"]}
     blocks = [_lines({**columns, "varies (values)": varied})] if len(sweeps) else []
@@ -309,7 +300,7 @@ def plan_cleaning(out: Path, given: Sequence[Path] = ()) -> Cleaning:
     ]
     remarks += [f"stays: {rows.sum()} {why}" for why, rows in stays.items() if rows.any()]
     locks = [] if given else sorted(out.glob("*.lock"))
-    stale = [lock for lock in locks if is_run_name(lock.stem) and not is_locked(lock.with_suffix(""))]
+    stale = [lock for lock in locks if on_disk.is_run_name(lock.stem) and not on_disk.is_locked(lock.with_suffix(""))]
     return Cleaning(remove, stale, remarks)
 
 
@@ -332,7 +323,7 @@ def _with_theirs(names: set[str], runs_of: Mapping[str, Sequence[str]]) -> set[s
 
 def _waits(directory: Path) -> bool:
     """Whether a run was moved aside, and the one that replaces it does not exist."""
-    return directory.name.endswith(REPLACED) and not _place(directory).exists()
+    return directory.name.endswith(on_disk.REPLACED) and not _place(directory).exists()
 
 
 def clean(cleaning: Cleaning) -> dict[Path, str]:
@@ -340,13 +331,13 @@ def clean(cleaning: Cleaning) -> dict[Path, str]:
     left = {}
     for row in cleaning.remove.to_dict("records"):
         place = _place(row["directory"])
-        with locked([] if row["kind"] == "sweep" else [place]) as ours:
+        with on_disk.locked([] if row["kind"] == "sweep" else [place]) as ours:
             if not (ours or row["kind"] == "sweep"):
                 left[row["directory"]] = "kept: a process is computing it"
                 continue
             try:
                 if row["kind"] == "run":
-                    recover(place)
+                    on_disk.recover(place)
                 if row["directory"].is_symlink():
                     row["directory"].unlink()
                 elif row["directory"].exists():
@@ -354,6 +345,6 @@ def clean(cleaning: Cleaning) -> dict[Path, str]:
                     shutil.rmtree(row["directory"])
             except OSError as error:
                 left[row["directory"]] = f"cannot be removed whole: {error.strerror or error} ({error.filename})"
-    with locked(lock.with_suffix("") for lock in cleaning.locks if lock.exists()):
+    with on_disk.locked(lock.with_suffix("") for lock in cleaning.locks if lock.exists()):
         pass  # a lock file goes with its lock
     return left

@@ -26,43 +26,15 @@ from walkers.inputs.run import Run
 from walkers.postprocess.results import measure
 from walkers.progress import Progress, Tell
 from walkers.rounding import duration_text
+from walkers.runner import directory as on_disk
 from walkers.runner.binary import Engine, is_new, model_sha256, read_audit
-from walkers.runner.directory import (
-    FAILURE_NAME,
-    FIRST_SEGMENT,
-    SEGMENT_NAME,
-    SEGMENTS,
-    case_of,
-    drive_from,
-    is_finished,
-    layout_of,
-    locked,
-    move_into_place,
-    recover,
-    room_on_disk,
-    run_place,
-    segment_directories,
-    unfinished,
-    write_case,
-    write_deck,
-    write_segment_record,
-)
 from walkers.runner.failures import AuditFailed, BeadsOverTheTop, UnauditedEngineWarning
 from walkers.runner.files import fsync_path, link_or_copy, read_json, settle, write_json
 from walkers.runner.launch import EngineReport, check_room, last_step, launch
 from walkers.runner.manifest import write_manifest
 from walkers.runner.provenance import look_ahead
-from walkers.templates.deck import (
-    DECK_NAME,
-    OUTPUT_NAME,
-    PREVIOUS_RESTART_NAME,
-    RESTART_NAME,
-    Deck,
-    Segment,
-    next_segment,
-    render_deck,
-    render_shared_deck,
-)
+from walkers.templates import deck as decks
+from walkers.templates.deck import Deck, Segment
 
 DECK_FOLDER = "shared_deck"
 """Folder in a run directory: the shared deck that made the run, and the engine's log."""
@@ -98,8 +70,11 @@ def make_runs(
     force: bool = False,
     on_progress: Tell | None = None,
     time_limit: float | None = None,
-) -> dict[str, Path]:
+) -> dict[str, bool]:
     """Make the missing runs in one deck, and measure them. A single run continues where it was interrupted.
+
+    `EngineFailure` if the engine fails. Nothing is left of a shared deck; its cases must be tried again in
+    smaller decks.
 
     Parameters
     ----------
@@ -113,19 +88,14 @@ def make_runs(
     Returns
     -------
     dict
-        Directories of the finished runs by name, without those that another process makes.
-
-    Raises
-    ------
-    runner.EngineFailure
-        If the engine fails. Nothing is left of a shared deck; its cases must be tried again in smaller decks.
+        The finished runs by name, and whether this call made them; without those that another process makes.
     """
     out.mkdir(parents=True, exist_ok=True)
-    places = {run_place(case, engine, out): case for case in cases}
-    with locked(places) as ours:
+    places = {on_disk.run_place(case, engine, out): case for case in cases}
+    with on_disk.locked(places) as ours:
         for place in ours:
-            recover(place)
-        runs = {} if force else {place.name: place for place in places if is_finished(place)}
+            on_disk.recover(place)
+        runs = {} if force else {place.name: False for place in places if on_disk.is_finished(place)}
         missing = {place: case for place, case in places.items() if place in ours and place.name not in runs}
         locks = [ours[place] for place in missing]
         if len(missing) == 1:
@@ -133,29 +103,31 @@ def make_runs(
             with open_locked(case, engine, place, locks, anew=force) as opened:
                 opened.make(on_progress=on_progress, time_limit=time_limit)
                 measure(opened.directory)
-                runs[place.name] = opened.finish()
+                opened.finish()
+            runs[place.name] = True
         elif missing:
             left = {place.name: case for place, case in missing.items()}
             for cycles in next(iter(left.values())).run.attempts:
                 if left:
-                    runs |= _make_together(left, cycles, out, engine, locks, on_progress, time_limit)
+                    done = _make_together(left, cycles, out, engine, locks, on_progress, time_limit)
+                    runs |= dict.fromkeys(done, True)
                 left = {name: case for name, case in left.items() if name not in runs}
     return runs
 
 
 def progress_at(place: Path) -> Progress | None:
     """Progress of a run from its files, with the wall time of its segment; None for shared decks and at the start."""
-    directory = unfinished(place)
+    directory = on_disk.unfinished(place)
     try:
-        case = case_of(directory)
-        done = [_read_segment(path) for path in segment_directories(directory)]
-        (folder,) = (directory / SEGMENTS).glob("*.new")
+        case = on_disk.case_of(directory)
+        done = [_read_segment(path) for path in on_disk.segment_directories(directory)]
+        (folder,) = (directory / on_disk.SEGMENTS).glob("*.new")
         run = case.run
-        cycles = layout_of(folder).steps // run.steps_per_cycle if run.until_steady else run.cycles
+        cycles = on_disk.layout_of(folder).steps // run.steps_per_cycle if run.until_steady else run.cycles
         begin = int(done[-1]["end"]) if done else 0
-        start = drive_from(case, done)
-        step = max(begin, last_step(folder / OUTPUT_NAME))
-        seconds = time.time() - (folder / DECK_NAME).stat().st_mtime
+        start = on_disk.drive_from(case, done)
+        step = max(begin, last_step(folder / decks.OUTPUT_NAME))
+        seconds = time.time() - (folder / decks.DECK_NAME).stat().st_mtime
     except (OSError, ValueError, KeyError, TypeError, WalkersError):
         return None
     return progress_in(run, cycles, Segment(begin, begin, start), step, seconds)
@@ -203,7 +175,7 @@ class OpenRun:
         *,
         on_progress: Tell | None = None,
         time_limit: float | None = None,
-        render: Callable[[Case, Segment], Deck] = render_deck,
+        render: Callable[[Case, Segment], Deck] = decks.render_deck,
     ) -> None:
         """Make the missing segments with decks by ``render``; ``time_limit`` (s) applies to each.
 
@@ -213,7 +185,7 @@ class OpenRun:
         for cycles in self.case.run.attempts:
             case = self.case.for_cycles(cycles)
             if self.case.run.until_steady and self.done and self.done[-1]["end"] < case.run.steps:
-                for directory in segment_directories(self.directory):  # those of an attempt with fewer cycles
+                for directory in on_disk.segment_directories(self.directory):  # those of an attempt with fewer cycles
                     shutil.rmtree(directory)
                 self.done.clear()
             while (segment := self._next_segment(case)).end > segment.begin:
@@ -221,57 +193,58 @@ class OpenRun:
                 try:
                     self._make(segment, render(case, segment), tell, time_limit)
                 except BeadsOverTheTop as over:
-                    begun_at = drive_from(self.case, self.done)
+                    begun_at = on_disk.drive_from(self.case, self.done)
                     if not case.boundary.closed or begun_at is None or segment.begin <= begun_at:
                         raise
                     # A climber left the container: this ends the experiment; the segments before are valid.
-                    shutil.rmtree(self.directory / SEGMENTS / f"{len(self.done):04d}.new")
+                    shutil.rmtree(self.directory / on_disk.SEGMENTS / f"{len(self.done):04d}.new")
                     self.ended = f"{over.lost} bead(s) left the container over its walls in the next segment"
                     return
             if cycles < self.case.run.cycles and _are_constant(self.directory):
                 return
 
     def _next_segment(self, case: Case) -> Segment:
-        return next_segment(case, int(self.done[-1]["end"]) if self.done else 0, drive_from(self.case, self.done))
+        return decks.next_segment(
+            case, int(self.done[-1]["end"]) if self.done else 0, on_disk.drive_from(self.case, self.done)
+        )
 
     def _make(self, segment: Segment, deck: Deck, tell: Callable[[int], None] | None, time_limit: float | None) -> None:
-        folder, number = self.directory / SEGMENTS, len(self.done)
+        folder, number = self.directory / on_disk.SEGMENTS, len(self.done)
         new, before = folder / f"{number:04d}.new", folder / f"{number - 1:04d}"
         shutil.rmtree(new, ignore_errors=True)
-        with room_on_disk(new, deck.layout.bead_dump_bytes):
+        with on_disk.room_on_disk(new, deck.layout.bead_dump_bytes):
             new.mkdir()
-            write_deck(deck, new, before if number else None)
+            on_disk.write_deck(deck, new, before if number else None)
             if segment.begin:
-                shutil.copyfile(before / RESTART_NAME, new / PREVIOUS_RESTART_NAME)
+                shutil.copyfile(before / decks.RESTART_NAME, new / decks.PREVIOUS_RESTART_NAME)
             report = launch(deck, new, self.engine, on_step=tell, time_limit=time_limit, keep_open=self.locks)
-            (new / PREVIOUS_RESTART_NAME).unlink(missing_ok=True)
-            restart = new / RESTART_NAME
+            (new / decks.PREVIOUS_RESTART_NAME).unlink(missing_ok=True)
+            restart = new / decks.RESTART_NAME
             size = restart.stat().st_size if restart.exists() else 0
             if not self.case.run.in_one and size < _LEAST_BYTES * deck.layout.atoms:  # the engine does not check this
                 raise DamagedSegment(f"{restart} is incomplete ({size} bytes): is the disk full?")
-            velocities = _RMS_VELOCITY.findall((new / OUTPUT_NAME).read_bytes())
-            record = write_segment_record(new, segment, report, float(velocities[-1]) if velocities else None)
+            velocities = _RMS_VELOCITY.findall((new / decks.OUTPUT_NAME).read_bytes())
+            record = on_disk.write_segment_record(new, segment, report, float(velocities[-1]) if velocities else None)
             settle()
             new.rename(folder / f"{number:04d}")
             fsync_path(folder)
         # The restart before the last one is kept in case the last one is damaged.
         if number > 1:
-            (folder / f"{number - 2:04d}" / RESTART_NAME).unlink(missing_ok=True)
+            (folder / f"{number - 2:04d}" / decks.RESTART_NAME).unlink(missing_ok=True)
         self.done.append(record)
 
-    def finish(self) -> Path:
-        """Write the manifest, and move the directory to its place, which is returned."""
+    def finish(self) -> None:
+        """Write the manifest, and move the directory to its place."""
         wall_seconds, loop_seconds = (sum(one[name] for one in self.done) for name in ("wall_seconds", "loop_seconds"))
         report = EngineReport(self.done[0]["version"], wall_seconds, loop_seconds, int(self.done[-1]["end"]))
-        start = drive_from(self.case, self.done) or 0
+        start = on_disk.drive_from(self.case, self.done) or 0
         rest = [segment["root_mean_square_velocity"] for segment in self.done if segment["end"] <= start]
         about: dict[str, Any] = {"started": self.started, "directory": self.directory, "segments": len(self.done)}
         about |= {"drive_from": start, "settled": rest[-1] if rest else None}
         about |= {"ended": self.ended} if self.ended else {}
         write_manifest(self.case, self.place.name, self.engine, report, **about)
         settle()
-        move_into_place(self.directory, self.place)
-        return self.place
+        on_disk.move_into_place(self.directory, self.place)
 
 
 def _teller(run: Run, cycles: int, segment: Segment, tell: Tell | None) -> Callable[[int], None] | None:
@@ -288,34 +261,34 @@ def open_locked(
 
     Without `OpenRun.finish` the directory remains ``….incomplete``; after a failure it contains ``failure.json``.
     """
-    directory = unfinished(place)
-    recover(place)
+    directory = on_disk.unfinished(place)
+    on_disk.recover(place)
     if anew:
         shutil.rmtree(directory, ignore_errors=True)
     try:
-        with room_on_disk(directory):
-            (directory / SEGMENTS).mkdir(parents=True, exist_ok=True)
+        with on_disk.room_on_disk(directory):
+            (directory / on_disk.SEGMENTS).mkdir(parents=True, exist_ok=True)
             # Left by an earlier call, besides complete segments: tables, incomplete files and segments.
-            for path in (*directory.iterdir(), *(directory / SEGMENTS).glob("*.new")):
+            for path in (*directory.iterdir(), *(directory / on_disk.SEGMENTS).glob("*.new")):
                 if path.is_file():
                     path.unlink()
-                elif path.name != SEGMENTS:
+                elif path.name != on_disk.SEGMENTS:
                     shutil.rmtree(path)
-            write_case(directory, case)
-            done = [_read_segment(path) for path in segment_directories(directory)]
+            on_disk.write_case(directory, case)
+            done = [_read_segment(path) for path in on_disk.segment_directories(directory)]
             yield OpenRun(case, engine, directory, place, locks, done)
     except Stopped:
         raise
     except (WalkersError, OSError) as failure:
         said = {"reason": type(failure).__name__, "message": str(failure), "lost": getattr(failure, "lost", 0)}
         with suppress(OSError):  # the disk may be full; the message reaches the user anyway
-            write_json(directory / FAILURE_NAME, said)
+            write_json(directory / on_disk.FAILURE_NAME, said)
         raise
 
 
 def _read_segment(directory: Path) -> dict[str, Any]:
     try:
-        record = read_json(directory / SEGMENT_NAME)
+        record = read_json(directory / on_disk.SEGMENT_NAME)
         if record["end"] > record["begin"] and "drive_from" in record:
             return record
         raise ValueError("begin, end or drive_from make no sense")
@@ -335,24 +308,24 @@ def _make_together(
     locks: Sequence[int],
     on_progress: Tell | None,
     time_limit: float | None,
-) -> dict[str, Path]:
+) -> list[str]:
     """Make runs in one deck for a number of cycles; return those with constant velocities or all of their cycles."""
     tried = {name: case.for_cycles(cycles) for name, case in cases.items()}
-    deck, started = render_shared_deck(list(tried.values())), time.time()
+    deck, started = decks.render_shared_deck(list(tried.values())), time.time()
     first = next(iter(cases))
-    incomplete = unfinished(out / first)
+    incomplete = on_disk.unfinished(out / first)
     shutil.rmtree(incomplete, ignore_errors=True)
     try:
-        with room_on_disk(incomplete, deck.layout.bead_dump_bytes):
+        with on_disk.room_on_disk(incomplete, deck.layout.bead_dump_bytes):
             check_room(out, 2 * deck.layout.bead_dump_bytes)  # the dump and its parts exist at the same time
             (incomplete / DECK_FOLDER).mkdir(parents=True)
-            write_deck(deck, incomplete / DECK_FOLDER)
+            on_disk.write_deck(deck, incomplete / DECK_FOLDER)
             # For other processes the directory is the unfinished first run.
             for name, case in [(".", cases[first]), *cases.items()]:
                 (incomplete / name).mkdir(exist_ok=True)
-                write_case(incomplete / name, case)
+                on_disk.write_case(incomplete / name, case)
             look_ahead()
-            tell = _teller(cases[first].run, cycles, next_segment(tried[first]), on_progress)
+            tell = _teller(cases[first].run, cycles, decks.next_segment(tried[first]), on_progress)
             folder = incomplete / DECK_FOLDER
             report = launch(deck, folder, engine, on_step=tell, time_limit=time_limit, keep_open=locks)
             _part(incomplete, tried, deck, report)
@@ -364,22 +337,22 @@ def _make_together(
                 write_manifest(cases[name], name, engine, report, directory=incomplete / name, **own)
             settle()
             for name in done:
-                move_into_place(incomplete / name, out / name)
+                on_disk.move_into_place(incomplete / name, out / name)
     finally:
         shutil.rmtree(incomplete, ignore_errors=True)
     for name in done:  # remains of a run that was made alone and killed
-        shutil.rmtree(unfinished(out / name), ignore_errors=True)
-    return {name: out / name for name in done}
+        shutil.rmtree(on_disk.unfinished(out / name), ignore_errors=True)
+    return done
 
 
 def _part(incomplete: Path, cases: Mapping[str, Case], deck: Deck, report: EngineReport) -> None:
     """Give each run its part of the output, and the deck."""
     from walkers.postprocess.splitting import split_output
 
-    places = {incomplete / name / FIRST_SEGMENT: case for name, case in cases.items()}
+    places = {incomplete / name / on_disk.FIRST_SEGMENT: case for name, case in cases.items()}
     for place in places:
         place.mkdir(parents=True)
     split_output(incomplete / DECK_FOLDER, deck.layout, places)
     for name, (place, case) in zip(cases, places.items(), strict=True):
-        write_segment_record(place, next_segment(case), report)
+        on_disk.write_segment_record(place, decks.next_segment(case), report)
         shutil.copytree(incomplete / DECK_FOLDER, incomplete / name / DECK_FOLDER, copy_function=link_or_copy)

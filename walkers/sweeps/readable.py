@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
-from dataclasses import replace
 from functools import cache
-from math import inf, isclose
+from math import isclose
 from typing import Any
 
 from pydantic_core import to_jsonable_python
@@ -13,6 +12,7 @@ from pydantic_core import to_jsonable_python
 from walkers.errors import InputError, Problem, refused
 from walkers.inputs import units
 from walkers.inputs.case import Case
+from walkers.inputs.origins import text_of
 from walkers.inputs.table import keys_of
 from walkers.inputs.units import Kind
 
@@ -33,20 +33,12 @@ def flattened(case: Case) -> FlatCase:
 
 
 def readable(key: str, value: Any) -> str:
-    """A value of `flattened` in the usual unit, such as ``4 g`` or ``0.3/0.2 mm``; a dash for none."""
+    """A value of `flattened` as a case file has it, such as ``4 g``; a dash for none."""
     if value is None:
         return "-"
-    kind = kind_of(key)
-    if kind is None or isinstance(value, str):
-        return _number(value, 1.0)
-    unit = kind.example.partition(" ")[2]
-    if (
-        key == "environment.gravity" or kind.unit == units.TEMPERATURE.unit
-    ):  # the paper's g, 9.8 m/s², is not the case's gravity
-        unit = kind.unit
-    unbounded = replace(kind, smallest=0.0, largest=inf)
-    size = 1.0 if unit == kind.unit else units.parse_quantity(f"1 {unit}", unbounded)
-    return f"{_number(value, size)} {unit}"
+    if key == "environment.gravity":  # the g of accelerations, 9.8 m/s², is that of the paper
+        return f"{value:.6g} m/s^2"
+    return text_of(value, kind_of(key))
 
 
 def kind_of(key: str) -> Kind | None:
@@ -65,14 +57,6 @@ def _kinds() -> Mapping[str, Kind]:
 def _ending(key: str) -> str:
     """The last two parts of a key, without places in lists: ``bead_wall`` is a friction or a roughness."""
     return ".".join(part.partition("[")[0] for part in key.split(".")[-2:])
-
-
-def _number(value: Any, size: float) -> str:
-    if isinstance(value, list):
-        return "/".join(_number(one, size) for one in value) or "-"
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return str(value)
-    return f"{value / size:.6g}"
 
 
 def differing(cases: Sequence[FlatCase]) -> list[str]:

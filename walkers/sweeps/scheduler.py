@@ -22,12 +22,12 @@ from collections import Counter
 from collections.abc import Collection, Hashable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import ceil, inf
 from pathlib import Path
 from platform import node
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from walkers.errors import InputError, Stopped, WalkersError, check_utf8, refused
 from walkers.inputs.case import Case
@@ -38,22 +38,11 @@ from walkers.rounding import counted, duration_text
 from walkers.runner.binary import Engine, find_engine
 from walkers.runner.directory import is_finished, is_locked, run_place, unfinished
 from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, OutputGone, ProgramDiffers
+from walkers.runner.launch import cores_here
 from walkers.show import PROGRAM_SECONDS, pairs_of_beads, predicted_overhead, predicted_seconds
+from walkers.sweeps import table
 from walkers.sweeps.making import check_audit, make_runs
 from walkers.sweeps.site import check_path, decks_at, prepare
-from walkers.sweeps.table import (
-    PARSL,
-    RECORD_NAME,
-    UNREADABLE,
-    PointState,
-    SweepRecord,
-    checked_states,
-    describe_sweep,
-    read_record,
-    states,
-    with_unit,
-    write_record,
-)
 from walkers.templates.scene import sharing_key
 
 if TYPE_CHECKING:
@@ -80,17 +69,16 @@ class SweepStopped(WalkersError):
 
 @dataclass(frozen=True)
 class Options:
-    """Options of a sweep: cores of this machine (``workers``), or a cluster instead; MPI processes of a deck.
+    """Options of a sweep: cores of this machine (``workers``, None: all), or a cluster; MPI processes of a deck.
 
-    An ``executor`` that is handed over runs as many decks at once as there are ``workers``. A failed point is repeated
-    ``retries`` times. Failures with the names ``final`` are never repeated, not even by a later call, because the
-    engine would fail again. ``time_limit`` is the wall time in s that an engine may take.
+    An ``executor`` that is handed over runs as many decks at once as there are ``workers``. Failures with the names
+    ``final`` are never repeated by a later call, because the engine would fail again. ``time_limit`` is the wall time
+    in s that an engine may take.
     """
 
-    workers: int
+    workers: int | None = None
     site: Config | None = None
     executor: Executor | None = None
-    retries: int = 0
     time_limit: float | None = None
     final: frozenset[str] = frozenset()
     ranks: int = 1
@@ -98,11 +86,10 @@ class Options:
     @property
     def decks_at_once(self) -> int:
         """Number of decks that run at the same time."""
-        if self.executor is not None:
-            return self.workers
-        if self.site is None:
-            return max(1, self.workers // self.ranks)
-        return decks_at(self.site, self.ranks)
+        workers = self.workers or cores_here()
+        if self.executor is None and self.site is not None:
+            return decks_at(self.site, self.ranks)
+        return workers if self.executor is not None else max(1, workers // self.ranks)
 
     def for_ranks(self, ranks: int) -> Options:
         """The same options for decks with a number of MPI processes; `InputError` if a node has fewer cores."""
@@ -114,13 +101,14 @@ class Options:
 
 @dataclass(frozen=True)
 class Failure:
-    """A failed point: number, run, name and message of the failure, directory with what is left of the run."""
+    """A failed point: number, run, name and message of the failure, directory with what is left of the run, `hits`."""
 
     point: int
     run: str
     reason: str
     message: str
     directory: str | None
+    hits: str = field(default="", repr=False)
 
 
 @dataclass(frozen=True)
@@ -199,7 +187,7 @@ def unfinished_parts(points: Sequence[int], cases: Sequence[Case], finished: Col
 class SweepPlan:
     """Plan of a sweep: points with their status, missing decks, failures that are not repeated."""
 
-    record: SweepRecord
+    record: table.SweepRecord
     cases: Sequence[Case]
     engine: Engine
     decks: Sequence[PlannedDeck]
@@ -216,12 +204,11 @@ class SweepPlan:
         apart = sum(predicted_seconds(self.cases[point]) * self.cases[point].run.ranks for point in missing)
         # Python works for one deck at a time, while other engines run.
         until = max(makespan((deck.seconds for deck in self.decks), at_once) + PROGRAM_SECONDS, besides)
-        text = ", ".join(f"{count} {status}" for status, count in sorted(Counter(self.statuses).items()))
-        keys = ", ".join(with_unit(key, unit) for key, unit in record.sweep.units.items())
+        keys = ", ".join(table.with_unit(key, unit) for key, unit in record.sweep.units.items())
         lines = [
             f"{record.sweep.name}: {record.sweep.title}".rstrip(": "),
             f"  varied     {keys or 'nothing'}",
-            f"  points     {len(record.runs)}: {text}",
+            f"  points     {len(record.runs)}: {table.status_text(Counter(self.statuses))}",
             f"  to do      {counted(len(missing), 'point')} in {counted(len(self.decks), 'deck')}",
             f"  predicted  {seconds + besides:.0f} core-seconds ({apart + besides:.0f} without shared decks), "
             f"{duration_text(until)} with {counted(at_once, 'deck')} in parallel",
@@ -236,10 +223,10 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     binary = find_engine(engine)
     cases = list(sweep.cases())
     options = options.for_ranks(max(case.run.ranks for case in cases))
-    record = describe_sweep(sweep, cases, binary, out)
+    record = table.describe_sweep(sweep, cases, binary, out)
     if options.site is not None:
         check_path(record.directory)
-    found = states(record)
+    found = table.states(record)
     final = _failures(record, found, options.final)
     settled = {point for point, state in enumerate(found) if state.status == "finished"}
     settled |= {failure.point for failure in final}
@@ -250,7 +237,7 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     return SweepPlan(record, cases, binary, decks, [state.status for state in found], options, final)
 
 
-def _failures(record: SweepRecord, found: Sequence[PointState], reasons: Collection[str]) -> list[Failure]:
+def _failures(record: table.SweepRecord, found: Sequence[table.PointState], reasons: Collection[str]) -> list[Failure]:
     """The points with such failures."""
     return [
         Failure(point, run, state.reason or "", state.message or "", str(state.directory))
@@ -267,8 +254,13 @@ def run_sweep(
     engine: str | None = None,
     allow_failed_audit: bool = False,
     on_progress: Tell | None = None,
-) -> tuple[SweepRecord, list[Failure]]:
+) -> tuple[table.SweepRecord, list[Failure]]:
     """Make the missing runs of a sweep.
+
+    `InputError` if a point is invalid, or the path of the folder cannot be used in the shell scripts of a cluster;
+    `EngineFailure` if there is no engine, its audit failed, or the sweep's directory was removed during the
+    sweep; `SweepStopped` if a failure hits every point, or the jobs of the cluster end without doing
+    any work.
 
     Parameters
     ----------
@@ -283,25 +275,16 @@ def run_sweep(
     -------
     record, failures
         The sweep (`walkers.sweeps.table.load` reads the table from ``record.directory``), and the failed points.
-
-    Raises
-    ------
-    InputError
-        If a point is invalid, or the path of the folder cannot be used in the shell scripts of a cluster.
-    runner.EngineFailure
-        If there is no engine, its audit failed, or the sweep's directory was removed during the sweep.
-    sweeps.scheduler.SweepStopped
-        If a failure hits every point, or the jobs of the cluster end without doing any work.
     """
     plan = plan_sweep(sweep, out, options, engine)
     record = plan.record
     if plan.decks:
         check_audit(plan.engine, allow_failed_audit)
     with suppress(InputError):  # no sweep of this name, or none that can be read
-        if not set(read_record(record.directory).runs) & set(record.runs):
+        if not set(table.read_record(record.directory).runs) & set(record.runs):
             text = "replaces a sweep of the same name without common runs; figures and reports there show that one"
             warnings.warn(f"{record.directory}: {text}", SweepReplacedWarning, stacklevel=2)
-    write_record(record)
+    table.write_record(record)
     for place in {record.out / run for run in record.runs}:
         if is_finished(place):
             with suppress(WalkersError, OSError, ValueError):  # it is among the failures
@@ -313,25 +296,18 @@ def run_sweep(
     if plan.decks:
         with _workers(plan.options, record) as (executor, stop):
             failures = _Loop(plan, executor, stop).run(on_progress or (lambda _: None))
-    if not (record.directory / RECORD_NAME).is_file():
+    if not (record.directory / table.RECORD_NAME).is_file():
         raise OutputGone(record.directory)
-    if list(read_record(record.directory).runs) != list(record.runs):
+    if list(table.read_record(record.directory).runs) != list(record.runs):
         raise SweepStopped(f"{record.directory} was replaced by another sweep of the same name; the runs are kept")
-    return record, [*failures, *_failures(record, checked_states(record), [UNREADABLE])]
+    return record, [*failures, *_failures(record, table.checked_states(record), [table.UNREADABLE])]
 
 
 # --- workers ----------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Report:
-    """Outcome of a deck: names of its finished runs, or name, `hits`, message and directory of a failure."""
-
-    finished: Collection[str] = ()
-    failure: str | None = None
-    hits: str = ""
-    message: str = ""
-    directory: str | None = None
+Report: TypeAlias = list[str] | Failure
+"""Outcome of a deck: names of its finished runs, or a failure of a point that is not known."""
 
 
 def work(
@@ -341,7 +317,6 @@ def work(
     out: Path,
     engine: Engine,
     time_limit: float | None,
-    retries: int = 0,
 ) -> Report:
     """Make the runs of a deck on a worker, until ``stop`` is set. Known failures are returned, not raised."""
 
@@ -356,10 +331,8 @@ def work(
             raise EngineDiffers(f"the engine on {node()}, {own.path}, is not the engine that started this sweep")
         if list(runs) != [run_place(case, own, out).name for case in cases]:
             raise ProgramDiffers(f"the program on {node()} has another version than the one that started the sweep")
-        return Report([*make_runs(cases, out, own, on_progress=look, time_limit=time_limit)])
+        return [*make_runs(cases, out, own, on_progress=look, time_limit=time_limit)]
     except (OSError, WalkersError) as error:
-        if retries and not isinstance(error, Stopped):
-            return work(stop, runs, cases, out, engine, time_limit, retries - 1)
         kind, message, directory = type(error), str(error), None
         if isinstance(error, EngineFailure):
             directory = str(unfinished(out / runs[0])) if error.directory else None
@@ -368,11 +341,11 @@ def work(
         elif isinstance(error, OSError) and error.filename:
             kind = OutputGone if error.errno == errno.ENOENT else kind
             message = f"{error.filename}: {error.strerror}"
-        return Report((), kind.__name__, getattr(kind, "hits", ""), message, directory)
+        return Failure(-1, "", kind.__name__, message, directory, getattr(kind, "hits", ""))
 
 
 @contextmanager
-def _workers(options: Options, record: SweepRecord) -> Iterator[tuple[Executor, threading.Event | None]]:
+def _workers(options: Options, record: table.SweepRecord) -> Iterator[tuple[Executor, threading.Event | None]]:
     """The executor of a sweep, with what stops its threads; threads and Parsl's workers end with the context."""
     if options.executor is not None:
         yield options.executor, None
@@ -388,7 +361,7 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[tuple[Executor, 
     from parsl import DataFlowKernel
     from parsl.concurrent import ParslPoolExecutor
 
-    folder = record.directory / PARSL
+    folder = record.directory / table.PARSL
     try:
         kernel = DataFlowKernel(prepare(options.site, folder, options.ranks))
     except Exception as error:  # any class: an address that this machine does not have, ports in use
@@ -416,7 +389,7 @@ def _report_of(future: Future[Report]) -> Report:
             first = " ".join(str(error).partition("Error 2:")[0].split())  # the other errors repeat the first
             raise SweepStopped(f"the cluster's jobs fail: {first}") from error
         if isinstance(error, ParslError):
-            return Report(failure=type(error).__name__, message=str(error) or repr(error))
+            return Failure(-1, "", type(error).__name__, str(error) or repr(error), None)
     raise error
 
 
@@ -430,7 +403,7 @@ class _Loop:
         """Submitted decks."""
         self.halves: list[PlannedDeck] = []
         """Second halves of failed decks, while no point is finished."""
-        self.alone: Counter[tuple[str | None, str]] = Counter()
+        self.alone: Counter[tuple[str, str]] = Counter()
         """Failures of points alone, by name and message."""
         self.begin, self.seconds = time.perf_counter(), sum(deck.seconds for deck in plan.decks)
         self.found = self.done = plan.statuses.count("finished")
@@ -460,30 +433,30 @@ class _Loop:
     def _submit(self, deck: PlannedDeck) -> None:
         plan = self.plan
         runs, cases = [self.record.runs[point] for point in deck.points], [plan.cases[point] for point in deck.points]
-        retries = plan.options.retries if len(runs) == 1 else 0
-        how = (self.record.out, plan.engine, plan.options.time_limit, retries)
+        how = (self.record.out, plan.engine, plan.options.time_limit)
         self.decks[self.executor.submit(work, self.stop, runs, cases, *how)] = deck
 
     def _take_in(self, deck: PlannedDeck, report: Report) -> None:
         """Count finished points, and submit the others again: in halves if the deck failed."""
-        if report.hits == "every point" or (report.hits == "all at first" and self.done == self.found):
-            raise SweepStopped(f"{report.message}; this would hit every point, and the sweep is stopped")
-        left = [point for point in deck.points if self.record.runs[point] not in report.finished]
+        failure, finished = (report, []) if isinstance(report, Failure) else (None, report)
+        left = [point for point in deck.points if self.record.runs[point] not in finished]
         self.done += len(deck.points) - len(left)
-        if len(left) == 1 and report.failure is not None:
-            run = self.record.runs[left[0]]
-            self.failures.append(Failure(left[0], run, report.failure, report.message, report.directory))
-            self._check_alike(report)
+        if failure:
+            self._check_hits(failure, alone=len(left) == 1)
+        if failure and len(left) == 1:
+            self.failures.append(replace(failure, point=left[0], run=self.record.runs[left[0]]))
         elif left:  # without a failure another process was making these points
-            first, *second = (_deck(part, self.plan.cases) for part in _parts(left, 2 if report.failure else 1))
+            first, *second = (_deck(part, self.plan.cases) for part in _parts(left, 2 if failure else 1))
             self._submit(first)
             self.halves += second
 
-    def _check_alike(self, report: Report) -> None:
-        """Raise `SweepStopped` if the first points all failed alone in the same way, but not by their parameters."""
-        alike = report.failure, report.message.partition(" (see ")[0]
-        self.alone[alike] += 1
-        if self.alone[alike] >= _MOST_ALIKE and self.done == self.found and report.hits != "one point":
+    def _check_hits(self, failure: Failure, *, alone: bool) -> None:
+        """Raise `SweepStopped` if a failure hits every point, or the first points alone in the same way."""
+        at_first, alike = self.done == self.found, (failure.reason, failure.message.partition(" (see ")[0])
+        if failure.hits == "every point" or (failure.hits == "all at first" and at_first):
+            raise SweepStopped(f"{failure.message}; this would hit every point, and the sweep is stopped")
+        self.alone[alike] += alone
+        if self.alone[alike] >= _MOST_ALIKE and at_first and failure.hits != "one point":  # not by its parameters
             text = f"the first {_MOST_ALIKE} points failed in the same way, and the sweep is stopped"
             raise SweepStopped(f"{alike[1]}; {text}")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, astuple, dataclass
+from dataclasses import asdict, dataclass
 from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,18 +42,7 @@ _WORDS = {
     "at_rest": f"rest (below {1e3 * REST:g} mm/s)",
     "separated": "come apart",
 }
-
-
-@dataclass(frozen=True)
-class Band:
-    """Percentiles (5, 50 and 95 %), smallest and largest value of a result, SI units, and number of its points."""
-
-    low: float
-    median: float
-    high: float
-    smallest: float
-    largest: float
-    points: int
+_ON_A_SLOPE = {"forward": "go up the slope", "backward": "go down"}
 
 
 @dataclass(frozen=True)
@@ -61,15 +50,17 @@ class Spread:
     """Results of a spread, in the directory of its sweep.
 
     ``varied`` are the values that were drawn from their ranges, ``held`` are unmeasured values that the case gives.
-    ``bands`` has the main results by the columns of the sweep's table, without walkers that came apart; ``depends`` has
-    their rank correlations (Spearman) with the drawn values, the strongest first, if larger than two standard errors.
+    ``bands`` has percentiles of the main results by the columns of the sweep's table (``low``, ``median`` and ``high``
+    for 5, 50 and 95 %), their ``smallest`` and ``largest`` values (SI units), and numbers of ``points``, without
+    walkers that came apart; ``depends`` has their rank correlations (Spearman) with the drawn values, the strongest
+    first, if larger than two standard errors.
     ``counts`` are numbers of points whose walkers go ``forward`` (along the heading), …; empty for piles.
     """
 
     directory: Path
     varied: tuple[Origin, ...]
     held: tuple[Origin, ...]
-    bands: Mapping[str, Band]
+    bands: Mapping[str, Mapping[str, float]]
     depends: Mapping[str, Mapping[str, float]]
     counts: Mapping[str, int]
     failures: tuple[Failure, ...]
@@ -95,12 +86,6 @@ def _range_of(one: Origin) -> dict[str, list[Any]]:
         message = f"expected a range that holds the case's own value, {one.text}"
         raise unusable(f"uncertain.{one.key}", message, [low, high])
     return {name: [low, written(min(max(own, ends.low), ends.high), ends.unit), high]}
-
-
-def _half(one: Origin) -> str:
-    """A note that half of the draws are equal, if the median is an end of the range."""
-    drawn = ranges_of({one.key: _range_of(one)})[one.key]
-    return f"; half of the draws at {one.text}" if drawn.median in (drawn.low, drawn.high) else ""
 
 
 def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> Sweep:
@@ -174,9 +159,9 @@ def spread_in(table: pd.DataFrame, case: Case, directory: Path, failures: Sequen
     )
 
 
-def _band(values: pd.Series[float]) -> Band:
-    low, middle, high = values.astype(float).quantile([0.05, 0.5, 0.95]).tolist()
-    return Band(low, middle, high, float(values.min()), float(values.max()), len(values))
+def _band(values: pd.Series[float]) -> dict[str, float]:
+    ends = values.astype(float).quantile([0.05, 0.5, 0.95, 0.0, 1.0]).tolist()
+    return dict(zip(("low", "median", "high", "smallest", "largest"), ends, strict=True)) | {"points": len(values)}
 
 
 def _ranks(table: pd.DataFrame, name: str, keys: Sequence[str]) -> dict[str, float]:
@@ -190,34 +175,23 @@ def _ranks(table: pd.DataFrame, name: str, keys: Sequence[str]) -> dict[str, flo
 
 def describe(spread: Spread) -> str:
     """A spread in a few lines: mm, mm/s."""
-    points = max((band.points for band in spread.bands.values()), default=0)
+    points = max((band["points"] for band in spread.bands.values()), default=0)
     lines = [f"  spread     {points} draws; values drawn independently from their ranges, median: value of the case"]
-    lines += [
-        f"             {one.key} {one.text} ({one.range[0]} to {one.range[1]}{_half(one)})"
-        for one in spread.varied
-        if one.range
-    ]
+    lines += [f"{'':13}{one.key} {one.text} ({' to '.join(map(str, one.range or ()))})" for one in spread.varied]
     if spread.held:
         text = ", ".join(f"{one.key} {one.text}" for one in spread.held)
         lines.append(f"    fixed    {text}; to vary these values, add ranges in [uncertain]")
     for name, band in spread.bands.items():
         unit, factor = unit_shown(declared(name).unit)
-        low, middle, high, smallest, largest = (
-            rounded(float(f"{one * factor:.3g}"), unit) for one in astuple(band)[:5]
-        )
-        ends = f"{low} to {high} {unit} (5 to 95 %), median {middle}; smallest {smallest}, largest {largest}"
-        lines.append(f"    {declared(name).label:8} {ends}")
+        texts = {end: rounded(float(f"{one * factor:.3g}"), unit) for end, one in band.items()}
+        ends = "{low} to {high} {unit} (5 to 95 %), median {median}; smallest {smallest}, largest {largest}"
+        lines.append(f"    {declared(name).label:8} {ends.format(unit=unit, **texts)}")
         ranks = ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items())
         text = f"strongest dependence: {ranks} (rank correlation)" if ranks else "no clear dependence on any of them"
-        if band.points < LEAST_PER_VALUE * len(spread.varied):
+        if band["points"] < LEAST_PER_VALUE * len(spread.varied):
             text = "too few draws for rank correlations; the band is approximate"
         lines.append(f"{'':13}{text}")
-    slope = (
-        {"forward": "go up the slope", "backward": "go down"}
-        if {"right_facing", "axial_velocity"} & spread.bands.keys()
-        else {}
-    )
-    words = _WORDS | slope
+    words = _WORDS | (_ON_A_SLOPE if {"right_facing", "axial_velocity"} & spread.bands.keys() else {})
     found = [f"{count} {words[name]}" for name, count in spread.counts.items() if count]
     found += [f"{len(spread.failures)} failed, not in the band"] if spread.failures else []
     lines += [f"    draws    {', '.join(found)}"] if found else []

@@ -15,24 +15,25 @@ from __future__ import annotations
 import io
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, Problem, refused, suggestion
 from walkers.inputs.case import Case
+from walkers.inputs.origins import text_of
 from walkers.postprocess.numbers import declared, headline, is_declared, ordered
-from walkers.postprocess.quantities import GROUPS
+from walkers.postprocess.quantities import GROUPS, unit_shown
 from walkers.postprocess.results import Results, modules_of, read
-from walkers.rounding import DIGITS, SHOWN_UNITS, counted, rounded
+from walkers.rounding import counted, rounded
 from walkers.runner.binary import Engine
 from walkers.runner.directory import FAILURE_NAME, is_finished, is_locked, run_place, unfinished
 from walkers.runner.files import json_bytes, read_json, write_bytes, write_json
 from walkers.sweeps.readable import short_keys
+from walkers.text import aligned
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,8 +56,6 @@ SIDES = ("right_facing", "left_facing")
 """Velocity columns that replace the mean if `sides_differ`."""
 FACING_DOWN = {"right_facing": "left_facing", "axial_velocity": "axial_left_facing"}
 """Columns of walkers that face down, by the columns of those that face up (`main_columns`)."""
-ERRORS = {"velocity": "scatter"}
-"""Columns that contain the scatter of other columns over copies."""
 SEEDS = ("run.seed", "seed")
 """Keys of the random numbers of a start: points that differ in nothing else repeat an experiment."""
 FORMATS = ("csv", "parquet", "json")
@@ -294,12 +293,7 @@ def with_unit(words: str, unit: str | None) -> str:
 
 def value_text(value: Any, unit: str | None = None) -> str:
     """A value of a key as text, with its unit unless it is a word such as auto; several are separated by slashes."""
-    if isinstance(value, list):
-        text = "/".join(map(value_text, value))
-    elif isinstance(value, bool):
-        text = str(value).lower()
-    else:
-        text = f"{value:g}" if isinstance(value, float) else str(value)
+    text = "/".join(map(text_of, value)) if isinstance(value, list) else text_of(value)
     return f"{text} {unit}" if unit and not isinstance(value, str) else text
 
 
@@ -352,35 +346,43 @@ def write_table_file(frame: pd.DataFrame, path: Path) -> None:
     write_bytes(path, encoded(frame, path.suffix.lstrip(".")))
 
 
-def short_text(frame: pd.DataFrame) -> str:
-    """A table as text: varied keys, Γ0, sin δ, results in mm, mm/s, nJ and degrees, status.
+def cells_of(frame: pd.DataFrame, named: Callable[[str], str] | None = None) -> tuple[pd.DataFrame, str]:
+    """Varied keys, Γ0, sin δ and the main results of a table as text in mm, mm/s, nJ and degrees, with units in heads.
 
-    Of a sweep's table, a line below has the results that are the same at all points.
+    The second value has the results that are the same at all points of a sweep. Columns are called ``named``; None: by
+    the last parts of keys.
     """
     import pandas as pd
 
     wanted = _SHOWN | (set(SIDES) if sides_differ(frame) else {"velocity", default_column(frame)})
-    names = [
-        name
-        for name in frame.columns
-        if name in wanted or not (is_declared(name) or name in ("lost", "reason", "message"))
-    ]
-    shown = frame[names].copy()
-    units = dict(frame.attrs.get("units", {}))
-    varied = frame.attrs["varied"]
-    for name in shown.columns.difference(varied):
-        if units.get(name) in SHOWN_UNITS:
-            units[name], factor = SHOWN_UNITS[units[name]]
-            shown[name] = (shown[name].astype(float) * factor).map(partial(rounded, unit=units[name]), "ignore")
-    kept = {"point", *varied, *main_columns(frame)} if "status" in shown else set(shown)
-    same = {name: shown.pop(name).dropna() for name in names if name not in kept and shown[name].nunique() < 2}
-    first = {name: cells.iloc[0] for name, cells in same.items() if len(cells) and name != "status"}
-    texts = {name: one if isinstance(one, str) else rounded(float(one)) for name, one in first.items()}
-    words = [f"{name} {one} {units[name]}".rstrip() for name, one in texts.items()]
-    heads = dict(zip(varied, short_keys(varied, names), strict=True))
-    shown.columns = pd.Index([with_unit(heads.get(name, name), units.get(name)) for name in shown.columns])
-    text = str(shown.to_string(index=False, float_format=lambda value: f"{value:.{DIGITS}g}", na_rep="-"))
-    return f"{text}\n\nthe same at all points: {', '.join(words)}" if words else text
+    names = [name for name in map(str, frame) if name in wanted or not (is_declared(name) or name in _ASIDE)]
+    varied, cells, same = frame.attrs["varied"], {}, []
+    kept = {"point", *varied, *main_columns(frame)} if "status" in names else {*names}
+    short = dict(zip(varied, short_keys(varied, names), strict=True))
+    for name in names:
+        unit, factor = frame.attrs["units"][name], 1.0
+        if name not in varied:
+            unit, factor = unit_shown(unit)
+        texts = [_cell(value, factor, unit) for value in frame[name].tolist()]
+        head, different = named(name) if named else short.get(name, name), {*texts} - {"-", ""}
+        if name in kept or len(different) > 1:
+            cells[with_unit(head, unit)] = texts
+        elif different and name != "status":
+            same.append(f"{head} {different.pop()} {unit}".rstrip())
+    return pd.DataFrame(cells), ", ".join(same)
+
+
+def _cell(value: Any, factor: float, unit: str) -> str:
+    if isinstance(value, (bool, str)):
+        return str(value)
+    return "-" if value is None else rounded(value if factor == 1.0 else value * factor, unit)
+
+
+def short_text(frame: pd.DataFrame) -> str:
+    """`cells_of` a table as text, with a line below for the results that are the same at all points."""
+    cells, same = cells_of(frame)
+    text = aligned([[*cells], *cells.to_numpy().tolist()], right=range(len(cells.columns)))
+    return f"{text}\n\nthe same at all points: {same}" if same else text
 
 
 def thresholds(frame: pd.DataFrame) -> pd.DataFrame:
@@ -419,11 +421,16 @@ def thresholds(frame: pd.DataFrame) -> pd.DataFrame:
     return table
 
 
+def status_text(numbers: Mapping[str, int]) -> str:
+    """Numbers of points by status as text: ``8 finished, 2 failed``."""
+    return ", ".join(f"{numbers[status]} {status}" for status in _STATUSES if numbers.get(status))
+
+
 def describe_status(frame: pd.DataFrame) -> str:
     """Numbers of points by status, failures with their messages, and the thresholds of descents."""
-    count = Counter(frame["status"])
-    text = ", ".join(f"{count[status]} {status}" for status in _STATUSES if count[status])
-    lines = [f"{frame.attrs['sweep']}: {counted(len(frame), 'point')}, {text or 'none'}"]
+    lines = [
+        f"{frame.attrs['sweep']}: {counted(len(frame), 'point')}, {status_text(Counter(frame['status'])) or 'none'}"
+    ]
     failed = frame[frame["status"] == "failed"]
     lines += [f"  failed     point {row.point}: {row.message}" for row in failed[:_MOST_FAILURES].itertuples()]
     if len(failed) > _MOST_FAILURES:

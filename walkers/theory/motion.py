@@ -26,13 +26,7 @@ import numpy.typing as npt
 from walkers.extras import require
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of, resistances_at_rest
-from walkers.theory.quasistatic import (
-    FloatArray,
-    inertia_matrix,
-    normal_force_matrix,
-    rolling_matrix,
-    translation,
-)
+from walkers.theory.quasistatic import FloatArray, inertia_matrix, normal_force_matrix, rolling_matrix, translation
 
 if TYPE_CHECKING:
     from walkers.theory.stepping import Effect

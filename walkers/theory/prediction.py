@@ -100,11 +100,7 @@ def predict(case: Case) -> dict[str, Any]:
     return {
         "gamma0": gamma0,
         "sin_delta": dimer.sin_delta,
-        "paper": {
-            "friction": FRICTION_OF_THE_PAPER,
-            "velocity": _number(linear),
-            "reason": reason,
-        },
+        "paper": {"friction": FRICTION_OF_THE_PAPER, "velocity": _number(linear), "reason": reason},
         "coulomb": _predicted(case, viscous=False),
         "viscous": _predicted(case, viscous=True),
         "detachment": {"gamma": float(end.gamma), "contact": CONTACTS[int(end.contact)]},

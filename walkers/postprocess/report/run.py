@@ -28,6 +28,9 @@ Origins = tuple[Origin, ...] | None
 def report_run(directory: Path, to: Path | None = None, origins: Origins = None, *, largest: int = LARGEST) -> Path:
     """Write the report of a run as a self-contained HTML file.
 
+    `InputError` and `DumpError` if the file is no HTML file in an existing folder; if the dumps cannot
+    be read.
+
     Parameters
     ----------
     directory, origins
@@ -36,11 +39,6 @@ def report_run(directory: Path, to: Path | None = None, origins: Origins = None,
         The file; None: ``report.html`` in the run directory.
     largest
         Size in bytes that the file must not reach: the player shows fewer frames of runs of many beads.
-
-    Raises
-    ------
-    InputError, postprocess.dump.DumpError
-        If the file is no HTML file in an existing folder; if the dumps cannot be read.
     """
     require("report")
     path = to or directory / NAME
