@@ -28,10 +28,11 @@ dynamic_viscosity = "6 mPa*s"
 volume_fraction   = 0.02
 
 [boundary]
-material = "glass"
+material = "soda-lime glass"
 
 [contact]
 friction         = { bead_bead = 0.2, bead_wall = 0.3 }
+roughness        = { bead_bead = "50 nm", bead_wall = "50 nm" }
 rolling_friction = 0.003
 
 [drive]
@@ -42,7 +43,7 @@ run = walkers.run(file)
 print(run.describe())
 
 # %%
-# The result lists the values that have not been measured: here friction and the drag of the bridges. See
+# The result lists the values that have not been measured: here friction, roughness and the liquid. See
 # :doc:`/how-to/own-beads` for the uncertainty that these values cause.
 
 picture = run.render("runs/steel.png", images=3)[0]

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from walkers.calibration.emulator import Emulator, Posterior
 from walkers.calibration.file import Calibration
 from walkers.calibration.observations import NO_NUMBERS, FloatArray, Observation, numbers_of
-from walkers.errors import InputError, Problem, WalkersError
+from walkers.errors import WalkersError
 from walkers.extras import require
 from walkers.inputs.axes import unit_cube
 from walkers.progress import progress_of
@@ -21,9 +20,8 @@ from walkers.runner.failures import BeadsLost, BlowUp
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
 from walkers.sweeps.table import load
 
-BEST, HELD_OUT = "highest posterior", "without what is held out"
-"""Names of the sets that the emulators propose: from all observations, and from those that are not held out."""
-MISSING = 30.0
+PROPOSED = ("highest posterior", "highest posterior without what is held out", "nearest of all sets")
+_MISSING = 30.0
 """Distance in deviations that counts for a number that does not exist."""
 FINAL = frozenset(failure.__name__ for failure in (BeadsLost, BlowUp))
 """Failures that the parameters cause: a repetition would fail again."""
@@ -35,37 +33,30 @@ class CalibrationStopped(WalkersError):
 
 @dataclass(frozen=True)
 class Outcome:
-    """Outcome of a calibration.
+    """Outcome of a calibration of D parameters to K observations.
 
-    Attributes
-    ----------
-    calibration
-        What was asked.
-    unit, numbers : ndarray, shape (P, D) and (P, K)
-        All sets that were run, in the unit cube of the prior, and the K observations of the engine; NaN where there is
-        none. First the sets that the file names, last those that the emulators propose.
-    names
-        Names of sets, by their places.
-    emulators, posterior, held_out
-        Of the observations, from the sets before the proposed ones; the posterior from all, and from those that are
-        not held out (None if nothing is).
-    failures
-        Points that failed, by sweep.
+    ``sets`` are points of the unit cube of the prior, shape (D,): those of the file, then `PROPOSED`; ``numbers`` the
+    engine's observations there, shape (K,), NaN where there is none. The emulators, of all but costly observations, are
+    from a ``number`` of sets. ``held_out`` is the posterior without what is held out. ``failures`` are by sweep.
     """
 
     calibration: Calibration
-    unit: FloatArray
-    numbers: FloatArray
-    names: Mapping[str, int]
-    emulators: tuple[Emulator, ...]
+    sets: Mapping[str, FloatArray]
+    numbers: Mapping[str, FloatArray]
+    number: int
+    emulators: Sequence[Emulator]
     posterior: Posterior
-    held_out: Posterior | None
+    held_out: Posterior
     failures: Mapping[str, list[Failure]]
 
-    @property
-    def best(self) -> int:
-        """The set with most agreeing facts by the engine; with equal numbers, the one nearest to them."""
-        return int(ranking(self.calibration.file.observations, self.numbers)[0])
+    def predicted(self, observation: Observation) -> FloatArray | None:
+        """5 %, median and 95 % of what was held out, from the other observations; None for others."""
+        emulator = next((one for one in self.emulators if one.observation is observation), None)
+        if emulator is None or observation.group not in self.calibration.file.design.held_out:
+            return None
+        samples = self.held_out.samples
+        normal = np.random.default_rng(self.held_out.seed).standard_normal(len(samples))
+        return np.percentile(emulator.numbers(samples, normal), (5.0, 50.0, 95.0))
 
 
 def calibrate(
@@ -73,8 +64,8 @@ def calibrate(
 ) -> Outcome:
     """Start or continue a calibration; finished runs are not repeated.
 
-    The named sets and a Sobol sequence of sets are a sweep, ``NAME-sets``. Two further sets, of the highest posterior
-    from all observations and from those that are not held out, are another one, ``NAME-proposed``.
+    Three sweeps: ``NAME-named``, the sets of the file; ``NAME-round``, a Sobol sequence of sets without the costly
+    experiments; and ``NAME-proposed``.
 
     Parameters
     ----------
@@ -95,68 +86,53 @@ def calibrate(
         If there is no engine, or its audit failed.
     """
     require("calibrate")
-    _check_ranges(calibration)
-    design, observations = calibration.file.design, calibration.file.observations
-    failures: dict[str, list[Failure]] = {}
+    file, failures = calibration.file, dict[str, list[Failure]]()
+    design, observations = file.design, file.observations
+    ends = np.array([one.range for one in file.parameters.values()]).T
+    list(calibration.sweep(calibration.name, ends).cases())  # refuses ranges that exceed those of their keys
 
-    def run(part: str, unit: FloatArray) -> FloatArray:
-        sweep = calibration.sweep(f"{calibration.name}-{part}", calibration.values(unit))
+    def run(part: str, unit: FloatArray, experiments: Sequence[str] = ()) -> FloatArray:
+        sweep = calibration.sweep(f"{calibration.name}-{part}", calibration.values(unit), experiments)
         with progress_of(sweep.name, progress) as advance:
             record, failed = run_sweep(sweep, out, replace(options, final=FINAL), on_progress=advance, **how)
         failures.update({sweep.name: failed} if failed else {})
-        return _numbers(calibration, record.directory, failed)
+        return _numbers(calibration, experiments or [*calibration.experiments], record.directory, failed)
 
-    sobol = unit_cube("sobol", len(calibration.file.parameters), design.points, design.seed)
+    named = run("named", calibration.sets) if file.sets else np.zeros((0, len(observations)))
+    sobol = unit_cube("sobol", len(file.parameters), design.points, design.seed)
+    cheap = [label for label in calibration.experiments if label not in calibration.costly]
     unit = np.concatenate([calibration.sets, sobol])
-    numbers, names = run("sets", unit), dict(zip(calibration.file.sets, range(len(unit)), strict=False))
-    emulators = tuple(
-        Emulator.of(one, unit, column, design.seed) for one, column in zip(observations, numbers.T, strict=True)
+    numbers = np.concatenate([named, run("round", sobol, cheap)])
+    each = zip(observations, numbers.T, strict=True)
+    emulators = [Emulator.of(one, unit, column, design.seed) for one, column in each if not one.costly]
+    posterior, held_out = (
+        Posterior.of(emulators, design.posterior, design.seed, without) for without in ((), design.held_out)
     )
-    posteriors = [Posterior.of(emulators, design.posterior, design.seed)]
-    if design.held_out:
-        posteriors.append(Posterior.of(emulators, design.posterior, design.seed, design.held_out))
-    proposed = np.stack([one.best for one in posteriors])
-    names |= {name: len(unit) + place for place, name in enumerate((BEST, HELD_OUT)[: len(proposed)])}
-    numbers, unit = np.concatenate([numbers, run("proposed", proposed)]), np.concatenate([unit, proposed])
-    held_out = posteriors[1] if design.held_out else None
-    return Outcome(calibration, unit, numbers, names, emulators, posteriors[0], held_out, failures)
+    proposed = np.stack([posterior.best, held_out.best, unit[nearest(observations, numbers)]])
+    rows, names = np.concatenate([named, run("proposed", proposed)]), (*file.sets, *PROPOSED)
+    sets = dict(zip(names, np.concatenate([calibration.sets, proposed]), strict=True))
+    outcome = dict(zip(names, rows, strict=True))
+    return Outcome(calibration, sets, outcome, len(unit), emulators, posterior, held_out, failures)
 
 
-def _numbers(calibration: Calibration, sweep: Path, failed: list[Failure]) -> FloatArray:
-    """The observations of the sets of a sweep, shape (P, K); NaN for those of runs that failed for good."""
-    table, labels = load(sweep), list(calibration.experiments)
-    undone = [failure for failure in failed if failure.reason not in FINAL]
+def _numbers(calibration: Calibration, labels: Sequence[str], sweep: Path, failed: list[Failure]) -> FloatArray:
+    """The observations of the sets of a sweep, shape (P, K); NaN for those of runs that failed, or are none of it."""
+    table, undone = load(sweep), [failure for failure in failed if failure.reason not in FINAL]
     if undone or not table["status"].isin(("finished", "failed")).all():
         message = undone[0].message if undone else "another process is running them"
         raise CalibrationStopped(f"{sweep.name}: points are missing ({message}); call again to continue")
     states = zip(table["run"], table["status"], strict=True)
     seen = [numbers_of(run) if status == "finished" else NO_NUMBERS for run, status in states]
-    sets = [dict(zip(labels, seen[at : at + len(labels)], strict=True)) for at in range(0, len(seen), len(labels))]
+    lacking = dict.fromkeys(calibration.experiments, NO_NUMBERS)
+    sets = [lacking | dict(zip(labels, seen[at:], strict=False)) for at in range(0, len(seen), len(labels))]
     return np.array([[one.of_numbers(numbers) for one in calibration.file.observations] for numbers in sets])
 
 
-def _check_ranges(calibration: Calibration) -> None:
-    """Resolve the cases at the ends of all ranges: refuse ranges that exceed those of a case."""
-    ends = np.array([parameter.range for parameter in calibration.file.parameters.values()]).T
-    try:
-        list(calibration.sweep(calibration.name, ends).cases())
-    except InputError as error:
-        problem = error.problems[0]
-        for name, one in calibration.file.parameters.items():
-            if problem.key in one.keys:
-                message = f"{problem.key} = {problem.value}: {problem.expected}"
-                key, value = f"parameters.{name}.range", f"[{one.range[0]:g}, {one.range[1]:g}]"
-                raise InputError(calibration.source, [Problem(key, value, message)]) from error
-        raise
+def nearest(observations: Sequence[Observation], numbers: FloatArray) -> int:
+    """The set with the least Σ ln(1 + r²) by its numbers (P, K), r the distances from facts with weight in deviations.
 
-
-def ranking(observations: list[Observation], numbers: FloatArray) -> npt.NDArray[np.int64]:
-    """Order of sets by their numbers (P, K): those with most agreeing facts come first.
-
-    Derived observations do not count. Sets with equal counts are ordered by Σ ln(1 + r²), r the distances from the
-    facts in deviations; the logarithm limits the weight of a fact that no set reproduces.
+    The logarithm limits the weight of a fact that no set reproduces.
     """
-    own = [place for place, one in enumerate(observations) if not one.derived]
+    own = [place for place, one in enumerate(observations) if one.weighed]
     away = np.array([[observations[place].residual(row[place]) for place in own] for row in numbers])
-    misfit = np.log1p(np.where(np.isnan(away), MISSING, away) ** 2).sum(axis=1)
-    return np.lexsort((misfit, -(np.abs(away) <= 1.0).sum(axis=1)))
+    return int(np.argmin(np.log1p(np.where(np.isnan(away), _MISSING, away) ** 2).sum(axis=1)))

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -17,28 +16,35 @@ from scipy.stats import t as student
 from walkers.calibration.observations import FloatArray, Observation
 from walkers.inputs.axes import unit_cube
 
-LEAST_SAMPLES = 400.0
-"""Smallest effective sample size of a converged posterior."""
 LARGEST = 10.0
 """Deviations at which distances from a fact end, so that sets that are far off do not shape the emulators."""
 _FREEDOM = 4.0
 """Degrees of freedom of Student's t: a fact that no set reproduces does not outweigh all others."""
-_KEPT = 4000
-_AT_ONCE = 8192
+_KEPT, _AT_ONCE = 4000, 8192
+
+
+def middle(observation: Observation) -> float:
+    """The value of a fact, its only limit, or the middle of both."""
+    return float(np.mean([one for one in observation.limits if np.isfinite(one)]))
+
+
+def distances(observation: Observation, numbers: FloatArray) -> FloatArray:
+    """What an emulator learns: distances of numbers from the `middle` in deviations, at most `LARGEST`.
+
+    A number that does not exist is as far off as one can be, on the side where no limit allows it.
+    """
+    away = np.clip((numbers - middle(observation)) / observation.deviation, -LARGEST, LARGEST)
+    return np.where(np.isnan(numbers), -LARGEST if observation.most is None else LARGEST, away)
 
 
 @dataclass(frozen=True)
 class Emulator:
-    """One observation as a function of the parameters: a Gaussian process of its distance from the fact.
-
-    The distance is in deviations from the value, or from the only limit or the middle of both. Errors are those of
-    leaving out one set after the other.
-    """
+    """One observation as a function of D parameters: a Gaussian process of its `distances` from the fact."""
 
     observation: Observation
     process: Any  # of scikit-learn, fitted
-    error: float  # root mean square of the errors, in deviations
-    inflation: float  # factor by which the process takes them for smaller; at least 1
+    error: float  # root mean square, in deviations, of sets that are left out one after the other
+    inflation: float  # factor by which the process takes these errors for smaller; at least 1
 
     @classmethod
     def of(cls, observation: Observation, unit: FloatArray, numbers: FloatArray, seed: int) -> Emulator:
@@ -51,7 +57,8 @@ class Emulator:
         process = GaussianProcessRegressor(
             kernel + WhiteKernel(1e-2, (1e-6, 1.0)), normalize_y=True, n_restarts_optimizer=2, random_state=seed
         )
-        with _quietly():
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # scales at a bound, which have no influence
             process.fit(unit, away)
         # Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), eqs. 5.10 to 5.12.
         inverse = np.diag(cho_solve((process.L_, True), np.eye(len(unit))))
@@ -82,59 +89,27 @@ class Emulator:
         return np.asarray(middle(self.observation) + self.observation.deviation * (mean + error * normal))
 
 
-def middle(observation: Observation) -> float:
-    """The value of a fact, its only limit, or the middle of both."""
-    return float(np.mean([one for one in observation.limits if np.isfinite(one)]))
-
-
-def distances(observation: Observation, numbers: FloatArray) -> FloatArray:
-    """What an emulator learns: distances of numbers from the `middle` in deviations, at most `LARGEST`.
-
-    A number that does not exist is as far off as one can be, on the side where no limit allows it.
-    """
-    away = np.clip((numbers - middle(observation)) / observation.deviation, -LARGEST, LARGEST)
-    return np.where(np.isnan(numbers), -LARGEST if observation.most is None else LARGEST, away)
-
-
-@contextmanager
-def _quietly() -> Iterator[None]:
-    """Fit in one thread (matrices are small) and without warnings about scales at a bound, which have no influence."""
-    from sklearn.exceptions import ConvergenceWarning
-    from threadpoolctl import threadpool_limits
-
-    with warnings.catch_warnings(), threadpool_limits(1):
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        yield
-
-
 @dataclass(frozen=True)
 class Posterior:
     """Points of the prior, weighted by the likelihood of the observations that were used."""
 
     points: FloatArray  # of a Sobol sequence in the unit cube of the prior, shape (N, D)
     log_weight: FloatArray  # normalised, shape (N,)
-    log_evidence: float  # mean likelihood over the prior
     seed: int
 
     @classmethod
     def of(cls, emulators: Sequence[Emulator], points: int, seed: int, without: Collection[str] = ()) -> Posterior:
-        """Weigh points of the prior by the observations that are neither derived nor of the groups ``without``."""
-        used = [one for one in emulators if not one.observation.derived and one.observation.group not in without]
+        """Weigh points of the prior by the observations that have a weight and are not of the groups ``without``."""
+        used = [one for one in emulators if one.observation.weighed and one.observation.group not in without]
         unit = unit_cube("sobol", used[0].process.n_features_in_, points, seed)
         parts = [unit[at : at + _AT_ONCE] for at in range(0, points, _AT_ONCE)]
         total = np.concatenate([np.sum([one.log_likelihood(part) for one in used], axis=0) for part in parts])
-        whole = float(logsumexp(total))
-        return cls(unit, total - whole, whole - float(np.log(points)), seed)
+        return cls(unit, total - logsumexp(total), seed)
 
     @property
     def effective_samples(self) -> float:
         """1/Σ w²."""
         return float(np.exp(-logsumexp(2.0 * self.log_weight)))
-
-    @property
-    def converged(self) -> bool:
-        """Whether the effective sample size is large enough."""
-        return self.effective_samples > LEAST_SAMPLES
 
     @property
     def best(self) -> FloatArray:

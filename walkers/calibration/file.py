@@ -1,21 +1,6 @@
 """Calibration files: free parameters of a case, and the observations that weigh them.
 
-case = "fig1b"
-
-[parameters.friction]
-keys  = ["contact.friction.bead_wall"]
-range = [0.05, 0.5]
-log   = true
-
-[experiments.slow]
-drive.peak_acceleration = "4 g"
-
-[[observations]]
-name      = "v_4g"
-group     = "speeds"
-of        = ["slow"]
-value     = "1.23 mm/s"
-deviation = "0.18 mm/s"
+`docs/how-to/calibrate.md` has an example and all keys.
 """
 
 from __future__ import annotations
@@ -39,8 +24,6 @@ from walkers.inputs.sweep import Sweep, expand
 from walkers.inputs.table import Table
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import Number, Whole
-
-_DIGITS = 6
 
 
 class Parameter(Table):
@@ -68,6 +51,11 @@ class Parameter(Table):
             raise ValueError("expected numbers above zero: log is that of magnitudes")
         return value
 
+    @property
+    def label(self) -> str:
+        """Symbol and unit, if it has them."""
+        return f"{self.symbol}{f' ({self.unit})' if self.symbol and self.unit else ''}"
+
     @cached_property
     def _prior(self) -> Any:
         """The prior of the value, or of its logarithm (scipy)."""
@@ -88,10 +76,7 @@ class Parameter(Table):
 
 
 class DesignTable(Table):
-    """``[design]``: numbers of parameter sets for the emulators and of points for the posterior; what is held out.
-
-    The groups of observations in ``held_out`` are predicted from all others.
-    """
+    """``[design]``: numbers of parameter sets for the emulators and of points for the posterior; groups to predict."""
 
     seed: Annotated[Whole, Field(ge=0)] = 1
     points: Annotated[Whole, Field(ge=4, le=10_000)] = 64
@@ -115,16 +100,9 @@ class CalibrationFile(Table):
 
 @dataclass(frozen=True)
 class Calibration:
-    """A calibration, read from its file.
+    """A calibration file with its name, what messages call it, and its folder.
 
-    Attributes
-    ----------
-    name, source, folder
-        Of the file.
-    file
-        What it says.
-    experiments
-        For each, the values of the same keys: those that any experiment changes.
+    ``experiments`` has, for each, values of all keys that any experiment changes.
     """
 
     name: str
@@ -134,7 +112,7 @@ class Calibration:
     experiments: Mapping[str, Mapping[str, Value]]
 
     def values(self, unit: FloatArray) -> FloatArray:
-        """Values of the D parameters at points of the unit cube, shape (N, D)."""
+        """Values of the D parameters at points of the unit cube of the prior, shape (N, D)."""
         each = zip(self.file.parameters.values(), unit.T, strict=True)
         return np.stack([parameter.values(shares) for parameter, shares in each], axis=1)
 
@@ -143,38 +121,38 @@ class Calibration:
         """The named sets as points of the unit cube, shape (S, D)."""
         known = self.file.parameters.items()
         rows = [[parameter.unit_of(given[label]) for label, parameter in known] for given in self.file.sets.values()]
-        return np.reshape(np.array(rows, np.float64), (-1, len(self.file.parameters)))
+        return np.reshape(np.array(rows, np.float64), (-1, len(known)))
 
-    def sweep(self, name: str, values: FloatArray | None = None) -> Sweep:
-        """The sweep of all experiments, for every parameter set (N, D) or, without sets, with the case's own values.
+    @property
+    def costly(self) -> set[str]:
+        """Experiments that only costly observations need."""
+        needed = {label for one in self.file.observations if not one.costly for label in (*one.of, *one.over)}
+        return set(self.experiments) - needed
+
+    def sweep(self, name: str, values: FloatArray | None = None, experiments: Collection[str] = ()) -> Sweep:
+        """The sweep of experiments (default: all), for every parameter set (N, D) or with the case's own values.
 
         `InputError` if a key of the file is no key of a case, or its case has no dimers.
         """
         points = [
-            {**keys, **self._changes(label, row)}
+            {**self.experiments[label], **self._changes(label, row)}
             for row in ([None] if values is None else values)
-            for label, keys in self.experiments.items()
+            for label in experiments or self.experiments
         ]
-        varied = set(points[0])
-        document = {
-            "title": self.file.title,
-            "case": self.file.case,
-            "set": {key: value for key, value in flatten(self.file.set).items() if key not in varied},
-            "zip": [{key: [point[key] for point in points] for key in points[0]}],
-        }
+        usual = {key: value for key, value in flatten(self.file.set).items() if key not in points[0]}
+        columns = {key: [point[key] for point in points] for key in points[0]}
+        document = {"title": self.file.title, "case": self.file.case, "set": usual, "zip": [columns]}
         sweep = expand(document, source=self.source, name=name, folder=self.folder)
         if "dimers" not in sweep.document:
-            problem = Problem("case", f'"{self.file.case}"', "expected a case of dimers")
-            raise InputError(self.source, [problem])
+            raise InputError(self.source, [Problem("case", f'"{self.file.case}"', "expected a case of dimers")])
         return sweep
 
     def _changes(self, label: str, row: FloatArray | None) -> dict[str, Value]:
         """Values of the keys of parameters in an experiment, for one parameter set (D,)."""
         changes: dict[str, Value] = {}
-        for parameter, value in zip(self.file.parameters.values(), [] if row is None else row, strict=row is not None):
-            digits = f"{value:.{_DIGITS}g}"
+        for parameter, value in zip(self.file.parameters.values(), [] if row is None else row, strict=False):
             if label in (parameter.experiments or [label]):
-                given = f"{digits} {parameter.unit}" if parameter.unit else float(digits)
+                given = f"{value:.6g} {parameter.unit}" if parameter.unit else float(f"{value:.6g}")
                 changes |= dict.fromkeys(parameter.keys, given)
         return changes
 
@@ -191,23 +169,12 @@ def load_calibration(calibration: str | Path) -> Calibration:
 def read_calibration(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Calibration:
     """A calibration given as nested tables; parameters and errors as for `walkers.inputs.sweep.expand`."""
     file = validated(CalibrationFile, document, source, "a calibration")
-    usual, own = flatten(file.set), {label: flatten(table) for label, table in file.experiments.items()}
-    varied = list(dict.fromkeys(key for keys in own.values() for key in keys))
-    experiments = {
-        label: {key: {**usual, **keys}[key] for key in varied if key in usual or key in keys}
-        for label, keys in own.items()
-    }
-    lacking = [
-        Problem(
-            f"experiments.{label}.{key}", None, "missing; expected it here or in [set]: other experiments change it"
-        )
-        for label, keys in experiments.items()
-        for key in varied
-        if key not in keys
-    ]
-    if problems := [*_unknown_names(file), *_contradictions(file), *_doubly_set(file), *lacking]:
+    own = {label: flatten(table) for label, table in file.experiments.items()}
+    varied = dict.fromkeys(key for keys in own.values() for key in keys)
+    usual = {key: value for key, value in flatten(file.set).items() if key in varied}
+    if problems := [*_unknown_names(file), *_contradictions(file), *_problems_of_keys(file, {*varied} - {*usual})]:
         raise InputError(source, problems)
-    return Calibration(name, source, folder, file, experiments)
+    return Calibration(name, source, folder, file, {label: usual | keys for label, keys in own.items()})
 
 
 def _unknown_names(file: CalibrationFile) -> Iterator[Problem]:
@@ -217,18 +184,11 @@ def _unknown_names(file: CalibrationFile) -> Iterator[Problem]:
         for label, parameter in file.parameters.items()
     ]
     for number, one in enumerate(file.observations):
-        named += [
-            (f"observations[{number}].{key}", getattr(one, key), file.experiments, "an experiment")
-            for key in ("of", "over")
-        ]
-    named += [
-        (f"sets.{label}.{name}", [name], file.parameters, "a parameter")
-        for label in file.sets
-        for name in file.sets[label]
-    ]
-    groups = dict.fromkeys(one.group for one in file.observations)
-    named.append(("design.held_out", file.design.held_out, groups, "a group of observations"))
-    for place, given, known, what in named:
+        for key, labels in (("of", one.of), ("over", one.over)):
+            named.append((f"observations[{number}].{key}", labels, file.experiments, "an experiment"))
+    named += [(f"sets.{label}", given, file.parameters, "a parameter") for label, given in file.sets.items()]
+    groups = {one.group for one in file.observations}
+    for place, given, known, what in (*named, ("design.held_out", file.design.held_out, groups, "a group")):
         for name in given:
             if name not in known:
                 expected = f"expected {what}: one of {', '.join(sorted(known))}{suggestion(name, known)}"
@@ -243,33 +203,29 @@ def _contradictions(file: CalibrationFile) -> Iterator[Problem]:
             yield Problem(f"{place}.name", f'"{one.name}"', "expected a name of its own")
         if one.over and set(one.over) == set(one.of):
             yield Problem(f"{place}.over", None, "expected other experiments than in of: the ratio would be 1")
-        if (one.value is None) == (limits == [None, None]):
-            yield Problem(f"{place}.value", None, "expected either value or limits (least, most)")
-        if None not in limits and one.limits[0] >= one.limits[1]:
-            yield Problem(f"{place}.most", f"{one.most:g}", "expected more than least")
-    if not any(one.group not in file.design.held_out and not one.derived for one in file.observations):
-        yield Problem("observations", None, "expected one that is neither derived nor held out")
+        if (one.value is None) == (limits == [None, None]) or one.limits[0] > one.limits[1]:
+            yield Problem(place, None, "expected either a value or limits: least, most, or both in this order")
+    if not any(one.weighed and one.group not in file.design.held_out for one in file.observations):
+        yield Problem("observations", None, "expected one that is neither derived, costly nor held out")
     for label, given in file.sets.items():
         for name, parameter in file.parameters.items():
-            place, (low, high) = f"sets.{label}.{name}", parameter.range
-            if name not in given:
-                yield Problem(place, None, "missing; a set has all parameters")
-            elif not low <= given[name] <= high:
-                expected = f"expected a number within the parameter's range, {low:g} to {high:g}"
-                yield Problem(place, f"{given[name]:g}", expected)
+            value, (low, high) = given.get(name), parameter.range
+            if value is None or not low <= value <= high:
+                expected = f"expected a number in the range of the parameter, {low:g} to {high:g}"
+                yield Problem(f"sets.{label}.{name}", None if value is None else f"{value:g}", expected)
 
 
-def _doubly_set(file: CalibrationFile) -> Iterator[Problem]:
-    """A key of a parameter is that of one parameter in every experiment, or in none."""
-    taken: dict[str, dict[str, str]] = {}
-    for name, parameter in file.parameters.items():
-        for key in parameter.keys:
-            for experiment in parameter.experiments or file.experiments:
-                other = taken.setdefault(key, {}).setdefault(experiment, name)
-                if other != name:
-                    expected = f"{key} of the experiment {experiment} is set by {other} already"
-                    yield Problem(f"parameters.{name}.keys", None, expected)
-    for key, having in taken.items():
-        if lacking := [experiment for experiment in file.experiments if experiment not in having]:
-            expected = f"no parameter sets {key} for {', '.join(lacking)}: expected it for all experiments or none"
-            yield Problem("parameters", None, expected)
+def _problems_of_keys(file: CalibrationFile, varied: Collection[str]) -> Iterator[Problem]:
+    """All experiments have the same keys: of the ``varied`` ones, and of the parameters, each of one parameter."""
+    every = dict.fromkeys(key for parameter in file.parameters.values() for key in parameter.keys)
+    for label, table in file.experiments.items():
+        for key in sorted({*varied} - {*flatten(table)}):
+            expected = "missing; expected it here or in [set]: other experiments change it"
+            yield Problem(f"experiments.{label}.{key}", None, expected)
+        own = [one.keys for one in file.parameters.values() if label in (one.experiments or [label])]
+        for key, number in ((key, sum(key in keys for keys in own)) for key in every):
+            if number != 1:
+                expected = (
+                    f"expected one parameter that sets {key} for {label}, or none for any experiment; {number} do"
+                )
+                yield Problem("parameters", None, expected)

@@ -33,20 +33,20 @@ A bead that only rolls has 0, one that is dragged without rolling has 1.
 """
 Angle = Literal["largest_angle", "smallest_angle"]
 """Of all walkers to the drive axis at the end of the run, in either direction, 0 to 90 degrees."""
-LEAST_SPEED = 5e-5
-"""m/s; a ratio to a smaller speed has no meaning."""
 NO_NUMBERS: dict[str, float] = dict.fromkeys((*get_args(Speed), *get_args(Slip), *get_args(Angle)), nan)
 """Quantities of a run that failed."""
+LEAST_SPEED = 5e-5
+"""m/s; a ratio to a smaller speed has no meaning."""
 Names = Annotated[list[str], Field(min_length=1)]
 
 
 class Observation(Table):
     """``[[observations]]``: a fact, where it was found, and the number that it is about.
 
-    The number is the mean of a quantity over the experiments ``of``, or its ratio to the mean over those ``over``. The
-    fact gives its ``value``, or that it is at ``least`` or at ``most`` so large, and the ``deviation`` within which a
-    number agrees: one standard deviation of the value, the tolerance of a limit. They are in SI units, angles in
-    degrees; a file gives speeds and angles with their unit, shares and ratios as plain numbers.
+    The number is the mean of a quantity (`Speed`, `Slip` or `Angle`) over the experiments ``of``, or its ratio to the
+    mean over those ``over``. The fact gives its ``value``, or that it is at ``least`` or at ``most`` so large, and the
+    ``deviation`` within which a number agrees: one standard deviation of the value, the tolerance of a limit. They are
+    in SI units, angles in degrees; a file gives speeds and angles with their unit, other numbers plainly.
 
     Attributes
     ----------
@@ -54,10 +54,9 @@ class Observation(Table):
         Own name; that of what is held out together; short text for tables and figures, the name by default.
     says, source
         The fact as it was said, and where.
-    quantity
-        A `Speed`, `Slip` or `Angle`.
-    derived
-        Whether it follows from other observations: it is reported, and has no weight in a calibration.
+    derived, costly
+        Whether it follows from other observations, or needs runs too long for many parameter sets. Either has no weight
+        in a calibration.
     """
 
     name: str
@@ -73,6 +72,7 @@ class Observation(Table):
     most: Number | None = None
     deviation: Annotated[Number, Field(gt=0)]
     derived: bool = False
+    costly: bool = False
 
     @field_validator("value", "least", "most", "deviation", mode="before")
     @classmethod
@@ -80,14 +80,15 @@ class Observation(Table):
         if info.context != WRITTEN:
             return value
         kind = None if info.data.get("over") else kind_of(info.data.get("quantity", "velocity"))
-        if kind is None and isinstance(value, str):
-            raise ValueError("expected a plain number: a ratio or a share has no unit")
-        if kind is None:
-            return value
-        if not isinstance(value, str):
-            raise ValueError(kind.expectation)
-        number = parse_quantity(value, kind)
+        if isinstance(value, str) == (kind is None):
+            raise ValueError(kind.expectation if kind else "expected a plain number: a ratio or a share has no unit")
+        number = parse_quantity(value, kind) if kind else value
         return degrees(number) if kind is ANGLE else number
+
+    @property
+    def weighed(self) -> bool:
+        """Whether it has a weight in a calibration."""
+        return not (self.derived or self.costly)
 
     @property
     def unit(self) -> tuple[str, float]:
@@ -111,25 +112,19 @@ class Observation(Table):
         return f"{limits} ± {self.deviation * scale:.2g} {unit}".strip()
 
     def of_numbers(self, numbers: Mapping[str, Mapping[str, float]]) -> float:
-        """The number of this observation; NaN if one that it needs is NaN or its ratio is to walkers at rest.
+        """The number of this observation, from quantities by experiment (`numbers_of`).
 
-        Parameters
-        ----------
-        numbers
-            Quantities by experiment, as from `numbers_of`.
+        NaN if one that it needs is NaN, or its ratio is to walkers at rest.
         """
-        above, below = (
-            float(np.mean([numbers[label][self.quantity] for label in each])) if each else 1.0
-            for each in (self.of, self.over)
-        )
-        if self.over and kind_of(self.quantity) is SPEED and abs(below) < LEAST_SPEED:
-            return nan
-        return above / below if self.over else above
+        mean = float(np.mean([numbers[label][self.quantity] for label in self.of]))
+        if not self.over:
+            return mean
+        below = float(np.mean([numbers[label][self.quantity] for label in self.over]))
+        return nan if kind_of(self.quantity) is SPEED and abs(below) < LEAST_SPEED else mean / below
 
     def residual(self, number: float) -> float:
         """How far a number is from what the fact allows, in deviations; NaN for NaN."""
-        low, high = self.limits
-        return (number - float(np.clip(number, low, high))) / self.deviation
+        return (number - float(np.clip(number, *self.limits))) / self.deviation
 
     def agrees(self, number: float) -> bool:
         """Whether a number is within a deviation of what the fact allows; NaN is not."""
@@ -144,12 +139,13 @@ def kind_of(quantity: str) -> Kind | None:
 def numbers_of(run: str | Path) -> dict[str, float]:
     """All quantities of the finished run of a dimer; NaN where no walker is steady and keeps its beads together."""
     walkers, kept = read_table(run, "walkers"), steady_walkers(read(run))
-    numbers = {name: float(kept[name].mean()) for name in get_args(Speed)}
-    group = read_motion(run).groups[0]
-    seen, samples, chosen = gait(group), settled_samples(group), kept.index.to_numpy()
-    size = np.sqrt(np.mean(seen.velocity[samples][:, chosen] ** 2)) if len(chosen) else nan
-    for name, sliding in zip(get_args(Slip), np.moveaxis(seen.sliding[samples], -1, 0), strict=False):
-        numbers[name] = float(np.sqrt(np.mean(sliding[:, chosen] ** 2)) / size) if len(chosen) else nan
-    angles = misalignment(walkers[together(walkers)])
-    reduced = (angles.max(), angles.min()) if len(angles) else (nan, nan)
-    return numbers | dict(zip(get_args(Angle), map(float, reduced), strict=True))
+    numbers = NO_NUMBERS | {name: float(kept[name].mean()) for name in get_args(Speed)}
+    if len(kept):
+        group = read_motion(run).groups[0]
+        seen, samples, chosen = gait(group), settled_samples(group), kept.index.to_numpy()
+        velocity, sliding = seen.velocity[samples][:, chosen], seen.sliding[samples][:, chosen]
+        for place, name in enumerate(get_args(Slip)):
+            numbers[name] = float(np.sqrt(np.mean(sliding[..., place] ** 2) / np.mean(velocity**2)))
+    if len(angles := misalignment(walkers[together(walkers)])):
+        numbers |= {"largest_angle": float(angles.max()), "smallest_angle": float(angles.min())}
+    return numbers
