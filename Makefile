@@ -36,7 +36,7 @@ pile: setup ## Shake the small pile (or PILE=pile-fig1a): what climbed, pictures
 	@$(MAKE) --no-print-directory walker CASE=$(PILE) OUT=$(OUT) FILM=$(if $(filter file,$(origin FILM)),720p,$(FILM))
 
 .PHONY: figures
-figures: setup .venv/with-theory ## The paper's figures and published numbers beside ours, in figures/ (runs what is missing)
+figures: setup .venv/with-theory ## The paper's figures, and its facts beside ours, in figures/ (runs what is missing)
 	@$(WALKERS) paper figures --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
 
 .PHONY: calibrate

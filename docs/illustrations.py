@@ -308,6 +308,8 @@ def facts(docs: Path) -> dict[str, str]:
     numbers = {name: f"{value:.3g}" for name, value in values.items() if value is not None}
     numbers["agree"] = f"{counted['agree']} of {counted['of']}"
     numbers["threshold"] = f"{np.mean([list(one.values())[1:3] for one in compared['thresholds']]):.2f}"
+    by_frequency = {one["of"]: one["by_frequency"] for one in compared["curve"]}
+    numbers["by_frequency_5g"] = f"{by_frequency['Fig. 2, 5 g']:.2f}"
     checked = read_json(docs / CHECKED)["lines"]
     numbers |= tables.of_calibration(read_json(docs / "figures" / "calibration.json"))
     return {**numbers, **_of_checks(checked), **dict(tables.cells(docs / "figures"))}

@@ -42,7 +42,7 @@ FIG1B: dict[str, Any] = {
     "boundary": {"material": "chromium-coated glass"},
     "drive": {"frequency": "80 Hz", "peak_acceleration": "4 g"},
 }
-SIZES = {"L": "0.3 mm", "s": "0.2 mm"}
+SIZES = {"L": "0.3 mm", "m": "0.21 mm", "s": "0.2 mm"}
 # A dimer's speed is that of 40 cycles, 20 of them to settle, to a thousandth.
 BRIEF = {"cycles": 20, "settling_cycles": 12}
 FIG1B_SPEED = 1.079e-3
@@ -115,6 +115,8 @@ def test_pairs_of_beads_are_numbered_along_the_arrangement_and_head_to_the_large
     assert [len(neighbours) for _, neighbours in raft.bridged] == [6, *[3] * 6]
     for sizes, heading in {"Lss": (1.0, -0.5, -0.5), "sLs": (1.0, 0.0, -1.0), "sss": (1.0, 0.0, -1.0)}.items():
         assert of_tables(cluster("chain", sizes)).walkers[0].toward_large == pytest.approx(heading, abs=1e-12)
+    near = of_tables(cluster("chain", "sLm")).walkers[0]  # centroids a fiftieth of its length apart
+    assert near.toward_large == near.front
 
 
 CLIMBER = read_toml(shipped("case")["climber-dimer"])

@@ -51,16 +51,27 @@ def test_a_dimer_without_friction_comes_to_its_speed_on_a_slope_as_in_the_engine
     np.testing.assert_allclose(found, expected, rtol=1e-3, atol=1e-4 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize(("ratio", "modulus"), [(1.0, "50 MPa"), (20.0, "500 MPa")])
+_REFERENCE = {"contact.friction.bead_wall": 0.2, "run.cycles": 16, "run.settling_cycles": 8}
+_SHIPPED = {"contact.rolling_friction": 0.0, "dimers.angle": "0 deg", "dimers.replicates": 1, "run.most_cycles": 40}
+# A softened bead creeps while its contacts stick, for a part of each cycle at 2 g: by 6 % of the velocity at 50 MPa.
+_RIGID = {**_SHIPPED, "contact.youngs_modulus": "800 MPa"}
+
+
+@pytest.mark.parametrize(
+    ("case", "changes"),
+    [
+        (None, _REFERENCE),
+        (None, {**_REFERENCE, "liquid.viscosity_ratio": 20.0, "contact.youngs_modulus": "500 MPa"}),
+        ("fig1b", {**_RIGID, "drive.peak_acceleration": "2 g"}),
+        ("fig1b", {**_SHIPPED, "drive.peak_acceleration": "6 g"}),
+        ("fig1b", {**_SHIPPED, "drive.peak_acceleration": "6 g", "liquid.meniscus_radius": "150 um"}),
+    ],
+)
 def test_bridges_slow_the_theorys_walker_as_they_do_the_engines(
-    run_directory: Callable[..., Path], ratio: float, modulus: str
+    run_directory: Callable[..., Path], case: str | None, changes: dict[str, Any]
 ) -> None:
     """Its velocity, both beads' rotation and the sliding at all contacts."""
-    case = make_case(
-        liquid={"viscosity_ratio": ratio},
-        contact={"friction": {"bead_bead": 0.1, "bead_wall": 0.2}, "youngs_modulus": modulus},
-        run={"cycles": 16, "settling_cycles": 8},
-    )
+    case = load_case(case, changes) if case else make_case().changed(changes)
     result, motion = read(run_directory(case)), motion_of(case)
     found = [result["velocity"], result["rotation_1"], result["rotation_2"]]
     found += [result["sliding_1"], result["sliding_2"], result["sliding_pair_1"]]
@@ -151,7 +162,8 @@ def test_walkers_rest_just_below_the_threshold_and_move_just_above(changes: dict
 
 def test_a_prediction_names_the_contact_that_opens() -> None:
     """At the weakest drive, in steps of 1 g, at which one does: the two others stay closed."""
-    cases = [load_case("fig4b", {"drive.peak_acceleration": f"{peak} g"}) for peak in range(4, 12)]
+    rough = {"contact.friction.bead_wall": 0.7}
+    cases = [load_case("fig4b", {**rough, "drive.peak_acceleration": f"{peak} g"}) for peak in range(4, 12)]
     motion = motion_of(*cases)
     place = int(np.argmax(motion.opened))
     (opened,) = np.flatnonzero(motion.smallest_normal_force[:, place] <= 0.0)
@@ -209,7 +221,7 @@ def test_in_viscous_bridges_a_dimer_turns_over_as_its_beads_settle() -> None:
     settling = case.axial_gravity * (speeds[0] - speeds[1]) / (2.0 * np.sqrt(np.prod(dimer.radii)))
     found = alignment_of(case)
     assert found["rate"] == pytest.approx(settling, rel=0.01)
-    assert found["rolling_rate"] < 0.7 * settling
+    assert found["rolling_rate"] < 0.8 * settling
 
 
 def test_bridges_slow_the_turning_over_and_on_a_slope_the_drive_ends_it() -> None:
@@ -217,9 +229,9 @@ def test_bridges_slow_the_turning_over_and_on_a_slope_the_drive_ends_it() -> Non
     assert fluid["rate"] > 2.0 * weak["rate"] > 4.0 * slow["rate"] > 0.0
     assert not weak["stands"]
     assert weak["turns_over_after"] == pytest.approx(time_to_turn(weak["rate"]))
-    stands = alignment_of(climber(1.0, tilt="2 deg"))
+    stands = alignment_of(climber(0.1, tilt="2 deg"))
     assert (stands["stands"], stands["turns_over_after"]) == (True, None)
-    assert not alignment_of(climber(1.0, tilt="2 deg", peak_acceleration="2 g"))["stands"]
+    assert not alignment_of(climber(0.1, tilt="2 deg", peak_acceleration="2 g"))["stands"]
 
 
 @pytest.mark.parametrize(("viscosity", "acceleration"), [(0.1, "16.2 g"), (1.0, "2 g"), (3.0, "2 g")])
@@ -239,7 +251,7 @@ def test_the_program_prints_theory_beside_the_engine(in_folder: Path) -> None:
     contents = json.loads(call("show", "test.toml", "--theory", "--json", check=True).stdout)
     assert contents["engine"]["velocity"] == pytest.approx(contents["viscous"]["velocity"], rel=0.08)
     table = describe(contents, contents["engine"]).splitlines()
-    assert f"{contents['viscous']['velocity'] * 1e3:.2f}" in table[4]
+    assert f"{contents['viscous']['velocity'] * 1e3:.3f}" in table[4]
     (in_folder / "up.toml").write_text(to_toml(document(drive={"axis": "z"})))
     done = call("show", "up.toml", "--theory")
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
