@@ -179,26 +179,35 @@ def _calibrated() -> list[Case]:
     return [load_case(read.file.case, {**base, **values}) for values in read.experiments.values()]
 
 
-_AS_SLOPES = {"y": "axial_velocity", "hue": "liquid.viscosity_ratio", "panels": "clusters[0].arrangement"}
+_BY_FRICTION = {
+    **{"x": "contact.friction.bead_wall", "y": "axial_velocity"},
+    **{"hue": "liquid.name", "panels": "contact.roughness.bead_wall"},
+}
 _SWEEPS: Mapping[str, Mapping[str, str]] = {
-    "climb-friction": {"x": "contact.friction.bead_wall", **_AS_SLOPES},
-    "climb-tilt": {"x": "boundary.tilt", **_AS_SLOPES},
+    "climb-liquids": _BY_FRICTION,
+    "climb-corner": _BY_FRICTION,
     "zoo": {"y": "axial_velocity", "hue": "none"},
     "zoo-corner": {"y": "axial_velocity"},
     "tray-phases": {"x": "drive.peak_acceleration", "y": "clustered_share", "hue": "walkers", "panels": "coverage"},
 }
 """Sweeps and how their figures show them."""
+_TABLES = {
+    "climb-liquids": tables.least_frictions,
+    "climb-corner": tables.least_frictions,
+    "tray-phases": tables.means_of_trays,
+}
+"""Those of which there is a table too."""
 
 
 def _of_sweep(name: str, options: Mapping[str, Any]) -> Illustration:
-    """The figure of a sweep; of trays also the table."""
-    files = [f"figures/{name}.png", *(["figures/tray-phases.md"] if name == "tray-phases" else [])]
+    """The figure of a sweep, and its table."""
+    files = [f"figures/{name}.png", *([f"figures/{name}.md"] if name in _TABLES else [])]
 
     def make(out: Path, docs: Path) -> None:
         done = sweep(name, out)
         save_figure(done.figure(**options), docs / files[0], [one.directory.name for one in done.runs])
         for file in files[1:]:
-            write_text(docs / file, tables.page(f"walkers list {name}", tables.means_of_trays(done.table())))
+            write_text(docs / file, tables.page(f"walkers list {name}", _TABLES[name](done.table())))
 
     return Illustration(tuple(files), lambda: load_sweep(name).cases(), make)
 
@@ -217,13 +226,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     "climber": _of_run("climber", "climber"),
     "pile-starts": _of_climbs("pile-starts", assembly=_ASSEMBLES),
     "pile-controls": _of_climbs("pile-controls", "pile-starts"),
-    "pile-needs": _of_climbs("pile-needs"),
-    "pile-map": _of_climbs("pile-map"),
-    "pile-beads": _of_climbs("pile-beads"),
     "pile-contacts": _of_climbs("pile-contacts"),
-    "pile-numerics": _of_climbs("pile-numerics"),
-    "pile-calibrated": _of_climbs("pile-calibrated"),
-    "pile-cylinder": _of_climbs("pile-cylinder"),
     "pile-paper": _of_climbs("pile-paper"),
     "paper-pile": _of_run("pile-paper", "pile-fig1a", _PAPERS),
     "paper-pile-film": _of_run(
