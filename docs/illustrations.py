@@ -57,8 +57,8 @@ CHECKED = Path("figures") / "validation.json"
 _BLOCK = re.compile(r"(?ms)(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n)(?P<text>.*?)(?=^```)")
 _FACT = re.compile(r"<!--fact (?P<name>\S+)-->(?P<text>[^<]*)<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
-_CLIMBS = {"run.seed": 1}
-"""A start from which the small pile climbs within its four seconds."""
+_CLIMBS = {f"contact.roughness.bead_{other}": "0.2 um" for other in ("bead", "wall")}
+"""The small pile of which clusters climb within its four seconds."""
 _OF_CALIBRATION = ("corner", "predictions")
 
 
@@ -185,7 +185,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     ),
     "tray": _of_run("tray", "tray"),
     "climber": _of_run("climber", "climber"),
-    "pile-contacts": _of_climbs("pile-contacts"),
+    "pile-roughness": _of_climbs("pile-roughness"),
     "pile": _of_run("pile", "pile-small", _CLIMBS),
     **{name: _of_figure(name, f"figures/{name}.png", sweeps=one.sweeps) for name, one in FIGURES.items()},
     **{name: _of_sweep(name, options) for name, options in _SWEEPS.items()},
