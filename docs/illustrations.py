@@ -93,15 +93,14 @@ def _of_run(name: str, case: str, changes: Mapping[str, Any] | None = None, film
 
 
 def _of_climbs(name: str) -> Illustration:
-    """Figure and output of `walkers climb` for a sweep."""
-    files = [f"figures/{name}.png", f"figures/{name}.md"]
+    """Output of `walkers climb` for a sweep."""
+    file = f"figures/{name}.md"
 
     def make(out: Path, docs: Path) -> None:
-        sweep(name, out)
-        climbs = climb([out / name], to=docs / files[0])
-        write_text(docs / files[1], tables.page(f"walkers climb {name}", list(map(texts_of, climbs))))
+        climbs = climb([sweep(name, out).directory])
+        write_text(docs / file, tables.page(f"walkers climb {name}", list(map(texts_of, climbs))))
 
-    return Illustration(tuple(files), lambda: load_sweep(name).cases(), make)
+    return Illustration((file,), lambda: load_sweep(name).cases(), make)
 
 
 def _make_validation(out: Path, docs: Path) -> None:
