@@ -78,7 +78,7 @@ def test_list_has_all_runs_and_sweeps_with_their_results(out: Path) -> None:
 
 def test_list_selects_by_values_and_has_a_column_for_each_that_differs(out: Path) -> None:
     runs = _listed(
-        "--where", "drive.frequency=0.08 kHz", "--where", "friction.bead_wall=0.1", "--where", "radii=0.3/0.2 mm"
+        "--where", "drive.frequency=0.08 kHz", "--where", "friction.bead_wall=0.1", "--where", "radii=0.3 mm, 0.2 mm"
     )
     assert {row["varies"]["drive.peak_acceleration"] for row in runs} == {19.6, 39.2, 58.8}
     head, *lines = call("list", "--where", "friction.bead_wall=0.2", check=True).stdout.splitlines()
@@ -169,7 +169,7 @@ def test_compare_tells_parameters_and_results_of_two_runs(out: Path) -> None:
     assert results["velocity"]["numerical_error"] is None
     # Cases may be named, and one that was not run; changes are of the second side.
     told = call("compare", "base.toml", "fig4a", check=True).stdout
-    assert "0.6/0.3 mm" in told and "fig4a: no finished run" in told
+    assert "0.6 mm, 0.3 mm" in told and "fig4a: no finished run" in told
     assert "all results are the same" in call("compare", "base.toml", "base.toml", check=True).stdout
     for sides in (["base.toml"], ["base.toml", "base.toml"]):
         found = json.loads(call("compare", *sides, "--set", "drive.frequency=90Hz", "--json", check=True).stdout)
