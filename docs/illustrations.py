@@ -27,7 +27,7 @@ from matplotlib.figure import Figure
 
 from docs import effects, tables
 from walkers import load_case, run, sweep
-from walkers.api import Run, climb
+from walkers.api import climb
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.file import load_calibration
 from walkers.calibration.report import write_outcome
@@ -36,7 +36,6 @@ from walkers.check.lines import as_dict, failures, run_checks
 from walkers.check.literature import LITERATURE
 from walkers.errors import InputError, Problem
 from walkers.inputs.case import Case
-from walkers.inputs.keys import flatten
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.make import COMPARED, FIGURES, make_figures
 from walkers.paper.sources import sweep_of
@@ -57,11 +56,9 @@ CHECKED = Path("figures") / "validation.json"
 _BLOCK = re.compile(r"(?ms)(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n)(?P<text>.*?)(?=^```)")
 _FACT = re.compile(r"<!--fact (?P<name>\S+)-->(?P<text>[^<]*)<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
-_ASSEMBLES = {"run.duration": "10 s", "run.seed": 10}
-"""The pile whose first climber the page follows: it climbs a plain wall, and its beads were no neighbours at rest."""
-_PAPERS = {"run.ranks": 1, "run.seed": 1}
-"""Of the paper's pile, as the sweep pile-paper runs it."""
-_OF_CALIBRATION = ("corner", "predictions")
+_CLIMBS = {f"contact.roughness.bead_{other}": "0.2 um" for other in ("bead", "wall")}
+"""The small pile of which clusters climb within its four seconds."""
+_OF_CALIBRATION = ("calibration.md", "calibration.json", "predictions.png")
 
 
 @dataclass(frozen=True)
@@ -94,50 +91,15 @@ def _of_run(name: str, case: str, changes: Mapping[str, Any] | None = None, film
     return Illustration((file,), lambda: [load_case(case, changes)], make)
 
 
-def _of_climbs(name: str, *others: str, assembly: Mapping[str, Any] | None = None) -> Illustration:
-    """Figure and output of `walkers climb` for sweeps, and the assembly of the first climb of a run."""
-    names = (*others, name)
-    files = [f"figures/{name}.png", f"figures/{name}.md", *(["figures/pile-assembly.png"] if assembly else [])]
+def _of_climbs(name: str) -> Illustration:
+    """Output of `walkers climb` for a sweep."""
+    file = f"figures/{name}.md"
 
     def make(out: Path, docs: Path) -> None:
-        for sweep_name in names:
-            sweep(sweep_name, out)
-        climbs = climb([out / sweep_name for sweep_name in names], to=docs / files[0])
-        write_text(docs / files[1], tables.page(f"walkers climb {' '.join(names)}", list(map(texts_of, climbs))))
-        if assembly:
-            done = run(load_case("pile-small", assembly), out)
-            save_figure(_assembly(done), docs / files[2], [done.directory.name])
+        climbs = climb([sweep(name, out).directory])
+        write_text(docs / file, tables.page(f"walkers climb {name}", list(map(texts_of, climbs))))
 
-    return Illustration(tuple(files), lambda: [one for each in names for one in load_sweep(each).cases()], make)
-
-
-@styled
-def _assembly(done: Run) -> Figure:
-    """Heights of the beads of the first climb out of a pile, thick while joined, and numbers of joined beads."""
-    clusters, past, bed = (done.table(name) for name in ("clusters", "assembly", "bed"))
-    chosen = clusters[clusters["climbed"] & clusters["out_of_pile"]].sort_values("qualified").iloc[0]
-    past = past[past["track"] == chosen["track"]]
-    figure, (heights, numbers) = new_figure(TWO_COLUMNS, 4.8, nrows=2, height_ratios=(2.0, 1.0), sharex=True)
-    seen = bed[bed["time"].between(past["time"].min(), past["time"].max())]
-    heights.plot(seen["time"], 1e3 * seen["surface"], color="0.5", label="surface of the pile")
-    for number, (bead, rows) in enumerate(past.groupby("bead")):
-        size = "large" if rows["large"].iloc[0] else "small"
-        text = f"{size} bead {bead}{', leads' if bead == chosen['leader'] else ''}"
-        heights.plot(rows["time"], 1e3 * rows["height"], color=f"C{number}", lw=0.6)
-        joined = rows["height"].where(rows["joined"])
-        heights.plot(rows["time"], 1e3 * joined, color=f"C{number}", lw=2.0, label=text)
-    counts = {"joined": "joined to most of them", "in_bulk": "in the pile's bulk", "at_wall": "at a side wall"}
-    for number, (name, text) in enumerate(counts.items()):
-        past.groupby("time")[name].sum().plot(
-            ax=numbers, color=f"C{2 * number}", ls="--" if number else "-", label=text
-        )
-    heights.set(title="Beads of the first climb; thick: joined to most of the others", ylabel="height (mm)")
-    numbers.set(title="Number of these beads that are", xlabel="time since the start of the drive (s)", ylabel="beads")
-    for axes in (heights, numbers):
-        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), borderaxespad=0.0)
-    letter_panels((heights, numbers))
-    figure.suptitle(done.case.title)
-    return figure
+    return Illustration((file,), lambda: load_sweep(name).cases(), make)
 
 
 def _make_validation(out: Path, docs: Path) -> None:
@@ -168,37 +130,40 @@ def _make_calibration(out: Path, docs: Path) -> None:
     found = calibrate(load_calibration("ruby"), out, Options())
     write_outcome(found, out / "ruby")
     for name in _OF_CALIBRATION:
-        shutil.copy(out / "ruby" / f"{name}.png", docs / "figures" / f"calibration-{name}.png")
-    shutil.copy(out / "ruby" / "calibration.md", docs / "figures" / "calibration.md")
+        shutil.copy(out / "ruby" / name, docs / "figures" / name.replace("predictions", "calibration"))
 
 
 def _calibrated() -> list[Case]:
     """The experiments of the calibration with the shipped values of its parameters."""
-    read = load_calibration("ruby")
-    base = flatten(read.file.set, lambda _: False)
-    return [load_case(read.file.case, {**base, **values}) for values in read.experiments.values()]
+    return list(load_calibration("ruby").sweep("ruby").cases())
 
 
-_AS_SLOPES = {"y": "axial_velocity", "hue": "liquid.viscosity_ratio", "panels": "clusters[0].arrangement"}
+_BY_FRICTION = {"x": "contact.friction.bead_wall", "y": "axial_velocity", "hue": "liquid.name"}
 _SWEEPS: Mapping[str, Mapping[str, str]] = {
-    "climb-friction": {"x": "contact.friction.bead_wall", **_AS_SLOPES},
-    "climb-tilt": {"x": "boundary.tilt", **_AS_SLOPES},
+    "climb-liquids": {**_BY_FRICTION, "panels": "contact.roughness.bead_wall"},
+    "climb-corner": _BY_FRICTION,
     "zoo": {"y": "axial_velocity", "hue": "none"},
     "zoo-corner": {"y": "axial_velocity"},
     "tray-phases": {"x": "drive.peak_acceleration", "y": "clustered_share", "hue": "walkers", "panels": "coverage"},
 }
 """Sweeps and how their figures show them."""
+_TABLES = {
+    "climb-liquids": tables.least_frictions,
+    "climb-corner": tables.least_frictions,
+    "tray-phases": tables.means_of_trays,
+}
+"""Those of which there is a table too."""
 
 
 def _of_sweep(name: str, options: Mapping[str, Any]) -> Illustration:
-    """The figure of a sweep; of trays also the table."""
-    files = [f"figures/{name}.png", *(["figures/tray-phases.md"] if name == "tray-phases" else [])]
+    """The figure of a sweep, and its table."""
+    files = [f"figures/{name}.png", *([f"figures/{name}.md"] if name in _TABLES else [])]
 
     def make(out: Path, docs: Path) -> None:
         done = sweep(name, out)
         save_figure(done.figure(**options), docs / files[0], [one.directory.name for one in done.runs])
         for file in files[1:]:
-            write_text(docs / file, tables.page(f"walkers list {name}", tables.means_of_trays(done.table())))
+            write_text(docs / file, tables.page(f"walkers list {name}", _TABLES[name](done.table())))
 
     return Illustration(tuple(files), lambda: load_sweep(name).cases(), make)
 
@@ -215,26 +180,8 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     ),
     "tray": _of_run("tray", "tray"),
     "climber": _of_run("climber", "climber"),
-    "pile-starts": _of_climbs("pile-starts", assembly=_ASSEMBLES),
-    "pile-controls": _of_climbs("pile-controls", "pile-starts"),
-    "pile-needs": _of_climbs("pile-needs"),
-    "pile-map": _of_climbs("pile-map"),
-    "pile-beads": _of_climbs("pile-beads"),
-    "pile-contacts": _of_climbs("pile-contacts"),
-    "pile-numerics": _of_climbs("pile-numerics"),
-    "pile-calibrated": _of_climbs("pile-calibrated"),
-    "pile-cylinder": _of_climbs("pile-cylinder"),
-    "pile-paper": _of_climbs("pile-paper"),
-    "paper-pile": _of_run("pile-paper", "pile-fig1a", _PAPERS),
-    "paper-pile-film": _of_run(
-        *("pile-paper", "pile-fig1a", _PAPERS),
-        film=FilmOptions(size=(360, 640), fps=10, slowdown=1.0, begin=4.0, end=10.0),
-    ),
-    "pile-film": _of_run(
-        *("pile", "pile-small", _ASSEMBLES),
-        film=FilmOptions(size=(360, 640), fps=10, slowdown=1.0, begin=2.5, end=8.5),
-    ),
-    "pile": _of_run("pile", "pile-small", {"run.duration": "10 s"}),
+    "pile-roughness": _of_climbs("pile-roughness"),
+    "pile": _of_run("pile", "pile-small", _CLIMBS),
     **{name: _of_figure(name, f"figures/{name}.png", sweeps=one.sweeps) for name, one in FIGURES.items()},
     **{name: _of_sweep(name, options) for name, options in _SWEEPS.items()},
     "comparison": _of_figure("comparison", "figures/comparison.md", "figures/comparison.json", sweeps=COMPARED),
@@ -249,7 +196,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
         _make_validation,
     ),
     "calibration": Illustration(
-        tuple(f"figures/calibration-{name}.png" for name in _OF_CALIBRATION), _calibrated, _make_calibration
+        tuple(f"figures/calibration.{ending}" for ending in ("md", "json", "png")), _calibrated, _make_calibration
     ),
 }
 
@@ -305,7 +252,7 @@ def pages_of(docs: Path) -> list[Path]:
 
 
 def facts(docs: Path) -> dict[str, str]:
-    """Numbers that sentences may quote: of the comparison with the paper, of `CHECKED`, of the tables of climbs."""
+    """Numbers that sentences may quote: of comparison and calibration, of `CHECKED`, of the tables of climbs."""
     compared: dict[str, Any] = read_json(docs / "figures" / "comparison.json")
     shipped, counted = next(iter(compared["sets"].items()))
     values = {one["name"]: one["values"][shipped] for one in compared["facts"]}
@@ -315,6 +262,7 @@ def facts(docs: Path) -> dict[str, str]:
     by_frequency = {one["of"]: one["by_frequency"] for one in compared["curve"]}
     numbers["by_frequency_5g"] = f"{by_frequency['Fig. 2, 5 g']:.2f}"
     checked = read_json(docs / CHECKED)["lines"]
+    numbers |= tables.of_calibration(read_json(docs / "figures" / "calibration.json"))
     return {**numbers, **_of_checks(checked), **dict(tables.cells(docs / "figures"))}
 
 

@@ -16,6 +16,7 @@ import pytest
 from scipy.stats import poisson
 
 import walkers
+from docs import tables
 from tests.conftest import call, to_toml
 from walkers.inputs.reading import shipped
 from walkers.runner.files import read_json
@@ -212,6 +213,19 @@ def test_conditions_are_named_by_what_is_not_usual() -> None:
         "drive.frequency = 100 Hz": ["2", "6"],
         "drive.frequency = 250 Hz": ["3"],
     }
+
+
+def test_clusters_climb_from_the_friction_of_no_velocity_on() -> None:
+    """Of two liquids in any order: 3/4 of the way from 0.2 to 0.3, and at a friction of the sweep itself."""
+    friction, speeds = [0.3, 0.1, 0.2, 0.4], {"water": [1e-3, -9e-3, -3e-3, 5e-3], "oil": [-4e-3, -6e-3, -5e-3, 0.0]}
+    frames = [
+        pd.DataFrame({"contact.friction.bead_wall": friction, "axial_velocity": speed, "liquid.name": liquid})
+        for liquid, speed in speeds.items()
+    ]
+    found = [list(row.values()) for row in tables.least_frictions(pd.concat(frames))]
+    assert found == [["water", "0.28", "5"], ["oil", "0.40", "0"]]
+    rough = pd.concat(frames).assign(**{"contact.roughness.bead_wall": 0.1})
+    assert [row["cluster"] for row in tables.least_frictions(rough)] == ["water, 0.1 um", "oil, 0.1 um"]
 
 
 def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:

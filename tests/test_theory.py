@@ -53,7 +53,7 @@ def test_a_dimer_without_friction_comes_to_its_speed_on_a_slope_as_in_the_engine
 
 _REFERENCE = {"contact.friction.bead_wall": 0.2, "run.cycles": 16, "run.settling_cycles": 8}
 _SHIPPED = {"contact.rolling_friction": 0.0, "dimers.angle": "0 deg", "dimers.replicates": 1, "run.most_cycles": 40}
-# A softened bead creeps while its contacts stick, for a part of each cycle at 2 g: by 6 % of the velocity at 50 MPa.
+# Soft beads without rolling friction creep while contacts stick, as in a part of each cycle at 2 g: 6 % slow at 50 MPa.
 _RIGID = {**_SHIPPED, "contact.youngs_modulus": "800 MPa"}
 
 

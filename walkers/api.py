@@ -833,7 +833,7 @@ def calibrate(
     progress: bool | None = None,
     **how: Any,
 ) -> Outcome:
-    """Calibrate unknown parameters to published numbers; an interrupted calibration continues. Arguments: see `sweep`.
+    """Calibrate unknown parameters to facts; an interrupted calibration continues. Arguments: see `sweep`.
 
     `walkers.calibration.report.write_outcome` writes tables and figures of the outcome.
     """

@@ -195,7 +195,7 @@ def calibrate(
     jobs: Jobs = None,
     by: By = By(),
 ) -> int:
-    """Calibrate unknown parameters to published numbers. An interrupted calibration continues.
+    """Calibrate unknown parameters to facts, measured or published. An interrupted calibration continues.
 
     Parameters
     ----------

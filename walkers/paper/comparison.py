@@ -114,7 +114,6 @@ def _curve(sources: Sources, sweep: str, column: str, label: Callable[[float], s
         slow, fast = (float(group["engine"].iloc[end]) for end in (0, -1))
         ratio = fast / slow if len(group) > 1 and abs(slow) > LEAST_SPEED else nan
         means = {name: float(group[name].mean()) * 1e3 for name in found}
-        rows.append(
-            {"of": f"{sweep}, {label(float(group[column].iloc[0]))}", **_known({**means, "by_frequency": ratio})}
-        )
+        name = f"Fig. {sweep.removeprefix('fig')}, {label(float(group[column].iloc[0]))}"
+        rows.append({"of": name, **_known({**means, "by_frequency": ratio})})
     return rows

@@ -38,8 +38,8 @@ def render_film(
 ) -> Path:
     """Render a film of one walker if walkers are independent or one is chosen, otherwise of all beads.
 
-    `InputError` and `WalkersError` if the format cannot hold the film, the walker does not exist, or no frame is
-    between begin and end; if ffmpeg fails.
+    `InputError` if the format cannot hold the film, the walker does not exist, or no frame is between begin and end;
+    `WalkersError` if ffmpeg fails.
 
     Parameters
     ----------

@@ -105,8 +105,8 @@ def derived(case: Case) -> dict[str, Any]:
 def measure(directory: Path) -> None:
     """Measure a run, finished or not; write its tables and, last, ``result.json``.
 
-    `DumpError` if a dump cannot be read; `FileChanged` if a dump of a finished run is
-    not what it was.
+    `walkers.postprocess.dump.DumpError` if a dump cannot be read; `walkers.runner.manifest.FileChanged` if a dump of a
+    finished run is not what it was.
     """
     from walkers.postprocess.motion import read_motion
     from walkers.postprocess.tables import write_table

@@ -21,7 +21,7 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) ->
     """Write the dumps and the layout of each case into its directory, and remove those of the shared deck.
 
     Beads and walkers are renumbered; their positions are those in the shared deck. `WalkersMet` if two
-    walkers came so close that they are not independent; `DumpError` if a dump cannot be read.
+    walkers came so close that they are not independent; `walkers.postprocess.dump.DumpError` if a dump cannot be read.
 
     Parameters
     ----------

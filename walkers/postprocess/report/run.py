@@ -28,8 +28,8 @@ Origins = tuple[Origin, ...] | None
 def report_run(directory: Path, to: Path | None = None, origins: Origins = None, *, largest: int = LARGEST) -> Path:
     """Write the report of a run as a self-contained HTML file.
 
-    `InputError` and `DumpError` if the file is no HTML file in an existing folder; if the dumps cannot
-    be read.
+    `InputError` if the file is no HTML file in an existing folder, `walkers.postprocess.dump.DumpError` if the dumps
+    cannot be read.
 
     Parameters
     ----------
