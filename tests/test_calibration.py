@@ -27,6 +27,7 @@ from walkers.inputs.reading import shipped
 from walkers.postprocess.gait import misalignment
 from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import load
+from walkers.text import rendered
 
 # --- facts ------------------------------------------------------------------------------------------------------------
 
@@ -312,6 +313,7 @@ def test_the_record_has_quantiles_and_agreement_of_a_known_outcome(
     assert found["posterior"]["drag/friction"] == pytest.approx(ratios, rel=1e-2)
     assert found["observations"][0]["numbers"]["guess"] == pytest.approx(1e3 * (known(TRUTH)[0, 0] + 0.3))
     assert found["observations"][1]["numbers"][PROPOSED[0]] is None
+    assert "| drag/friction |" in rendered("walkers.calibration", "report.md.j2", found=found)
 
 
 # --- files ------------------------------------------------------------------------------------------------------------
