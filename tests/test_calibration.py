@@ -115,6 +115,7 @@ def test_emulators_know_their_error(emulators: tuple[Emulator, ...]) -> None:
         assert np.mean(np.abs(value - true) <= above - value + 1e-6) > 0.9
     numbers = DESIGN.sum(axis=1) + 0.2 * np.random.default_rng(3).standard_normal(64)
     noisy = Emulator.of(fact(value=1.0, deviation=0.1), DESIGN, numbers, 1)
+    assert min(one.inflation for one in (*emulators, noisy)) >= 1.0
     mean, error = noisy.process.predict(DESIGN, return_std=True)
     np.testing.assert_allclose([mean, 3.0 * error], replace(noisy, inflation=3.0).predict(DESIGN))
     left = []

@@ -381,9 +381,9 @@ class Run:
 
         Examples
         --------
-        >>> error = walkers.run("fig1b", tmp).accuracy().errors["velocity"]["total"]
+        >>> error = walkers.run("fig4a", tmp).accuracy().errors["velocity"]["total"]
         >>> round(1e3 * error, 3)  # mm/s
-        0.024
+        0.002
         """
         from walkers.sweeps.accuracy import measure_accuracy
         from walkers.sweeps.scheduler import Options
@@ -481,7 +481,7 @@ def run(
     >>> import walkers
     >>> one = walkers.run("fig1b", tmp)
     >>> round(1e3 * one.result["velocity"], 3)  # mm/s
-    1.08
+    1.981
     >>> one.walkers[["facing", "steady"]].drop_duplicates("facing").to_dict("list")
     {'facing': [1, -1], 'steady': [True, True]}
     """

@@ -86,7 +86,12 @@ _IF_ANY = (
 
 def declared(name: str) -> Quantity:
     """The quantity of a number; ``velocity_low`` is an end of the band of ``velocity``. `KeyError` if there is none."""
-    return _DECLARED[name] if name in _DECLARED else declared_in(name, NUMBERS.values())
+    if name in _DECLARED:
+        return _DECLARED[name]
+    number, _, end = name.rpartition("_")
+    if end in _ENDS:  # of a number of one bead
+        return next(one for one in _with_ends(declared(number)) if one.name == name)
+    return declared_in(name, NUMBERS.values())
 
 
 def is_error(name: str) -> bool:
@@ -109,7 +114,7 @@ def scatter_of(name: str) -> str:
 def ordered(names: Iterable[str]) -> list[str]:
     """Names of numbers in the order of their declarations; both ends of a band follow the number."""
     places = {name: place for place, name in enumerate(_DECLARED)}
-    return sorted(names, key=lambda name: (places.get(name, places.get(f"{name.rpartition('_')[0]}_*", -1)), name))
+    return sorted(names, key=lambda name: (places.get(re.sub(r"_\d+(?=_|$)", "_*", name), places.get(name, -1)), name))
 
 
 def headline(numbers: Mapping[str, Any]) -> str:
