@@ -120,7 +120,7 @@ def _bridges(case: Case, radius: FloatArray, without: Collection[str]) -> Bridge
             tables += [(*_splined(case.law, meeting), meeting.volume) for meeting in surfaces.volumes]
     acts = np.array(["capillary" not in without, *["lubrication" not in without] * 4], dtype=np.float64)
     spans, splines, volumes = map(np.stack, zip(*tables, strict=True))
-    liquid = 4.0 / 3.0 * pi * radius**3 * case.liquid.volume_fraction
+    liquid = 4.0 / 3.0 * pi * radius**3 * case.liquid.of_bridges.volume_fraction
     steps = 8 if case.liquid.conserved else 0
     return Bridges(spans, splines * acts, kind.astype(np.int64), between, volumes, steps, full, liquid)
 

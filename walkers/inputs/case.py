@@ -95,7 +95,7 @@ class Liquid(Table):
         return BridgeLiquid(
             surface_tension=self.surface_tension,
             viscosity=float(f"{self.dynamic_viscosity * self.viscosity_ratio:.15g}"),
-            volume_fraction=self.volume_fraction,
+            volume_fraction=self.volume_fraction or 0.0,
             meniscus_radius=self.meniscus_radius or 0.0,
             contact_angle=self.contact_angle,
             conserved=self.conserved,
