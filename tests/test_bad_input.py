@@ -141,7 +141,10 @@ LIBRARIES: list[tuple[str, str]] = [
     (material("glass"), "materials.glass: is in the library of"),
     (material("m", range=["3 g/cm^3", "4 g/cm^3"]), "expected two ends with the value between them"),
     (material("a\x1b[31m"), "materials.a\\x1b[31m: expected printable text on one line"),
-    (pairs(["glass", "ruby"]), "surface_pairs[0] = glass on ruby: is in the library of"),
+    (
+        pairs(["chromium-coated glass", "ruby"]),
+        "surface_pairs[0] = chromium-coated glass on ruby: is in the library of",
+    ),
 ]
 LAW = """
 import dataclasses, random, sys
@@ -200,7 +203,8 @@ COMMANDS: list[tuple[str, str]] = [
     *((f"sweep {what}", "") for what in ("bad_sweep.toml", "nosuch", "fig2 --site nosite.toml", "fig2 --out {case}")),
     *((f"{command} fig1b --set 'drive.frequency=70 mm'", 'fig1b: --set drive.frequency = "70 mm": expected a frequency')
       for command in ("show", "run", "export --to deck", "show --theory", "plot", "report", "check")),
-    *((f"{command} fig1b --set liquid.volume_fraction=0.02 --set 'liquid.contact_angle=88 deg'", 'fig1b: --set liquid.contact_angle = "88 deg": expected')
+    *((f"{command} fig1b --set liquid.volume_fraction=0.02 --set 'liquid.contact_angle=88 deg'",
+       'fig1b: --set liquid.contact_angle = "88 deg": expected')
       for command in ("show", "run", "run --spread")),
     ("sweep fig4 --set 'liquid.name=Si AK5'", 'liquid.name = "Si AK5": varies in this sweep and cannot be set'),
     ("show fig1b --set drive.freq=2 --set beads.mat=3", '"frequency"?\nfig1b: --set beads.mat: unknown key'),

@@ -278,9 +278,10 @@ def test_a_rest_before_the_drive_is_one(tmp_path: Path, frequency: str) -> None:
 
 
 ALIKE = {"dimers.radii": ["0.25 mm", "0.25 mm"]}
-SOULIE = {"liquid.law": "soulie", "contact.roughness": {"bead_bead": "1.2 um", "bead_wall": "2 um"}}
+ROUGH = [f"contact.roughness.{pair}" for pair in ("bead_bead", "bead_wall")]
+SOULIE = {"liquid.law": "soulie", **dict(zip(ROUGH, ("1.2 um", "2 um"), strict=True))}
 BIG = {
-    **{"liquid.law": "soulie", "contact.roughness": {"bead_bead": "2 um", "bead_wall": "3 um"}},
+    **{"liquid.law": "soulie", **dict(zip(ROUGH, ("2 um", "3 um"), strict=True))},
     **{"dimers.radii": ["0.6 mm", "0.3 mm"], "drive.peak_acceleration": "2 g"},
 }
 
@@ -346,7 +347,7 @@ def test_rolling_friction_turns_a_walker_to_the_axis_and_a_symmetric_dimer_away(
             "rolling_friction": 0.003,
             "roughness": {"bead_bead": "2 um", "bead_wall": "2 um"},
         },
-        "liquid": {"dynamic_viscosity": "100 mPa*s"},
+        "liquid": {"dynamic_viscosity": "10 mPa*s"},
         "run": {"cycles": 40, "settling_cycles": 20},
     }
     asymmetric = trajectory(dimers={"angle": "5 deg"}, **common).orientation[-1, 0]
@@ -447,7 +448,7 @@ def test_what_walkers_do_as_many_is_counted() -> None:
     assert found == pytest.approx({**shares, **speeds, **others})
 
 
-FRICTIONS = {0.1: -9.57e-3, 0.2: -3.33e-3, 0.3: 4.77e-3}
+FRICTIONS = {0.1: -5.16e-3, 0.2: -2.39e-3, 0.3: 1.845e-3}
 """Climbing speeds in m/s, as measured; the theory has those that climb a tenth faster."""
 
 
@@ -456,7 +457,8 @@ def on_a_wall(friction: float = 0.3, **start: Any) -> Case:
     run = {"time_step": "4 us", "cycles": 24, "settling_cycles": 12}
     begin = {**START, "spacing": "0.1 m", **start}
     frictions = {f"contact.friction.bead_{other}": friction for other in ("bead", "wall")}
-    case = Case.read({**CLIMBER, "run": run}, name="climber-dimer")
+    soft = {**CLIMBER, "run": run, "contact": {**CLIMBER["contact"], "youngs_modulus": "50 MPa"}}
+    case = Case.read(soft, name="climber-dimer")
     return case.changed({**frictions, **{f"dimers.{key}": value for key, value in begin.items()}})
 
 
@@ -474,12 +476,12 @@ def test_the_shipped_climber_comes_upright_and_climbs_and_its_posture_is_that_of
     run_directory: Ran,
 ) -> None:
     """With its spread of starts, for a fifth of its time; then the same motion, turned."""
-    run = {"time_step": "2 us", "cycles": 36, "settling_cycles": 24, "samples_per_cycle": 1}
+    run = {"cycles": 36, "settling_cycles": 24, "samples_per_cycle": 1}
     upright = run_directory(Case.read({**read_toml(shipped("case")["climber"]), "run": run}, name="climber"))
     result, group = read(upright), read_motion(upright).groups[0]
     assert np.degrees(read_table(upright, "walkers")["start_angle"].abs().max()) > 9.0
     assert result["upright"] == result["climbing"] == result["walkers"] == 6
-    assert result["velocity"] == pytest.approx(3.62e-3, rel=0.03)
+    assert result["velocity"] == pytest.approx(2.67e-3, rel=0.03)
     # Leaning from 15° on, turned over from 90° after the start, whatever comes after.
     tilting = np.linspace(0.0, np.radians(20.0), len(group.time))[:, None]
     over = np.where(group.time == group.time[9], np.radians(100.0), 0.0)[:, None]

@@ -47,7 +47,7 @@ def test_what_is_usual_lies_within_its_range() -> None:
     for key, (known, ends) in numbers.items():
         assert known is not None
         assert ends is not None
-        kind = kind_of(key) if key == "liquid.contact_angle" else None
+        kind = kind_of(key.partition(" of ")[0].replace("contact.meniscus", "liquid.meniscus"))
         value, low, high = (parse_quantity(one, kind) if kind else one for one in (known.written, *ends))
         assert low < value < high or (key == "liquid.contact_angle" and value == low == 0.0), key
 

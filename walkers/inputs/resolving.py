@@ -23,7 +23,6 @@ from walkers.inputs.standing import OVERLAP, check_bodies, overlaps
 from walkers.inputs.table import alternatives, changed
 from walkers.inputs.units import LENGTH, TEMPERATURE, parse_quantity
 from walkers.physics.capillary import DEFAULT_LAW, bridge_volume
-from walkers.physics.laws import LAWS
 from walkers.physics.mixtures import MIXTURES
 
 if TYPE_CHECKING:
@@ -295,7 +294,7 @@ def _surfaces(case: Case) -> Case:
     most = _ROUGHEST * smallest
     for name, rough in vars(contact.roughness).items():
         key = f"contact.roughness.{name}"
-        if rough > most:
+        if rough > most * (1.0 + 1e-9):
             raise unusable(key, f"expected {1e6 * most:.3g} um or less, a hundredth of a bead's radius")
         case = _ranging_to(case, key, most)
     try:
@@ -318,8 +317,8 @@ def _ranging_to(case: Case, key: str, most: float) -> Case:
 
 
 def _law(case: Case) -> Case:
-    """A user's law can be used for the beads of the case."""
-    if case.liquid.law not in LAWS:
+    """Laws but the default one may refuse the beads or the liquid of a case."""
+    if case.liquid.law != DEFAULT_LAW:
         try:
             for radius in case.radii:
                 bridge_at_rest(case, radius, inf)
