@@ -342,12 +342,7 @@ def test_walkers_are_as_fast_as_measured(run_directory: Ran, name: str) -> None:
 def test_rolling_friction_turns_a_walker_to_the_axis_and_a_symmetric_dimer_away(trajectory: Moved) -> None:
     friction = {"bead_bead": 0.2, "bead_wall": 0.2}
     common: dict[str, Any] = {
-        "contact": {
-            "friction": friction,
-            "rolling_friction": 0.003,
-            "roughness": {"bead_bead": "2 um", "bead_wall": "2 um"},
-        },
-        "liquid": {"dynamic_viscosity": "10 mPa*s"},
+        "contact": {"friction": friction, "rolling_friction": 0.01},
         "run": {"cycles": 40, "settling_cycles": 20},
     }
     asymmetric = trajectory(dimers={"angle": "5 deg"}, **common).orientation[-1, 0]
