@@ -106,10 +106,11 @@ def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
     """Track of each bead of a pile, -1 for none, and whether it climbs; shape (F, N)."""
     members = read_columns(motion.directory, "members")
     climbed = read_columns(motion.directory, "clusters")["climbed"]
-    track = np.full(motion.position.shape[:2], -1, dtype=np.int64)
+    track = np.full((len(motion.time), motion.case.count), -1, dtype=np.int64)
     frame = np.searchsorted(motion.time, members["time"]).clip(max=len(motion.time) - 1)
     there = motion.time[frame] == members["time"]  # a motion need not have all frames
     track[frame[there], members["bead"][there]] = members["track"][there]
+    track = track if motion.numbers is None else track[:, motion.numbers]  # a motion need not have all beads
     return track, np.append(climbed, False)[track]
 
 
