@@ -382,6 +382,14 @@ def test_reporting_bridges_does_not_disturb_the_walkers(tmp_path: Path) -> None:
     assert dumps[0] == dumps[1]
 
 
+def test_contacts_of_several_makes_are_as_stiff_as_one_of_them_asks_for() -> None:
+    """Larger beads ask for stiffer ones; the order of the makes does not matter."""
+    soft, stiff = ({"arrangement": "chain", "radii": [size] * 3, "replicates": 1} for size in ("0.2 mm", "0.6 mm"))
+    alone, *both = (of_tables(*makes) for makes in ([soft], [stiff], [soft, stiff], [stiff, soft]))
+    moduli = [case.contact.youngs_modulus for case in both]
+    assert alone.contact.youngs_modulus < moduli[0] == moduli[1] == moduli[2]
+
+
 def test_several_makes_of_walkers_stand_together(tmp_path: Path) -> None:
     """A dimer beside trimers walks as it does alone, and each make has its part of the result."""
     tables = cluster("fan", "Lss"), cluster("chain", "Lss", replicates=1)

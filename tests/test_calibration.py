@@ -3,6 +3,7 @@
 import copy
 import json
 import tomllib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -286,6 +287,17 @@ def test_beads_that_came_apart_are_no_walker(tmp_path: Path) -> None:
     assert np.isnan([apart[name] for name in ("velocity", "slip_1")]).all()
 
 
+def test_a_walker_that_still_turns_is_observed_by_its_angle_alone(run_directory: Callable[..., Path]) -> None:
+    """It starts across the drive; the other numbers are those of the steady walker beside it, as it walks alone."""
+    start = {"facing": "right", "gap_spread": 0.0, "angle_spread": "90 deg"}
+    times = {"cycles": 12, "settling_cycles": 6, "samples_per_cycle": 20, "seed": 39}
+    changes = {"run": times, "drive": {"peak_acceleration": "3 g"}}
+    both, alone = (numbers_of(run_directory(dimers={**start, "replicates": count}, **changes)) for count in (2, 1))
+    assert both.pop("largest_angle") > 30.0
+    assert alone.pop("largest_angle") < 1.0
+    assert both == pytest.approx(alone, rel=1e-6)
+
+
 # --- what is written --------------------------------------------------------------------------------------------------
 
 
@@ -300,11 +312,13 @@ def test_the_record_has_quantiles_and_agreement_of_a_known_outcome(
     calibration = small(tmp_path)
     parameters = calibration.file.parameters
     parameters["drag"] = parameters["friction"].but(range=(0.4, 10.0))
-    calibration = replace(calibration, file=calibration.file.but(observations=[one, other]))
+    design = calibration.file.design.but(held_out=["b"])
+    calibration = replace(calibration, file=calibration.file.but(observations=[one, other], design=design))
+    without = Posterior(np.array([[0.9, 0.5]]), np.zeros(1), 1)  # what is held out
     names = ("guess", *PROPOSED[::2])
     sets, seen = zip(names, [[0.5, 0.5], [0.1, 0.1], [0.9, 0.9]], strict=True), zip(names, rows, strict=True)
     unit = {name: np.array(row) for name, row in sets}
-    found = record_of(Outcome(calibration, unit, dict(seen), 10, emulators, even, even, {}))
+    found = record_of(Outcome(calibration, unit, dict(seen), 10, emulators, even, without, {}))
     assert found["sets"]["guess"] == {"friction": pytest.approx(0.1), "drag": pytest.approx(2.0)}
     assert list(found["agree"].values()) == [1, 1, 2]
     assert found["posterior"]["friction"] == pytest.approx([0.04 * 6.25**at for at in (0.41, 0.5, 0.59)], rel=1e-3)
@@ -314,6 +328,8 @@ def test_the_record_has_quantiles_and_agreement_of_a_known_outcome(
     assert found["posterior"]["drag/friction"] == pytest.approx(ratios, rel=1e-2)
     assert found["observations"][0]["numbers"]["guess"] == pytest.approx(1e3 * (known(TRUTH)[0, 0] + 0.3))
     assert found["observations"][1]["numbers"][PROPOSED[0]] is None
+    predicted = [row["predicted"] for row in found["observations"]]
+    assert predicted == [None, pytest.approx([1e3 * known(without.points)[0, 1]] * 3, rel=0.02)]
     assert "| drag/friction |" in rendered("walkers.calibration", "report.md.j2", found=found)
 
 

@@ -244,6 +244,10 @@ def own(in_folder: Path) -> Path:
 density = { value = "2.45 g/cm^3", source = "weighed" }
 youngs_modulus = { value = "2.5 GPa", source = "its data sheet" }
 
+[materials."my plate"]
+density = { value = "2.5 g/cm^3", source = "weighed" }
+roughness = { value = "40 nm", source = "by a profiler" }
+
 [[surface_pairs]]
 materials = ["my beads", "glass"]
 friction  = { value = 0.21, source = "tilting table", range = [0.18, 0.24] }
@@ -261,6 +265,9 @@ def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(own: Pat
     assert (density.origin, density.source) == ("own library", "library.toml, weighed")
     assert (friction.range, friction.guessed) == ((0.18, 0.24), False)
     assert origins(load_case("fig1b", {"beads.material": "my beads"}))["beads.density"].origin == "own library"
+    # Of a contact with a material of one's own.
+    roughness = origins(load_case("fig1b", {"boundary.material": "my plate"}))["contact.roughness.bead_wall"]
+    assert (roughness.text, roughness.origin, "by a profiler" in roughness.source) == ("44.7 nm", "own library", True)
     assert summarise(case)["beads"]["stiffness_ratio"] == pytest.approx(0.02)  # 50 MPa instead of its 2.5 GPa
     assert "Young's modulus of the beads reduced by a factor of 50\n" in describe(summarise(case))
     # What it took goes along: into case.json, sweeps, spreads and their archives.

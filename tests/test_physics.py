@@ -269,15 +269,16 @@ def test_rough_surfaces_resist_as_smooth_ones_farther_apart(other: float) -> Non
 @pytest.mark.parametrize("meniscus", [20e-6, 70e-6, 150e-6])
 def test_menisci_of_one_radius_have_one_suction(other: float, meniscus: float) -> None:
     """The bridge in contact has the pressure -γ/r; a small one the volume 4πR*r² (toroid: two radii of curvature)."""
-    liquid = BridgeLiquid(
-        surface_tension=0.02, viscosity=1.0, volume_fraction=0.0, contact_angle=0.2, meniscus_radius=meniscus
-    )
-    given = Surfaces.of(0.3e-3, other, liquid, Roughness(bead_bead=1e-8, bead_wall=1e-8))
-    solved = force_curve(given.radius, given.other_radius, given.volume, 0.2, [0.0])
-    assert solved.bridges[0, 2] == pytest.approx(-1.0 / meniscus, rel=1e-8)
+    for angle in (0.2, 0.4):
+        liquid = BridgeLiquid(
+            surface_tension=0.02, viscosity=1.0, volume_fraction=0.0, contact_angle=angle, meniscus_radius=meniscus
+        )
+        given = Surfaces.of(0.3e-3, other, liquid, Roughness(bead_bead=1e-8, bead_wall=1e-8))
+        solved = force_curve(given.radius, given.other_radius, given.volume, angle, [0.0])
+        assert solved.bridges[0, 2] == pytest.approx(-1.0 / meniscus, rel=1e-8)
     tiny = replace(liquid, contact_angle=0.0, meniscus_radius=1e-8)
     volume = Surfaces.of(0.3e-3, other, tiny, Roughness(bead_bead=1e-8, bead_wall=1e-8)).volume
-    assert volume == pytest.approx(4.0 * pi * given.reduced_radius * 1e-16, rel=0.03)
+    assert volume == pytest.approx(4.0 * pi * given.reduced_radius * 1e-16, rel=0.03, abs=0.0)
 
 
 @pytest.mark.parametrize(
@@ -450,6 +451,16 @@ def test_the_viscous_limit_counts_the_walls_that_a_bead_touches_at_once(boundary
     closest = case.contact.roughness.bead_wall + 2.0 * 0.061 / 101_325.0
     of_a_wall = 6.0 * np.pi * case.liquid.of_bridges.viscosity * 3e-4**2 / closest / mass
     assert (rate(**boundary) - rate()) / of_a_wall == pytest.approx(walls - 1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_viscous_limit_is_of_no_less_than_bridges_resist(law: str) -> None:
+    """2/Σ(c/m) of a bead beside its equal: m is its own mass at the wall, half of it between them."""
+    case = make_case(dimers={"radii": ["0.3 mm", "0.3 mm"]}, liquid={"law": law, "volume_fraction": 0.1})
+    mass, given = 4.0 / 3.0 * pi * 3e-4**3 * case.beads.density, (case.liquid.of_bridges, case.contact.roughness)
+    wall, pair = (by_name(law)(Surfaces.of(3e-4, other, *given)).forces(np.zeros(1)).normal[0] for other in (inf, 3e-4))
+    share = 0.5 * limits_of(case).viscous * (wall + 2.0 * pair) / mass
+    assert 0.9 < share < 1.0 + 1e-9
 
 
 @pytest.mark.parametrize("name", ["fig1b", "fig4a", "symmetric", "pile-small"])
