@@ -296,8 +296,8 @@ def tones(phase: float) -> dict[str, Any]:
     return {**ALIKE, "drive": {"harmonics": [first, second]}}
 
 
-# Numbers of results as measured, in mm/s. By Soulié's law with an independent prototype deck, but for Fig. 4b, whose gaps
-# are others; other engines with the same forces agree within 0.4 %.
+# Numbers of results as measured, in mm/s. By Soulié's law with an independent prototype deck, but for Fig. 4b, whose
+# gaps are others; other engines with the same forces agree within 0.4 %.
 SPEEDS: dict[str, tuple[bool, dict[str, Any], dict[str, float]]] = {
     **{f"{a0} by soulie": (False, {**SOULIE, "drive.peak_acceleration": a0}, {"velocity": speed})
        for a0, speed in (("2 g", 1.375), ("4 g", 3.806), ("6 g", 5.391), ("8 g", 7.045))},
