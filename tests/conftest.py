@@ -65,10 +65,12 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 os.environ["OMPI_MCA_mpi_yield_when_idle"] = "1"  # noqa: SIM112
 # The user's cache is not ours to read or write, for audits of the engine are kept there; but for what is named by all
 # that it depends on: solutions of an equation, half a second each, and the compiled contact model, which takes four.
-_KEPT = make_cache_folder("young-laplace").parent
+_SOLVED = ("young-laplace", "menisci")
+_KEPT, _ = (make_cache_folder(name).parent for name in _SOLVED)
 os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="walkers-tests-")
 _OURS = make_cache_folder()
-(_OURS / "young-laplace").symlink_to(_KEPT / "young-laplace")
+for _name in _SOLVED:
+    (_OURS / _name).symlink_to(_KEPT / _name)
 for _kept in _KEPT.glob("bridge-*"):  # a copy: a link to it is not loaded
     shutil.copy(_kept, _OURS)
 

@@ -104,7 +104,7 @@ class Library:
             return None
         parts = zip(*((known.written, *(known.range or (known.written,) * 2)) for known in (one, other)), strict=True)
         squares = [sum(parse_quantity(text, LENGTH) ** 2 for text in pair) for pair in parts]
-        value, *ends = (f"{1e9 * sqrt(square):.3g} nm" for square in squares)
+        value, *ends = (f"{float(f'{1e9 * sqrt(square):.3g}'):g} nm" for square in squares)
         sources = dict.fromkeys(f"{name}: {known.source}" for name, known in ((first, one), (second, other)))
         own = one if one.origin != "library" else other
         return own._replace(written=value, range=(ends[0], ends[1]), source="; ".join(sources))
