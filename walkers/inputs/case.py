@@ -28,7 +28,18 @@ from walkers.inputs.messages import blaming, blaming_changes, check_key, validat
 from walkers.inputs.origins import Origin, Source, Whence, text_of
 from walkers.inputs.resolving import GIVEN_BY, resolve, supplied
 from walkers.inputs.run import Run, settling_of
-from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, changed, contradictions, key
+from walkers.inputs.table import (
+    SAME_RUN,
+    Choice,
+    Derived,
+    Filled,
+    Indirect,
+    Table,
+    alternatives,
+    changed,
+    contradictions,
+    key,
+)
 from walkers.inputs.units import Coefficient, Number, kind_in
 from walkers.physics.capillary import DEFAULT_LAW, BridgeLiquid
 from walkers.physics.laws import by_name
@@ -267,6 +278,9 @@ class Case(Table):
                 problems = [replace(one, key=f"uncertain.{one.key}") for one in error.problems]
                 raise InputError(source, problems) from error
             value = self.value_of(name)
+            if value is None and alternatives(Case, name):
+                said = "expected a value that the case has: it says the same in other words"
+                raise InputError(source, [Problem(f"uncertain.{name}", None, said)])
             if (
                 around
                 and isinstance(value, (int, float))
