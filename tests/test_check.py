@@ -323,6 +323,7 @@ def test_the_installed_engine_passes() -> None:
     assert all(line.what in as_text(audit.lines) for line in audit.lines)
 
 
+@pytest.mark.slow
 def test_a_machine_without_wide_instructions_gives_the_same_bytes(
     own_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -87,6 +87,7 @@ def _drag_of_the_first_bead(
     return terms[1] * friction, np.array([drag, 0.0, 0.0]), 0.5 * drag * np.array([-1.0, 1.0, -1.0])
 
 
+@pytest.mark.slow
 def test_a_further_effect_is_what_the_same_forces_of_bridges_are() -> None:
     """A drag on the centre of the first bead, and twice the friction with the substrate: the loads count too."""
     walker, drag = Walker.of_case(make_case()), 3e-4  # N s/m

@@ -23,7 +23,7 @@ from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Surfaces
 from walkers.physics.capillary import solver
 
-NODES = (24, 48, 96)
+NODES = (48, 96)
 """Numbers of gaps at which the equation is solved, increased until the last coefficients are small; the largest one
 suffices for errors below 1e-7 of the pull at contact at volumes above 1e-6 R³."""
 _Shape = tuple[float, float, float]
