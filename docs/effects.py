@@ -36,7 +36,7 @@ _CASES: Mapping[str, tuple[str, Mapping[str, Any]]] = {
     },
     "Fig. 3, 0.3": ("fig1b", {"drive.gamma0": 0.5}),
     "Fig. 3, 0.4": ("fig1b", {"drive.gamma0": 0.5, "dimers.radii": ["0.4 mm", "0.2 mm"]}),
-    **{f"Fig. {name}": (f"fig{name}", {"run.time_step": "auto"}) for name in ("4a", "4b")},
+    **{f"Fig. {name}": (f"fig{name}", {}) for name in ("4a", "4b")},
 }
 
 
@@ -77,7 +77,7 @@ def _parts(case: Case, effect: Effect) -> tuple[FloatArray, FloatArray]:
     dimer, liquid, loads = dimer_of(case), case.liquid.of_bridges, contact_loads(case)
     tension, radii = liquid.surface_tension, np.array(dimer.radii)
     curved = np.array([*radii, dimer.reduced_radius])
-    wetted = (4.0 * curved * [load.volume for load in loads] / pi) ** 0.25  # r_w of the law
+    wetted = (4.0 * curved * [load.surfaces.volume for load in loads] / pi) ** 0.25  # r_w of the law
     on_bead = wetted[:2] + wetted[2]
     above = effect.lifted_above or np.inf
     lifts = _LIFT * liquid.viscosity * curved * np.sqrt(curved / above)

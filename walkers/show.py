@@ -178,7 +178,7 @@ def _liquid(case: Case, volume: float) -> float:
     """Volume of the liquid on all beads, or, if their menisci give it, in the bridges of the walkers, m³."""
     if case.liquid.meniscus_radius is None:
         return volume * case.liquid.volume_fraction
-    return sum(load.volume * one.replicates for one in case.walkers for load in contact_loads(case, one))
+    return sum(load.surfaces.volume * one.replicates for one in case.walkers for load in contact_loads(case, one))
 
 
 def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
@@ -189,7 +189,7 @@ def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
     planes = [capillary_force_limit_at_wall(tension, radius) for radius in walkers.radii]
     columns = {
         "contact": contacts,
-        "bridge_volume": [one.volume for one in loads],
+        "bridge_volume": [one.surfaces.volume for one in loads],
         "capillary_force": [one.pull for one in loads],
         "capillary_force_limit": [*planes, *(None for _ in walkers.pairs)],
         "rupture_distance": [one.rupture for one in loads],

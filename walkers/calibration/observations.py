@@ -21,7 +21,6 @@ from walkers.inputs.units import ANGLE, SPEED, WRITTEN, Kind, Number, parse_quan
 from walkers.postprocess.gait import gait, misalignment, settled_samples, steady_walkers, together
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.results import read
-from walkers.postprocess.tables import read_table
 
 FloatArray = npt.NDArray[np.float64]
 Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_pair_1"]
@@ -138,7 +137,8 @@ def kind_of(quantity: str) -> Kind | None:
 
 def numbers_of(run: str | Path) -> dict[str, float]:
     """All quantities of the finished run of a dimer; NaN where no walker is steady and keeps its beads together."""
-    walkers, kept = read_table(run, "walkers"), steady_walkers(read(run))
+    results = read(run)
+    walkers, kept = results.table("walkers"), steady_walkers(results)
     numbers = NO_NUMBERS | {name: float(kept[name].mean()) for name in get_args(Speed)}
     if len(kept):
         group = read_motion(run).groups[0]

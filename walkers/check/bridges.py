@@ -15,10 +15,10 @@ import numpy as np
 
 from walkers.api import run
 from walkers.check.lines import Line
-from walkers.inputs.loads import dimer_of
+from walkers.inputs.loads import dimer_of, surfaces_of
 from walkers.inputs.reading import load_case
 from walkers.physics import capillary
-from walkers.physics.bridge import FloatArray, Surfaces
+from walkers.physics.bridge import FloatArray
 from walkers.physics.laws import rabinovich, soulie, willett, young_laplace
 
 COMPARED = ("fig1b", "climber-dimer")
@@ -54,7 +54,7 @@ def pulls() -> Iterator[Line]:
         case = load_case(name)
         large, small = dimer_of(case).radii
         for place, radius in (("beads", small), ("wall", inf)):
-            surfaces = Surfaces.of(large, radius, case.liquid.of_bridges, case.contact.roughness)
+            surfaces = surfaces_of(case, large, radius)
             shape = (surfaces.radius, surfaces.other_radius, surfaces.volume, surfaces.liquid.contact_angle)
             exact = young_laplace.law(surfaces)
             distances = _even(exact.rupture)

@@ -13,6 +13,7 @@ from walkers.check import kernels
 from walkers.check.kernels import CELLS, Bridges, Constants, FloatArray, State
 from walkers.inputs.boundary import Flat, Wall
 from walkers.inputs.case import Case
+from walkers.inputs.loads import surfaces_of
 from walkers.physics.bridge import BridgeLaw, Surfaces
 
 TERMS = ("capillary", "lubrication", "damping", "friction", "rolling-friction", "gravity", "drive")
@@ -115,7 +116,7 @@ def _bridges(case: Case, radius: FloatArray, without: Collection[str]) -> Bridge
     for row, small in enumerate(sizes.tolist()):
         between[row, :row], full[row, :row] = between[:row, row], full[:row, row, ::-1]
         for column, large in list(enumerate([*sizes.tolist(), inf]))[row:]:
-            surfaces = Surfaces.of(small, large, case.liquid.of_bridges, case.contact.roughness)
+            surfaces = surfaces_of(case, small, large)
             between[row, column], full[row, column] = len(tables), surfaces.films[0]
             tables += [(*_splined(case.law, meeting), meeting.volume) for meeting in surfaces.volumes]
     acts = np.array(["capillary" not in without, *["lubrication" not in without] * 4], dtype=np.float64)

@@ -26,6 +26,7 @@ from walkers.errors import Stopped
 from walkers.inputs.boundary import BOTTOM, Flat, Round, Wall
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Vector
+from walkers.inputs.loads import surfaces_of
 from walkers.inputs.reading import load_case
 from walkers.physics.bridge import Curve, Forces, Surfaces
 from walkers.physics.laws import LAWS, by_name
@@ -355,7 +356,7 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
     bare = bench_case({**liquid, "contact.restitution": 0.5})
     scene = standing(pair(-DEEP, 0.05, STILL, (STILL, STILL)))
     deck = compose(prescribed(bare, scene))
-    meeting = Surfaces.of(S, R, bare.liquid.of_bridges, bare.contact.roughness)
+    meeting = surfaces_of(bare, S, R)
     fine = tabulated(by_name(bare.liquid.law), meeting, tolerance=1e-10).text()
     tables = deck.files[BRIDGES_NAME].split("bridge ")
     tables = [f"1 1 {S!r} {R!r}\n{fine}" if table.startswith(f"1 1 {S!r} {R!r}") else table for table in tables]

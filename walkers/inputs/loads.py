@@ -6,10 +6,9 @@ from functools import lru_cache
 from math import inf, pi
 from typing import TYPE_CHECKING, NamedTuple
 
-from walkers.physics.capillary import bead_volume
+from walkers.physics.capillary import bead_volume, largest_normal
 from walkers.physics.contact import hertz_overlap, hertz_stiffness, reduced_modulus
 from walkers.physics.dimer import Dimer
-from walkers.physics.reynolds import largest_normal
 
 if TYPE_CHECKING:
     from walkers.inputs.bodies import Walkers
@@ -26,9 +25,9 @@ def dimer_of(case: Case) -> Dimer:
 
 
 class Load(NamedTuple):
-    """A contact at rest: liquid (m³), pull (N) and rupture distance (m) of its bridge, and the overlap (m)."""
+    """A contact at rest: its surfaces, pull (N) and rupture distance (m) of its bridge, and the overlap (m)."""
 
-    volume: float
+    surfaces: Surfaces
     pull: float
     rupture: float
     overlap: float = 0.0
@@ -36,10 +35,11 @@ class Load(NamedTuple):
 
 def bridge_at_rest(case: Case, radius: float, other_radius: float) -> Load:
     """The bridge of a bead to another, or to a plane (a radius of infinity), by the case's law; radii in m."""
-    return _at_rest(case.law, _surfaces(case, radius, other_radius))
+    return _at_rest(case.law, surfaces_of(case, radius, other_radius))
 
 
-def _surfaces(case: Case, radius: float, other_radius: float) -> Surfaces:
+def surfaces_of(case: Case, radius: float, other_radius: float) -> Surfaces:
+    """A bead of a case and another bead or a plane (a radius of infinity), with a bridge between them; radii in m."""
     from walkers.physics.bridge import Surfaces
 
     return Surfaces.of(radius, other_radius, case.liquid.of_bridges, case.contact.roughness)
@@ -52,14 +52,14 @@ def _at_rest(law: BridgeLaw, surfaces: Surfaces) -> Load:
     curve = law(surfaces)
     touching = np.zeros(1)
     pull = curve.pull(touching) if curve.pull else curve.forces(touching).pull
-    return Load(surfaces.volume, float(pull[0]), curve.rupture)
+    return Load(surfaces, float(pull[0]), curve.rupture)
 
 
 def resistances_at_rest(case: Case, radius: float, other_radius: float) -> tuple[float, float, float]:
     """S (N s/m), C (N s) and Q (N m s) of that bridge, the smaller bead as body 1 (`walkers.physics.bridge`)."""
     import numpy as np
 
-    touching = case.law(_surfaces(case, radius, other_radius)).forces(np.zeros(1))
+    touching = case.law(surfaces_of(case, radius, other_radius)).forces(np.zeros(1))
     _, _, sliding, coupling, rolling = map(float, touching.columns()[0])
     return sliding, coupling, rolling
 
@@ -71,18 +71,11 @@ def delay(case: Case, walkers: Walkers) -> float:
     bridge's normal resistance N. Friction is limited by the elastic force, and follows as late. Velocities differ from
     those of rigid beads by about 0.7 of this phase, and sliding by 2.5 (Figs. 2, 4a and 4b, up to 3.2 GPa).
     """
-    contact, liquid = case.contact, case.liquid.of_bridges
-    modulus, rough = reduced_modulus(contact.youngs_modulus, contact.poissons_ratio), contact.roughness
-    floors = [(radius, rough.bead_wall) for radius in walkers.radii]
-    pairs = [(walkers.radii[one], walkers.radii[other]) for one, other in walkers.pairs]
+    modulus = reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
     times = [
-        largest_normal(reduced, roughness, liquid) / hertz_stiffness(load.overlap, reduced, modulus)
-        for load, (reduced, roughness) in zip(
-            contact_loads(case, walkers),
-            [*floors, *((one * other / (one + other), rough.bead_bead) for one, other in pairs)],
-            strict=True,
-        )
-        if load.overlap
+        largest_normal(of.reduced_radius, of.roughness, of.liquid) / hertz_stiffness(depth, of.reduced_radius, modulus)
+        for of, *_, depth in contact_loads(case, walkers)
+        if depth
     ]
     return 2.0 * pi * max(wave.frequency for wave in case.excitation.harmonics) * max(times, default=0.0)
 
@@ -91,15 +84,13 @@ def contact_loads(case: Case, walkers: Walkers | None = None) -> list[Load]:
     """The contacts of a case's first (or other) walkers at rest: each bead on the floor, then each pair of beads."""
     make, contact = walkers or case.walkers[0], case.contact
     modulus = reduced_modulus(contact.youngs_modulus, contact.poissons_ratio)
+    density, gravity = case.beads.density, case.pressing_gravity
+    held = [(radius, inf, bead_volume(radius) * density * gravity) for radius in make.radii]
     loads = []
-    for radius in make.radii:
-        bridge = bridge_at_rest(case, radius, inf)
-        weight = bead_volume(radius) * case.beads.density * case.pressing_gravity
-        loads.append(bridge._replace(overlap=hertz_overlap(bridge.pull + weight, radius, modulus)))
-    for one, other in make.pairs:
-        pair = (make.radii[one], make.radii[other])
-        bridge = bridge_at_rest(case, *pair)
-        loads.append(bridge._replace(overlap=hertz_overlap(bridge.pull, pair[0] * pair[1] / sum(pair), modulus)))
+    for radius, other, weight in [*held, *((make.radii[one], make.radii[other], 0.0) for one, other in make.pairs)]:
+        bridge = bridge_at_rest(case, radius, other)
+        overlap = hertz_overlap(bridge.pull + weight, bridge.surfaces.reduced_radius, modulus)
+        loads.append(bridge._replace(overlap=overlap))
     return loads
 
 

@@ -290,17 +290,15 @@ def _drive(case: Case) -> Case:
 
 def _surfaces(case: Case) -> Case:
     """Roughness is small compared with the beads, and menisci fit between them and at walls."""
-    contact, liquid, smallest = case.contact, case.liquid.of_bridges, min(case.radii)
-    most = _ROUGHEST * smallest
-    for name, rough in vars(contact.roughness).items():
-        key = f"contact.roughness.{name}"
-        if rough > most * (1.0 + 1e-9):
+    liquid, most = case.liquid.of_bridges, _ROUGHEST * min(case.radii)
+    for key in _ROUGHNESS:
+        if case.value_of(key) > most * (1.0 + 1e-9):
             raise unusable(key, f"expected {1e6 * most:.3g} um or less, a hundredth of a bead's radius")
         case = _ranging_to(case, key, most)
     try:
         for radius in case.radii if liquid.meniscus_radius else ():
             for other in (*case.radii, inf):
-                bridge_volume(*sorted((radius, other)), liquid)
+                bridge_volume(radius, other, liquid)
     except ValueError as error:
         raise unusable("liquid.meniscus_radius", f"expected menisci that fit between the surfaces: {error}") from error
     return case

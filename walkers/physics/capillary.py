@@ -56,7 +56,7 @@ def bridge_volume(radius: float, other_radius: float, liquid: BridgeLiquid) -> f
     this suction, by the Young–Laplace equation.
     """
     if liquid.meniscus_radius:
-        shape = (radius, other_radius, liquid.contact_angle, liquid.meniscus_radius)
+        shape = (*sorted((radius, other_radius)), liquid.contact_angle, liquid.meniscus_radius)
         place = place_of_numbers("menisci", solver() + repr(shape).encode())
         return float(kept_numbers(place, lambda: _volume_by_suction(*shape))[0])
     fraction = liquid.volume_fraction
@@ -80,6 +80,11 @@ def solver() -> bytes:
 def cavitation_gap(liquid: BridgeLiquid) -> float:
     """Gap 2γ cos θ/p in which a meniscus has the suction p of the air's pressure, m (`walkers.physics.reynolds`)."""
     return 2.0 * liquid.surface_tension * cos(liquid.contact_angle) / _AIR_PRESSURE
+
+
+def largest_normal(reduced_radius: float, roughness: float, liquid: BridgeLiquid) -> float:
+    """Upper bound of a bridge's N: that of much liquid between touching surfaces, N s/m; radius and roughness in m."""
+    return 6.0 * pi * liquid.viscosity * reduced_radius**2 / (roughness + cavitation_gap(liquid))
 
 
 def share_of_bead(radius: float, other_radius: float, volume_fraction: float) -> float:

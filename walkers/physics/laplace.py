@@ -36,7 +36,7 @@ against gap by numerical integration; filling angles that are not monotonic).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from math import cbrt, exp, inf, log, pi, sin, sqrt
 from typing import Any, NamedTuple
 
@@ -402,6 +402,7 @@ def volume_at_contact(radius_1: float, radius_2: float, contact_angle: float, me
     """
     ends = [log(share * 4.0 / 3.0 * pi * min(radius_1, radius_2) ** 3) for share in (1e-9, 0.5)]
 
+    @cache
     def missing(log_volume: float) -> float:
         """Suction that is missing, over the wanted one."""
         volume = exp(log_volume)

@@ -61,7 +61,7 @@ from math import pi, sqrt
 import numpy as np
 
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
-from walkers.physics.capillary import BridgeLiquid, cavitation_gap
+from walkers.physics.capillary import cavitation_gap
 
 _A, _B = 2.0 - sqrt(2.5), 2.0 + sqrt(2.5)
 _THIN = 1e-5
@@ -94,11 +94,6 @@ def resistances(surfaces: Surfaces, gaps: FloatArray) -> tuple[FloatArray, Float
     tilting = 96.0 * pi * viscosity * reduced**3 * _tilted(deep)
     shear = 2.0 * pi * viscosity * reduced * np.log1p(deep)
     return normal, shear + bend**2 * tilting, -bend * tilting, tilting
-
-
-def largest_normal(reduced_radius: float, roughness: float, liquid: BridgeLiquid) -> float:
-    """Upper bound of N, that of much liquid between surfaces in contact, N s/m; radius and roughness in m."""
-    return 6.0 * pi * liquid.viscosity * reduced_radius**2 / (roughness + cavitation_gap(liquid))
 
 
 def _tilted(deep: FloatArray) -> FloatArray:

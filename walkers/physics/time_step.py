@@ -21,11 +21,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, inf, pi, sqrt
+from typing import TYPE_CHECKING
 
-from walkers.physics.bridge import Roughness
-from walkers.physics.capillary import BridgeLiquid, bead_volume
+from walkers.physics.capillary import BridgeLiquid, bead_volume, largest_normal
 from walkers.physics.contact import reduced_modulus
-from walkers.physics.reynolds import largest_normal
+
+if TYPE_CHECKING:  # numpy is not needed for a time step
+    from walkers.physics.bridge import Roughness
 
 AUTO_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.2, "hertz": 0.1, "viscous": 0.4}
 """Largest share of each limit for ``"auto"`` with loose beads. At 0.4 of the viscous limit (2 µs for glycerol), the

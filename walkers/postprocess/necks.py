@@ -67,10 +67,7 @@ def necks_of(
     """
     begins, ends = between
     radius, other = motion.radius[contacts[:, 0]], np.where(contacts[:, 1] < 0, np.inf, motion.radius[contacts[:, 1]])
-    liquid = motion.case.liquid.of_bridges
-    volume = np.vectorize(bridge_volume, otypes=[float], excluded=[2])(
-        np.minimum(radius, other), np.maximum(radius, other), liquid
-    )
+    volume = np.vectorize(bridge_volume, [float], excluded=[2])(radius, other, motion.case.liquid.of_bridges)
     reduced = 1.0 / (1.0 / radius + 1.0 / other)
     length = np.linalg.norm(ends - begins, axis=1)
     beyond = np.where(np.isfinite(other), other, 0.0)
