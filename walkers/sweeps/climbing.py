@@ -56,8 +56,8 @@ def conditions_in(frame: pd.DataFrame) -> Iterator[tuple[str, list[Path]]]:
     Yields
     ------
     tuple of str and list of Path
-        The varied values of a condition that are not the most common ones, such as ``drive.frequency = 100 Hz``; empty
-        for the usual condition. Its runs.
+        The varied values of a condition but those that half of them or more have, such as ``drive.frequency = 100 Hz``;
+        empty for the usual condition. Its runs.
     """
     import pandas as pd
 
@@ -66,9 +66,10 @@ def conditions_in(frame: pd.DataFrame) -> Iterator[tuple[str, list[Path]]]:
         raise refused(frame.attrs["sweep"], "expected a finished run of a pile: no point is finished")
     sets = [rows for _, rows in groups(done)]
     texts = pd.concat([key_texts(rows.head(1)) for rows in sets]).drop(columns=list(SEEDS), errors="ignore")
-    most = texts.mode()
+    most = {key: column.mode().tolist() for key, column in texts.items()}
+    usual = {key: values for key, values in most.items() if 2 * (texts[key] == values[0]).sum() >= len(texts)}
     for rows, values in zip(sets, texts.to_dict("records") or [{}], strict=True):
-        unusual = [f"{key} = {text}" for key, text in values.items() if [text] != most[key].dropna().tolist()]
+        unusual = [f"{key} = {text}" for key, text in values.items() if [text] != usual.get(key)]
         yield ", ".join(unusual), [*map(Path, dict.fromkeys(rows["run"]))]
 
 
