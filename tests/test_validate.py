@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import subprocess
+from collections.abc import Sequence
 from dataclasses import replace
 from math import cos, inf, pi
 from pathlib import Path
@@ -150,24 +151,54 @@ NUMBERS = [
     ("delete-atoms", ("-var", "compress", "no"), [(1.0, 1.0)]),
     ("washino-wall", (), [(1.0, 1.0), (1.0, 0.0)]),
     ("wall-is-a-sphere", (), [(1.0, 0.435), (1.0, 0.25)]),
+    ("mesh-formats", ("-var", "mesh", "floor-binary.stl"), [(1.0, 1.0)]),
+    ("mesh-triangles", (), [(1.0, 1.0)]),
     ("liquid-content", (), [(88.85e-6, 412.4e-6), (88.85e-6, 88.85e-6), (1.0, 100.0 ** (1.0 / 3.0))]),
 ]
+
+
+# Deck, options, exit status, a part of its message, and whether the message reaches a pipe.
+ENDS = [
+    ("abort-loses-its-message", (), 1, "Cannot open gzipped file", False),
+    ("mesh-formats", (), 1, "Expecting ASCII VTK mesh file, cannot continue (./src/input_mesh_tri.cpp:209)", True),
+    ("mesh-formats", ("-var", "mesh", "floor-solid.stl"), 1, "root causes: (a) mesh empty", True),
+    ("mesh-triangles", ("-var", "mesh", "duplicate.stl"), 1, "(lines 9 and 2) are duplicate", False),
+    ("mesh-triangles", ("-var", "mesh", "sliver.stl"), 1, "(line 9) is lower than the specified curvature", False),
+    ("mesh-triangles", (), 0, "WARNING: Mesh floor: proc 0 has 1 element pairs that are coplanar", True),
+]
+
+
+def _run_report(folder: Path, name: str, options: Sequence[str], *, buffered: bool) -> subprocess.CompletedProcess[str]:
+    """Run a deck by the engine as it is packaged: without a contact model of ours."""
+    for kind in ("lig", "stl", "vtk"):
+        for file in REPORTS.glob(f"*.{kind}"):
+            shutil.copy(file, folder)
+    environment = {name: value for name, value in os.environ.items() if name != "LD_PRELOAD"} | ALONE
+    command = [*(() if buffered else ("stdbuf", "-oL")), "liggghts", "-log", "none", *options, "-in", f"{name}.lig"]
+    how = {"env": environment, "capture_output": True, "text": True, "errors": "replace"}
+    return subprocess.run(command, cwd=folder, check=False, **how)
+
+
+def test_reports_name_their_decks() -> None:
+    assert all(f"({deck.stem}.lig)" in (REPORTS / "index.md").read_text("utf-8") for deck in REPORTS.glob("*.lig"))
 
 
 @pytest.mark.parametrize(("name", "options", "numbers"), NUMBERS)
 def test_deck_gives_the_number_of_its_report(
     tmp_path: Path, name: str, options: tuple[str, ...], numbers: list[tuple[float, float]]
 ) -> None:
-    """With the engine as it is packaged: without a contact model of ours."""
-    for file in (*REPORTS.glob("*.lig"), *REPORTS.glob("*.stl")):
-        shutil.copy(file, tmp_path)
-    assert all(f"({deck.stem}.lig)" in (REPORTS / "index.md").read_text("utf-8") for deck in REPORTS.glob("*.lig"))
-    environment = {name: value for name, value in os.environ.items() if name != "LD_PRELOAD"} | ALONE
-    command = ["stdbuf", "-oL", "liggghts", "-log", "none", *options, "-in", f"{name}.lig"]
-    how = {"env": environment, "capture_output": True, "text": True, "errors": "replace"}
-    done = subprocess.run(command, cwd=tmp_path, check=False, **how)
+    done = _run_report(tmp_path, name, options, buffered=False)
     assert done.returncode == 0, done.stdout[-500:]
     measured = [float(number) for line in _RESULT.findall(done.stdout) for number in _NUMBER.findall(line)]
     for value, (expected, stated) in zip(measured, numbers, strict=True):
         assert value == pytest.approx(stated, rel=3e-3, abs=1e-7)
         assert expected == stated or abs(value - expected) > 0.1 * abs(expected)
+
+
+@pytest.mark.parametrize(("name", "options", "status", "message", "heard"), ENDS)
+def test_deck_ends_as_its_report_says(
+    tmp_path: Path, name: str, options: tuple[str, ...], status: int, message: str, heard: bool
+) -> None:
+    for buffered in (False, True):
+        done = _run_report(tmp_path, name, options, buffered=buffered)
+        assert (done.returncode, message in done.stdout) == (status, heard or not buffered)
