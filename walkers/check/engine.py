@@ -134,6 +134,12 @@ def _constants(case: Case, radius: FloatArray, walls: Sequence[Wall], without: C
         (*wave.direction, wave.angular_frequency, wave.peak_acceleration, wave.phase)
         for wave in case.excitation.harmonics
     ]
+    course = np.zeros((0, 3))
+    if drive and (case.drive.ramp or case.drive.record):
+        waves, times = [], case.run.time_step * np.arange(case.run.steps + 1, dtype=np.float64)
+        course = np.zeros((len(times), 3))
+        for direction, moved in case.excitation.motions(times):
+            course -= np.outer(moved[2], direction)
     none, bridges, skin = (0.0, 0.0, 0.0), _bridges(case, radius, without), _SKIN * float(radius.min())
     flat = [(wall.point, wall.normal) if isinstance(wall, Flat) else (none, none) for wall in walls]
     return Constants(
@@ -145,6 +151,7 @@ def _constants(case: Case, radius: FloatArray, walls: Sequence[Wall], without: C
         hollow=np.array([0.0 if isinstance(wall, Flat) else wall.radius for wall in walls]),
         gravity=np.array(case.gravity_vector) * gravity,
         harmonics=np.array(waves if drive else (), dtype=np.float64).reshape(-1, 6),
+        course=course,
         modulus=modulus / (2.0 * (1.0 - ratio**2)),
         shear_modulus=modulus / (4.0 * (1.0 + ratio) * (2.0 - ratio)),
         damping=-loss / sqrt(loss**2 + pi**2) * damping,

@@ -62,7 +62,8 @@ class Constants(NamedTuple):
 
     Beads are near each other if they are closer than the sum of their ``reach`` (N,), which includes the ``skin``.
 
-    ``harmonics`` (H, 6) are directions, ω, accelerations and phases; moduli are E* and G*, ``damping`` is β. Rolling
+    ``harmonics`` (H, 6) are directions, ω, accelerations and phases; ``course`` has the inertial acceleration at each
+    step of a drive with a ramp or from a record, else no rows; moduli are E* and G*, ``damping`` is β. Rolling
     friction is the same for beads and walls.
     """
 
@@ -74,6 +75,7 @@ class Constants(NamedTuple):
     hollow: FloatArray
     gravity: FloatArray
     harmonics: FloatArray
+    course: FloatArray
     modulus: float
     shear_modulus: float
     damping: float
@@ -295,6 +297,8 @@ def forces(c: Constants, state: State, clock: int, moves: bool) -> None:
         for number in range(c.harmonics.shape[0]):
             wave = c.harmonics[number]
             total = plus(total, wave[4] * sin(wave[3] * clock * c.step + wave[5]), (wave[0], wave[1], wave[2]))
+        if c.course.shape[0]:
+            total = plus(total, 1.0, vector(c.course[clock]))
     for bead in range(beads):
         for axis in range(3):
             state.force[bead, axis] = c.mass[bead] * total[axis]

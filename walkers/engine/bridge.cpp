@@ -470,6 +470,7 @@ public:
       return Vec{x, y, number()};
     };
     std::string file;
+    double most = 0., factor = 0.;  // displacement, and factor of the ramp
     Vec gravity = {0., 0., 0.};
     while (at < count) {
       const std::string word = next();
@@ -485,7 +486,17 @@ public:
       } else if (word == "shaken") {
         const Vec amplitude = vector();
         const double frequency = 2. * M_PI * number();
-        waves_.push_back({amplitude, frequency, number(), 0.});
+        waves_.push_back({amplitude, frequency, number(), 0., -1});
+        most += length(amplitude);
+      } else if (word == "recorded") {
+        const Vec amplitude = vector();
+        waves_.push_back({amplitude, 0., 0., 0., static_cast<int>(records_.size())});
+        most += length(amplitude) * read_record(next());
+      } else if (word == "ramp") {
+        for (int left = static_cast<int>(number()); left > 0; left--) {
+          const double time = number();
+          ramp_.push_back({time, number()});
+        }
       } else if (word == "gravity") gravity = vector();
       else if (word == "begin") begin_ = static_cast<bigint>(number());
       else if (word == "frame") {
@@ -498,6 +509,8 @@ public:
     if (walls_.empty()) error->fix_error(FLERR, this, "expected a plane or a cylinder");
     if (type_ < 1 || type_ > atom->ntypes) error->fix_error(FLERR, this, "expected a type, of those of the box");
     if (moves_ && !file.empty()) error->fix_error(FLERR, this, "loads need the walls' frame: expected frame walls");
+    for (const auto &one : ramp_) factor = std::max(factor, one.second);
+    sway_ = most * (ramp_.empty() ? 1. : factor);
     loads_.push_back(gravity);
     for (const Wave &wave : waves_) loads_.push_back(wave.amplitude);
     if (!file.empty()) read_loads(file);
@@ -530,8 +543,7 @@ public:
   void pre_neighbor()
   {
     double reach = law_->formed() + neighbor->skin;
-    if (moves_)
-      for (const Wave &wave : waves_) reach += 2. * length(wave.amplitude);
+    if (moves_) reach += 2. * sway_;
     near_.clear();
     move(0.);
     for (int wall = 0; wall < static_cast<int>(walls_.size()); wall++)
@@ -601,6 +613,17 @@ private:
   struct Wave {
     Vec amplitude;
     double frequency, phase, push;  // rad/s, rad; inertial acceleration now for an amplitude of 1
+    int record;                     // of a motion that is recorded, -1 of a sine
+  };
+
+  /* From a time on, a motion is the sum of these times powers of the time since, until the next such piece. */
+  struct Piece {
+    double time, powers[6];
+  };
+
+  struct Record {
+    double period;  // after which it repeats, or 0
+    std::vector<Piece> pieces;
   };
 
   struct Near {
@@ -612,6 +635,9 @@ private:
   std::vector<Surface> walls_;
   std::vector<double> history_;  // of each bead at each wall
   std::vector<Wave> waves_;
+  std::vector<Record> records_;
+  std::vector<std::pair<double, double>> ramp_;  // times, and factors of the displacement
+  double sway_;                                  // largest displacement
   std::vector<Near> near_;
   std::vector<Vec> loads_;  // by the ids of beads, first the command's: gravity, amplitude of each wave
   bigint begin_;
@@ -638,18 +664,65 @@ private:
 
   double *history_of(const int i, const int wall) { return of(i) + HISTORY * wall; }
 
+  /* Reads a motion; returns its largest displacement. */
+  double read_record(const std::string &file)
+  {
+    std::ifstream in(file.c_str());
+    Record record = {-1., {}};
+    double most = 0.;
+    in >> record.period;
+    for (Piece piece; in >> piece.time;) {
+      for (double &one : piece.powers) in >> one;
+      if (!in) record.period = -1.;
+      most = std::max(most, std::fabs(piece.powers[0]));
+      record.pieces.push_back(piece);
+    }
+    if (!in.eof() || record.pieces.empty() || !(record.period >= 0.))
+      error->fix_error(FLERR, this, (file + " has no motion that can be read").c_str());
+    records_.push_back(record);
+    return most;
+  }
+
+  /* Displacement (order 0), velocity (1) or acceleration (2) for an amplitude of 1, without the ramp. */
+  double unramped(const Wave &wave, double time, const int order) const
+  {
+    if (wave.record < 0) {
+      const double w = wave.frequency, turn = w * time + wave.phase;
+      return order == 0 ? std::sin(turn) : order == 1 ? w * std::cos(turn) : -w * w * std::sin(turn);
+    }
+    const Record &record = records_[wave.record];
+    if (record.period > 0.) time -= record.period * std::floor(time / record.period);
+    const auto later = [](const double now, const Piece &piece) { return now < piece.time; };
+    const Piece &piece = *--std::upper_bound(record.pieces.begin() + 1, record.pieces.end(), time, later);
+    double sum = 0.;
+    for (int k = 5; k >= order; k--)
+      sum = sum * (time - piece.time) + piece.powers[k] * (order == 0 ? 1 : order == 1 ? k : k * (k - 1));
+    return sum;
+  }
+
+  /* The same with the ramp, whose factor changes evenly from one of its times to the next. */
+  double motion(const Wave &wave, const double time, const int order) const
+  {
+    const double plain = unramped(wave, time, order);
+    if (ramp_.empty()) return plain;
+    const auto later = [](const double now, const std::pair<double, double> &one) { return now < one.first; };
+    const auto next = std::upper_bound(ramp_.begin(), ramp_.end(), time, later), last = next - (next != ramp_.begin());
+    if (next == last || next == ramp_.end()) return last->second * plain;
+    const double slope = (next->second - last->second) / (next->first - last->first);
+    const double changing = order ? order * slope * unramped(wave, time, order - 1) : 0.;
+    return (last->second + slope * (time - last->first)) * plain + changing;
+  }
+
   /* Puts the walls where they are in this step, with the velocity of some time before. */
   void move(const double before)
   {
     shift_ = velocity_ = {0., 0., 0.};
     const double time = (update->ntimestep - begin_) * update->dt;
     for (Wave &wave : waves_) {
-      const double w = wave.frequency;
-      const double sine = time < 0. ? 0. : std::sin(w * time + wave.phase);
-      wave.push = moves_ ? 0. : w * w * sine;
+      wave.push = moves_ || time < 0. ? 0. : -motion(wave, time, 2);
       if (time < 0. || !moves_) continue;
-      shift_ = shift_ + sine * wave.amplitude;
-      velocity_ = velocity_ + w * std::cos(w * (time - before) + wave.phase) * wave.amplitude;
+      shift_ = shift_ + motion(wave, time, 0) * wave.amplitude;
+      velocity_ = velocity_ + motion(wave, time - before, 1) * wave.amplitude;
     }
   }
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import cached_property
 from html import escape
 from math import cos, hypot, inf, isclose, pi, sin
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import BeforeValidator, Field, ValidationError
@@ -26,6 +27,7 @@ from walkers.inputs.keys import MISSING, flatten, parts_of, value_at
 from walkers.inputs.library import library_of
 from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
 from walkers.inputs.origins import Origin, Source, Whence, text_of
+from walkers.inputs.record import with_record
 from walkers.inputs.resolving import GIVEN_BY, resolve, supplied
 from walkers.inputs.run import Run, settling_of
 from walkers.inputs.table import (
@@ -253,6 +255,7 @@ class Case(Table):
                     document = changed(cls, document, changes)
                 return cls.read(document, source=source, name=name, around=around)
         with blaming(source, document):
+            document = with_record(document, Path())
             tables, sources, unknown = supplied(cls, document, library_of(document, source))
             try:
                 case = validated(cls, tables, source, further=[*unknown, *contradictions(cls, tables)])
@@ -338,7 +341,9 @@ class Case(Table):
         """Origins of the values, in the order of the tables of a case file."""
         origins: dict[str, Origin] = {}
         for name, value, field in self.leaves():
-            if name in ("title", "uncertain") or name.startswith("placed["):  # no value, or hundreds
+            if name in ("title", "uncertain", "drive.record.rows") or name.startswith(
+                "placed["
+            ):  # no value, or hundreds
                 continue
             raw, kind = value_at(self.document, parts_of(name)), kind_in([*field.metadata, field.annotation])
             if raw is not MISSING and not units.is_auto(raw):

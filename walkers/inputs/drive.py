@@ -9,15 +9,21 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from math import degrees, gcd, hypot, isclose, isfinite, lcm, pi
-from typing import Annotated, Any, ClassVar, Literal
+from itertools import pairwise
+from math import degrees, gcd, hypot, inf, isclose, isfinite, lcm, pi
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from walkers.errors import Problem
 from walkers.inputs import units
+from walkers.inputs.record import Record, record_of
 from walkers.inputs.table import Choice, Filled, Indirect, Table, key
 from walkers.inputs.units import Angle, Coefficient
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
 
 Vector = tuple[float, float, float]
 Frame = Literal["lab", "container"]
@@ -47,6 +53,19 @@ def _axis(value: object) -> object:
 
 
 _AXIS = {"anyOf": [{"enum": list(AXES)}, {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}]}
+
+
+Ramp = tuple[tuple[float, float], ...]
+
+
+def _increasing(ramp: Ramp) -> Ramp:
+    """A ramp whose times increase."""
+    if any(time >= later for (time, _), (later, _) in pairwise(ramp)):
+        raise ValueError("expected times that increase")
+    return ramp
+
+
+_RAMP = {"type": "array", "items": {"type": "array", "minItems": 2, "maxItems": 2}}
 
 
 class Harmonic(Table):
@@ -88,12 +107,13 @@ class Drive(Harmonic):
     """``[drive]``: one harmonic by its keys, or several as ``[[drive.harmonics]]``.
 
     In the ``frame`` of the container, as is usual, the beads feel the inertial force; in that of the laboratory the
-    walls move, which they can for one harmonic without a phase.
+    walls move, which they can for one harmonic without a phase, and for a record.
     """
 
     choices: ClassVar[tuple[Choice, ...]] = (
-        Choice((("peak_acceleration",), ("gamma0",), ("harmonics",))),
-        Choice((("frequency",), ("harmonics",))),
+        Choice((("peak_acceleration",), ("gamma0",), ("harmonics",), ("record",))),
+        Choice((("frequency",), ("harmonics",), ("record",))),
+        *(Choice(((one,), ("record",)), required=False) for one in ("axis", "phase", "waveform")),
     )
     frequency: Filled[units.Frequency] = key("Frequency in cycles per second.", None)
     waveform: Literal["sine", "triangle", "sawtooth"] = key(
@@ -104,6 +124,19 @@ class Drive(Harmonic):
         "container",
     )
     harmonics: Annotated[tuple[Harmonic, ...], Field(max_length=24)] = key("Several harmonics.", ())
+    record: Filled[Annotated[Any, BeforeValidator(record_of), WithJsonSchema({"type": "string"})]] = key(
+        "File with the acceleration of the boundary against time. See [](../cases.md#recorded-shaking).",
+        None,
+        "trace.csv",
+    )
+    repeats: Filled[units.Flag] = key("Whether the record is a period, which repeats. Default: false.", None)
+    ramp: Annotated[
+        tuple[tuple[units.NonNegativeDuration, Coefficient], ...], AfterValidator(_increasing), WithJsonSchema(_RAMP)
+    ] = key(
+        "Times from the start of the drive, and factors of the displacement then; in between they change evenly.",
+        (),
+        [["0 s", 1], ["2 s", 0.2]],
+    )
 
     @classmethod
     def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
@@ -111,24 +144,29 @@ class Drive(Harmonic):
         if not given.get("harmonics"):
             yield from super().problems(given, place)
             return
-        for name in sorted(given.keys() & {*Harmonic.model_fields, "waveform"}):
-            instead = f": write {place}.harmonics[0].{name}" if name != "waveform" else ""
+        for name in sorted(given.keys() & {*Harmonic.model_fields, "waveform", "record"}):
+            instead = f": write {place}.harmonics[0].{name}" if name in Harmonic.model_fields else ""
             yield Problem(f"{place}.{name}", None, f"expected none beside {place}.harmonics{instead}")
 
     @cached_property
     def excitation(self) -> Excitation:
         """The sum of sines that the resolved keys describe."""
+        if self.record:
+            return Excitation((), self.frame, self.record.but(repeats=bool(self.repeats)), self.ramp)
         names = ("axis", "frequency", "peak_acceleration", "phase")
         sines = [Harmonic(**{name: getattr(one, name) for name in names}) for one in self.harmonics or (self,)]
-        return Excitation(tuple(sines) if self.harmonics else waveform(self.waveform, sines[0]), self.frame)
+        harmonics = tuple(sines) if self.harmonics else waveform(self.waveform, sines[0])
+        return Excitation(harmonics, self.frame, ramp=self.ramp)
 
 
 @dataclass(frozen=True)
 class Excitation:
-    """A sum of sines, and the frame: moving walls, or an inertial force on the beads."""
+    """A sum of sines or a record, a ramp, and the frame: moving walls, or an inertial force on the beads."""
 
     harmonics: tuple[Harmonic, ...]
     frame: Frame
+    record: Record | None = None
+    ramp: Ramp = ()
 
     @property
     def largest(self) -> Harmonic:
@@ -137,13 +175,13 @@ class Excitation:
 
     @property
     def direction(self) -> Vector:
-        """Direction of the largest harmonic, a unit vector."""
-        return self.largest.direction
+        """Direction of the largest harmonic or of the record, a unit vector."""
+        return self.record.direction if self.record else self.largest.direction
 
     @property
     def peak_acceleration(self) -> float:
-        """That of the largest harmonic, m/s²."""
-        return self.largest.peak_acceleration
+        """That of the largest harmonic or of the record at the ramp's largest factor, m/s²."""
+        return self._most * (self.record.largest(2) if self.record else self.largest.peak_acceleration)
 
     @property
     def is_plain(self) -> bool:
@@ -153,20 +191,75 @@ class Excitation:
     @property
     def frequency(self) -> float:
         """Of the cycle, the common period of the harmonics, Hz; raises `ValueError` if they have none."""
-        return common_frequency([one.frequency for one in self.harmonics])
+        return (
+            self.record.frequencies[0] if self.record else common_frequency([one.frequency for one in self.harmonics])
+        )
+
+    @property
+    def fastest(self) -> float:
+        """The highest frequency, Hz."""
+        return self.record.frequencies[1] if self.record else max(one.frequency for one in self.harmonics)
 
     @property
     def amplitude(self) -> float:
         """Largest displacement that the harmonics could add up to, m."""
-        return sum(one.amplitude for one in self.harmonics)
+        return self._most * (self.record.largest(0) if self.record else sum(one.amplitude for one in self.harmonics))
 
     @property
     def peak_velocity(self) -> float:
         """Largest speed that the harmonics could add up to, m/s."""
-        return sum(one.peak_velocity for one in self.harmonics)
+        return self._most * (
+            self.record.largest(1) if self.record else sum(one.peak_velocity for one in self.harmonics)
+        )
+
+    @property
+    def _most(self) -> float:
+        """Largest factor of the ramp."""
+        return max((factor for _, factor in self.ramp), default=1.0)
+
+    @property
+    def cycles(self) -> tuple[float, float]:
+        """Smallest and largest number of cycles of a run: to the end of the ramp, and of a record that ends."""
+        record, fewest = self.record, self.ramp[-1][0] * self.frequency if self.ramp else 0.0
+        return fewest, record.length * self.frequency if record and not record.repeats else inf
+
+    def factor(self, time: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """Factor of the ramp at times (s), and how fast it changes, 1/s."""
+        import numpy as np
+
+        times, factors = np.array(self.ramp or ((0.0, 1.0),)).T
+        slopes = np.concatenate([[0.0], np.diff(factors) / np.diff(times), [0.0]])
+        return np.interp(time, times, factors), slopes[np.searchsorted(times, time, side="right")]
+
+    def motions(self, time: npt.NDArray[np.float64]) -> Iterator[tuple[Vector, tuple[npt.NDArray[np.float64], ...]]]:
+        """Direction of each harmonic or axis of a record, and displacement, velocity and acceleration at times (s)."""
+        import numpy as np
+
+        for one in self.harmonics:
+            turn = one.angular_frequency * time + one.phase
+            sine = np.sin(turn)
+            course = (one.amplitude * sine, one.peak_velocity * np.cos(turn), -one.peak_acceleration * sine)
+            yield one.direction, self._ramped(time, course)
+        if self.record:
+            beyond, orders = "periodic" if self.record.repeats else None, range(3)
+            moved = np.stack([self.record.course(time, order, extrapolate=beyond) for order in orders])
+            for axis, place in self.record.axes.items():
+                yield AXES[axis], self._ramped(time, tuple(moved[..., place]))
+
+    def _ramped(
+        self, time: npt.NDArray[np.float64], course: tuple[npt.NDArray[np.float64], ...]
+    ) -> tuple[npt.NDArray[np.float64], ...]:
+        """A motion with the ramp."""
+        if not self.ramp:
+            return course
+        (place, speed, acceleration), (factor, slope) = course, self.factor(time)
+        return factor * place, factor * speed + slope * place, factor * acceleration + 2.0 * slope * speed
 
     def described(self) -> str:
-        """The harmonics in a few words, such as ``80 Hz, a0 = 39.2 m/s² + 160 Hz, a0 = 29.4 m/s², 90°``."""
+        """The drive in a few words, such as ``80 Hz, a0 = 39.2 m/s² + 160 Hz, a0 = 29.4 m/s², 90°``."""
+        ramp = f", times {' to '.join(f'{factor:g}' for _, factor in self.ramp)}" if self.ramp else ""
+        if self.record:
+            return f"record, {self.frequency:.4g} Hz, a0 = {self.record.largest(2):.4g} m/s²{ramp}"
         shown = self.harmonics if len(self.harmonics) <= _FEW else (self.largest,)
         words = [
             f"{one.frequency:g} Hz, a0 = {one.peak_acceleration:.4g} m/s²"
@@ -176,7 +269,7 @@ class Excitation:
         if len(shown) < len(self.harmonics):
             highest = max(one.frequency for one in self.harmonics)
             words.append(f"{len(self.harmonics) - 1} harmonics up to {highest:g} Hz")
-        return " + ".join(words)
+        return " + ".join(words) + ramp
 
 
 def common_frequency(frequencies: list[float]) -> float:

@@ -77,7 +77,7 @@ def delay(case: Case, walkers: Walkers) -> float:
         for of, *_, depth in contact_loads(case, walkers)
         if depth
     ]
-    return 2.0 * pi * max(wave.frequency for wave in case.excitation.harmonics) * max(times, default=0.0)
+    return 2.0 * pi * case.excitation.fastest * max(times, default=0.0)
 
 
 def contact_loads(case: Case, walkers: Walkers | None = None) -> list[Load]:

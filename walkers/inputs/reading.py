@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, check_utf8, refused, shortened, suggestion
 from walkers.inputs.library import FILE_NAME, read_library
+from walkers.inputs.messages import blaming
+from walkers.inputs.record import with_record
 from walkers.inputs.toml import read_toml
 
 if TYPE_CHECKING:
@@ -78,6 +80,8 @@ def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
     directory if None. A case that has a ``[library]`` itself takes no other.
     """
     document = read_toml(path)
+    with blaming(str(path), document):
+        document = dict(with_record(document, path.parent))
     if "library" not in document and path.name != FILE_NAME:
         beside = (folder or Path()) if path.parent == _HERE / "cases" else path.parent
         if own := read_library(beside):

@@ -21,12 +21,13 @@ from walkers.inputs.origins import Source
 from walkers.inputs.run import with_run
 from walkers.inputs.standing import OVERLAP, check_bodies, overlaps
 from walkers.inputs.table import alternatives, changed
-from walkers.inputs.units import LENGTH, TEMPERATURE, parse_quantity
+from walkers.inputs.units import ACCELERATION, LENGTH, TEMPERATURE, parse_quantity, quantity_text
 from walkers.physics.capillary import DEFAULT_LAW, bridge_volume
 from walkers.physics.mixtures import MIXTURES
 
 if TYPE_CHECKING:
     from walkers.inputs.case import Case
+    from walkers.inputs.record import Record
 
 _PACKING = 0.55
 """Packing fraction of a settled wet pile, for the count that fills a height."""
@@ -34,6 +35,8 @@ _SOFTEST, _LATEST = 5e7, 0.025
 """Lowest Young's modulus of ``"auto"``, Pa, and the largest `delay`, rad: velocities are then within 2 %."""
 _ROUGHEST = 0.01
 """Largest roughness over the radius of a bead: the wedge of liquid between smooth spheres is then no model."""
+_MEET = 0.01
+"""Largest difference of the ends of a record that repeats, over its peak acceleration."""
 _FACING = {"up": "right", "down": "left"}
 """The words for climbers."""
 NAMES = ("beads.material", "boundary.material", "liquid.name")
@@ -268,6 +271,10 @@ def _check_places(cluster: Cluster, key: str) -> None:
 
 def _drive(case: Case) -> Case:
     boundary = case.boundary
+    if record := case.excitation.record:
+        return _record(case, record)
+    if case.drive.repeats:
+        raise unusable("drive.repeats", "expected none without drive.record")
     several = {f"drive.harmonics[{number}]": one for number, one in enumerate(case.drive.harmonics)}
     for key, one in (several or {"drive": case.drive}).items():
         if one.axis is None:
@@ -286,6 +293,17 @@ def _drive(case: Case) -> Case:
         message = "several harmonics, or one with a phase, are driven in the container's frame"
         raise unusable("drive.frame", f'expected "container": {message}')
     return case
+
+
+def _record(case: Case, record: Record) -> Case:
+    """A case with what its record gives in place of a frequency and a peak acceleration."""
+    first, last = (record.rows[end][1:] for end in (0, -1))
+    if record.repeats and dist(first, last) > _MEET * record.largest(2):
+        raise unusable("drive.repeats", "expected a record whose last row is that of the next period's begin")
+    why = "divides all of its spectrum" if record.repeats else "the strongest of its spectrum"
+    case = case.noted("drive.frequency", f"of the record, {why}", text=f"{case.excitation.frequency:.6g} Hz")
+    peak = quantity_text(case.excitation.peak_acceleration, ACCELERATION)
+    return case.noted("drive.peak_acceleration", "of the record, without its mean", text=peak)
 
 
 def _surfaces(case: Case) -> Case:

@@ -172,7 +172,8 @@ def with_run(case: Case) -> Case:
         message = f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed}, "
         raise unusable("run.time_step", f'{message}"auto", or allow_unstable = true')
     time_step, steps = fit_into_cycle(largest, frequency, samples)
-    wanted: float = table.cycles or table.most_cycles or _MOST_CYCLES
+    fewest, most = case.excitation.cycles
+    wanted: float = table.cycles or table.most_cycles or ceil(fewest) or int(min(_MOST_CYCLES, most))
     if table.duration is not None:
         wanted = table.duration * case.excitation.frequency * (1.0 - 1e-12)
     cycles, until_steady = ceil(wanted / cycles_per_sample) * cycles_per_sample, _until_steady(case, cycles_per_sample)
@@ -181,6 +182,7 @@ def with_run(case: Case) -> Case:
         settling = settling_of(cycles) if case.walkers else 0
     rest = table.longest_settling if table.longest_settling is not None else _LONGEST_SETTLING * loose
     _check_length(case, cycles, settling, cycles_per_sample)
+    _check_drive(case, cycles, time_step)
     most = MOST_STEPS // steps - (ceil((rest + 1.0) * frequency) if rest else 0)
     if cycles > most:
         name, longest = ("cycles", f"{most}") if table.duration is None else ("duration", f"{most // frequency:g} s")
@@ -231,6 +233,20 @@ def _sources(run: Run, case: Case, reason: str) -> dict[str, Source]:
     return sources
 
 
+def _check_drive(case: Case, cycles: int, time_step: float) -> None:
+    """A run is as long as its ramp and not longer than its record, whose rows are not closer than its steps."""
+    drive, name = case.excitation, "run.cycles" if case.run.duration is None else "run.duration"
+    fewest, most = drive.cycles
+    if cycles < fewest:
+        raise unusable(name, f"expected at least {ceil(fewest)} cycles, {drive.ramp[-1][0]:g} s, of drive.ramp")
+    if cycles > most + 1e-9:
+        message = "drive.record has no more; drive.repeats = true repeats one that ends as it begins"
+        raise unusable(name, f"expected at most {int(most)} cycles: {message}")
+    if drive.record and (apart := drive.record.length / (len(drive.record.rows) - 1)) < time_step:
+        rows = f"its rows, {1e6 * apart:.3g} us apart, are closer than the time step, {1e6 * time_step:.3g} us"
+        raise unusable("drive.record", f"{rows}; expected fewer rows, or a shorter run.time_step", drive.record.file)
+
+
 def _check_length(case: Case, cycles: int, settling: int, cycles_per_sample: int) -> None:
     """At least two cycles are measured, and one frame of walkers."""
     if cycles < 2:
@@ -275,7 +291,9 @@ def _until_steady(case: Case, cycles_per_sample: int) -> bool:
         )
     if asked and not case.apart:
         raise unusable(f"run.{asked[0]}", "expected run.duration: a run until steady needs independent walkers")
-    if not case.apart or given or table.ranks != 1 or cycles_per_sample != 1:
+    if asked and case.drive.ramp:
+        raise unusable(f"run.{asked[0]}", "expected a number of cycles: with drive.ramp no velocity is constant")
+    if case.drive.ramp or not case.apart or given or table.ranks != 1 or cycles_per_sample != 1:
         return False
     # A few cycles suffice for asymmetric dimers that start near the axis.
     return all(

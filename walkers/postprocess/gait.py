@@ -120,13 +120,9 @@ def averages(group: Group) -> Averages:
     looks = chain([group], (replace(group, position=between(group, share)) for share in shares))
     for part, (before, after) in enumerate(pairwise(looks)):
         opened.append((before.gap[samples] > 0.0).mean(axis=0))
-        for harmonic in group.case.excitation.harmonics:
-            phase = harmonic.angular_frequency * (begin + (part + 0.5) / parts * interval) + harmonic.phase
-            pull, way = (
-                harmonic.peak_acceleration * np.sin(phase),
-                after.mass_centre - before.mass_centre[: len(interval)],
-            )
-            work += pull[:, None] * (way @ np.array(harmonic.direction))
+        for direction, course in group.case.excitation.motions(begin + (part + 0.5) / parts * interval):
+            pull, way = -course[-1], after.mass_centre - before.mass_centre[: len(interval)]
+            work += pull[:, None] * (way @ np.array(direction))
     cycles = len(work) // run.samples_per_cycle
     of_cycles = work[: cycles * run.samples_per_cycle].reshape(cycles, run.samples_per_cycle, -1).sum(axis=1)
     mean = gait(group.motion.averaged.group(group.walkers[0].make))

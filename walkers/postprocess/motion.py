@@ -369,10 +369,9 @@ def boundary_motion(drive: Excitation, time: FloatArray) -> tuple[FloatArray, Fl
     """Displacement and velocity of the boundary in the laboratory, m and m/s, shape (F, 3); zero before 0 s."""
     displacement, velocity = np.zeros((len(time), 3)), np.zeros((len(time), 3))
     driven = time >= 0.0
-    for one in drive.harmonics:
-        phase = one.angular_frequency * time + one.phase
-        displacement += np.outer(one.amplitude * np.sin(phase) * driven, one.direction)
-        velocity += np.outer(one.peak_velocity * np.cos(phase) * driven, one.direction)
+    for direction, (place, speed, _) in drive.motions(time):
+        displacement += np.outer(place * driven, direction)
+        velocity += np.outer(speed * driven, direction)
     return displacement, velocity
 
 

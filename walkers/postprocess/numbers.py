@@ -64,6 +64,7 @@ _DECLARED = {quantity.name: quantity for number in NUMBERS.values() for quantity
 ASIDE = frozenset(
     {
         *("scatter", "smallest", "largest", "right_scatter", "left_scatter", "numerical_error"),
+        *("stops_within", "starts_within", "gamma0_stops_within", "gamma0_starts_within"),
         *("orientation_smallest", "orientation_largest", "facing_right", "facing_left"),
         *("gamma0", "sin_delta", "mass_asymmetry", "radius_1", "radius_2"),
         *("meets", "came_apart", "facings_differ", "depends_on_start"),

@@ -89,9 +89,9 @@ class Results(Mapping[str, Any]):
 
 def modules_of(case: Case) -> list[Any]:
     """The modules that measure a case, in the order of results."""
-    from walkers.postprocess import meetings, piles, walking
+    from walkers.postprocess import meetings, piles, threshold, walking
 
-    return [module for module in (walking, meetings, piles) if module.applies(case)]
+    return [module for module in (walking, threshold, meetings, piles) if module.applies(case)]
 
 
 def derived(case: Case) -> dict[str, Any]:

@@ -250,8 +250,8 @@ def _work(groups: Sequence[Group], cycles: Columns, walkers: Columns) -> dict[st
 
 def _is_symmetric(case: Case) -> bool:
     """Whether boundary and drive are the same for both headings."""
-    drive = case.excitation.harmonics
-    return not case.boundary.tilt and len(drive) == 1 and abs(drive[0].direction[2]) in (0.0, 1.0)
+    drive = case.excitation
+    return not case.boundary.tilt and len(drive.harmonics) == 1 and abs(drive.direction[2]) in (0.0, 1.0)
 
 
 def _depends_on_start(walkers: Columns, facing: IntArray, case: Case) -> bool:

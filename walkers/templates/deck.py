@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from walkers.errors import InputError, Problem
 from walkers.inputs.case import Case
-from walkers.inputs.drive import Vector
+from walkers.inputs.drive import AXES, Excitation, Vector
 from walkers.inputs.loads import bridge_at_rest, hop_height, reach
 from walkers.inputs.run import limits_of
 from walkers.physics.capillary import bead_volume
@@ -174,6 +174,8 @@ def compose(plan: Plan) -> Deck:
     # Resistances of built-in laws are proportional to the viscosity.
     scalable = len(surfaces) == 1 and liquid.law in LAWS and liquid.viscosity > 0.0
     files = {BRIDGES_NAME: tables_of(case, surfaces, {(bead.surface, bead.radius) for bead in scene.beads})}
+    record = case.excitation.record
+    files |= {f"record.{axis}.txt": record.pieces(place) for axis, place in record.axes.items()} if record else {}
     files |= {LOADS_NAME: _loads(scene)} if len(scene.loadings) > 1 else {}
     limits = limits_of(case)
     text = rendered(
@@ -192,6 +194,8 @@ def compose(plan: Plan) -> Deck:
         types=len(surfaces) + 1,
         ends=suffixes(len(case.excitation.harmonics)),
         down=[component / gravity for component in case.gravity_vector] if gravity else [],
+        recorded={axis: AXES[axis] for axis in record.axes} if record else {},
+        start=_start(case.excitation),
         shaken=plan.segment.drive_from is not None,
         stable=min(vars(limits).values()),
         contacts=contacts,
@@ -206,6 +210,16 @@ def compose(plan: Plan) -> Deck:
     slowest = min(case.run.steps_per_sample, case.run.steps_per_cycle) * len(scene.beads) * _SLOWEST_STEP
     bounds = (max(_SILENCE, slowest), max(_LOG_BYTES, case.run.cycles * _LOG_BYTES_PER_CYCLE))
     return Deck(text, files, layout, (scene.lower, scene.upper), fastest, *bounds, beyond)
+
+
+def _start(drive: Excitation) -> list[float]:
+    """Velocity of the walls at the start in the laboratory, m/s; empty if it is the sine's, which has a name."""
+    if drive.is_plain and not drive.ramp:
+        return []
+    import numpy as np
+
+    moved = [(direction, float(speed[0])) for direction, (_, speed, _) in drive.motions(np.zeros(1))]
+    return [sum(direction[axis] * speed for direction, speed in moved) for axis in range(3)]
 
 
 def tables_of(case: Case, surfaces: Sequence[Surface], sizes: Collection[tuple[int, float]]) -> str:

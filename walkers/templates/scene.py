@@ -14,7 +14,7 @@ from functools import lru_cache
 
 from walkers.inputs.boundary import Wall
 from walkers.inputs.case import Case, Contact
-from walkers.inputs.drive import Vector
+from walkers.inputs.drive import AXES, Vector
 from walkers.inputs.loads import hop_height, reach
 from walkers.inputs.standing import standing
 from walkers.physics.capillary import BridgeLiquid
@@ -61,7 +61,9 @@ def surface_of(case: Case) -> Surface:
 
 def loading_of(case: Case) -> Loading:
     """Loads on the beads of a case."""
-    amplitudes = [(one.amplitude, one.direction) for one in case.excitation.harmonics]
+    drive = case.excitation
+    amplitudes = [(one.amplitude, one.direction) for one in drive.harmonics]
+    amplitudes += [(1.0, AXES[axis]) for axis in (drive.record.axes if drive.record else ())]
     return case.gravity_vector, *((a * x, a * y, a * z) for a, (x, y, z) in amplitudes)
 
 
@@ -79,7 +81,12 @@ def sharing_key(case: Case) -> Hashable:
     rolling = float(case.contact.rolling_friction > 0.0)
     contact = case.contact.but(friction=None, roughness=None, restitution=0.0, rolling_friction=rolling)
     boundary = case.boundary.but(material="", tilt=0.0, uphill=0.0)
-    times: Hashable = tuple((one.frequency, one.phase) for one in case.excitation.harmonics)
+    times: Hashable = (
+        *((one.frequency, one.phase) for one in case.excitation.harmonics),
+        case.drive.record,
+        case.drive.repeats,
+        case.drive.ramp,
+    )
     driven = (case.excitation, loading_of(case)) if case.drive.frame == "lab" else times
     run = tuple(case.run.but(seed=0).determinants().items())
     return (boundary, contact, driven, run, case.beads.density, crowded)

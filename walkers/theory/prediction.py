@@ -55,8 +55,8 @@ def check_applies(*cases: Case) -> None:
             raise ValueError("bodies: expected dimers; the theory is for dimers only")
         if not case.boundary.bare:
             raise ValueError("boundary.shape: the theory is for planes")
-        if not case.excitation.is_plain or case.excitation.direction[2] != 0.0:
-            raise ValueError("drive: the theory is for a single harmonic along the plane, without a phase")
+        if case.drive.ramp or not case.excitation.is_plain or case.excitation.direction[2] != 0.0:
+            raise ValueError("drive: the theory is for a single harmonic along the plane, without a phase or a ramp")
         if hypot(*case.gravity_vector[:2]) > abs(case.axial_gravity) + 1e-9:
             raise ValueError("boundary.uphill: the theory is for planes tilted along the drive")
 

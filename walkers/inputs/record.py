@@ -1,0 +1,197 @@
+"""Recorded shaking: the acceleration of the boundary against time, from a file of comma-separated values.
+
+Between its rows the acceleration is a cubic spline, without its mean: the offset of a sensor, and gravity along z.
+Integrated twice it gives the displacement, a polynomial of fifth order from row to row; its constants are such that the
+boundary starts at no displacement and comes back to it at the end. With p rows a period, the spline of a sine is off by
+(2π/p)⁴/384 of its peak: 4e-5 with 18 rows, 2e-10 with 400.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from itertools import pairwise
+from math import isfinite
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING, Annotated, Any
+
+from walkers.errors import unusable
+from walkers.inputs.table import SAME_RUN, Table
+from walkers.inputs.units import ACCELERATION, TIME, parse_quantity
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+    from scipy.interpolate import PPoly
+
+FEWEST, MOST = 16, 100_000
+"""Numbers of rows."""
+_GAP = 1.5
+"""Longest time between two rows, in medians of all."""
+_COARSE = 0.1
+"""Largest change by leaving out every second row, root mean square; a sine does with six rows a period."""
+_FAINT = 0.05
+"""Share of the strongest amplitude in the spectrum below which others do not count."""
+_HEADER = 'expected a header of a time and accelerations along x, y or z, such as "time (ms), x (g), z (m/s^2)"'
+
+
+class Record(Table):
+    """The rows of a file: time (s), acceleration along x, y and z (m/s²); whether they are a period, which repeats."""
+
+    file: Annotated[str, SAME_RUN] = ""
+    rows: tuple[tuple[float, float, float, float], ...]
+    repeats: Annotated[bool, SAME_RUN] = False  # as the key of the drive says
+
+    @cached_property
+    def course(self) -> PPoly:
+        """Displacement along x, y and z, m, against the time since the first row, s."""
+        import numpy as np
+
+        course = _spline(np.array(self.rows), self.repeats).antiderivative(2)
+        drift = course(course.x[-1]) / course.x[-1]
+        course.c[-2] -= drift
+        course.c[-1] -= drift * course.x[:-1, None]
+        return course
+
+    @property
+    def length(self) -> float:
+        """Time from the first to the last row, s."""
+        return self.rows[-1][0] - self.rows[0][0]
+
+    @property
+    def axes(self) -> dict[str, int]:
+        """The axes that are shaken, and their places among x, y and z."""
+        return {axis: place for place, axis in enumerate("xyz") if any(row[1 + place] for row in self.rows)}
+
+    def largest(self, order: int) -> float:
+        """Largest displacement (order 0, m), velocity (1) or acceleration (2) at the rows."""
+        import numpy as np
+
+        return float(np.linalg.norm(self.course(self.course.x, order), axis=1).max())
+
+    @cached_property
+    def direction(self) -> tuple[float, float, float]:
+        """Direction in which the acceleration has its largest root mean square, a unit vector."""
+        import numpy as np
+
+        acceleration = self.course(self.course.x, 2)
+        axis = np.linalg.eigh(acceleration.T @ acceleration)[1][:, -1]
+        x, y, z = (axis * np.sign(axis[np.argmax(np.abs(axis))])).tolist()
+        return (x, y, z)
+
+    @cached_property
+    def frequencies(self) -> tuple[float, float]:
+        """Frequency of a cycle, and the highest one in the spectrum, Hz.
+
+        A record that repeats has as many cycles as divide all of its lines; else a cycle is that of the strongest line.
+        """
+        import numpy as np
+
+        count = len(self.rows)
+        window = 1.0 if self.repeats else np.hanning(count + 1)[:-1, None]
+        even = self.course(np.arange(count) * self.length / count, 2)
+        lines = np.linalg.norm(np.fft.rfft(even * window, axis=0), axis=1)
+        high = np.flatnonzero(lines > _FAINT * lines[1:].max())
+        cycles, peak = float(np.gcd.reduce(high)), int(lines[1:].argmax()) + 1
+        if not self.repeats:
+            left, top, right = np.log(lines[peak - 1 : peak + 2])
+            cycles = peak + 0.5 * float((left - right) / (left - 2.0 * top + right))
+        return cycles / self.length, float(high[-1]) / self.length
+
+    def pieces(self, place: int) -> str:
+        """The motion along an axis as the engine reads it: the period, then time and powers of each piece."""
+        rows = zip(self.course.x.tolist(), *self.course.c[::-1, :, place].tolist(), strict=False)
+        return "\n".join([repr(self.length * self.repeats), *(" ".join(map(repr, row)) for row in rows)]) + "\n"
+
+
+def _spline(rows: npt.NDArray[np.float64], repeats: bool = False) -> PPoly:
+    """The acceleration through rows, shape (N, 4), without its mean."""
+    from scipy.interpolate import CubicSpline
+
+    if repeats:
+        rows[-1, 1:] = rows[0, 1:]
+    spline = CubicSpline(rows[:, 0] - rows[0, 0], rows[:, 1:], bc_type="periodic" if repeats else "not-a-knot")
+    spline.c[-1] -= spline.integrate(0.0, spline.x[-1]) / spline.x[-1]
+    return spline
+
+
+def record_of(value: object) -> object:
+    """A record from its file's name and its rows."""
+    if not isinstance(value, Mapping):
+        return value
+    record = Record(file=value.get("file", ""), rows=tuple(tuple(map(float, row)) for row in value["rows"]))
+    _check(record.rows)
+    return record
+
+
+def with_record(document: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
+    """Tables of a case with the rows of the record that they name, if they do, by a path relative to a folder."""
+    drive = document.get("drive")
+    name = drive.get("record") if isinstance(drive, Mapping) else None
+    if not isinstance(name, str) or not isinstance(drive, Mapping):
+        return document
+    try:
+        rows = list(_read(folder / name))
+        _check(rows)
+    except OSError as error:
+        raise unusable("drive.record", f"cannot be read: {error.strerror}", name) from error
+    except UnicodeDecodeError as error:
+        raise unusable("drive.record", "expected text in UTF-8", name) from error
+    except (ValueError, csv.Error) as error:
+        raise unusable("drive.record", str(error), name) from error
+    return {**document, "drive": {**drive, "record": {"file": name, "rows": rows}}}
+
+
+def _read(path: Path) -> Iterator[list[float]]:
+    """Rows of a file: time, s, and acceleration along x, y and z, m/s²."""
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        lines = csv.reader(file)
+        columns = [_column(text) for text in next(lines, [])]
+        names = [name for name, _ in columns]
+        if names[:1] != ["time"] or len(names) < 2 or len({*names}) < len(names):
+            raise ValueError(_HEADER)
+        for line in lines:
+            try:
+                numbers = [float(text) * factor for text, (_, factor) in zip(line, columns, strict=True)]
+            except ValueError as error:
+                raise ValueError(f"line {lines.line_num}: expected {len(columns)} numbers with commas") from error
+            row = dict(zip(names, numbers, strict=True))
+            yield [row.get(name, 0.0) for name in ("time", *"xyz")]
+
+
+def _column(text: str) -> tuple[str, float]:
+    """Name of a column, and its unit in SI units."""
+    name, _, unit = text.strip().removesuffix(")").partition("(")
+    name = name.strip()
+    if name not in ("time", *"xyz"):
+        raise ValueError(f"{_HEADER}; not {text.strip()!r}")
+    return name, parse_quantity(f"1 {unit}", TIME if name == "time" else ACCELERATION)
+
+
+def _check(rows: Sequence[Sequence[float]]) -> None:
+    """Raise `ValueError` for rows of which no motion can be made."""
+    import numpy as np
+
+    if not FEWEST <= len(rows) <= MOST:
+        raise ValueError(f"has {len(rows)} rows; expected {FEWEST} to {MOST}")
+    for number, row in enumerate(rows, 1):
+        if not all(map(isfinite, row)) or max(map(abs, row[1:])) > ACCELERATION.largest:
+            raise ValueError(
+                f"row {number}: expected finite numbers, accelerations up to {ACCELERATION.largest:g} m/s²"
+            )
+    steps = [later[0] - row[0] for row, later in pairwise(rows)]
+    usual = median(steps)
+    for number, step in enumerate(steps, 2):
+        if not 0.0 < step <= _GAP * usual:
+            after = f"row {number} is {1e3 * step:.6g} ms after the one before"
+            raise ValueError(f"{after}; expected times that increase without gaps, about {1e3 * usual:.6g} ms apart")
+    array = np.array(rows)
+    whole, half = _spline(array)(array[:, 0] - array[0, 0]), _spline(array[::2])(array[:, 0] - array[0, 0])
+    if not whole.any():
+        raise ValueError("expected an acceleration that changes")
+    change = float(np.linalg.norm((whole - half)[:-1]) / np.linalg.norm(whole))
+    if change > _COARSE:
+        message = "rows are too far apart, or too noisy: leaving out every second one changes the acceleration by"
+        raise ValueError(f"{message} {change:.0%} (root mean square); expected at most {_COARSE:.0%}")
