@@ -31,6 +31,7 @@ from walkers.api import climb
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.file import load_calibration
 from walkers.calibration.report import write_outcome
+from walkers.check import experiments
 from walkers.check.benchmarks import curve_of, published
 from walkers.check.lines import as_dict, failures, run_checks
 from walkers.check.literature import LITERATURE
@@ -49,6 +50,8 @@ from walkers.templates.deck import CONTENT_VERSION
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from walkers.check.scenes import Bench
 
 RECORD = Path("figures") / "made-from.json"
 CHECKED = Path("figures") / "validation.json"
@@ -126,6 +129,47 @@ def _benchmarks() -> Figure:
     return figure
 
 
+def _make_others(_: Path, docs: Path) -> None:
+    with experiments.workbench() as bench:
+        save_figure(_experiments(bench), docs / "figures" / "others.png", (), title="Experiments of others")
+
+
+@styled
+def _experiments(bench: Bench) -> Figure:
+    """Drift by two tones against phase and strength, and restitution on a wet plate against 1/St."""
+    figure, (phases, strengths, impacts) = new_figure(TWO_COLUMNS, 3.2, ncols=3)
+    at, fine = experiments.PHASES, np.arange(0.0, 181.0, 10.0)
+    drifts = np.array([experiments.slider(bench, phase) for phase in at])
+    curves = np.array([experiments.modelled(phase) for phase in fine])
+    for number, strength in enumerate(experiments.STRENGTHS):
+        phases.plot(at, drifts[:, number], "o", mfc="none", ms=4.0, color=f"C{number}")
+        phases.plot(fine, curves[:, number], lw=1.0, color=f"C{number}", label=f"a = {strength:g} · 7/2 μg")
+    phases.plot(fine, [experiments.weak(phase) for phase in fine], "k--", lw=1.0, label="weak friction")
+    for number, phase in enumerate((0.0, 90.0)):
+        of, curve = (
+            -rows[list(places).index(phase)] * experiments.STRENGTHS for rows, places in ((drifts, at), (curves, fine))
+        )
+        strengths.plot(experiments.STRENGTHS, of, "o", mfc="none", ms=4.0, color=f"C{number}", label=f"{phase:g}°")
+        strengths.plot(experiments.STRENGTHS, curve, lw=1.0, color=f"C{number}")
+    for label, how in (
+        ("70 GPa", {}),
+        ("70 GPa, bridge from the film on", {"law": f"{experiments.__name__}:filmed"}),
+        ("50 MPa", {"modulus": 5e7}),
+    ):
+        stokes, e = experiments.restitutions(bench, **how)
+        impacts.plot(1.0 / stokes[:, 2], e[:, 2], "o-", mfc="none", ms=4.0, lw=1.0, label=label)
+    inverse = np.array([0.0, 1.0 / stokes[:, 2].min()])
+    loss = np.log(experiments.FILM / experiments.ROUGH) * inverse
+    impacts.plot(inverse, experiments.RESTITUTION * (1.0 - loss), "k--", lw=1.0, label="lubrication, approach")
+    phases.set(xlabel="phase of the second tone (°)", ylabel="drift / speed of the first tone")
+    strengths.set(xlabel="a/(7/2 μg)", ylabel="drift / (7/2 μg/ω)")
+    impacts.set(xlabel="1/St", ylabel="restitution", ylim=(0.0, 1.0), xticks=(0.0, 0.005, 0.01))
+    for axes in (phases, strengths, impacts):
+        legend_below(axes)
+    letter_panels((phases, strengths, impacts))
+    return figure
+
+
 def _make_calibration(out: Path, docs: Path) -> None:
     found = calibrate(load_calibration("ruby"), out, Options())
     write_outcome(found, out / "ruby")
@@ -195,6 +239,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
         _shipped("fig1b", "fig4a", "fig4b", "climber", "climber-dimer", "pile-ci"),
         _make_validation,
     ),
+    "others": Illustration(("figures/others.png",), lambda: [load_case("symmetric")], _make_others),
     "calibration": Illustration(
         tuple(f"figures/calibration.{ending}" for ending in ("md", "json", "png")), _calibrated, _make_calibration
     ),

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import call
-from walkers.check import literature
+from walkers.check import experiments, literature
 from walkers.check.benchmarks import TESTS, farthest_point, largest, published
 from walkers.check.bridges import LAWS, pulls
 from walkers.check.crosscheck import courses
@@ -76,6 +76,29 @@ def test_benchmarks_pass_and_a_check_that_cannot_be_computed_leaves_the_others(
     assert {line["verdict"] for line in passed} == {"pass"}
     assert len(passed) > 55
     assert (failed["check"], failed["verdict"], "no engine here" in failed["what"]) == ("crosscheck", "ERROR", True)
+
+
+def test_experiments_of_others_pass_where_they_are_judged(in_folder: Path) -> None:
+    """A bead that is thrown, one on a wet incline, impacts; and the drift of a dry bead at one phase."""
+    with experiments.workbench() as bench:
+        lines = [*experiments.thrown(bench), *experiments.incline(bench), *experiments.impacts(bench)]
+        assert experiments.slider(bench, 60.0) == pytest.approx(experiments.modelled(60.0), abs=5e-3)
+    assert [count(lines, verdict) for verdict in (Verdict.PASS, Verdict.NOT_JUDGED)] == [9, 4]
+    assert not failures(lines)
+
+
+def test_a_symmetric_dimer_drifts_by_tones_2_to_3_only(in_folder: Path) -> None:
+    drifts, *judged = experiments.symmetry(Path("runs"))
+    assert abs(drifts.measured) > 0.1
+    assert [line.verdict for line in judged] == [Verdict.PASS, Verdict.PASS]
+
+
+def test_experiments_fail_with_twice_the_friction(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The speed of rolling does not depend on it."""
+    monkeypatch.setitem(experiments._DRY, "contact.friction.bead_wall", 2.0 * experiments.FRICTION)
+    with experiments.workbench() as bench:
+        assert [line.verdict for line in experiments.thrown(bench)] == [Verdict.PASS, Verdict.FAIL]
+        assert np.abs(experiments.slider(bench, 90.0) - experiments.modelled(90.0)).max() > 0.05
 
 
 GOOD, BAD = Line("good", 1.0, 1.05, 0.1), Line("bad", 1.0, 1.2, 0.1, check="second")

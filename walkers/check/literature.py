@@ -8,11 +8,13 @@ from pathlib import Path
 from walkers.check.benchmarks import benchmarks
 from walkers.check.bridges import pulls, velocities
 from walkers.check.crosscheck import crosschecks
+from walkers.check.experiments import experiments
 from walkers.check.lines import Line
 
 LITERATURE: Mapping[str, Callable[[Path], Iterable[Line]]] = {
     "benchmarks": lambda _: benchmarks(),
     "bridges": lambda out: [*pulls(), *velocities(out)],
     "crosscheck": crosschecks,
+    "experiments": experiments,
 }
 """Checks by name, from the folder of runs."""

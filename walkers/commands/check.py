@@ -83,7 +83,7 @@ def literature(*only: Annotated[str, Parameter(name="CHECK")], out: Out = DEFAUL
     Parameters
     ----------
     only
-        benchmarks, bridges or crosscheck; default: all.
+        benchmarks, bridges, crosscheck or experiments; default: all.
     """
     from walkers.check.lines import run_checks
     from walkers.check.literature import LITERATURE

@@ -1,0 +1,243 @@
+"""Experiments of others in the engine: a thrown bead, two tones, impacts on a wet plate, a wet incline.
+
+Lines are judged where the reference is exact or has the assumptions of the model; the others show what the model lacks.
+Sources and what they measured are in the documentation (``explanation/others``).
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from math import inf, log, pi, radians
+from pathlib import Path
+
+import numpy as np
+
+from walkers.api import run
+from walkers.check.kernels import FloatArray
+from walkers.check.lines import Line
+from walkers.check.scenes import DRY, FLOOR, STILL, Bench, R, bench_case, over, recording
+from walkers.inputs.boundary import Flat, Wall
+from walkers.inputs.case import Case
+from walkers.inputs.drive import Harmonic
+from walkers.inputs.loads import bridge_at_rest, contact_loads, resistances_at_rest
+from walkers.inputs.reading import load_case
+from walkers.physics.bridge import Curve, Surfaces
+from walkers.physics.capillary import bead_volume
+from walkers.physics.contact import Impact, reduced_modulus
+from walkers.physics.laws import young_laplace
+from walkers.runner.binary import find_engine
+from walkers.templates.deck import Plan
+from walkers.templates.scene import Bead, Scene, loading_of, surface_of
+
+FRICTION, G = 0.2, 9.81
+SLOWS = 3.5 * FRICTION * G
+"""m/s²; friction slows the surface of a solid sphere 7/2 times as much as its centre."""
+BASE, CYCLES, FIRST = 80.0, 12, 4
+"""Hz; cycles that are run, and those of them that are not measured."""
+PHASES, STRENGTHS = np.arange(0.0, 180.0, 30.0), np.array([2.0, 4.0, 8.0, 16.0])
+"""Of the second tone, degrees; peak acceleration of both tones over `SLOWS`."""
+GLASS, FILM, ROUGH, RESTITUTION = 2.75e-3, 0.45e-3, 1e-7, 0.97
+"""Radius of a glass bead, thickness of the film, roughness, m; restitution of the dry bead."""
+OILS, SPEEDS = np.array([0.25, 0.5, 1.0, 2.0, 4.0]) * 4.6e-3, np.array([0.25, 0.5, 1.0, 2.0])
+"""Viscosities, Pa s, and speeds of impacts, m/s."""
+_DRY = {**DRY, "environment.gravity": f"{G} m/s^2", "contact.restitution": 0.5, "contact.friction.bead_wall": FRICTION}
+_GLASS = {"beads.density": "2.5 g/cm^3", "contact.roughness.bead_wall": f"{ROUGH} m"}
+
+
+@contextmanager
+def workbench() -> Iterator[Bench]:
+    """A bench with the installed engine in a folder that goes away."""
+    with tempfile.TemporaryDirectory(prefix="walkers-experiments-") as folder:
+        yield Bench(find_engine(), Path(folder))
+
+
+def experiments(out: Path) -> Iterator[Line]:
+    """All lines; ``out`` is the folder of the runs of walkers."""
+    yield from symmetry(out)
+    with workbench() as bench:
+        for lines in (thrown, two_tones, impacts, incline):
+            yield from lines(bench)
+
+
+def symmetry(out: Path) -> Iterator[Line]:
+    """A symmetric wet dimer drifts at 80 and 120 Hz, not at 40 and 120 Hz; the opposite waveform reverses its drift."""
+    given = load_case("symmetric", {"dimers.replicates": 1, "run.cycles": 30}).document
+    speeds = []
+    for first, start in ((40, 0), (80, 0), (80, 180)):
+        sines = [
+            {"frequency": f"{tone} Hz", "peak_acceleration": f"{peak} g", "phase": f"{phase} deg"}
+            for tone, peak, phase in ((first, 4, start), (120, 3, start + 90))
+        ]
+        case = Case.read({**given, "drive": {"harmonics": sines}}, name="symmetric")
+        speeds.append(1e3 * run(case, out).result["velocity"])
+    odd, even, opposite = speeds
+    yield Line("symmetric dimer, tones 2:3: velocity (not zero)", 0.0, even, unit="mm/s")
+    yield Line("symmetric dimer: velocity at 1:3 over that at 2:3", 0.0, odd / even, 1e-3)
+    yield Line(
+        "symmetric dimer, 2:3: velocity by the opposite waveform over that by the waveform", -1, opposite / even, 0.01
+    )
+
+
+def followed(
+    bench: Bench, cases: Sequence[Case], beads: Sequence[Bead], steps: int, every: int, walls: Sequence[Wall] = (FLOOR,)
+) -> FloatArray:
+    """Frames of beads, each with its own case, 8 mm apart along y; shape (steps // every + 1, beads, 9)."""
+    kinds = list(dict.fromkeys(map(surface_of, cases)))
+    placed = [
+        replace(
+            bead, id=n + 1, centre=(0.0, 8e-3 * n, bead.centre[2]), surface=1 + kinds.index(surface_of(case)), loading=n
+        )
+        for n, (case, bead) in enumerate(zip(cases, beads, strict=True))
+    ]
+    room = (-0.05, -0.01, -0.01), (0.05, 8e-3 * len(placed), 0.1)
+    scene = Scene(tuple(placed), tuple(walls), *room, tuple(kinds), tuple(map(loading_of, cases)))
+    return bench.run(Plan(cases[0], scene, **recording(steps, every))).frames
+
+
+def thrown(bench: Bench, speed: float = 0.05) -> Iterator[Line]:
+    """A dry bead that is thrown sliding rolls at 5/7 of its speed after 2v/7μg."""
+    case, ends = bench_case(_DRY), speed / SLOWS
+    bead = over(FLOOR, -contact_loads(case)[0].overlap, R, (speed, 0.0, 0.0), STILL)
+    frames = followed(bench, [case], [bead], 10 * round(0.15 * ends / case.run.time_step), 10)[:, 0]
+    slip, time = frames[:, 3] - R * frames[:, 7], 10.0 * case.run.time_step * np.arange(len(frames))
+    slope, start = np.polyfit(time[slip > 0.05 * speed], slip[slip > 0.05 * speed], 1)
+    yield Line("thrown bead: speed of rolling over that of the throw", 5.0 / 7.0, frames[-1, 3] / speed, 1e-3)
+    yield Line("thrown bead: time until it rolls", 2.0 * speed / (7.0 * FRICTION * G), -start / slope, 1e-3, "s")
+
+
+def glide(phase: float, angle: FloatArray | float) -> FloatArray:
+    """Velocity by two tones, at a phase of the cycle (rad), without friction; over the speed of the first tone.
+
+    Tones have the frequencies 1:2 and equal accelerations; ``phase`` is that of the second, degrees.
+    """
+    return np.asarray(-np.cos(angle) - 0.5 * np.cos(2.0 * np.asarray(angle) + radians(phase)))
+
+
+def weak(phase: float) -> float:
+    """Drift in the limit of weak friction, in which a slider slides forward as long as backward."""
+    return -float(np.median(glide(phase, np.linspace(0.0, 2.0 * pi, 20_000, endpoint=False))))
+
+
+def modelled(phase: float, steps: int = 2500) -> FloatArray:
+    """Drift of a mass with Coulomb friction, which stops it at the end of a step if it can; as of `slider`."""
+    step, way = 2.0 * pi / steps, np.zeros_like(STRENGTHS)
+    slip = glide(phase, 0.0) + weak(phase) + way
+    for number in range(CYCLES * steps):
+        slip = slip + glide(phase, (number + 1) * step) - glide(phase, number * step)
+        slip = np.sign(slip) * np.maximum(np.abs(slip) - step / STRENGTHS, 0.0)
+        way += slip * (number >= FIRST * steps)
+    return way / ((CYCLES - FIRST) * steps)
+
+
+def slider(bench: Bench, phase: float) -> FloatArray:
+    """Mean sliding velocity of a dry bead on the plate by `STRENGTHS`, over the speed of the first tone.
+
+    Its surface moves as a slider with 7/2 times the friction. It starts as it moves in the limit of weak friction.
+    """
+    plain, start, drift = bench_case(_DRY), float(glide(phase, 0.0)), weak(phase)
+    speeds = SLOWS * STRENGTHS / (2.0 * pi * BASE)
+    gap, steps, cases = -contact_loads(plain)[0].overlap, round(1.0 / BASE / plain.run.time_step), []
+    for peak in SLOWS * STRENGTHS:
+        tones = (BASE, 0.0), (2.0 * BASE, radians(phase))
+        sines = (Harmonic(axis="x", frequency=tone, peak_acceleration=peak, phase=angle) for tone, angle in tones)
+        cases.append(plain.put("drive.harmonics", tuple(sines)))
+    moves, turns = start + 2.0 / 7.0 * drift, -5.0 / 7.0 * drift / R  # so that the centre stays here
+    beads = [over(FLOOR, gap, R, (moves * one, 0.0, 0.0), (0.0, turns * one, 0.0)) for one in speeds.tolist()]
+    frames = followed(bench, cases, beads, CYCLES * steps, 50)[1 + FIRST * steps // 50 :]
+    return np.asarray((frames[..., 3] - R * frames[..., 7]).mean(axis=0) / speeds)
+
+
+def two_tones(bench: Bench) -> Iterator[Line]:
+    """Drift of a dry bead by two tones, beside the friction model and limits."""
+    drifts, expected = (np.array([drift(phase) for phase in PHASES]) for drift in (partial(slider, bench), modelled))
+    what = "dry bead, two tones"
+    away = float(np.abs(drifts - expected).max())
+    yield Line(f"{what}, {drifts.size} drives: largest distance of the drift from the friction model", 0.0, away, 5e-3)
+    yield Line(f"{what} in phase, weak friction: drift", weak(0.0), drifts[0, -1], 0.03)
+    for phase, growth in ((0, 2.0), (90, 1.0)):
+        last = drifts[list(PHASES).index(phase), -2:] * STRENGTHS[-2:]
+        yield Line(f"{what}, {phase}°: growth of the drift at twice the drive", growth, last[1] / last[0])
+
+
+def filmed(surfaces: Surfaces) -> Curve:
+    """The default law with bridges that form where the bead meets the surface of the film."""
+    return replace(young_laplace.law(surfaces), formation=FILM)
+
+
+def restitutions(bench: Bench, modulus: float = 7e10, law: str = "young-laplace") -> tuple[FloatArray, FloatArray]:
+    """Stokes numbers ρDv/9η and restitutions of glass beads of a modulus (Pa) on a wet plate, (`OILS`, `SPEEDS`).
+
+    A bridge contains what a bead displaces of the film, so that at its edge it is as high as the film.
+    """
+    impact = Impact(2500.0 * bead_volume(GLASS), GLASS, reduced_modulus(modulus, 0.3))
+    plain = bench_case(
+        {
+            **{**_GLASS, "dimers.radii": [f"{GLASS} m"] * 2, "contact.restitution": RESTITUTION, "liquid.law": law},
+            **{"liquid.volume_fraction": 2.0 * pi * GLASS * FILM**2 / bead_volume(GLASS)},
+            **{"contact.youngs_modulus": f"{modulus} Pa", "run.time_step": f"{impact.duration(2.0) / 100.0} s"},
+        }
+    )
+    cases = [plain.put("liquid.dynamic_viscosity", oil) for oil in OILS.tolist() for _ in SPEEDS]
+    high, far = 1.001 * FILM, 1.01 * bridge_at_rest(plain, GLASS, inf).rupture
+    beads = [over(FLOOR, high, GLASS, (0.0, 0.0, -speed), STILL) for _ in OILS for speed in SPEEDS.tolist()]
+    lasts = (high + 5.0 * far) / SPEEDS.min() + 2.0 * impact.duration(SPEEDS.min())
+    every = round(lasts / plain.run.time_step / 200)
+    frames = followed(bench, cases, beads, 200 * every, every)
+    gone = (frames[..., 2] > GLASS + far) & (frames[..., 5] > 0.0)
+    after = np.where(gone.any(axis=0), frames[gone.argmax(axis=0), range(len(beads)), 5], 0.0)
+    stokes = 2500.0 * 2.0 * GLASS * SPEEDS / (9.0 * OILS[:, None])
+    return stokes, after.reshape(stokes.shape) / SPEEDS
+
+
+def impacts(bench: Bench) -> Iterator[Line]:
+    """Restitution of a glass bead on a wet plate at 1 m/s by viscosity, and what changes it at one Stokes number."""
+    stokes, hard = restitutions(bench)
+    drag, e = 1.0 / stokes[:, 2], hard[:, 2]
+    slope, start = np.polyfit(drag, e, 1)
+    what = "glass bead on a wet plate"
+    yield Line(f"{what}: largest distance of e from a line in 1/St", 0.0, np.abs(start + slope * drag - e).max(), 0.02)
+    yield Line(f"{what}: e at 1/St = 0, dry bead", RESTITUTION, start, 0.02)
+    yield Line(f"{what}: critical Stokes number, ln(film/roughness) of approach", log(FILM / ROUGH), -slope / start)
+    what += f", St = {stokes[2, 2]:.0f}: e"
+    yield Line(f"{what} at 1 m/s and at 2 m/s", hard[2, 2], hard[3, 3])
+    yield Line(
+        f"{what}, bridge from the surface of the film",
+        hard[2, 2],
+        restitutions(bench, law=f"{__name__}:filmed")[1][2, 2],
+    )
+    yield Line(f"{what}, bead of 50 MPa", hard[2, 2], restitutions(bench, 5e7)[1][2, 2])
+
+
+def incline(bench: Bench, radius: float = 1e-3, film: float = 7.5e-5) -> Iterator[Line]:
+    """A bead on and below a plate of 20° with a viscous film, with and without friction, and which beads hang."""
+    fraction = 2.0 * pi * radius * film**2 / bead_volume(radius)
+    plain = bench_case(
+        {
+            **{**_GLASS, "dimers.radii": [f"{radius} m"] * 2, "contact.restitution": 0.5, "run.time_step": "0.2 us"},
+            **{"boundary.tilt": "20 deg", "environment.gravity": f"{G} m/s^2", "liquid.volume_fraction": fraction},
+        }
+    )
+    oily, thin = (plain.put("liquid.dynamic_viscosity", viscosity) for viscosity in (0.1, 4.6e-3))
+    ceiling, load = Flat((0.0, 0.0, 0.02), (0.0, 0.0, -1.0), "ceiling"), contact_loads(plain)[0]
+    held = load.pull / (bead_volume(radius) * plain.pressing_gravity)
+    beads = [over(wall, -load.overlap, radius, spin=STILL) for wall in (FLOOR, FLOOR, ceiling, ceiling, ceiling)]
+    beads[3:] = [replace(bead, density=share * held) for bead, share in zip(beads[3:], (0.9, 1.1), strict=True)]
+    cases = oily, oily.put("contact.friction.bead_wall", FRICTION), oily, thin, thin
+    last = followed(bench, cases, beads, 300_000, 3000, (FLOOR, ceiling))[-1]
+    rolls = np.abs(radius * last[:, 7] / last[:, 3])
+    sliding, coupling, rolling = resistances_at_rest(oily, radius, inf)
+    free = (radius * sliding + coupling) / (radius * sliding + 2.0 * coupling + rolling / radius)  # no torque
+    yield Line("bead on a wet incline, no friction: Rω/v", free, rolls[0], 1e-2)
+    yield Line("bead on a wet incline, friction 0.2: Rω/v", 1.0, rolls[1], 1e-2)
+    yield Line("bead below a wet incline, no friction: Rω/v", free, rolls[2], 1e-2)
+    for share, hangs, gap in zip((0.9, 1.1), (1.0, 0.0), 0.02 - radius - last[3:, 2], strict=True):
+        yield Line(
+            f"bead below a wet incline, {share} of the weight that its bridge holds: hangs",
+            hangs,
+            float(gap < film),
+            0.0,
+        )
