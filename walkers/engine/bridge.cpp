@@ -163,6 +163,14 @@ public:
   /* The largest gap at which any bridge forms, m. */
   double formed() const { return formed_; }
 
+  /* The largest gap of any bridge, m. */
+  double longest() const
+  {
+    double most = 0.;
+    for (const bridge::Table &one : tables_) most = std::max(most, one.rupture);
+    return most;
+  }
+
   /* Films at the begin of a step: in it, all bridges of a bead form from these, on all ranks alike. */
   void begin_step()
   {
@@ -454,7 +462,7 @@ private:
   }
 };
 
-/* Planes and the insides of upright cylinders, shaken as one. */
+/* Planes, the insides of upright cylinders and facets of other surfaces, shaken as one. */
 class FixWallBridge : public Fix {
 public:
   FixWallBridge(LAMMPS *lmp, int count, char **args) : Fix(lmp, count, args), law_(0), type_(0), begin_(0), moves_(true)
@@ -478,12 +486,13 @@ public:
       else if (word == "plane") {
         const Vec point = vector(), normal = vector();
         if (!(length(normal) > 0.)) error->fix_error(FLERR, this, "a plane has a normal of no length");
-        walls_.push_back({1. / length(normal) * normal, point, 0.});
+        walls_.push_back({1. / length(normal) * normal, point, 0., ALL, {}, {}, {}});
       } else if (word == "cylinder") {
         const double x = number(), y = number();
-        walls_.push_back({{0., 0., 0.}, {x, y, 0.}, number()});
+        walls_.push_back({{0., 0., 0.}, {x, y, 0.}, number(), ALL, {}, {}, {}});
         if (!(walls_.back().radius > 0.)) error->fix_error(FLERR, this, "a cylinder has a radius that is not above 0");
-      } else if (word == "shaken") {
+      } else if (word == "facets") read_facets(next());
+      else if (word == "shaken") {
         const Vec amplitude = vector();
         const double frequency = 2. * M_PI * number();
         waves_.push_back({amplitude, frequency, number(), 0., -1});
@@ -506,7 +515,7 @@ public:
       } else if (word == "loads") file = next();
       else error->fix_error(FLERR, this, ("unknown keyword " + word).c_str());
     }
-    if (walls_.empty()) error->fix_error(FLERR, this, "expected a plane or a cylinder");
+    if (walls_.empty()) error->fix_error(FLERR, this, "expected a plane, a cylinder or facets");
     if (type_ < 1 || type_ > atom->ntypes) error->fix_error(FLERR, this, "expected a type, of those of the box");
     if (moves_ && !file.empty()) error->fix_error(FLERR, this, "loads need the walls' frame: expected frame walls");
     for (const auto &one : ramp_) factor = std::max(factor, one.second);
@@ -542,7 +551,7 @@ public:
      beads go less than the skin, and walls twice their amplitudes. */
   void pre_neighbor()
   {
-    double reach = law_->formed() + neighbor->skin;
+    double reach = law_->formed() + neighbor->skin, farther = law_->longest() - law_->formed();
     if (moves_) reach += 2. * sway_;
     near_.clear();
     move(0.);
@@ -550,7 +559,9 @@ public:
       for (int i = 0; i < atom->nlocal; i++) {
         Vec n;
         if (!(atom->mask[i] & groupbit)) continue;
-        if (gap_at(wall, i, n) > reach && history_of(i, wall)[TABLE] == 0.) continue;
+        const Surface &of = walls_[wall];
+        const double gap = of.part == ALL ? gap_at(wall, i, n) : box_gap(of, i) - farther;
+        if (gap > reach && history_of(i, wall)[TABLE] == 0.) continue;
         near_.push_back({i, wall});
       }
   }
@@ -605,9 +616,21 @@ public:
 private:
   enum { COLUMNS = 12 };  // foot, bead: x, y, z; wall, id; force: x, y, z; overlap
 
+  enum Part { ALL, FACE, EDGE, CORNER };
+
+  struct Half {
+    Vec at, way;
+    double least;
+  };
+
+  /* Of an edge the normal is its direction, of a corner 0. Cells are where beads are whose nearest point is in a facet;
+     low and high are the corners of its box. */
   struct Surface {
     Vec normal, point;
-    double radius;  // of a cylinder, 0 of a plane
+    double radius;  // of a cylinder, 0 of others
+    Part part;
+    std::vector<std::vector<Half>> cells;
+    Vec low, high;
   };
 
   struct Wave {
@@ -660,6 +683,74 @@ private:
         whole = static_cast<bool>(in >> loads_[k].x >> loads_[k].y >> loads_[k].z);
     }
     if (!whole || !in.eof()) error->fix_error(FLERR, this, (file + " has no loads that can be read").c_str());
+  }
+
+  void read_facets(const std::string &file)
+  {
+    const double far = std::numeric_limits<double>::infinity();
+    std::ifstream in(file.c_str());
+    const auto vector = [&in](Vec &v) -> bool { return static_cast<bool>(in >> v.x >> v.y >> v.z); };
+    bool whole = static_cast<bool>(in);
+    for (std::string part; whole && in >> part;) {
+      Surface one = {{}, {}, 0., part == "face" ? FACE : part == "edge" ? EDGE : CORNER, {}, {far, far, far}, {}};
+      one.high = -1. * one.low;
+      size_t cells;
+      whole = (one.part != CORNER || part == "corner") && vector(one.point) && vector(one.normal) && in >> cells;
+      for (size_t halves; whole && cells && (whole = static_cast<bool>(in >> halves)); cells--) {
+        one.cells.push_back({});
+        for (; whole && halves; halves--) {
+          Half half;
+          whole = vector(half.at) && vector(half.way) && in >> half.least;
+          one.cells.back().push_back(half);
+          one.low = {std::min(one.low.x, half.at.x), std::min(one.low.y, half.at.y), std::min(one.low.z, half.at.z)};
+          one.high = {std::max(one.high.x, half.at.x), std::max(one.high.y, half.at.y), std::max(one.high.z, half.at.z)};
+        }
+      }
+      walls_.push_back(one);
+    }
+    if (!whole || !in.eof()) error->fix_error(FLERR, this, (file + " has no facets that can be read").c_str());
+  }
+
+  /* Gap of a bead to the box of a facet, no more than that to the facet. */
+  double box_gap(const Surface &wall, const int i) const
+  {
+    const Vec x = vec(atom->x[i]) - shift_, low = wall.low - x, high = x - wall.high;
+    const Vec out = {std::max(0., std::max(low.x, high.x)), std::max(0., std::max(low.y, high.y)),
+                     std::max(0., std::max(low.z, high.z))};
+    return length(out) - atom->radius[i];
+  }
+
+  /* Whether a wall has a point that is nearer to a bead than all points of the surface around it. */
+  bool meets(const Surface &wall, const int i) const
+  {
+    if (wall.part == ALL) return true;
+    const Vec x = vec(atom->x[i]) - shift_;
+    if (wall.part == FACE && !(dot(wall.normal, x - wall.point) > 0.)) return false;
+    for (const std::vector<Half> &cell : wall.cells)
+      if (std::all_of(cell.begin(), cell.end(), [&](const Half &h) { return dot(h.way, x - h.at) > h.least; }))
+        return true;
+    return false;
+  }
+
+  /* Bridge and spring of a bead go with its nearest point from one facet to the next, around an edge or into a valley:
+     to the one without a bridge that is nearest, if that is nearer than a radius. If there is none, the bridge breaks. */
+  void hand_over(const Near &one)
+  {
+    const auto free = [](const double *const h) { return std::all_of(h, h + HISTORY, [](double x) { return x == 0.; }); };
+    double *const from = history_of(one.bead, one.wall), *to = 0;
+    if (free(from) || meets(walls_[one.wall], one.bead)) return;
+    const double radius = atom->radius[one.bead];
+    Vec n;
+    double gap = gap_at(one.wall, one.bead, n), nearest = radius;
+    const Vec foot = (radius + gap) * n;
+    for (const Near &other : near_) {
+      double *const history = history_of(other.bead, other.wall);
+      if (other.bead != one.bead || !free(history) || !meets(walls_[other.wall], one.bead)) continue;
+      gap = gap_at(other.wall, one.bead, n);
+      const double away = length((radius + gap) * n - foot);
+      if (away < nearest) nearest = away, to = history;
+    }
+    if (to) std::swap_ranges(from, from + HISTORY, to);
   }
 
   double *history_of(const int i, const int wall) { return of(i) + HISTORY * wall; }
@@ -745,6 +836,12 @@ private:
     const Surface &wall = walls_[number];
     Vec d = vec(atom->x[i]) - wall.point - shift_;
     n = wall.normal;
+    if (wall.part > FACE) {
+      d = d - dot(n, d) * n;
+      const double out = length(d);
+      n = 1. / out * d;
+      return out - atom->radius[i];
+    }
     if (!(wall.radius > 0.)) return dot(n, d) - atom->radius[i];
     d.z = 0.;
     const double out = length(d);
@@ -767,12 +864,15 @@ private:
     const double formed = law_->formed();
     const auto finish = [&]() { this->finish(add, stretch, told); };
     batch.count = 0;
+    for (const Near &one : near_)
+      if (walls_[one.wall].part != ALL) hand_over(one);
     for (const Near &one : near_) {
       const int i = one.bead;
       double *const history = history_of(i, one.wall);
       Vec n;
-      const double gap = gap_at(one.wall, i, n);
+      double gap = gap_at(one.wall, i, n);
       if (std::isnan(gap)) error->one(FLERR, "fix wall/bridge: a bead's position is no number");
+      if (!meets(walls_[one.wall], i)) gap = std::numeric_limits<double>::infinity();
       if (!(gap < 0.)) std::fill_n(history + SPRING, HISTORY - SPRING, 0.);
       if (gap > formed && history[TABLE] == 0.) continue;
       const bridge::Table *const table =

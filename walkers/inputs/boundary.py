@@ -1,4 +1,4 @@
-"""Boundaries: planes, channels, grooves, containers.
+"""Boundaries: planes, channels, grooves, containers, vessels of the user's own (`walkers.inputs.vessel`).
 
 Most have a floor, the plane z = 0 in their own frame, and may have side walls. To add one, name it in `Shape` and
 `SIZES`, and give it `Boundary.walls` and `Boundary.room`.
@@ -8,17 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import ceil, cos, degrees, inf, pi, sin, sqrt
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from functools import lru_cache
+from itertools import count
+from math import ceil, cos, degrees, inf, pi, radians, sin, sqrt
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeAlias
 
 from walkers.errors import Problem
 from walkers.inputs import units
 from walkers.inputs.drive import Vector
-from walkers.inputs.table import SAME_RUN, Filled, Table, key, within
+from walkers.inputs.table import SAME_RUN, Derived, Filled, Indirect, Table, key, within
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
+
+    from walkers.inputs.vessel import Facet, Vessel
 
     FloatArray = npt.NDArray[np.floating[Any]]
 
@@ -27,6 +32,9 @@ LOOSE = 1.03
 """Pitch of the places from which beads are poured, in diameters of the largest bead."""
 _SLOPE = f'{units.NOT_NEGATIVE}; boundary.uphill = "180 deg" turns the slope'
 _LEAST = 1e-13
+SHARP = radians(44.9)
+"""Faces of a convex vessel that turn by less at an edge cannot be planes without end: a bead near one of them would
+have a bridge to the other behind the edge. Its gap there is R/cos - R, at 45° 0.41 R, beyond the reach of bridges."""
 _RIM = 2e-4
 """m; the simulation box of a container reaches this far beyond its walls."""
 
@@ -65,34 +73,47 @@ class Round(NamedTuple):
         return found
 
 
-Wall = Flat | Round
+Wall: TypeAlias = "Flat | Round | Facet"
 BOTTOM = Flat((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 """The floor of all boundaries with a floor."""
 
 
 class Layer(NamedTuple):
-    """A layer of positions from which beads are poured: positions (m), pitch (m), and largest displacement."""
+    """A layer of positions from which beads are poured: positions (m), pitch (m), largest displacement; height (m)."""
 
     places: Sequence[tuple[float, float]]
     pitch: float
     tight: bool = False
+    level: float = 0.0
 
     def play(self, radius: float, largest: float) -> float:
         """Largest displacement of a bead from its position, m."""
         return (LOOSE * largest - radius) / 2.0 if self.tight else self.pitch / 2.0 - radius
 
 
-Shape = Literal["plane", "channel", "groove", "box", "cylinder", "octagon"]
+Shape = Literal["plane", "channel", "groove", "box", "cylinder", "octagon", "vessel"]
 SIZES: Mapping[str, Collection[str]] = {
     "plane": (),
     "channel": ("width",),
     "groove": ("opening",),
     **dict.fromkeys(("box", "cylinder", "octagon"), ("width", "height")),
+    "vessel": (),
 }
 """Size keys of each shape."""
 _AREAS = {"box": 1.0, "cylinder": pi / 4.0, "octagon": 2.0 * (sqrt(2.0) - 1.0)}
 """Of the cross-sections of containers, in squares of their width."""
 _CORNERS = {"+x+y": (1.0, 1.0), "+x-y": (1.0, -1.0), "-x+y": (-1.0, 1.0), "-x-y": (-1.0, -1.0)}
+
+
+class Plane(Table):
+    """One of ``[[boundary.planes]]``: a point and the normal, toward the beads."""
+
+    point: tuple[units.SignedLength, units.SignedLength, units.SignedLength] = key(
+        "A point of the plane.", example=["0 mm", "0 mm", "0 mm"]
+    )
+    normal: tuple[units.Number, units.Number, units.Number] = key(
+        "Direction of its normal, toward the beads.", example=[0, 0, 1]
+    )
 
 
 class Boundary(Table):
@@ -111,6 +132,15 @@ class Boundary(Table):
     )
     width: Filled[units.Length] = key("Width of a channel; inner side or diameter of a container.", None, "5.3 mm")
     height: Filled[units.Length] = key("Height of a container. Beads are lost above twice this height.", None, "5.3 mm")
+    mesh: Indirect[str] = key(
+        "File of a vessel of your own: its inner surface as triangles or polygons, in any format of meshio.",
+        None,
+        "funnel.stl",
+    )
+    scale: Indirect[units.Length] = key("Length of the unit of the mesh, which files do not say.", None, "1 mm")
+    planes: tuple[Plane, ...] = key("Planes around the beads, up to the `height`, instead of a mesh.", ())
+    points: Derived[tuple[Vector, ...]] = ()
+    triangles: Derived[tuple[tuple[int, int, int], ...]] = ()
     tilt: Annotated[float, replace(units.ANGLE, largest=1.5708, sign=_SLOPE)] = key(
         'Tilt of the floor: 0° is level, 90° is a wall. `uphill = "180 deg"` turns the slope.', 0.0
     )
@@ -119,7 +149,20 @@ class Boundary(Table):
     @classmethod
     def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
         """Sizes that the shape lacks, or that are those of another shape."""
-        sizes = SIZES.get(shape := str(given.get("shape", "plane")), ())
+        yield from super().problems(given, place)
+        own = "mesh" if "mesh" in given else "planes" if "planes" in given else ""
+        if own and given.get("shape", "vessel") != "vessel":
+            yield Problem(within(place, "shape"), None, f"expected none beside {place}.{own}")
+            return
+        shape = "vessel" if own else str(given.get("shape", "plane"))
+        if shape == "vessel" and not own:
+            yield cls.missing("mesh", place, ", or planes")
+        for name, of in {"scale": "mesh", "height": "planes"}.items():
+            if own == of and name not in given:
+                yield cls.missing(name, place)
+        if "scale" in given and own != "mesh":
+            yield Problem(within(place, "scale"), None, "expected none without a mesh")
+        sizes = ("height",) if own == "planes" else SIZES.get(shape, ())
         for name in ("opening", "width", "height") if shape in SIZES else ():
             if name in sizes and name not in given:
                 yield cls.missing(name, place)
@@ -129,7 +172,12 @@ class Boundary(Table):
     @property
     def closed(self) -> bool:
         """Whether the boundary is a container for poured beads."""
-        return self.shape in _AREAS
+        return self.shape == "vessel" or self.shape in _AREAS
+
+    @property
+    def vessel(self) -> Vessel:
+        """The surface of a vessel of the user's own."""
+        return _vessel_of(self)
 
     @property
     def bare(self) -> bool:
@@ -149,6 +197,8 @@ class Boundary(Table):
     @property
     def walls(self) -> tuple[Wall, ...]:
         """The floor first, if there is one, then the side walls."""
+        if self.shape == "vessel":
+            return _walls_of(self)
         if self.shape == "groove":
             across, up = cos(self.opening / 2.0), sin(self.opening / 2.0)
             return (Flat(BOTTOM.point, (0.0, across, up), "-y"), Flat(BOTTOM.point, (0.0, -across, up), "+y"))
@@ -174,6 +224,8 @@ class Boundary(Table):
         """
         if self.shape == "groove":
             return 1.0 + abs(cos(self.opening))
+        if self.triangles:  # of faces that turn by a small angle, whose normals are nearly one
+            return 2.0
         return 2.0 if (self.width or inf) < 2.02 * radius else 1.0
 
     def room(
@@ -200,7 +252,12 @@ class Boundary(Table):
         return (-down * _round(cos(self.uphill)), -down * _round(sin(self.uphill)), -press)
 
     def side_clearance(self, places: FloatArray) -> FloatArray:
-        """Distance of each place, shape (n, 3), from the nearest side wall, shape (n,), m."""
+        """Distance of each place, shape (n, 3), from the nearest side wall, shape (n,), m.
+
+        Among the facets of a vessel it is that from the nearest wall, negative for a place outside.
+        """
+        if self.triangles:
+            return self.vessel.clearance(places)
         found = places[:, 0] + inf
         for wall in self.walls:
             if wall.name != FLOOR:
@@ -220,8 +277,12 @@ class Boundary(Table):
 
     @property
     def cross_section(self) -> float:
-        """Inner cross-section of a container, m²."""
-        return self.width**2 * _AREAS[self.shape]
+        """Inner cross-section of a container, m²; of a vessel of the user's own, its mean."""
+        return self.volume(self.height) / self.height if self.shape == "vessel" else self.width**2 * _AREAS[self.shape]
+
+    def volume(self, level: float) -> float:
+        """Volume of a container below a level (m), m³."""
+        return self.vessel.volume(level) if self.shape == "vessel" else self.cross_section * level
 
     def layer(self, largest: float) -> Layer:
         """Places from which beads up to a radius (m) are poured into a container.
@@ -238,6 +299,55 @@ class Boundary(Table):
         room = self.side_clearance(np.array([(x, y, 0.0) for x, y in square]).reshape(-1, 3))
         places = [place for place, clear in zip(square, room, strict=True) if clear > near]
         return Layer(places, pitch, tight=self.shape != "box")
+
+    def layers(self, largest: float, floor: float) -> Iterator[Layer]:
+        """Layers of such places above a height (m), one upon the other; of a vessel of the user's own up to the top."""
+        deep = 2.0 * LOOSE * largest
+        if self.shape != "vessel":
+            layer = self.layer(largest)
+            yield from (layer._replace(level=(number + 0.5) * deep) for number in count())
+            return
+        import numpy as np
+
+        line = deep * (np.arange(ceil(self.width / deep)) - (ceil(self.width / deep) - 1) / 2.0)
+        for level in (np.arange(max(int((2.0 * self.height - floor) / deep), 0)) + 0.5) * deep:
+            places = np.stack(np.meshgrid(line, line, [floor + level]), axis=-1).reshape(-1, 3)
+            clear = np.minimum(self.side_clearance(places), places[:, 2])
+            if len(found := places[clear > (1.0 - 1e-9) * LOOSE * largest]):
+                yield Layer([(x, y) for x, y, _ in found.tolist()], deep, True, float(level))
+
+
+def with_meshes(document: Mapping[str, Any], folder: Path = Path(), names: Sequence[object] = ()) -> dict[str, Any]:
+    """The tables of a case with the meshes that they, or others, name in a folder: as numbers, under ``meshes``.
+
+    So a case is whole without these files. Raises `InputError` if one cannot be read.
+    """
+    own, known = document.get("boundary"), document.get("meshes")
+    known = known if isinstance(known, Mapping) else {}
+    wanted = [*names, own.get("mesh") if isinstance(own, Mapping) else None]
+    if not (new := sorted({name for name in wanted if isinstance(name, str)} - known.keys())):
+        return {**document}
+    from walkers.inputs.vessel import read_mesh
+
+    return {**document, "meshes": {**known, **{name: read_mesh(folder / name) for name in new}}}
+
+
+@lru_cache(maxsize=16)
+def _vessel_of(boundary: Boundary) -> Vessel:
+    from walkers.inputs.vessel import Vessel, vessel_between
+
+    if boundary.triangles:
+        return Vessel.of(boundary.points, boundary.triangles)
+    return vessel_between([(one.point, one.normal) for one in boundary.planes], boundary.height)
+
+
+@lru_cache(maxsize=16)
+def _walls_of(boundary: Boundary) -> tuple[Wall, ...]:
+    from walkers.inputs.vessel import named
+
+    if boundary.triangles:
+        return tuple(boundary.vessel.facets())
+    return tuple(Flat(one.point, one.normal, named(one.normal, number)) for number, one in enumerate(boundary.planes))
 
 
 def _round(value: float) -> float:

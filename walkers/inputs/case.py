@@ -21,7 +21,7 @@ from walkers.errors import InputError, Problem, each, refused, shown, unusable
 from walkers.inputs import units
 from walkers.inputs.axes import is_axis, ranges_of
 from walkers.inputs.bodies import MOST_BEADS, Cluster, Dimers, Mixture, PlacedBead, Walkers
-from walkers.inputs.boundary import Boundary
+from walkers.inputs.boundary import Boundary, with_meshes
 from walkers.inputs.drive import AXES, Drive, Excitation, Vector
 from walkers.inputs.keys import MISSING, flatten, parts_of, value_at
 from walkers.inputs.library import library_of
@@ -255,7 +255,7 @@ class Case(Table):
                     document = changed(cls, document, changes)
                 return cls.read(document, source=source, name=name, around=around)
         with blaming(source, document):
-            document = with_record(document, Path())
+            document = with_meshes(with_record(document, Path()), Path())
             tables, sources, unknown = supplied(cls, document, library_of(document, source))
             try:
                 case = validated(cls, tables, source, further=[*unknown, *contradictions(cls, tables)])
@@ -341,9 +341,7 @@ class Case(Table):
         """Origins of the values, in the order of the tables of a case file."""
         origins: dict[str, Origin] = {}
         for name, value, field in self.leaves():
-            if name in ("title", "uncertain", "drive.record.rows") or name.startswith(
-                "placed["
-            ):  # no value, or hundreds
+            if name in ("title", "uncertain", "drive.record.rows") or name.startswith(("placed[", "boundary.planes[")):
                 continue
             raw, kind = value_at(self.document, parts_of(name)), kind_in([*field.metadata, field.annotation])
             if raw is not MISSING and not units.is_auto(raw):

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, check_utf8, refused, shortened, suggestion
+from walkers.inputs.boundary import with_meshes
 from walkers.inputs.library import FILE_NAME, read_library
 from walkers.inputs.messages import blaming
 from walkers.inputs.record import with_record
@@ -77,11 +78,11 @@ def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
     """The tables of a case file, the user's own library among them under ``library``.
 
     That is the library beside the file; beside a case that comes with the program it is that in ``folder``, the working
-    directory if None. A case that has a ``[library]`` itself takes no other.
+    directory if None. A case that has a ``[library]`` itself takes no other. The mesh of a vessel is read, too.
     """
     document = read_toml(path)
     with blaming(str(path), document):
-        document = dict(with_record(document, path.parent))
+        document = dict(with_meshes(with_record(document, path.parent), path.parent))
     if "library" not in document and path.name != FILE_NAME:
         beside = (folder or Path()) if path.parent == _HERE / "cases" else path.parent
         if own := read_library(beside):

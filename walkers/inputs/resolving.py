@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
-from math import atan2, dist, inf
+from itertools import combinations
+from math import acos, atan2, degrees, dist, inf
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import Problem, expected_of, shown, unusable
 from walkers.inputs.bodies import ARRANGEMENTS, MOST_BEADS, Cluster, Walkers, touching
-from walkers.inputs.drive import common_frequency
+from walkers.inputs.boundary import BOTTOM, SHARP, Plane
+from walkers.inputs.drive import common_frequency, unit_vector
 from walkers.inputs.keys import MISSING, parts_of, value_at
 from walkers.inputs.library import Known, Library, unmeasured
 from walkers.inputs.loads import bridge_at_rest, contact_loads, delay, dimer_of, reach
@@ -80,7 +82,7 @@ def supplied(
     values = _values(library, bead, wall, None if problem else liquid, mixture)
     # What was calibrated was so with one law of the bridges: with another it is a guess.
     calibrated = liquid if said["liquid.law"] in (MISSING, DEFAULT_LAW) else None
-    tables = {name: value for name, value in document.items() if name != "library"}
+    tables = {name: value for name, value in document.items() if name not in ("library", "meshes")}
     tables.setdefault("contact", {})
     written: dict[str, Any] = {}
     for key in SUPPLIED:
@@ -189,6 +191,49 @@ def _radii(case: Case) -> Case:
     return case
 
 
+def _vessel(case: Case) -> Case:
+    """A vessel of the user's own: its planes, or its points and triangles where it has no planes, and its extent."""
+    boundary = case.boundary
+    if boundary.mesh is None and not boundary.planes:
+        return case
+    from walkers.inputs.vessel import vessel_of
+
+    why = "of the mesh"
+    if boundary.mesh is not None:
+        try:
+            vessel = vessel_of(case.document["meshes"][boundary.mesh], boundary.scale)
+        except (KeyError, IndexError, TypeError, ValueError) as error:
+            raise unusable("meshes", f"expected points and triangles of {boundary.mesh}") from error
+        boundary = boundary.but(planes=tuple(Plane(point=at, normal=way) for at, way in vessel.planes or ()))
+        if not boundary.planes:
+            boundary = boundary.but(
+                points=tuple(map(tuple, vessel.points)), triangles=tuple(map(tuple, vessel.triangles))
+            )
+        case = case.but(boundary=boundary).filled("boundary.height", vessel.height, why)
+    else:
+        planes, why = _planes(boundary.planes), "of the planes"
+        case = case.put("boundary.planes", planes)
+    extent = float(abs(case.boundary.but(shape="vessel").vessel.points[:, :2]).max())
+    case = case.filled("boundary.width", float(f"{2.0 * extent:.12g}"), why)
+    return case.filled("boundary.shape", "vessel", why)
+
+
+def _planes(planes: Sequence[Plane]) -> tuple[Plane, ...]:
+    """The planes with normals of length one, a level one through the origin first."""
+    found = []
+    for number, plane in enumerate(planes):
+        try:
+            found.append(plane.but(normal=unit_vector(plane.normal)))
+        except ValueError as error:
+            raise unusable(f"boundary.planes[{number}].normal", "expected a direction such as [0, 0, 1]") from error
+    for (number, one), (other, two) in combinations(enumerate(found), 2):
+        turn = acos(max(-1.0, min(1.0, sum(a * b for a, b in zip(one.normal, two.normal, strict=True)))))
+        if turn < SHARP:
+            message = f"turns by {degrees(turn):.3g} deg from planes[{number}]; expected 45 deg or more, or a mesh"
+            raise unusable(f"boundary.planes[{other}].normal", message)
+    return tuple(sorted(found, key=lambda one: one.normal != BOTTOM.normal or one.point[2] != 0.0))
+
+
 def _viscosity(case: Case) -> Case:
     liquid = case.liquid
     if liquid.kinematic_viscosity is not None:
@@ -212,7 +257,7 @@ def _count(case: Case) -> Case:
     if not case.boundary.closed:
         raise unusable("boundary.shape", 'expected a container, such as "box": a mixture is poured into it')
     if mixture.count is None:
-        count = round(_PACKING * case.boundary.cross_section * mixture.fill_height / mixture.mean_volume)
+        count = round(_PACKING * case.boundary.volume(mixture.fill_height) / mixture.mean_volume)
         if not 1 <= count <= MOST_BEADS:
             raise unusable("mixture.fill_height", f"that takes {count} beads; expected 1 to {MOST_BEADS}")
         case = case.filled("mixture.count", count, "from the fill_height")
@@ -416,6 +461,7 @@ def _gravity(case: Case) -> Case:
 
 STEPS: Sequence[Callable[[Case], Case]] = (
     *(
+        _vessel,
         _radii,
         _viscosity,
         _count,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from walkers.errors import unusable
 from walkers.inputs.bodies import Mixture, Walkers
-from walkers.inputs.boundary import LOOSE, Boundary
+from walkers.inputs.boundary import FLOOR, LOOSE, Boundary
 from walkers.inputs.loads import contact_loads
 
 if TYPE_CHECKING:
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 OVERLAP = 0.01
 """Radii by which beads that are given places may overlap with each other and the walls."""
+_WIDEST = 1000.0
+_MOST_PARTS = 10_000_000  # of beads and walls: each bead has 32 bytes for each wall
 
 
 class StandingBead(NamedTuple):
@@ -95,14 +97,11 @@ def _poured(case: Case, mixture: Mixture) -> Standing:
     from numpy.random import default_rng
 
     largest, draw = max(mixture.radii), default_rng(case.run.seed)
-    layer = case.boundary.layer(largest)
     floor, beads = _top_of_others(case), []
-    for number, radius in enumerate(float(one) for one in draw.permutation(mixture.all_radii)):
-        level, place = divmod(number, len(layer.places))
-        x, y = layer.places[place]
+    places = ((layer, x, y) for layer in case.boundary.layers(largest, floor) for x, y in layer.places)
+    for radius, (layer, x, y) in zip((float(one) for one in draw.permutation(mixture.all_radii)), places):  # noqa: B905
         shift = draw.uniform(-1.0, 1.0, 2) * 0.9 * layer.play(radius, largest)
-        height = (level + 0.5) * 2.0 * LOOSE * largest
-        beads.append(StandingBead(x + float(shift[0]), y + float(shift[1]), floor + height, radius))
+        beads.append(StandingBead(x + float(shift[0]), y + float(shift[1]), floor + layer.level, radius))
     return Standing(tuple(beads))
 
 
@@ -115,6 +114,8 @@ def _top_of_others(case: Case) -> float:
 def check_bodies(case: Case) -> Case:
     """Refuse bodies that do not fit into the boundary or beside each other."""
     boundary, mixture = case.boundary, case.mixture
+    if boundary.shape == "vessel":
+        _check_vessel(case)
     if case.run.ranks > 1 and not boundary.closed:
         raise unusable("run.ranks", "expected 1: walkers on a plane run slower on several processes")
     if not case.walkers and mixture is None and "seed" in case.document.get("run", {}):
@@ -130,8 +131,34 @@ def check_bodies(case: Case) -> Case:
     return case
 
 
+def _check_vessel(case: Case) -> None:
+    """Refuse a vessel of another scale than the beads, of too many faces for them, or without a floor for walkers."""
+    boundary, size = case.boundary, 2.0 * max(case.radii)
+    blamed = "boundary.planes" if boundary.mesh is None else "boundary.mesh"
+    if not 1.0 < boundary.width / size < _WIDEST:
+        wide = f"the vessel is {_length(boundary.width)} wide and the beads {_length(size)}"
+        raise unusable("boundary.scale" if boundary.mesh else blamed, f"{wide}; expected 1 to {_WIDEST:g} beads across")
+    if (walls := len(boundary.walls)) * case.count > _MOST_PARTS:
+        most = f"at most {_MOST_PARTS // case.count} for {case.count} beads: a coarser mesh"
+        raise unusable(blamed, f"has {walls} faces, edges and corners; expected {most}")
+    if case.walkers and boundary.walls[0].name != FLOOR:
+        raise unusable(
+            blamed, "has no level floor at its bottom, on which walkers stand; expected [[placed]] beads in it"
+        )
+
+
+def _length(size: float) -> str:
+    return f"{size:.3g} m" if size >= 1.0 else f"{1e3 * size:.3g} mm"
+
+
 def _check_pour(mixture: Mixture, boundary: Boundary, floor: float) -> None:
     largest = max(mixture.large_radii)
+    if boundary.shape == "vessel":
+        room = sum(len(layer.places) for layer in boundary.layers(max(mixture.radii), floor))
+        if room < mixture.count:
+            fits = f"the vessel has places for {room} beads, up to twice its height"
+            raise unusable("mixture.count", f"{fits} of {1e3 * boundary.height:.4g} mm; expected at most {room}")
+        return
     if boundary.width < 4.0 * largest:
         raise unusable("boundary.width", "expected at least two of the large beads side by side")
     layer = boundary.layer(largest)
@@ -200,7 +227,10 @@ def _outside(case: Case, beads: list[_Held]) -> list[bool]:
     """Whether each bead is within a side wall."""
     import numpy as np
 
-    clearances = case.boundary.side_clearance(np.array([bead.place for bead in beads]))
+    places, boundary = np.array([bead.place for bead in beads]), case.boundary
+    clearances = boundary.side_clearance(places)
+    if boundary.triangles and case.walkers:  # they stand on its floor
+        clearances = np.where(np.isfinite(boundary.walls[0].distances(places)), clearances, -1.0)
     return [clear < (1.0 - OVERLAP) * bead.radius for bead, clear in zip(beads, clearances, strict=True)]
 
 

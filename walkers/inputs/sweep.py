@@ -34,6 +34,7 @@ from walkers.inputs.axes import (
     sampled,
     zipped,
 )
+from walkers.inputs.boundary import with_meshes
 from walkers.inputs.case import Case
 from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
@@ -229,6 +230,8 @@ def expand(
                     raise unusable(key, f"expected one of {key} and {other}, which replace each other")
             case_name, given = (path.stem, read_case(path, folder)) if path else base or ("", {})
             tables = changed(Case, given, settings)
+            meshes = [row[keys.index("boundary.mesh")] for row in rows] if "boundary.mesh" in keys else []
+            tables = with_meshes(tables, folder, meshes)
             changed(Case, tables, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:
         raise refused(source, "has infinitely nested tables") from error

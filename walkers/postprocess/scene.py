@@ -272,10 +272,14 @@ def plan_axes(motion: Motion, along: FloatArray) -> FloatArray:
 def walls_of(motion: Motion) -> list[FloatArray]:
     """Corners of each wall, counterclockwise as seen from the beads, m, shape (K, 3).
 
-    The walls of a container end at its rim, unbounded walls around the beads. A cylinder is a prism.
+    The walls of a container end at its rim, unbounded walls around the beads. A cylinder is a prism; a vessel of the
+    user's own is its triangles.
     """
     from scipy.spatial import HalfspaceIntersection
 
+    if motion.case.boundary.shape == "vessel":
+        vessel = motion.case.boundary.vessel
+        return [*vessel.points[vessel.triangles]]
     boundary, margin, inside = motion.case.boundary, 4.0 * float(motion.radius.max()), motion.position[0, 0]
     low, high = motion.position.min(axis=(0, 1)) - margin, motion.position.max(axis=(0, 1)) + margin
     if boundary.closed:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, inf, prod, sqrt
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.errors import InputError, Problem
+from walkers.inputs.boundary import Flat, Round
 from walkers.inputs.case import Case
 from walkers.inputs.drive import AXES, Excitation, Vector
 from walkers.inputs.loads import bridge_at_rest, hop_height, reach
@@ -19,17 +20,21 @@ from walkers.templates.parameters import PRINTED, STATUS_LINES_PER_CYCLE, along,
 from walkers.templates.scene import Scene, Surface, place, surface_of
 from walkers.text import rendered
 
+if TYPE_CHECKING:
+    from walkers.inputs.vessel import Facet
+
 DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"
 LAYOUT_NAME = "layout.json"
 BRIDGES_NAME = "bridges.txt"
 LOADS_NAME = "loads.txt"
+FACETS_NAME = "facets.txt"
 RUN_NAME = "run.sh"
 SCALE_NAME = "scale.awk"
 """Script beside decks to be run by hand: rescales the tables for an edited viscosity."""
 _NAMES = {
     **{"layout": LAYOUT_NAME, "bridges": BRIDGES_NAME, "scaled": "bridges.scaled.txt"},
-    **{"loads": LOADS_NAME, "run": RUN_NAME, "scale": SCALE_NAME},
+    **{"loads": LOADS_NAME, "facets": FACETS_NAME, "run": RUN_NAME, "scale": SCALE_NAME},
 }
 CONTENT_VERSION = 9
 """Version of what decks compute, part of the names of runs: increase it if a case gives other numbers.
@@ -177,6 +182,8 @@ def compose(plan: Plan) -> Deck:
     record = case.excitation.record
     files |= {f"record.{axis}.txt": record.pieces(place) for axis, place in record.axes.items()} if record else {}
     files |= {LOADS_NAME: _loads(scene)} if len(scene.loadings) > 1 else {}
+    facets = [wall for wall in scene.walls if not isinstance(wall, (Flat, Round))]
+    files |= {FACETS_NAME: "".join(map(_facet, facets))} if facets else {}
     limits = limits_of(case)
     text = rendered(
         "walkers.templates",
@@ -239,6 +246,19 @@ def _loads(scene: Scene) -> str:
         for bead in scene.beads
         if bead.loading
     )
+
+
+def _facet(facet: Facet) -> str:
+    """A facet as the engine reads it, a line for each cell."""
+
+    def numbers(*values: float) -> str:
+        return " ".join(repr(float(x)) for x in values)
+
+    cells = (
+        f"{len(cell)}  {'  '.join(numbers(*at, *way, least) for at, way, least in cell)}\n" for cell in facet.cells
+    )
+    head = f"{facet.kind} {numbers(*facet.point)}  {numbers(*facet.along)}  {len(facet.cells)}\n"
+    return head + "".join(cells)
 
 
 def _search(plan: Plan) -> dict[str, Any]:

@@ -1,0 +1,137 @@
+"""Vessels of the user's own: surfaces from files, and the forces of their faces, edges and corners."""
+
+from __future__ import annotations
+
+from itertools import product
+from math import cos, sin, sqrt, tan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from walkers.check.scenes import DRY, Bench, bench_case, full_case, prescribed, standing
+from walkers.inputs.vessel import Vessel
+from walkers.postprocess.dump import FloatArray
+from walkers.runner.binary import find_engine
+from walkers.templates.scene import Bead
+
+R = 1e-4
+"""Radius of the beads, m."""
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    return Bench(find_engine(), tmp_path)
+
+
+def cuboid(low: FloatArray, high: FloatArray, toward: float = 1.0) -> Vessel:
+    """A block with beads around it, or (-1) a room with beads in it."""
+    points = np.array([[(low, high)[k][axis] for axis, k in enumerate(corner)] for corner in product((0, 1), repeat=3)])
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    triangles = np.array([[a, *pair] for a, b, c, d in quads for pair in ((b, c), (c, d))])
+    return Vessel(points, triangles if toward > 0.0 else triangles[:, ::-1])
+
+
+def extruded(profile: list[tuple[float, float]], half: float = 5e-3) -> Vessel:
+    """A profile in x and z, beads above it, along y."""
+    points = np.array([(x, y, z) for x, z in profile for y in (-half, half)])
+    return Vessel(points, np.array([(k + a, k + b, k + c) for k in range(0, 2 * len(profile) - 2, 2)
+                                    for a, b, c in ((0, 2, 1), (1, 2, 3))]))  # fmt: skip
+
+
+def hertz(overlap: float) -> float:
+    """Repulsion of a bead from a plane in `bench_case`, N."""
+    return 4.0 / 3.0 * 50e6 / (2.0 * (1.0 - 0.3**2)) * sqrt(R) * overlap**1.5
+
+
+def forces_on(bench: Bench, vessel: Vessel, centres: FloatArray, changes: dict[str, Any], **motion: Any) -> FloatArray:
+    """Forces on beads that are moved, or held, in each of some steps, N, shape (F, N, 3)."""
+    beads = [Bead(0, tuple(centre), R, motion.get("velocity", (0.0, 0.0, 0.0)), motion.get("spin", (0.0, 0.0, 0.0)))
+             for centre in centres.tolist()]  # fmt: skip
+    case = motion.get("case", bench_case)(changes)
+    return bench.run(prescribed(case, standing(beads, tuple(vessel.facets())), motion.get("steps", 2))).forces[..., :3]
+
+
+def test_faces_edges_and_corners_repel_as_planes_do(bench: Bench) -> None:
+    """Around a block that is turned, each bead touches the nearest point of it once: in a face, an edge or a corner."""
+    from scipy.spatial.transform import Rotation
+
+    turn, half, overlap = Rotation.from_rotvec([0.4, -0.7, 0.9]).as_matrix(), np.array([4e-4, 3e-4, 2e-4]), 1e-6
+    draw, centres, ways = np.random.default_rng(1), [], []
+    block = cuboid(-half, half)
+    while len(centres) < 40:
+        way = draw.normal(size=3)
+        nearest = half * np.clip(draw.uniform(-2.0, 2.0, size=3), -1.0, 1.0)
+        out = (np.abs(nearest) == half) * np.sign(nearest) * np.abs(way)
+        if not out.any():
+            continue
+        ways.append(turn @ (out / np.linalg.norm(out)))
+        centre = turn @ nearest + (R - overlap) * ways[-1]
+        if all(np.linalg.norm(centre - other) > 2.1 * R for other in centres):
+            centres.append(centre)
+        else:
+            ways.pop()
+    around = np.sum([np.sum(np.abs(np.array(ways) @ turn) > 1e-9, axis=1) == kind for kind in (1, 2, 3)], axis=1)
+    assert (around > 2).all()
+    found = forces_on(bench, Vessel(block.points @ turn.T, block.triangles), np.array(centres), DRY)[0]
+    np.testing.assert_allclose(found, hertz(overlap) * np.array(ways), rtol=0, atol=1e-12 * hertz(overlap))
+
+
+DEEP = 1e-6
+SLOT = [(-1e-3, 0.0), (-6e-5, 0.0), (-6e-5, -1e-3), (6e-5, -1e-3), (6e-5, 0.0), (1e-3, 0.0)]
+RIDGE = [(-1e-3, -1e-3), (0.0, 0.0), (1e-3, -1e-3)]
+VALLEY = [(-1e-3, 1e-3), (0.0, 0.0), (1e-3, 1e-3)]
+FLAT = [(-1e-3, 0.0), (2e-5, 0.0), (1e-3, 0.0)]
+STEP = [(-1e-3, 0.0), (0.0, 0.0), (0.0, 2e-4), (1e-3, 2e-4)]
+BENT = [(-1e-3, 1e-3 * tan(0.1)), (0.0, 0.0), (1e-3, 0.0)]
+_HALF = sqrt(0.5)
+_RISE = sqrt((R - DEEP) ** 2 - 6e-5**2)
+PROFILES: dict[str, tuple[list[tuple[float, float]], tuple[float, float], list[tuple[float, float]]]] = {
+    "a face": (FLAT, (-3e-4, R - DEEP), [(0.0, 1.0)]),
+    "two triangles of a face": (FLAT, (2e-5, R - DEEP), [(0.0, 1.0)]),
+    "upon a ridge": (RIDGE, (0.0, R - DEEP), [(0.0, 1.0)]),
+    "beside a ridge": (RIDGE, ((R - DEEP) * sin(0.3), (R - DEEP) * cos(0.3)), [(sin(0.3), cos(0.3))]),
+    "where a face ends at a ridge": (RIDGE, (_HALF * (R - DEEP), _HALF * (R - DEEP)), [(_HALF, _HALF)]),
+    "a valley": (VALLEY, (0.0, (R - DEEP) / _HALF), [(_HALF, _HALF), (-_HALF, _HALF)]),
+    "a face beside a valley": (BENT, (3e-5, R - DEEP), [(0.0, 1.0)]),
+    "the foot of a step": (STEP, (-R + DEEP, R - DEEP), [(0.0, 1.0), (-1.0, 0.0)]),
+    "the edge of a step": (STEP, (-(R - DEEP) * sin(0.5), 2e-4 + (R - DEEP) * cos(0.5)), [(-sin(0.5), cos(0.5))]),
+    "over a slot": (SLOT, (0.0, _RISE), [(s * 6e-5 / (R - DEEP), _RISE / (R - DEEP)) for s in (1.0, -1.0)]),
+    "behind a face": (FLAT, (0.0, -R + DEEP), []),
+}
+"""Profiles, places of a bead (x, z), and the directions in which it is pushed, each as by a plane."""
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_a_bead_touches_what_is_nearest_around_it_once(bench: Bench, name: str) -> None:
+    profile, (x, z), ways = PROFILES[name]
+    (found,) = forces_on(bench, extruded(profile), np.array([(x, 0.0, z)]), DRY)[0]
+    expected = hertz(DEEP) * np.array([0.0, 0.0, 0.0]) + sum(hertz(DEEP) * np.array([a, 0.0, b]) for a, b in ways)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * hertz(DEEP))
+    walls = tuple(extruded(profile).facets())
+    assert sum(float(wall.distances(np.array([x, 0.0, z]))) < R for wall in walls) == len(ways)
+
+
+def roof(turn: float) -> list[tuple[float, float]]:
+    """A level face, and one that falls away from it by an angle (rad)."""
+    return [(-1e-3, 0.0), (0.0, 0.0), (1e-3, -1e-3 * tan(turn))]
+
+
+@pytest.mark.parametrize("gap", [-DEEP, 0.2 * R])
+def test_bridge_and_spring_go_with_a_bead_over_an_edge(bench: Bench, gap: float) -> None:
+    """It slides from a face over a ridge of 0.01 rad onto the next, and is held, and pulled, as on a plane.
+
+    At a gap above that of formation only the bridge of before can pull: there is one as the bead has touched.
+    """
+    speed, steps = 0.02, 400  # 8 um across the ridge, less than what slips
+    rough = {"contact.friction.bead_wall": 100.0, "contact.rolling_friction": 0.0}
+    start = np.array([(-4e-6, 0.0, R + min(gap, 0.0))])
+    moves = {"velocity": (speed, 0.0, 0.0), "steps": steps, "case": full_case}
+    if gap > 0.0:  # lifted as it crosses
+        moves["velocity"] = (speed, 0.0, gap / (steps * 1e-6))
+    over, plane = (
+        forces_on(bench, extruded(profile), start, rough, **moves)[:, 0] for profile in (roof(0.01), roof(0.0))
+    )
+    assert np.abs(plane[-1]).min(where=np.array([True, False, True]), initial=1.0) > 1e-6
+    np.testing.assert_allclose(over, plane, rtol=0, atol=0.05 * np.abs(plane).max())

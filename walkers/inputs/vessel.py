@@ -1,0 +1,465 @@
+"""Vessels of the user's own: a mesh file becomes a clean surface, and the surface becomes walls.
+
+A bead touches a surface wherever its distance has a local minimum. Of a surface of flat faces these are points within
+faces, and points of edges and corners that stand out toward the beads: each such part is a `Facet`, and says of a bead
+whether the nearest point is in it. A point where facets meet is in one of them alone, so that no contact counts twice.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from io import StringIO
+from itertools import pairwise
+from math import cos, inf
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from walkers.errors import InputError, unusable
+from walkers.inputs.boundary import SHARP
+from walkers.inputs.drive import Vector
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+Half = tuple[Vector, Vector, float]
+"""A point, a direction and a bound: a place is in it if its offset from the point is above the bound along it."""
+MOST_TRIANGLES = 20_000
+_SAME = 1e-6
+"""Of the extent of a surface: points that are nearer are one."""
+_COPLANAR = cos(1e-3)
+_CLOSED, _ACROSS = -3e-308, -1e-12  # bounds of halves: the border is in it; triangles of one face overlap (m)
+
+
+class Facet(NamedTuple):
+    """A part of a surface: ``face``, ``edge`` or ``corner``.
+
+    ``point`` is in it (m); ``along`` is the normal of a face, toward the beads, the direction of an edge, zero of a
+    corner. The nearest point of the surface is in it for beads that are in one of the ``cells``.
+    """
+
+    kind: str
+    point: Vector
+    along: Vector
+    cells: tuple[tuple[Half, ...], ...]
+    name: str
+
+    def _away(self, places: FloatArray) -> FloatArray:
+        away, along = places - self.point, np.array(self.along)
+        over: FloatArray = (away @ along)[..., None] * along
+        return over if self.kind == "face" else away - over
+
+    def distances(self, places: FloatArray) -> FloatArray:
+        """Of places, shape (..., 3), m; infinite where another part of the surface is nearer."""
+        within = np.zeros(places.shape[:-1], dtype=bool)
+        for cell in self.cells:
+            at, way, least = (np.array(each) for each in zip(*cell, strict=True))
+            within |= np.all(np.einsum("...hx,hx->...h", places[..., None, :] - at, way) > least, axis=-1)
+        if self.kind == "face":
+            within &= (places - self.point) @ np.array(self.along) > 0.0
+        found: FloatArray = np.where(within, np.linalg.norm(self._away(places), axis=-1), inf)
+        return found
+
+    def normals(self, places: FloatArray) -> FloatArray:
+        """Unit vectors away from it, of the shape of the places."""
+        away = self._away(places)
+        found: FloatArray = away / np.linalg.norm(away, axis=-1, keepdims=True)
+        return found
+
+
+@lru_cache(maxsize=64)
+def _read(path: Path, _changed: int) -> dict[str, Any]:
+    import meshio
+
+    try:
+        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+            mesh = meshio.read(path)
+        points = np.asarray(mesh.points)
+        digits = 7 if points.dtype == np.float32 else 15  # 2.65, not 2.6500000953
+        parts = []
+        for block in mesh.cells:
+            sides = {"triangle": 3, "quad": 4}.get(block.type.rstrip("0123456789"), 0)
+            sides = len(block.data[0]) if block.type == "polygon" else sides
+            corners = np.array(block.data, dtype=np.int64)[:, :sides]
+            parts += [corners[:, [0, side - 1, side]] for side in range(2, sides)]
+        given = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
+        triangles = np.concatenate([np.empty((0, 3), dtype=np.int64), *parts])
+        exact = [[float(f"{x:.{digits}g}") for x in point] for point in given.tolist()]
+    except (Exception, SystemExit) as error:  # meshio ends the process where a file is not of its format
+        raise unusable(
+            "boundary.mesh", "cannot be read: expected a mesh that meshio reads (STL, OBJ, PLY, …)"
+        ) from error
+    return {"points": exact, "triangles": triangles.tolist()}
+
+
+def read_mesh(path: Path) -> dict[str, Any]:
+    """Points (in the file's unit) and triangles of a mesh file; raises `InputError` if it has none."""
+    if not path.is_file():
+        raise unusable("boundary.mesh", "no such file; expected a mesh, a path from the case file")
+    mesh = _read(path, path.stat().st_mtime_ns)
+    if not 3 < len(mesh["triangles"]) <= MOST_TRIANGLES:
+        found = f"has {len(mesh['triangles'])} triangles"
+        raise unusable("boundary.mesh", f"{found}; expected the inner surface of a vessel, 4 to {MOST_TRIANGLES}")
+    return mesh
+
+
+def _at(point: FloatArray) -> str:
+    return f"({', '.join(f'{1e3 * x + 0.0:.4g}' for x in point)}) mm"
+
+
+def _broken(problem: str, point: FloatArray, expected: str) -> InputError:
+    return unusable("boundary.mesh", f"{problem} at {_at(point)}; expected {expected}")
+
+
+@dataclass(frozen=True)
+class Vessel:
+    """A surface around the beads: points (m), shape (P, 3), and triangles, counterclockwise as seen from the beads."""
+
+    points: FloatArray
+    triangles: IntArray
+
+    @classmethod
+    def of(cls, points: Sequence[Sequence[float]], triangles: Sequence[Sequence[int]]) -> Vessel:
+        """A vessel of numbers that are known to be one."""
+        return cls(np.array(points, dtype=np.float64), np.array(triangles, dtype=np.int64))
+
+    @cached_property
+    def normals(self) -> FloatArray:
+        """Of the triangles, toward the beads, shape (T, 3)."""
+        first, second, third = self.points[self.triangles.T]
+        area = np.cross(second - first, third - first)
+        normals: FloatArray = area / np.linalg.norm(area, axis=1, keepdims=True)
+        return normals
+
+    @cached_property
+    def sharing(self) -> dict[frozenset[int], list[tuple[int, int]]]:
+        """Triangles at each edge, with the side of the triangle that it is."""
+        found: dict[frozenset[int], list[tuple[int, int]]] = defaultdict(list)
+        for number, corners in enumerate(self.triangles.tolist()):
+            for side in range(3):
+                found[frozenset((corners[side], corners[(side + 1) % 3]))].append((number, side))
+        return dict(found)
+
+    def _ends(self, triangle: int, side: int) -> tuple[int, int]:
+        corners = self.triangles[triangle]
+        return int(corners[side]), int(corners[(side + 1) % 3])
+
+    def _spread(self, joins: Callable[[int, int], bool]) -> IntArray:
+        """Number of the first triangle of all that are joined over edges, shape (T,)."""
+        beside: dict[int, list[int]] = defaultdict(list)
+        for pair in self.sharing.values():
+            for one, _ in pair:
+                beside[one] += [other for other, _ in pair if other != one]
+        labels = np.full(len(self.triangles), -1)
+        for seed in range(len(labels)):
+            todo = [seed] if labels[seed] < 0 else []
+            while todo:
+                labels[one := todo.pop()] = seed
+                todo += [other for other in beside[one] if labels[other] < 0 and joins(seed, other)]
+        return labels
+
+    @cached_property
+    def faces(self) -> IntArray:
+        """Number of the first triangle of the face of each: connected ones in a plane."""
+        return self._spread(lambda seed, other: float(self.normals[seed] @ self.normals[other]) > _COPLANAR)
+
+    @cached_property
+    def rims(self) -> list[list[int]]:
+        """Points along each opening."""
+        follows = dict(self._ends(*shared[0]) for shared in self.sharing.values() if len(shared) == 1)
+        rims = []
+        while follows:
+            rims.append([first := next(iter(follows))])
+            while (point := follows.pop(rims[-1][-1], first)) != first:
+                rims[-1].append(point)
+        return rims
+
+    @cached_property
+    def height(self) -> float:
+        """Of the lowest point of the rim, or of the top of a closed vessel, m."""
+        return float(min((self.points[rim, 2].min() for rim in self.rims), default=self.points[:, 2].max()))
+
+    @cached_property
+    def capped(self) -> Vessel:
+        """The vessel with a lid on each opening."""
+        points, triangles = [*self.points], [*self.triangles]
+        for rim in self.rims:
+            triangles += [
+                np.array([end, begin, len(points)]) for begin, end in zip(rim, [*rim[1:], rim[0]], strict=True)
+            ]
+            points.append(self.points[rim].mean(axis=0))
+        return Vessel(np.array(points), np.array(triangles))
+
+    def volume(self, level: float = inf, slices: int = 400) -> float:
+        """Volume below a level (m), m³, from the areas of slices."""
+        closed = self.capped
+        low = closed.points[:, 2].min()
+        step = (min(level, self.height) - low) / slices
+        corners = closed.points[closed.triangles]
+        total = 0.0
+        for z in low + (np.arange(slices) + 0.5) * step:
+            up = corners[..., 2] > z
+            cut = corners[up.any(axis=1) & ~up.all(axis=1)]
+            rise = np.roll(cut, -1, axis=1)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                crossing = cut + ((z - cut[..., 2]) / (rise[..., 2] - cut[..., 2]))[..., None] * (rise - cut)
+            above = cut[..., 2] > z
+            goes = np.roll(above, -1, axis=1) & ~above  # from below to above; the other way where it ends
+            comes = above & ~np.roll(above, -1, axis=1)
+            begin, end = crossing[goes], crossing[comes]
+            total += step * 0.5 * abs(float(np.sum(begin[:, 0] * end[:, 1] - begin[:, 1] * end[:, 0])))
+        return total
+
+    def clearance(self, places: FloatArray) -> FloatArray:
+        """Distance of places from the surface, shape (n,), m, negative outside; above the rim it is open."""
+        import pyvista as pv
+
+        def distances(vessel: Vessel, of: FloatArray) -> FloatArray:
+            surface = pv.PolyData.from_regular_faces(vessel.points, vessel.triangles)
+            return np.array(pv.PolyData(of).compute_implicit_distance(surface)["implicit_distance"])
+
+        below = places.copy()
+        below[:, 2] = np.minimum(below[:, 2], self.height - 1e-3 * np.ptp(self.points[:, 2]))
+        found: FloatArray = np.copysign(distances(self, places), distances(self.capped, below))
+        return found
+
+    @cached_property
+    def turns(self) -> list[float]:
+        """Angle by which the surface turns at each edge between faces, rad; negative where it stands out."""
+        angles = []
+        for shared in self.sharing.values():
+            if len(shared) == 2 and self.faces[shared[0][0]] != self.faces[shared[1][0]]:
+                one, other = (number for number, _ in shared)
+                turn = float(np.arccos(np.clip(self.normals[one] @ self.normals[other], -1.0, 1.0)))
+                angles.append(turn if self._inward(*shared[1]) @ self.normals[one] > 0.0 else -turn)
+        return angles
+
+    @property
+    def planes(self) -> list[tuple[Vector, Vector]] | None:
+        """Points and normals of the planes that are the same vessel, the floor first; None if none are."""
+        if min(self.turns) < SHARP or len(set(self._spread(lambda *_: True).tolist())) > 1:
+            return None
+        planes = []
+        for first in self._in_order():
+            normal = self.normals[first]
+            foot = (normal @ self.points[self.triangles[first, 0]]) * normal
+            planes.append((_vector(foot), _vector(normal)))
+        return planes
+
+    def _in_order(self) -> list[int]:
+        """The faces, first a level one at the bottom, if there is any."""
+        faces = list(dict.fromkeys(self.faces.tolist()))
+        bottom = _SAME * float(np.ptp(self.points, axis=0).max())
+        level = [face for face in faces if self.normals[face, 2] > _COPLANAR and self._lowest(face) < bottom]
+        return [*level[:1], *(face for face in faces if face not in level[:1])]
+
+    def _lowest(self, face: int) -> float:
+        return float(self.points[self.triangles[self.faces == face], 2].max())
+
+    def _inward(self, triangle: int, side: int) -> FloatArray:
+        """Unit vector in a triangle across one of its sides."""
+        begin, end = self.points[[*self._ends(triangle, side)]]
+        across = np.cross(self.normals[triangle], end - begin)
+        unit: FloatArray = across / np.linalg.norm(across)
+        return unit
+
+    def facets(self) -> Iterator[Facet]:
+        """Its faces, the floor first, then the edges and corners that stand out."""
+        yield from self._of_faces()
+        standing: list[frozenset[int]] = []
+        for edge, shared in self.sharing.items():
+            if len(shared) == 2:
+                (one, _), other = shared
+                if self.faces[one] == self.faces[other[0]] or self._inward(*other) @ self.normals[one] >= 0.0:
+                    continue
+            standing.append(edge)
+            begin, end = self._ends(*shared[0])
+            first, last = self.points[begin], self.points[end]
+            halves = [(first, last - first), (last, first - last)]
+            halves += [(self.points[self._ends(*at)[0]], -self._inward(*at)) for at in shared]
+            cell = tuple((_vector(at), _vector(way), 0.0) for at, way in halves)
+            along = _vector((last - first) / np.linalg.norm(last - first))
+            yield Facet("edge", _vector(first), along, (cell,), f"edge {len(standing)}")
+        corners = sorted({point for edge in standing for point in edge})
+        for number, corner in enumerate(corners, 1):
+            others = sorted(other for edge in self.sharing if corner in edge for other in edge - {corner})
+            at = self.points[corner]
+            cell = tuple((_vector(at), _vector(at - self.points[other]), _CLOSED) for other in others)
+            yield Facet("corner", _vector(at), (0.0, 0.0, 0.0), (cell,), f"corner {number}")
+
+    def _of_faces(self) -> Iterator[Facet]:
+        for number, face in enumerate(self._in_order()):
+            cells = []
+            for triangle in np.flatnonzero(self.faces == face).tolist():
+                halves = []
+                for side in range(3):
+                    begin, end = self._ends(triangle, side)
+                    within = all(self.faces[other] == face for other, _ in self.sharing[frozenset((begin, end))])
+                    within &= len(self.sharing[frozenset((begin, end))]) > 1
+                    inward = _vector(self._inward(triangle, side))
+                    halves.append((_vector(self.points[begin]), inward, _ACROSS if within else _CLOSED))
+                cells.append(tuple(halves))
+            normal = _vector(self.normals[face])
+            yield Facet(
+                "face", _vector(self.points[self.triangles[face, 0]]), normal, tuple(cells), named(normal, number)
+            )
+
+
+def _vector(array: FloatArray) -> Vector:
+    x, y, z = (array + 0.0).tolist()
+    return (x, y, z)
+
+
+def named(normal: Vector, number: int) -> str:
+    """Name of a wall by its side, or by its number in the vessel: the first is the floor if it is level."""
+    level = {(0.0, 0.0, 1.0): "floor"} if number == 0 else {}
+    sides = {(1.0, 0.0, 0.0): "-x", (-1.0, 0.0, 0.0): "+x", (0.0, 1.0, 0.0): "-y", (0.0, -1.0, 0.0): "+y"}
+    return (sides | level).get(tuple(round(x, 9) + 0.0 for x in normal), f"face {number + 1}")  # type: ignore[arg-type]
+
+
+# --- from a file ------------------------------------------------------------------------------------------------------
+
+
+def vessel_of(mesh: Mapping[str, Any], scale: float) -> Vessel:
+    """A vessel of a mesh (`read_mesh`) in units of a length (m), its lowest point at z = 0, about the z axis.
+
+    Raises `InputError` if it is not the inner surface of one vessel.
+    """
+    points, triangles = _merged(np.array(mesh["points"]) * scale, np.array(mesh["triangles"]))
+    vessel = _oriented(Vessel(points, triangles))
+    _check_crossings(vessel)
+    if vessel.height <= points[:, 2].min() + _SAME * np.ptp(points):
+        lowest = vessel.points[vessel.rims[0]]
+        lowest = lowest[lowest[:, 2].argmin()]
+        raise _broken("is open at its lowest point,", lowest, "a closed bottom: beads would fall out")
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = np.array([*(low + high)[:2] / 2.0, low[2]])
+    return Vessel(np.array([[float(f"{x:.12g}") for x in point] for point in points - middle]), vessel.triangles)
+
+
+def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
+    """The points, those that are nearly the same as one, and the triangles that are left, each once."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    near = _SAME * float(np.ptp(points, axis=0).max())
+    pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
+    _, first, same = np.unique(connected_components(graph)[1], return_index=True, return_inverse=True)
+    triangles = same[triangles]
+    sides = points[first][triangles] - np.roll(points[first][triangles], -1, axis=1)
+    longest = np.linalg.norm(sides, axis=2).max(axis=1)
+    wide = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) > near * longest
+    _, once = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
+    triangles = triangles[[number for number in sorted(once) if wide[number]]]
+    if not len(triangles):
+        raise unusable("boundary.mesh", "has no triangles of any size; expected the inner surface of a vessel")
+    used, renumbered = np.unique(triangles, return_inverse=True)
+    return points[first][used], renumbered.reshape(-1, 3)
+
+
+def _oriented(vessel: Vessel) -> Vessel:
+    """The vessel with all triangles counterclockwise as seen from the beads: within the largest part, about others."""
+    for edge, shared in vessel.sharing.items():
+        if len(shared) > 2:
+            middle = vessel.points[[*edge]].mean(axis=0)
+            raise _broken(f"has {len(shared)} triangles at an edge,", middle, "two: give sheets a thickness")
+    flips, parts = np.zeros(len(vessel.triangles), dtype=bool), np.full(len(vessel.triangles), -1)
+    for seed in range(len(parts)):
+        todo, parts[seed] = ([seed], seed) if parts[seed] < 0 else ([], parts[seed])
+        while todo:
+            one = todo.pop()
+            for side in range(3):
+                for other, at in vessel.sharing[frozenset(vessel._ends(one, side))]:
+                    flipped = flips[one] ^ (vessel._ends(one, side) == vessel._ends(other, at))
+                    if parts[other] < 0:
+                        parts[other], flips[other] = seed, flipped
+                        todo.append(other)
+                    elif other != one and flips[other] != flipped:
+                        where = vessel.points[vessel.triangles[other, 0]]
+                        raise _broken("has a surface of one side alone,", where, "one with an inside and an outside")
+    turned = Vessel(vessel.points, np.where(flips[:, None], vessel.triangles[:, ::-1], vessel.triangles))
+    rims = turned.rims
+    if len(rims) > 1:
+        low = min(rims, key=lambda rim: float(turned.points[rim, 2].min()))
+        where = turned.points[low[int(turned.points[low, 2].argmin())]]
+        raise _broken(f"has {len(rims)} openings, the lowest", where, "one, at its top: close the others")
+    closed = turned.capped
+    corners = closed.points[closed.triangles]
+    volumes = np.einsum("tx,tx->t", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
+    lid = len(closed.triangles) - len(parts)
+    of = np.append(parts, [parts[int(vessel.sharing[frozenset(rims[0][:2])][0][0])]] * lid if lid else [])
+    sizes = {part: float(volumes[of == part].sum()) for part in dict.fromkeys(parts.tolist())}
+    outer = max(sizes, key=lambda part: abs(sizes[part]))
+    if lid and of[-1] != outer:
+        raise _broken("has an opening in an inner part", turned.points[rims[0][0]], "closed parts within the vessel")
+    back = np.array([(sizes[part] > 0.0) == (part == outer) for part in parts.tolist()])
+    return Vessel(turned.points, np.where(back[:, None], turned.triangles[:, ::-1], turned.triangles))
+
+
+def _check_crossings(vessel: Vessel) -> None:
+    """Refuse triangles that intersect, by separating axes: normals, sides across them, and sides across sides."""
+    corners = vessel.points[vessel.triangles]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    slack = 1e-7 * float(np.ptp(vessel.points, axis=0).max())
+    rows = np.arange(len(corners))
+    for some in np.array_split(rows, 1 + len(rows) ** 2 // 1_000_000):
+        near = np.all((low[some, None] <= high) & (high[some, None] >= low), axis=2) & (some[:, None] < rows)
+        one, other = (of[at] for of, at in zip((some, rows), np.nonzero(near), strict=True))
+        first, second, sides = corners[one], corners[other], np.roll(corners, -1, axis=1) - corners
+        normal, normals = vessel.normals[one][:, None], vessel.normals[other][:, None]
+        level = np.abs(np.einsum("nkx,nx->nk", second - first[:, :1], normal[:, 0])).max(axis=1) < slack
+        across = np.cross(sides[one][:, :, None], sides[other][:, None]).reshape(-1, 9, 3)
+        out = np.concatenate([normal, normals, across], axis=1)
+        out[level] = 0.0  # of triangles in a plane only axes in it separate
+        axes = np.concatenate([out, np.cross(sides[one], normal), np.cross(sides[other], normals)], axis=1)
+        size = np.linalg.norm(axes, axis=2)
+        none = size < 1e-6 * size.max(axis=1, keepdims=True, initial=0.0)
+        axes /= np.where(none, 1.0, size)[..., None]
+        spans = [np.einsum("nkx,nax->nak", each, axes) for each in (first, second)]
+        apart = np.maximum(spans[0].min(2) - spans[1].max(2), spans[1].min(2) - spans[0].max(2))
+        for pair in np.flatnonzero(np.where(none, -inf, apart).max(axis=1, initial=-inf) < -slack):
+            where = (first[pair].mean(axis=0) + second[pair].mean(axis=0)) / 2.0
+            what = "overlap in a plane" if level[pair] else "intersect"
+            raise _broken(f"has triangles that {what}, near", where, "a surface that does not cross itself")
+
+
+# --- from planes ------------------------------------------------------------------------------------------------------
+
+
+def vessel_between(planes: Sequence[tuple[Vector, Vector]], height: float) -> Vessel:
+    """The vessel that planes enclose up to a height (m); raises `InputError` if they enclose none."""
+    from scipy.optimize import linprog
+    from scipy.spatial import HalfspaceIntersection
+
+    far = 2.0  # m
+    ends = [((0.0, 0.0, height), (0.0, 0.0, -1.0))]
+    ends += [(tuple(-far * axis), tuple(axis)) for axis in np.array([*np.eye(3), *-np.eye(3)[:2]])]
+    points, normals = (np.array(each) for each in zip(*planes, *ends, strict=True))
+    offsets = np.einsum("px,px->p", normals, points)
+    spheres = np.column_stack([-normals, np.ones(len(normals))])  # the largest one between them is in the middle
+    best = linprog([0, 0, 0, -1], spheres, -offsets, bounds=[(None, None)] * 3 + [(0, None)])
+    if best.status or best.x[3] < 1e-9:
+        raise unusable("boundary.planes", "enclose nothing; expected normals toward the beads, and a height above them")
+    room = HalfspaceIntersection(np.column_stack([-normals, offsets]), best.x[:3])
+    corners = room.intersections
+    if np.abs(corners).max() > 0.999 * far:
+        out = corners[np.abs(corners).max(axis=1).argmax()]
+        side = f"{'-+'[int(out[abs(out).argmax()] > 0.0)]}{'xyz'[int(abs(out).argmax())]}"
+        raise unusable("boundary.planes", f"are open toward {side}; expected planes that close the vessel")
+    triangles: list[list[int]] = []
+    for number, normal in enumerate(normals[: len(planes)]):
+        held = np.array([place for place, meeting in enumerate(room.dual_facets) if number in meeting])
+        if len(held) < 3:
+            raise unusable(f"boundary.planes[{number}]", "is behind the others; expected planes that beads can touch")
+        spokes = corners[held] - corners[held].mean(axis=0)
+        around = held[np.argsort(np.arctan2(spokes @ np.cross(normal, spokes[0]), spokes @ spokes[0]))]
+        triangles += [[around[0], *pair] for pair in pairwise(around[1:])]
+    merged, kept = _merged(corners, np.array(triangles))
+    return Vessel(merged, kept)
