@@ -502,6 +502,7 @@ public:
         waves_.push_back({amplitude, 0., 0., 0., static_cast<int>(records_.size())});
         most += length(amplitude) * read_record(next());
       } else if (word == "ramp") {
+        span_ = number();
         for (int left = static_cast<int>(number()); left > 0; left--) {
           const double time = number();
           ramp_.push_back({time, number()});
@@ -660,6 +661,7 @@ private:
   std::vector<Wave> waves_;
   std::vector<Record> records_;
   std::vector<std::pair<double, double>> ramp_;  // times, and factors of the displacement
+  double span_;                                  // over which these are averaged
   double sway_;                                  // largest displacement
   std::vector<Near> near_;
   std::vector<Vec> loads_;  // by the ids of beads, first the command's: gravity, amplitude of each wave
@@ -791,17 +793,30 @@ private:
     return sum;
   }
 
-  /* The same with the ramp, whose factor changes evenly from one of its times to the next. */
+  /* Integral (order 0) of a factor that changes evenly from one time of the ramp to the next, it (1), or its slope (2).
+   */
+  double even(const double time, const int order) const
+  {
+    double sum = 0.;
+    size_t k = 0;
+    for (; k + 1 < ramp_.size() && !(time < ramp_[k + 1].first); k++)
+      sum += 0.5 * (ramp_[k + 1].first - ramp_[k].first) * (ramp_[k].second + ramp_[k + 1].second);
+    const double since = time - ramp_[k].first, factor = ramp_[k].second;
+    const bool changes = since >= 0. && k + 1 < ramp_.size();
+    const double slope = changes ? (ramp_[k + 1].second - factor) / (ramp_[k + 1].first - ramp_[k].first) : 0.;
+    return order == 0 ? sum + since * (factor + 0.5 * slope * since) : order == 1 ? factor + slope * since : slope;
+  }
+
+  /* The same with the ramp: its factor is the mean of the even one over the span, so that velocities do not jump. */
   double motion(const Wave &wave, const double time, const int order) const
   {
-    const double plain = unramped(wave, time, order);
-    if (ramp_.empty()) return plain;
-    const auto later = [](const double now, const std::pair<double, double> &one) { return now < one.first; };
-    const auto next = std::upper_bound(ramp_.begin(), ramp_.end(), time, later), last = next - (next != ramp_.begin());
-    if (next == last || next == ramp_.end()) return last->second * plain;
-    const double slope = (next->second - last->second) / (next->first - last->first);
-    const double changing = order ? order * slope * unramped(wave, time, order - 1) : 0.;
-    return (last->second + slope * (time - last->first)) * plain + changing;
+    if (ramp_.empty()) return unramped(wave, time, order);
+    double sum = 0.;
+    for (int k = 0; k <= order; k++) {
+      const double factor = (even(time + 0.5 * span_, k) - even(time - 0.5 * span_, k)) / span_;
+      sum += (order == 2 && k == 1 ? 2. : 1.) * factor * unramped(wave, time, order - k);
+    }
+    return sum;
   }
 
   /* Puts the walls where they are in this step, with the velocity of some time before. */

@@ -223,13 +223,18 @@ class Excitation:
         record, fewest = self.record, self.ramp[-1][0] * self.frequency if self.ramp else 0.0
         return fewest, record.length * self.frequency if record and not record.repeats else inf
 
-    def factor(self, time: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        """Factor of the ramp at times (s), and how fast it changes, 1/s."""
+    def factor(self, time: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Factor of the ramp at times (s), its first and its second derivative, shape (3, N).
+
+        It is a mean over a cycle, so that velocities do not jump where the ramp has a kink.
+        """
         import numpy as np
+        from scipy.interpolate import make_interp_spline
 
         times, factors = np.array(self.ramp or ((0.0, 1.0),)).T
-        slopes = np.concatenate([[0.0], np.diff(factors) / np.diff(times), [0.0]])
-        return np.interp(time, times, factors), slopes[np.searchsorted(times, time, side="right")]
+        half, first, last = 0.5 / self.frequency, min(0.0, time.min()) - 1.0, max(times[-1], time.max()) + 1.0
+        even = make_interp_spline([first, *times, last], [factors[0], *factors, factors[-1]], k=1).antiderivative()
+        return np.stack([(even(time + half, order) - even(time - half, order)) / (2.0 * half) for order in range(3)])
 
     def motions(self, time: npt.NDArray[np.float64]) -> Iterator[tuple[Vector, tuple[npt.NDArray[np.float64], ...]]]:
         """Direction of each harmonic or axis of a record, and displacement, velocity and acceleration at times (s)."""
@@ -252,8 +257,8 @@ class Excitation:
         """A motion with the ramp."""
         if not self.ramp:
             return course
-        (place, speed, acceleration), (factor, slope) = course, self.factor(time)
-        return factor * place, factor * speed + slope * place, factor * acceleration + 2.0 * slope * speed
+        (x, v, a), (factor, slope, bend) = course, self.factor(time)
+        return factor * x, factor * v + slope * x, factor * a + 2.0 * slope * v + bend * x
 
     def described(self) -> str:
         """The drive in a few words, such as ``80 Hz, a0 = 39.2 m/s² + 160 Hz, a0 = 29.4 m/s², 90°``."""

@@ -1,0 +1,147 @@
+"""Recorded shaking and ramps, in both frames and in both engines; thresholds of motion by a ramp."""
+
+import shutil
+from math import nan, pi
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.conftest import call, document, make_case, to_toml
+from walkers import load_case, run
+from walkers.check.crosscheck import compare
+from walkers.inputs.case import Case
+from walkers.postprocess.motion import boundary_motion
+from walkers.postprocess.threshold import _crossed
+
+PERIOD = 1.0 / 80.0
+BRIEF = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
+RAMP = [["0.01 s", 0.5], ["0.06 s", 1.25]]
+
+
+def csv(time: Any, **columns: Any) -> str:
+    """A record with times in ms and accelerations in g, all digits."""
+    heads = ["time (ms)", *(f"{axis} (g)" for axis in columns)]
+    rows = np.column_stack([1e3 * time, *columns.values()]).tolist()
+    return "\n".join([",".join(heads), *(",".join(map(repr, row)) for row in rows)]) + "\n"
+
+
+def sine(rows: int = 1000, **more: float) -> str:
+    """A period of 4 g at 80 Hz along x, of which the displacement is a sine; and other columns, which are constant."""
+    time = np.linspace(0.0, PERIOD, rows + 1)
+    other = {axis: np.full_like(time, value) for axis, value in more.items()}
+    return csv(time, x=-4.0 * np.sin(2.0 * pi * time / PERIOD), **other)
+
+
+def recorded(folder: Path, text: str, run: Any = None, dimers: Any = None, **drive: Any) -> Case:
+    """The reference case with a record."""
+    tables = document(run=run or BRIEF, dimers=dimers or {})
+    tables["drive"] = {"record": "record.csv", **drive}
+    (folder / "record.csv").write_text(text)
+    (folder / "case.toml").write_text(to_toml(tables))
+    return load_case(folder / "case.toml")
+
+
+@pytest.mark.parametrize("frame", ["container", "lab"])
+@pytest.mark.parametrize("ramp", [[], RAMP], ids=["even", "ramp"])
+def test_a_sine_as_a_record_is_the_sine(frame: str, ramp: list[Any], tmp_path: Path) -> None:
+    """So are the bytes of its numbers to nine digits; a constant along z, such as gravity, is none of the shaking."""
+    drive = {"frame": frame, **({"ramp": ramp} if ramp else {})}
+    expected = run(make_case(run=BRIEF, drive=drive), tmp_path).result
+    found = run(recorded(tmp_path, sine(z=1.0), repeats=True, **drive), tmp_path).result
+    names = ("velocity", "work", "rotation_1", "frequency", "peak_acceleration", "amplitude", "peak_velocity", "gamma0")
+    assert [found[name] for name in names] == pytest.approx([expected[name] for name in names], rel=1e-9)
+
+
+def test_a_ramp_multiplies_the_displacement() -> None:
+    """By a factor that is even between its times; by hand, half way and after its end, with the velocity's own part."""
+    case = make_case(run=BRIEF, drive={"ramp": RAMP})
+    turn = 2.0 * pi * 80.0
+    for time, factor, slope in ((0.002, 0.5, 0.0), (0.035, 0.875, 15.0), (0.07, 1.25, 0.0)):
+        place, speed = boundary_motion(case.excitation, np.array([time]))
+        plain = 39.2 / turn**2 * np.sin(turn * time)
+        assert place[0, 0] == pytest.approx(factor * plain)
+        assert speed[0, 0] == pytest.approx(factor * 39.2 / turn * np.cos(turn * time) + slope * plain)
+    assert case.excitation.peak_acceleration == pytest.approx(1.25 * 39.2)
+
+
+@pytest.mark.parametrize("with_record", [False, True])
+def test_frames_and_engines_agree_on_a_ramp(with_record: bool, tmp_path: Path) -> None:
+    """Of harmonics, and of a record with noise in two directions that does not repeat."""
+    time = np.arange(0.0, 0.1, 1e-4)
+    noise = np.random.default_rng(1).normal(scale=0.02, size=(2, len(time)))
+    shaken = [peak * np.sin(2.0 * pi * one * time + 1.0) for peak, one in ((4.0, 80.0), (0.3, 160.0))]
+    cases = []
+    for frame in ("container", "lab"):
+        case = make_case(run=BRIEF, drive={"ramp": RAMP, "frame": frame})
+        if with_record:
+            text = csv(time, x=shaken[0] + noise[0], z=shaken[1] + 1.0 + noise[1])
+            case = recorded(tmp_path, text, ramp=RAMP, frame=frame)
+        cases.append(case)
+    runs = [run(case, tmp_path) for case in cases]
+    assert runs[1].result["velocity"] == pytest.approx(runs[0].result["velocity"], rel=2e-5)
+    assert [line for line in compare([runs[0].motion]) if line.failed] == []
+
+
+def test_a_run_has_its_record(tmp_path: Path) -> None:
+    """It is named by the numbers, not by the file, and needs no file after: nor its deck and its changed case."""
+    case = recorded(tmp_path, sine(40), repeats=True)
+    first = run(case, tmp_path)
+    (tmp_path / "other").mkdir()
+    shutil.move(tmp_path / "record.csv", tmp_path / "other" / "renamed.csv")
+    again = run(case.changed({"drive.record": str(tmp_path / "other" / "renamed.csv")}), tmp_path)
+    assert (again.directory, again.cached) == (first.directory, True)
+    assert run(recorded(tmp_path, sine(44), repeats=True), tmp_path).directory != first.directory
+    shutil.rmtree(tmp_path / "other")
+    (tmp_path / "record.csv").unlink()
+    kept = Case.from_dict(first.case.as_dict())
+    assert kept == first.case
+    assert kept.changed({"run.cycles": 7}).excitation.frequency == pytest.approx(80.0)
+    assert call("show", str(first.directory), check=True).stdout.count("record") > 1
+
+
+def test_cycles_of_records(tmp_path: Path) -> None:
+    """Of one that repeats, what divides all of its lines; of another the period of the strongest, as many as it has."""
+    time = np.linspace(0.0, 4.0 * PERIOD, 801)
+    tones = np.sin(2.0 * pi * 160.0 * time) + 0.8 * np.sin(2.0 * pi * 240.0 * time)
+    repeats = recorded(tmp_path, csv(time, y=tones), repeats=True)
+    assert repeats.excitation.frequency == pytest.approx(80.0)
+    assert (repeats.excitation.fastest, repeats.drive_axis) == (pytest.approx(240.0), (0.0, 1.0, 0.0))
+    time = np.arange(0.0, 0.3, 2e-4)
+    once = recorded(tmp_path, csv(time, x=np.sin(2.0 * pi * 73.3 * time + 1.0)), run={"cycles": None} | BRIEF)
+    assert once.excitation.frequency == pytest.approx(73.3, rel=1e-3)
+    assert once.excitation.cycles == (0.0, pytest.approx(0.2998 * 73.3, rel=1e-3))
+    direction = recorded(tmp_path, csv(time, x=tones[0] + np.sin(500.0 * time), y=-np.sin(500.0 * time))).excitation
+    assert direction.direction == pytest.approx((0.5**0.5, -(0.5**0.5), 0.0))
+
+
+@pytest.mark.parametrize(("ramp", "name"), [([1.2, 0.8], "stops_at"), ([0.8, 1.2], "starts_at")])
+def test_a_ramp_finds_the_threshold(ramp: list[float], name: str, tmp_path: Path) -> None:
+    """Where a walker that is driven at this drive all the time begins to move, at 0.9 g and not at 0.8 g."""
+    points = [["0 s", ramp[0]], ["0.6 s", ramp[1]]]
+    changes = {"drive.peak_acceleration": "1 g", "dimers.replicates": 1, "run.samples_per_cycle": 1}
+    found = run(load_case("fig1b", {**changes, "drive.ramp": points}), tmp_path).result
+    assert found[name] == pytest.approx(0.9 * 9.8, abs=found[name.replace("_at", "_within")])
+    assert found[name.replace("_at", "_within")] == pytest.approx(0.4 * 9.8 * 8 / 48)
+    assert found[f"gamma0_{name}"] == pytest.approx(0.0857, rel=0.04)
+    other = {"stops_at": "starts_at", "starts_at": "stops_at"}[name]
+    assert np.isnan(found[other])
+
+
+@pytest.mark.parametrize(
+    ("moves", "expected"),
+    [
+        ([[1, 1], [1, 0], [0, 0]], (3.5, 0.5)),
+        ([[1, 1], [1, 1], [1, 0]], (3.0, 0.5)),
+        ([[0], [1], [0]], (3.0, 0.5)),
+        ([[0], [0]], (nan, nan)),
+        ([[1], [1]], (nan, nan)),
+    ],
+)
+def test_the_last_window_in_which_a_walker_moves(moves: list[list[int]], expected: tuple[float, float]) -> None:
+    """Mean over walkers; one that never moves, or never rests, has none."""
+    peaks = np.array([4.0, 3.0, 2.0])[: len(moves)]
+    assert _crossed(np.array(moves, dtype=np.bool_), peaks, np.full(len(moves), 0.5)) == pytest.approx(
+        expected, nan_ok=True
+    )
