@@ -35,9 +35,9 @@ against gap by numerical integration; filling angles that are not monotonic).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
-from math import cbrt, exp, inf, log, pi, sin, sqrt
+from math import cbrt, exp, inf, log, nan, pi, sin, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,9 +52,15 @@ Array = npt.NDArray[Any]
 _NODES, _WEIGHTS = (
     0.5 * (part + shift) for part, shift in zip(np.polynomial.legendre.leggauss(48), (1.0, 0.0), strict=True)
 )
+_PLACES = np.append(_NODES, 1.0)
+"""Fractions of the profile at which it is computed: those of the integrals, and its end."""
+_HALVES, _AWAY = np.array([1.0, 0.5]), np.array([-1.0, 1.0])
+_POSITIVE = np.array([0, 1, 3])
+"""Of a bridge: arcs and length."""
 _NEWTON_STEPS = 30
 _CONVERGED = 1e-12
 _COMPLEX_STEP = 1e-30
+_STEPS = 1j * _COMPLEX_STEP * np.eye(5)
 _ARC_STEP, _MOST_STEPS, _LARGEST_TURN = 0.05, 2000, 0.2
 _SHARES = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02)
 _GROWTH = 1.2
@@ -82,29 +88,6 @@ class ForceCurve(NamedTuple):
     bridges: FloatArray
 
 
-@dataclass(frozen=True)
-class _Solid:
-    """A sphere of curvature k (0: a plane) with contact angle θ; arcs t are measured from its apex."""
-
-    curvature: float
-    contact_angle: float
-
-    def slope(self, arc: Array) -> Array:
-        """Filling angle."""
-        return self.curvature * arc
-
-    def radius(self, arc: Array) -> Array:
-        return np.asarray(arc * _sinc(self.curvature * arc))
-
-    def rise(self, arc: Array) -> Array:
-        """Height of the wetted cap."""
-        return np.asarray(0.5 * self.curvature * arc**2 * _sinc(0.5 * self.curvature * arc) ** 2)
-
-    def cap_volume(self, arc: Array) -> Array:
-        rise = self.rise(arc)
-        return np.asarray(pi / 6.0 * rise * (3.0 * self.radius(arc) ** 2 + rise**2))
-
-
 def _sinc(x: Array) -> Array:
     """sin(x)/x, also for complex arguments (derivatives by complex steps)."""
     small = np.abs(x) < 1e-4
@@ -114,78 +97,77 @@ def _sinc(x: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Family:
-    """Bridges of volume 1 between two solids; a bridge is x = (arc 1, arc 2, p, length of the profile, gap)."""
+    """Bridges of volume 1 between two solids: spheres of curvature k (0: a plane) with contact angles θ.
 
-    first: _Solid
-    second: _Solid
+    A bridge is x = (arc 1, arc 2, p, length of the profile, gap), with the arcs from the apexes of the solids.
+    """
 
-    def start(self, arc: Array) -> tuple[Array, Array]:
-        """The profile's r sin φ and r cos φ at the first solid."""
-        slope = pi - self.first.contact_angle - self.first.slope(arc)
-        radius = self.first.radius(arc)
-        return radius * np.sin(slope), radius * np.cos(slope)
+    curvatures: tuple[float, float]
+    contact_angles: tuple[float, float]
 
-    def profile(self, x: Array, fractions: FloatArray) -> tuple[Array, Array]:
-        """Radii r and r sin φ at fractions of the length, shape (..., n), of bridges of shape (..., 5)."""
-        pressure, length = x[..., 2, None], x[..., 3, None]
-        upright, outward = (part[..., None] for part in self.start(x[..., 0]))
-        at, start = length * fractions, upright**2 + outward**2
-        squared = (
-            start
-            + (1.0 - pressure * upright) * at**2 * _sinc(0.5 * pressure * at) ** 2
-            + 2.0 * outward * at * _sinc(pressure * at)
-        )
-        return np.sqrt(squared), upright + 0.5 * pressure * (squared - start)
+    def ends(self, slopes: Array, radii: Array) -> tuple[Array, Array]:
+        """The profile's r sin φ and r cos φ at both solids, shape (..., 2), of filling angles and wetting lines."""
+        angles = np.array([pi - self.contact_angles[0], self.contact_angles[1]]) + _AWAY * slopes
+        return radii * np.sin(angles), radii * np.cos(angles)
 
     def misfit(self, x: Array) -> Array:
         """Residuals of the boundary conditions, shape (..., 4): end on the second solid, contact angle, volume."""
-        radius, upright = self.profile(x, _NODES)
-        pressure, length = x[..., 2], x[..., 3]
-        solids = ((self.first, x[..., 0]), (self.second, x[..., 1]))
-        rise = length * np.sum(_WEIGHTS * upright / radius, axis=-1)
-        volume = pi * length * np.sum(_WEIGHTS * upright * radius, axis=-1)
-        slope, end = self.second.contact_angle + self.second.slope(x[..., 1]), self.second.radius(x[..., 1])
-        start_upright, start_outward = self.start(x[..., 0])
-        turn = pressure * length
-        outward = start_outward * np.cos(turn) + (1.0 - pressure * start_upright) * length * _sinc(turn)
-        return np.stack(
-            [
-                self.profile(x, np.ones(1))[1][..., 0] - end * np.sin(slope),
-                outward - end * np.cos(slope),
-                rise - x[..., 4] - sum(solid.rise(arc) for solid, arc in solids),
-                volume - 1.0 - sum(solid.cap_volume(arc) for solid, arc in solids),
-            ],
-            axis=-1,
-        )
+        arcs, pressure, length, curvatures = x[..., :2], x[..., 2:3], x[..., 3:4], np.array(self.curvatures)
+        at, slopes = length * _PLACES, curvatures * arcs
+        turns = pressure * at
+        (of_slopes, of_halves), (swings, halves) = (_sinc(np.multiply.outer(_HALVES, one)) for one in (slopes, turns))
+        radii, rises = arcs * of_slopes, 0.5 * curvatures * arcs**2 * of_halves**2
+        caps = pi / 6.0 * rises * (3.0 * radii**2 + rises**2)
+        uprights, outwards = self.ends(slopes, radii)
+        upright, outward = uprights[..., :1], outwards[..., :1]
+        start, bend = upright**2 + outward**2, 1.0 - pressure * upright
+        squared = start + bend * at**2 * halves**2 + 2.0 * outward * at * swings
+        along = upright + 0.5 * pressure * (squared - start)
+        weighted, radius = _WEIGHTS * along[..., :-1], np.sqrt(squared[..., :-1])
+        last = outward[..., 0] * np.cos(turns[..., -1]) + bend[..., 0] * x[..., 3] * swings[..., -1]
+        misfit = np.empty_like(x[..., :4])
+        misfit[..., 0] = along[..., -1] - uprights[..., 1]
+        misfit[..., 1] = last - outwards[..., 1]
+        misfit[..., 2] = x[..., 3] * (weighted / radius).sum(axis=-1) - x[..., 4] - rises.sum(axis=-1)
+        misfit[..., 3] = pi * x[..., 3] * (weighted * radius).sum(axis=-1) - 1.0 - caps.sum(axis=-1)
+        return misfit
 
     def jacobian(self, x: FloatArray) -> FloatArray:
-        """Derivatives of the misfit, shape (4, 5), exact: by complex steps."""
-        steps = x + 1j * _COMPLEX_STEP * np.eye(5)
-        return self.misfit(steps).imag.T / _COMPLEX_STEP
+        """Derivatives of the misfit, shape (..., 4, 5), exact: by complex steps."""
+        return np.swapaxes(self.misfit(x[..., None, :] + _STEPS).imag, -1, -2) / _COMPLEX_STEP
 
-    def force(self, x: FloatArray) -> float:
-        """F/γ at the start of the profile."""
-        upright = self.start(x[0])[0]
-        return float(pi * (2.0 * upright - x[2] * self.first.radius(x[0]) ** 2))
+    def forces(self, x: FloatArray) -> FloatArray:
+        """F/γ at the starts of the profiles."""
+        slopes = np.array(self.curvatures) * x[:, :2]
+        radii = x[:, :2] * _sinc(slopes)
+        return pi * (2.0 * self.ends(slopes, radii)[0] - x[:, 2:3] * radii**2)[:, 0]
 
-    def solve(self, x: FloatArray, row: FloatArray, value: float) -> FloatArray | None:
-        """Newton's method from x for a bridge with row · x = value; None where it fails."""
+    def solve(self, x: FloatArray, row: FloatArray, values: FloatArray) -> FloatArray:
+        """Newton's method from n bridges x, shape (n, 5), for bridges with row · x = value; NaN where it fails."""
+        found, left = np.full_like(x, nan), np.arange(len(x))
         for _ in range(_NEWTON_STEPS):
-            misfit = np.append(self.misfit(x), row @ x - value)
-            matrix = np.vstack([self.jacobian(x), row])
+            misfit, matrices = np.empty((len(x), 5, 1)), np.empty((len(x), 5, 5))
+            misfit[:, :4, 0], misfit[:, 4, 0] = self.misfit(x), x @ row - values
+            matrices[:, :4], matrices[:, 4] = self.jacobian(x), row
             try:
-                step = np.linalg.solve(matrix, misfit)
+                step = np.linalg.solve(matrices, misfit)[..., 0]
             except np.linalg.LinAlgError:
-                return None
-            x = x - step * min(1.0, 0.3 / float(np.max(np.abs(step[[0, 1, 3]] / x[[0, 1, 3]])) + 1e-300))
-            if not np.all(np.isfinite(x)) or np.any(x[[0, 1, 3]] <= 0.0):
-                return None
-            if np.max(np.abs(step)) < _CONVERGED * max(1.0, float(np.max(np.abs(x)))):
-                return x
-        return None
+                break
+            change = np.abs(step[:, _POSITIVE] / x[:, _POSITIVE]).max(axis=1)
+            x = x - step * np.minimum(1.0, 0.3 / (change + 1e-300))[:, None]
+            sound = (x[:, _POSITIVE] > 0.0).all(axis=1)
+            good = sound & (np.abs(step).max(axis=1) < _CONVERGED * np.maximum(1.0, np.abs(x).max(axis=1)))
+            found[left[good]] = x[good]
+            sound &= ~good
+            if not sound.any():
+                break
+            x, values, left = x[sound], values[sound], left[sound]
+        return found
 
-    def at_gap(self, x: FloatArray, gap: float) -> FloatArray | None:
-        return self.solve(x, _GAP, gap)
+    def nearest(self, x: FloatArray, row: FloatArray, value: float) -> FloatArray | None:
+        """One bridge by Newton's method from x; None where it fails."""
+        (found,) = self.solve(x[None], row, np.array([value]))
+        return None if np.isnan(found[0]) else found
 
     def tangent(self, x: FloatArray, before: FloatArray, scale: FloatArray) -> FloatArray:
         """Direction of the family at x, of length 1 in units of `scale`, onward from `before`."""
@@ -196,17 +178,17 @@ class _Family:
 _GAP = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
 
 
-def _toroid(family: _Family, gap: float) -> FloatArray:
-    """An approximate bridge: a circular profile between wetting lines of one radius, which enclose the volume 1."""
-    curvature = family.first.curvature + family.second.curvature
-    # π b² (gap + k b² / 4) = 1, between surfaces whose distance grows as k b² / 2.
-    squared = 2.0 / (pi * gap + sqrt((pi * gap) ** 2 + pi * curvature))
-    arc = np.full(2, sqrt(squared))
-    height = gap + float(family.first.rise(arc)[0] + family.second.rise(arc)[0])
-    angles = [solid.contact_angle + float(solid.slope(arc)[0]) for solid in (family.first, family.second)]
+def _toroid(family: _Family) -> FloatArray:
+    """An approximate bridge at contact: a circular profile between wetting lines of one radius, of volume 1."""
+    # π k b⁴ / 4 = 1, between surfaces whose distance grows as k b² / 2.
+    arc = np.full(2, sqrt(2.0 / sqrt(pi * sum(family.curvatures))))
+    curvatures = np.array(family.curvatures)
+    slopes = curvatures * arc
+    height = float(sum(0.5 * curvatures * arc**2 * _sinc(0.5 * slopes) ** 2))
+    angles = [angle + float(slope) for angle, slope in zip(family.contact_angles, slopes, strict=True)]
     turn = 0.5 * (pi - sum(angles))
     length = height / float(_sinc(np.array(turn)))
-    return np.array([*arc, 1.0 / arc[0] - 2.0 * sin(turn) / height, length, gap])
+    return np.array([*arc, 1.0 / arc[0] - 2.0 * sin(turn) / height, length, 0.0])
 
 
 def _family_of(radii: tuple[float, float], volume: float, contact_angle: float | tuple[float, float]) -> _Family:
@@ -217,14 +199,7 @@ def _family_of(radii: tuple[float, float], volume: float, contact_angle: float |
     if not all(0.0 <= angle < pi for angle in angles):
         raise ValueError(f"contact angles {angles}: expected 0 to π")
     unit = cbrt(volume)
-    first, second = (_Solid(unit / radius, angle) for radius, angle in zip(radii, angles, strict=True))
-    return _Family(first, second)
-
-
-def _shrunk(family: _Family, share: float) -> _Family:
-    """The same liquid between solids whose curvature is reduced by a factor."""
-    first, second = (_Solid(share * one.curvature, one.contact_angle) for one in (family.first, family.second))
-    return _Family(first, second)
+    return _Family((unit / radii[0], unit / radii[1]), angles)
 
 
 def _touching(family: _Family) -> FloatArray:
@@ -235,9 +210,14 @@ def _touching(family: _Family) -> FloatArray:
     NoBridgeError
         If Newton's method does not find it.
     """
+
+    def flatter(share: float) -> _Family:
+        first, second = family.curvatures
+        return replace(family, curvatures=(share * first, share * second))
+
     for first_share in _SHARES:
-        share, x = first_share, _toroid(_shrunk(family, first_share), 0.0)
-        while (found := _shrunk(family, share).at_gap(x, 0.0)) is not None:
+        share, x = first_share, _toroid(flatter(first_share))
+        while (found := flatter(share).nearest(x, _GAP, 0.0)) is not None:
             if share == 1.0:
                 return found
             x, share = found, min(1.0, _GROWTH * share)
@@ -288,7 +268,7 @@ def _onward(
 ) -> tuple[FloatArray, FloatArray] | None:
     """The bridge one step further along the family, and the tangent of the family there."""
     row = tangent / scale**2
-    found = family.solve(x + step * tangent, row, float(row @ x) + step)
+    found = family.nearest(x + step * tangent, row, float(row @ x) + step)
     return None if found is None else (found, family.tangent(found, tangent, scale))
 
 
@@ -342,37 +322,52 @@ def force_curve(
     wanted = np.asarray(gaps, np.float64) / unit
     if wanted.min() < 0.0 or wanted.max() > largest * (1.0 + 1e-12):
         raise ValueError(f"gaps: expected 0 to {largest * unit:.6g}, where the bridge ruptures")
-    bridges = [_stable(family, branch, min(float(gap), largest)) for gap in wanted]
-    forces = unit * np.array([family.force(x) for x in bridges])
-    return ForceCurve(forces, np.array(bridges)[:, :4] * [unit, unit, 1.0 / unit, unit])
+    bridges = _stable(family, branch, np.minimum(wanted, largest))
+    return ForceCurve(unit * family.forces(bridges), bridges[:, :4] * [unit, unit, 1.0 / unit, unit])
 
 
-def _stable(family: _Family, branch: _Branch, gap: float) -> FloatArray:
-    """The stable bridge at a gap."""
-    gaps = branch.bridges[:, 4]
-    if gap >= gaps[-1]:
-        return branch.bridges[-1]  # type: ignore[no-any-return]
-    index = min(int(np.searchsorted(gaps, gap, side="right")) - 1, len(gaps) - 2)
-    piece = slice(index, index + 2)
-    between = CubicHermiteSpline(branch.arcs[piece], branch.bridges[piece], branch.tangents[piece])
-    low, high = branch.arcs[piece]
-    # At its left end the piece may begin above the gap by rounding.
-    at = low if gap <= gaps[index] else float(brentq(lambda arc: between(arc)[4] - gap, low, high))
-    found = family.at_gap(between(at), gap)
-    if found is None or np.max(np.abs(found - between(at))[[0, 1, 3]]) > _NEAR:
-        # Near the largest gap, bridges depend strongly on it, or the unstable one is found: search along the family.
-        chord = branch.bridges[index + 1] - branch.bridges[index]
+def _stable(family: _Family, branch: _Branch, gaps: FloatArray) -> FloatArray:
+    """The stable bridges at n gaps, shape (n, 5)."""
+    knots = branch.bridges[:, 4]
+    pieces = np.clip(np.searchsorted(knots, gaps, side="right") - 1, 0, len(knots) - 2)
+    cubics = CubicHermiteSpline(branch.arcs, branch.bridges, branch.tangents).c[:, pieces]
+    lows, highs = branch.arcs[pieces], branch.arcs[pieces + 1]
 
-        def across(arc: float) -> FloatArray:
-            near = between(arc)
-            other = family.solve(near, chord, float(chord @ near))
-            return near if other is None else other
+    def ahead(arc: float, one: int) -> float:
+        return float(_cubic(of_gaps[one], arc - lows[one]) - gaps[one])
 
-        last = across(high)[4] <= gap
-        found = across(high if last else float(brentq(lambda arc: across(arc)[4] - gap, low, high, xtol=1e-12)))
-    if abs(found[4] - gap) > _SAME_GAP or np.max(np.abs(family.misfit(found))) > _SAME_GAP:
-        raise NoBridgeError(f"no bridge was found at a gap of {gap:.6g} of the volume's cube root")
+    of_gaps, inside = cubics[:, :, 4].T.tolist(), (knots[pieces] < gaps) & (gaps < knots[-1])
+    # At its left end a piece may begin above the gap by rounding.
+    arcs = [brentq(ahead, lows[one], highs[one], (one,)) if inside[one] else lows[one] for one in range(len(gaps))]
+    near = _cubic(cubics, (np.array(arcs) - lows)[:, None])
+    found = family.solve(near, _GAP, gaps)
+    found[gaps >= knots[-1]] = branch.bridges[-1]
+    far = ~(np.max(np.abs(found - near)[:, _POSITIVE], axis=1) <= _NEAR) & (gaps < knots[-1])
+    for one in np.flatnonzero(far):
+        chord = branch.bridges[pieces[one] + 1] - branch.bridges[pieces[one]]
+        found[one] = _across(family, cubics[:, one], chord, (lows[one], highs[one]), gaps[one])
+    lost = np.maximum(np.abs(found[:, 4] - gaps), np.max(np.abs(family.misfit(found)), axis=1)) > _SAME_GAP
+    if lost.any():
+        raise NoBridgeError(f"no bridge was found at a gap of {gaps[lost][0]:.6g} of the volume's cube root")
     return found
+
+
+def _cubic(coefficients: Any, x: Any) -> Any:
+    """The polynomials of degree 3 that begin with the first of (4, ...) coefficients."""
+    first, second, third, last = coefficients
+    return last + third * x + second * (x * x) + first * (x * x * x)
+
+
+def _across(family: _Family, cubic: FloatArray, chord: FloatArray, ends: tuple[float, float], gap: float) -> FloatArray:
+    """The bridge at a gap near the largest one, where it depends strongly on the gap: sought along the family."""
+
+    def at(arc: float) -> FloatArray:
+        near = _cubic(cubic, arc - ends[0])
+        other = family.nearest(near, chord, float(chord @ near))
+        return near if other is None else other
+
+    last = at(ends[1])
+    return last if last[4] <= gap else at(float(brentq(lambda arc: at(arc)[4] - gap, *ends, xtol=1e-12)))
 
 
 def rupture_distance(
