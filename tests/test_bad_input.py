@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Callable
+from math import pi, sin
 from pathlib import Path
 from string import Formatter
 from typing import Any
@@ -14,6 +15,7 @@ Files = dict[str, str | bytes]
 WALKER = {"radii": ["0.3 mm", "0.2 mm"]}
 MIXTURE = {"small": ["0.3 mm", "0.315 mm"], "large": ["0.5 mm", "0.59 mm"], "count": 20}
 HARMONICS = {"harmonics": [{"frequency": "80 Hz", "peak_acceleration": "1 g"}]}
+NO_SINE = {"frequency": None, "peak_acceleration": None, "record": "record.csv"}
 MEETING = {"radii": ["0.4 mm", "0.25 mm"], "meet": True, "replicates": 4}
 
 
@@ -94,6 +96,17 @@ CASES: list[tuple[dict[str, Any], str]] = [
      'run.duration = "1e4 s": expected at most 8388 s: the engine counts'),
     ({"dimers": None, "placed": [bead("1 mm", "9 mm")], "run": {"seed": 3}}, "run.seed = 3: expected none with placed"),
     ({"liquid": {"name": "water-glycerol", "mass_fraction": 60}}, "liquid.mass_fraction = 60: expected the mass of"),
+    ({"drive": {**NO_SINE, "record": {"rows": [[0, 1]]}}}, "expected text: a file of comma-separated values"),
+    ({"drive": {"repeats": True}}, "drive.repeats = true: expected none without drive.record"),
+    *(({"drive": {"ramp": ramp}, **more}, told) for ramp, more, told in (
+        ([["0 s", 1], ["0 s", 0.5]], {}, "drive.ramp = [[\"0 s\", 1], [\"0 s\", 0.5]]: expected times that increase"),
+        ([["0 s", -1]], {}, "drive.ramp[0][1] = -1: expected at least 0"),
+        ([["-1 s", 1]], {}, 'drive.ramp[0][0] = "-1 s": expected a duration with its unit'),
+        ([["0 s"]], {}, 'drive.ramp[0] = ["0 s"]: has 1 value; expected 2'),
+        ([["0 s", 1], ["2 s", 0.5]], {}, "run.cycles = 24: expected at least 160 cycles, 2 s, of drive.ramp"),
+        ([["0 s", 1], ["2 s", 0.5]], {"run": {"cycles": "auto", "settling_cycles": None}},
+         'run.cycles = "auto": expected a number of cycles: with drive.ramp no velocity is constant'),
+    )),
     # Bodies and boundaries
     ({"dimers": {"gap": "-50 um"}}, "overlap by more than 2 % of the smallest radius: expected -4 um or more"),
     ({"dimers": {"replicates": 2, "spacing": "0.5 mm"}}, 'dimers.spacing = "0.5 mm": neighbouring walkers would touch'),
@@ -173,6 +186,46 @@ LAWS: list[tuple[str, str]] = [
     ("K = random.random()\ndef law(surfaces): return Curve(lambda gaps: forces(gaps, K), 1e-4)", "other numbers"),
 ]
 LONG = "x" * 100_000
+
+
+def trace(head: str = "time (ms), x (g)", rows: int = 100, step: float = 0.5, **odd: str) -> str:
+    """A record of 4 g at 80 Hz, with some odd rows by number."""
+    lines = [f"{step * row!r}, {4.0 * sin(160e-3 * pi * step * row)!r}" for row in range(rows)]
+    return "\n".join([head, *(odd.get(f"row_{number}", line) for number, line in enumerate(lines, 1))])
+
+
+# A record, what else the drive and the run say, and the message after the key.
+RECORDS: list[tuple[str | bytes, dict[str, Any], str]] = [
+    (trace("time, x (g)"), {}, 'drive.record = "record.csv": expected a time with its unit'),
+    (trace("time (ms), x (mm)"), {}, 'drive.record = "record.csv": expected an acceleration with its unit'),
+    (trace("t (ms), x (g)"), {}, "expected a header of a time and accelerations"),
+    (trace("x (g), time (ms)"), {}, "expected a header of a time and accelerations"),
+    (trace("time (ms), x (g), x (g)"), {}, "expected a header of a time and accelerations"),
+    ("", {}, "expected a header of a time and accelerations"),
+    (b"\xff\xfe", {}, "expected text in UTF-8"),
+    (trace(row_7="3.0, 1.0, 2.0"), {}, "line 8: expected 2 numbers with commas"),
+    (trace(row_7="3.0, nan"), {}, "row 7: expected finite numbers"),
+    (
+        trace(row_7="2.5, 1.0"),
+        {},
+        "row 7 is 0 ms after the one before; expected times that increase without gaps, abou",
+    ),
+    (
+        trace(row_7="3.9, 1.0"),
+        {},
+        "row 7 is 1.4 ms after the one before; expected times that increase without gaps, ab",
+    ),
+    (trace(rows=9), {}, "has 9 rows; expected 16 to 100000"),
+    (trace(rows=40, step=4.0), {}, "rows are too far apart, or too noisy: leaving out every second one changes the ac"),
+    (trace(rows=20), {}, "run.cycles = 24: expected at most 0 cycles: drive.record has no more"),
+    (trace(rows=400, step=1e-3), {}, "run.cycles = 24: expected at most"),
+    (trace(), {"repeats": True}, "drive.repeats = true: expected a record whose last row is that of the next period's"),
+    (trace(), {"frequency": "80 Hz"}, 'drive.record = "record.csv": expected either frequency or record, not both'),
+    (trace(), {"peak_acceleration": "1 g"}, "expected either peak_acceleration or record, not both"),
+    (trace(), HARMONICS, 'drive.record = "record.csv": expected none beside drive.harmonics'),
+    (trace(), {"axis": "x"}, 'drive.record = "record.csv": expected either axis or record, not both'),
+    (trace(), {"record": "none.csv"}, 'drive.record = "none.csv": cannot be read: No such file or directory'),
+]
 FILES: list[tuple[Files, str, str]] = [
     # No TOML, or no case
     ({"bad.toml": "[dimers\nradii = 3"}, "show bad.toml", "bad.toml: not TOML: "),
@@ -259,6 +312,10 @@ def _said(tables: dict[str, Any]) -> dict[str, Any]:
 
 ROWS: list[tuple[Files, str, str]] = [
     *(({"bad.toml": to_toml(_said(document(**tables)))}, "show bad.toml", told) for tables, told in CASES),
+    *(
+        ({"record.csv": text, "bad.toml": to_toml(_said(document(drive={**NO_SINE, **drive})))}, "show bad.toml", told)
+        for text, drive, told in RECORDS
+    ),
     *(({"library.toml": text}, "show fig1b", f"{told}") for text, told in LIBRARIES),
     *(({"own.py": f"{LAW}\n{text}\n"}, USE_LAW, f"executes \n{told}") for text, told in LAWS),
     *FILES,

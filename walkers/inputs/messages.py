@@ -47,6 +47,8 @@ _GIVEN_ELSEWHERE = {"beads": "a material", "liquid": "a liquid", "contact": "sur
 def quoted(document: Mapping[str, Any], parts: Sequence[str | int]) -> str | None:
     """The value at a place of a document, quoted; None if there is none."""
     value = value_at(document, parts)
+    if isinstance(value, Mapping) and "rows" in value:  # of a record, whose file a case names
+        value = value.get("file", value)
     return None if value is MISSING else shown(value)
 
 

@@ -118,12 +118,13 @@ def _spline(rows: npt.NDArray[np.float64], repeats: bool = False) -> PPoly:
 
 
 def record_of(value: object) -> object:
-    """A record from its file's name and its rows."""
-    if not isinstance(value, Mapping):
-        return value
-    record = Record(file=value.get("file", ""), rows=tuple(tuple(map(float, row)) for row in value["rows"]))
-    _check(record.rows)
-    return record
+    """A record from its file's name and its rows, as `with_record` puts them in the place of the name."""
+    try:
+        rows = tuple((float(time), float(x), float(y), float(z)) for time, x, y, z in value["rows"])  # type: ignore[index]
+    except (LookupError, TypeError, ValueError) as error:
+        raise ValueError("expected text: a file of comma-separated values") from error
+    _check(rows)
+    return Record(file=value.get("file", ""), rows=rows)  # type: ignore[attr-defined]
 
 
 def with_record(document: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:

@@ -99,12 +99,13 @@ def fig3(sources: Sources) -> Figure:
 
 @styled
 def fig2_threshold(sources: Sources) -> Figure:
-    """Γc by the protocol of the paper: between the last drive with motion and the first one without."""
+    """Γc between the last drive with motion and the first one without, and by the protocol of the paper, a ramp."""
     sources.finished("fig2-threshold")
-    frequencies, low, high, theory = thresholds_with_theory(sources).to_numpy(dtype=float).T
+    frequencies, low, high, theory, ramp, within = thresholds_with_theory(sources).to_numpy(dtype=float).T
     figure, axes = new_figure(ONE_COLUMN, 2.8)
-    label = "engine: rests below, moves above"
+    label = "engine: runs from rest, rest below, motion above"
     axes.errorbar(frequencies, (low + high) / 2.0, (high - low) / 2.0, fmt="o", mfc="none", label=label)
+    axes.errorbar(frequencies + 1.0, ramp, within, fmt="s", mfc="none", label="engine: one run, the drive falls")
     axes.plot(frequencies, theory, "--", color="0.2", lw=0.9, label=MODEL)
     axes.set(xlabel="frequency (Hz)", ylabel=r"threshold of motion $\Gamma_\mathrm{c}$")
     axes.set(xticks=frequencies, ylim=(0.0, 1.3 * float(np.nanmax([*high, *theory]))))

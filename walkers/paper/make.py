@@ -38,7 +38,9 @@ _FIG2 = partial(of_sweep, name="fig2", x="drive.peak_acceleration", hue="drive.f
 FIGURES = {
     "fig1b": Drawing(fig1b, ("alignment",), "Fig. 1b: strobed top views of a walker"),
     "fig2": Drawing(_FIG2, ("fig2",), "Fig. 2: velocity against peak acceleration"),
-    "fig2-threshold": Drawing(fig2_threshold, ("fig2-threshold",), "Fig. 2, inset: the threshold of motion"),
+    "fig2-threshold": Drawing(
+        fig2_threshold, ("fig2-threshold", "fig2-ramp"), "Fig. 2, inset: the threshold of motion"
+    ),
     "fig3": Drawing(fig3, ("fig3",), "Fig. 3: velocity against asymmetry"),
     "fig4": Drawing(fig4, ("fig4",), "Fig. 4: rotation of the beads through two cycles"),
     "alignment": Drawing(fig_alignment, ("alignment",), "Alignment with the shaking axis and across it"),
@@ -47,7 +49,7 @@ FIGURES = {
     ),
 }
 COMPARISON = "comparison"
-COMPARED = (*map(of_facts, sets()), "fig2-threshold", "fig2", "fig3")
+COMPARED = (*map(of_facts, sets()), "fig2-threshold", "fig2-ramp", "fig2", "fig3")
 """Sweeps of the comparison."""
 
 

@@ -88,8 +88,13 @@ class Sources:
 
 
 def thresholds_with_theory(sources: Sources) -> pd.DataFrame:
-    """Γc of the sweep ``fig2-threshold``: the Γ0 at which walkers rest and move, and that of the ``theory``."""
+    """Γc of the sweep ``fig2-threshold``: the Γ0 at which walkers rest and move, and that of the ``theory``.
+
+    Beside it that of the sweep ``fig2-ramp``, ``ramp``, and its resolution, ``within``.
+    """
     ends = thresholds(sources.table("fig2-threshold"))
     cases = [load_case("fig1b", {"drive.frequency": f"{one} Hz"}) for one in ends["drive.frequency"]]
     shown = ends[["drive.frequency", "gamma0_at_rest", "gamma0_moving"]]
-    return shown.assign(theory=[threshold(case) for case in cases])
+    ramp = sources.table("fig2-ramp").groupby("drive.frequency")[["gamma0_stops_at", "gamma0_stops_within"]].first()
+    found = ramp.reindex(shown["drive.frequency"]).to_numpy(dtype=float).T
+    return shown.assign(theory=[threshold(case) for case in cases], ramp=found[0], within=found[1])

@@ -199,11 +199,12 @@ def shown(number: float, unit: str) -> tuple[str, str]:
 
 
 def _errors(numbers: Mapping[str, Any], one: Quantity) -> str:
-    """Scatter, band and numerical error of a number in its displayed unit."""
+    """Scatter or resolution, band and numerical error of a number in its displayed unit."""
     parts = []
     if isfinite(scatter := numbers.get(one.error, nan)):
         text = shown(scatter, one.unit)[0]
-        parts.append(f"scatter {'below 0.001' if text == '0' and one.unit == 'm/s' else text}")
+        word = "resolution" if one.error.endswith("_within") else "scatter"
+        parts.append(f"{word} {'below 0.001' if text == '0' and one.unit == 'm/s' else text}")
     low, high = (numbers.get(f"{one.name}_{end}") for end in _BAND)
     if low is not None and high is not None:
         parts.append(f"band {band_text(low, high, one.unit)}")
