@@ -887,7 +887,8 @@ private:
       Vec n;
       double gap = gap_at(one.wall, i, n);
       if (std::isnan(gap)) error->one(FLERR, "fix wall/bridge: a bead's position is no number");
-      if (!meets(walls_[one.wall], i)) gap = std::numeric_limits<double>::infinity();
+      const bool away = gap > formed && history[TABLE] == 0.;
+      if (!away && !meets(walls_[one.wall], i)) gap = std::numeric_limits<double>::infinity();
       if (!(gap < 0.)) std::fill_n(history + SPRING, HISTORY - SPRING, 0.);
       if (gap > formed && history[TABLE] == 0.) continue;
       const bridge::Table *const table =

@@ -207,7 +207,7 @@ def _vessel(case: Case) -> Case:
         boundary = boundary.but(planes=tuple(Plane(point=at, normal=way) for at, way in vessel.planes or ()))
         if not boundary.planes:
             boundary = boundary.but(
-                points=tuple(map(tuple, vessel.points)), triangles=tuple(map(tuple, vessel.triangles))
+                points=tuple(map(tuple, vessel.points.tolist())), triangles=tuple(map(tuple, vessel.triangles.tolist()))
             )
         case = case.but(boundary=boundary).filled("boundary.height", vessel.height, why)
     else:
