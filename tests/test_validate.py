@@ -79,12 +79,20 @@ def test_benchmarks_pass_and_a_check_that_cannot_be_computed_leaves_the_others(
 
 
 def test_experiments_of_others_pass_where_they_are_judged(in_folder: Path) -> None:
-    """A bead that is thrown, one on a wet incline, impacts; and the drift of a dry bead at one phase."""
+    """A bead that is thrown, one on a wet incline; and the drift of a dry bead at one phase."""
     with experiments.workbench() as bench:
-        lines = [*experiments.thrown(bench), *experiments.incline(bench), *experiments.impacts(bench)]
+        lines = [*experiments.thrown(bench), *experiments.incline(bench)]
         assert experiments.slider(bench, 60.0) == pytest.approx(experiments.modelled(60.0), abs=5e-3)
-    assert [count(lines, verdict) for verdict in (Verdict.PASS, Verdict.NOT_JUDGED)] == [9, 4]
-    assert not failures(lines)
+    assert {line.verdict for line in lines} == {Verdict.PASS}
+    assert len(lines) == 7
+
+
+def test_restitution_on_a_wet_plate_falls_with_the_drag(in_folder: Path) -> None:
+    with experiments.workbench() as bench:
+        straight, limit, *shown = experiments.impacts(bench)
+    assert [straight.verdict, limit.verdict] == [Verdict.PASS, Verdict.PASS]
+    assert {line.verdict for line in shown} == {Verdict.NOT_JUDGED}
+    assert shown[-1].measured < 0.5 * shown[-1].expected, "a softened bead loses more"
 
 
 def test_a_symmetric_dimer_drifts_by_tones_2_to_3_only(in_folder: Path) -> None:

@@ -7,12 +7,13 @@ Sources and what they measured are in the documentation (``explanation/others``)
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from math import inf, log, pi, radians
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -34,18 +35,14 @@ from walkers.templates.deck import Plan
 from walkers.templates.scene import Bead, Scene, loading_of, surface_of
 
 FRICTION, G = 0.2, 9.81
-SLOWS = 3.5 * FRICTION * G
-"""m/s²; friction slows the surface of a solid sphere 7/2 times as much as its centre."""
-BASE, CYCLES, FIRST = 80.0, 12, 4
-"""Hz; cycles that are run, and those of them that are not measured."""
-PHASES, STRENGTHS = np.arange(0.0, 180.0, 30.0), np.array([2.0, 4.0, 8.0, 16.0])
-"""Of the second tone, degrees; peak acceleration of both tones over `SLOWS`."""
-GLASS, FILM, ROUGH, RESTITUTION = 2.75e-3, 0.45e-3, 1e-7, 0.97
-"""Radius of a glass bead, thickness of the film, roughness, m; restitution of the dry bead."""
-OILS, SPEEDS = np.array([0.25, 0.5, 1.0, 2.0, 4.0]) * 4.6e-3, np.array([0.25, 0.5, 1.0, 2.0])
-"""Viscosities, Pa s, and speeds of impacts, m/s."""
+SLOWS = 3.5 * FRICTION * G  # m/s²; friction slows the surface of a solid sphere 7/2 times as much as its centre
+BASE, CYCLES, FIRST = 80.0, 12, 4  # Hz; cycles that are run, and those of them that are not measured
+PHASES = np.arange(0.0, 180.0, 30.0)  # of the second tone, degrees
+STRENGTHS = np.array([2.0, 4.0, 8.0, 16.0])  # peak acceleration of both tones over that of friction, `SLOWS`
+GLASS, FILM, ROUGH, RESTITUTION = 2.75e-3, 0.45e-3, 1e-7, 0.97  # radius of a bead, film, roughness, m; of a dry bead
+OILS = np.array([0.25, 0.5, 1.0, 2.0, 4.0]) * 4.6e-3  # viscosities, Pa s
+SPEEDS = np.array([0.25, 0.5, 1.0, 2.0])  # of impacts, m/s
 _DRY = {**DRY, "environment.gravity": f"{G} m/s^2", "contact.restitution": 0.5, "contact.friction.bead_wall": FRICTION}
-_GLASS = {"beads.density": "2.5 g/cm^3", "contact.roughness.bead_wall": f"{ROUGH} m"}
 
 
 @contextmanager
@@ -168,19 +165,19 @@ def filmed(surfaces: Surfaces) -> Curve:
     return replace(young_laplace.law(surfaces), formation=FILM)
 
 
-def restitutions(bench: Bench, modulus: float = 7e10, law: str = "young-laplace") -> tuple[FloatArray, FloatArray]:
-    """Stokes numbers ρDv/9η and restitutions of glass beads of a modulus (Pa) on a wet plate, (`OILS`, `SPEEDS`).
+def _wet(radius: float, film: float, changes: Mapping[str, Any]) -> Case:
+    """A glass bead and a film, m. A bridge has the liquid that the bead displaces: it is as high as the film."""
+    share = 2.0 * pi * radius * film**2 / bead_volume(radius)
+    liquid = {"liquid.volume_fraction": share, "contact.roughness.bead_wall": f"{ROUGH} m"}
+    bead = {"beads.density": "2.5 g/cm^3", "dimers.radii": [f"{radius} m"] * 2, "contact.restitution": RESTITUTION}
+    return bench_case({**bead, **liquid, **changes})
 
-    A bridge contains what a bead displaces of the film, so that at its edge it is as high as the film.
-    """
+
+def restitutions(bench: Bench, modulus: float = 7e10, law: str = "young-laplace") -> tuple[FloatArray, FloatArray]:
+    """Stokes numbers ρDv/9η and restitutions of glass beads of a modulus (Pa) on a wet plate, (`OILS`, `SPEEDS`)."""
     impact = Impact(2500.0 * bead_volume(GLASS), GLASS, reduced_modulus(modulus, 0.3))
-    plain = bench_case(
-        {
-            **{**_GLASS, "dimers.radii": [f"{GLASS} m"] * 2, "contact.restitution": RESTITUTION, "liquid.law": law},
-            **{"liquid.volume_fraction": 2.0 * pi * GLASS * FILM**2 / bead_volume(GLASS)},
-            **{"contact.youngs_modulus": f"{modulus} Pa", "run.time_step": f"{impact.duration(2.0) / 100.0} s"},
-        }
-    )
+    step = {"run.time_step": f"{impact.duration(SPEEDS.max()) / 100.0} s"}
+    plain = _wet(GLASS, FILM, {**step, "liquid.law": law, "contact.youngs_modulus": f"{modulus} Pa"})
     cases = [plain.put("liquid.dynamic_viscosity", oil) for oil in OILS.tolist() for _ in SPEEDS]
     high, far = 1.001 * FILM, 1.01 * bridge_at_rest(plain, GLASS, inf).rupture
     beads = [over(FLOOR, high, GLASS, (0.0, 0.0, -speed), STILL) for _ in OILS for speed in SPEEDS.tolist()]
@@ -195,7 +192,8 @@ def restitutions(bench: Bench, modulus: float = 7e10, law: str = "young-laplace"
 
 def impacts(bench: Bench) -> Iterator[Line]:
     """Restitution of a glass bead on a wet plate at 1 m/s by viscosity, and what changes it at one Stokes number."""
-    stokes, hard = restitutions(bench)
+    (stokes, hard), (_, soft) = restitutions(bench), restitutions(bench, 5e7)
+    filled = restitutions(bench, law=f"{__name__}:filmed")[1]
     drag, e = 1.0 / stokes[:, 2], hard[:, 2]
     slope, start = np.polyfit(drag, e, 1)
     what = "glass bead on a wet plate"
@@ -203,24 +201,15 @@ def impacts(bench: Bench) -> Iterator[Line]:
     yield Line(f"{what}: e at 1/St = 0, dry bead", RESTITUTION, start, 0.02)
     yield Line(f"{what}: critical Stokes number, ln(film/roughness) of approach", log(FILM / ROUGH), -slope / start)
     what += f", St = {stokes[2, 2]:.0f}: e"
-    yield Line(f"{what} at 1 m/s and at 2 m/s", hard[2, 2], hard[3, 3])
-    yield Line(
-        f"{what}, bridge from the surface of the film",
-        hard[2, 2],
-        restitutions(bench, law=f"{__name__}:filmed")[1][2, 2],
-    )
-    yield Line(f"{what}, bead of 50 MPa", hard[2, 2], restitutions(bench, 5e7)[1][2, 2])
+    yield Line(f"{what} at 1 m/s and at 2 m/s", e[2], hard[3, 3])
+    yield Line(f"{what}, bridge from the surface of the film", e[2], filled[2, 2])
+    yield Line(f"{what}, bead of 50 MPa", e[2], soft[2, 2])
 
 
 def incline(bench: Bench, radius: float = 1e-3, film: float = 7.5e-5) -> Iterator[Line]:
     """A bead on and below a plate of 20° with a viscous film, with and without friction, and which beads hang."""
-    fraction = 2.0 * pi * radius * film**2 / bead_volume(radius)
-    plain = bench_case(
-        {
-            **{**_GLASS, "dimers.radii": [f"{radius} m"] * 2, "contact.restitution": 0.5, "run.time_step": "0.2 us"},
-            **{"boundary.tilt": "20 deg", "environment.gravity": f"{G} m/s^2", "liquid.volume_fraction": fraction},
-        }
-    )
+    weight = {"boundary.tilt": "20 deg", "environment.gravity": f"{G} m/s^2", "run.time_step": "0.2 us"}
+    plain = _wet(radius, film, weight)
     oily, thin = (plain.put("liquid.dynamic_viscosity", viscosity) for viscosity in (0.1, 4.6e-3))
     ceiling, load = Flat((0.0, 0.0, 0.02), (0.0, 0.0, -1.0), "ceiling"), contact_loads(plain)[0]
     held = load.pull / (bead_volume(radius) * plain.pressing_gravity)
@@ -228,16 +217,11 @@ def incline(bench: Bench, radius: float = 1e-3, film: float = 7.5e-5) -> Iterato
     beads[3:] = [replace(bead, density=share * held) for bead, share in zip(beads[3:], (0.9, 1.1), strict=True)]
     cases = oily, oily.put("contact.friction.bead_wall", FRICTION), oily, thin, thin
     last = followed(bench, cases, beads, 300_000, 3000, (FLOOR, ceiling))[-1]
-    rolls = np.abs(radius * last[:, 7] / last[:, 3])
+    rolls, gaps = np.abs(radius * last[:, 7] / last[:, 3]), 0.02 - radius - last[:, 2]
     sliding, coupling, rolling = resistances_at_rest(oily, radius, inf)
     free = (radius * sliding + coupling) / (radius * sliding + 2.0 * coupling + rolling / radius)  # no torque
     yield Line("bead on a wet incline, no friction: Rω/v", free, rolls[0], 1e-2)
     yield Line("bead on a wet incline, friction 0.2: Rω/v", 1.0, rolls[1], 1e-2)
     yield Line("bead below a wet incline, no friction: Rω/v", free, rolls[2], 1e-2)
-    for share, hangs, gap in zip((0.9, 1.1), (1.0, 0.0), 0.02 - radius - last[3:, 2], strict=True):
-        yield Line(
-            f"bead below a wet incline, {share} of the weight that its bridge holds: hangs",
-            hangs,
-            float(gap < film),
-            0.0,
-        )
+    yield Line("bead below a wet incline, 0.9 of what its bridge holds: hangs", 1.0, float(gaps[3] < film), 0.0)
+    yield Line("bead below a wet incline, 1.1 of what its bridge holds: hangs", 0.0, float(gaps[4] < film), 0.0)
