@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Callable
+from itertools import pairwise
 from math import pi, sin
 from pathlib import Path
 from string import Formatter
@@ -162,6 +163,74 @@ LIBRARIES: list[tuple[str, str]] = [
         "surface_pairs[0] = chromium-coated glass on ruby: is in the library of",
     ),
 ]
+SQUARE = [(x, y, z) for z in (0, 4) for x, y in ((-2, -2), (2, -2), (2, 2), (-2, 2))]
+FLOOR, SIDES = [(1, 2, 3, 4)], [(1, 2, 6, 5), (2, 3, 7, 6), (3, 4, 8, 7), (4, 1, 5, 8)]
+OPEN_BOX = [*FLOOR, *SIDES]
+
+
+def obj(points: list[tuple[float, ...]], faces: list[tuple[int, ...]]) -> str:
+    """A mesh as text."""
+    lines = [f"v {' '.join(map(str, point))}" for point in points]
+    corners = [(one[0], *pair) for one in faces for pair in pairwise(one[1:])]
+    return "\n".join([*lines, *(f"f {' '.join(map(str, face))}" for face in corners), ""])
+
+
+def turned(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+    """Points upside down."""
+    return [(x, -y, -z) for x, y, z in points]
+
+
+OF_MESH = {"mesh": "own.obj", "scale": "1 mm"}
+BALL = {"dimers": None, "placed": [bead("0.3 mm", "0 mm")], "run": {"cycles": 10}}
+BALL_IN_WALL = {**BALL, "placed": [bead("0.3 mm", "1.8 mm")]}
+INNER = [(0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (0.0, 1.0, 1.0), (0.0, 0.0, 2.0)]
+TETRAHEDRON = [(1, 3, 2), (1, 2, 4), (2, 3, 4), (3, 1, 4)]
+
+
+def beside(points: list[tuple[float, ...]]) -> str:
+    """A box, and a tetrahedron of given points with it."""
+    return obj([*SQUARE, *points], [*OPEN_BOX, *(tuple(8 + k for k in face) for face in TETRAHEDRON)])
+
+
+def plane(*normal: float, at: tuple[str, str, str] = ("0 mm", "0 mm", "0 mm")) -> dict[str, Any]:
+    """A plane around the beads."""
+    return {"point": list(at), "normal": list(normal)}
+
+
+CUP = [plane(0, 0, 1), *(plane(-x, -y, 0, at=(f"{2 * x} mm", f"{2 * y} mm", "0 mm"))
+                        for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1)))]  # fmt: skip
+VESSELS: list[tuple[str | None, dict[str, Any], dict[str, Any], str]] = [
+    (None, OF_MESH, {}, 'boundary.mesh = "own.obj": no such file; expected a mesh'),
+    ("v a b c", OF_MESH, {}, 'boundary.mesh = "own.obj": cannot be read: expected a mesh that meshio reads'),
+    ("", {**OF_MESH, "mesh": "bad.toml"}, {}, 'boundary.mesh = "bad.toml": cannot be read'),
+    (obj(SQUARE, []), OF_MESH, {}, 'boundary.mesh = "own.obj": has 0 triangles; expected the inner surface'),
+    (obj([(0.0, 0.0, 0.0)] * 8, OPEN_BOX), OF_MESH, {}, "has no triangles of any size"),
+    (obj(SQUARE, OPEN_BOX), {"mesh": "own.obj"}, {}, 'boundary.scale: missing; expected such as "1 mm"'),
+    (obj(SQUARE, OPEN_BOX), {**OF_MESH, "shape": "box"}, {}, "expected none beside boundary.mesh"),
+    (obj(SQUARE, OPEN_BOX), {**OF_MESH, "height": "3 mm"}, {}, 'boundary.height = "3 mm": expected none of a vessel'),
+    (obj(SQUARE, SIDES), OF_MESH, {}, "has 2 openings, the lowest at (-2, -2, 0) mm; expected one, at its top"),
+    (obj(turned(SQUARE), OPEN_BOX), OF_MESH, {}, "is open at its lowest point, at (-2, 2, -4) mm; expected a closed"),
+    (obj(SQUARE, OPEN_BOX[:-1]), OF_MESH, {}, "is open at its lowest point, at (-2, 2, 0) mm"),
+    (obj(SQUARE, [*OPEN_BOX, (1, 3, 7, 5)]), OF_MESH, {}, "has 3 triangles at an edge, at (0, 0, 0) mm; expected two"),
+    (beside([(x + 1.5, y, z) for x, y, z in INNER]), OF_MESH, {}, "has triangles that intersect, at (1.917, 0.5, 1.16"),
+    (beside([(x, y, z - 1.0) for x, y, z in INNER]), OF_MESH, {}, "has triangles that overlap in a plane, at ("),
+    (obj(SQUARE, OPEN_BOX), {**OF_MESH, "scale": "1 m"}, {},
+     'boundary.scale = "1 m": the vessel is 4 m wide and the beads 0.6 mm; expected 1 to 1000 beads across'),
+    (obj(SQUARE, OPEN_BOX), OF_MESH, BALL_IN_WALL, "placed[0].at = "),
+    (beside(INNER), OF_MESH, {**BALL, "placed": [bead("0.2 mm", "0.2 mm", "1.3 mm")]}, "placed[0].at = "),
+    (obj([*SQUARE[4:], (0, 0, 0)], [(1, 2, 5), (2, 3, 5), (3, 4, 5), (4, 1, 5)]), OF_MESH, {},
+     "has no level floor at its bottom, on which walkers stand"),
+    (None, {"planes": CUP}, {}, "boundary.height: missing"),
+    (None, {"planes": CUP[1:], "height": "5 mm"}, {}, ": are open toward -z"),
+    (None, {"planes": CUP[:-1], "height": "5 mm"}, {}, ": are open toward -y"),
+    (None, {"planes": [*CUP, plane(0, 0, -1)], "height": "5 mm"}, {}, ": enclose nothing"),
+    (None, {"planes": [*CUP, plane(0, 0, 0)], "height": "5 mm"}, {}, "planes[5].normal = [0, 0, 0]: expected a"),
+    (None, {"planes": [*CUP, plane(0, 1, 2)], "height": "5 mm"}, {},
+     "boundary.planes[5].normal = [0, 1, 2]: turns by 26.6 deg from planes[0]; expected 45 deg or more"),
+    (None, {"planes": [*CUP, plane(-1, 1, 0, at=("9 mm", "0 mm", "0 mm"))], "height": "5 mm"}, {},
+     ": is behind the others; expected planes"),
+]  # fmt: skip
+"""Mesh, boundary, other tables, and what is said."""
 LAW = """
 import dataclasses, random, sys
 import numpy as np
@@ -319,6 +388,17 @@ ROWS: list[tuple[Files, str, str]] = [
     *(({"library.toml": text}, "show fig1b", f"{told}") for text, told in LIBRARIES),
     *(({"own.py": f"{LAW}\n{text}\n"}, USE_LAW, f"executes \n{told}") for text, told in LAWS),
     *FILES,
+    *(
+        (
+            {
+                "bad.toml": to_toml(_said(document(**others, boundary={"material": "glass", **boundary}))),
+                **({} if mesh is None else {"own.obj": mesh}),
+            },
+            "show bad.toml",
+            told,
+        )
+        for mesh, boundary, others, told in VESSELS
+    ),
     *(({}, command, told) for command, told in COMMANDS),
 ]
 """Files, a command, and a part of each line that it is refused with."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
-from math import cos, sin, sqrt, tan
+from math import cos, pi, sin, sqrt, tan
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +11,13 @@ import numpy as np
 import pytest
 
 from walkers.check.scenes import DRY, Bench, bench_case, full_case, prescribed, standing
+from walkers.inputs.boundary import FLOOR
+from walkers.inputs.case import Case
 from walkers.inputs.vessel import Vessel
 from walkers.postprocess.dump import FloatArray
 from walkers.runner.binary import find_engine
+from walkers.runner.directory import run_place
+from walkers.templates.deck import render_deck
 from walkers.templates.scene import Bead
 
 R = 1e-4
@@ -135,3 +139,84 @@ def test_bridge_and_spring_go_with_a_bead_over_an_edge(bench: Bench, gap: float)
     )
     assert np.abs(plane[-1]).min(where=np.array([True, False, True]), initial=1.0) > 1e-6
     np.testing.assert_allclose(over, plane, rtol=0, atol=0.05 * np.abs(plane).max())
+
+
+# --- vessels from files -----------------------------------------------------------------------------------------------
+
+BOX: dict[str, Any] = {"shape": "box", "width": "4 mm", "height": "12 mm"}
+POURED: dict[str, Any] = {
+    "mixture": {"small": ["0.3 mm", "0.315 mm"], "large": ["0.5 mm", "0.59 mm"], "count": 12},
+    "beads": {"material": "glass"},
+    "liquid": {"name": "water", "volume_fraction": 0.01},
+    "contact": {"friction": {"bead_bead": 0.4, "bead_wall": 0.4}, "rolling_friction": 0.0},
+    "drive": {"frequency": "100 Hz", "peak_acceleration": "3 g"},
+    "run": {"duration": "0.02 s", "longest_settling": "0.02 s"},
+}
+
+
+def poured(**boundary: Any) -> dict[str, Any]:
+    """The tables of a small pile in a vessel."""
+    return {**POURED, "boundary": {"material": "glass", **boundary}}
+
+
+def prism(sides: int, inner: float, height: float) -> Vessel:
+    """A prism open above, of the inner radius and the height: the floor first, then the sides from -x on."""
+    turns = pi + 2.0 * pi * (np.arange(sides) - 0.5) / sides
+    ring = inner / cos(pi / sides) * np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=1)
+    points = np.round(np.concatenate([ring, ring + np.array([0.0, 0.0, height])]), 9)
+    floor = [[0, k, k + 1] for k in range(1, sides - 1)]
+    walls = [(k, (k + 1) % sides, sides) for k in range(sides)]
+    order = (0, 2, 1, 3) if sides == 4 else range(sides)  # those of a box: -x, +x, -y, +y
+    sides_of = [walls[k] for k in order]
+    return Vessel(
+        points,
+        np.array([*floor, *((b, a, n + a) for a, b, n in sides_of), *((b, n + a, n + b) for a, b, n in sides_of)]),
+    )
+
+
+def write(folder: Path, vessel: Vessel, name: str = "own.obj") -> str:
+    """Write a vessel in mm; returns its path."""
+    import meshio
+
+    meshio.Mesh(1e3 * vessel.points, [("triangle", vessel.triangles)]).write(folder / name)
+    return str(folder / name)
+
+
+def test_a_box_is_the_same_from_a_mesh_from_planes_and_by_its_size(tmp_path: Path) -> None:
+    """The same decks, but that it is poured by levels; bridges and walls have the same names and numbers."""
+    mesh = write(tmp_path, prism(4, 2e-3, 12e-3))
+    planes = [{"point": [f"{2 * x} mm", f"{2 * y} mm", "0 mm"], "normal": [-x, -y, 0]}
+              for x, y in ((-1, 0), (1, 0), (0, -1), (0, 1))]  # fmt: skip
+    planes.insert(3, {"point": ["0 mm", "0 mm", "0 mm"], "normal": [0, 0, 1]})
+    ball = {"placed": [{"radius": "0.3 mm", "at": ["0 mm", "0 mm", "1 mm"]}], "mixture": None}
+    cases = []
+    for boundary in (BOX, {"mesh": mesh, "scale": "1 mm"}, {"planes": planes, "height": "12 mm"}):
+        tables = {key: value for key, value in {**poured(**boundary), **ball}.items() if value is not None}
+        cases.append(Case.read(tables))
+    decks = [render_deck(case) for case in cases]
+    assert decks[0].text == decks[1].text == decks[2].text
+    assert decks[0].files == decks[1].files == decks[2].files
+    assert cases[0].boundary.walls == cases[1].boundary.walls == cases[2].boundary.walls
+    assert cases[1].determinants() == cases[2].determinants()
+    for case in cases[1:]:
+        assert case.boundary.cross_section == pytest.approx(cases[0].boundary.cross_section, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["a.stl", "a.ply", "a.vtk", "a.vtu", "a.msh", "a.off"])
+def test_a_run_is_named_by_the_numbers_of_its_vessel(tmp_path: Path, name: str) -> None:
+    """Not by its file, whose format, name and place may be any; the case is whole without it."""
+    hexagon = prism(6, 4e-3, 12e-3)
+    path = Path(write(tmp_path, hexagon, name))
+    tables = poured(mesh=str(path), scale="1 mm")
+    case, other = Case.read(tables), Case.read(poured(mesh=write(tmp_path, hexagon), scale="1 mm"))
+    path.unlink()
+    places = [run_place(one, find_engine(), tmp_path) for one in (case, other)]
+    if name in ("a.vtu", "a.vtk", "a.off"):  # the others have fewer digits or another order of points
+        assert places[0] == places[1]
+    again = [Case.from_dict(case.as_dict()), case.changed({}), Case.read(case.document)]
+    assert all(one.boundary == case.boundary for one in again)
+    larger = case.changed({"boundary.scale": "1.5 mm"})
+    assert larger.boundary.width == pytest.approx(1.5 * case.boundary.width)
+    assert run_place(larger, find_engine(), tmp_path) != places[0]
+    assert len(case.boundary.walls) == 7
+    assert case.boundary.walls[0].name == FLOOR

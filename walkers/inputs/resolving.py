@@ -39,6 +39,8 @@ _ROUGHEST = 0.01
 """Largest roughness over the radius of a bead: the wedge of liquid between smooth spheres is then no model."""
 _MEET = 0.01
 """Largest difference of the ends of a record that repeats, over its peak acceleration."""
+_WIDEST = 1000.0
+"""Largest width of a vessel in diameters of the largest bead."""
 _FACING = {"up": "right", "down": "left"}
 """The words for climbers."""
 NAMES = ("beads.material", "boundary.material", "liquid.name")
@@ -213,9 +215,13 @@ def _vessel(case: Case) -> Case:
     else:
         planes, why = _planes(boundary.planes), "of the planes"
         case = case.put("boundary.planes", planes)
-    extent = float(abs(case.boundary.but(shape="vessel").vessel.points[:, :2]).max())
-    case = case.filled("boundary.width", float(f"{2.0 * extent:.12g}"), why)
-    return case.filled("boundary.shape", "vessel", why)
+        vessel = case.boundary.but(shape="vessel").vessel
+    width, size = float(f"{2.0 * abs(vessel.points[:, :2]).max():.12g}"), 2.0 * max(case.radii)
+    if not 1.0 < width / size < _WIDEST:
+        wide, across = (f"{one:.4g} m" if one >= 1.0 else f"{1e3 * one:.4g} mm" for one in (width, size))
+        message = f"the vessel is {wide} wide and the beads {across}; expected 1 to {_WIDEST:g} beads across"
+        raise unusable("boundary.scale" if boundary.mesh else "boundary.planes", message)
+    return case.filled("boundary.width", width, why).filled("boundary.shape", "vessel", why)
 
 
 def _planes(planes: Sequence[Plane]) -> tuple[Plane, ...]:
@@ -461,8 +467,8 @@ def _gravity(case: Case) -> Case:
 
 STEPS: Sequence[Callable[[Case], Case]] = (
     *(
-        _vessel,
         _radii,
+        _vessel,
         _viscosity,
         _count,
         _walkers,

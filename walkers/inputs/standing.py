@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 OVERLAP = 0.01
 """Radii by which beads that are given places may overlap with each other and the walls."""
-_WIDEST = 1000.0
 _MOST_PARTS = 10_000_000  # of beads and walls: each bead has 32 bytes for each wall
 
 
@@ -132,12 +131,9 @@ def check_bodies(case: Case) -> Case:
 
 
 def _check_vessel(case: Case) -> None:
-    """Refuse a vessel of another scale than the beads, of too many faces for them, or without a floor for walkers."""
-    boundary, size = case.boundary, 2.0 * max(case.radii)
-    blamed = "boundary.planes" if boundary.mesh is None else "boundary.mesh"
-    if not 1.0 < boundary.width / size < _WIDEST:
-        wide = f"the vessel is {_length(boundary.width)} wide and the beads {_length(size)}"
-        raise unusable("boundary.scale" if boundary.mesh else blamed, f"{wide}; expected 1 to {_WIDEST:g} beads across")
+    """Refuse a vessel of too many faces for the beads, or without a floor for walkers."""
+    boundary = case.boundary
+    blamed = "boundary.mesh" if boundary.mesh else "boundary.planes"
     if (walls := len(boundary.walls)) * case.count > _MOST_PARTS:
         most = f"at most {_MOST_PARTS // case.count} for {case.count} beads: a coarser mesh"
         raise unusable(blamed, f"has {walls} faces, edges and corners; expected {most}")
@@ -145,10 +141,6 @@ def _check_vessel(case: Case) -> None:
         raise unusable(
             blamed, "has no level floor at its bottom, on which walkers stand; expected [[placed]] beads in it"
         )
-
-
-def _length(size: float) -> str:
-    return f"{size:.3g} m" if size >= 1.0 else f"{1e3 * size:.3g} mm"
 
 
 def _check_pour(mixture: Mixture, boundary: Boundary, floor: float) -> None:

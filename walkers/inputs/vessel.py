@@ -427,7 +427,7 @@ def _check_crossings(vessel: Vessel) -> None:
         for pair in np.flatnonzero(np.where(none, -inf, apart).max(axis=1, initial=-inf) < -slack):
             where = (first[pair].mean(axis=0) + second[pair].mean(axis=0)) / 2.0
             what = "overlap in a plane" if level[pair] else "intersect"
-            raise _broken(f"has triangles that {what}, near", where, "a surface that does not cross itself")
+            raise _broken(f"has triangles that {what},", where, "a surface that does not cross itself")
 
 
 # --- from planes ------------------------------------------------------------------------------------------------------
@@ -438,7 +438,7 @@ def vessel_between(planes: Sequence[tuple[Vector, Vector]], height: float) -> Ve
     from scipy.optimize import linprog
     from scipy.spatial import HalfspaceIntersection
 
-    far = 2.0  # m
+    far = 1e3 * height
     ends = [((0.0, 0.0, height), (0.0, 0.0, -1.0))]
     ends += [(tuple(-far * axis), tuple(axis)) for axis in np.array([*np.eye(3), *-np.eye(3)[:2]])]
     points, normals = (np.array(each) for each in zip(*planes, *ends, strict=True))
