@@ -78,9 +78,19 @@ docs: setup .venv/with-docs ## Build the documentation into build/site, to be op
 	@.venv/bin/python -m sphinx -q -W --keep-going -d build/doctrees docs build/site
 	@echo "open build/site/index.html"
 
+.PHONY: paper
+paper: pandoc ## Build the paper about the program (paper/paper.md) into build/paper.html
+	@mkdir -p build && pandoc paper/paper.md --from markdown --citeproc --bibliography paper/paper.bib --standalone \
+	  --metadata author= --output build/paper.html
+	@echo "open build/paper.html"
+
 .PHONY: bench
 bench: setup .venv/with-dev ## Measure what docs/explanation/performance.md states
-	.venv/bin/python tests/benchmark.py
+	.venv/bin/python -m tests.benchmark
+
+.PHONY: bench-codes
+bench-codes: setup codes .venv/with-dev ## Measure what docs/explanation/other-codes.md states, beside Debian's LAMMPS and YADE
+	.venv/bin/python -m tests.benchmark_codes
 
 .PHONY: clean
 clean: ## Remove the environment and caches, never the runs
@@ -102,6 +112,10 @@ chromium: PACKAGES := chromium
 chromium: NEEDED := chromium
 paraview: PACKAGES := paraview python3-paraview xvfb xauth
 paraview: NEEDED := pvpython xvfb-run
+pandoc: PACKAGES := pandoc
+pandoc: NEEDED := pandoc
+codes: PACKAGES := lammps yade
+codes: NEEDED := lmp yade
 venv-package: PACKAGES := python3-venv
 venv-package: NEEDED := /usr/lib/python3*/ensurepip
 # The tests start a throw-away SLURM of their own where they are root; elsewhere they leave that out and say so.
@@ -110,8 +124,8 @@ cluster: NEEDED := $(if $(filter 0,$(shell id -u)),/usr/sbin/slurmctld)
 
 # As root, through sudo, or with one message for whoever is root.
 # Without what Debian recommends: with liggghts that is ParaView, 2.4 GB.
-.PHONY: engine chromium paraview venv-package cluster
-engine chromium paraview venv-package cluster:
+.PHONY: engine chromium paraview pandoc codes venv-package cluster
+engine chromium paraview pandoc codes venv-package cluster:
 	@missing=; sudo=; for needed in $(NEEDED); do command -v $$needed || ls -d $$needed || missing=yes; done >/dev/null 2>&1; \
 	[ "$$missing" ] || exit 0; echo "installing $(PACKAGES)"; \
 	if [ "$$(id -u)" != 0 ]; then sudo=sudo; command -v sudo >/dev/null && { [ -t 0 ] || sudo -n true 2>/dev/null; } || { \

@@ -12,7 +12,7 @@ import re
 import resource
 import subprocess
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
@@ -22,14 +22,19 @@ from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
 from walkers.runner.binary import find_engine, plugin_of
 from walkers.runner.directory import write_deck
-from walkers.runner.launch import ALONE
-from walkers.templates.deck import DECK_NAME, Deck, Segment, compose, plan_of
+from walkers.runner.launch import ALONE, launch
+from walkers.templates.deck import Deck, Segment, compose, plan_of
+from walkers.templates.scene import Bead
 
-_REPEATS = 3
+REPEATS = 3
 RATIOS = Path(__file__).with_name("benchmark_ratios.json")
 """User CPU time of decks for the stock engine's model over that of today's, as last measured."""
-_PILES = {"pile-200": ("pile-small", 40_000), "pile-1630": ("pile-fig1a", 12_000)}
+PILES = {"pile-200": ("pile-small", 40_000), "pile-1630": ("pile-fig1a", 12_000)}
 """Case and steps of each pile."""
+_TILE, _TILES, _TILE_WIDTH = 2000, 5, 11.7
+"""Beads and width (mm) of the shaken piles that side by side, without walls between them, are the large pile."""
+ENGINE = ("liggghts", "-log", "none", "-in")
+SCRIPT = "script.py"
 _STOCK_MODEL = "gran model hertz tangential history cohesion easo/capillary/viscous"
 _STOCK_LIQUID = """
 fix tension all property/global surfaceTension scalar {liquid.surface_tension!r}
@@ -42,43 +47,79 @@ fix farthest all property/global maxSeparationDistanceRatio scalar 1.2
 
 
 def main() -> None:
-    """CPU time of a step in today's decks and in minimal ones, in turn; medians of several."""
-    preload, ratios = {"LD_PRELOAD": str(plugin_of(find_engine()))}, {}
+    """CPU time of a step in today's decks and in minimal ones, in turn; medians of several. And a large pile."""
+    ratios = {}
     print("| deck | µs a step: minimal | today | bead-steps/s |\n|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
-        for name, (case, steps) in _PILES.items():
-            deck = _shaken_pile(name, Path(folder))
-            decks = {"today": deck, "minimal": replace(deck, text=_minimal(deck, load_case(case)))}
+        for name, (case, steps) in PILES.items():
+            deck = compose_from(case, steps, shaken(case, Path(folder)))
+            decks = {"today": deck, "minimal": replace(deck, text=minimal(deck, load_case(case)))}
             took: dict[str, list[float]] = {way: [] for way in decks}
-            for way in [*decks] * _REPEATS:
+            for way in [*decks] * REPEATS:
                 place = Path(folder) / way / f"{name}-{len(took[way])}"
                 place.mkdir(parents=True)
                 write_deck(decks[way], place)
-                took[way].append(_cpu_time(place, preload if way == "today" else {}, steps) / steps)
-            today, minimal = median(took["today"]), median(took["minimal"])
-            ratios[name] = {"minimal": round(minimal / today, 2)}
-            speed = deck.layout.atoms / today / 1e6
-            print(f"| {name} | {1e6 * minimal:.1f} | {1e6 * today:.1f} | {speed:.1f} M |", flush=True)
+                text = without_steps(decks[way].text)
+                took[way].append(cpu_time(place, ENGINE, text, steps, environment(stock=way == "minimal")) / steps)
+            of_today, of_minimal = median(took["today"]), median(took["minimal"])
+            ratios[name] = {"minimal": round(of_minimal / of_today, 2)}
+            speed = deck.layout.atoms / of_today / 1e6
+            print(f"| {name} | {1e6 * of_minimal:.1f} | {1e6 * of_today:.1f} | {speed:.1f} M |", flush=True)
+        print(_large_pile(Path(folder)))
     print(f"before: {RATIOS.read_text('utf-8')}")
     RATIOS.write_text(json.dumps(ratios, indent=2) + "\n", encoding="utf-8")
 
 
-def _shaken_pile(name: str, folder: Path) -> Deck:
-    """Today's deck of a pile that has come to rest and was shaken for a tenth of a second."""
-    case, steps = _PILES[name]
-    settings = {"run.ranks": 1, "run.duration": "0.1 s", "run.segment": "0.1 s"}
-    motion = walkers.run(load_case(case, settings), folder / "starts").motion
-    plan = plan_of(load_case(case, {"run.ranks": 1}), segment=Segment(0, steps, 0))
+def environment(*, stock: bool) -> dict[str, str]:
+    """That of one process of the engine, with or without the contact model."""
+    return ALONE | ({} if stock else {"LD_PRELOAD": str(plugin_of(find_engine()))})
+
+
+def shaken(case: str, folder: Path, **settings: object) -> list[Bead]:
+    """Beads of a pile that has come to rest and was shaken for a tenth of a second."""
+    settings = {"run.ranks": 1, "run.duration": "0.1 s", "run.segment": "0.1 s"} | settings
+    run = walkers.run(load_case(case, settings), folder / "starts")
+    motion = run.motion
     now = zip(*(one[-1].tolist() for one in (motion.position, motion.velocity, motion.spin)), strict=True)
-    beads = [
-        replace(bead, centre=tuple(place), velocity=tuple(velocity), spin=tuple(spin))
-        for bead, (place, velocity, spin) in zip(plan.scene.beads, now, strict=True)
+    return [
+        Bead(number, tuple(place), radius, tuple(velocity), tuple(spin))
+        for number, ((place, velocity, spin), radius) in enumerate(zip(now, motion.radius.tolist(), strict=True), 1)
     ]
+
+
+def compose_from(case: str, steps: int, beads: list[Bead], **settings: object) -> Deck:
+    """Today's deck of a pile from given beads, without frames between its ends."""
+    plan = plan_of(load_case(case, {"run.ranks": 1} | settings), segment=Segment(0, steps, 0))
     scene = replace(plan.scene, beads=tuple(beads))
     return compose(replace(plan, scene=scene, sample_every=steps, bridge_every=steps))
 
 
-def _minimal(deck: Deck, case: Case) -> str:
+def _large_pile(folder: Path) -> str:
+    """What 10 ms of 50,000 beads take on two ranks."""
+    tile = {"mixture.count": _TILE, "boundary.width": f"{_TILE_WIDTH} mm"}
+    one, beads = shaken("pile-fig1a", folder, **tile), []
+    for number in range(_TILES**2):
+        aside = [1e-3 * _TILE_WIDTH * (index - (_TILES - 1) / 2) for index in divmod(number, _TILES)]
+        for bead in one:
+            x, y, z = bead.centre
+            beads.append(replace(bead, id=len(beads) + 1, centre=(x + aside[0], y + aside[1], z)))
+    large = {"mixture.count": len(beads), "boundary.width": f"{_TILES * _TILE_WIDTH} mm", "run.ranks": 2}
+    run = load_case("pile-fig1a", large).run
+    steps = round(0.01 / run.time_step)
+    place = folder / "large"
+    place.mkdir()
+    deck = compose_from("pile-fig1a", steps, beads, **large)
+    write_deck(deck, place)
+    report = launch(deck, place, find_engine())
+    megabytes = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+    speed = len(beads) * steps / report.loop_seconds / 1e6
+    took = f"{report.wall_seconds:.0f} s, of them {report.loop_seconds:.0f} s in {steps} steps"
+    return (
+        f"{len(beads)} beads, 10 ms, 2 ranks: {took} ({speed:.1f} M bead-steps/s); at most {megabytes:.0f} MB a process"
+    )
+
+
+def minimal(deck: Deck, case: Case) -> str:
     """The deck with the stock engine's model and walls: planes, of which each pulls half as much as a plane does."""
     text = re.sub(r"&\n *", " ", deck.text)
     text = re.sub(r"(?m)^(dump|dump_modify) +(pairs|walls) .*\n", "", text)
@@ -97,15 +138,19 @@ def _minimal(deck: Deck, case: Case) -> str:
     return re.sub(r"(?m)^fix +motion ", lambda found: walls + found[0], text)
 
 
-def _cpu_time(folder: Path, environment: Mapping[str, str], steps: int) -> float:
-    """User CPU time of steps of a deck, s: without that of its start."""
-    text, seconds = (folder / DECK_NAME).read_text("utf-8"), []
+def without_steps(text: str) -> str:
+    """A deck with STEPS where its number of steps was."""
+    return re.sub(r"(?m)^run .*", "run STEPS", text)
+
+
+def cpu_time(folder: Path, command: Sequence[str], text: str, steps: int, environment: Mapping[str, str]) -> float:
+    """User CPU time of steps of a script, s: without that of its start. The script has STEPS for their number."""
+    seconds = []
     for number in (0, steps):
-        name = f"{number}.{DECK_NAME}"
-        (folder / name).write_text(re.sub(r"(?m)^run .*", f"run {number}", text), "utf-8")
+        (folder / SCRIPT).write_text(text.replace("STEPS", str(number)), "utf-8")
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-        command = [str(find_engine().path), "-log", "none", "-in", name]
-        subprocess.run(command, cwd=folder, env={**os.environ, **ALONE, **environment}, check=True, capture_output=True)
+        how = {"env": {**os.environ, **environment}, "capture_output": True}
+        subprocess.run([*command, SCRIPT], cwd=folder, check=True, **how)
         seconds.append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before)
     return seconds[1] - seconds[0]
 

@@ -29,7 +29,7 @@ _Place = tuple[SignedLength, SignedLength]
 _Range = tuple[Radius, Radius]
 _DiameterRange = tuple[Diameter, Diameter]
 _FEW = Field(min_length=2, max_length=100)
-MOST_BEADS = 20_000
+MOST_BEADS = 200_000
 _LEAST_LEVER = 0.1
 """Of a cluster's extent: large and small beads whose centroids are nearer than that give no heading."""
 _TOUCHING = 0.02
