@@ -31,7 +31,7 @@ RATIOS = Path(__file__).with_name("benchmark_ratios.json")
 """User CPU time of decks for the stock engine's model over that of today's, as last measured."""
 PILES = {"pile-200": ("pile-small", 40_000), "pile-1630": ("pile-fig1a", 12_000)}
 """Case and steps of each pile."""
-_TILE, _TILES, _TILE_WIDTH = 2000, 5, 11.7
+_TILE, _TILES, _TILE_WIDTH = 500, 10, 5.85
 """Beads and width (mm) of the shaken piles that side by side, without walls between them, are the large pile."""
 ENGINE = ("liggghts", "-log", "none", "-in")
 SCRIPT = "script.py"

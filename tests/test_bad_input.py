@@ -93,6 +93,7 @@ CASES: list[tuple[dict[str, Any], str]] = [
     ({"liquid": {"contact_angle": "90 deg"}, "environment": {"gravity": "0 g"}}, "bead 1 and the boundary apart"),
     ({"run": {"time_step": "20 us"}}, 'run.time_step = "20 us": beyond the rayleigh'),
     ({"run": {"cycles": 10, "settling_cycles": 10}}, "run.settling_cycles = 10: expected at most"),
+    ({"mixture": {**MIXTURE, "count": 200_001}}, "mixture.count = 200001: expected at most 200000"),
     ({"run": {"cycles": None, "settling_cycles": None, "duration": "1e4 s"}},
      'run.duration = "1e4 s": expected at most 8388 s: the engine counts'),
     ({"dimers": None, "placed": [bead("1 mm", "9 mm")], "run": {"seed": 3}}, "run.seed = 3: expected none with placed"),
