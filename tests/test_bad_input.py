@@ -222,6 +222,8 @@ VESSELS: list[tuple[str | None, dict[str, Any], dict[str, Any], str]] = [
     (obj([*SQUARE[4:], (0, 0, 0)], [(1, 2, 5), (2, 3, 5), (3, 4, 5), (4, 1, 5)]), OF_MESH, {},
      "has no level floor at its bottom, on which walkers stand"),
     (None, {"planes": CUP}, {}, "boundary.height: missing"),
+    (None, {"planes": [plane(0, 0, 1, at=("0 mm", "0 mm", "1 mm")), *CUP[1:]], "height": "5 mm"}, {},
+     "have their lowest point at z = 1 mm; expected 0 mm"),
     (None, {"planes": CUP[1:], "height": "5 mm"}, {}, ": are open toward -z"),
     (None, {"planes": CUP[:-1], "height": "5 mm"}, {}, ": are open toward -y"),
     (None, {"planes": [*CUP, plane(0, 0, -1)], "height": "5 mm"}, {}, ": enclose nothing"),

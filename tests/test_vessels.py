@@ -10,11 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+import walkers
 from walkers.check.scenes import DRY, Bench, bench_case, full_case, prescribed, standing
 from walkers.inputs.boundary import FLOOR
 from walkers.inputs.case import Case
+from walkers.inputs.reading import load_case
 from walkers.inputs.vessel import Vessel
 from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.motion import read_bridges
+from walkers.postprocess.scene import walls_of
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.templates.deck import render_deck
@@ -220,3 +224,61 @@ def test_a_run_is_named_by_the_numbers_of_its_vessel(tmp_path: Path, name: str) 
     assert run_place(larger, find_engine(), tmp_path) != places[0]
     assert len(case.boundary.walls) == 7
     assert case.boundary.walls[0].name == FLOOR
+
+
+def bowl(radius: float, rings: int) -> Vessel:
+    """Half a sphere of facets, four sides around it for each ring."""
+    bends, turns = np.linspace(0.0, pi / 2.0, rings + 1), pi / (2.0 * rings) * np.arange(4 * rings)
+    ring = np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=1)
+    points = np.concatenate([radius * sin(at) * ring + [0.0, 0.0, radius * (1.0 - cos(at))] for at in bends])
+    number = np.arange(len(points)).reshape(rings + 1, -1)
+    a, b, c, d = (
+        each.ravel() for each in (number[:-1], np.roll(number[:-1], -1, 1), np.roll(number[1:], -1, 1), number[1:])
+    )
+    return Vessel(points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
+
+
+def test_a_bowl_of_facets_becomes_round(tmp_path: Path) -> None:
+    """Its volume, how far beads are from it, and how many of its faces are nearest around the foot of a bead."""
+    size, off = 5e-3, []
+    for rings in (4, 8, 16):
+        case = Case.read(poured(mesh=write(tmp_path, bowl(size, rings)), scale="1 mm"))
+        vessel = case.boundary.vessel
+        assert vessel.height == pytest.approx(size)
+        off.append(1.0 - vessel.volume() / (2.0 / 3.0 * pi * size**3))
+        assert case.boundary.volume(size / 2) == pytest.approx(
+            pi * (size / 2) ** 2 * (size - size / 6), rel=3 * off[-1]
+        )
+    assert off[1] / off[2] == pytest.approx(4.0, rel=0.1)
+    away, near = np.random.default_rng(1).normal(size=(400, 3)), 0.9 * size
+    centres = np.array([0.0, 0.0, size]) - near * (
+        away * [1.0, 1.0, 0.0] + [0.0, 0.0, 3.0] * np.abs(away)
+    ) / np.linalg.norm(away * [1.0, 1.0, 0.0] + [0.0, 0.0, 3.0] * np.abs(away), axis=1, keepdims=True)
+    distances = np.array([wall.distances(centres) for wall in case.boundary.walls if wall.name.startswith("f")])
+    np.testing.assert_allclose(distances.min(axis=0), size - near, atol=0.01 * size)
+    np.testing.assert_allclose(case.boundary.side_clearance(centres), distances.min(axis=0), atol=1e-12)
+    assert (distances < np.inf).sum() / len(centres) == pytest.approx(1.0 / 0.9**2, rel=0.03)
+
+
+@pytest.mark.parametrize("boundary", ["hexagon", "funnel"])
+def test_beads_are_poured_into_a_vessel_and_stay_there(tmp_path: Path, boundary: str) -> None:
+    """Through the opening of a funnel too, into a narrower neck; walls, bridges and pictures agree."""
+    vessel = prism(6, 2.5e-3, 8e-3)
+    if boundary == "funnel":
+        ring, up = vessel.points[:6], np.array([0.0, 0.0, 1e-3])
+        points = np.concatenate([ring, ring + 2.0 * up, 2.0 * ring + 6.0 * up])
+        vessel = Vessel(points, np.concatenate([vessel.triangles, vessel.triangles[4:] + 6]))
+    done = walkers.run(load_case(poured(mesh=write(tmp_path, vessel), scale="1 mm")), tmp_path)
+    motion, walls = done.motion, done.case.boundary.walls
+    clear = done.case.boundary.side_clearance(motion.position[-1]) - motion.radius
+    assert (clear > -0.02 * motion.radius).all()
+    bridges = list(read_bridges(motion))[-1]
+    beads, numbers = bridges.at_walls
+    assert len(beads) > 3
+    gaps = [
+        float(walls[wall].distances(motion.position[-1, bead])) - motion.radius[bead]
+        for bead, wall in zip(beads, numbers, strict=True)
+    ]
+    np.testing.assert_allclose(gaps, bridges.gap[len(bridges.beads) :], atol=1e-9)
+    assert sum(len(corners) - 2 for corners in walls_of(motion)) == len(vessel.triangles)
+    assert {"floor"} <= {wall.name for wall in walls}

@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from walkers.check import kernels
 from walkers.check.kernels import CELLS, Bridges, Constants, FloatArray, State
+from walkers.errors import refused
 from walkers.inputs.boundary import Flat, Wall
 from walkers.inputs.case import Case
 from walkers.inputs.loads import surfaces_of
@@ -55,6 +56,8 @@ class SecondEngine:
     ) -> None:
         if unknown := set(without) - set(TERMS):
             raise ValueError(f"without {unknown}: expected any of {', '.join(TERMS)}")
+        if case.boundary.triangles and not walls:
+            raise refused(case.name, "boundary.mesh: expected a vessel of planes; the second engine knows no facets")
         self.clock = clock
         radius = np.ascontiguousarray(radius, dtype=np.float64)
         self.constants = _constants(case, radius, walls or case.boundary.walls, without)
