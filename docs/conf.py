@@ -22,7 +22,7 @@ version = release = metadata.version("granular-walkers")
 extensions = [
     *("numpydoc", "sphinx.ext.autodoc", "myst_parser"),
     *("sphinx_copybutton", "sphinx_design", "sphinx_gallery.gen_gallery", "sphinxcontrib.bibtex"),
-    *("readable", "generated"),  # docs/_ext
+    *("readable", "generated", "texts"),  # docs/_ext
 ]
 exclude_patterns = ["_ext", "examples", "gallery/**.ipynb"]
 default_role = "py:obj"
@@ -42,7 +42,8 @@ html_static_path = ["_static"]
 html_css_files = ["walkers.css"]
 html_show_sourcelink = False
 html_copy_source = False
-html_show_search_summary = False  # a browser may not read other pages from disk
+html_show_search_summary = False  # a browser may not read other pages from disk: docs/_ext/texts.py instead
+html_search_scorer = "_static/scorer.js"
 html_theme_options = {
     "navbar_align": "left",
     "navbar_end": ["theme-switcher"],
