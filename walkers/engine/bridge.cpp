@@ -465,7 +465,7 @@ private:
 /* Planes, the insides of upright cylinders and facets of other surfaces, shaken as one. */
 class FixWallBridge : public Fix {
 public:
-  FixWallBridge(LAMMPS *lmp, int count, char **args) : Fix(lmp, count, args), law_(0), type_(0), begin_(0), moves_(true)
+  FixWallBridge(LAMMPS *lmp, int count, char **args) : Fix(lmp, count, args), law_(0), type_(0), begin_(0), moves_(true), ramp_(), sway_(0.)
   {
     int at = 3;
     const auto next = [&]() {
@@ -478,7 +478,6 @@ public:
       return Vec{x, y, number()};
     };
     std::string file;
-    double most = 0., factor = 0.;  // displacement, and factor of the ramp
     Vec gravity = {0., 0., 0.};
     while (at < count) {
       const std::string word = next();
@@ -496,18 +495,14 @@ public:
         const Vec amplitude = vector();
         const double frequency = 2. * M_PI * number();
         waves_.push_back({amplitude, frequency, number(), 0., -1});
-        most += length(amplitude);
+        sway_ += length(amplitude);
       } else if (word == "recorded") {
         const Vec amplitude = vector();
         waves_.push_back({amplitude, 0., 0., 0., static_cast<int>(records_.size())});
-        most += length(amplitude) * read_record(next());
-      } else if (word == "ramp") {
-        span_ = number();
-        for (int left = static_cast<int>(number()); left > 0; left--) {
-          const double time = number();
-          ramp_.push_back({time, number()});
-        }
-      } else if (word == "gravity") gravity = vector();
+        records_.push_back(read_course(next()));
+        sway_ += length(amplitude) * records_.back().most;
+      } else if (word == "ramp") ramp_ = read_course(next());
+      else if (word == "gravity") gravity = vector();
       else if (word == "begin") begin_ = static_cast<bigint>(number());
       else if (word == "frame") {
         const std::string frame = next();
@@ -519,8 +514,7 @@ public:
     if (walls_.empty()) error->fix_error(FLERR, this, "expected a plane, a cylinder or facets");
     if (type_ < 1 || type_ > atom->ntypes) error->fix_error(FLERR, this, "expected a type, of those of the box");
     if (moves_ && !file.empty()) error->fix_error(FLERR, this, "loads need the walls' frame: expected frame walls");
-    for (const auto &one : ramp_) factor = std::max(factor, one.second);
-    sway_ = most * (ramp_.empty() ? 1. : factor);
+    if (!ramp_.pieces.empty()) sway_ *= ramp_.most;
     loads_.push_back(gravity);
     for (const Wave &wave : waves_) loads_.push_back(wave.amplitude);
     if (!file.empty()) read_loads(file);
@@ -640,14 +634,26 @@ private:
     int record;                     // of a motion that is recorded, -1 of a sine
   };
 
-  /* From a time on, a motion is the sum of these times powers of the time since, until the next such piece. */
+  /* From a time on, a course is the sum of these times powers of the time since, until the next such piece. */
   struct Piece {
     double time, powers[6];
   };
 
-  struct Record {
-    double period;  // after which it repeats, or 0
+  struct Course {
+    double period, most;  // after which it repeats, or 0; largest value at the begin of a piece
     std::vector<Piece> pieces;
+
+    /* Its value (order 0), and the first or the second derivative. */
+    double at(double time, const int order) const
+    {
+      if (period > 0.) time -= period * std::floor(time / period);
+      const auto later = [](const double now, const Piece &piece) { return now < piece.time; };
+      const Piece &piece = *--std::upper_bound(pieces.begin() + 1, pieces.end(), time, later);
+      double sum = 0.;
+      for (int k = 5; k >= order; k--)
+        sum = sum * (time - piece.time) + piece.powers[k] * (order == 0 ? 1 : order == 1 ? k : k * (k - 1));
+      return sum;
+    }
   };
 
   struct Near {
@@ -659,10 +665,9 @@ private:
   std::vector<Surface> walls_;
   std::vector<double> history_;  // of each bead at each wall
   std::vector<Wave> waves_;
-  std::vector<Record> records_;
-  std::vector<std::pair<double, double>> ramp_;  // times, and factors of the displacement
-  double span_;                                  // over which these are averaged
-  double sway_;                                  // largest displacement
+  std::vector<Course> records_;
+  Course ramp_;  // of the factor of the displacement
+  double sway_;  // largest displacement
   std::vector<Near> near_;
   std::vector<Vec> loads_;  // by the ids of beads, first the command's: gravity, amplitude of each wave
   bigint begin_;
@@ -757,65 +762,37 @@ private:
 
   double *history_of(const int i, const int wall) { return of(i) + HISTORY * wall; }
 
-  /* Reads a motion; returns its largest displacement. */
-  double read_record(const std::string &file)
+  Course read_course(const std::string &file)
   {
     std::ifstream in(file.c_str());
-    Record record = {-1., {}};
-    double most = 0.;
-    in >> record.period;
+    Course course = {-1., 0., {}};
+    in >> course.period;
     for (Piece piece; in >> piece.time;) {
-      for (double &one : piece.powers) in >> one;
-      if (!in) record.period = -1.;
-      most = std::max(most, std::fabs(piece.powers[0]));
-      record.pieces.push_back(piece);
+      for (double &one : piece.powers)
+        if (!(in >> one)) course.period = -1.;
+      course.most = std::max(course.most, std::fabs(piece.powers[0]));
+      course.pieces.push_back(piece);
     }
-    if (!in.eof() || record.pieces.empty() || !(record.period >= 0.))
-      error->fix_error(FLERR, this, (file + " has no motion that can be read").c_str());
-    records_.push_back(record);
-    return most;
+    if (!in.eof() || course.pieces.empty() || !(course.period >= 0.))
+      error->fix_error(FLERR, this, (file + " has no course that can be read").c_str());
+    return course;
   }
 
   /* Displacement (order 0), velocity (1) or acceleration (2) for an amplitude of 1, without the ramp. */
-  double unramped(const Wave &wave, double time, const int order) const
+  double unramped(const Wave &wave, const double time, const int order) const
   {
-    if (wave.record < 0) {
-      const double w = wave.frequency, turn = w * time + wave.phase;
-      return order == 0 ? std::sin(turn) : order == 1 ? w * std::cos(turn) : -w * w * std::sin(turn);
-    }
-    const Record &record = records_[wave.record];
-    if (record.period > 0.) time -= record.period * std::floor(time / record.period);
-    const auto later = [](const double now, const Piece &piece) { return now < piece.time; };
-    const Piece &piece = *--std::upper_bound(record.pieces.begin() + 1, record.pieces.end(), time, later);
-    double sum = 0.;
-    for (int k = 5; k >= order; k--)
-      sum = sum * (time - piece.time) + piece.powers[k] * (order == 0 ? 1 : order == 1 ? k : k * (k - 1));
-    return sum;
+    if (wave.record >= 0) return records_[wave.record].at(time, order);
+    const double w = wave.frequency, turn = w * time + wave.phase;
+    return order == 0 ? std::sin(turn) : order == 1 ? w * std::cos(turn) : -w * w * std::sin(turn);
   }
 
-  /* Integral (order 0) of a factor that changes evenly from one time of the ramp to the next, it (1), or its slope (2).
-   */
-  double even(const double time, const int order) const
-  {
-    double sum = 0.;
-    size_t k = 0;
-    for (; k + 1 < ramp_.size() && !(time < ramp_[k + 1].first); k++)
-      sum += 0.5 * (ramp_[k + 1].first - ramp_[k].first) * (ramp_[k].second + ramp_[k + 1].second);
-    const double since = time - ramp_[k].first, factor = ramp_[k].second;
-    const bool changes = since >= 0. && k + 1 < ramp_.size();
-    const double slope = changes ? (ramp_[k + 1].second - factor) / (ramp_[k + 1].first - ramp_[k].first) : 0.;
-    return order == 0 ? sum + since * (factor + 0.5 * slope * since) : order == 1 ? factor + slope * since : slope;
-  }
-
-  /* The same with the ramp: its factor is the mean of the even one over the span, so that velocities do not jump. */
+  /* The same with the ramp. */
   double motion(const Wave &wave, const double time, const int order) const
   {
-    if (ramp_.empty()) return unramped(wave, time, order);
+    if (ramp_.pieces.empty()) return unramped(wave, time, order);
     double sum = 0.;
-    for (int k = 0; k <= order; k++) {
-      const double factor = (even(time + 0.5 * span_, k) - even(time - 0.5 * span_, k)) / span_;
-      sum += (order == 2 && k == 1 ? 2. : 1.) * factor * unramped(wave, time, order - k);
-    }
+    for (int k = 0; k <= order; k++)
+      sum += (order == 2 && k == 1 ? 2. : 1.) * ramp_.at(time, k) * unramped(wave, time, order - k);
     return sum;
   }
 

@@ -17,13 +17,16 @@ from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from walkers.errors import Problem
 from walkers.inputs import units
-from walkers.inputs.record import Record, record_of
+from walkers.inputs.record import Record, course_text, record_of
 from walkers.inputs.table import Choice, Filled, Indirect, Table, key
 from walkers.inputs.units import Angle, Coefficient
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
+    from scipy.interpolate import PPoly
+
+    FloatArray = npt.NDArray[np.float64]
 
 Vector = tuple[float, float, float]
 Frame = Literal["lab", "container"]
@@ -223,20 +226,21 @@ class Excitation:
         record, fewest = self.record, self.ramp[-1][0] * self.frequency if self.ramp else 0.0
         return fewest, record.length * self.frequency if record and not record.repeats else inf
 
-    def factor(self, time: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Factor of the ramp at times (s), its first and its second derivative, shape (3, N).
-
-        It is a mean over a cycle, so that velocities do not jump where the ramp has a kink.
-        """
+    @cached_property
+    def factor(self) -> PPoly:
+        """Factor of the ramp against time (s): its mean over a cycle, so that velocities do not jump at its kinks."""
         import numpy as np
-        from scipy.interpolate import make_interp_spline
+        from scipy.interpolate import PPoly, make_interp_spline
 
         times, factors = np.array(self.ramp or ((0.0, 1.0),)).T
-        half, first, last = 0.5 / self.frequency, min(0.0, time.min()) - 1.0, max(times[-1], time.max()) + 1.0
-        even = make_interp_spline([first, *times, last], [factors[0], *factors, factors[-1]], k=1).antiderivative()
-        return np.stack([(even(time + half, order) - even(time - half, order)) / (2.0 * half) for order in range(3)])
+        cycle, far = 1.0 / self.frequency, (times[0] - 9.0, times[-1] + 9.0)
+        even = make_interp_spline([far[0], *times, far[1]], [factors[0], *factors, factors[-1]], k=1).antiderivative()
+        knots = np.unique([far[0] + cycle, *(times - cycle / 2.0), *(times + cycle / 2.0), far[1] - cycle])
+        places = ((knots[1:] + knots[:-1]) / 2.0, knots[:-1], knots[:-1])  # the second derivative is not continuous
+        mean = [even(at + cycle / 2.0, k) - even(at - cycle / 2.0, k) for k, at in zip((2, 1, 0), places, strict=True)]
+        return PPoly(np.stack(mean) / [[2.0 * cycle], [cycle], [cycle]], knots)
 
-    def motions(self, time: npt.NDArray[np.float64]) -> Iterator[tuple[Vector, tuple[npt.NDArray[np.float64], ...]]]:
+    def motions(self, time: FloatArray) -> Iterator[tuple[Vector, tuple[FloatArray, ...]]]:
         """Direction of each harmonic or axis of a record, and displacement, velocity and acceleration at times (s)."""
         import numpy as np
 
@@ -244,21 +248,27 @@ class Excitation:
             turn = one.angular_frequency * time + one.phase
             sine = np.sin(turn)
             course = (one.amplitude * sine, one.peak_velocity * np.cos(turn), -one.peak_acceleration * sine)
-            yield one.direction, self._ramped(time, course)
+            yield one.direction, self._ramped(time, *course)
         if self.record:
-            beyond, orders = "periodic" if self.record.repeats else None, range(3)
-            moved = np.stack([self.record.course(time, order, extrapolate=beyond) for order in orders])
+            moved = self.record.motion(time)
             for axis, place in self.record.axes.items():
-                yield AXES[axis], self._ramped(time, tuple(moved[..., place]))
+                yield AXES[axis], self._ramped(time, *moved[..., place])
 
-    def _ramped(
-        self, time: npt.NDArray[np.float64], course: tuple[npt.NDArray[np.float64], ...]
-    ) -> tuple[npt.NDArray[np.float64], ...]:
+    def _ramped(self, time: FloatArray, *course: FloatArray) -> tuple[FloatArray, ...]:
         """A motion with the ramp."""
         if not self.ramp:
             return course
-        (x, v, a), (factor, slope, bend) = course, self.factor(time)
+        (x, v, a), (factor, slope, bend) = course, (self.factor(time, order) for order in range(3))
         return factor * x, factor * v + slope * x, factor * a + 2.0 * slope * v + bend * x
+
+    def courses(self) -> dict[str, str]:
+        """Names and contents of the files from which the engine reads a record and a ramp."""
+        record = self.record
+        files = {} if record is None else {
+            f"record.{axis}.txt": course_text(record.course.x, record.course.c[..., place], record.repeats)
+            for axis, place in record.axes.items()
+        }  # fmt: skip
+        return files | ({"ramp.txt": course_text(self.factor.x, self.factor.c)} if self.ramp else {})
 
     def described(self) -> str:
         """The drive in a few words, such as ``80 Hz, a0 = 39.2 m/s² + 160 Hz, a0 = 29.4 m/s², 90°``."""

@@ -8,13 +8,9 @@ boundary starts at no displacement and comes back to it at the end. With p rows 
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
-from itertools import pairwise
-from math import isfinite
 from pathlib import Path
-from statistics import median
 from typing import TYPE_CHECKING, Annotated, Any
 
 from walkers.errors import unusable
@@ -100,10 +96,19 @@ class Record(Table):
             cycles = peak + 0.5 * float((left - right) / (left - 2.0 * top + right))
         return cycles / self.length, float(high[-1]) / self.length
 
-    def pieces(self, place: int) -> str:
-        """The motion along an axis as the engine reads it: the period, then time and powers of each piece."""
-        rows = zip(self.course.x.tolist(), *self.course.c[::-1, :, place].tolist(), strict=False)
-        return "\n".join([repr(self.length * self.repeats), *(" ".join(map(repr, row)) for row in rows)]) + "\n"
+    def motion(self, time: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Displacement, velocity and acceleration along x, y and z at times (s), shape (3, N, 3)."""
+        import numpy as np
+
+        beyond = "periodic" if self.repeats else None
+        return np.stack([self.course(time, order, extrapolate=beyond) for order in range(3)])
+
+
+def course_text(times: npt.NDArray[np.float64], powers: npt.NDArray[np.float64], repeats: bool = False) -> str:
+    """A course as the engine reads it: a period or 0, then each piece's time and powers, given the highest first."""
+    powers = powers[::-1].tolist() + [[0.0] * powers.shape[1]] * (6 - len(powers))
+    rows = zip(times.tolist(), *powers, strict=False)
+    return "\n".join([repr(float(times[-1] * repeats)), *(" ".join(map(repr, row)) for row in rows)]) + "\n"
 
 
 def _spline(rows: npt.NDArray[np.float64], repeats: bool = False) -> PPoly:
@@ -134,41 +139,31 @@ def with_record(document: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
     if not isinstance(name, str) or not isinstance(drive, Mapping):
         return document
     try:
-        rows = list(_read(folder / name))
+        rows = _read(folder / name)
         _check(rows)
     except OSError as error:
         raise unusable("drive.record", f"cannot be read: {error.strerror}", name) from error
-    except UnicodeDecodeError as error:
-        raise unusable("drive.record", "expected text in UTF-8", name) from error
-    except (ValueError, csv.Error) as error:
-        raise unusable("drive.record", str(error), name) from error
+    except ValueError as error:  # its subclasses are of pandas
+        found = "" if type(error) is ValueError else "expected rows of numbers with commas below a header: "
+        raise unusable("drive.record", f"{found}{error}".strip(), name) from error
     return {**document, "drive": {**drive, "record": {"file": name, "rows": rows}}}
 
 
-def _read(path: Path) -> Iterator[list[float]]:
+def _read(path: Path) -> list[list[float]]:
     """Rows of a file: time, s, and acceleration along x, y and z, m/s²."""
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        lines = csv.reader(file)
-        columns = [_column(text) for text in next(lines, [])]
-        names = [name for name, _ in columns]
-        if names[:1] != ["time"] or len(names) < 2 or len({*names}) < len(names):
-            raise ValueError(_HEADER)
-        for line in lines:
-            try:
-                numbers = [float(text) * factor for text, (_, factor) in zip(line, columns, strict=True)]
-            except ValueError as error:
-                raise ValueError(f"line {lines.line_num}: expected {len(columns)} numbers with commas") from error
-            row = dict(zip(names, numbers, strict=True))
-            yield [row.get(name, 0.0) for name in ("time", *"xyz")]
+    import numpy as np
+    import pandas as pd
 
-
-def _column(text: str) -> tuple[str, float]:
-    """Name of a column, and its unit in SI units."""
-    name, _, unit = text.strip().removesuffix(")").partition("(")
-    name = name.strip()
-    if name not in ("time", *"xyz"):
-        raise ValueError(f"{_HEADER}; not {text.strip()!r}")
-    return name, parse_quantity(f"1 {unit}", TIME if name == "time" else ACCELERATION)
+    table = pd.read_csv(path, skipinitialspace=True, float_precision="round_trip", index_col=False)
+    heads = [text.strip().removesuffix(")").partition("(") for text in table.columns]
+    names, kinds = [name.strip() for name, _, _ in heads], dict.fromkeys("xyz", ACCELERATION) | {"time": TIME}
+    if names[:1] != ["time"] or len(names) < 2 or len({*names}) < len(names) or not kinds.keys() >= {*names}:
+        raise ValueError(_HEADER)
+    rows = np.zeros((len(table), 4))
+    for name, (_, _, unit), (_, column) in zip(names, heads, table.items(), strict=True):
+        numbers = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
+        rows[:, ("time", *"xyz").index(name)] = numbers * parse_quantity(f"1 {unit}", kinds[name])
+    return rows.tolist()
 
 
 def _check(rows: Sequence[Sequence[float]]) -> None:
@@ -177,19 +172,17 @@ def _check(rows: Sequence[Sequence[float]]) -> None:
 
     if not FEWEST <= len(rows) <= MOST:
         raise ValueError(f"has {len(rows)} rows; expected {FEWEST} to {MOST}")
-    for number, row in enumerate(rows, 1):
-        if not all(map(isfinite, row)) or max(map(abs, row[1:])) > ACCELERATION.largest:
-            raise ValueError(
-                f"row {number}: expected finite numbers, accelerations up to {ACCELERATION.largest:g} m/s²"
-            )
-    steps = [later[0] - row[0] for row, later in pairwise(rows)]
-    usual = median(steps)
-    for number, step in enumerate(steps, 2):
-        if not 0.0 < step <= _GAP * usual:
-            after = f"row {number} is {1e3 * step:.6g} ms after the one before"
-            raise ValueError(f"{after}; expected times that increase without gaps, about {1e3 * usual:.6g} ms apart")
-    array = np.array(rows)
-    whole, half = _spline(array)(array[:, 0] - array[0, 0]), _spline(array[::2])(array[:, 0] - array[0, 0])
+    array, largest = np.array(rows), ACCELERATION.largest
+    if (odd := ~np.isfinite(array).all(axis=1) | (np.abs(array[:, 1:]) > largest).any(axis=1)).any():
+        raise ValueError(
+            f"row {np.argmax(odd) + 1}: expected a number in each column, accelerations up to {largest:g} m/s²"
+        )
+    steps = np.diff(array[:, 0])
+    usual = np.median(steps)
+    if (odd := (steps <= 0.0) | (steps > _GAP * usual)).any():
+        after = f"row {np.argmax(odd) + 2} is {1e3 * steps[np.argmax(odd)]:.6g} ms after the one before"
+        raise ValueError(f"{after}; expected times that increase without gaps, about {1e3 * usual:.6g} ms apart")
+    whole, half = (_spline(part)(array[:, 0] - array[0, 0]) for part in (array, array[::2]))
     if not whole.any():
         raise ValueError("expected an acceleration that changes")
     change = float(np.linalg.norm((whole - half)[:-1]) / np.linalg.norm(whole))

@@ -353,8 +353,10 @@ def _record(case: Case, record: Record) -> Case:
     first, last = (record.rows[end][1:] for end in (0, -1))
     if record.repeats and dist(first, last) > _MEET * record.largest(2):
         raise unusable("drive.repeats", "expected a record whose last row is that of the next period's begin")
-    why = "divides all of its spectrum" if record.repeats else "the strongest of its spectrum"
-    case = case.noted("drive.frequency", f"of the record, {why}", text=f"{case.excitation.frequency:.6g} Hz")
+    why = "all lines are multiples" if record.repeats else "the strongest line"
+    case = case.noted(
+        "drive.frequency", f"of the spectrum of the record: {why}", text=f"{case.excitation.frequency:.6g} Hz"
+    )
     peak = quantity_text(case.excitation.peak_acceleration, ACCELERATION)
     return case.noted("drive.peak_acceleration", "of the record, without its mean", text=peak)
 

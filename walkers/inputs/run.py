@@ -236,15 +236,15 @@ def _sources(run: Run, case: Case, reason: str) -> dict[str, Source]:
 def _check_drive(case: Case, cycles: int, time_step: float) -> None:
     """A run is as long as its ramp and not longer than its record, whose rows are not closer than its steps."""
     drive, name = case.excitation, "run.cycles" if case.run.duration is None else "run.duration"
+    if drive.record and (apart := drive.record.length / (len(drive.record.rows) - 1)) < time_step:
+        rows = f"its rows, {1e6 * apart:.3g} us apart, are closer than the time step, {1e6 * time_step:.3g} us"
+        raise unusable("drive.record", f"{rows}; expected fewer rows, or a shorter run.time_step", drive.record.file)
     fewest, most = drive.cycles
     if cycles < fewest:
         raise unusable(name, f"expected at least {ceil(fewest)} cycles, {drive.ramp[-1][0]:g} s, of drive.ramp")
     if cycles > most + 1e-9:
         message = "drive.record has no more; drive.repeats = true repeats one that ends as it begins"
         raise unusable(name, f"expected at most {int(most)} cycles: {message}")
-    if drive.record and (apart := drive.record.length / (len(drive.record.rows) - 1)) < time_step:
-        rows = f"its rows, {1e6 * apart:.3g} us apart, are closer than the time step, {1e6 * time_step:.3g} us"
-        raise unusable("drive.record", f"{rows}; expected fewer rows, or a shorter run.time_step", drive.record.file)
 
 
 def _check_length(case: Case, cycles: int, settling: int, cycles_per_sample: int) -> None:

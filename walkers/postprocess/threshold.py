@@ -41,7 +41,7 @@ def measure(motion: Motion) -> Measured:
     times, whole = walked[0][0][::WINDOW], np.concatenate([distance[::WINDOW] for _, distance in walked], axis=1)
     velocity = np.diff(whole, axis=0) / np.diff(times)[:, None]
     whole_drive = max(factor for _, factor in drive.ramp) or 1.0
-    peaks = drive.factor(times)[0] * drive.peak_acceleration / whole_drive
+    peaks = drive.factor(times) * drive.peak_acceleration / whole_drive
     middle, owner = (
         (peaks[1:] + peaks[:-1]) / 2.0,
         [walker.walker for group in motion.groups for walker in group.walkers],

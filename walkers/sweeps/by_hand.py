@@ -165,7 +165,8 @@ def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float]
     # A deck has no Γ0, but the acceleration for the density and the surface tension that it was made for.
     by_gamma0 = any(one.gamma0 is not None for one in (case.drive, *case.drive.harmonics))
     if (sines := _sines(case, values)) != _sines(case, {}) or by_gamma0:
-        document["drive"] = {"frame": case.drive.frame, **(sines[0] if len(sines) == 1 else {"harmonics": sines})}
+        kept = {name: one for name, one in document["drive"].items() if name in ("frame", "ramp")}
+        document["drive"] = {**kept, **(sines[0] if len(sines) == 1 else {"harmonics": sines})}
     ran = Case.read(changed(Case, document, changes), source=source, name=case.name).for_cycles(cycles)
     drive, parts = ran.excitation, case.run.samples_per_cycle
     if not isclose(step * steps * drive.frequency, 1.0, rel_tol=_SAME) or steps % parts:

@@ -180,7 +180,7 @@ def compose(plan: Plan) -> Deck:
     scalable = len(surfaces) == 1 and liquid.law in LAWS and liquid.viscosity > 0.0
     files = {BRIDGES_NAME: tables_of(case, surfaces, {(bead.surface, bead.radius) for bead in scene.beads})}
     record = case.excitation.record
-    files |= {f"record.{axis}.txt": record.pieces(place) for axis, place in record.axes.items()} if record else {}
+    files |= case.excitation.courses()
     files |= {LOADS_NAME: _loads(scene)} if len(scene.loadings) > 1 else {}
     facets = [wall for wall in scene.walls if not isinstance(wall, (Flat, Round))]
     files |= {FACETS_NAME: "".join(map(_facet, facets))} if facets else {}
