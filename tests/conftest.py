@@ -15,6 +15,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout, suppress
+from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -64,7 +65,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # MPI processes that wait for each other give way to others meanwhile: on a busy machine they are ten times as fast so.
 os.environ["OMPI_MCA_mpi_yield_when_idle"] = "1"  # noqa: SIM112
 # The user's cache is not ours to read or write, for audits of the engine are kept there; but for what is named by all
-# that it depends on: solutions of an equation, half a second each, and the compiled contact model, which takes four.
+# that it depends on: solutions of an equation, of a tenth of a second, and the compiled contact model, of four.
 _SOLVED = ("young-laplace", "menisci")
 _KEPT, _ = (make_cache_folder(name).parent for name in _SOLVED)
 os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="walkers-tests-")
@@ -74,6 +75,12 @@ for _name in _SOLVED:
 for _kept in _KEPT.glob("bridge-*"):  # a copy: a link to it is not loaded
     shutil.copy(_kept, _OURS)
 
+_LONGEST = (
+    *("test_a_sweep_through_slurm", "test_beads_play_pause_and_turn", "[pilots", "[a pile, killed]"),
+    *("test_known_parameters_are_found", "test_a_dimer_on_the_axis_climbs", "test_mandatory_packages"),
+    *("test_workers_of_another_process", "test_figures_and_comparison", "test_piles_agree_until"),
+)
+"""Parts of the names of tests that take more than a few seconds, the longest first."""
 T = TypeVar("T")
 PROGRAM = str(Path(sys.executable).with_name("walkers"))
 SHORT = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
@@ -100,6 +107,23 @@ def make_case(**changes: Any) -> Case:
 def origins(case: Case) -> dict[str, Origin]:
     """The origins of a case's values, by key."""
     return {one.key: one for one in case.origins}
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let each worker begin with some of the longest tests, so that none of them begins when all others have ended.
+
+    Workers get equal pieces of what was collected, in its order, and take from each other later.
+    """
+    long = [item for name in _LONGEST for item in items if name in item.name]
+    short = iter([item for item in items if item not in long])
+    workers, left = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")), len(items)
+    items.clear()
+    for worker in range(workers):
+        piece, share = left // (workers - worker), long[worker::workers]
+        items += [*share, *islice(short, max(piece - len(share), 0))]
+        left -= piece
+    items += short
 
 
 @contextmanager
@@ -288,10 +312,11 @@ PATIENCE = 300.0
 def wait_for(condition: Callable[[], T | None], seconds: float = PATIENCE) -> T:
     """What a condition gives as soon as that is anything."""
     end = time.monotonic() + seconds
-    while time.monotonic() < end:
+    while (began := time.monotonic()) < end:
         if found := condition():
             return found
-        time.sleep(0.02)
+        # A look may take the processor from what is waited for.
+        time.sleep(min(max(0.02, time.monotonic() - began), 0.5))
     raise AssertionError("waited in vain")
 
 

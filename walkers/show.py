@@ -30,7 +30,7 @@ _WALKER_MICROSECONDS = 0.22
 """Measured: 1.0 µs per step for one walker, 2.2 for 6, 6.2 for 24, 22 for 96, 2.6 for 9 in a tray."""
 _BEAD_STEPS_PER_SECOND = 10.5e6
 """For loose beads; measured on a quiet core from settled piles on: 11.0 million with 200 beads, 10.2 with 1,630."""
-_SOLVING_SECONDS = 0.27
+_SOLVING_SECONDS = 0.1
 """For each shape of bridge without a cached solution."""
 _MEASURING_SECONDS = 0.037
 """For the tables and the result of a run."""

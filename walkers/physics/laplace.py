@@ -91,6 +91,8 @@ class ForceCurve(NamedTuple):
 def _sinc(x: Array) -> Array:
     """sin(x)/x, also for complex arguments (derivatives by complex steps)."""
     small = np.abs(x) < 1e-4
+    if not small.any():
+        return np.asarray(np.sin(x) / x)
     safe = np.where(small, 1.0, x)
     return np.where(small, 1.0 - x**2 / 6.0, np.sin(safe) / safe)
 
@@ -346,7 +348,7 @@ def _stable(family: _Family, branch: _Branch, gaps: FloatArray) -> FloatArray:
     for one in np.flatnonzero(far):
         chord = branch.bridges[pieces[one] + 1] - branch.bridges[pieces[one]]
         found[one] = _across(family, cubics[:, one], chord, (lows[one], highs[one]), gaps[one])
-    lost = np.maximum(np.abs(found[:, 4] - gaps), np.max(np.abs(family.misfit(found)), axis=1)) > _SAME_GAP
+    lost = ~(np.maximum(np.abs(found[:, 4] - gaps), np.max(np.abs(family.misfit(found)), axis=1)) <= _SAME_GAP)
     if lost.any():
         raise NoBridgeError(f"no bridge was found at a gap of {gaps[lost][0]:.6g} of the volume's cube root")
     return found

@@ -54,7 +54,7 @@ _MARKERS = "osD^vXP<>*"
 _MODELS = (("--", "_"), (":", "+"))  # line of each model, and its symbol if points are not joined
 _CURVE = 61  # points of a model's curve
 _OF_SHAPE = ("radii", "volume_fraction", "meniscus_radius", "contact_angle")
-"""Ends of the keys that change the shape of bridges, each of which takes a quarter of a second to solve."""
+"""Ends of the keys that change the shape of bridges, each of which takes a tenth of a second to solve."""
 _MOST_COLOURS = 12  # numbers with more values have a colour scale instead of a legend
 _ROUNDING = 1e-12  # relative to the largest number
 _LEAST_RANGE = 1e-4  # smallest range of the y axis relative to the mean, so that rounding errors are not shown

@@ -4,7 +4,7 @@ The pull between beads and at a plane is the closed solution of `walkers.physics
 contact angle. The bridge breaks at the largest gap at which the equation has a solution. Near rupture, the pull falls
 as the square root of the remaining gap, with an infinite slope. It is smooth in t = √(1 - h/rupture), and a polynomial
 in t through a few dozen solutions is as accurate as the equation. The user's cache keeps the polynomial of each shape
-of bridge, which saves half a second.
+of bridge, which saves a tenth of a second.
 
 The resistances are those of `walkers.physics.reynolds`.
 """
@@ -47,7 +47,7 @@ def law(surfaces: Surfaces) -> Curve:
 
 
 def unsolved(bridges: Iterable[Surfaces]) -> int:
-    """Number of bridge shapes without a cached solution; each takes a quarter of a second."""
+    """Number of bridge shapes without a cached solution; each takes a tenth of a second."""
     return sum(not _place(shape).is_file() for shape in {_shape(one) for one in bridges})
 
 
