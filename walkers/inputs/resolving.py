@@ -324,7 +324,7 @@ def _check_places(cluster: Cluster, key: str) -> None:
 
 def _drive(case: Case) -> Case:
     boundary = case.boundary
-    if record := case.excitation.record:
+    if case.drive.record and (record := case.excitation.record):  # before Γ0 gives a peak, there is no excitation
         return _record(case, record)
     if case.drive.repeats:
         raise unusable("drive.repeats", "expected none without drive.record")
