@@ -12,6 +12,7 @@ import pytest
 
 import walkers
 from walkers.check.scenes import DRY, Bench, bench_case, full_case, prescribed, standing
+from walkers.errors import InputError
 from walkers.inputs.boundary import FLOOR
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
@@ -282,3 +283,15 @@ def test_beads_are_poured_into_a_vessel_and_stay_there(tmp_path: Path, boundary:
     np.testing.assert_allclose(gaps, bridges.gap[len(bridges.beads) :], atol=1e-9)
     assert sum(len(corners) - 2 for corners in walls_of(motion)) == len(vessel.triangles)
     assert {"floor"} <= {wall.name for wall in walls}
+
+
+def test_walkers_in_a_vessel_walk_as_on_a_plane(tmp_path: Path) -> None:
+    """On the floor of one with twelve sides, which is a face; they are refused where they do not fit."""
+    changes = {"dimers.replicates": 1, "dimers.facing": "right", "run.cycles": 10, "run.settling_cycles": 4}
+    of = {"mesh": write(tmp_path, prism(12, 4e-3, 3e-3)), "scale": "1 mm", "material": "chromium-coated glass"}
+    plane = load_case("fig1b", changes)
+    vessel = Case.read({**plane.document, "boundary": of}, name="vessel")
+    speeds = [walkers.run(case, tmp_path).result["velocity"] for case in (plane, vessel)]
+    assert speeds[1] == pytest.approx(speeds[0], rel=1e-6)
+    with pytest.raises(InputError, match="do not fit between the walls of the vessel; expected at most"):
+        vessel.changed({"dimers.replicates": 30, "dimers.meet": True})

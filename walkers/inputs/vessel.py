@@ -49,7 +49,8 @@ class Facet(NamedTuple):
     cells: tuple[tuple[Half, ...], ...]
     name: str
 
-    def _away(self, places: FloatArray) -> FloatArray:
+    def away(self, places: FloatArray) -> FloatArray:
+        """Offset of places from its nearest point, or that of its plane or line, of the shape of the places, m."""
         away, along = places - self.point, np.array(self.along)
         over: FloatArray = (away @ along)[..., None] * along
         return over if self.kind == "face" else away - over
@@ -62,12 +63,12 @@ class Facet(NamedTuple):
             within |= np.all(np.einsum("...hx,hx->...h", places[..., None, :] - at, way) > least, axis=-1)
         if self.kind == "face":
             within &= (places - self.point) @ np.array(self.along) > 0.0
-        found: FloatArray = np.where(within, np.linalg.norm(self._away(places), axis=-1), inf)
+        found: FloatArray = np.where(within, np.linalg.norm(self.away(places), axis=-1), inf)
         return found
 
     def normals(self, places: FloatArray) -> FloatArray:
         """Unit vectors away from it, of the shape of the places."""
-        away = self._away(places)
+        away = self.away(places)
         found: FloatArray = away / np.linalg.norm(away, axis=-1, keepdims=True)
         return found
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from walkers.inputs.boundary import Flat, Round
 from walkers.inputs.case import Case
 from walkers.physics.capillary import bridge_volume
 from walkers.postprocess.dump import FloatArray, IntArray
@@ -54,7 +55,9 @@ def ends_of(motion: Motion, place: FloatArray, contacts: IntArray) -> Ends:
     begins, ends = place[contacts[:, 0]], place[contacts[:, 1]]
     for number, wall in enumerate(motion.case.boundary.walls):
         held = contacts[:, 2] == number
-        ends[held] = begins[held] - wall.distances(begins[held])[:, None] * wall.normals(begins[held])
+        first = begins[held]
+        flat = isinstance(wall, (Flat, Round))  # facets are not near all beads
+        ends[held] = first - (wall.distances(first)[:, None] * wall.normals(first) if flat else wall.away(first))
     return begins, ends
 
 

@@ -221,15 +221,14 @@ def _walls(motion: Motion, step: float) -> list[Any]:
     """The boundary, with transparent side walls, and lines on a bare floor with a spacing (mm)."""
     import k3d
 
-    faces = [1e3 * corners for corners in view.walls_of(motion)]
-    parts = []
-    for corners in faces:
-        level = bool(np.ptp(corners[:, 2]) < 1e-6)
-        points = (corners - [0.0, 0.0, 2e-3 * level]).astype(np.float32)  # below beads that touch it
+    faces, parts = [1e3 * corners for corners in view.walls_of(motion)], []
+    for level in (True, False):
+        some = [corners for corners in faces if (np.ptp(corners[:, 2]) < 1e-6) == level]
+        if not some:
+            continue
+        points = (np.concatenate(some) - [0.0, 0.0, 2e-3 * level]).astype(np.float32)  # below beads that touch it
         look = {"color": _FLOOR, "side": "double", "roughness": 1.0, "name": "floor" if level else "wall"}
-        parts.append(
-            k3d.mesh(points, view.fans_of([corners]).astype(np.uint32), opacity=1.0 if level else 0.12, **look)
-        )
+        parts.append(k3d.mesh(points, view.fans_of(some).astype(np.uint32), opacity=1.0 if level else 0.12, **look))
     if motion.case.boundary.bare:
         low, high = faces[0].min(axis=0), faces[0].max(axis=0)
         step = max(step, view.round_below(float(np.ptp([low, high])) / _MOST_LINES))
