@@ -154,7 +154,7 @@ def _read(path: Path) -> list[list[float]]:
     import numpy as np
     import pandas as pd
 
-    table = pd.read_csv(path, skipinitialspace=True, float_precision="round_trip", index_col=False)
+    table = pd.read_csv(path, skipinitialspace=True, index_col=False)
     heads = [text.strip().removesuffix(")").partition("(") for text in table.columns]
     names, kinds = [name.strip() for name, _, _ in heads], dict.fromkeys("xyz", ACCELERATION) | {"time": TIME}
     if names[:1] != ["time"] or len(names) < 2 or len({*names}) < len(names) or not kinds.keys() >= {*names}:
