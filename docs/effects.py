@@ -49,6 +49,7 @@ class Effect:
     hysteresis: float = 0.0  # cos θ of receding edges on beads, minus that of advancing ones
     edges: tuple[float, float] = (0.0, 0.0)  # drags on the substrate and on beads, as `_EDGES`
     merged: bool = False  # the bridges of both beads to the substrate
+    asperities: float = 0.0  # sliding resistance of flows between asperities over 3πηR
     friction: tuple[float, float] = (1.0, 1.0)  # factors on that of beads with the substrate, and with each other
     changes: Mapping[str, Any] = field(default_factory=dict)  # of keys of the cases
 
@@ -69,14 +70,20 @@ EFFECTS = (
     Effect("(e) all edges", edges=_ALL),
     Effect("(e) all edges, more friction", edges=_ALL, friction=(1.2, 1.1)),
     Effect("(e) all edges, more friction, 150 µm", edges=_ALL, friction=(1.4, 1.2), changes=_WIDE),
+    Effect("(f) asperities", asperities=1.0),
+    Effect("(f) asperities, ten times", asperities=10.0),
 )
+
+
+def _curved(case: Case) -> FloatArray:
+    """Reduced radii of the contacts, m."""
+    return np.array([*dimer_of(case).radii, dimer_of(case).reduced_radius])
 
 
 def _parts(case: Case, effect: Effect) -> tuple[FloatArray, FloatArray]:
     """Parameters of `acts` for a case, and losses of the loads of its contacts, in units of 4πγR̄."""
     dimer, liquid, loads = dimer_of(case), case.liquid.of_bridges, contact_loads(case)
-    tension, radii = liquid.surface_tension, np.array(dimer.radii)
-    curved = np.array([*radii, dimer.reduced_radius])
+    tension, radii, curved = liquid.surface_tension, np.array(dimer.radii), _curved(case)
     wetted = (4.0 * curved * [load.surfaces.volume for load in loads] / pi) ** 0.25  # r_w of the law
     on_bead = wetted[:2] + wetted[2]
     above = effect.lifted_above or np.inf
@@ -125,14 +132,18 @@ def row(effect: Effect) -> dict[str, str]:
     terms, lost = map(np.array, zip(*(_parts(case, effect) for case in cases), strict=True))
     walker = Walker.joined([Walker.of_case(case) for case in cases])
     more = np.array([effect.friction[0], *effect.friction])[:, None]
-    walker = replace(walker, friction=walker.friction * more, at_rest=walker.at_rest - lost.T)
+    resistances = walker.resistances.copy()
+    squeezed = np.array([3.0 * pi * case.liquid.of_bridges.viscosity * _curved(case) for case in cases]).T
+    resistances[0] += effect.asperities * squeezed
+    walker = replace(walker, friction=walker.friction * more, at_rest=walker.at_rest - lost.T, resistances=resistances)
     drives = ([getattr(case.excitation, name) for case in cases] for name in ("frequency", "peak_acceleration"))
     motion = walk(walker, *drives, steps_per_cycle=_STEPS, effect=(acts, terms))
     velocity = dict(zip(_CASES, 1e3 * motion.velocity, strict=True))
     mean = {peak: (velocity[f"{peak} g, 60 Hz"] + velocity[f"{peak} g, 90 Hz"]) / 2.0 for peak in _PEAKS}
+    slide = effect.asperities * squeezed[0, 0] * _SHOWN / dimer_of(cases[0]).capillary_scale
     lift, turn, drags = terms[0, 0] * _SHOWN, terms[0, 3], (terms[0, 5] + terms[0, 7]) * _SHOWN ** (2.0 / 3.0)
     numbers = {
-        "size, %": 100.0 * (lift + turn + drags + lost[0, 0]) / walker.at_rest[0, 0],
+        "size, %": 100.0 * (lift + turn + drags + slide + lost[0, 0]) / walker.at_rest[0, 0],
         **{f"{peak} g": mean[peak] for peak in _PEAKS[:-1]},
         "10 g / 6 g": mean[10] / mean[6],
         "Fig. 3, 0.4 / 0.3": velocity["Fig. 3, 0.4"] / velocity["Fig. 3, 0.3"],
