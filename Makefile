@@ -79,10 +79,15 @@ docs: setup .venv/with-docs ## Build the documentation into build/site, to be op
 	@echo "open build/site/index.html"
 
 .PHONY: paper
-paper: pandoc ## Build the paper about the program (paper/paper.md) into build/paper.html
+paper: setup chromium .venv/with-docs .venv/with-dev ## The whole comparison with the paper as one article, build/paper/article.html and .pdf
+	@.venv/bin/python -m docs.illustrations $(OUT) docs
+	@.venv/bin/python docs/article.py build/paper
+
+.PHONY: joss
+joss: pandoc ## Build the paper about the program (paper/paper.md) into build/joss.html
 	@mkdir -p build && pandoc paper/paper.md --from markdown --citeproc --bibliography paper/paper.bib --standalone \
-	  --metadata author= --output build/paper.html
-	@echo "open build/paper.html"
+	  --metadata author= --output build/joss.html
+	@echo "open build/joss.html"
 
 .PHONY: bench
 bench: setup .venv/with-dev ## Measure what docs/explanation/performance.md states

@@ -61,6 +61,18 @@ _FACT = re.compile(r"<!--fact (?P<name>\S+)-->(?P<text>[^<]*)<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
 _CLIMBS = {f"contact.roughness.bead_{other}": "0.2 um" for other in ("bead", "wall")}
 """The small pile of which clusters climb within its four seconds."""
+_PILES = ("pile-starts", "pile-frictions", "pile-contacts", "pile-controls", "pile-paper")
+_OF_CLIMBS = (
+    "pile",
+    "climbed",
+    "climbs",
+    "rate",
+    "on plain walls",
+    "in corners",
+    "led by large",
+    "p by chance",
+    "speed (mm/s)",
+)
 _OF_CALIBRATION = ("calibration.md", "calibration.json", "predictions.png")
 
 
@@ -94,15 +106,11 @@ def _of_run(name: str, case: str, changes: Mapping[str, Any] | None = None, film
     return Illustration((file,), lambda: [load_case(case, changes)], make)
 
 
-def _of_climbs(name: str) -> Illustration:
-    """Output of `walkers climb` for a sweep."""
-    file = f"figures/{name}.md"
-
-    def make(out: Path, docs: Path) -> None:
-        climbs = climb([sweep(name, out).directory])
-        write_text(docs / file, tables.page(f"walkers climb {name}", list(map(texts_of, climbs))))
-
-    return Illustration((file,), lambda: load_sweep(name).cases(), make)
+def _make_climbs(out: Path, docs: Path) -> None:
+    """Figure and table of the climbs in all sweeps of piles."""
+    climbs = climb([sweep(name, out).directory for name in _PILES], to=docs / "figures" / "pile-climbs.png")
+    rows = [{name: one[name] for name in _OF_CLIMBS} for one in map(texts_of, climbs)]
+    write_text(docs / "figures" / "pile-climbs.md", tables.page(f"walkers climb {' '.join(_PILES)}", rows))
 
 
 def _make_validation(out: Path, docs: Path) -> None:
@@ -224,7 +232,11 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     ),
     "tray": _of_run("tray", "tray"),
     "climber": _of_run("climber", "climber"),
-    "pile-roughness": _of_climbs("pile-roughness"),
+    "pile-climbs": Illustration(
+        ("figures/pile-climbs.png", "figures/pile-climbs.md"),
+        lambda: [case for name in _PILES for case in load_sweep(name).cases()],
+        _make_climbs,
+    ),
     "pile": _of_run("pile", "pile-small", _CLIMBS),
     **{name: _of_figure(name, f"figures/{name}.png", sweeps=one.sweeps) for name, one in FIGURES.items()},
     **{name: _of_sweep(name, options) for name, options in _SWEEPS.items()},
