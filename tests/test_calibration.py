@@ -24,7 +24,7 @@ from walkers.calibration.observations import NO_NUMBERS, FloatArray, Observation
 from walkers.calibration.report import draw_facts, record_of
 from walkers.errors import InputError
 from walkers.inputs.axes import unit_cube
-from walkers.inputs.reading import shipped
+from walkers.inputs.reading import load_case, shipped
 from walkers.postprocess.gait import misalignment
 from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import load
@@ -238,8 +238,9 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     file = tmp_path / "reduced.toml"
     file.write_text(to_toml(document))
     told = call("calibrate", str(file), "--out", str(out), "--to", str(to), check=True).stdout
-    assert [Path(line).name for line in told.splitlines()] == [
-        *("posterior.parquet", "calibration.json", "calibration.md", "predictions.png")
+    summary, names = told.rpartition("\n\n")[0], told.splitlines()[-5:]
+    assert [Path(line).name for line in names] == [
+        *("posterior.parquet", "calibration.json", "calibration.md", "best.toml", "predictions.png")
     ]
     assert "| fact | measured |" in (to / "calibration.md").read_text()
     said = json.loads((to / "calibration.json").read_text())
@@ -249,7 +250,11 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
         low, middle, high = said["posterior"][name]
         assert low < true < high, name
         assert [middle, said["sets"][PROPOSED[0]][name]] == pytest.approx([true, true], rel=0.25), name
+        assert f"{middle:.3g} ({low:.3g} to {high:.3g})" in summary
     assert said["agree"]["guess"] < said["agree"][PROPOSED[0]]
+    assert f"{said['agree']['guess']} of 5 measured facts agree" in summary
+    best, values = load_case(to / "best.toml"), said["sets"][PROPOSED[0]]
+    assert best.contact.friction.bead_wall == pytest.approx(values["friction"], rel=1e-5)
     assert list(pd.read_parquet(to / "posterior.parquet").columns) == list(TRUE)
     predicted = {row["name"]: row["predicted"] for row in said["observations"] if row["predicted"]}
     assert predicted["ratio"][0] < document["observations"][3]["value"] < predicted.pop("ratio")[2]

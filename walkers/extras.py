@@ -11,7 +11,7 @@ from walkers.errors import InputError, Problem
 
 EXTRAS = {
     "archive": ("an archive", ("tomli-w",)),
-    "calibrate": ("a calibration", ("scikit-learn",)),
+    "calibrate": ("a calibration", ("scikit-learn", "tomli-w")),
     "check": ("a check of the engine", ("numba",)),
     "cluster": ("a sweep on a cluster", ("parsl",)),
     "film": ("an MP4", ("imageio-ffmpeg",)),

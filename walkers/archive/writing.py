@@ -16,6 +16,7 @@ from walkers.archive.crate import METADATA_NAME, PAPER, Author, describe_crate
 from walkers.archive.verification import SUMS_NAME
 from walkers.errors import refused
 from walkers.extras import require
+from walkers.inputs.toml import toml_bytes
 from walkers.runner.directory import CASE_NAME, case_of, name_of
 from walkers.runner.files import beside, checksum, json_bytes
 from walkers.runner.manifest import MANIFEST_NAME, FileChanged, read_manifest
@@ -181,7 +182,7 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
     table["run"] = [f"{RUNS}/{Path(run).name}" if run else "" for run in table["run"]]  # not where this machine has it
     sources: dict[str, Path | bytes] = {f"{place}/{RECORD_NAME}": record.directory / RECORD_NAME}
     sources |= {f"{place}/table.{form}": encoded(table, form) for form in ("csv", "parquet")}
-    sources |= {f"{place}/{name}.toml": _toml(record.sweep.file)}
+    sources |= {f"{place}/{name}.toml": toml_bytes(record.sweep.file)}
     files, manifests = {path: File.of(path, source) for path, source in sources.items()}, {}
     for run in dict.fromkeys(state.directory for state in points if state.directory is not None):
         place, manifests[place], of_run = _packed(run, dumps)
@@ -196,16 +197,12 @@ def _packed(directory: Path, dumps: bool) -> tuple[str, dict[str, Any], dict[str
     files = {name: File.of(name, directory / name, manifest["sha256"].get(name)) for name in manifest["files"]}
     before = set(manifest.get("left_out", ()))
     left_out = {name for name, file in files.items() if name in before or (file.role == "dump" and not dumps)}
-    sources: dict[str, Path | bytes] = {f"{name_of(case.name)}.toml": _toml(case.document)} if case.document else {}
+    sources: dict[str, Path | bytes] = (
+        {f"{name_of(case.name)}.toml": toml_bytes(case.document)} if case.document else {}
+    )
     sources[MANIFEST_NAME] = record
     if left_out - before:
         manifest["left_out"] = sorted(left_out)
         sources[MANIFEST_NAME] = json_bytes(manifest)
     files |= {name: File.of(name, source) for name, source in sources.items()}
     return place, manifest, {f"{place}/{name}": file for name, file in files.items() if name not in left_out}
-
-
-def _toml(tables: Any) -> bytes:
-    import tomli_w
-
-    return tomli_w.dumps(tables).encode("utf-8")

@@ -17,11 +17,12 @@ from scipy.stats import truncnorm, uniform
 
 from walkers.calibration.observations import FloatArray, Names, Observation
 from walkers.errors import InputError, Problem, suggestion
+from walkers.inputs.case import Case
 from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import validated
 from walkers.inputs.reading import find_input
 from walkers.inputs.sweep import Sweep, expand
-from walkers.inputs.table import Table
+from walkers.inputs.table import Table, changed
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import Number, Whole
 
@@ -146,6 +147,11 @@ class Calibration:
         if "dimers" not in sweep.document:
             raise InputError(self.source, [Problem("case", f'"{self.file.case}"', "expected a case of dimers")])
         return sweep
+
+    def case(self, values: FloatArray) -> dict[str, Any]:
+        """Tables of the case of the first experiment, with these values of the parameters (D,)."""
+        sweep = self.sweep(self.name, values[None], [next(iter(self.experiments))])
+        return changed(Case, sweep.document, dict(zip(sweep.keys, sweep.rows[0], strict=True)))
 
     def _changes(self, label: str, row: FloatArray | None) -> dict[str, Value]:
         """Values of the keys of parameters in an experiment, for one parameter set (D,)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import combinations
 from math import isfinite
 from pathlib import Path
@@ -9,31 +10,35 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkers.calibration.calibrate import Outcome
+from walkers.calibration.calibrate import PROPOSED, Outcome
+from walkers.inputs.toml import toml_bytes
 from walkers.postprocess.drawing import TWO_COLUMNS, new_figure, save_figure, styled
 from walkers.runner.files import write_bytes, write_json, write_text
-from walkers.text import rendered
+from walkers.text import aligned, rendered
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 RECORD_NAME = "calibration.json"
+BEST_NAME = "best.toml"
 _ENDS = (0.05, 0.5, 0.95)
 
 
 def write_outcome(found: Outcome, to: Path) -> list[Path]:
-    """Write ``posterior.parquet``, ``calibration.json`` and ``.md``, and ``predictions.png``; return their paths.
+    """Write posterior, record, table, best case and figure (``posterior.parquet`` …); return their paths.
 
-    Rows of the first are samples of equal weight, columns are the parameters in their units.
+    Rows of the first are samples of equal weight, columns are the parameters in their units. The case ``best.toml`` is
+    that of the first experiment at the highest posterior.
     """
     import pandas as pd
 
     to.mkdir(parents=True, exist_ok=True)
     record, calibration = record_of(found), found.calibration
     samples = pd.DataFrame(calibration.values(found.posterior.samples), columns=[*calibration.file.parameters])
-    files = [to / file for file in ("posterior.parquet", RECORD_NAME, "calibration.md")]
+    files = [to / file for file in ("posterior.parquet", RECORD_NAME, "calibration.md", BEST_NAME)]
     write_bytes(files[0], samples.to_parquet(index=False))
     write_json(files[1], record)
+    write_bytes(files[3], toml_bytes(calibration.case(calibration.values(found.sets[PROPOSED[0]][None])[0])))
     write_text(files[2], rendered("walkers.calibration", "report.md.j2", found=record))
     sources = [f"{calibration.name}-{part}" for part in ("named", "round", "proposed")]
     return files + save_figure(draw_facts(found), to / "predictions.png", sources, title=record["title"])
@@ -64,6 +69,18 @@ def record_of(found: Outcome) -> dict[str, Any]:
         "effective_samples": [one.effective_samples for one in (found.posterior, found.held_out)],
         "observations": rows,
     }
+
+
+def summary(record: Mapping[str, Any]) -> str:
+    """The facts that agree at each set, and the interval of each parameter, from `record_of`."""
+    agree = [
+        [name, f"{count} of {record['of']} {record['observed']} facts agree"] for name, count in record["agree"].items()
+    ]
+    known = [
+        [record["labels"].get(name, name), "{1:.3g} ({0:.3g} to {2:.3g})".format(*ends)]
+        for name, ends in record["posterior"].items()
+    ]
+    return "\n\n".join([aligned(agree), aligned(known), "posterior: median, in brackets 5 to 95 %"])
 
 
 def _row(found: Outcome, place: int) -> dict[str, Any]:

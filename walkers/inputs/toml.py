@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import stat
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from walkers.errors import refused
 
 _MOST_BYTES = 16 << 20
+
+
+def toml_bytes(tables: Mapping[str, Any]) -> bytes:
+    """Tables as a TOML file; needs the extra that installs tomli-w."""
+    import tomli_w
+
+    return tomli_w.dumps(tables).encode("utf-8")
 
 
 def read_toml(path: Path) -> dict[str, Any]:
