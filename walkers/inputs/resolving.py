@@ -206,7 +206,7 @@ def _vessel(case: Case) -> Case:
             vessel = vessel_of(case.document["meshes"][boundary.mesh], boundary.scale)
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise unusable("meshes", f"expected points and triangles of {boundary.mesh}") from error
-        boundary = boundary.but(planes=tuple(Plane(point=at, normal=way) for at, way in vessel.planes or ()))
+        boundary = boundary.but(planes=tuple(Plane(point=at, normal=way) for at, way in vessel.planes(SHARP) or ()))
         if not boundary.planes:
             boundary = boundary.but(
                 points=tuple(map(tuple, vessel.points.tolist())), triangles=tuple(map(tuple, vessel.triangles.tolist()))

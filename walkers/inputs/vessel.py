@@ -22,7 +22,6 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.errors import InputError, unusable
-from walkers.inputs.boundary import SHARP
 from walkers.inputs.drive import Vector
 
 FloatArray = npt.NDArray[np.float64]
@@ -240,10 +239,12 @@ class Vessel:
                 angles.append(turn if self._inward(*shared[1]) @ self.normals[one] > 0.0 else -turn)
         return angles
 
-    @property
-    def planes(self) -> list[tuple[Vector, Vector]] | None:
-        """Points and normals of the planes that are the same vessel, the floor first; None if none are."""
-        if min(self.turns) < SHARP or len(set(self._spread(lambda *_: True).tolist())) > 1:
+    def planes(self, sharp: float) -> list[tuple[Vector, Vector]] | None:
+        """Points and normals of the planes that are the same vessel, the floor first.
+
+        None if there are none, or if some faces turn at an edge by less than an angle (rad).
+        """
+        if min(self.turns) < sharp or len(set(self._spread(lambda *_: True).tolist())) > 1:
             return None
         planes = []
         for first in self._in_order():
