@@ -43,7 +43,7 @@ html_css_files = ["walkers.css"]
 html_show_sourcelink = False
 html_copy_source = False
 html_show_search_summary = False  # a browser may not read other pages from disk: docs/_ext/texts.py instead
-html_search_scorer = "_static/scorer.js"
+html_search_scorer = str(HERE / "_static" / "scorer.js")
 html_theme_options = {
     "navbar_align": "left",
     "navbar_end": ["theme-switcher"],
