@@ -233,7 +233,7 @@ def test_a_wall_that_moves_meets_beads_that_do_not(bench: Bench) -> None:
 
 REFUSED_WALLS = {
     "type 3 plane 0 0 0 0 0 1": "expected a type",
-    "type 2": "expected a plane or a cylinder",
+    "type 2": "expected a plane, a cylinder or facets",
     "type 2 plane 0 0 0 0 0 0": "a normal of no length",
     "type 2 cylinder 0 0 -1": "a radius that is not above 0",
     "type 2 cylinder 0 0": "ends early",
@@ -268,7 +268,7 @@ def test_a_dry_contact_with_a_wall_begins_without_friction(bench: Bench) -> None
     assert np.abs(series.forces[41:, 0, :2]).max() < 1e-9 * abs(shear)
 
 
-FORCES = {8: "bc6f476ac81dec9a"}
+FORCES = {8: "27857f4ef71cba77"}
 
 
 def test_a_change_of_the_contact_model_asks_for_another_version_of_its_forces() -> None:

@@ -333,10 +333,11 @@ def test_company_does_not_matter_whatever_forces_it_feels(tmp_path: Path) -> Non
 
 
 def test_each_file_has_what_is_declared(run_directory: Callable[..., Path], pile_run: Path) -> None:
-    """Of six dimers, of dimers that may meet, and of a pile."""
+    """Of six dimers, of dimers that may meet, of one with a ramp, and of a pile."""
     meeting = {"replicates": 4, "spacing": "1.6 mm", "meet": True}
     tray = run_directory(dimers=meeting, run={"cycles": 4, "settling_cycles": 1})
-    runs = (run_directory(load_case("fig1b")), tray, pile_run)
+    ramped = run_directory(drive={"ramp": [["0 s", 1], ["0.2 s", 0]]}, run={"cycles": 30, "settling_cycles": 1})
+    runs = (run_directory(load_case("fig1b")), tray, ramped, pile_run)
     files = {path.stem: path for run in runs for path in run.glob("*.parquet")}
     assert files.keys() == TABLES.keys()
     for name, path in files.items():
