@@ -7,15 +7,19 @@ from math import cos, pi, sin, sqrt, tan
 from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 import pytest
 
 import walkers
+from tests.conftest import to_toml
 from walkers.check.scenes import DRY, Bench, bench_case, full_case, prescribed, standing
 from walkers.errors import InputError
-from walkers.inputs.boundary import FLOOR
+from walkers.inputs.boundary import FLOOR, LOOSE
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
+from walkers.inputs.standing import standing as starts
+from walkers.inputs.sweep import load_sweep
 from walkers.inputs.vessel import Vessel
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import read_bridges
@@ -181,8 +185,6 @@ def prism(sides: int, inner: float, height: float) -> Vessel:
 
 def write(folder: Path, vessel: Vessel, name: str = "own.obj") -> str:
     """Write a vessel in mm; returns its path."""
-    import meshio
-
     meshio.Mesh(1e3 * vessel.points, [("triangle", vessel.triangles)]).write(folder / name)
     return str(folder / name)
 
@@ -227,6 +229,82 @@ def test_a_run_is_named_by_the_numbers_of_its_vessel(tmp_path: Path, name: str) 
     assert case.boundary.walls[0].name == FLOOR
 
 
+MESHES: dict[str, Any] = {
+    # Files of a box of 5.3 mm, whose sides are the pairs of triangles: points (mm), triangles.
+    "elsewhere": lambda points, triangles: meshio.Mesh(points + np.array([3.0, -2.0, 7.0]), [("triangle", triangles)]),
+    "of quads": lambda points, triangles: meshio.Mesh(
+        points, [("triangle", triangles[:2]), ("quad", np.column_stack([triangles[2:6], triangles[6:, 2]]))]
+    ),
+    "of single precision": lambda points, triangles: meshio.Mesh(points.astype(np.float32), [("triangle", triangles)]),
+    "turned at random": lambda points, triangles: meshio.Mesh(
+        points, [("triangle", [one[:: (-1) ** k] for k, one in enumerate(triangles)])]
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_files_of_one_vessel(tmp_path: Path, name: str) -> None:
+    """Wherever its points are, of polygons, of few digits, of triangles that are turned either way."""
+    box = prism(4, 2.65e-3, 12e-3)
+    expected = Case.read(poured(mesh=write(tmp_path, box), scale="1 mm")).boundary
+    MESHES[name](1e3 * box.points, box.triangles).write(tmp_path / "other.vtk")
+    found = Case.read(poured(mesh=str(tmp_path / "other.vtk"), scale="1 mm")).boundary
+    assert (found.walls, found.width, found.height) == (expected.walls, 5.3e-3, 12e-3)
+    np.testing.assert_allclose(found.volume(6e-3), 5.3e-3**2 * 6e-3, rtol=1e-9)
+
+
+def test_beads_are_between_a_vessel_and_a_body_in_it(tmp_path: Path) -> None:
+    """However its triangles are turned: they look away from the body."""
+    low, high = np.array([-1e-3, -5e-4, 2e-3]), np.array([5e-4, 1e-3, 3e-3])
+    box = prism(4, 2e-3, 4e-3)
+    for toward in (1.0, -1.0):
+        body = cuboid(low, high, toward)
+        both = Vessel(np.concatenate([box.points, body.points]), np.concatenate([box.triangles, 8 + body.triangles]))
+        boundary = Case.read(poured(mesh=write(tmp_path, both), scale="1 mm")).boundary
+        assert boundary.volume(4e-3) == pytest.approx(16e-6 * 4e-3 - np.prod(high - low), rel=1e-2)
+        places = np.array([[0.0, 0.0, 3.2e-3], [0.0, 0.0, 2.9e-3], [0.7e-3, 0.0, 2.5e-3]])
+        np.testing.assert_allclose(boundary.side_clearance(places), [2e-4, -1e-4, 2e-4], atol=1e-12)
+
+
+def test_a_vessel_is_as_high_as_the_lowest_point_of_its_rim(tmp_path: Path) -> None:
+    points = prism(6, 4e-3, 12e-3).points
+    oblique = Vessel(points * [1.0, 1.0, 1.0] + np.outer(points[:, 0] * (points[:, 2] > 0.0), [0.0, 0.0, 0.5]),
+                     prism(6, 4e-3, 12e-3).triangles)  # fmt: skip
+    height = 12e-3 - 0.5 * np.abs(points[:, 0]).max()
+    boundary = Case.read(poured(mesh=write(tmp_path, oblique), scale="1 mm")).boundary
+    assert boundary.height == pytest.approx(height)
+    assert boundary.volume(2.0 * height) == pytest.approx(6.0 * (4e-3) ** 2 / sqrt(3.0) * height)
+
+
+def test_beads_are_poured_above_others_up_to_twice_the_height(tmp_path: Path) -> None:
+    """As many as there are places."""
+    mesh, at = write(tmp_path, prism(6, 2.5e-3, 8e-3)), ["0 mm", "0 mm", "2 mm"]
+    tables = poured(mesh=mesh, scale="1 mm") | {"placed": [{"radius": "0.5 mm", "at": at}]}
+    mixture = POURED["mixture"] | {"large": ["0.5 mm", "0.5 mm"]}
+    with pytest.raises(InputError, match=r"the vessel has places for .* up to twice its height of 8 mm") as refusal:
+        Case.read(tables | {"mixture": mixture | {"count": 5000}})
+    room = int(str(refusal.value).split()[-1])
+    case = Case.read(tables | {"mixture": mixture | {"count": room}})
+    (_, pile), _ = starts(case)
+    heights, radius = [bead.z for bead in pile.beads], LOOSE * 0.5e-3
+    assert len(heights) == room
+    assert min(heights) == pytest.approx(2.5e-3 + radius)
+    assert 16e-3 - 3.0 * radius < max(heights) < 16e-3 - radius
+
+
+def test_meshes_are_beside_the_files_that_name_them(tmp_path: Path) -> None:
+    """A case, and a sweep over meshes, of another folder than the working one."""
+    for size in (3, 4):
+        write(tmp_path, prism(6, size * 1e-3, 12e-3), f"{size}.obj")
+    case = to_toml(poured(mesh="3.obj", scale="1 mm"))
+    (tmp_path / "vessel.toml").write_text(case)
+    sweep = 'case = "vessel.toml"\n[axes]\n"boundary.mesh" = ["3.obj", "4.obj"]\n'
+    (tmp_path / "sizes.toml").write_text(sweep)
+    cases = [load_case(tmp_path / "vessel.toml"), *load_sweep(tmp_path / "sizes.toml").cases()]
+    across = [float(-one.boundary.walls[-1].distances(np.zeros(3))) for one in cases]
+    assert np.abs(across) == pytest.approx([3e-3, 3e-3, 4e-3])
+
+
 def bowl(radius: float, rings: int) -> Vessel:
     """Half a sphere of facets, four sides around it for each ring."""
     bends, turns = np.linspace(0.0, pi / 2.0, rings + 1), pi / (2.0 * rings) * np.arange(4 * rings)
@@ -251,6 +329,10 @@ def test_a_bowl_of_facets_becomes_round(tmp_path: Path) -> None:
             pi * (size / 2) ** 2 * (size - size / 6), rel=3 * off[-1]
         )
     assert off[1] / off[2] == pytest.approx(4.0, rel=0.1)
+    with pytest.raises(
+        InputError, match=r"faces, edges and corners; expected at most .* for 50000 beads: a coarser mesh"
+    ):
+        case.changed({"mixture.count": 50_000})
     away, near = np.random.default_rng(1).normal(size=(400, 3)), 0.9 * size
     centres = np.array([0.0, 0.0, size]) - near * (
         away * [1.0, 1.0, 0.0] + [0.0, 0.0, 3.0] * np.abs(away)

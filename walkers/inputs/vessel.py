@@ -80,7 +80,7 @@ def _read(path: Path, _changed: int) -> dict[str, Any]:
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             mesh = meshio.read(path)
         points = np.asarray(mesh.points)
-        digits = 7 if points.dtype == np.float32 else 15  # 2.65, not 2.6500000953
+        digits = 7 if points.dtype.itemsize == 4 else 15  # 2.65, not 2.6500000953; of either byte order
         parts = []
         for block in mesh.cells:
             sides = {"triangle": 3, "quad": 4}.get(block.type.rstrip("0123456789"), 0)
