@@ -80,7 +80,12 @@ def summary(record: Mapping[str, Any]) -> str:
         [record["labels"].get(name, name), "{1:.3g} ({0:.3g} to {2:.3g})".format(*ends)]
         for name, ends in record["posterior"].items()
     ]
-    return "\n\n".join([aligned(agree), aligned(known), "posterior: median, in brackets 5 to 95 %"])
+    note = "posterior: median, in brackets 5 to 95 %"
+    if 2 * max(record["agree"].values()) < record["of"]:
+        note += (
+            "; no set agrees with half of the facts: the model, or a fact, is in question, and the intervals say little"
+        )
+    return "\n\n".join([aligned(agree), aligned(known), note])
 
 
 def _row(found: Outcome, place: int) -> dict[str, Any]:

@@ -272,7 +272,7 @@ class Excitation:
 
     def described(self) -> str:
         """The drive in a few words, such as ``80 Hz, a0 = 39.2 m/s² + 160 Hz, a0 = 29.4 m/s², 90°``."""
-        ramp = f", times {' to '.join(f'{factor:g}' for _, factor in self.ramp)}" if self.ramp else ""
+        ramp = f", ramp {' to '.join(f'{factor:g}' for _, factor in self.ramp)}" if self.ramp else ""
         if self.record:
             return f"record, {self.frequency:.4g} Hz, a0 = {self.record.largest(2):.4g} m/s²{ramp}"
         shown = self.harmonics if len(self.harmonics) <= _FEW else (self.largest,)

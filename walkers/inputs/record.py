@@ -162,7 +162,10 @@ def _read(path: Path) -> list[list[float]]:
     rows = np.zeros((len(table), 4))
     for name, (_, _, unit), (_, column) in zip(names, heads, table.items(), strict=True):
         numbers = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
-        rows[:, ("time", *"xyz").index(name)] = numbers * parse_quantity(f"1 {unit}", kinds[name])
+        try:
+            rows[:, ("time", *"xyz").index(name)] = numbers * parse_quantity(f"1 {unit}", kinds[name])
+        except ValueError as error:
+            raise ValueError(f'column "{name} ({unit})": {error}, in brackets behind the name') from error
     return rows.tolist()
 
 

@@ -218,6 +218,10 @@ def _vessel(case: Case) -> Case:
         vessel = case.boundary.but(shape="vessel").vessel
         if abs(lowest := float(vessel.points[:, 2].min())) > 1e-9:
             raise unusable("boundary.planes", f"have their lowest point at z = {1e3 * lowest:.4g} mm; expected 0 mm")
+        if (top := vessel.height) < (1.0 - 1e-9) * boundary.height:
+            raise unusable(
+                "boundary.height", f"the planes close the vessel at {1e3 * top:.4g} mm; expected that at most"
+            )
     width, size = float(f"{2.0 * abs(vessel.points[:, :2]).max():.12g}"), 2.0 * max(case.radii)
     if not 1.0 < width / size < _WIDEST:
         wide, across = (f"{one:.4g} m" if one >= 1.0 else f"{1e3 * one:.4g} mm" for one in (width, size))

@@ -148,7 +148,7 @@ def _check_pour(mixture: Mixture, boundary: Boundary, floor: float) -> None:
     if boundary.shape == "vessel":
         room = sum(len(layer.places) for layer in boundary.layers(max(mixture.radii), floor))
         if room < mixture.count:
-            fits = f"the vessel has places for {room} beads, up to twice its height"
+            fits = f"the vessel has places for {room} beads to be poured from, up to twice its height"
             raise unusable("mixture.count", f"{fits} of {1e3 * boundary.height:.4g} mm; expected at most {room}")
         return
     if boundary.width < 4.0 * largest:

@@ -32,6 +32,7 @@ MOST_TRIANGLES = 20_000
 _SAME = 1e-6
 """Of the extent of a surface: points that are nearer are one."""
 _COPLANAR = cos(1e-3)
+_UPRIGHT = 1e-3  # largest vertical part of a normal
 _CLOSED, _ACROSS = -3e-308, -1e-12  # bounds of halves: the border is in it; triangles of one face overlap (m)
 
 
@@ -242,9 +243,13 @@ class Vessel:
     def planes(self, sharp: float) -> list[tuple[Vector, Vector]] | None:
         """Points and normals of the planes that are the same vessel, the floor first.
 
-        None if there are none, or if some faces turn at an edge by less than an angle (rad).
+        None if there are none, if some faces turn at an edge by less than an angle (rad), or if some are not upright at
+        the rim: planes go on above it, where a funnel would be wider.
         """
+        at_rim = np.isin(self.triangles, [point for rim in self.rims for point in rim]).any(axis=1)
         if min(self.turns) < sharp or len(set(self._spread(lambda *_: True).tolist())) > 1:
+            return None
+        if (np.abs(self.normals[at_rim, 2]) > _UPRIGHT).any():
             return None
         planes = []
         for first in self._in_order():
@@ -427,9 +432,24 @@ def _check_crossings(vessel: Vessel) -> None:
         spans = [np.einsum("nkx,nax->nak", each, axes) for each in (first, second)]
         apart = np.maximum(spans[0].min(2) - spans[1].max(2), spans[1].min(2) - spans[0].max(2))
         for pair in np.flatnonzero(np.where(none, -inf, apart).max(axis=1, initial=-inf) < -slack):
-            where = (first[pair].mean(axis=0) + second[pair].mean(axis=0)) / 2.0
+            where = _crossing(first[pair], second[pair])
             what = "overlap in a plane" if level[pair] else "intersect"
             raise _broken(f"has triangles that {what},", where, "a surface that does not cross itself")
+
+
+def _crossing(one: FloatArray, other: FloatArray) -> FloatArray:
+    """A point where a side of a triangle crosses another one; of triangles in a plane the middle between both."""
+    for sides, face in ((one, other), (other, one)):
+        normal = np.cross(face[1] - face[0], face[2] - face[0])
+        for begin, end in zip(sides, np.roll(sides, -1, axis=0), strict=True):
+            out, far = (begin - face[0]) @ normal, (end - face[0]) @ normal
+            if out * far > 0.0 or out == far:
+                continue
+            point: FloatArray = begin + out / (out - far) * (end - begin)
+            if all(np.cross(to - at, point - at) @ normal >= 0.0 for at, to in pairwise([*face, face[0]])):
+                return point
+    middle: FloatArray = (one.mean(axis=0) + other.mean(axis=0)) / 2.0
+    return middle
 
 
 # --- from planes ------------------------------------------------------------------------------------------------------
