@@ -13,7 +13,11 @@ from walkers import load_case, run
 from walkers.check.crosscheck import compare
 from walkers.inputs.case import Case
 from walkers.postprocess.motion import boundary_motion
+from walkers.postprocess.sides import REST
 from walkers.postprocess.threshold import _crossed
+from walkers.runner.binary import find_engine
+from walkers.sweeps.making import make_runs
+from walkers.templates.scene import sharing_key
 
 PERIOD = 1.0 / 80.0
 BRIEF = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
@@ -101,6 +105,22 @@ def test_a_run_has_its_record(tmp_path: Path) -> None:
     assert call("show", str(first.directory), check=True).stdout.count("record") > 1
 
 
+def test_what_shares_a_deck_has_one_record_and_one_ramp(tmp_path: Path) -> None:
+    """Walkers with other frictions do, and move as they would alone."""
+    other = {"contact.friction.bead_wall": 0.2}
+    case = recorded(tmp_path, sine(400), repeats=True, ramp=RAMP)
+    apart = [case.changed({"drive.ramp": [*RAMP[:1], ["0.06 s", 0.75]]}), recorded(tmp_path, sine(400), repeats=True)]
+    apart.append(recorded(tmp_path, sine(500), repeats=True, ramp=RAMP))
+    assert sharing_key(case.changed(other)) == sharing_key(case)
+    assert len({*map(sharing_key, [case, *apart])}) == 4
+    both = [case, case.changed(other)]
+    together, alone = tmp_path / "together", tmp_path / "alone"
+    make_runs(both, together, find_engine())
+    for one in both:
+        found, expected = (run(one, place).result["velocity"] for place in (together, alone))
+        assert found == pytest.approx(expected, rel=1e-6)
+
+
 def test_cycles_of_records(tmp_path: Path) -> None:
     """Of one that repeats, what divides all of its lines; of another the period of the strongest, as many as it has."""
     time = np.linspace(0.0, 4.0 * PERIOD, 801)
@@ -109,9 +129,9 @@ def test_cycles_of_records(tmp_path: Path) -> None:
     assert repeats.excitation.frequency == pytest.approx(80.0)
     assert (repeats.excitation.fastest, repeats.drive_axis) == (pytest.approx(240.0), (0.0, 1.0, 0.0))
     time = np.arange(0.0, 0.3, 2e-4)
-    once = recorded(tmp_path, csv(time, x=np.sin(2.0 * pi * 73.3 * time + 1.0)), run={"cycles": None} | BRIEF)
-    assert once.excitation.frequency == pytest.approx(73.3, rel=1e-3)
-    assert once.excitation.cycles == (0.0, pytest.approx(0.2998 * 73.3, rel=1e-3))
+    once = recorded(tmp_path, csv(time, x=np.sin(2.0 * pi * 74.4 * time + 1.0)))
+    assert once.excitation.frequency == pytest.approx(74.4, rel=1e-3)  # a third of the way between two lines
+    assert once.excitation.cycles == (0.0, pytest.approx(0.2998 * 74.4, rel=1e-3))
     direction = recorded(tmp_path, csv(time, x=tones[0] + np.sin(500.0 * time), y=-np.sin(500.0 * time))).excitation
     assert direction.direction == pytest.approx((0.5**0.5, -(0.5**0.5), 0.0))
 
@@ -121,7 +141,11 @@ def test_a_ramp_finds_the_threshold(ramp: list[float], name: str, tmp_path: Path
     """Where a walker that is driven at this drive all the time begins to move, at 0.9 g and not at 0.8 g."""
     points = [["0 s", ramp[0]], ["0.6 s", ramp[1]]]
     changes = {"drive.peak_acceleration": "1 g", "dimers.replicates": 1, "run.samples_per_cycle": 1}
-    found = run(load_case("fig1b", {**changes, "drive.ramp": points}), tmp_path).result
+    done = run(load_case("fig1b", {**changes, "drive.ramp": points}), tmp_path)
+    found, windows = done.result, done.result.table("ramp")
+    moves = windows[windows["velocity"].abs() > REST]["peak_acceleration"]
+    assert found[name] == pytest.approx(moves.min() - found[name.replace("_at", "_within")] / 2.0, rel=1e-6)
+    assert "  resolution " in done.describe()
     assert found[name] == pytest.approx(0.9 * 9.8, abs=found[name.replace("_at", "_within")])
     assert found[name.replace("_at", "_within")] == pytest.approx(0.4 * 9.8 * 8 / 48)
     assert found[f"gamma0_{name}"] == pytest.approx(0.0857, rel=0.04)

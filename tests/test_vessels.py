@@ -13,6 +13,7 @@ import pytest
 
 import walkers
 from tests.conftest import to_toml
+from walkers.check.crosscheck import compare
 from walkers.check.scenes import DRY, Bench, bench_case, full_case, prescribed, standing
 from walkers.errors import InputError
 from walkers.inputs.boundary import FLOOR, LOOSE
@@ -23,6 +24,7 @@ from walkers.inputs.sweep import load_sweep
 from walkers.inputs.vessel import Vessel
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import read_bridges
+from walkers.postprocess.necks import ends_of
 from walkers.postprocess.scene import walls_of
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
@@ -363,6 +365,11 @@ def test_beads_are_poured_into_a_vessel_and_stay_there(tmp_path: Path, boundary:
         for bead, wall in zip(beads, numbers, strict=True)
     ]
     np.testing.assert_allclose(gaps, bridges.gap[len(bridges.beads) :], atol=1e-9)
+    _, ends = ends_of(motion, motion.position[-1], bridges.contacts[len(bridges.beads) :])
+    np.testing.assert_allclose(done.case.boundary.vessel.clearance(ends), 0.0, atol=1e-9)
+    if boundary == "funnel":
+        with pytest.raises(InputError, match="the second engine knows no facets"):
+            compare([motion])
     assert sum(len(corners) - 2 for corners in walls_of(motion)) == len(vessel.triangles)
     assert {"floor"} <= {wall.name for wall in walls}
 

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from walkers.check import kernels
 from walkers.check.kernels import CELLS, Bridges, Constants, FloatArray, State
 from walkers.errors import refused
-from walkers.inputs.boundary import Flat, Wall
+from walkers.inputs.boundary import Flat, Round, Wall
 from walkers.inputs.case import Case
 from walkers.inputs.loads import surfaces_of
 from walkers.physics.bridge import BridgeLaw, Surfaces
@@ -151,7 +151,7 @@ def _constants(case: Case, radius: FloatArray, walls: Sequence[Wall], without: C
         mass=4.0 / 3.0 * pi * radius**3 * case.beads.density,
         point=np.array([point for point, _ in flat]).reshape(-1, 3),
         normal=np.array([normal for _, normal in flat]).reshape(-1, 3),
-        hollow=np.array([0.0 if isinstance(wall, Flat) else wall.radius for wall in walls]),
+        hollow=np.array([wall.radius if isinstance(wall, Round) else 0.0 for wall in walls]),
         gravity=np.array(case.gravity_vector) * gravity,
         harmonics=np.array(waves if drive else (), dtype=np.float64).reshape(-1, 6),
         course=course,

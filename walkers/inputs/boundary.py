@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from walkers.inputs.vessel import Facet, Vessel
 
-    FloatArray = npt.NDArray[np.floating[Any]]
+    FloatArray = npt.NDArray[np.float64]
 
 FLOOR = "floor"
 LOOSE = 1.03

@@ -221,7 +221,7 @@ class Vessel:
         import pyvista as pv
 
         def distances(vessel: Vessel, of: FloatArray) -> FloatArray:
-            surface = pv.PolyData.from_regular_faces(vessel.points, vessel.triangles)
+            surface = pv.PolyData.from_regular_faces(vessel.points, vessel.triangles.tolist())
             return np.array(pv.PolyData(of).compute_implicit_distance(surface)["implicit_distance"])
 
         below = places.copy()

@@ -56,8 +56,10 @@ def ends_of(motion: Motion, place: FloatArray, contacts: IntArray) -> Ends:
     for number, wall in enumerate(motion.case.boundary.walls):
         held = contacts[:, 2] == number
         first = begins[held]
-        flat = isinstance(wall, (Flat, Round))  # facets are not near all beads
-        ends[held] = first - (wall.distances(first)[:, None] * wall.normals(first) if flat else wall.away(first))
+        if isinstance(wall, (Flat, Round)):
+            ends[held] = first - wall.distances(first)[:, None] * wall.normals(first)
+        else:  # facets are not near all beads
+            ends[held] = first - wall.away(first)
     return begins, ends
 
 

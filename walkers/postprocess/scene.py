@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.errors import refused
-from walkers.inputs.boundary import Flat
+from walkers.inputs.boundary import Flat, Round
 from walkers.inputs.case import Case
 from walkers.postprocess import piles
 from walkers.postprocess.dump import FloatArray, IntArray
@@ -290,7 +290,7 @@ def walls_of(motion: Motion) -> list[FloatArray]:
     for wall in boundary.walls:
         if isinstance(wall, Flat):
             planes.append((wall.point, wall.normal))
-        else:
+        elif isinstance(wall, Round):
             turns = 2.0 * pi * (np.arange(_SIDES) + 0.5) / _SIDES
             planes += [(wall.radius * out, -out) for out in np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], 1)]
     ends = [(low, axis) for axis in np.eye(3)] + [(high, -axis) for axis in np.eye(3)]
