@@ -61,7 +61,7 @@ _FACT = re.compile(r"<!--fact (?P<name>\S+)-->(?P<text>[^<]*)<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
 _CLIMBS = {f"contact.roughness.bead_{other}": "0.2 um" for other in ("bead", "wall")}
 """The small pile of which clusters climb within its four seconds."""
-_PILES = ("pile-starts", "pile-frictions")
+_PILES = ("pile-starts", "pile-frictions", "pile-contacts")
 _OF_CLIMBS = (
     "pile",
     "climbed",
