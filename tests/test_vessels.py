@@ -16,7 +16,7 @@ from tests.conftest import to_toml
 from walkers.check.crosscheck import compare
 from walkers.check.scenes import DRY, Bench, bench_case, full_case, prescribed, standing
 from walkers.errors import InputError
-from walkers.inputs.boundary import FLOOR, LOOSE
+from walkers.inputs.boundary import FLOOR, LOOSE, SHARP
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
 from walkers.inputs.standing import standing as starts
@@ -317,6 +317,14 @@ def bowl(radius: float, rings: int) -> Vessel:
         each.ravel() for each in (number[:-1], np.roll(number[:-1], -1, 1), np.roll(number[1:], -1, 1), number[1:])
     )
     return Vessel(points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
+
+
+def test_planes_are_where_no_edge_is_obtuse_and_no_rim_flares() -> None:
+    """A plane without end would pull behind an obtuse edge, and go on above the rim of a funnel."""
+    hexagon, dodecagon, funnel = prism(6, 4e-3, 8e-3), prism(12, 4e-3, 8e-3), prism(4, 4e-3, 8e-3)
+    wide = np.where(funnel.points[:, 2:] > 0.0, [1.1, 1.1, 1.0], 1.0) * funnel.points
+    found = [one.planes(SHARP) for one in (hexagon, dodecagon, Vessel(wide, funnel.triangles))]
+    assert [None if planes is None else len(planes) for planes in found] == [7, None, None]
 
 
 def test_a_bowl_of_facets_becomes_round(tmp_path: Path) -> None:
