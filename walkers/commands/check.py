@@ -205,12 +205,14 @@ def calibrate(
         Folder to write tables and figures to; default: OUT/NAME.
     """
     from walkers.calibration.file import load_calibration
-    from walkers.calibration.report import record_of, summary, write_outcome
+    from walkers.calibration.report import RECORD_NAME, summary, write_outcome
+    from walkers.runner.files import read_json
 
     folder = to or out / load_calibration(calibration).name
     refuse("--to", folder.is_file(), f"expected a folder, {folder} is a file")
     outcome = walkers.calibrate(calibration, out, jobs=jobs, progress=True, **vars(by))
     tell(*(f"{name}: {len(failures)} points failed" for name, failures in outcome.failures.items()))
-    print(summary(record_of(outcome)))
-    print_lines(write_outcome(outcome, folder))
+    files = write_outcome(outcome, folder)
+    print(summary(read_json(folder / RECORD_NAME)))
+    print_lines(files)
     return 0  # a set whose run fails is an outcome: it counts as far off

@@ -302,20 +302,12 @@ class Boundary(Table):
 
     def layers(self, largest: float, floor: float) -> Iterator[Layer]:
         """Layers of such places above a height (m), one upon the other; of a vessel of the user's own up to the top."""
-        deep = 2.0 * LOOSE * largest
-        if self.shape != "vessel":
-            layer = self.layer(largest)
-            # In this order: another one changes the last digit of heights, and piles are chaotic.
-            yield from (layer._replace(level=(number + 0.5) * 2.0 * LOOSE * largest) for number in count())
+        if self.shape == "vessel":
+            yield from _layers_in(self, largest, floor)
             return
-        import numpy as np
-
-        line = deep * (np.arange(ceil(self.width / deep)) - (ceil(self.width / deep) - 1) / 2.0)
-        for level in (np.arange(max(int((2.0 * self.height - floor) / deep), 0)) + 0.5) * deep:
-            places = np.stack(np.meshgrid(line, line, [floor + level]), axis=-1).reshape(-1, 3)
-            clear = np.minimum(self.side_clearance(places), places[:, 2])
-            if len(found := places[clear > (1.0 - 1e-9) * LOOSE * largest]):
-                yield Layer([(x, y) for x, y, _ in found.tolist()], deep, True, float(level))
+        layer = self.layer(largest)
+        # In this order: another one changes the last digit of heights, and piles are chaotic.
+        yield from (layer._replace(level=(number + 0.5) * 2.0 * LOOSE * largest) for number in count())
 
 
 def with_meshes(document: Mapping[str, Any], folder: Path = Path(), names: Sequence[object] = ()) -> dict[str, Any]:
@@ -340,6 +332,21 @@ def _vessel_of(boundary: Boundary) -> Vessel:
     if boundary.triangles:
         return Vessel.of(boundary.points, boundary.triangles)
     return vessel_between([(one.point, one.normal) for one in boundary.planes], boundary.height)
+
+
+@lru_cache(maxsize=16)
+def _layers_in(boundary: Boundary, largest: float, floor: float) -> tuple[Layer, ...]:
+    """Layers of a vessel of the user's own, see `Boundary.layers`."""
+    import numpy as np
+
+    deep, layers = 2.0 * LOOSE * largest, []
+    line = deep * (np.arange(ceil(boundary.width / deep)) - (ceil(boundary.width / deep) - 1) / 2.0)
+    for level in (np.arange(max(int((2.0 * boundary.height - floor) / deep), 0)) + 0.5) * deep:
+        places = np.stack(np.meshgrid(line, line, [floor + level]), axis=-1).reshape(-1, 3)
+        clear = np.minimum(boundary.side_clearance(places), places[:, 2])
+        if len(found := places[clear > (1.0 - 1e-9) * LOOSE * largest]):
+            layers.append(Layer([(x, y) for x, y, _ in found.tolist()], deep, True, float(level)))
+    return tuple(layers)
 
 
 @lru_cache(maxsize=16)

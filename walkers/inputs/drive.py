@@ -184,7 +184,7 @@ class Excitation:
     @property
     def peak_acceleration(self) -> float:
         """That of the largest harmonic or of the record at the ramp's largest factor, m/s²."""
-        return self._most * (self.record.largest(2) if self.record else self.largest.peak_acceleration)
+        return self.largest_factor * (self.record.largest(2) if self.record else self.largest.peak_acceleration)
 
     @property
     def is_plain(self) -> bool:
@@ -206,17 +206,19 @@ class Excitation:
     @property
     def amplitude(self) -> float:
         """Largest displacement that the harmonics could add up to, m."""
-        return self._most * (self.record.largest(0) if self.record else sum(one.amplitude for one in self.harmonics))
+        return self.largest_factor * (
+            self.record.largest(0) if self.record else sum(one.amplitude for one in self.harmonics)
+        )
 
     @property
     def peak_velocity(self) -> float:
         """Largest speed that the harmonics could add up to, m/s."""
-        return self._most * (
+        return self.largest_factor * (
             self.record.largest(1) if self.record else sum(one.peak_velocity for one in self.harmonics)
         )
 
     @property
-    def _most(self) -> float:
+    def largest_factor(self) -> float:
         """Largest factor of the ramp."""
         return max((factor for _, factor in self.ramp), default=1.0)
 

@@ -140,7 +140,6 @@ def with_record(document: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
         return document
     try:
         rows = _read(folder / name)
-        _check(rows)
     except OSError as error:
         raise unusable("drive.record", f"cannot be read: {error.strerror}", name) from error
     except ValueError as error:  # its subclasses are of pandas

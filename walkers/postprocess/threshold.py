@@ -40,12 +40,9 @@ def measure(motion: Motion) -> Measured:
     drive, walked = motion.case.excitation, [distance_walked(group) for group in motion.groups]
     times, whole = walked[0][0][::WINDOW], np.concatenate([distance[::WINDOW] for _, distance in walked], axis=1)
     velocity = np.diff(whole, axis=0) / np.diff(times)[:, None]
-    whole_drive = max(factor for _, factor in drive.ramp) or 1.0
-    peaks = drive.factor(times) * drive.peak_acceleration / whole_drive
-    middle, owner = (
-        (peaks[1:] + peaks[:-1]) / 2.0,
-        [walker.walker for group in motion.groups for walker in group.walkers],
-    )
+    peaks = drive.factor(times) * drive.peak_acceleration / (drive.largest_factor or 1.0)
+    middle = (peaks[1:] + peaks[:-1]) / 2.0
+    owner = [walker.walker for group in motion.groups for walker in group.walkers]
     columns = {
         "walker": np.repeat(owner, len(middle)),
         "time": np.tile((times[1:] + times[:-1]) / 2.0, len(owner)),

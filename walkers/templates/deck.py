@@ -220,8 +220,8 @@ def compose(plan: Plan) -> Deck:
 
 
 def _start(drive: Excitation) -> list[float]:
-    """Velocity of the walls at the start in the laboratory, m/s; empty if it is the sine's, which has a name."""
-    if drive.is_plain and not drive.ramp:
+    """Velocity of the walls at the start, m/s; empty if they rest, or if it is the sine's, which has a name."""
+    if drive.frame != "lab" or (drive.is_plain and not drive.ramp):
         return []
     import numpy as np
 
