@@ -76,7 +76,7 @@ for _kept in _KEPT.glob("bridge-*"):  # a copy: a link to it is not loaded
     shutil.copy(_kept, _OURS)
 
 _LONGEST = (
-    *("test_a_sweep_through_slurm", "test_beads_play_pause_and_turn", "[pilots", "[a pile, killed]"),
+    *("test_a_sweep_through_slurm", "test_a_sweeps_points_open_reports", "[pilots", "[a pile, killed]"),
     *("test_known_parameters_are_found", "test_a_dimer_on_the_axis_climbs", "test_mandatory_packages"),
     *("test_workers_of_another_process", "test_figures_and_comparison", "test_piles_agree_until"),
 )

@@ -132,6 +132,11 @@ def test_cycles_of_records(tmp_path: Path) -> None:
     once = recorded(tmp_path, csv(time, x=np.sin(2.0 * pi * 74.4 * time + 1.0)))
     assert once.excitation.frequency == pytest.approx(74.4, rel=1e-3)  # a third of the way between two lines
     assert once.excitation.cycles == (0.0, pytest.approx(0.2998 * 74.4, rel=1e-3))
+    # Left out, a run has all whole cycles of its record, or those of its ramp.
+    lengths = [
+        load_case({**one.document, "run": {}}).run.cycles for one in (once, repeats.changed({"drive.ramp": RAMP}))
+    ]
+    assert lengths == [22, 5]
     direction = recorded(tmp_path, csv(time, x=tones[0] + np.sin(500.0 * time), y=-np.sin(500.0 * time))).excitation
     assert direction.direction == pytest.approx((0.5**0.5, -(0.5**0.5), 0.0))
 

@@ -253,16 +253,29 @@ def rested(page: Page, *others: bytes) -> bytes:
     return wait_for(same)
 
 
-@pytest.mark.parametrize("name", ["walked_report", "pile_report"])
-def test_beads_play_pause_and_turn(name: str, visit: Callable[..., Page], request: pytest.FixtureRequest) -> None:
-    page = visit(request.getfixturevalue(name))
+def begun(page: Page) -> bytes:
+    """The first picture of a scene, which plays after."""
     page.wait_for_selector(".scene[data-ready]")
-    play, time = page.locator(".play"), page.locator(".time")
     begin = rested(page)
-    assert (play.text_content(), time.text_content()) == ("Play", "0.0000 s")
-    play.click()
-    expect(play).to_have_text("Pause")
+    assert (page.locator(".play").text_content(), page.locator(".time").text_content()) == ("Play", "0.0000 s")
+    page.locator(".play").click()
+    expect(page.locator(".play")).to_have_text("Pause")
     wait_for(lambda: picture(page) != begin)
+    return begin
+
+
+def test_a_pile_plays(pile_report: Path, visit: Callable[..., Page]) -> None:
+    begun(visit(pile_report))
+
+
+def test_a_sweeps_points_open_reports_in_which_beads_play_pause_and_turn(
+    swept_report: Path, visit: Callable[..., Page]
+) -> None:
+    page = visit(swept_report, ready=False)
+    assert page.evaluate("window.hostile") is None
+    assert page.locator("h1").text_content() == HOSTILE
+    page.locator("table.sweep a").click()
+    begin, play, time = begun(page), page.locator(".play"), page.locator(".time")
 
     def pause() -> str | None:
         """The time at which it pauses; it goes on if that is the beginning, to which it returns."""
@@ -287,11 +300,3 @@ def test_beads_play_pause_and_turn(name: str, visit: Callable[..., Page], reques
     assert time.text_content() == stopped  # turned, not played
     page.get_by_role("button", name="onto the floor").click()
     rested(page, begin, paused, turned)
-
-
-def test_a_sweeps_points_open_the_reports_of_their_runs(swept_report: Path, visit: Callable[..., Page]) -> None:
-    page = visit(swept_report, ready=False)
-    assert page.evaluate("window.hostile") is None
-    assert page.locator("h1").text_content() == HOSTILE
-    page.locator("table.sweep a").click()
-    page.wait_for_selector(".scene[data-ready]")

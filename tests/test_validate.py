@@ -92,6 +92,7 @@ def test_restitution_on_a_wet_plate_falls_with_the_drag(in_folder: Path) -> None
         straight, limit, *shown = experiments.impacts(bench)
     assert [straight.verdict, limit.verdict] == [Verdict.PASS, Verdict.PASS]
     assert {line.verdict for line in shown} == {Verdict.NOT_JUDGED}
+    assert {line.what.count("St = 332") for line in shown[1:]} == {1}, "m over 6πηR² v: 2.75 mm, 2.5 g/cm³, 4.6 mPa s"
     assert shown[-1].measured < 0.5 * shown[-1].expected, "a softened bead loses more"
 
 
