@@ -752,7 +752,7 @@ def compare(
     y
         Column of two sweeps; None: ``velocity``, or ``climbs`` for piles.
     """
-    from walkers.errors import each
+    from walkers.errors import apply_all
     from walkers.sweeps.comparison import Side, compare_runs, compare_sweeps
 
     if second is None and not changes:
@@ -774,7 +774,7 @@ def compare(
         label = directory.name if directory and not given and find(name, out).kind == "run" else str(name)
         return Side(" ".join([label, *(f"{key}={value}" for key, value in given.items())]), case, directory)
 
-    return compare_runs(*each(side, range(2)))
+    return compare_runs(*apply_all(side, range(2)))
 
 
 def climb(
@@ -800,14 +800,14 @@ def climb(
     to
         Also write the figure (.png, .svg, .pdf) or the table (.csv) to this file.
     """
-    from walkers.errors import each
+    from walkers.errors import apply_all
     from walkers.postprocess.drawing import FORMATS, check_place
     from walkers.sweeps.climbing import conditions_in, summarise_climbs, write_climbs
 
     if to is not None:
         check_place(Path(to), *(f".{form}" for form in FORMATS), ".csv")
     climbs, runs = [], []
-    for one in each(lambda name: load(name, out, changes), what):
+    for one in apply_all(lambda name: load(name, out, changes), what):
         source, conditions = [one.directory.name] * (len(what) > 1), iter([("", [one.directory])])
         if isinstance(one, Sweep):
             frame = one.table()

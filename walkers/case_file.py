@@ -35,9 +35,9 @@ def new(path: str | Path, case: str = "fig1b", *, schema: bool = False) -> list[
     if path.name in ("", "..") or path.stem in (".", ".."):
         raise refused(path, "expected a name")
     path = path if path.suffix == ".toml" else path.with_name(f"{path.name}.toml")
-    if case not in (known := shipped("case")):
-        raise refused(case, expected_of(case, known))
-    text = known[case].read_text("utf-8")
+    if case not in (cases := shipped("case")):
+        raise refused(case, expected_of(case, cases))
+    text = cases[case].read_text("utf-8")
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(f"#:schema {_SCHEMA}\n\n{text}" if schema else text)

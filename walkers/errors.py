@@ -70,20 +70,20 @@ def unusable(key: str, expected: str, value: object = None) -> InputError:
     return InputError("", [Problem(key, None if value is None else shown(value), expected)])
 
 
-def each(function: Callable[[T], R], things: Iterable[T]) -> list[R]:
-    """What a function gives for each thing, such as a name; raises one `InputError` with all that it refuses."""
-    given: list[R] = []
+def apply_all(function: Callable[[T], R], arguments: Iterable[T]) -> list[R]:
+    """Results of a function for several arguments; raises one `InputError` with the problems of all of them."""
+    results: list[R] = []
     errors: list[InputError] = []
-    for thing in things:
+    for argument in arguments:
         try:
-            given.append(function(thing))
+            results.append(function(argument))
         except InputError as error:
             errors.append(error)
     if errors:
-        all_of_them = InputError(errors[0].source, [one for error in errors for one in error.problems])
+        all_of_them = InputError(errors[0].source, [problem for error in errors for problem in error.problems])
         all_of_them.args = ("\n".join(dict.fromkeys(map(str, errors))),)  # each with its own source
         raise all_of_them from errors[0]
-    return given
+    return results
 
 
 def shown(value: object) -> str:

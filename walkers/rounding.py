@@ -68,8 +68,8 @@ def counted(number: int, noun: str) -> str:
 
 def duration_text(seconds: float) -> str:
     """A time in the largest unit of which it is at least two, such as ``3 d``."""
-    told = (f"{seconds / size:.0f} {unit}" for unit, size in _LONGER.items() if seconds >= 2 * size)
-    return next(told, f"{seconds:.0f} s")
+    texts = (f"{seconds / size:.0f} {unit}" for unit, size in _LONGER.items() if seconds >= 2 * size)
+    return next(texts, f"{seconds:.0f} s")
 
 
 def percent(share: float) -> str:

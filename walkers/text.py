@@ -30,14 +30,14 @@ def printable(text: str) -> str:
     >>> printable("one\ntwo \x1b[31m")
     'one two \\x1b[31m'
     """
-    return "".join(one if one.isprintable() else repr(one)[1:-1] for one in " ".join(text.split()))
+    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in " ".join(text.split()))
 
 
 def aligned(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
     """Rows of cells as text with aligned columns, those with the numbers ``right`` at their right ends."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    ways = [str.rjust if number in right else str.ljust for number in range(len(widths))]
-    filled = ([way(cell, width) for way, cell, width in zip(ways, row, widths, strict=True)] for row in rows)
+    justify = [str.rjust if number in right else str.ljust for number in range(len(widths))]
+    filled = ([fill(cell, width) for fill, cell, width in zip(justify, row, widths, strict=True)] for row in rows)
     return "\n".join("  ".join(row).rstrip() for row in filled)
 
 
@@ -66,7 +66,7 @@ def environment(*packages: str, html: bool = False) -> Environment:
     """What renders the templates of packages; in ``html`` values are escaped."""
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
-    made = Environment(
+    environment = Environment(
         loader=ChoiceLoader([PackageLoader(package, ".") for package in packages]),
         undefined=StrictUndefined,
         autoescape=html,
@@ -75,5 +75,5 @@ def environment(*packages: str, html: bool = False) -> Environment:
         lstrip_blocks=True,
         auto_reload=False,
     )
-    made.filters.update(_FILTERS)
-    return made
+    environment.filters.update(_FILTERS)
+    return environment

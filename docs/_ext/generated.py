@@ -20,7 +20,7 @@ from pydantic.fields import FieldInfo
 from walkers.commands import commands
 from walkers.commands.catalogue import COMMANDS, NOT_KNOWN, catalogue
 from walkers.inputs.case import Case
-from walkers.inputs.library import Known
+from walkers.inputs.library import LibraryNumber
 from walkers.inputs.resolving import SUPPLIED
 from walkers.inputs.table import Table, example_of, keys_in, table_in
 from walkers.inputs.units import ACCELERATION, AUTO, TEMPERATURE, Kind, kind_in, quantity_text
@@ -125,8 +125,8 @@ def tables_of_keys(model: type[Table] = Case, place: str = "") -> Iterator[tuple
     rows = (_row(name, fields[name], supplied=f"{path}{name}" in SUPPLIED) for name in keys)
     text = _table(["key", "meaning", "expects", "default"], rows)
     for choice in model.choices:
-        ways = "; ".join(" and ".join(f"`{name}`" for name in way) for way in choice.ways)
-        needed = choice.required and not any(f"{path}{name}" in SUPPLIED for way in choice.ways for name in way)
+        ways = "; ".join(" and ".join(f"`{name}`" for name in way) for way in choice.expressions)
+        needed = choice.required and not any(f"{path}{name}" in SUPPLIED for way in choice.expressions for name in way)
         text += f"\n{'Exactly' if needed else 'At most'} one of: {ways}.\n"
     yield place or "Top level", text
     for name, inner in below.items():
@@ -172,13 +172,13 @@ def _library() -> str:
     return f"{text}\n## Not measured\n\n{NOT_KNOWN}\n\n{_table(['', 'default', 'range'], rows)}"
 
 
-def _sourced(numbers: Mapping[str, Known]) -> str:
+def _sourced(numbers: Mapping[str, LibraryNumber]) -> str:
     linked = {key: _PAGE.sub(r"[docs/\1](../../\1)", known.source) for key, known in numbers.items()}
     rows = ((f"`{key}`", str(known.written), _range(known), linked[key]) for key, known in numbers.items())
     return _table(["", "value", "range", "source"], rows)
 
 
-def _range(known: Known) -> str:
+def _range(known: LibraryNumber) -> str:
     return f"{known.range[0]} to {known.range[1]}" if known.range else ""
 
 

@@ -8,7 +8,7 @@ from importlib import resources
 from pathlib import Path
 
 from walkers.errors import refused, suggestion
-from walkers.inputs.library import HALF, Known, Library, read_library, unmeasured
+from walkers.inputs.library import HALF, Library, LibraryNumber, read_library, unmeasured
 from walkers.inputs.reading import shipped
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import TEMPERATURE, quantity_text
@@ -39,7 +39,7 @@ class Entry:
     kind: str
     name: str
     place: str = ""
-    numbers: Mapping[str, Known] = field(default_factory=dict)
+    numbers: Mapping[str, LibraryNumber] = field(default_factory=dict)
     text: str = ""
     file: str = ""
 
@@ -90,7 +90,7 @@ def describe(found: Sequence[Entry]) -> str:
     return "\n".join(lines[1:])
 
 
-def _cell(numbers: Mapping[str, Known], column: str) -> str:
+def _cell(numbers: Mapping[str, LibraryNumber], column: str) -> str:
     """A number with its range; of ``viscosity`` whichever of the two there is."""
     keys = ("kinematic_viscosity", "dynamic_viscosity") if column == "viscosity" else (column,)
     known = next((numbers[key] for key in keys if key in numbers), None)

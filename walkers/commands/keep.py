@@ -102,7 +102,7 @@ def clean(*runs: RunOrSweep, out: Out = DEFAULT_OUT, yes: Annotated[bool, Parame
         Do not ask for confirmation.
     """
     from walkers.api import directory_of
-    from walkers.errors import each
+    from walkers.errors import apply_all
     from walkers.runner.directory import UNFINISHED
     from walkers.sweeps.folder import clean, plan_cleaning
 
@@ -111,7 +111,7 @@ def clean(*runs: RunOrSweep, out: Out = DEFAULT_OUT, yes: Annotated[bool, Parame
             return directory_of(name, out)
         return Path(name) if Path(name).is_dir() else out / name
 
-    plan = plan_cleaning(out, each(place_of, runs))
+    plan = plan_cleaning(out, apply_all(place_of, runs))
     print(plan.as_text())
     if plan.remove.empty and not plan.locks:
         return 0

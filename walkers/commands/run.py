@@ -11,7 +11,7 @@ from cyclopts.validators import Number
 
 import walkers
 from walkers.commands.options import NOT_NEGATIVE, At, By, Case, Jobs, Json, print_as, print_lines, refuse, tell
-from walkers.errors import each, refused
+from walkers.errors import apply_all, refused
 
 _MANY = 10_000
 """Number of points that take seconds to resolve."""
@@ -97,12 +97,12 @@ def run(
     refuse("--points", points is not None and not spread, "is for --spread")
     refuse("--share", share is not None and not accuracy, "is for --accuracy")
     # Report a mistake in the last file before the first run starts.
-    finished = each(lambda case: None if at.changes or force else finished_at(case, at.out), cases)
-    loaded = each(lambda case: case_at(case, at.out, at.values), cases)
+    finished = apply_all(lambda case: None if at.changes or force else finished_at(case, at.out), cases)
+    loaded = apply_all(lambda case: case_at(case, at.out, at.values), cases)
     if accuracy:
         from walkers.sweeps.accuracy import SHARE, times_of
 
-        each(lambda one: times_of(one[0]), loaded)
+        apply_all(lambda one: times_of(one[0]), loaded)
     if spread:
         from walkers.sweeps.spread import POINTS, describe, spread_sweep
 

@@ -88,15 +88,15 @@ def values_of(key: str, axis: object) -> list[Value]:
         message = f'expected first value, last value and number, such as {{ {kind} = ["0.5 g", "10 g", 20] }}'
         raise unusable(key, message, axis)
     (first, last), unit = _numbers(key, given[:2], positive=kind == "geomspace")
-    numbers = [written(float(one), unit) for one in getattr(np, kind)(first, last, given[2])]
+    numbers = [written(float(number), unit) for number in getattr(np, kind)(first, last, given[2])]
     # Between whole numbers whole ones stay whole: seeds, cycles, replicates.
     whole = type(given[0]) is type(given[1]) is int
-    return [int(one) if whole and one.is_integer() else one for one in numbers]
+    return [int(number) if whole and number.is_integer() else number for number in numbers]
 
 
 def _numbers(key: str, given: list[Value], *, positive: bool) -> tuple[list[float], str | None]:
     """The numbers of a range and their unit."""
-    unit, numbers = unit_of(key, given), [number_of(key, one) for one in given]
+    unit, numbers = unit_of(key, given), [number_of(key, value) for value in given]
     if positive and min(numbers) <= 0:
         raise unusable(key, "expected values above zero", given)
     return numbers, unit
@@ -136,12 +136,12 @@ def unit_of(key: str, values: Sequence[Value]) -> str | None:
 def listed(key: str, given: object) -> Axis:
     """An axis of one key with different values, so that no point occurs twice."""
     values = values_of(key, given)
-    known: set[str] = set()
+    occurred: set[str] = set()
     for value in values:
         same = repr([as_quantity(part) or part for part in (value if isinstance(value, list) else [value])])
-        if same in known:
+        if same in occurred:
             raise unusable(key, "expected different values: this one occurs twice", value)
-        known.add(same)
+        occurred.add(same)
     return Axis.of({key: values})
 
 
@@ -181,7 +181,7 @@ def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> A
         raise unusable("sample.ranges", "expected keys and their ranges", dict(ranges))
     shares = zip(unit_cube(method, len(ends), points, seed).T, ends.items(), strict=True)
     return Axis.of(
-        {key: [written(float(number), one.unit) for number in one.at(share)] for share, (key, one) in shares}
+        {key: [written(float(number), span.unit) for number in span.at(share)] for share, (key, span) in shares}
     )
 
 
@@ -201,16 +201,16 @@ def ranges_of(ranges: Mapping[str, Any]) -> dict[str, Range]:
 
     A number between the two is the median: ``{ uniform = [low, median, high] }``. Raises `InputError` for others.
     """
-    found = {}
+    spans = {}
     for key, given in flatten(ranges, is_axis).items():
         kind, ends = next(iter(given.items())) if isinstance(given, Mapping) and len(given) == 1 else ("", None)
         if kind not in _DISTRIBUTIONS or not (isinstance(ends, list) and len(ends) in (2, 3)):
             raise unusable(key, "expected { uniform = [low, high] } or { loguniform = [low, high] }", given)
         (low, *median, high), unit = _numbers(key, ends, positive=kind == "loguniform")
-        if low >= high or not all(low <= one <= high for one in median):
+        if low >= high or not all(low <= middle <= high for middle in median):
             raise unusable(key, "expected the smaller value first", given)
-        found[key] = Range(low, high, unit, kind == "loguniform", *median)
-    return found
+        spans[key] = Range(low, high, unit, kind == "loguniform", *median)
+    return spans
 
 
 def unit_cube(method: str, dimensions: int, points: int, seed: int) -> npt.NDArray[np.float64]:
@@ -233,7 +233,7 @@ def combinations(axes: Sequence[Axis]) -> tuple[tuple[str, ...], list[tuple[Valu
     keys = tuple(key for axis in axes for key in axis.keys)
     for number, key in enumerate(keys):
         list_of = key.partition("[")[0]
-        if any(other in (key, list_of) or other.partition("[")[0] == key for other in keys[:number]):
+        if any(earlier in (key, list_of) or earlier.partition("[")[0] == key for earlier in keys[:number]):
             raise unusable(key, "varies on two axes; expected one")
     if (many := prod(len(axis.rows) for axis in axes)) > MOST_POINTS:
         raise unusable("axes", f"{many} points; expected at most {MOST_POINTS}")

@@ -57,8 +57,8 @@ def _fan(radii: Sequence[float], apart: Apart) -> Places:
     """The first bead in front, the others behind it: all touch it, and each the next."""
     turns = [0.0]
     for bead in range(1, len(radii) - 1):
-        one, other, between = apart(0, bead), apart(0, bead + 1), apart(bead, bead + 1)
-        cosine = (one**2 + other**2 - between**2) / (2.0 * one * other)
+        side, next_side, between = apart(0, bead), apart(0, bead + 1), apart(bead, bead + 1)
+        cosine = (side**2 + next_side**2 - between**2) / (2.0 * side * next_side)
         if abs(cosine) > 1.0:
             raise ValueError(_TOO_SMALL)
         turns.append(turns[-1] + acos(cosine))
@@ -73,8 +73,8 @@ def _diamond(radii: Sequence[float], apart: Apart) -> Places:
     """One in front, two side by side behind it, one at the back that touches these two."""
     front, left, right = _fan(radii[:3], apart)
     along, across = right[0] - left[0], right[1] - left[1]
-    width, reach, other = apart(1, 2), apart(1, 3), apart(2, 3)
-    share = (reach**2 - other**2 + width**2) / (2.0 * width**2)
+    width, reach, last_reach = apart(1, 2), apart(1, 3), apart(2, 3)
+    share = (reach**2 - last_reach**2 + width**2) / (2.0 * width**2)
     if reach < abs(share) * width:
         raise ValueError(_TOO_SMALL)
     height = sqrt(reach**2 - (share * width) ** 2) / width
@@ -105,18 +105,18 @@ def _ring(radii: Sequence[float], apart: Apart) -> Places:
 
 def touching(places: Sequence[tuple[float, float]], radii: Sequence[float], slack: float) -> Pairs:
     """Pairs of beads at given positions whose gap is below a fraction of their radii."""
-    found = []
-    for (one, (x, y)), (other, (to_x, to_y)) in combinations(enumerate(places), 2):
-        gap = hypot(x - to_x, y - to_y, radii[one] - radii[other]) - radii[one] - radii[other]
-        if gap < slack * min(radii[one], radii[other]):
-            found.append((one, other))
-    return tuple(found)
+    pairs = []
+    for (first, (x, y)), (second, (to_x, to_y)) in combinations(enumerate(places), 2):
+        gap = hypot(x - to_x, y - to_y, radii[first] - radii[second]) - radii[first] - radii[second]
+        if gap < slack * min(radii[first], radii[second]):
+            pairs.append((first, second))
+    return tuple(pairs)
 
 
 def _sites(number: int) -> Places:
     """So many sites of a hexagonal lattice: the origin, the one behind it, and on around it; their distance is 1."""
     reach = range(-10, 11)  # of 100 sites the outermost is six away
-    sites = [(one + other / 2.0, other * sqrt(0.75)) for one in reach for other in reach]
+    sites = [(row + column / 2.0, column * sqrt(0.75)) for row in reach for column in reach]
     return sorted(sites, key=lambda at: (round(hypot(*at), 6), round(atan2(-at[1], -at[0]) % (2.0 * pi), 6)))[:number]
 
 
@@ -188,9 +188,9 @@ class Walkers(Table):
     def bridged(self) -> list[tuple[float, list[float]]]:
         """Radius of each bead of a walker and radii of the beads that touch it, m."""
         neighbours: list[list[float]] = [[] for _ in self.radii]
-        for one, other in self.pairs:
-            neighbours[one].append(self.radii[other])
-            neighbours[other].append(self.radii[one])
+        for first, second in self.pairs:
+            neighbours[first].append(self.radii[second])
+            neighbours[second].append(self.radii[first])
         return list(zip(self.radii, neighbours, strict=True))
 
     @cached_property
@@ -198,19 +198,19 @@ class Walkers(Table):
         """Positions of rigid beads on a plane in the frame of the walker, m."""
         return list(self.at) or ARRANGEMENTS[self.arrangement].places(self.radii, self.rigid)
 
-    def rigid(self, one: int, other: int) -> float:
+    def rigid(self, bead: int, neighbour: int) -> float:
         """Distance seen from above of two beads that touch each other and the floor without overlap, m."""
-        first, second = self.radii[one], self.radii[other]
+        first, second = self.radii[bead], self.radii[neighbour]
         return (first + second) * cos(asin((first - second) / (first + second)))
 
     @cached_property
     def length(self) -> float:
         """Length of the walker seen from above, m."""
-        known = {} if self.at else {pair: self.rigid(*pair) for pair in self.pairs}
+        distances = {} if self.at else {pair: self.rigid(*pair) for pair in self.pairs}
         extents = []
-        for one, other in combinations(range(len(self.radii)), 2):
-            apart = known.get((one, other), dist(self.design[one], self.design[other]))
-            extents.append(apart + (self.radii[one] + self.radii[other]))
+        for first, second in combinations(range(len(self.radii)), 2):
+            distance = distances.get((first, second), dist(self.design[first], self.design[second]))
+            extents.append(distance + (self.radii[first] + self.radii[second]))
         return max(extents)
 
     @cached_property
@@ -244,14 +244,14 @@ class Walkers(Table):
         """Positions of the beads of a walker in its frame, from heights and overlaps, m."""
         if self.at:
             return list(self.at)
-        known = {pair: overlaps[len(self.radii) + number] for number, pair in enumerate(self.pairs)}
+        overlap_of = {pair: overlaps[len(self.radii) + number] for number, pair in enumerate(self.pairs)}
 
-        def apart(one: int, other: int) -> float:
-            between = self.radii[one] + self.radii[other] - known[min(one, other), max(one, other)]
-            if between < abs(heights[one] - heights[other]):
+        def apart(first: int, second: int) -> float:
+            between = self.radii[first] + self.radii[second] - overlap_of[min(first, second), max(first, second)]
+            if between < abs(heights[first] - heights[second]):
                 message = "the radii differ too much: the beads do not touch when they rest on the boundary"
                 raise ValueError(f"{message}; expected more similar radii")
-            return sqrt(between**2 - (heights[one] - heights[other]) ** 2)
+            return sqrt(between**2 - (heights[first] - heights[second]) ** 2)
 
         return ARRANGEMENTS[self.arrangement].places(self.radii, apart)
 
@@ -290,9 +290,9 @@ class Cluster(Walkers):
     )
 
 
-def beside(one: float, other: float) -> list[tuple[float, list[float]]]:
+def beside(radius: float, neighbour: float) -> list[tuple[float, list[float]]]:
     """`Walkers.bridged` of two beads, radii in m."""
-    return [(one, [other]), (other, [one])]
+    return [(radius, [neighbour]), (neighbour, [radius])]
 
 
 class Mixture(Table):

@@ -48,8 +48,8 @@ class Flat(NamedTuple):
 
     def distances(self, places: FloatArray) -> FloatArray:
         """Of places, shape (..., 3), m."""
-        found: FloatArray = (places - self.point) @ self.normal
-        return found
+        distances: FloatArray = (places - self.point) @ self.normal
+        return distances
 
     def normals(self, places: FloatArray) -> FloatArray:
         """Unit vectors away from it, of the shape of the places."""
@@ -64,13 +64,13 @@ class Round(NamedTuple):
 
     def distances(self, places: FloatArray) -> FloatArray:
         """Of places, shape (..., 3), m."""
-        found: FloatArray = self.radius - (places[..., 0] ** 2 + places[..., 1] ** 2) ** 0.5
-        return found
+        distances: FloatArray = self.radius - (places[..., 0] ** 2 + places[..., 1] ** 2) ** 0.5
+        return distances
 
     def normals(self, places: FloatArray) -> FloatArray:
         """Unit vectors toward the axis, of the shape of the places."""
-        found: FloatArray = places * (-1.0, -1.0, 0.0) / (self.radius - self.distances(places))[..., None]
-        return found
+        normals: FloatArray = places * (-1.0, -1.0, 0.0) / (self.radius - self.distances(places))[..., None]
+        return normals
 
 
 Wall: TypeAlias = "Flat | Round | Facet"
@@ -150,19 +150,19 @@ class Boundary(Table):
     def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
         """Sizes that the shape lacks, or that are those of another shape."""
         yield from super().problems(given, place)
-        own = "mesh" if "mesh" in given else "planes" if "planes" in given else ""
-        if own and given.get("shape", "vessel") != "vessel":
-            yield Problem(within(place, "shape"), None, f"expected none beside {place}.{own}")
+        vessel = "mesh" if "mesh" in given else "planes" if "planes" in given else ""
+        if vessel and given.get("shape", "vessel") != "vessel":
+            yield Problem(within(place, "shape"), None, f"expected none beside {place}.{vessel}")
             return
-        shape = "vessel" if own else str(given.get("shape", "plane"))
-        if shape == "vessel" and not own:
+        shape = "vessel" if vessel else str(given.get("shape", "plane"))
+        if shape == "vessel" and not vessel:
             yield cls.missing("mesh", place, ", or planes")
         for name, of in {"scale": "mesh", "height": "planes"}.items():
-            if own == of and name not in given:
+            if vessel == of and name not in given:
                 yield cls.missing(name, place)
-        if "scale" in given and own != "mesh":
+        if "scale" in given and vessel != "mesh":
             yield Problem(within(place, "scale"), None, "expected none without a mesh")
-        sizes = ("height",) if own == "planes" else SIZES.get(shape, ())
+        sizes = ("height",) if vessel == "planes" else SIZES.get(shape, ())
         for name in ("opening", "width", "height") if shape in SIZES else ():
             if name in sizes and name not in given:
                 yield cls.missing(name, place)
@@ -211,8 +211,8 @@ class Boundary(Table):
         if self.shape in ("channel", "box", "octagon"):
             walls += [Flat((0.0, -half, 0.0), (0.0, 1.0, 0.0), "-y"), Flat((0.0, half, 0.0), (0.0, -1.0, 0.0), "+y")]
         if self.shape == "octagon":  # as a box, and walls across its corners
-            for name, way in _CORNERS.items():
-                x, y = (sqrt(0.5) * along for along in way)
+            for name, corner in _CORNERS.items():
+                x, y = (sqrt(0.5) * along for along in corner)
                 walls.append(Flat((half * x, half * y, 0.0), (-x, -y, 0.0), name))
         return tuple(walls)
 
@@ -258,11 +258,11 @@ class Boundary(Table):
         """
         if self.triangles:
             return self.vessel.clearance(places)
-        found = places[:, 0] + inf
+        clearances = places[:, 0] + inf
         for wall in self.walls:
             if wall.name != FLOOR:
-                found = found.clip(max=wall.distances(places))
-        return found
+                clearances = clearances.clip(max=wall.distances(places))
+        return clearances
 
     def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
         """Places about the origin for walkers that stand ``spacing`` (m) apart: a square grid, or a row along x."""
@@ -315,14 +315,15 @@ def with_meshes(document: Mapping[str, Any], folder: Path = Path(), names: Seque
 
     So a case is whole without these files. Raises `InputError` if one cannot be read.
     """
-    own, known = document.get("boundary"), document.get("meshes")
-    known = known if isinstance(known, Mapping) else {}
-    wanted = [*names, own.get("mesh") if isinstance(own, Mapping) else None]
-    if not (new := sorted({name for name in wanted if isinstance(name, str)} - known.keys())):
+    boundary, meshes = (
+        table if isinstance(table := document.get(name), Mapping) else {} for name in ("boundary", "meshes")
+    )
+    files = {name for name in (*names, boundary.get("mesh")) if isinstance(name, str)}
+    if not (new := sorted(files - meshes.keys())):
         return {**document}
     from walkers.inputs.vessel import read_mesh
 
-    return {**document, "meshes": {**known, **{name: read_mesh(folder / name) for name in new}}}
+    return {**document, "meshes": {**meshes, **{name: read_mesh(folder / name) for name in new}}}
 
 
 @lru_cache(maxsize=16)
@@ -331,7 +332,7 @@ def _vessel_of(boundary: Boundary) -> Vessel:
 
     if boundary.triangles:
         return Vessel.of(boundary.points, boundary.triangles)
-    return vessel_between([(one.point, one.normal) for one in boundary.planes], boundary.height)
+    return vessel_between([(plane.point, plane.normal) for plane in boundary.planes], boundary.height)
 
 
 @lru_cache(maxsize=16)
@@ -344,8 +345,8 @@ def _layers_in(boundary: Boundary, largest: float, floor: float) -> tuple[Layer,
     for level in (np.arange(max(int((2.0 * boundary.height - floor) / deep), 0)) + 0.5) * deep:
         places = np.stack(np.meshgrid(line, line, [floor + level]), axis=-1).reshape(-1, 3)
         clear = np.minimum(boundary.side_clearance(places), places[:, 2])
-        if len(found := places[clear > (1.0 - 1e-9) * LOOSE * largest]):
-            layers.append(Layer([(x, y) for x, y, _ in found.tolist()], deep, True, float(level)))
+        if len(free := places[clear > (1.0 - 1e-9) * LOOSE * largest]):
+            layers.append(Layer([(x, y) for x, y, _ in free.tolist()], deep, True, float(level)))
     return tuple(layers)
 
 
@@ -355,7 +356,9 @@ def _walls_of(boundary: Boundary) -> tuple[Wall, ...]:
 
     if boundary.triangles:
         return tuple(boundary.vessel.facets())
-    return tuple(Flat(one.point, one.normal, named(one.normal, number)) for number, one in enumerate(boundary.planes))
+    return tuple(
+        Flat(plane.point, plane.normal, named(plane.normal, number)) for number, plane in enumerate(boundary.planes)
+    )
 
 
 def _round(value: float) -> float:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import BeforeValidator, Field, ValidationError
 
-from walkers.errors import InputError, Problem, each, refused, shown, unusable
+from walkers.errors import InputError, Problem, apply_all, refused, shown, unusable
 from walkers.inputs import units
 from walkers.inputs.axes import is_axis, ranges_of
 from walkers.inputs.bodies import MOST_BEADS, Cluster, Dimers, Mixture, PlacedBead, Walkers
@@ -158,21 +158,21 @@ def _ranges(value: object) -> object:
     """Ranges by dotted keys (`_problems_of_ranges` has checked them)."""
     if not isinstance(value, dict):
         return value
-    return {name: one if is_axis(one) else {"uniform": one} for name, one in flatten(value, is_axis).items()}
+    return {name: ends if is_axis(ends) else {"uniform": ends} for name, ends in flatten(value, is_axis).items()}
 
 
 def _problems_of_ranges(model: type[Table], ranges: object) -> Iterator[Problem]:
     """Keys that no case has, and ranges that are not two values of one unit, the smaller first."""
     if not isinstance(ranges, Mapping):
         return
-    for name, one in flatten(ranges, is_axis).items():
+    for name, ends in flatten(ranges, is_axis).items():
         try:
             check_key(model, name)
-            if ranges_of({name: one if isinstance(one, Mapping) else {"uniform": one}})[name].median is not None:
-                raise unusable(name, "expected [low, high]: the case's own value is the median", one)
+            if ranges_of({name: ends if isinstance(ends, Mapping) else {"uniform": ends}})[name].median is not None:
+                raise unusable(name, "expected [low, high]: the case's own value is the median", ends)
         except InputError as error:
             message = error.problems[0].expected.replace("{ uniform = [low, high] }", "[low, high]")
-            yield Problem(f"uncertain.{name}", shown(one), message)
+            yield Problem(f"uncertain.{name}", shown(ends), message)
 
 
 Ranges = Annotated[dict[str, Any], BeforeValidator(_ranges)]
@@ -251,7 +251,7 @@ class Case(Table):
         if changes:
             with blaming_changes(changes):
                 with blaming(source):
-                    each(lambda one: check_key(cls, one), changes)
+                    apply_all(lambda name: check_key(cls, name), changes)
                     document = changed(cls, document, changes)
                 return cls.read(document, source=source, name=name, around=around)
         with blaming(source, document):
@@ -260,10 +260,14 @@ class Case(Table):
             try:
                 case = validated(cls, tables, source, further=[*unknown, *contradictions(cls, tables)])
             except InputError as error:  # what a wrong name would have given is not missing too
-                wrong = {one.key for one in error.problems if one.key in GIVEN_BY}
+                wrong = {problem.key for problem in error.problems if problem.key in GIVEN_BY}
                 given = tuple(begin for name in wrong for begin in GIVEN_BY[name])
-                told = [one for one in error.problems if one.value or one.key in wrong or not one.key.startswith(given)]
-                raise InputError(source, told) from error
+                kept = [
+                    problem
+                    for problem in error.problems
+                    if problem.value or problem.key in wrong or not problem.key.startswith(given)
+                ]
+                raise InputError(source, kept) from error
             try:
                 case = resolve(case.but(name=name, document=dict(document), sources=sources))
             except ArithmeticError as error:
@@ -278,18 +282,18 @@ class Case(Table):
             try:
                 low, high = (validated(Case, changed(Case, tables, {name: end}), source).value_of(name) for end in ends)
             except InputError as error:
-                problems = [replace(one, key=f"uncertain.{one.key}") for one in error.problems]
+                problems = [replace(problem, key=f"uncertain.{problem.key}") for problem in error.problems]
                 raise InputError(source, problems) from error
             value = self.value_of(name)
             if value is None and alternatives(Case, name):
-                said = "expected a value that the case has: it says the same in other words"
-                raise InputError(source, [Problem(f"uncertain.{name}", None, said)])
+                message = "expected a value that the case has: it says the same in other words"
+                raise InputError(source, [Problem(f"uncertain.{name}", None, message)])
             if (
                 around
                 and isinstance(value, (int, float))
                 and abs(value - (low + high) / 2.0) > 0.500000001 * (high - low)
             ):
-                text = next((one.text for one in self.origins if one.key == name), str(value))
+                text = next((origin.text for origin in self.origins if origin.key == name), str(value))
                 message = f"expected a range that holds the case's own value, {text}"
                 raise InputError(source, [Problem(f"uncertain.{name}", None, message)])
 
@@ -359,20 +363,20 @@ class Case(Table):
             ((distribution, (low, high)),) = given.items()
             # What has no line of its own, such as one of two radii, has one if the case calls it uncertain.
             raw = value_at(self.document, parts_of(name))
-            one = origins.get(name) or Origin(name, "-" if raw is MISSING else text_of(raw), "given")
+            origin = origins.get(name) or Origin(name, "-" if raw is MISSING else text_of(raw), "given")
             logarithmic = distribution == "loguniform"
-            origins[name] = replace(one, range=(low, high), logarithmic=logarithmic, uncertain=True)
+            origins[name] = replace(origin, range=(low, high), logarithmic=logarithmic, uncertain=True)
         return tuple(origins.values())
 
     def __repr__(self) -> str:
-        given = ", ".join(f"{one.key} = {one.text}" for one in self.origins if one.origin == "given")
+        given = ", ".join(f"{origin.key} = {origin.text}" for origin in self.origins if origin.origin == "given")
         return f"<Case {self.name}: {given}>"
 
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
         """All values with their origins, for notebooks."""
-        cells = ([one.key, one.text, one.word, one.source] for one in self.origins)
+        cells = ([origin.key, origin.text, origin.word, origin.source] for origin in self.origins)
         rows = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in cells)
         return f"<table><caption>{escape(self.title or self.name)}</caption>{rows}</table>"
 
@@ -465,9 +469,12 @@ class Case(Table):
     @cached_property
     def shifted_rows(self) -> int:
         """Even length of rows of which every second one begins facing left, so that neighbours meet; 0 if none does."""
-        if not (self.meets and any(one.facing == "both" and not isclose(one.angle_spread, pi) for one in self.walkers)):
+        if not (
+            self.meets
+            and any(walkers.facing == "both" and not isclose(walkers.angle_spread, pi) for walkers in self.walkers)
+        ):
             return 0
-        rows = [x for x, _ in self.boundary.grid(sum(one.replicates for one in self.walkers), 1.0)]
+        rows = [x for x, _ in self.boundary.grid(sum(walkers.replicates for walkers in self.walkers), 1.0)]
         length = rows.count(rows[0])
         return length if length % 2 == 0 and length < len(rows) else 0
 
@@ -498,4 +505,4 @@ class Case(Table):
     @property
     def axial_gravity(self) -> float:
         """Component of gravity against the drive axis, m/s²."""
-        return -sum(one * along for one, along in zip(self.gravity_vector, self.drive_axis, strict=True))
+        return -sum(component * along for component, along in zip(self.gravity_vector, self.drive_axis, strict=True))

@@ -49,7 +49,9 @@ def _axis(value: object) -> object:
     if value in (None, "x", "y", "z"):
         return value
     if isinstance(value, (list, tuple)) and len(value) == 3 and any(value):
-        numbers = tuple(float(one) for one in value if type(one) in (int, float) and isfinite(one))
+        numbers = tuple(
+            float(component) for component in value if type(component) in (int, float) and isfinite(component)
+        )
         if len(numbers) == 3:
             return numbers
     raise ValueError("expected 'x', 'y' or 'z', or a direction such as [1, 0, 1]")
@@ -116,7 +118,7 @@ class Drive(Harmonic):
     choices: ClassVar[tuple[Choice, ...]] = (
         Choice((("peak_acceleration",), ("gamma0",), ("harmonics",), ("record",))),
         Choice((("frequency",), ("harmonics",), ("record",))),
-        *(Choice(((one,), ("record",)), required=False) for one in ("axis", "phase", "waveform")),
+        *(Choice(((name,), ("record",)), required=False) for name in ("axis", "phase", "waveform")),
     )
     frequency: Filled[units.Frequency] = key("Frequency in cycles per second.", None)
     waveform: Literal["sine", "triangle", "sawtooth"] = key(
@@ -157,7 +159,7 @@ class Drive(Harmonic):
         if self.record:
             return Excitation((), self.frame, self.record.but(repeats=bool(self.repeats)), self.ramp)
         names = ("axis", "frequency", "peak_acceleration", "phase")
-        sines = [Harmonic(**{name: getattr(one, name) for name in names}) for one in self.harmonics or (self,)]
+        sines = [Harmonic(**{name: getattr(sine, name) for name in names}) for sine in self.harmonics or (self,)]
         harmonics = tuple(sines) if self.harmonics else waveform(self.waveform, sines[0])
         return Excitation(harmonics, self.frame, ramp=self.ramp)
 
@@ -174,7 +176,7 @@ class Excitation:
     @property
     def largest(self) -> Harmonic:
         """The harmonic of the largest peak acceleration, the first of equal ones."""
-        return max(self.harmonics, key=lambda one: one.peak_acceleration)
+        return max(self.harmonics, key=lambda sine: sine.peak_acceleration)
 
     @property
     def direction(self) -> Vector:
@@ -195,26 +197,26 @@ class Excitation:
     def frequency(self) -> float:
         """Of the cycle, the common period of the harmonics, Hz; raises `ValueError` if they have none."""
         return (
-            self.record.frequencies[0] if self.record else common_frequency([one.frequency for one in self.harmonics])
+            self.record.frequencies[0] if self.record else common_frequency([sine.frequency for sine in self.harmonics])
         )
 
     @property
     def fastest(self) -> float:
         """The highest frequency, Hz."""
-        return self.record.frequencies[1] if self.record else max(one.frequency for one in self.harmonics)
+        return self.record.frequencies[1] if self.record else max(sine.frequency for sine in self.harmonics)
 
     @property
     def amplitude(self) -> float:
         """Largest displacement that the harmonics could add up to, m."""
         return self.largest_factor * (
-            self.record.largest(0) if self.record else sum(one.amplitude for one in self.harmonics)
+            self.record.largest(0) if self.record else sum(sine.amplitude for sine in self.harmonics)
         )
 
     @property
     def peak_velocity(self) -> float:
         """Largest speed that the harmonics could add up to, m/s."""
         return self.largest_factor * (
-            self.record.largest(1) if self.record else sum(one.peak_velocity for one in self.harmonics)
+            self.record.largest(1) if self.record else sum(sine.peak_velocity for sine in self.harmonics)
         )
 
     @property
@@ -246,11 +248,12 @@ class Excitation:
         """Direction of each harmonic or axis of a record, and displacement, velocity and acceleration at times (s)."""
         import numpy as np
 
-        for one in self.harmonics:
-            turn = one.angular_frequency * time + one.phase
+        for harmonic in self.harmonics:
+            turn = harmonic.angular_frequency * time + harmonic.phase
             sine = np.sin(turn)
-            course = (one.amplitude * sine, one.peak_velocity * np.cos(turn), -one.peak_acceleration * sine)
-            yield one.direction, self._ramped(time, *course)
+            speed = harmonic.peak_velocity * np.cos(turn)
+            course = (harmonic.amplitude * sine, speed, -harmonic.peak_acceleration * sine)
+            yield harmonic.direction, self._ramped(time, *course)
         if self.record:
             moved = self.record.motion(time)
             for axis, place in self.record.axes.items():
@@ -279,12 +282,12 @@ class Excitation:
             return f"record, {self.frequency:.4g} Hz, a0 = {self.record.largest(2):.4g} m/s²{ramp}"
         shown = self.harmonics if len(self.harmonics) <= _FEW else (self.largest,)
         words = [
-            f"{one.frequency:g} Hz, a0 = {one.peak_acceleration:.4g} m/s²"
-            + (f", {degrees(one.phase):g}°" if one.phase else "")
-            for one in shown
+            f"{harmonic.frequency:g} Hz, a0 = {harmonic.peak_acceleration:.4g} m/s²"
+            + (f", {degrees(harmonic.phase):g}°" if harmonic.phase else "")
+            for harmonic in shown
         ]
         if len(shown) < len(self.harmonics):
-            highest = max(one.frequency for one in self.harmonics)
+            highest = max(harmonic.frequency for harmonic in self.harmonics)
             words.append(f"{len(self.harmonics) - 1} harmonics up to {highest:g} Hz")
         return " + ".join(words) + ramp
 
@@ -297,10 +300,10 @@ def common_frequency(frequencies: list[float]) -> float:
     first = frequencies[0]
     if len(frequencies) == 1:  # asked for at every turn of a sweep's plan
         return first
-    ratios = [Fraction(one / first).limit_denominator(LARGEST_RATIO) for one in frequencies]
-    for one, ratio in zip(frequencies, ratios, strict=True):
-        if not isclose(float(ratio) * first, one, rel_tol=1e-9) or ratio.numerator > LARGEST_RATIO:
-            raise ValueError(f"{one:g} Hz / {first:g} Hz is not a ratio of whole numbers up to {LARGEST_RATIO}")
+    ratios = [Fraction(frequency / first).limit_denominator(LARGEST_RATIO) for frequency in frequencies]
+    for frequency, ratio in zip(frequencies, ratios, strict=True):
+        if not isclose(float(ratio) * first, frequency, rel_tol=1e-9) or ratio.numerator > LARGEST_RATIO:
+            raise ValueError(f"{frequency:g} Hz / {first:g} Hz is not a ratio of whole numbers up to {LARGEST_RATIO}")
     below = lcm(*(ratio.denominator for ratio in ratios))
     numerators = [int(ratio * below) for ratio in ratios]
     common = gcd(*numerators)

@@ -49,7 +49,7 @@ def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool] = lambda _:
     for name, value in table.items():
         below = {name: value}
         if isinstance(value, Mapping) and value and not is_leaf(value):
-            below = {f"{name}.{key}": one for key, one in flatten(value, is_leaf).items()}
+            below = {f"{name}.{key}": leaf for key, leaf in flatten(value, is_leaf).items()}
         if twice := flat.keys() & below.keys():
             raise unusable(twice.pop(), "is given twice; expected one value")
         flat |= below
@@ -59,11 +59,11 @@ def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool] = lambda _:
 def dotted(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
     """Values of nested tables by dotted keys, entries of lists of tables one by one."""
     if isinstance(value, Mapping):
-        for name, one in value.items():
-            yield from dotted(one, f"{key}.{name}" if key else name)
+        for name, below in value.items():
+            yield from dotted(below, f"{key}.{name}" if key else name)
     elif isinstance(value, list) and value and isinstance(value[0], Mapping):
-        for number, one in enumerate(value):
-            yield from dotted(one, f"{key}[{number}]")
+        for number, entry in enumerate(value):
+            yield from dotted(entry, f"{key}[{number}]")
     else:
         yield key, value
 

@@ -32,7 +32,7 @@ _OF_MIXTURES = {
 }
 
 
-class Known(NamedTuple):
+class LibraryNumber(NamedTuple):
     """A number of the library, as a case would write it.
 
     The ``range`` of an unmeasured number has the ends between which it may lie, that of a calibrated one 5 to 95 % of
@@ -62,52 +62,52 @@ class Library:
     name has two meanings: the user's library cannot redefine a name of the program.
     """
 
-    def __init__(self, own: Mapping[str, Any] | None = None) -> None:
-        mine = [Collection("own library", own.get("file", ""), own)] if own else []
-        self.collections = [*mine, Collection("library", "", _contents())]
+    def __init__(self, users: Mapping[str, Any] | None = None) -> None:
+        own_library = [Collection("own library", users.get("file", ""), users)] if users else []
+        self.collections = [*own_library, Collection("library", "", _contents())]
 
     def names(self, kind: str) -> tuple[str, ...]:
         """Names of the ``materials`` or of the ``liquids``."""
-        return tuple(dict.fromkeys(name for one in self.collections for name in one.tables.get(kind, ())))
+        return tuple(dict.fromkeys(name for collection in self.collections for name in collection.tables.get(kind, ())))
 
-    def numbers(self, kind: str, name: str, mixture: tuple[float, float] | None = None) -> Mapping[str, Known]:
+    def numbers(self, kind: str, name: str, mixture: tuple[float, float] | None = None) -> Mapping[str, LibraryNumber]:
         """Numbers of one of the ``materials`` or ``liquids``, in SI units; empty if there is none of this name.
 
         ``mixture`` is the mass fraction and the temperature (K) of a liquid whose numbers depend on them.
         """
-        for one in self.collections:
-            if found := one.tables.get(kind, {}).get(name):
+        for collection in self.collections:
+            if numbers := collection.tables.get(kind, {}).get(name):
                 computed = MIXTURES[name](*mixture or HALF) if name in MIXTURES else {}
                 texts = {key: quantity_text(float(f"{computed[key]:.4g}"), _OF_MIXTURES[key]) for key in computed}
-                return {key: _known({"value": texts.get(key), **entry}, one) for key, entry in found.items()}
+                return {key: _number({"value": texts.get(key), **entry}, collection) for key, entry in numbers.items()}
         return {}
 
-    def surface_pair(self, first: str | None, second: str | None) -> Mapping[str, Known]:
+    def surface_pair(self, first: str | None, second: str | None) -> Mapping[str, LibraryNumber]:
         """Contact parameters of two wet surfaces; empty if there are none.
 
         ``friction``, ``rolling_friction`` and, where known, ``contact_angle`` (rad), ``meniscus_radius`` (m) or
         ``volume_fraction``, and ``restitution``.
         """
-        for one in self.collections:
-            for pair in one.tables.get("surface_pairs", ()):
+        for collection in self.collections:
+            for pair in collection.tables.get("surface_pairs", ()):
                 if sorted(pair["materials"]) == sorted([first or "", second or ""]):
                     liquids = tuple(pair.get("calibrated_with", ()))
                     numbers = {key: entry for key, entry in pair.items() if isinstance(entry, Mapping)}
-                    return {key: _known(entry, one, liquids) for key, entry in numbers.items()}
+                    return {key: _number(entry, collection, liquids) for key, entry in numbers.items()}
         return {}
 
-    def roughness(self, first: str | None, second: str | None) -> Known | None:
+    def roughness(self, first: str | None, second: str | None) -> LibraryNumber | None:
         """Roughness of the contact of two materials, the root of the sum of both squares; None if one is unknown."""
-        both = [self.numbers("materials", name or "").get("roughness") for name in (first, second)]
-        one, other = both
-        if one is None or other is None:
+        materials = [(name, self.numbers("materials", name or "").get("roughness")) for name in (first, second)]
+        entries = [(name, entry) for name, entry in materials if entry is not None]
+        if len(entries) < 2:
             return None
-        parts = zip(*((known.written, *(known.range or (known.written,) * 2)) for known in (one, other)), strict=True)
+        parts = zip(*((entry.written, *(entry.range or (entry.written,) * 2)) for _, entry in entries), strict=True)
         squares = [sum(parse_quantity(text, LENGTH) ** 2 for text in pair) for pair in parts]
         value, *ends = (f"{float(f'{1e9 * sqrt(square):.3g}'):g} nm" for square in squares)
-        sources = dict.fromkeys(f"{name}: {known.source}" for name, known in ((first, one), (second, other)))
-        own = one if one.origin != "library" else other
-        return own._replace(written=value, range=(ends[0], ends[1]), source="; ".join(sources))
+        sources = dict.fromkeys(f"{name}: {entry.source}" for name, entry in entries)
+        number = max((entry for _, entry in entries), key=lambda entry: entry.origin != "library")
+        return number._replace(written=value, range=(ends[0], ends[1]), source="; ".join(sources))
 
 
 @cache
@@ -115,10 +115,12 @@ def _contents() -> dict[str, Any]:
     return tomllib.loads(resources.files("walkers.inputs").joinpath("library.toml").read_text("utf-8"))
 
 
-def _known(entry: Mapping[str, Any], of: Collection, liquids: tuple[str, ...] = ()) -> Known:
-    source = entry.get("source", f"calibrated with {' and '.join(liquids)}" if liquids else "")
-    place, ends = ", ".join(filter(None, (of.place, source))), entry.get("range")
-    return Known(entry["value"], place, ends and (ends[0], ends[1]), liquids, of.origin, entry.get("log", False))
+def _number(table: Mapping[str, Any], of: Collection, liquids: tuple[str, ...] = ()) -> LibraryNumber:
+    source = table.get("source", f"calibrated with {' and '.join(liquids)}" if liquids else "")
+    place, ends = ", ".join(filter(None, (of.place, source))), table.get("range")
+    return LibraryNumber(
+        table["value"], place, ends and (ends[0], ends[1]), liquids, of.origin, table.get("log", False)
+    )
 
 
 def check_library(tables: object, source: str) -> None:
@@ -132,16 +134,19 @@ def check_library(tables: object, source: str) -> None:
     kinds = ("materials", "liquids")
     again = [f"{kind}.{name}" for kind in kinds for name in tables.get(kind, ()) if name in shipped[kind]]
     problems = [Problem(key, None, f"{text}another name") for key in again]
-    known, pairs = Library(tables).names("materials"), [sorted(one["materials"]) for one in shipped["surface_pairs"]]
+    materials, pairs = (
+        Library(tables).names("materials"),
+        [sorted(pair["materials"]) for pair in shipped["surface_pairs"]],
+    )
     given = list(pairs)
-    for number, materials in enumerate(one["materials"] for one in tables.get("surface_pairs", ())):
-        key, pair = f"surface_pairs[{number}]", sorted(materials)
+    for number, names in enumerate(pair["materials"] for pair in tables.get("surface_pairs", ())):
+        key, pair = f"surface_pairs[{number}]", sorted(names)
         if pair in given:
             why = f"{text}its numbers in the case instead" if pair in pairs else "is given twice; expected one table"
-            problems.append(Problem(key, " on ".join(materials), why))
+            problems.append(Problem(key, " on ".join(names), why))
         given.append(pair)
-        for name in sorted({*materials}.difference(known)):
-            why = f"not in the library; {expected_of(name, known)}"
+        for name in sorted({*names}.difference(materials)):
+            why = f"not in the library; {expected_of(name, materials)}"
             problems.append(Problem(f"{key}.materials", shown(name), why))
     if problems:
         raise InputError(source, problems)
@@ -149,21 +154,23 @@ def check_library(tables: object, source: str) -> None:
 
 def library_of(document: Mapping[str, Any], source: str = "") -> Library:
     """The library for a case, by its tables; raises `InputError` if its own is none."""
-    own = document.get("library")
-    if own is None:
+    users = document.get("library")
+    if users is None:
         return _shipped()
     try:
-        check_library(_tables_in(own), source)
+        check_library(_tables_in(users), source)
     except InputError as error:
-        raise InputError(source, [replace(one, key=f"library.{one.key}") for one in error.problems]) from error
-    return Library(own)
+        raise InputError(
+            source, [replace(problem, key=f"library.{problem.key}") for problem in error.problems]
+        ) from error
+    return Library(users)
 
 
-def _tables_in(own: object) -> object:
+def _tables_in(library: object) -> object:
     """The library of a case without the name of its file, which `read_library` puts beside its tables."""
-    if not isinstance(own, Mapping):
-        return own
-    return {name: tables for name, tables in own.items() if name != "file" or not isinstance(tables, str)}
+    if not isinstance(library, Mapping):
+        return library
+    return {name: tables for name, tables in library.items() if name != "file" or not isinstance(tables, str)}
 
 
 @cache
@@ -185,7 +192,7 @@ def read_library(folder: Path) -> dict[str, Any]:
 
 
 @cache
-def unmeasured() -> Mapping[str, Known]:
+def unmeasured() -> Mapping[str, LibraryNumber]:
     """Defaults and ranges of the unmeasured values that a case may leave out, by keys of a case."""
     program = Collection("library", "", {})
-    return {key: _known(entry, program) for key, entry in _contents()["unmeasured"].items()}
+    return {key: _number(entry, program) for key, entry in _contents()["unmeasured"].items()}

@@ -60,8 +60,10 @@ def blaming(source: str, document: Mapping[str, Any] | None = None) -> Iterator[
     except InputError as error:
         if error.source:
             raise
-        found = [(one, one.value or quoted(document or {}, parts_of(one.key))) for one in error.problems]
-        raise InputError(source, [replace(one, value=value) for one, value in found]) from error
+        blamed = [
+            (problem, problem.value or quoted(document or {}, parts_of(problem.key))) for problem in error.problems
+        ]
+        raise InputError(source, [replace(problem, value=value) for problem, value in blamed]) from error
 
 
 @contextmanager
@@ -71,12 +73,12 @@ def blaming_changes(changes: Mapping[str, Any]) -> Iterator[None]:
         yield
     except InputError as error:
         given = [parts_of(key) for key in changes]
-        parts = [parts_of(one.key) for one in error.problems]
-        ours = [any(of and of[: len(one)] == one[: len(of)] for one in given) for of in parts]
+        parts = [parts_of(problem.key) for problem in error.problems]
+        ours = [any(of and of[: len(key)] == key[: len(of)] for key in given) for of in parts]
         if not any(ours):
             raise
         problems = zip(error.problems, ours, strict=True)
-        named = [replace(one, key=f"--set {one.key}") if of else one for one, of in problems]
+        named = [replace(problem, key=f"--set {problem.key}") if of else problem for problem, of in problems]
         raise InputError(error.source, named) from error
 
 
@@ -87,12 +89,15 @@ def validated(
 
     Raises `InputError` with all that pydantic finds wrong, and with ``further`` problems.
     """
-    problems = {one.key: replace(one, value=one.value or quoted(document, parts_of(one.key))) for one in further}
+    problems = {
+        problem.key: replace(problem, value=problem.value or quoted(document, parts_of(problem.key)))
+        for problem in further
+    }
     try:
         file = model.model_validate(document, context=WRITTEN)
     except ValidationError as error:
-        found = [_problem_of(each, document, model, whole) for each in error.errors()]
-        problems = {one.key: one for one in found} | problems
+        refused = [_problem_of(details, document, model, whole) for details in error.errors()]
+        problems = {problem.key: problem for problem in refused} | problems
     if problems:
         raise InputError(source, list(problems.values()))
     return file
@@ -119,8 +124,8 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
         message = f"missing; expected {_in_a_table(parts, field) or example}{_elsewhere(parts)}"
     else:
         form = _SENTENCES.get(kind, "expected {example}")
-        known = {"example": example, "such": such, "meaning": field.description if field else "", "key": key}
-        message = form.format(**{**known, **context})
+        words = {"example": example, "such": such, "meaning": field.description if field else "", "key": key}
+        message = form.format(**{**words, **context})
         if kind == "literal_error":
             message += suggestion(str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"])))
         elif kind in ("list_type", "tuple_type") and field:
@@ -134,32 +139,34 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
 
 def _elsewhere(parts: Sequence[str | int]) -> str:
     """What else may give a key: a name that the library knows."""
-    return f", or {known} of the library" if (known := _GIVEN_ELSEWHERE.get(str(parts[0]))) and len(parts) > 1 else ""
+    return f", or {named} of the library" if (named := _GIVEN_ELSEWHERE.get(str(parts[0]))) and len(parts) > 1 else ""
 
 
 def _in_a_table(parts: Sequence[str | int], field: FieldInfo | None) -> str:
     """How a table begins; empty for other keys."""
     table = table_in(field.annotation) if field else None
-    texts = {name: example_of(one).partition("such as ")[2] for name, one in keys_in(table).items()} if table else {}
+    texts = (
+        {name: example_of(entry).partition("such as ")[2] for name, entry in keys_in(table).items()} if table else {}
+    )
     such = next((f", such as {name} = {text}" for name, text in texts.items() if text), "")
     return f"a table [{joined(parts)}]{such}" if table else ""
 
 
-def _place(location: Sequence[str | int], known: Collection[str]) -> str:
+def _place(location: Sequence[str | int], keys: Collection[str]) -> str:
     """The key of a kind of file for a key of a file, with an asterisk for a name of the user's."""
     place = ""
     for part in (part for part in location if isinstance(part, str)):
         below = f"{place}.{part}".lstrip(".")
-        place = below if below in known else f"{place}.*"
+        place = below if below in keys else f"{place}.*"
     return place
 
 
 def check_key(model: type[Table], key: str) -> None:
     """Refuse a key that no case has; raises `InputError` if it is one."""
-    parts, known = re.sub(r"\[\d+\]", "", key).split("."), keys_of(model)
+    parts, fields = re.sub(r"\[\d+\]", "", key).split("."), keys_of(model)
     if "" in parts:
         raise unusable(key, "is not a key of a case; expected one such as drive.frequency")
-    if (field := known.get(".".join(parts))) is None:
+    if (field := fields.get(".".join(parts))) is None:
         raise unusable(key, _unknown_key(parts, model, "a case"))
     if table_in(field.annotation):
         raise unusable(key, "is a table of a case; expected one of its keys")
@@ -169,13 +176,13 @@ def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
     *tables, word = location
     if ".".join(location) in _ENDED:
         return "expected none: this key has ended; the program limits the engine itself"
-    known = keys_of(file)
-    field = known.get(_place(tables, known))
+    fields = keys_of(file)
+    field = fields.get(_place(tables, fields))
     table = table_in(field.annotation) if field else None if tables else file
     siblings = list(keys_in(table)) if table else []
-    keys = {re.sub(r"^(clusters|placed|drive\.harmonics)\.", r"\1[0].", key): one for key, one in known.items()}
+    keys = {re.sub(r"^(clusters|placed|drive\.harmonics)\.", r"\1[0].", key): field for key, field in fields.items()}
     hint = suggestion(word, siblings) if siblings else suggestion(".".join(location), keys)
-    plain = [key for key, one in keys.items() if "*" not in key and not table_in(one.annotation)]
+    plain = [key for key, field in keys.items() if "*" not in key and not table_in(field.annotation)]
     elsewhere = [key for key in plain if key.split(".")[-1] == word]
     if not hint and elsewhere:
         hint = f'; did you mean "{elsewhere[0]}"?'

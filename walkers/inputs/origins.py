@@ -58,14 +58,14 @@ class Origin:
 def text_of(value: Any, kind: Kind | None = None) -> str:
     """A value of a case file as text: lists with commas, tables by their keys; numbers of a kind are in SI units."""
     if isinstance(value, (list, tuple)):
-        texts = [text_of(one, kind) for one in value]
+        texts = [text_of(entry, kind) for entry in value]
         return ", ".join(
-            f"({text})" if isinstance(one, (list, tuple)) else text for one, text in zip(value, texts, strict=True)
+            f"({text})" if isinstance(entry, (list, tuple)) else text for entry, text in zip(value, texts, strict=True)
         )
     if isinstance(value, bool):
         return "true" if value else "false"
     if kind is not None and isinstance(value, (int, float)):
         return quantity_text(value, kind)
     if isinstance(value, Mapping):
-        return "; ".join(f"{name} {text_of(one)}" for name, one in value.items())
+        return "; ".join(f"{name} {text_of(below)}" for name, below in value.items())
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -85,8 +85,8 @@ def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
         document = dict(with_meshes(with_record(document, path.parent), path.parent))
     if "library" not in document and path.name != FILE_NAME:
         beside = (folder or Path()) if path.parent == _HERE / "cases" else path.parent
-        if own := read_library(beside):
-            document["library"] = own
+        if library := read_library(beside):
+            document["library"] = library
     return document
 
 
@@ -101,24 +101,24 @@ def find_input(name: str | Path, kind: str) -> Path:
     Raises `InputError` if there is neither, or if it is known to be of another kind: with the command that takes it.
     """
     check_utf8(name)
-    path, known = Path(name), shipped(kind)
+    path, of_kind = Path(name), shipped(kind)
     with suppress(OSError):
-        if not path.exists() and str(name) not in known and Path(f"{name}.toml").is_file():
+        if not path.exists() and str(name) not in of_kind and Path(f"{name}.toml").is_file():
             path = Path(f"{name}.toml")
-    found = None if str(name) in known else _kind_of(path)
-    if found not in (None, kind):
-        raise refused(name, f"is {_COMMANDS[str(found)].format(name)}")
+    actual = None if str(name) in of_kind else _kind_of(path)
+    if actual not in (None, kind):
+        raise refused(name, f"is {_COMMANDS[str(actual)].format(name)}")
     try:
-        if path.is_file() or (path.exists() and str(name) not in known):
+        if path.is_file() or (path.exists() and str(name) not in of_kind):
             if path.stem in (".", ".."):  # of "...toml"
                 raise refused(name, "expected a name before .toml")
             return path
     except OSError as error:
         raise refused(shortened(str(name)), f"cannot be read: {error.strerror}") from error
-    if str(name) in known:
-        return known[str(name)]
-    there = "no such file, run or sweep" if kind == "case" else "no such file"
-    raise refused(name, f"{there}, nor a shipped {kind} ({', '.join(known)}){suggestion(str(name), known)}")
+    if str(name) in of_kind:
+        return of_kind[str(name)]
+    missing = "no such file, run or sweep" if kind == "case" else "no such file"
+    raise refused(name, f"{missing}, nor a shipped {kind} ({', '.join(of_kind)}){suggestion(str(name), of_kind)}")
 
 
 def _kind_of(path: Path) -> str | None:

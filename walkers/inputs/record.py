@@ -143,8 +143,8 @@ def with_record(document: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
     except OSError as error:
         raise unusable("drive.record", f"cannot be read: {error.strerror}", name) from error
     except ValueError as error:  # its subclasses are of pandas
-        found = "" if type(error) is ValueError else "expected rows of numbers with commas below a header: "
-        raise unusable("drive.record", f"{found}{error}".strip(), name) from error
+        expected = "" if type(error) is ValueError else "expected rows of numbers with commas below a header: "
+        raise unusable("drive.record", f"{expected}{error}".strip(), name) from error
     return {**document, "drive": {**drive, "record": {"file": name, "rows": rows}}}
 
 

@@ -17,7 +17,7 @@ from walkers.inputs.bodies import ARRANGEMENTS, MOST_BEADS, Cluster, Walkers, to
 from walkers.inputs.boundary import BOTTOM, SHARP, Plane
 from walkers.inputs.drive import common_frequency, unit_vector
 from walkers.inputs.keys import MISSING, parts_of, value_at
-from walkers.inputs.library import Known, Library, unmeasured
+from walkers.inputs.library import Library, LibraryNumber, unmeasured
 from walkers.inputs.loads import bridge_at_rest, contact_loads, delay, dimer_of, reach
 from walkers.inputs.origins import Source
 from walkers.inputs.run import with_run
@@ -74,8 +74,7 @@ def supplied(
 
     Also the sources of these values, and names that the library does not know.
     """
-    said = {key: value_at(document, parts_of(key)) for key in (*SUPPLIED, "liquid.law")}
-    given = {key for key, value in said.items() if value is not MISSING}
+    given = {key for key in SUPPLIED if value_at(document, parts_of(key)) is not MISSING}
     named = (value_at(document, parts_of(key)) for key in NAMES)
     bead, wall, liquid = (name if isinstance(name, str) else None for name in named)
     problems = list(_unknown(library, given, bead, wall, liquid))
@@ -83,13 +82,13 @@ def supplied(
     problems += problem
     values = _values(library, bead, wall, None if problem else liquid, mixture)
     # What was calibrated was so with one law of the bridges: with another it is a guess.
-    calibrated = liquid if said["liquid.law"] in (MISSING, DEFAULT_LAW) else None
+    calibrated = liquid if value_at(document, ("liquid", "law")) in (MISSING, DEFAULT_LAW) else None
     tables = {name: value for name, value in document.items() if name not in ("library", "meshes")}
     tables.setdefault("contact", {})
     written: dict[str, Any] = {}
     for key in SUPPLIED:
-        said_already = {key, *alternatives(model, key)} & {*given, *written}
-        if key in values and not said_already and isinstance(tables.get(key.split(".")[0]), Mapping):
+        replaced = {key, *alternatives(model, key)} & {*given, *written}
+        if key in values and not replaced and isinstance(tables.get(key.split(".")[0]), Mapping):
             written[key], sources[key] = values[key].written, _source_of(key, values[key], calibrated)
     return changed(model, tables, written), sources, problems
 
@@ -137,7 +136,7 @@ def _mixture(
 @lru_cache(maxsize=1024)
 def _values(
     library: Library, bead: str | None, wall: str | None, liquid: str | None, mixture: tuple[float, float] | None
-) -> dict[str, Known]:
+) -> dict[str, LibraryNumber]:
     """What is usual, and what the library has of materials and a liquid, by the keys of a case."""
     on_bead, on_wall = library.surface_pair(bead, bead), library.surface_pair(bead, wall)
     of_liquid = library.numbers("liquids", liquid or "", mixture)
@@ -145,25 +144,24 @@ def _values(
         "beads.density": library.numbers("materials", bead or "").get("density"),
         "contact.friction.bead_bead": on_bead.get("friction"),
         "contact.friction.bead_wall": on_wall.get("friction"),
-        **{key: library.roughness(bead, other) for key, other in zip(_ROUGHNESS, (bead, wall), strict=True)},
+        **{key: library.roughness(bead, material) for key, material in zip(_ROUGHNESS, (bead, wall), strict=True)},
         **{key: on_wall.get(key.split(".")[1]) for key in _OF_SURFACES},
-        **{f"liquid.{key}": known for key, known in of_liquid.items()},
+        **{f"liquid.{key}": number for key, number in of_liquid.items()},
     }
     # Of the two that give the liquid, the library's own is taken; without one it is a volume.
-    usual = {key: known for key, known in unmeasured().items() if key != "liquid.meniscus_radius"}
-    return usual | {key: known for key, known in values.items() if known}
+    usual = {key: number for key, number in unmeasured().items() if key != "liquid.meniscus_radius"}
+    return usual | {key: number for key, number in values.items() if number}
 
 
-def _source_of(key: str, known: Known, liquid: str | None) -> Source:
-    """What was calibrated with other liquids is a guess for this one."""
-    loose, text = unmeasured().get(key), str(known.written)
-    if loose is None or (known.source and not known.calibrated_with):
-        of_sizes = loose is not None and loose.logarithmic
-        return Source(known.origin, known.source, text, known.range, of_sizes)
-    if liquid in known.calibrated_with:
-        origin = "calibrated" if known.range else "assumed"
-        return Source(origin, known.source, text, known.range, loose.logarithmic)  # type: ignore[arg-type]
-    return Source("default", known.source, text, loose.range, loose.logarithmic)
+def _source_of(key: str, entry: LibraryNumber, liquid: str | None) -> Source:
+    """The source of a number of the library; a number that was calibrated with other liquids is a guess."""
+    usual, text = unmeasured().get(key), str(entry.written)
+    logarithmic = usual is not None and usual.logarithmic
+    if usual is None or (entry.source and not entry.calibrated_with):
+        return Source(entry.origin, entry.source, text, entry.range, logarithmic)
+    if liquid in entry.calibrated_with:
+        return Source("calibrated" if entry.range else "assumed", entry.source, text, entry.range, logarithmic)
+    return Source("default", entry.source, text, usual.range, logarithmic)
 
 
 # --- from other values ------------------------------------------------------------------------------------------------
@@ -182,7 +180,7 @@ def _radii(case: Case) -> Case:
         shares = (1.0 + dimers.sin_delta, 1.0 - dimers.sin_delta)
         radii = tuple(float(f"{dimers.mean_radius * share:.15g}") for share in shares)
         case = case.filled("dimers.radii", radii, "from mean_radius and sin_delta")
-    given = {f"{key}.radii": getattr(one, "diameters", None) for key, one in case.walkers_by_key.items()}
+    given = {f"{key}.radii": getattr(walkers, "diameters", None) for key, walkers in case.walkers_by_key.items()}
     given |= {f"mixture.{name}": getattr(case.mixture, f"{name}_diameters", None) for name in ("small", "large")}
     for key, diameters in given.items():
         if diameters is not None:
@@ -206,7 +204,9 @@ def _vessel(case: Case) -> Case:
             vessel = vessel_of(case.document["meshes"][boundary.mesh], boundary.scale)
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise unusable("meshes", f"expected points and triangles of {boundary.mesh}") from error
-        boundary = boundary.but(planes=tuple(Plane(point=at, normal=way) for at, way in vessel.planes(SHARP) or ()))
+        boundary = boundary.but(
+            planes=tuple(Plane(point=at, normal=normal) for at, normal in vessel.planes(SHARP) or ())
+        )
         if not boundary.planes:
             boundary = boundary.but(
                 points=tuple(map(tuple, vessel.points.tolist())), triangles=tuple(map(tuple, vessel.triangles.tolist()))
@@ -224,7 +224,7 @@ def _vessel(case: Case) -> Case:
             )
     width, size = float(f"{2.0 * abs(vessel.points[:, :2]).max():.12g}"), 2.0 * max(case.radii)
     if not 1.0 < width / size < _WIDEST:
-        wide, across = (f"{one:.4g} m" if one >= 1.0 else f"{1e3 * one:.4g} mm" for one in (width, size))
+        wide, across = (f"{length:.4g} m" if length >= 1.0 else f"{1e3 * length:.4g} mm" for length in (width, size))
         message = f"the vessel is {wide} wide and the beads {across}; expected 1 to {_WIDEST:g} beads across"
         raise unusable("boundary.scale" if boundary.mesh else "boundary.planes", message)
     return case.filled("boundary.width", width, why).filled("boundary.shape", "vessel", why)
@@ -232,18 +232,18 @@ def _vessel(case: Case) -> Case:
 
 def _planes(planes: Sequence[Plane]) -> tuple[Plane, ...]:
     """The planes with normals of length one, a level one through the origin first."""
-    found = []
+    units = []
     for number, plane in enumerate(planes):
         try:
-            found.append(plane.but(normal=unit_vector(plane.normal)))
+            units.append(plane.but(normal=unit_vector(plane.normal)))
         except ValueError as error:
             raise unusable(f"boundary.planes[{number}].normal", "expected a direction such as [0, 0, 1]") from error
-    for (number, one), (other, two) in combinations(enumerate(found), 2):
-        turn = acos(max(-1.0, min(1.0, sum(a * b for a, b in zip(one.normal, two.normal, strict=True)))))
+    for (number, first), (index, second) in combinations(enumerate(units), 2):
+        turn = acos(max(-1.0, min(1.0, sum(a * b for a, b in zip(first.normal, second.normal, strict=True)))))
         if turn < SHARP:
             message = f"turns by {degrees(turn):.3g} deg from planes[{number}]; expected 45 deg or more, or a mesh"
-            raise unusable(f"boundary.planes[{other}].normal", message)
-    return tuple(sorted(found, key=lambda one: one.normal != BOTTOM.normal or one.point[2] != 0.0))
+            raise unusable(f"boundary.planes[{index}].normal", message)
+    return tuple(sorted(units, key=lambda plane: plane.normal != BOTTOM.normal or plane.point[2] != 0.0))
 
 
 def _viscosity(case: Case) -> Case:
@@ -278,14 +278,14 @@ def _count(case: Case) -> Case:
 
 def _walkers(case: Case) -> Case:
     """The walkers, whose arrangements are possible."""
-    for key, one in case.walkers_by_key.items():
-        if one.facing in _FACING:
+    for key, walkers in case.walkers_by_key.items():
+        if walkers.facing in _FACING:
             if not case.boundary.tilt or case.boundary.uphill:
                 message = "on a plane that is tilted along the drive alone walkers face up or down"
                 raise unusable(f"{key}.facing", f'expected "both", "right" or "left": {message}')
-            case = case.put(f"{key}.facing", _FACING[one.facing])
-        if isinstance(one, Cluster):
-            _check_places(one, f"{key}.at") if one.at else _check_arrangement(one, key)
+            case = case.put(f"{key}.facing", _FACING[walkers.facing])
+        if isinstance(walkers, Cluster):
+            _check_places(walkers, f"{key}.at") if walkers.at else _check_arrangement(walkers, key)
     return case
 
 
@@ -304,8 +304,8 @@ def _check_arrangement(cluster: Cluster, key: str) -> None:
     except ValueError as error:
         raise unusable(key, str(error)) from error
     if overlapping:
-        one, other = (bead + 1 for bead in overlapping[0])
-        raise unusable(key, f"beads {one} and {other} would overlap in a {name}; expected similar radii")
+        first, second = (bead + 1 for bead in overlapping[0])
+        raise unusable(key, f"beads {first} and {second} would overlap in a {name}; expected similar radii")
 
 
 def _check_places(cluster: Cluster, key: str) -> None:
@@ -314,9 +314,9 @@ def _check_places(cluster: Cluster, key: str) -> None:
     if len(places) != len(everyone):
         raise unusable(key, f"expected a place for each of the {len(everyone)} beads")
     if overlapping := touching(places, cluster.radii, -OVERLAP):
-        one, other = overlapping[0]
-        apart = dist(places[one], places[other]), cluster.rigid(one, other)
-        raise unusable(f"{key}[{other}]", overlaps(f"{key}[{one}]", *apart))
+        first, second = overlapping[0]
+        distances = dist(places[first], places[second]), cluster.rigid(first, second)
+        raise unusable(f"{key}[{second}]", overlaps(f"{key}[{first}]", *distances))
     if not any(cluster.front):
         raise unusable(key, "expected some beads ahead of others: this walker has no heading")
     joined = {0}
@@ -332,18 +332,18 @@ def _drive(case: Case) -> Case:
         return _record(case, record)
     if case.drive.repeats:
         raise unusable("drive.repeats", "expected none without drive.record")
-    several = {f"drive.harmonics[{number}]": one for number, one in enumerate(case.drive.harmonics)}
-    for key, one in (several or {"drive": case.drive}).items():
-        if one.axis is None:
+    several = {f"drive.harmonics[{number}]": harmonic for number, harmonic in enumerate(case.drive.harmonics)}
+    for key, harmonic in (several or {"drive": case.drive}).items():
+        if harmonic.axis is None:
             axis = "z" if boundary.closed else "x"
             case = case.filled(f"{key}.axis", axis, f"of a {boundary.shape}", "default")
-        if one.gamma0 is not None:
+        if harmonic.gamma0 is not None:
             if not case.walkers or len(case.walkers[0].radii) != 2:
                 raise unusable(f"{key}.gamma0", "expected peak_acceleration: only a dimer has a Γ0")
-            peak, why = dimer_of(case).peak_acceleration(one.gamma0), "from gamma0, the dimer and the liquid"
+            peak, why = dimer_of(case).peak_acceleration(harmonic.gamma0), "from gamma0, the dimer and the liquid"
             case = case.filled(f"{key}.peak_acceleration", peak, why)
     try:
-        common_frequency([one.frequency for one in case.excitation.harmonics])
+        common_frequency([harmonic.frequency for harmonic in case.excitation.harmonics])
     except ValueError as error:
         raise unusable("drive.harmonics", f"expected frequencies with a common period: {error}") from error
     if case.drive.frame == "lab" and not case.excitation.is_plain:
@@ -374,8 +374,8 @@ def _surfaces(case: Case) -> Case:
         case = _ranging_to(case, key, most)
     try:
         for radius in case.radii if liquid.meniscus_radius else ():
-            for other in (*case.radii, inf):
-                bridge_volume(radius, other, liquid)
+            for opposite in (*case.radii, inf):
+                bridge_volume(radius, opposite, liquid)
     except ValueError as error:
         raise unusable("liquid.meniscus_radius", f"expected menisci that fit between the surfaces: {error}") from error
     return case
@@ -436,11 +436,11 @@ def _spacing(case: Case) -> Case:
         _check_held(case, walkers)
         overlap = max(load.overlap for load in contact_loads(case, walkers)) if gap is None else -gap
         if overlap * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):
-            blamed, other = "contact.youngs_modulus", f"a larger modulus, or {key}.gap"
+            blamed, remedy = "contact.youngs_modulus", f"a larger modulus, or {key}.gap"
             if gap is not None:
                 least = -0.02e6 * min(walkers.radii) / (1.0 + walkers.gap_spread)
-                blamed, other = f"{key}.gap", f"{least:.3g} um or more"
-            message = f"the beads overlap by more than 2 % of the smallest radius: expected {other}"
+                blamed, remedy = f"{key}.gap", f"{least:.3g} um or more"
+            message = f"the beads overlap by more than 2 % of the smallest radius: expected {remedy}"
             raise unusable(blamed, message)
         if gap is None:
             case = case.noted(f"{key}.gap", "where the forces at rest balance", text="auto")
@@ -450,7 +450,7 @@ def _spacing(case: Case) -> Case:
             why = "so that walkers do not touch at the start" if walkers.meet else "so that walkers do not meet"
             spacing = 2.0 * (walkers.length if walkers.meet else reach(case))
             case = case.filled(f"{key}.spacing", spacing, why)
-        elif walkers.spacing < least and sum(one.replicates for one in case.walkers) > 1:
+        elif walkers.spacing < least and sum(make.replicates for make in case.walkers) > 1:
             message = f'neighbouring walkers would touch or overlap; expected at least {1e3 * least:.3g} mm, or "auto"'
             raise unusable(f"{key}.spacing", message)
     return case
@@ -459,13 +459,13 @@ def _spacing(case: Case) -> Case:
 def _check_held(case: Case, walkers: Walkers) -> None:
     """Refuse walkers that would not stay in contact at rest, because bridges push by more than weights press."""
     names = [f"bead {bead} and the boundary" for bead in range(1, len(walkers.radii) + 1)]
-    names += [f"beads {one + 1} and {other + 1}" for one, other in walkers.pairs]
+    names += [f"beads {first + 1} and {second + 1}" for first, second in walkers.pairs]
     for name, load in zip(names, contact_loads(case, walkers), strict=True):
         if load.pull < 0.0 == load.overlap:  # no overlap: the load is tensile
             angle = case.liquid.contact_angle
-            key, other = ("contact_angle", "a smaller angle or less liquid") if angle else ("law", "a law that pulls")
+            key, remedy = ("contact_angle", "a smaller angle or less liquid") if angle else ("law", "a law that pulls")
             pushed = f"at rest, the bridge pushes {name} apart ({-1e6 * load.pull:.3g} uN)"
-            raise unusable(f"liquid.{key}", f"expected {other}: {pushed}")
+            raise unusable(f"liquid.{key}", f"expected {remedy}: {pushed}")
 
 
 def _gravity(case: Case) -> Case:

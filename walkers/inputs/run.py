@@ -130,7 +130,7 @@ class Run(Table):
 
     def steps_until(self, cycles: int) -> int:
         """Steps of the attempts up to the one for so many cycles."""
-        return self.steps_per_cycle * sum(one for one in self.attempts if one <= cycles)
+        return self.steps_per_cycle * sum(attempt for attempt in self.attempts if attempt <= cycles)
 
     @property
     def rests(self) -> bool:
@@ -173,10 +173,13 @@ def with_run(case: Case) -> Case:
         raise unusable("run.time_step", f'{message}"auto", or allow_unstable = true')
     time_step, steps = fit_into_cycle(largest, frequency, samples)
     fewest, most = case.excitation.cycles
-    wanted: float = table.cycles or table.most_cycles or ceil(fewest) or int(min(_MOST_CYCLES, most))
+    cycles_needed: float = table.cycles or table.most_cycles or ceil(fewest) or int(min(_MOST_CYCLES, most))
     if table.duration is not None:
-        wanted = table.duration * case.excitation.frequency * (1.0 - 1e-12)
-    cycles, until_steady = ceil(wanted / cycles_per_sample) * cycles_per_sample, _until_steady(case, cycles_per_sample)
+        cycles_needed = table.duration * case.excitation.frequency * (1.0 - 1e-12)
+    cycles, until_steady = (
+        ceil(cycles_needed / cycles_per_sample) * cycles_per_sample,
+        _until_steady(case, cycles_per_sample),
+    )
     settling = table.settling_cycles
     if settling is None:
         settling = settling_of(cycles) if case.walkers else 0
@@ -208,19 +211,19 @@ def with_run(case: Case) -> Case:
 
 def _sources(run: Run, case: Case, reason: str) -> dict[str, Source]:
     """Where the values of a run are from that its table does not give."""
-    whence, cycles, settling = "from the duration" if run.duration else "not checked earlier", "", ""
+    cycles_from, cycles, settling = "from the duration" if run.duration else "not checked earlier", "", ""
     if run.until_steady:
-        whence = "checked after 12 and 24 cycles"
+        cycles_from = "checked after 12 and 24 cycles"
         cycles = f"until constant within {percent(CONSTANT)}, at most {run.cycles}"
         settling = ", ".join(f"{settling_of(number)} of {number}" for number in run.attempts)
     often = "" if run.cycles_per_sample == 1 else f"1 in {run.cycles_per_sample} cycles"
     if often:
-        whence += f", rounded up to a multiple of {run.cycles_per_sample} cycles (one sample)"
+        cycles_from += f", rounded up to a multiple of {run.cycles_per_sample} cycles (one sample)"
     by_time = case.loose or bool(run.frames_per_second)
     sources = {
         "run.samples_per_cycle": Source("derived" if by_time else "default", "from frames_per_second" * by_time, often),
         "run.time_step": Source("derived", f"auto: {reason}, a whole number of steps per cycle"),
-        "run.cycles": Source("derived", whence, cycles),
+        "run.cycles": Source("derived", cycles_from, cycles),
         "run.settling_cycles": Source("derived", "a third of the cycles, at most 20", settling),
         "run.longest_settling": Source("default", "of loose beads"),
         "run.settled_below": Source("default"),
@@ -264,8 +267,10 @@ def _sampling(case: Case) -> tuple[int, int, int]:
     table = case.run
     samples, cycles_per_sample = table.samples_per_cycle or _SAMPLES, 1
     if table.samples_per_cycle is None and (table.frames_per_second is not None or case.loose):
-        wanted = case.excitation.frequency / (table.frames_per_second or _FRAMES_PER_SECOND)
-        samples, cycles_per_sample = (round(1.0 / wanted), 1) if wanted < 1.0 else (1, round(wanted))
+        cycles_needed = case.excitation.frequency / (table.frames_per_second or _FRAMES_PER_SECOND)
+        samples, cycles_per_sample = (
+            (round(1.0 / cycles_needed), 1) if cycles_needed < 1.0 else (1, round(cycles_needed))
+        )
     name, bridges = "run.bridge_samples_per_cycle", table.bridge_samples_per_cycle
     if bridges is None:
         return samples, cycles_per_sample, 1 if case.loose else samples
@@ -282,17 +287,17 @@ def _until_steady(case: Case, cycles_per_sample: int) -> bool:
     Raises `InputError` if a case asks for both.
     """
     table = case.run
-    asked = ["cycles"] if "cycles" in table.model_fields_set and table.cycles is None else []
-    asked += ["most_cycles"] if table.most_cycles is not None else []
+    until = ["cycles"] if "cycles" in table.model_fields_set and table.cycles is None else []
+    until += ["most_cycles"] if table.most_cycles is not None else []
     given = [name for name in ("cycles", "duration", "settling_cycles", "segment") if getattr(table, name) is not None]
-    if given and asked:
+    if given and until:
         raise unusable(
-            f"run.{given[0]}", f"expected none: with run.{asked[0]}, walkers run until their velocity is constant"
+            f"run.{given[0]}", f"expected none: with run.{until[0]}, walkers run until their velocity is constant"
         )
-    if asked and not case.apart:
-        raise unusable(f"run.{asked[0]}", "expected run.duration: a run until steady needs independent walkers")
-    if asked and case.drive.ramp:
-        raise unusable(f"run.{asked[0]}", "expected a number of cycles: with drive.ramp no velocity is constant")
+    if until and not case.apart:
+        raise unusable(f"run.{until[0]}", "expected run.duration: a run until steady needs independent walkers")
+    if until and case.drive.ramp:
+        raise unusable(f"run.{until[0]}", "expected a number of cycles: with drive.ramp no velocity is constant")
     if case.drive.ramp or not case.apart or given or table.ranks != 1 or cycles_per_sample != 1:
         return False
     # A few cycles suffice for asymmetric dimers that start near the axis.

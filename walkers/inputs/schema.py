@@ -23,10 +23,10 @@ class _Generator(GenerateJsonSchema):
 
     def tuple_schema(self, schema: TupleSchema) -> JsonSchemaValue:
         """Lists of a fixed length whose entries are alike: older drafts, which editors read, know ``items`` alone."""
-        made = super().tuple_schema(schema)
-        if entries := made.pop("prefixItems", None):
-            made["items"] = entries[0]
-        return made
+        schema_of_tuple = super().tuple_schema(schema)
+        if entries := schema_of_tuple.pop("prefixItems", None):
+            schema_of_tuple["items"] = entries[0]
+        return schema_of_tuple
 
     def nullable_schema(self, schema: NullableSchema) -> JsonSchemaValue:
         return self.generate_inner(schema["schema"])

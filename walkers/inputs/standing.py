@@ -50,8 +50,8 @@ def standing(case: Case) -> Iterator[tuple[int, Standing]]:
     first = 0
     for number, body in enumerate(case.bodies):
         if isinstance(body, Walkers):
-            for one in _walkers(case, body, first):
-                yield number, one
+            for walker in _walkers(case, body, first):
+                yield number, walker
             first += body.replicates
         else:
             yield number, _poured(case, body)
@@ -98,7 +98,7 @@ def _poured(case: Case, mixture: Mixture) -> Standing:
     largest, draw = max(mixture.radii), default_rng(case.run.seed)
     floor, beads = _top_of_others(case), []
     places = ((layer, x, y) for layer in case.boundary.layers(largest, floor) for x, y in layer.places)
-    for radius, (layer, x, y) in zip((float(one) for one in draw.permutation(mixture.all_radii)), places):  # noqa: B905
+    for radius, (layer, x, y) in zip((float(size) for size in draw.permutation(mixture.all_radii)), places):  # noqa: B905
         shift = draw.uniform(-1.0, 1.0, 2) * 0.9 * layer.play(radius, largest)
         beads.append(StandingBead(x + float(shift[0]), y + float(shift[1]), floor + layer.level, radius))
     return Standing(tuple(beads))
@@ -106,8 +106,8 @@ def _poured(case: Case, mixture: Mixture) -> Standing:
 
 def _top_of_others(case: Case) -> float:
     """Largest height at the start of the bodies beside a mixture, m."""
-    walkers = [2.0 * max(one.radii) for one in case.walkers]
-    return max([*walkers, *(bead.at[2] + bead.radius for bead in case.placed)], default=0.0)
+    walking = [2.0 * max(walkers.radii) for walkers in case.walkers]
+    return max([*walking, *(bead.at[2] + bead.radius for bead in case.placed)], default=0.0)
 
 
 def check_bodies(case: Case) -> Case:
@@ -183,13 +183,13 @@ def _check_places(case: Case) -> None:
 
 def _standing_walkers(case: Case, most: int | None = None) -> list[_Held]:
     """The beads of all walkers, or of the first ones alone."""
-    keys = [key for key, one in case.walkers_by_key.items() for _ in range(one.replicates)][:most]
+    keys = [key for key, walkers in case.walkers_by_key.items() for _ in range(walkers.replicates)][:most]
     walkers: list[Standing] = []
     try:
-        walkers.extend(one for _, one in islice(standing(case), len(keys)))
+        walkers.extend(walker for _, walker in islice(standing(case), len(keys)))
     except ValueError as error:
         raise unusable(f"{keys[len(walkers)]}.radii", str(error)) from error
-    grid = case.boundary.grid(len(keys), max(one.spacing for one in case.walkers)) if keys else []
+    grid = case.boundary.grid(len(keys), max(walkers.spacing for walkers in case.walkers)) if keys else []
     return [
         _Held(key, (x + bead.x, y + bead.y, bead.z), bead.radius, number)
         for number, (key, (x, y), walker) in enumerate(zip(keys, grid, walkers, strict=True))
@@ -199,7 +199,7 @@ def _standing_walkers(case: Case, most: int | None = None) -> list[_Held]:
 
 def _check_walls(case: Case, beads: list[_Held]) -> None:
     boundary, top = case.boundary, case.boundary.height or inf
-    largest = max((max(one.radii) for one in case.walkers), default=0.0)
+    largest = max((max(walkers.radii) for walkers in case.walkers), default=0.0)
     if boundary.width is not None and boundary.width < 2.0 * (1.0 - OVERLAP) * largest:
         raise unusable("boundary.width", f"expected more than a bead's diameter, {2e3 * largest:.4g} mm")
     for bead, out in zip(beads, _outside(case, beads), strict=True):
@@ -228,8 +228,8 @@ def _outside(case: Case, beads: list[_Held]) -> list[bool]:
 
 def _most_walkers(case: Case) -> str:
     """How many walkers would fit, of a case with some outside."""
-    spacing = max(one.spacing for one in case.walkers)
-    few, many = 0, sum(one.replicates for one in case.walkers)
+    spacing = max(walkers.spacing for walkers in case.walkers)
+    few, many = 0, sum(walkers.replicates for walkers in case.walkers)
     while many - few > 1:
         number = (few + many) // 2
         few, many = (few, number) if any(_outside(case, _standing_walkers(case, number))) else (number, many)
@@ -241,8 +241,8 @@ def _check_overlaps(beads: list[_Held]) -> None:
 
     near = cKDTree([bead.place for bead in beads]).query_pairs(2.0 * max(bead.radius for bead in beads))
     strangers = (pair for pair in near if beads[pair[0]].walker != beads[pair[1]].walker or beads[pair[0]].walker < 0)
-    for one, other in sorted(strangers, key=lambda pair: pair[::-1]):
-        first, second = beads[one], beads[other]
+    for pair in sorted(strangers, key=lambda pair: pair[::-1]):
+        first, second = (beads[number] for number in pair)
         apart, touching = dist(first.place, second.place), first.radius + second.radius
         if apart < touching - OVERLAP * min(first.radius, second.radius):
             if second.walker >= 0:

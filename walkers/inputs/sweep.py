@@ -22,7 +22,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from walkers.errors import InputError, Problem, each, refused, shortened, unusable
+from walkers.errors import InputError, Problem, apply_all, refused, shortened, unusable
 from walkers.inputs.axes import (
     MOST_POINTS,
     Axis,
@@ -133,7 +133,10 @@ class Sweep:
     @cached_property
     def values(self) -> list[tuple[Any, ...]]:
         """The points without units."""
-        return [tuple([*map(plain, one)] if isinstance(one, list) else plain(one) for one in row) for row in self.rows]
+        return [
+            tuple([*map(plain, value)] if isinstance(value, list) else plain(value) for value in row)
+            for row in self.rows
+        ]
 
     @cached_property
     def units(self) -> dict[str, str | None]:
@@ -184,11 +187,13 @@ def load_sweep(sweep: str | Path | Mapping[str, Any], changes: Mapping[str, Valu
             document = {**document, "set": {**settings_in(document.get("set", {})), **changes}}
         name = _name_with(name, changes)
     with blaming_changes(changes or {}):
-        made = expand(document, source=source, name=name, folder=path.parent)
+        expanded = expand(document, source=source, name=name, folder=path.parent)
         text = "varies in this sweep and cannot be set"
-        if problems := [Problem(key, f'"{value}"', text) for key, value in (changes or {}).items() if key in made.keys]:
+        if problems := [
+            Problem(key, f'"{value}"', text) for key, value in (changes or {}).items() if key in expanded.keys
+        ]:
             raise InputError(source, problems)
-    return made
+    return expanded
 
 
 def _name_with(name: str, changes: Mapping[str, Value]) -> str:
@@ -224,10 +229,10 @@ def expand(
             for key in keys:
                 if key == "title":
                     raise unusable(key, f"expected another key, for {key} does not determine a run")
-            each(partial(check_key, Case), [key for key in (*settings, *keys) if key != "library"])
+            apply_all(partial(check_key, Case), [key for key in (*settings, *keys) if key != "library"])
             for key in keys:
-                for other in alternatives(Case, key) & {*keys}:
-                    raise unusable(key, f"expected one of {key} and {other}, which replace each other")
+                for alternative in alternatives(Case, key) & {*keys}:
+                    raise unusable(key, f"expected one of {key} and {alternative}, which replace each other")
             case_name, given = (path.stem, read_case(path, folder)) if path else base or ("", {})
             tables = changed(Case, given, settings)
             meshes = [row[keys.index("boundary.mesh")] for row in rows] if "boundary.mesh" in keys else []
@@ -241,8 +246,8 @@ def expand(
 
 def settings_in(tables: Mapping[str, Any]) -> dict[str, Any]:
     """Dotted keys of a case's tables, the user's own library in them as it is."""
-    own = {"library": tables["library"]} if "library" in tables else {}
-    return own | flatten({key: value for key, value in tables.items() if key != "library"})
+    library = {"library": tables["library"]} if "library" in tables else {}
+    return library | flatten({key: value for key, value in tables.items() if key != "library"})
 
 
 def _base(case: str, source: str, folder: Path) -> Path:

@@ -26,8 +26,8 @@ SAME_RUN = "same run"
 _TYPES: Mapping[Any, str] = {str: "text in quotes", int: "a whole number", list: "a list", dict: "a table"}
 
 
-def _only_derived(value: object, info: ValidationInfo) -> object:
-    if info.context == WRITTEN:
+def _only_derived(value: object, validation: ValidationInfo) -> object:
+    if validation.context == WRITTEN:
         raise PydanticCustomError("extra_forbidden", "no file has this key")
     return value
 
@@ -51,16 +51,16 @@ def key(meaning: str, default: Any = PydanticUndefined, example: Any = None, **b
 
 
 class Choice(NamedTuple):
-    """Keys of a table that say the same in other words: exactly one of the ways, or at most one; or something else."""
+    """Keys that exclude each other: a table has one of the expressions, at most one, or something ``instead``."""
 
-    ways: tuple[tuple[str, ...], ...]
+    expressions: tuple[tuple[str, ...], ...]
     required: bool = True
     instead: str = ""
 
     @property
     def text(self) -> str:
-        """The ways, such as ``radii or mean_radius and sin_delta``."""
-        return " or ".join(" and ".join(way) for way in self.ways)
+        """The expressions, such as ``radii or mean_radius and sin_delta``."""
+        return " or ".join(" and ".join(names) for names in self.expressions)
 
 
 class Table(BaseModel):
@@ -109,8 +109,8 @@ class Table(BaseModel):
             if isinstance(part, int):
                 value = value[part] if isinstance(value, tuple) and part < len(value) else None
             else:
-                known = isinstance(value, Table) and part in type(value).model_fields
-                value = getattr(value, part) if known else None
+                has_key = isinstance(value, Table) and part in type(value).model_fields
+                value = getattr(value, part) if has_key else None
         return value
 
     def leaves(self, prefix: str = "") -> Iterator[tuple[str, Any, FieldInfo]]:
@@ -120,8 +120,8 @@ class Table(BaseModel):
             if isinstance(value, Table):
                 yield from value.leaves(f"{place}.")
             elif isinstance(value, tuple) and value and isinstance(value[0], Table):
-                for number, one in enumerate(value):
-                    yield from one.leaves(f"{place}[{number}].")
+                for number, entry in enumerate(value):
+                    yield from entry.leaves(f"{place}[{number}].")
             else:
                 yield place, value, field
 
@@ -135,7 +135,7 @@ class Table(BaseModel):
             if SAME_RUN in field.metadata or (value := getattr(self, name)) in (None, ()):
                 continue
             several = isinstance(value, tuple) and isinstance(value[0], Table)
-            kept[name] = [one.determinants() for one in value] if several else value
+            kept[name] = [entry.determinants() for entry in value] if several else value
             if isinstance(value, Table):
                 kept[name] = value.determinants()
         return kept
@@ -144,17 +144,21 @@ class Table(BaseModel):
     def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
         """What a table that is given at a place says in no way, or in two."""
         for choice in cls.choices:
-            said = [way for way in choice.ways if any(name in given and not is_auto(given[name]) for name in way)]
-            if len(said) > 1:
-                name = next(name for name in said[1] if name in given)
-                two = Choice(tuple(said[:2])).text
+            given_by = [
+                names
+                for names in choice.expressions
+                if any(name in given and not is_auto(given[name]) for name in names)
+            ]
+            if len(given_by) > 1:
+                name = next(name for name in given_by[1] if name in given)
+                two = Choice(tuple(given_by[:2])).text
                 yield Problem(within(place, name), None, f"expected either {two}, not both")
-            elif said or choice.required:
-                way = said[0] if said else choice.ways[0]
-                others = [other for other in choice.ways if other is not way] if not said else []
-                others += [(choice.instead,)] if choice.instead else []
-                instead = "".join(f", or {' and '.join(other)}" for other in others)
-                yield from (cls.missing(name, place, instead) for name in way if name not in given)
+            elif given_by or choice.required:
+                expected = given_by[0] if given_by else choice.expressions[0]
+                alternatives = [names for names in choice.expressions if names is not expected] if not given_by else []
+                alternatives += [(choice.instead,)] if choice.instead else []
+                instead = "".join(f", or {' and '.join(names)}" for names in alternatives)
+                yield from (cls.missing(name, place, instead) for name in expected if name not in given)
 
     @classmethod
     def missing(cls, name: str, place: str, instead: str = "") -> Problem:
@@ -181,7 +185,7 @@ def keys_of(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
     for name, field in keys_in(model).items():
         table, names = table_in(field.annotation), f"{name}.*" if get_origin(field.annotation) is dict else name
         keys |= {name: field, names: field} if table else {name: field}
-        keys |= {f"{names}.{key}": one for key, one in keys_of(table).items()} if table else {}
+        keys |= {f"{names}.{key}": below for key, below in keys_of(table).items()} if table else {}
     return keys
 
 
@@ -196,7 +200,7 @@ def table_in(annotation: Any) -> type[Table] | None:
     """The table that a field holds, alone, in a tuple or by names."""
     if isinstance(annotation, type) and issubclass(annotation, Table):
         return annotation
-    return next((table for one in get_args(annotation) if (table := table_in(one))), None)
+    return next((table for inner in get_args(annotation) if (table := table_in(inner))), None)
 
 
 def example_of(field: FieldInfo) -> str:
@@ -216,8 +220,8 @@ def contradictions(model: type[Table], document: Any, place: str = "") -> Iterat
     yield from model.problems({name: value for name, value in document.items() if value != []}, place)
     for name, inner in _tables_in(model).items():
         below, where = document.get(name), within(place, name)
-        for number, one in enumerate(below if isinstance(below, list) else [below]):
-            yield from contradictions(inner, one, f"{where}[{number}]" if isinstance(below, list) else where)
+        for number, entry in enumerate(below if isinstance(below, list) else [below]):
+            yield from contradictions(inner, entry, f"{where}[{number}]" if isinstance(below, list) else where)
 
 
 def alternatives(model: type[Table], name: str) -> set[str]:
@@ -228,8 +232,13 @@ def alternatives(model: type[Table], name: str) -> set[str]:
         if (table := table_in(field.annotation) if field else None) is None:
             return set()
         model = table
-    ways = [way for choice in model.choices if any(last in way for way in choice.ways) for way in choice.ways]
-    return {joined([*path, other]) for way in ways if last not in way for other in way}
+    expressions = [
+        names
+        for choice in model.choices
+        if any(last in names for names in choice.expressions)
+        for names in choice.expressions
+    ]
+    return {joined([*path, name]) for names in expressions if last not in names for name in names}
 
 
 def changed(model: type[Table], document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -251,8 +260,8 @@ def _put(tables: dict[str, Any], name: str, value: Any, instead_of: Collection[s
         above = parts[:number]
         if isinstance(part, int):
             if not isinstance(place, list) or part >= len(place):
-                other = f"a place below [{len(place)}]" if isinstance(place, list) else "the whole list"
-                message = f"the base case has no {joined(above)} of that length; expected {other}"
+                expected = f"a place below [{len(place)}]" if isinstance(place, list) else "the whole list"
+                message = f"the base case has no {joined(above)} of that length; expected {expected}"
                 raise unusable(name, message, value)
         elif isinstance(place, list):
             raise unusable(name, f"{joined(above)} is a list: say which one, such as {joined(above)}[0]", value)
@@ -260,6 +269,6 @@ def _put(tables: dict[str, Any], name: str, value: Any, instead_of: Collection[s
             return
         if number + 1 < len(parts):
             place = place[part] if isinstance(part, int) else place.setdefault(part, {})
-    for other in instead_of:
-        place.pop(parts_of(other)[-1], None)
+    for replaced in instead_of:
+        place.pop(parts_of(replaced)[-1], None)
     place[parts[-1]] = value

@@ -28,8 +28,8 @@ def read_toml(path: Path) -> dict[str, Any]:
             raise refused(path, f"expected a file of at most {_MOST_BYTES >> 20} MB")
         return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except UnicodeDecodeError as error:
-        found = f"byte {error.object[error.start]:#04x} at offset {error.start}"
-        raise refused(path, f"expected UTF-8 text, found {found}") from error
+        actual = f"byte {error.object[error.start]:#04x} at offset {error.start}"
+        raise refused(path, f"expected UTF-8 text, found {actual}") from error
     except (ValueError, RecursionError) as error:  # TOML's own errors, integers of 5000 digits, brackets without end
         raise refused(path, f"not TOML: {error}") from error
     except OSError as error:

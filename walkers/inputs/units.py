@@ -78,9 +78,9 @@ class Kind:
         """A text with a unit, for editors that check case files."""
         return {"type": "string", "pattern": _PATTERN, "description": self.expectation, "examples": [self.example]}
 
-    def _read(self, value: object, info: ValidationInfo) -> object:
+    def _read(self, value: object, validation: ValidationInfo) -> object:
         if not isinstance(value, str):
-            if info.context == WRITTEN:
+            if validation.context == WRITTEN:
                 raise ValueError(self.expectation)
             return value
         number = parse_quantity(value, self)
@@ -164,8 +164,8 @@ def quantity_text(value: float, kind: Kind) -> str:
 
 def kind_in(annotations: Iterable[Any]) -> Kind | None:
     """The kind of quantity that a field of a table holds, by its metadata and annotation; or None."""
-    for one in annotations:
-        if (kind := one if isinstance(one, Kind) else kind_in(get_args(one))) is not None:
+    for annotation in annotations:
+        if (kind := annotation if isinstance(annotation, Kind) else kind_in(get_args(annotation))) is not None:
             return kind
     return None
 
@@ -173,7 +173,7 @@ def kind_in(annotations: Iterable[Any]) -> Kind | None:
 def shown_in_file(value: Any) -> str:
     """A value as a TOML file has it: text in quotes, tables in braces."""
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{name} = {shown_in_file(one)}" for name, one in value.items()) + " }"
+        return "{ " + ", ".join(f"{name} = {shown_in_file(entry)}" for name, entry in value.items()) + " }"
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(map(shown_in_file, value))}]"
     return json.dumps(value, ensure_ascii=False)

@@ -59,18 +59,16 @@ class Facet(NamedTuple):
         """Of places, shape (..., 3), m; infinite where another part of the surface is nearer."""
         within = np.zeros(places.shape[:-1], dtype=bool)
         for cell in self.cells:
-            at, way, least = (np.array(each) for each in zip(*cell, strict=True))
-            within |= np.all(np.einsum("...hx,hx->...h", places[..., None, :] - at, way) > least, axis=-1)
+            points, directions, bounds = (np.array(column) for column in zip(*cell, strict=True))
+            within |= np.all(np.einsum("...hx,hx->...h", places[..., None, :] - points, directions) > bounds, axis=-1)
         if self.kind == "face":
             within &= (places - self.point) @ np.array(self.along) > 0.0
-        found: FloatArray = np.where(within, np.linalg.norm(self.away(places), axis=-1), inf)
-        return found
+        return np.where(within, np.linalg.norm(self.away(places), axis=-1), inf)
 
     def normals(self, places: FloatArray) -> FloatArray:
         """Unit vectors away from it, of the shape of the places."""
         away = self.away(places)
-        found: FloatArray = away / np.linalg.norm(away, axis=-1, keepdims=True)
-        return found
+        return np.asarray(away / np.linalg.norm(away, axis=-1, keepdims=True))
 
 
 @lru_cache(maxsize=64)
@@ -104,8 +102,8 @@ def read_mesh(path: Path) -> dict[str, Any]:
         raise unusable("boundary.mesh", "no such file; expected a mesh, a path from the case file")
     mesh = _read(path, path.stat().st_mtime_ns)
     if not 3 < len(mesh["triangles"]) <= MOST_TRIANGLES:
-        found = f"has {len(mesh['triangles'])} triangles"
-        raise unusable("boundary.mesh", f"{found}; expected the inner surface of a vessel, 4 to {MOST_TRIANGLES}")
+        actual = f"has {len(mesh['triangles'])} triangles"
+        raise unusable("boundary.mesh", f"{actual}; expected the inner surface of a vessel, 4 to {MOST_TRIANGLES}")
     return mesh
 
 
@@ -140,11 +138,11 @@ class Vessel:
     @cached_property
     def sharing(self) -> dict[frozenset[int], list[tuple[int, int]]]:
         """Triangles at each edge, with the side of the triangle that it is."""
-        found: dict[frozenset[int], list[tuple[int, int]]] = defaultdict(list)
+        triangles_at: dict[frozenset[int], list[tuple[int, int]]] = defaultdict(list)
         for number, corners in enumerate(self.triangles.tolist()):
             for side in range(3):
-                found[frozenset((corners[side], corners[(side + 1) % 3]))].append((number, side))
-        return dict(found)
+                triangles_at[frozenset((corners[side], corners[(side + 1) % 3]))].append((number, side))
+        return dict(triangles_at)
 
     def _ends(self, triangle: int, side: int) -> tuple[int, int]:
         corners = self.triangles[triangle]
@@ -154,20 +152,22 @@ class Vessel:
         """Number of the first triangle of all that are joined over edges, shape (T,)."""
         beside: dict[int, list[int]] = defaultdict(list)
         for pair in self.sharing.values():
-            for one, _ in pair:
-                beside[one] += [other for other, _ in pair if other != one]
+            for triangle, _ in pair:
+                beside[triangle] += [neighbour for neighbour, _ in pair if neighbour != triangle]
         labels = np.full(len(self.triangles), -1)
         for seed in range(len(labels)):
             todo = [seed] if labels[seed] < 0 else []
             while todo:
-                labels[one := todo.pop()] = seed
-                todo += [other for other in beside[one] if labels[other] < 0 and joins(seed, other)]
+                labels[triangle := todo.pop()] = seed
+                todo += [
+                    neighbour for neighbour in beside[triangle] if labels[neighbour] < 0 and joins(seed, neighbour)
+                ]
         return labels
 
     @cached_property
     def faces(self) -> IntArray:
         """Number of the first triangle of the face of each: connected ones in a plane."""
-        return self._spread(lambda seed, other: float(self.normals[seed] @ self.normals[other]) > _COPLANAR)
+        return self._spread(lambda seed, triangle: float(self.normals[seed] @ self.normals[triangle]) > _COPLANAR)
 
     @cached_property
     def rims(self) -> list[list[int]]:
@@ -226,8 +226,8 @@ class Vessel:
 
         below = places.copy()
         below[:, 2] = np.minimum(below[:, 2], self.height - 1e-3 * np.ptp(self.points[:, 2]))
-        found: FloatArray = np.copysign(distances(self, places), distances(self.capped, below))
-        return found
+        clearances: FloatArray = np.copysign(distances(self, places), distances(self.capped, below))
+        return clearances
 
     @cached_property
     def turns(self) -> list[float]:
@@ -235,9 +235,9 @@ class Vessel:
         angles = []
         for shared in self.sharing.values():
             if len(shared) == 2 and self.faces[shared[0][0]] != self.faces[shared[1][0]]:
-                one, other = (number for number, _ in shared)
-                turn = float(np.arccos(np.clip(self.normals[one] @ self.normals[other], -1.0, 1.0)))
-                angles.append(turn if self._inward(*shared[1]) @ self.normals[one] > 0.0 else -turn)
+                before, after = (number for number, _ in shared)
+                turn = float(np.arccos(np.clip(self.normals[before] @ self.normals[after], -1.0, 1.0)))
+                angles.append(turn if self._inward(*shared[1]) @ self.normals[before] > 0.0 else -turn)
         return angles
 
     def planes(self, sharp: float) -> list[tuple[Vector, Vector]] | None:
@@ -281,22 +281,22 @@ class Vessel:
         standing: list[frozenset[int]] = []
         for edge, shared in self.sharing.items():
             if len(shared) == 2:
-                (one, _), other = shared
-                if self.faces[one] == self.faces[other[0]] or self._inward(*other) @ self.normals[one] >= 0.0:
+                (before, _), after = shared
+                if self.faces[before] == self.faces[after[0]] or self._inward(*after) @ self.normals[before] >= 0.0:
                     continue
             standing.append(edge)
             begin, end = self._ends(*shared[0])
             first, last = self.points[begin], self.points[end]
             halves = [(first, last - first), (last, first - last)]
             halves += [(self.points[self._ends(*at)[0]], -self._inward(*at)) for at in shared]
-            cell = tuple((_vector(at), _vector(way), 0.0) for at, way in halves)
+            cell = tuple((_vector(point), _vector(inward), 0.0) for point, inward in halves)
             along = _vector((last - first) / np.linalg.norm(last - first))
             yield Facet("edge", _vector(first), along, (cell,), f"edge {len(standing)}")
         corners = sorted({point for edge in standing for point in edge})
         for number, corner in enumerate(corners, 1):
-            others = sorted(other for edge in self.sharing if corner in edge for other in edge - {corner})
+            neighbours = sorted(neighbour for edge in self.sharing if corner in edge for neighbour in edge - {corner})
             at = self.points[corner]
-            cell = tuple((_vector(at), _vector(at - self.points[other]), _CLOSED) for other in others)
+            cell = tuple((_vector(at), _vector(at - self.points[neighbour]), _CLOSED) for neighbour in neighbours)
             yield Facet("corner", _vector(at), (0.0, 0.0, 0.0), (cell,), f"corner {number}")
 
     def _of_faces(self) -> Iterator[Facet]:
@@ -306,7 +306,9 @@ class Vessel:
                 halves = []
                 for side in range(3):
                     begin, end = self._ends(triangle, side)
-                    within = all(self.faces[other] == face for other, _ in self.sharing[frozenset((begin, end))])
+                    within = all(
+                        self.faces[neighbour] == face for neighbour, _ in self.sharing[frozenset((begin, end))]
+                    )
                     within &= len(self.sharing[frozenset((begin, end))]) > 1
                     inward = _vector(self._inward(triangle, side))
                     halves.append((_vector(self.points[begin]), inward, _ACROSS if within else _CLOSED))
@@ -381,15 +383,15 @@ def _oriented(vessel: Vessel) -> Vessel:
     for seed in range(len(parts)):
         todo, parts[seed] = ([seed], seed) if parts[seed] < 0 else ([], parts[seed])
         while todo:
-            one = todo.pop()
+            triangle = todo.pop()
             for side in range(3):
-                for other, at in vessel.sharing[frozenset(vessel._ends(one, side))]:
-                    flipped = flips[one] ^ (vessel._ends(one, side) == vessel._ends(other, at))
-                    if parts[other] < 0:
-                        parts[other], flips[other] = seed, flipped
-                        todo.append(other)
-                    elif other != one and flips[other] != flipped:
-                        where = vessel.points[vessel.triangles[other, 0]]
+                for neighbour, at in vessel.sharing[frozenset(vessel._ends(triangle, side))]:
+                    flipped = flips[triangle] ^ (vessel._ends(triangle, side) == vessel._ends(neighbour, at))
+                    if parts[neighbour] < 0:
+                        parts[neighbour], flips[neighbour] = seed, flipped
+                        todo.append(neighbour)
+                    elif neighbour != triangle and flips[neighbour] != flipped:
+                        where = vessel.points[vessel.triangles[neighbour, 0]]
                         raise _broken("has a surface of one side alone,", where, "one with an inside and an outside")
     turned = Vessel(vessel.points, np.where(flips[:, None], vessel.triangles[:, ::-1], vessel.triangles))
     rims = turned.rims
@@ -418,28 +420,28 @@ def _check_crossings(vessel: Vessel) -> None:
     rows = np.arange(len(corners))
     for some in np.array_split(rows, 1 + len(rows) ** 2 // 1_000_000):
         near = np.all((low[some, None] <= high) & (high[some, None] >= low), axis=2) & (some[:, None] < rows)
-        one, other = (of[at] for of, at in zip((some, rows), np.nonzero(near), strict=True))
-        first, second, sides = corners[one], corners[other], np.roll(corners, -1, axis=1) - corners
-        normal, normals = vessel.normals[one][:, None], vessel.normals[other][:, None]
+        rows_1, rows_2 = (of[at] for of, at in zip((some, rows), np.nonzero(near), strict=True))
+        first, second, sides = corners[rows_1], corners[rows_2], np.roll(corners, -1, axis=1) - corners
+        normal, normals = vessel.normals[rows_1][:, None], vessel.normals[rows_2][:, None]
         level = np.abs(np.einsum("nkx,nx->nk", second - first[:, :1], normal[:, 0])).max(axis=1) < slack
-        across = np.cross(sides[one][:, :, None], sides[other][:, None]).reshape(-1, 9, 3)
+        across = np.cross(sides[rows_1][:, :, None], sides[rows_2][:, None]).reshape(-1, 9, 3)
         out = np.concatenate([normal, normals, across], axis=1)
         out[level] = 0.0  # of triangles in a plane only axes in it separate
-        axes = np.concatenate([out, np.cross(sides[one], normal), np.cross(sides[other], normals)], axis=1)
+        axes = np.concatenate([out, np.cross(sides[rows_1], normal), np.cross(sides[rows_2], normals)], axis=1)
         size = np.linalg.norm(axes, axis=2)
         none = size < 1e-6 * size.max(axis=1, keepdims=True, initial=0.0)
         axes /= np.where(none, 1.0, size)[..., None]
-        spans = [np.einsum("nkx,nax->nak", each, axes) for each in (first, second)]
+        spans = [np.einsum("nkx,nax->nak", corners_of, axes) for corners_of in (first, second)]
         apart = np.maximum(spans[0].min(2) - spans[1].max(2), spans[1].min(2) - spans[0].max(2))
         for pair in np.flatnonzero(np.where(none, -inf, apart).max(axis=1, initial=-inf) < -slack):
             where = _crossing(first[pair], second[pair])
-            what = "overlap in a plane" if level[pair] else "intersect"
-            raise _broken(f"has triangles that {what},", where, "a surface that does not cross itself")
+            overlap = "overlap in a plane" if level[pair] else "intersect"
+            raise _broken(f"has triangles that {overlap},", where, "a surface that does not cross itself")
 
 
-def _crossing(one: FloatArray, other: FloatArray) -> FloatArray:
+def _crossing(first: FloatArray, second: FloatArray) -> FloatArray:
     """A point where a side of a triangle crosses another one; of triangles in a plane the middle between both."""
-    for sides, face in ((one, other), (other, one)):
+    for sides, face in ((first, second), (second, first)):
         normal = np.cross(face[1] - face[0], face[2] - face[0])
         for begin, end in zip(sides, np.roll(sides, -1, axis=0), strict=True):
             out, far = (begin - face[0]) @ normal, (end - face[0]) @ normal
@@ -448,7 +450,7 @@ def _crossing(one: FloatArray, other: FloatArray) -> FloatArray:
             point: FloatArray = begin + out / (out - far) * (end - begin)
             if all(np.cross(to - at, point - at) @ normal >= 0.0 for at, to in pairwise([*face, face[0]])):
                 return point
-    middle: FloatArray = (one.mean(axis=0) + other.mean(axis=0)) / 2.0
+    middle: FloatArray = (first.mean(axis=0) + second.mean(axis=0)) / 2.0
     return middle
 
 
@@ -463,7 +465,7 @@ def vessel_between(planes: Sequence[tuple[Vector, Vector]], height: float) -> Ve
     far = 1e3 * height
     ends = [((0.0, 0.0, height), (0.0, 0.0, -1.0))]
     ends += [(tuple(-far * axis), tuple(axis)) for axis in np.array([*np.eye(3), *-np.eye(3)[:2]])]
-    points, normals = (np.array(each) for each in zip(*planes, *ends, strict=True))
+    points, normals = (np.array(column) for column in zip(*planes, *ends, strict=True))
     offsets = np.einsum("px,px->p", normals, points)
     spheres = np.column_stack([-normals, np.ones(len(normals))])  # the largest one between them is in the middle
     best = linprog([0, 0, 0, -1], spheres, -offsets, bounds=[(None, None)] * 3 + [(0, None)])

@@ -117,7 +117,9 @@ class _Family:
         arcs, pressure, length, curvatures = x[..., :2], x[..., 2:3], x[..., 3:4], np.array(self.curvatures)
         at, slopes = length * _PLACES, curvatures * arcs
         turns = pressure * at
-        (of_slopes, of_halves), (swings, halves) = (_sinc(np.multiply.outer(_HALVES, one)) for one in (slopes, turns))
+        (of_slopes, of_halves), (swings, halves) = (
+            _sinc(np.multiply.outer(_HALVES, argument)) for argument in (slopes, turns)
+        )
         radii, rises = arcs * of_slopes, 0.5 * curvatures * arcs**2 * of_halves**2
         caps = pi / 6.0 * rises * (3.0 * radii**2 + rises**2)
         uprights, outwards = self.ends(slopes, radii)
@@ -146,7 +148,7 @@ class _Family:
 
     def solve(self, x: FloatArray, row: FloatArray, values: FloatArray) -> FloatArray:
         """Newton's method from n bridges x, shape (n, 5), for bridges with row · x = value; NaN where it fails."""
-        found, left = np.full_like(x, nan), np.arange(len(x))
+        solved, left = np.full_like(x, nan), np.arange(len(x))
         for _ in range(_NEWTON_STEPS):
             misfit, matrices = np.empty((len(x), 5, 1)), np.empty((len(x), 5, 5))
             misfit[:, :4, 0], misfit[:, 4, 0] = self.misfit(x), x @ row - values
@@ -159,17 +161,17 @@ class _Family:
             x = x - step * np.minimum(1.0, 0.3 / (change + 1e-300))[:, None]
             sound = (x[:, _POSITIVE] > 0.0).all(axis=1)
             good = sound & (np.abs(step).max(axis=1) < _CONVERGED * np.maximum(1.0, np.abs(x).max(axis=1)))
-            found[left[good]] = x[good]
+            solved[left[good]] = x[good]
             sound &= ~good
             if not sound.any():
                 break
             x, values, left = x[sound], values[sound], left[sound]
-        return found
+        return solved
 
     def nearest(self, x: FloatArray, row: FloatArray, value: float) -> FloatArray | None:
         """One bridge by Newton's method from x; None where it fails."""
-        (found,) = self.solve(x[None], row, np.array([value]))
-        return None if np.isnan(found[0]) else found
+        (solved,) = self.solve(x[None], row, np.array([value]))
+        return None if np.isnan(solved[0]) else solved
 
     def tangent(self, x: FloatArray, before: FloatArray, scale: FloatArray) -> FloatArray:
         """Direction of the family at x, of length 1 in units of `scale`, onward from `before`."""
@@ -219,10 +221,10 @@ def _touching(family: _Family) -> FloatArray:
 
     for first_share in _SHARES:
         share, x = first_share, _toroid(flatter(first_share))
-        while (found := flatter(share).nearest(x, _GAP, 0.0)) is not None:
+        while (bridge := flatter(share).nearest(x, _GAP, 0.0)) is not None:
             if share == 1.0:
-                return found
-            x, share = found, min(1.0, _GROWTH * share)
+                return bridge
+            x, share = bridge, min(1.0, _GROWTH * share)
     raise NoBridgeError("no bridge was found at contact")
 
 
@@ -249,13 +251,13 @@ def _branch(family: _Family) -> _Branch:
     tangent, step = family.tangent(x, _GAP, scale), _ARC_STEP
     arcs, bridges, tangents = [0.0], [x], [tangent]
     for _ in range(_MOST_STEPS):
-        found = _onward(family, x, tangent, step, scale)
-        if found is None or float(np.linalg.norm((found[1] - tangent) / scale)) > _LARGEST_TURN:
+        onward = _onward(family, x, tangent, step, scale)
+        if onward is None or float(np.linalg.norm((onward[1] - tangent) / scale)) > _LARGEST_TURN:
             step *= 0.5
             continue
-        if found[1][4] <= 0.0:
-            found, step = _turning_point(family, x, tangent, step, scale)
-        x, tangent = found
+        if onward[1][4] <= 0.0:
+            onward, step = _turning_point(family, x, tangent, step, scale)
+        x, tangent = onward
         arcs.append(arcs[-1] + step)
         bridges.append(x)
         tangents.append(tangent)
@@ -270,8 +272,8 @@ def _onward(
 ) -> tuple[FloatArray, FloatArray] | None:
     """The bridge one step further along the family, and the tangent of the family there."""
     row = tangent / scale**2
-    found = family.nearest(x + step * tangent, row, float(row @ x) + step)
-    return None if found is None else (found, family.tangent(found, tangent, scale))
+    bridge = family.nearest(x + step * tangent, row, float(row @ x) + step)
+    return None if bridge is None else (bridge, family.tangent(bridge, tangent, scale))
 
 
 def _turning_point(
@@ -280,15 +282,15 @@ def _turning_point(
     """The bridge at the largest gap, which is less than a step along the family, and the step to it."""
 
     def opening(part: float) -> float:
-        found = _onward(family, x, tangent, part, scale)
-        if found is None:
+        onward = _onward(family, x, tangent, part, scale)
+        if onward is None:
             raise NoBridgeError("the family was lost at its largest gap")
-        return float(found[1][4])
+        return float(onward[1][4])
 
     part = float(brentq(opening, 0.0, step, xtol=1e-13, rtol=1e-13))
-    found = _onward(family, x, tangent, part, scale)
-    assert found is not None
-    return found, part
+    onward = _onward(family, x, tangent, part, scale)
+    assert onward is not None
+    return onward, part
 
 
 def force_curve(
@@ -321,10 +323,10 @@ def force_curve(
     family = _family_of((radius_1, radius_2), volume, contact_angle)
     unit, branch = cbrt(volume), _branch(family)
     largest = float(branch.bridges[-1, 4])
-    wanted = np.asarray(gaps, np.float64) / unit
-    if wanted.min() < 0.0 or wanted.max() > largest * (1.0 + 1e-12):
+    scaled = np.asarray(gaps, np.float64) / unit
+    if scaled.min() < 0.0 or scaled.max() > largest * (1.0 + 1e-12):
         raise ValueError(f"gaps: expected 0 to {largest * unit:.6g}, where the bridge ruptures")
-    bridges = _stable(family, branch, np.minimum(wanted, largest))
+    bridges = _stable(family, branch, np.minimum(scaled, largest))
     return ForceCurve(unit * family.forces(bridges), bridges[:, :4] * [unit, unit, 1.0 / unit, unit])
 
 
@@ -335,23 +337,26 @@ def _stable(family: _Family, branch: _Branch, gaps: FloatArray) -> FloatArray:
     cubics = CubicHermiteSpline(branch.arcs, branch.bridges, branch.tangents).c[:, pieces]
     lows, highs = branch.arcs[pieces], branch.arcs[pieces + 1]
 
-    def ahead(arc: float, one: int) -> float:
-        return float(_cubic(of_gaps[one], arc - lows[one]) - gaps[one])
+    def ahead(arc: float, number: int) -> float:
+        return float(_cubic(of_gaps[number], arc - lows[number]) - gaps[number])
 
     of_gaps, inside = cubics[:, :, 4].T.tolist(), (knots[pieces] < gaps) & (gaps < knots[-1])
     # At its left end a piece may begin above the gap by rounding.
-    arcs = [brentq(ahead, lows[one], highs[one], (one,)) if inside[one] else lows[one] for one in range(len(gaps))]
+    arcs = [
+        brentq(ahead, lows[number], highs[number], (number,)) if inside[number] else lows[number]
+        for number in range(len(gaps))
+    ]
     near = _cubic(cubics, (np.array(arcs) - lows)[:, None])
-    found = family.solve(near, _GAP, gaps)
-    found[gaps >= knots[-1]] = branch.bridges[-1]
-    far = ~(np.max(np.abs(found - near)[:, _POSITIVE], axis=1) <= _NEAR) & (gaps < knots[-1])
-    for one in np.flatnonzero(far):
-        chord = branch.bridges[pieces[one] + 1] - branch.bridges[pieces[one]]
-        found[one] = _across(family, cubics[:, one], chord, (lows[one], highs[one]), gaps[one])
-    lost = ~(np.maximum(np.abs(found[:, 4] - gaps), np.max(np.abs(family.misfit(found)), axis=1)) <= _SAME_GAP)
+    bridges = family.solve(near, _GAP, gaps)
+    bridges[gaps >= knots[-1]] = branch.bridges[-1]
+    far = ~(np.max(np.abs(bridges - near)[:, _POSITIVE], axis=1) <= _NEAR) & (gaps < knots[-1])
+    for number in np.flatnonzero(far):
+        chord = branch.bridges[pieces[number] + 1] - branch.bridges[pieces[number]]
+        bridges[number] = _across(family, cubics[:, number], chord, (lows[number], highs[number]), gaps[number])
+    lost = ~(np.maximum(np.abs(bridges[:, 4] - gaps), np.max(np.abs(family.misfit(bridges)), axis=1)) <= _SAME_GAP)
     if lost.any():
         raise NoBridgeError(f"no bridge was found at a gap of {gaps[lost][0]:.6g} of the volume's cube root")
-    return found
+    return bridges
 
 
 def _cubic(coefficients: Any, x: Any) -> Any:
@@ -365,8 +370,8 @@ def _across(family: _Family, cubic: FloatArray, chord: FloatArray, ends: tuple[f
 
     def at(arc: float) -> FloatArray:
         near = _cubic(cubic, arc - ends[0])
-        other = family.nearest(near, chord, float(chord @ near))
-        return near if other is None else other
+        exact = family.nearest(near, chord, float(chord @ near))
+        return near if exact is None else exact
 
     last = at(ends[1])
     return last if last[4] <= gap else at(float(brentq(lambda arc: at(arc)[4] - gap, *ends, xtol=1e-12)))

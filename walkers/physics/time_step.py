@@ -90,10 +90,10 @@ def time_step_limits(
         mass = bead_volume(radius) * density
         impacts.append((mass, radius))
         rates.append(walls * drag(radius, roughness.bead_wall) / mass)
-        for other in neighbours:
-            other_mass, reduced = bead_volume(other) * density, radius * other / (radius + other)
-            impacts.append((mass * other_mass / (mass + other_mass), reduced))
-            rates[-1] += drag(reduced, roughness.bead_bead) * (1.0 / mass + 1.0 / other_mass)
+        for neighbour in neighbours:
+            neighbour_mass, reduced = bead_volume(neighbour) * density, radius * neighbour / (radius + neighbour)
+            impacts.append((mass * neighbour_mass / (mass + neighbour_mass), reduced))
+            rates[-1] += drag(reduced, roughness.bead_bead) * (1.0 / mass + 1.0 / neighbour_mass)
     shear_modulus = youngs_modulus / (2.0 * (1.0 + poissons_ratio))
     slowest = pi * min(radius for radius, *_ in bridged) * sqrt(density / shear_modulus)
     return TimeStepLimits(

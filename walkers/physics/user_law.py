@@ -37,8 +37,8 @@ def checked(laws: Sequence[BridgeLaw]) -> BridgeLaw:
     """
 
     def law(surfaces: Surfaces) -> Curve:
-        curve, *others = [_curve(one, surfaces) for one in (*laws, laws[0])]
-        if any(_numbers(one) != _numbers(curve) for one in others):
+        curve, *repeated = [_curve(law, surfaces) for law in (*laws, laws[0])]
+        if any(_numbers(law) != _numbers(curve) for law in repeated):
             raise UnusableLawError("gives other numbers when it is evaluated again")
         return curve
 

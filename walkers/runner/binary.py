@@ -57,16 +57,16 @@ class Engine:
     sha256: str
 
 
-def find_engine(wanted: str | None = None) -> Engine:
+def find_engine(name_or_path: str | None = None) -> Engine:
     """Find the engine: by a name or path, else by the environment variable ``WALKERS_ENGINE``, else ``liggghts``.
 
     `EngineMissing` if there is no such executable.
     """
-    name = wanted or os.environ.get(ENGINE_VARIABLE) or "liggghts"
-    if (found := shutil.which(name)) is None:
+    name = name_or_path or os.environ.get(ENGINE_VARIABLE) or "liggghts"
+    if (executable := shutil.which(name)) is None:
         text = "is not an executable file on this machine; install it with: sudo apt-get install liggghts"
         raise EngineMissing(f"no engine: {name} {text}")
-    path, digest = Path(found).resolve(), hashlib.sha256()
+    path, digest = Path(executable).resolve(), hashlib.sha256()
     for part in _parts_of(path, path.stat().st_mtime_ns):
         about = part.stat()
         digest.update(bytes.fromhex(_sha256(part, about.st_mtime_ns, about.st_size)))
@@ -168,7 +168,7 @@ def _check_version(engine: Engine) -> None:
     """Refuse a binary that contains another version; if it contains none, the banner is checked later."""
     for part in _parts_of(engine.path, engine.path.stat().st_mtime_ns):
         with part.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as contents:
-            version = said[0].decode() if (said := _VERSION.search(contents)) else AUDITED_VERSION
+            version = match[0].decode() if (match := _VERSION.search(contents)) else AUDITED_VERSION
         if version != AUDITED_VERSION:
             raise OtherEngine(engine.path, version)
 
@@ -178,21 +178,21 @@ def _compile(place: Path, fingerprint: str) -> None:
     compiler, mpi = shutil.which("g++"), shutil.which("mpicxx")
     if compiler is None or mpi is None or not _HEADERS.is_dir():
         raise ContactModelMissing(f"it is compiled once; install what that needs: apt-get install {_PACKAGES}")
-    asked = subprocess.run([mpi, "--showme:incdirs"], capture_output=True, text=True, check=False)
-    included = [option for folder in (str(_HEADERS), *asked.stdout.split()) for option in ("-isystem", folder)]
+    mpi_folders = subprocess.run([mpi, "--showme:incdirs"], capture_output=True, text=True, check=False)
+    included = [option for folder in (str(_HEADERS), *mpi_folders.stdout.split()) for option in ("-isystem", folder)]
     linked = [f"-Wl,--version-script={SOURCES / 'bridge.map'}", "-Wl,-Bsymbolic", "-l:libliggghts.so.3"]
     with tempfile.TemporaryDirectory(dir=make_cache_folder()) as folder:
-        made = Path(folder) / place.name
-        command = [compiler, *_OPTIONS, f"-I{SOURCES}", *included, str(SOURCES / "bridge.cpp"), "-o", str(made)]
+        library = Path(folder) / place.name
+        command = [compiler, *_OPTIONS, f"-I{SOURCES}", *included, str(SOURCES / "bridge.cpp"), "-o", str(library)]
         done = subprocess.run([*command, *linked], capture_output=True, text=True, errors="replace", check=False)
         if done.returncode:
-            said = next((line for line in done.stderr.splitlines() if "error" in line), "nothing")
-            raise ContactModelMissing(f"the compiler says: {said}")
-        made.chmod(0o755)
+            error = next((line for line in done.stderr.splitlines() if "error" in line), "nothing")
+            raise ContactModelMissing(f"the compiler says: {error}")
+        library.chmod(0o755)
         record = Path(folder) / "record.json"
-        write_json(record, _record(made, fingerprint))
+        write_json(record, _record(library, fingerprint))
         record.chmod(0o644)
-        made.replace(place)
+        library.replace(place)
         record.replace(place.with_suffix(".json"))
 
 

@@ -65,8 +65,8 @@ def run_place(case: Case, engine: Engine, out: Path) -> Path:
     user's own bridge law is hashed.
     """
     determinants = {"case": case.determinants(), "deck": CONTENT_VERSION, "engine": engine.sha256, "format": FORMAT}
-    if own := case.recorded_law.sha256 if case.recorded_law else source_sha256(case.liquid.law):
-        determinants["law"] = own
+    if law_sha256 := case.recorded_law.sha256 if case.recorded_law else source_sha256(case.liquid.law):
+        determinants["law"] = law_sha256
     text = json.dumps(determinants, sort_keys=True, separators=(",", ":"))
     return out / f"{name_of(case.name)}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
 
@@ -145,8 +145,8 @@ def layout_of(segment: Path) -> Layout:
 
 def segment_directories(directory: Path) -> list[Path]:
     """The complete segments of a run, in order; for a deck that was run by hand, the directory itself."""
-    found = sorted(path for path in (directory / SEGMENTS).glob("[0-9]*") if not path.suffix)
-    return found or ([directory] if (directory / SEGMENT_NAME).is_file() else [])
+    segments = sorted(path for path in (directory / SEGMENTS).glob("[0-9]*") if not path.suffix)
+    return segments or ([directory] if (directory / SEGMENT_NAME).is_file() else [])
 
 
 def run_of(segment: Path) -> Path:
@@ -158,10 +158,12 @@ def files_of_segments(directory: Path) -> list[str]:
     """Input and output files of the engine for a run, as paths within its directory."""
     segments = segment_directories(directory)
     layouts = map(layout_of, segments[:1])
-    dumps = {name for one in layouts for name in (one.bead_dump, one.pair_bridge_dump, one.wall_bridge_dump)}
-    found = [path for segment in segments for path in segment.iterdir() if path.is_file()]
+    dumps = {
+        name for layout in layouts for name in (layout.bead_dump, layout.pair_bridge_dump, layout.wall_bridge_dump)
+    }
+    files = [path for segment in segments for path in segment.iterdir() if path.is_file()]
     by_hand = [directory] == segments  # with tables and pictures beside
-    return [path.relative_to(directory).as_posix() for path in found if not by_hand or path.name in dumps]
+    return [path.relative_to(directory).as_posix() for path in files if not by_hand or path.name in dumps]
 
 
 def is_deck_folder(folder: Path) -> bool:
@@ -234,13 +236,13 @@ def room_on_disk(incomplete: Path, needed: int | None = None) -> Iterator[None]:
         raise DiskFull(needed, shutil.disk_usage(incomplete.parent).free, incomplete) from error
 
 
-def move_into_place(made: Path, place: Path) -> None:
+def move_into_place(complete: Path, place: Path) -> None:
     """Rename a complete directory to its final place, and replace one that exists there."""
     recover(place)
     replaced = place.with_name(place.name + REPLACED)
     if place.exists():
         place.rename(replaced)
-    made.rename(place)
+    complete.rename(place)
     fsync_path(place.parent)
     shutil.rmtree(replaced, ignore_errors=True)
 

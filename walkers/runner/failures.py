@@ -104,8 +104,8 @@ class DiskFull(EngineFailure, hits="every point"):
     """No room for the output. Detected before the run from the known size of the dump, or while the engine writes."""
 
     def __init__(self, needed: int | None, free: int, directory: Path) -> None:
-        wanted = "" if needed is None else f"{needed / 1e6:.3g} MB are still to be written, "
-        super().__init__(f"disk full: {wanted}{free / 1e6:.3g} MB are free", directory)
+        missing = "" if needed is None else f"{needed / 1e6:.3g} MB are still to be written, "
+        super().__init__(f"disk full: {missing}{free / 1e6:.3g} MB are free", directory)
 
 
 class OutputGone(EngineFailure, hits="every point"):

@@ -17,12 +17,12 @@ def read_json(path: Path) -> dict[str, Any]:
     """Read a JSON object; raises `OSError` or `ValueError` if the file is unreadable or contains something else."""
     contents = path.read_bytes()
     try:
-        found = json.loads(contents)
+        value = json.loads(contents)
     except (ValueError, RecursionError) as error:
         raise ValueError(f"{path}: no JSON ({error})") from error
-    if not isinstance(found, dict):
+    if not isinstance(value, dict):
         raise ValueError(f"{path}: expected a JSON object")
-    return found
+    return value
 
 
 def write_json(path: Path, contents: Mapping[str, Any], *, at_once: bool = True) -> None:

@@ -286,7 +286,7 @@ class _Watch:
         if not self.error and (error := _ERROR_LINE.search(lines)):
             self.error = error[0].strip()
         for match in _STATUS_LINE.finditer(lines):
-            bounds = [float(one) for one in match[4].split()]
+            bounds = [float(number) for number in match[4].split()]
             failure = self._judge(int(match[1]), int(match[2]), float(match[3]), bounds)
             self.failure = self.failure or failure
         if loops := _LOOP_TIME.findall(lines):

@@ -104,14 +104,14 @@ def check_unchanged(directory: Path, names: Collection[str]) -> bool:
         sums = sums_of(read_manifest(directory), directory)
     except FileNotFoundError:
         return True
-    wanted = {name: sums[name] for name in names if name in sums}
-    for name, now in checksums(directory, wanted).items():
-        if now != wanted[name]:
+    recorded = {name: sums[name] for name in names if name in sums}
+    for name, now in checksums(directory, recorded).items():
+        if now != recorded[name]:
             message = f"has changed since the run was finished; list all changes with: walkers check files {directory}"
             if name == "result.json" or name.endswith(".parquet"):
                 message += f"; to measure the run again, delete the file and do: walkers run {directory}"
             raise FileChanged(f"{directory / name} {message}")
-    return len(wanted) == len(names)
+    return len(recorded) == len(names)
 
 
 def sums_of(contents: dict[str, Any], directory: Path) -> dict[str, str]:

@@ -28,7 +28,11 @@ def software() -> dict[str, Any]:
         version, required = metadata.version(PROJECT), metadata.requires(PROJECT) or []
     except metadata.PackageNotFoundError:
         version, required = "not installed", []
-    needed = [match[0] for one in required if "extra ==" not in one and (match := re.match(r"[\w.-]+", one))]
+    needed = [
+        match[0]
+        for requirement in required
+        if "extra ==" not in requirement and (match := re.match(r"[\w.-]+", requirement))
+    ]
     packages = {}
     for name in needed:
         with suppress(metadata.PackageNotFoundError):

@@ -121,9 +121,9 @@ def bridge_tables(
     for kind, (contact, liquid) in enumerate(surfaces, 1):
         radii = sorted(radius for of, radius in sizes if of == kind)
         for number, radius in enumerate(radii):
-            for other_kind, other in [(len(surfaces) + 1, inf), *((kind, size) for size in radii[number:])]:
-                for meeting in Surfaces.of(radius, other, liquid, contact.roughness).volumes:
-                    parts.append(f'# law "{liquid.law}"\nbridge {kind} {other_kind} {radius!r} {other!r}\n')
+            for other_kind, other_radius in [(len(surfaces) + 1, inf), *((kind, size) for size in radii[number:])]:
+                for meeting in Surfaces.of(radius, other_radius, liquid, contact.roughness).volumes:
+                    parts.append(f'# law "{liquid.law}"\nbridge {kind} {other_kind} {radius!r} {other_radius!r}\n')
                     if liquid.conserved:
                         numbers = " ".join(map(repr, (meeting.volume, *chain(*meeting.films))))
                         parts.append(f"liquid {numbers}\n")

@@ -166,7 +166,7 @@ def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
         ranks=run.ranks,
         restart_to=restart,
         restart_from=PREVIOUS_RESTART_NAME if restart and segment.begin else None,
-        fastest=max(fastest_of(one, scene) for one in cases),
+        fastest=max(fastest_of(sharing, scene) for sharing in cases),
         skin=_SKIN if case.loose else None,
     )
 
@@ -206,7 +206,7 @@ def compose(plan: Plan) -> Deck:
         shaken=plan.segment.drive_from is not None,
         stable=min(vars(limits).values()),
         contacts=contacts,
-        moduli=[one.youngs_modulus for one in (*contacts, case.contact)],
+        moduli=[contact.youngs_modulus for contact in (*contacts, case.contact)],
         liquid=liquid if scalable else None,
         **layout.bridge_terms(),
         **_search(plan),
@@ -255,7 +255,8 @@ def _facet(facet: Facet) -> str:
         return " ".join(repr(float(x)) for x in values)
 
     cells = (
-        f"{len(cell)}  {'  '.join(numbers(*at, *way, least) for at, way, least in cell)}\n" for cell in facet.cells
+        f"{len(cell)}  {'  '.join(numbers(*at, *direction, least) for at, direction, least in cell)}\n"
+        for cell in facet.cells
     )
     head = f"{facet.kind} {numbers(*facet.point)}  {numbers(*facet.along)}  {len(facet.cells)}\n"
     return head + "".join(cells)

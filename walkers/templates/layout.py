@@ -73,8 +73,8 @@ class Layout:
         pairs = " ".join(PAIR_BRIDGES).split()
         return {
             "pair_bridge_options": " ".join(PAIR_BRIDGES.values()),
-            "pair_bridge_terms": [f"c_pair_bridges[{pairs.index(one) + 1}]" for one in self.pair_bridge_columns],
-            "wall_bridge_terms": [f"f_walls[{WALL_BRIDGES.index(one) + 1}]" for one in self.wall_bridge_columns],
+            "pair_bridge_terms": [f"c_pair_bridges[{pairs.index(column) + 1}]" for column in self.pair_bridge_columns],
+            "wall_bridge_terms": [f"f_walls[{WALL_BRIDGES.index(column) + 1}]" for column in self.wall_bridge_columns],
         }
 
     def as_dict(self) -> dict[str, Any]:

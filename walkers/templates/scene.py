@@ -62,7 +62,7 @@ def surface_of(case: Case) -> Surface:
 def loading_of(case: Case) -> Loading:
     """Loads on the beads of a case."""
     drive = case.excitation
-    amplitudes = [(one.amplitude, one.direction) for one in drive.harmonics]
+    amplitudes = [(harmonic.amplitude, harmonic.direction) for harmonic in drive.harmonics]
     amplitudes += [(1.0, AXES[axis]) for axis in (drive.record.axes if drive.record else ())]
     return case.gravity_vector, *((a * x, a * y, a * z) for a, (x, y, z) in amplitudes)
 
@@ -76,13 +76,13 @@ def sharing_key(case: Case) -> Hashable:
     if not case.independent:
         return case
     # Walkers with a spacing below their own reach would meet other neighbours in a shared deck.
-    crowded = case if min(one.spacing for one in case.walkers) < 2.0 * reach(case) else None
+    crowded = case if min(walkers.spacing for walkers in case.walkers) < 2.0 * reach(case) else None
     # The model of rolling friction is in the deck or not.
     rolling = float(case.contact.rolling_friction > 0.0)
     contact = case.contact.but(friction=None, roughness=None, restitution=0.0, rolling_friction=rolling)
     boundary = case.boundary.but(material="", tilt=0.0, uphill=0.0)
     times: Hashable = (
-        *((one.frequency, one.phase) for one in case.excitation.harmonics),
+        *((harmonic.frequency, harmonic.phase) for harmonic in case.excitation.harmonics),
         case.drive.record,
         case.drive.repeats,
         case.drive.ramp,
@@ -105,22 +105,22 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
         raise ValueError("these cases cannot share a deck")
     surfaces = tuple(dict.fromkeys(surface_of(case) for case in cases))
     loadings = tuple(dict.fromkeys(loading_of(case) for case in cases))
-    bodies = [(case, make, one) for case in cases for make, one in standing(case)]
-    walking = sum(one.walks for _, _, one in bodies)
+    bodies = [(case, make, body) for case in cases for make, body in standing(case)]
+    walking = sum(body.walks for _, _, body in bodies)
     spacing = max((walkers.spacing for case in cases for walkers in case.walkers), default=0.0)
     boundary = cases[0].boundary
     grid = boundary.grid(walking, spacing) if walking else []
     walkers: list[PlacedWalker] = []
     beads: list[Bead] = []
-    for case, make, one in bodies:
-        x, y = origin = grid[len(walkers)] if one.walks else (0.0, 0.0)
+    for case, make, body in bodies:
+        x, y = origin = grid[len(walkers)] if body.walks else (0.0, 0.0)
         surface, loading = 1 + surfaces.index(surface_of(case)), loadings.index(loading_of(case))
-        ids = tuple(range(1 + len(beads), 1 + len(beads) + len(one.beads)))
-        for number, bead in zip(ids, one.beads, strict=True):
+        ids = tuple(range(1 + len(beads), 1 + len(beads) + len(body.beads)))
+        for number, bead in zip(ids, body.beads, strict=True):
             centre = (x + bead.x, y + bead.y, bead.z)
             beads.append(Bead(number, centre, bead.radius, surface=surface, loading=loading))
-        if one.walks:
-            walkers.append(PlacedWalker(len(walkers), make, ids, one.facing, one.angle, origin))
+        if body.walks:
+            walkers.append(PlacedWalker(len(walkers), make, ids, body.facing, body.angle, origin))
     room = _room(cases, grid, spacing)
     return Scene(tuple(beads), boundary.walls, *room, surfaces, loadings), tuple(walkers)
 

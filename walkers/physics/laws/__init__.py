@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:  # numpy is not needed to find a law by name
     from walkers.physics.bridge import BridgeLaw
 
-LAWS = tuple(one.name.replace("_", "-") for one in iter_modules(__path__))
+LAWS = tuple(module.name.replace("_", "-") for module in iter_modules(__path__))
 """Names of the built-in laws."""
 
 
@@ -53,11 +53,11 @@ def source_of(name: str) -> Path | None:
     if place.endswith(".py"):
         return Path(place).resolve()
     try:
-        if (found := find_spec(place)) is None:
+        if (module := find_spec(place)) is None:
             raise ImportError("no such module")
     except (ImportError, ValueError, AttributeError) as error:
         raise ValueError(f"bridge law {name!r}: {place} cannot be imported: {error}") from error
-    return Path(found.origin) if found.has_location and found.origin else None
+    return Path(module.origin) if module.has_location and module.origin else None
 
 
 def source_sha256(name: str) -> str | None:

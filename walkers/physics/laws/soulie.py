@@ -28,13 +28,13 @@ def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, 
 
     An infinite ``radius_2`` (m) is a plane. Overlapping surfaces have the pull of touching ones.
     """
-    (one, other), times = ((radius_1, radius_1), 2.0) if radius_2 == inf else ((radius_1, radius_2), 1.0)
-    larger = max(one, other)
+    (first, second), times = ((radius_1, radius_1), 2.0) if radius_2 == inf else ((radius_1, radius_2), 1.0)
+    larger = max(first, second)
     scaled = log(volume / larger**3)
     a = -1.1 * (volume / larger**3) ** -0.53
     b = (-0.148 * scaled - 0.96) * contact_angle**2 - 0.0082 * scaled + 0.48
     c = 0.0018 * scaled + 0.078
-    return np.asarray(times * pi * sqrt(one * other) * (np.exp(a * np.maximum(gaps, 0.0) / larger + b) + c))
+    return np.asarray(times * pi * sqrt(first * second) * (np.exp(a * np.maximum(gaps, 0.0) / larger + b) + c))
 
 
 def law(surfaces: Surfaces) -> Curve:

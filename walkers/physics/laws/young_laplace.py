@@ -48,15 +48,15 @@ def law(surfaces: Surfaces) -> Curve:
 
 def unsolved(bridges: Iterable[Surfaces]) -> int:
     """Number of bridge shapes without a cached solution; each takes a tenth of a second."""
-    return sum(not _place(shape).is_file() for shape in {_shape(one) for one in bridges})
+    return sum(not _place(shape).is_file() for shape in {_shape(surfaces) for surfaces in bridges})
 
 
 def _shape(surfaces: Surfaces) -> _Shape:
     """The other radius and the volume in units of the bead's radius, and the contact angle."""
     radius, angle = surfaces.radius, surfaces.liquid.contact_angle
     numbers = (surfaces.other_radius / radius, surfaces.volume / radius**3, angle)
-    other, volume, angle = (float(f"{one:.14g}") for one in numbers)
-    return other, volume, angle
+    other_radius, volume, angle = (float(f"{number:.14g}") for number in numbers)
+    return other_radius, volume, angle
 
 
 def _place(shape: _Shape) -> Path:
