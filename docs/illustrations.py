@@ -118,7 +118,7 @@ def _make_validation(out: Path, docs: Path) -> None:
     write_json(docs / CHECKED, as_dict(lines))
     save_figure(_benchmarks(), docs / "figures" / "benchmarks.png", (), title="Published benchmarks of impacts")
     for line in failures(lines):
-        print(f"walkers: not as expected: {line.check}: {line.what}", file=sys.stderr)
+        print(f"walkers: not as expected: {line.check}: {line.quantity}", file=sys.stderr)
 
 
 @styled
@@ -327,19 +327,19 @@ def _of_checks(lines: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     """The measured and the expected number of each line by check and words, and some numbers of many lines."""
     numbers: dict[str, str] = {}
     for line in lines:
-        name = "_".join(re.findall(r"\w+", f"{line['check']} {line['what']}".lower()))
+        name = "_".join(re.findall(r"\w+", f"{line['check']} {line['quantity']}".lower()))
         numbers |= {name: f"{line['measured']:.4g}", f"{name}_expected": f"{line['expected']:.4g}"}
     for check in LITERATURE:
         judged = [line for line in lines if line["check"] == check and line["tolerance"] is not None]
         passed = sum(line["verdict"] == "pass" for line in judged)
         numbers[f"{check}_pass"] = f"{passed} of {len(judged)}"
-        for test in sorted({line["what"][0] for line in judged} if check == "benchmarks" else ()):
-            shares = [line["error"] / line["tolerance"] for line in judged if line["what"].startswith(test)]
+        for test in sorted({line["quantity"][0] for line in judged} if check == "benchmarks" else ()):
+            shares = [line["error"] / line["tolerance"] for line in judged if line["quantity"].startswith(test)]
             numbers[f"benchmarks_{test}"] = f"{100.0 * max(shares):.0f}"
     crossed = [line for line in lines if line["check"] == "crosscheck"]
-    walked = [line["error"] for line in crossed if line["what"].endswith(": velocity")]
-    apart = [line["measured"] for line in crossed if line["what"].endswith(": largest distance of a bead")]
-    cycles = [line["measured"] for line in crossed if re.search("start .*: cycles", line["what"])]
+    walked = [line["error"] for line in crossed if line["quantity"].endswith(": velocity")]
+    apart = [line["measured"] for line in crossed if line["quantity"].endswith(": largest distance of a bead")]
+    cycles = [line["measured"] for line in crossed if re.search("start .*: cycles", line["quantity"])]
     return {
         **numbers,
         "crosscheck_velocity": f"{max(walked):.1g}",

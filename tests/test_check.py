@@ -178,7 +178,7 @@ def test_a_restart_keeps_what_is_between_beads(tmp_path: Path) -> None:
 def test_piles_agree_until_they_are_chaotic(in_folder: Path) -> None:
     (in_folder / "pile.toml").write_text(to_toml(pile(16)))
     done = call("check", "pile.toml", "--cycles", "9", "--seeds", "2", "--json", check=True)
-    measured = {line["what"]: line["measured"] for line in json.loads(done.stdout)["lines"]}
+    measured = {line["quantity"]: line["measured"] for line in json.loads(done.stdout)["lines"]}
     seed = load_case("pile-ci").run.seed
     assert all(measured[f"start {seed + number}: cycles of the same motion"] >= 1.0 for number in range(2))
     assert [*measured][:3:2] == ["height of the beads", "touching pairs per bead"]
@@ -193,7 +193,7 @@ def test_command(in_folder: Path) -> None:
     assert differs.returncode == 1
     told = json.loads(differs.stdout)
     assert told["without"] == ["lubrication"]
-    assert "velocity" in [line["what"] for line in told["lines"] if line["verdict"] == "FAIL"]
+    assert "velocity" in [line["quantity"] for line in told["lines"] if line["verdict"] == "FAIL"]
 
 
 # --- walls of the contact model ---------------------------------------------------------------------------------------
@@ -316,11 +316,11 @@ def _record(model: str, *failed: str) -> AuditRecord:
 
 def test_the_installed_engine_passes() -> None:
     audit = run_audit()
-    assert [line.what for line in failures(audit.lines)] == []
+    assert [line.quantity for line in failures(audit.lines)] == []
     assert [*dict.fromkeys(line.check for line in audit.lines)] == [*CHECKS]
     assert count(audit.lines, Verdict.PASS) > 60
     assert audit.version == "LIGGGHTS-PUBLIC 3.8.0"
-    assert all(line.what in as_text(audit.lines) for line in audit.lines)
+    assert all(line.quantity in as_text(audit.lines) for line in audit.lines)
 
 
 @pytest.mark.slow
@@ -345,7 +345,7 @@ def test_an_engine_that_fails_in_a_check_fails_the_check(own_cache: Path, front:
     broken = front('echo "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0, x)"\necho ERROR: out of order\nexit 1')
     audit = run_audit(["stock"], engine=find_engine(broken))
     (failed,) = audit.lines
-    assert "out of order" in failed.what
+    assert "out of order" in failed.quantity
     assert failed.verdict is Verdict.ERROR
     assert record(audit) is None
     done = call("check", "engine", "--only", "stock", "--engine", broken)

@@ -56,7 +56,7 @@ def test_laws_have_derjaguins_limit(law: str, radius_2: float) -> None:
 
 def test_published_laws_beside_young_laplace() -> None:
     """The fit of Willett et al. is within its published error; the law of Soulié et al. is too strong at walls."""
-    lines = {line.what: line for line in pulls()}
+    lines = {line.quantity: line for line in pulls()}
     assert [count(lines.values(), verdict) for verdict in (Verdict.PASS, Verdict.NOT_JUDGED)] == [4, 44]
     assert lines["Soulié 2006, fig1b, wall: work over Young–Laplace"].measured == pytest.approx(1.39, abs=0.01)
     assert lines["Soulié 2006, fig1b, beads: work over Young–Laplace"].measured == pytest.approx(0.99, abs=0.01)
@@ -75,7 +75,7 @@ def test_benchmarks_pass_and_a_check_that_cannot_be_computed_leaves_the_others(
     *passed, failed = contents["lines"]
     assert {line["verdict"] for line in passed} == {"pass"}
     assert len(passed) > 55
-    assert (failed["check"], failed["verdict"], "no engine here" in failed["what"]) == ("crosscheck", "ERROR", True)
+    assert (failed["check"], failed["verdict"], "no engine here" in failed["quantity"]) == ("crosscheck", "ERROR", True)
 
 
 def test_experiments_of_others_pass_where_they_are_judged(in_folder: Path) -> None:

@@ -67,8 +67,8 @@ NOT_A_RUN = {
 # --- names ------------------------------------------------------------------------------------------------------------
 
 
-class Found(NamedTuple):
-    """What a name means: a kind (of `RECORDS`, ``archive``, ``deck``, ``folder``, ``case``), and a path.
+class Meaning(NamedTuple):
+    """Kind of a name (of `RECORDS`, ``archive``, ``deck``, ``folder``, ``case``), and its path.
 
     The path of an unfinished run is that of its final directory.
     """
@@ -77,32 +77,32 @@ class Found(NamedTuple):
     path: Path
 
 
-def find(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Found:
+def find(reference: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Meaning:
     """What a path, a name in a folder of runs, or the name of a case means; with changes, the case; see `load`.
 
     Nothing but names is read. A folder does not hide a shipped case of the same name; the file of a sweep means the
     sweep if it was run.
     """
-    if isinstance(what, (str, Path)) and not changes:
+    if isinstance(reference, (str, Path)) and not changes:
         with suppress(OSError):  # a name that no file system accepts
-            return next(_meanings(Path(what), Path(out)))
-    return Found("case", Path(out))
+            return next(_meanings(Path(reference), Path(out)))
+    return Meaning("case", Path(out))
 
 
-def _meanings(path: Path, out: Path) -> Iterator[Found]:
+def _meanings(path: Path, out: Path) -> Iterator[Meaning]:
     is_shipped = str(path) in shipped("case")
     for place in (path, out / path):
-        yield from (Found(kind, place) for kind, file in RECORDS.items() if (place / file).is_file())
+        yield from (Meaning(kind, place) for kind, file in RECORDS.items() if (place / file).is_file())
         bare = place.parent / place.name.removesuffix(on_disk.UNFINISHED)
         if on_disk.is_run_name(bare.name) and _is_begun(bare):
-            yield Found("run", bare)
+            yield Meaning("run", bare)
         if on_disk.is_deck_folder(place) and not is_shipped:
-            yield Found("deck", place)
+            yield Meaning("deck", place)
     if (out / path.stem / RECORDS["sweep"]).is_file() and is_sweep_file(path):
-        yield Found("sweep", out / path.stem)
+        yield Meaning("sweep", out / path.stem)
     if path.suffix == ".zip" and path.is_file():
-        yield Found("archive", path)
-    yield Found("folder" if path.is_dir() and not is_shipped else "case", path)
+        yield Meaning("archive", path)
+    yield Meaning("folder" if path.is_dir() and not is_shipped else "case", path)
 
 
 def _is_begun(place: Path) -> bool:
@@ -110,25 +110,25 @@ def _is_begun(place: Path) -> bool:
     return (on_disk.unfinished(place) / on_disk.CASE_NAME).is_file() or on_disk.is_locked(place)
 
 
-def case_at(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> tuple[Case, Path]:
+def case_at(reference: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> tuple[Case, Path]:
     """The case that a user names, or the case of a run, and the folder in which its run belongs; see `load`."""
     out = Path(out)
-    if not isinstance(what, (str, Path, Mapping)):
-        return what.changed(changes or {}), out
-    kind, path = find(what, out)
+    if not isinstance(reference, (str, Path, Mapping)):
+        return reference.changed(changes or {}), out
+    kind, path = find(reference, out)
     if kind == "run":
         return Run(path).check().case.changed(changes or {}), path.parent
     if kind in ("sweep", "calibration"):
-        find_input(str(what) if is_sweep_file(Path(str(what))) else path, "case")
+        find_input(str(reference) if is_sweep_file(Path(str(reference))) else path, "case")
     if kind not in ("case", "archive"):
-        raise refused(what, "is a folder without a run" if kind == "folder" else NOT_A_RUN[kind].format(what))
-    return load_case(what, changes), out
+        raise refused(reference, "is a folder without a run" if kind == "folder" else NOT_A_RUN[kind].format(reference))
+    return load_case(reference, changes), out
 
 
-def case_and_run(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> tuple[Case, Path | None]:
+def case_and_run(reference: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> tuple[Case, Path | None]:
     """The case that a user names, and the directory of its finished run, if there is one; see `load`."""
-    case, folder = case_at(what, out, changes)
-    kind, place = find(what, out, changes)
+    case, folder = case_at(reference, out, changes)
+    kind, place = find(reference, out, changes)
     if kind != "run":
         try:
             place = on_disk.run_place(case, find_engine(), folder)
@@ -137,7 +137,7 @@ def case_and_run(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = 
     return case, place if on_disk.is_finished(place) else None
 
 
-def load(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Run | Sweep:
+def load(reference: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Run | Sweep:
     """Find a sweep, or a run, finished or not.
 
     `InputError` if it does not exist or cannot be read; `EngineFailure` if a case is given and no engine is
@@ -158,26 +158,26 @@ def load(what: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) ->
     >>> walkers.run("fig1b", tmp).directory == walkers.load("fig1b", tmp).directory
     True
     """
-    kind, path = find(what, out, changes)
+    kind, path = find(reference, out, changes)
     if kind == "sweep":
         return Sweep(path)
     if kind == "run":
         return _checked(Run(path))
     if kind != "case":
-        raise refused(what, NOT_A_RUN[kind].format(what))
-    case, folder = case_at(what, out, changes)
-    run = Run(on_disk.run_place(case, find_engine(), folder), asked=case)
+        raise refused(reference, NOT_A_RUN[kind].format(reference))
+    case, folder = case_at(reference, out, changes)
+    run = Run(on_disk.run_place(case, find_engine(), folder), requested=case)
     if on_disk.is_finished(run.directory) or _is_begun(run.directory):
         return _checked(run)
     settings = [f"--set {shlex.quote(f'{key}={value}')}" for key, value in (changes or {}).items()]
-    name = str(what) if isinstance(what, (str, Path)) else case.name
+    name = str(reference) if isinstance(reference, (str, Path)) else case.name
     raise refused(name, f"no finished run in {folder}; first do: walkers run {' '.join([name, *settings])}")
 
 
-def directory_of(what: str | Path, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Path:
+def directory_of(reference: str | Path, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Path:
     """The directory that a user names, whatever it contains; for a case, the directory of its run."""
-    found = find(what, out, changes)
-    return load(what, out, changes).directory if found.kind == "case" else found.path
+    meaning = find(reference, out, changes)
+    return load(reference, out, changes).directory if meaning.kind == "case" else meaning.path
 
 
 # --- runs -------------------------------------------------------------------------------------------------------------
@@ -193,14 +193,14 @@ class Run:
         The run directory. A run that is not finished is in the folder of this name with ``.incomplete`` appended.
     cached
         Whether the run existed before.
-    asked
+    requested
         The requested case; None: the case that made the run. A number may be given in the first and come from the
         library in the second.
     """
 
     directory: Path
     cached: bool = True
-    asked: Case | None = field(default=None, repr=False)
+    requested: Case | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         """Make a path of the name of a directory."""
@@ -266,7 +266,7 @@ class Run:
     @property
     def origins(self) -> tuple[Origin, ...] | None:
         """Sources of the values of the requested case; None: of the case that made the run."""
-        return None if self.asked is None else self.asked.origins
+        return None if self.requested is None else self.requested.origins
 
     @property
     def result(self) -> Results:
@@ -363,7 +363,7 @@ class Run:
         from walkers.sweeps.scheduler import Options
         from walkers.sweeps.spread import run_spread
 
-        case, options = self.asked or self.case, Options()
+        case, options = self.requested or self.case, Options()
         with progress_of(f"{case.name}, spread", progress) as advance:
             return run_spread(case, self.directory.parent, options, points=points, on_progress=advance, **how)
 
@@ -432,12 +432,12 @@ def writer_of(form: str, options: Iterable[str] = ()) -> Callable[..., Path]:
 
 
 @contextmanager
-def _refusing(directory: Path, what: str) -> Iterator[None]:
+def _refusing(directory: Path, contents: str) -> Iterator[None]:
     """Turn the errors of a damaged file into one `InputError`."""
     try:
         yield
     except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError, WalkersError) as error:
-        raise refused(directory, f"{what} cannot be read ({error})") from error
+        raise refused(directory, f"{contents} cannot be read ({error})") from error
 
 
 def _path(to: str | Path | None) -> Path | None:
@@ -502,7 +502,7 @@ def run(
     binary = find_engine(engine)
     place = on_disk.run_place(case, binary, out)
     if on_disk.is_finished(place) and not force:
-        return _measured(Run(place, asked=case))
+        return _measured(Run(place, requested=case))
     check_audit(binary, allow_failed_audit)
     # Numpy and pyarrow are loaded while the engine works and the interpreter is idle.
     threading.Thread(target=_load_postprocess, daemon=True).start()
@@ -510,12 +510,12 @@ def run(
         runs = make_runs([case], out, binary, force=force, on_progress=advance, time_limit=time_limit)
     if not runs:
         raise RunBusy("another process is still running this case", on_disk.unfinished(place))
-    return Run(place, cached=not runs[place.name], asked=case)
+    return Run(place, cached=not runs[place.name], requested=case)
 
 
-def finished_at(what: Named, out: str | Path) -> Run | None:
+def finished_at(reference: Named, out: str | Path) -> Run | None:
     """The finished run with a name or a directory, also of a deck that was run by hand; None for a case."""
-    kind, path = find(what, out)
+    kind, path = find(reference, out)
     if kind not in ("run", "deck"):
         return None
     if on_disk.is_deck_folder(path):
@@ -778,7 +778,7 @@ def compare(
 
 
 def climb(
-    what: Sequence[str | Path],
+    references: Sequence[str | Path],
     out: str | Path = DEFAULT_OUT,
     changes: Changes = None,
     *,
@@ -807,14 +807,14 @@ def climb(
     if to is not None:
         check_place(Path(to), *(f".{form}" for form in FORMATS), ".csv")
     climbs, runs = [], []
-    for one in apply_all(lambda name: load(name, out, changes), what):
-        source, conditions = [one.directory.name] * (len(what) > 1), iter([("", [one.directory])])
-        if isinstance(one, Sweep):
-            frame = one.table()
+    for item in apply_all(lambda name: load(name, out, changes), references):
+        source, conditions = [item.directory.name] * (len(references) > 1), iter([("", [item.directory])])
+        if isinstance(item, Sweep):
+            frame = item.table()
             conditions, left = conditions_in(frame), int((frame["status"] != "finished").sum())
             if left:
-                told = f"{left} of {len(frame)} points are not finished and left out"
-                warnings.warn(f"{one.directory.name}: {told}", stacklevel=2)
+                text = f"{left} of {len(frame)} points are not finished and left out"
+                warnings.warn(f"{item.directory.name}: {text}", stacklevel=2)
         for label, paths in conditions:
             climbs.append(
                 {**summarise_climbs(paths, within), "condition": ", ".join([*source, *filter(None, [label])])}
@@ -858,5 +858,5 @@ def predict(case: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None)
         key, _, why = str(error).partition(": ")
         raise InputError(named.name, [Problem(key, None, why)]) from error
     with suppress(InputError):  # a result that cannot be read
-        predicted["engine"] = directory and Run(directory, asked=named).result.as_dict()
+        predicted["engine"] = directory and Run(directory, requested=named).result.as_dict()
     return predicted

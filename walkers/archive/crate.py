@@ -129,13 +129,13 @@ def _simulation(graph: _Graph, contents: Contents, place: str, **agents: Any) ->
     text = f"Run directory of the case {manifest['name']}, finished {manifest['finished']}"
     parts = [{"@id": quote(path)} for path in contents.files if path.startswith(folder)]
     graph.add(quote(folder), "Dataset", name=name, description=text, hasPart=parts)
-    engine, others = manifest["engine"], int(manifest.get("shared_deck", {}).get("runs", 1)) - 1
+    engine, further_cases = manifest["engine"], int(manifest.get("shared_deck", {}).get("runs", 1)) - 1
     text = "Discrete element method. The SHA-256 combines those of the executable and libliggghts."
     more = {"url": ENGINE_HOME, "sha256": engine["sha256"], "description": text}
     binary = graph.software(f"{ENGINE_HOME}#{engine['sha256'][:12]}", "LIGGGHTS", engine["version"], **more)
     return graph.action(
         f"Simulation of {name}",
-        f"The engine runs the deck{f', together with {others} other cases' if others else ''}.",
+        f"The engine runs the deck{f', together with {further_cases} other cases' if further_cases else ''}.",
         binary,
         manifest["finished"],
         startTime=moment(manifest["started"]),

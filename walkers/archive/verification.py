@@ -101,14 +101,14 @@ def _listed(path: Path) -> dict[str, str]:
 def _compared(folder: Path, listed: Mapping[str, str], left_out: Collection[str] = ()) -> Verification:
     """Compare the files of a folder with their listed checksums, by relative path."""
     paths = (path for path in folder.rglob("*") if path.is_symlink() or not path.is_dir() or not any(path.iterdir()))
-    there = {path.relative_to(folder).as_posix(): path for path in sorted(paths)}
-    now = checksums(folder, [name for name, path in there.items() if name in listed and path.is_file()])
+    paths_by_name = {path.relative_to(folder).as_posix(): path for path in sorted(paths)}
+    now = checksums(folder, [name for name, path in paths_by_name.items() if name in listed and path.is_file()])
     changed = [name for name, checksum in now.items() if checksum != listed[name]]
-    others = [name for name in there if name not in listed and name not in (MANIFEST_NAME, SUMS_NAME)]
+    unlisted = [name for name in paths_by_name if name not in listed and name not in (MANIFEST_NAME, SUMS_NAME)]
     # Everything in the folder of segments is read as a part of the run.
-    doubted = [name for name in others if SEGMENTS in Path(name).parts or name.endswith(_READ)]
+    doubted = [name for name in unlisted if SEGMENTS in Path(name).parts or name.endswith(_READ)]
     folders = {"", *(name.rpartition("/")[0] for name in listed)}
-    since = (name for name in others if name not in doubted)
+    since = (name for name in unlisted if name not in doubted)
     parents = ((name, name.rpartition("/")[0]) for name in since)
     findings = {
         "changed": changed,

@@ -149,15 +149,15 @@ def _check(authors: Sequence[Author], licence: str) -> None:
             raise refused("orcid", f"expected an ORCID such as 0000-0002-1825-0097, found {author.orcid}")
 
 
-def _write(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: File) -> None:
+def _write(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, file: File) -> None:
     """Write a file, and compare what was written with its checksum."""
-    info.compress_type, info.external_attr = zipfile.ZIP_DEFLATED, 0o100644 << 16
-    with file.open() as source, archive.open(info, "w", force_zip64=True) as copy:
+    entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o100644 << 16
+    with file.open() as source, archive.open(entry, "w", force_zip64=True) as copy:
         shutil.copyfileobj(source, copy)
-    with archive.open(info) as written:
+    with archive.open(entry) as written:
         if hashlib.file_digest(written, "sha256").hexdigest() != file.sha256:  # type: ignore[arg-type]
             raise FileChanged(
-                f"{info.filename} has changed since the run was finished: walkers check files lists all changes"
+                f"{entry.filename} has changed since the run was finished: walkers check files lists all changes"
             )
 
 

@@ -51,7 +51,7 @@ def record(audit: Audit) -> AuditRecord | None:
         contact_model=audit.contact_model,
         version=audit.version,
         lines=len(audit.lines),
-        failures=tuple(line.what for line in failures(audit.lines)),
+        failures=tuple(line.quantity for line in failures(audit.lines)),
         skipped=count(audit.lines, Verdict.SKIPPED),
         date=time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
     )

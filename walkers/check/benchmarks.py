@@ -205,18 +205,18 @@ def curve_of(key: str) -> tuple[FloatArray, FloatArray]:
     return panel.x, panel.y(TESTS[panel.test], TESTS[panel.test].after)
 
 
-def farthest_point(what: str, points: FloatArray, curve: tuple[FloatArray, FloatArray], axis: float) -> Line:
+def farthest_point(title: str, points: FloatArray, curve: tuple[FloatArray, FloatArray], axis: float) -> Line:
     """The point that is farthest from a curve; its error is the distance divided by the axis."""
     away = np.interp(points[:, 0], *curve) - points[:, 1]
     worst = int(np.argmax(np.abs(away)))
-    words = f"{what}: largest deviation, at {points[worst, 0]:g}, over the axis"
+    words = f"{title}: largest deviation, at {points[worst, 0]:g}, over the axis"
     return Line(words, 0.0, float(away[worst]) / axis, READING)
 
 
-def largest(what: str, expected: FloatArray | float, measured: FloatArray, tolerance: float) -> Line:
+def largest(title: str, expected: FloatArray | float, measured: FloatArray, tolerance: float) -> Line:
     """The largest of several differences."""
     away = measured - expected
-    return Line(what, 0.0, float(away[np.argmax(np.abs(away))]), tolerance)
+    return Line(title, 0.0, float(away[np.argmax(np.abs(away))]), tolerance)
 
 
 def benchmarks() -> Iterator[Line]:
@@ -240,12 +240,12 @@ def benchmarks() -> Iterator[Line]:
         test, slides = TESTS[panel.test], (panel.slides[0] < panel.x) & (panel.x < panel.slides[1])
         axis = panels[key]["axis"]
         expected, values = (panel.y(test, speeds)[slides] / axis for speeds in (test.sliding(), test.after))
-        what = f"{panel.test[0]}: {key}, gross sliding: largest deviation over the axis"
-        yield largest(what, expected, values, SLIDING)
+        title = f"{panel.test[0]}: {key}, gross sliding: largest deviation over the axis"
+        yield largest(title, expected, values, SLIDING)
     for key, figure in panels.items():
         for series in figure["series"]:
             points, judged = series["points"], series.get("judged", [-np.inf, np.inf])
             if judged:
                 within = points[(judged[0] <= points[:, 0]) & (points[:, 0] < judged[1])]
-                what = f"{figure['title'].split()[1].rstrip(':')}: {key}, {series['name']}"
-                yield farthest_point(what, within, curve_of(key), figure["axis"])
+                title = f"{figure['title'].split()[1].rstrip(':')}: {key}, {series['name']}"
+                yield farthest_point(title, within, curve_of(key), figure["axis"])

@@ -63,17 +63,17 @@ def pulls() -> Iterator[Line]:
                 gaps = _even(law.rupture(*shape))
                 pull = law.pull(*shape, gaps)
                 work = float(np.trapezoid(pull, gaps) / np.trapezoid(true, distances))
-                what = f"{author}, {name}, {place}"
-                yield Line(f"{what}: pull at contact over Young–Laplace", 1.0, float(pull[0] / true[0]), law.error)
-                yield Line(f"{what}: work over Young–Laplace", 1.0, work)
-                yield Line(f"{what}: rupture distance over Young–Laplace", 1.0, float(gaps[-1] / exact.rupture))
+                title = f"{author}, {name}, {place}"
+                yield Line(f"{title}: pull at contact over Young–Laplace", 1.0, float(pull[0] / true[0]), law.error)
+                yield Line(f"{title}: work over Young–Laplace", 1.0, work)
+                yield Line(f"{title}: rupture distance over Young–Laplace", 1.0, float(gaps[-1] / exact.rupture))
 
 
 def velocities(out: Path) -> Iterator[Line]:
     """Velocities of walkers by other laws than Young–Laplace; ``out`` is the folder of their runs."""
     for name in WALKED:
-        exact, *others = (1e3 * run(load_case(name, {"liquid.law": law}), out).result["velocity"] for law in WALKED_BY)
-        for law, speed in zip(WALKED_BY[1:], others, strict=True):
+        exact, *by_laws = (1e3 * run(load_case(name, {"liquid.law": law}), out).result["velocity"] for law in WALKED_BY)
+        for law, speed in zip(WALKED_BY[1:], by_laws, strict=True):
             yield Line(f"velocity of {name}: {WALKED_BY[0]}, {law}", exact, speed, unit="mm/s")
 
 

@@ -73,12 +73,12 @@ def compare(motions: Sequence[Motion], without: Collection[str] = ()) -> list[Li
     numbers = [np.mean(side, axis=0).tolist() for side in sides]
     speeds = [abs(speed) for (_, unit), speed in zip(names, numbers[0], strict=True) if unit == "mm/s"]
     lines = []
-    for (what, unit), first, second in zip(names, *numbers, strict=True):
+    for (quantity, unit), first, second in zip(names, *numbers, strict=True):
         allowed = {"mm/s": max(GAIT * max(speeds), SPEED_FLOOR), "°": ORIENTATION}.get(unit, inf)
-        if what.startswith("velocity"):
+        if quantity.startswith("velocity"):
             allowed = max(SPEED * abs(first), SPEED_FLOOR)
         if unit != "%" or first or second:
-            lines.append(Line(what, first, second, inf if pile else allowed, unit, scale=None if pile else 1.0))
+            lines.append(Line(quantity, first, second, inf if pile else allowed, unit, scale=None if pile else 1.0))
     check = f"{motions[0].case.name}: LIGGGHTS (expected) and the second engine (measured)"
     check += f" without {', '.join(without)}" if without else ""
     lines += [line for both in zip(motions, seconds, strict=True) for line in courses(*both)]
@@ -93,7 +93,7 @@ def measured(motion: Motion) -> dict[tuple[str, str], float]:
     if motion.case.mixture is not None:
         late = motion.select(slice(int(np.searchsorted(motion.time, motion.time[-1] / 2.0)), None))
         apart = (pdist(position) for position in late.position)
-        radii = pdist(late.radius[:, None], lambda one, other: one[0] + other[0])
+        radii = pdist(late.radius[:, None], lambda first, second: first[0] + second[0])
         touching = sum(int(np.sum(distances < radii)) for distances in apart)
         return {
             ("height of the beads", "mm"): 1e3 * float(late.position[..., 2].mean()),
@@ -101,8 +101,8 @@ def measured(motion: Motion) -> dict[tuple[str, str], float]:
             ("touching pairs per bead", ""): touching / late.position[..., 0].size,
         }
     if not motion.groups:
-        way = motion.radius**3 / np.sum(motion.radius**3) @ (motion.position[-1] - motion.position[0])
-        speeds = (1e3 * way / np.ptp(motion.time)).tolist()
+        displacement = motion.radius**3 / np.sum(motion.radius**3) @ (motion.position[-1] - motion.position[0])
+        speeds = (1e3 * displacement / np.ptp(motion.time)).tolist()
         return {(f"centre of mass along {axis}", "mm/s"): speeds["xyz".index(axis)] for axis in "zyx"}
     numbers: dict[tuple[str, str], float] = {}
     for number, group in enumerate(motion.groups, 1):
@@ -111,10 +111,10 @@ def measured(motion: Motion) -> dict[tuple[str, str], float]:
         contacts = [*beads, *(f"beads {first + 1}-{second + 1}" for first, second in group.make.pairs)]
         numbers[f"velocity{label}", "mm/s"] = 1e3 * float(walk(group).velocity.mean())
         gait, kinds = averages(group), (("rotation", beads), ("sliding", contacts), ("open", contacts))
-        for what, places in kinds:
-            factor, unit = (100.0, "%") if what == "open" else (1e3, "mm/s")
-            means = (factor * getattr(gait, what).mean(axis=0)).tolist()
-            numbers |= {(f"{what} {place}{label}", unit): mean for place, mean in zip(places, means, strict=True)}
+        for quantity, places in kinds:
+            factor, unit = (100.0, "%") if quantity == "open" else (1e3, "mm/s")
+            means = (factor * getattr(gait, quantity).mean(axis=0)).tolist()
+            numbers |= {(f"{quantity} {place}{label}", unit): mean for place, mean in zip(places, means, strict=True)}
         numbers[f"orientation at the end{label}", "°"] = degrees(float(group.orientation[-1].mean()))
     return numbers
 
@@ -166,7 +166,7 @@ def crosschecks(out: Path) -> Iterator[Line]:
     """Run cases of all kinds in both engines; errors as of `crosscheck`."""
     for name, case in full_cases().items():
         for line in crosscheck(case, out, seeds=STARTS if case.mixture else 1):
-            yield replace(line, what=f"{name}: {line.what}")
+            yield replace(line, quantity=f"{name}: {line.quantity}")
 
 
 def full_cases() -> dict[str, Case]:

@@ -121,13 +121,13 @@ def weak(phase: float) -> float:
 
 def modelled(phase: float, steps: int = 2500) -> FloatArray:
     """Drift of a mass with Coulomb friction, which stops it at the end of a step if it can; as of `slider`."""
-    step, way = 2.0 * pi / steps, np.zeros_like(STRENGTHS)
-    slip = glide(phase, 0.0) + weak(phase) + way
+    step, displacement = 2.0 * pi / steps, np.zeros_like(STRENGTHS)
+    slip = glide(phase, 0.0) + weak(phase) + displacement
     for number in range(CYCLES * steps):
         slip = slip + glide(phase, (number + 1) * step) - glide(phase, number * step)
         slip = np.sign(slip) * np.maximum(np.abs(slip) - step / STRENGTHS, 0.0)
-        way += slip * (number >= FIRST * steps)
-    return way / ((CYCLES - FIRST) * steps)
+        displacement += slip * (number >= FIRST * steps)
+    return displacement / ((CYCLES - FIRST) * steps)
 
 
 def slider(bench: Bench, phase: float) -> FloatArray:
@@ -143,7 +143,7 @@ def slider(bench: Bench, phase: float) -> FloatArray:
         sines = (Harmonic(axis="x", frequency=tone, peak_acceleration=peak, phase=angle) for tone, angle in tones)
         cases.append(plain.put("drive.harmonics", tuple(sines)))
     moves, turns = start + 2.0 / 7.0 * drift, -5.0 / 7.0 * drift / R  # so that the centre stays here
-    beads = [over(FLOOR, gap, R, (moves * one, 0.0, 0.0), (0.0, turns * one, 0.0)) for one in speeds.tolist()]
+    beads = [over(FLOOR, gap, R, (moves * speed, 0.0, 0.0), (0.0, turns * speed, 0.0)) for speed in speeds.tolist()]
     frames = followed(bench, cases, beads, CYCLES * steps, 50)[1 + FIRST * steps // 50 :]
     return np.asarray((frames[..., 3] - R * frames[..., 7]).mean(axis=0) / speeds)
 
@@ -151,13 +151,13 @@ def slider(bench: Bench, phase: float) -> FloatArray:
 def two_tones(bench: Bench) -> Iterator[Line]:
     """Drift of a dry bead by two tones, beside the friction model and limits."""
     drifts, expected = (np.array([drift(phase) for phase in PHASES]) for drift in (partial(slider, bench), modelled))
-    what = "dry bead, two tones"
+    title = "dry bead, two tones"
     away = float(np.abs(drifts - expected).max())
-    yield Line(f"{what}, {drifts.size} drives: largest distance of the drift from the friction model", 0.0, away, 5e-3)
-    yield Line(f"{what} in phase, weak friction: drift", weak(0.0), drifts[0, -1], 0.03)
+    yield Line(f"{title}, {drifts.size} drives: largest distance of the drift from the friction model", 0.0, away, 5e-3)
+    yield Line(f"{title} in phase, weak friction: drift", weak(0.0), drifts[0, -1], 0.03)
     for phase, growth in ((0, 2.0), (90, 1.0)):
         last = drifts[list(PHASES).index(phase), -2:] * STRENGTHS[-2:]
-        yield Line(f"{what}, {phase}°: growth of the drift at twice the drive", growth, last[1] / last[0])
+        yield Line(f"{title}, {phase}°: growth of the drift at twice the drive", growth, last[1] / last[0])
 
 
 def filmed(surfaces: Surfaces) -> Curve:
@@ -184,8 +184,8 @@ def restitutions(bench: Bench, modulus: float = 7e10, law: str = "young-laplace"
     lasts = (high + 5.0 * far) / SPEEDS.min() + 2.0 * impact.duration(SPEEDS.min())
     every = round(lasts / plain.run.time_step / 200)
     frames = followed(bench, cases, beads, 200 * every, every)
-    gone = (frames[..., 2] > GLASS + far) & (frames[..., 5] > 0.0)
-    after = np.where(gone.any(axis=0), frames[gone.argmax(axis=0), range(len(beads)), 5], 0.0)
+    has_left = (frames[..., 2] > GLASS + far) & (frames[..., 5] > 0.0)
+    after = np.where(has_left.any(axis=0), frames[has_left.argmax(axis=0), range(len(beads)), 5], 0.0)
     stokes = 2500.0 * 2.0 * GLASS * SPEEDS / (9.0 * OILS[:, None])
     return stokes, after.reshape(stokes.shape) / SPEEDS
 
@@ -196,14 +196,14 @@ def impacts(bench: Bench) -> Iterator[Line]:
     filled = restitutions(bench, law=f"{__name__}:filmed")[1]
     drag, e = 1.0 / stokes[:, 2], hard[:, 2]
     slope, start = np.polyfit(drag, e, 1)
-    what = "glass bead on a wet plate"
-    yield Line(f"{what}: largest distance of e from a line in 1/St", 0.0, np.abs(start + slope * drag - e).max(), 0.02)
-    yield Line(f"{what}: e at 1/St = 0, dry bead", RESTITUTION, start, 0.02)
-    yield Line(f"{what}: critical Stokes number, ln(film/roughness) of approach", log(FILM / ROUGH), -slope / start)
-    what += f", St = {stokes[2, 2]:.0f}: e"
-    yield Line(f"{what} at 1 m/s and at 2 m/s", e[2], hard[3, 3])
-    yield Line(f"{what}, bridge from the surface of the film", e[2], filled[2, 2])
-    yield Line(f"{what}, bead of 50 MPa", e[2], soft[2, 2])
+    title = "glass bead on a wet plate"
+    yield Line(f"{title}: largest distance of e from a line in 1/St", 0.0, np.abs(start + slope * drag - e).max(), 0.02)
+    yield Line(f"{title}: e at 1/St = 0, dry bead", RESTITUTION, start, 0.02)
+    yield Line(f"{title}: critical Stokes number, ln(film/roughness) of approach", log(FILM / ROUGH), -slope / start)
+    title += f", St = {stokes[2, 2]:.0f}: e"
+    yield Line(f"{title} at 1 m/s and at 2 m/s", e[2], hard[3, 3])
+    yield Line(f"{title}, bridge from the surface of the film", e[2], filled[2, 2])
+    yield Line(f"{title}, bead of 50 MPa", e[2], soft[2, 2])
 
 
 def incline(bench: Bench, radius: float = 1e-3, film: float = 7.5e-5) -> Iterator[Line]:

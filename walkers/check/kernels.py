@@ -354,11 +354,11 @@ def advance(c: Constants, state: State, now: int, every: int, frames: FloatArray
         kick(c, state)
         farthest = 0.0
         for bead in range(c.radius.shape[0]):
-            way = 0.0
+            moved = 0.0
             for axis in range(3):
                 state.position[bead, axis] += c.step * state.velocity[bead, axis]
-                way += (state.position[bead, axis] - state.listed[bead, axis]) ** 2
-            farthest = max(farthest, way)
+                moved += (state.position[bead, axis] - state.listed[bead, axis]) ** 2
+            farthest = max(farthest, moved)
         forces(c, state, now + number + 1, True)
         kick(c, state)
         if (number + 1) % every == 0:

@@ -35,7 +35,7 @@ class Line:
     number, or 1 if that is 0. ``given`` is a verdict that does not follow from the error.
     """
 
-    what: str
+    quantity: str
     expected: float
     measured: float
     tolerance: float = inf
@@ -45,9 +45,9 @@ class Line:
     check: str = ""
 
     @classmethod
-    def without_number(cls, what: str, verdict: Verdict) -> Line:
+    def without_number(cls, quantity: str, verdict: Verdict) -> Line:
         """A line without a measured value."""
-        return cls(what, nan, nan, given=verdict)
+        return cls(quantity, nan, nan, given=verdict)
 
     @property
     def error(self) -> float:
@@ -70,7 +70,13 @@ class Line:
         """Plain JSON types; numbers that are none become null."""
         numbers = {name: getattr(self, name) for name in ("expected", "measured", "error", "tolerance")}
         finite = {name: value if isfinite(value) else None for name, value in numbers.items()}
-        return {"check": self.check, "what": self.what, "unit": self.unit, **finite, "verdict": str(self.verdict)}
+        return {
+            "check": self.check,
+            "quantity": self.quantity,
+            "unit": self.unit,
+            **finite,
+            "verdict": str(self.verdict),
+        }
 
 
 def run_checks(
@@ -78,7 +84,7 @@ def run_checks(
     given: T,
     only: Collection[str] = (),
     on_done: Callable[[str], None] | None = None,
-    each: Callable[[Callable[[str], list[Line]], Iterable[str]], Iterable[list[Line]]] = map,
+    mapped: Callable[[Callable[[str], list[Line]], Iterable[str]], Iterable[list[Line]]] = map,
 ) -> list[Line]:
     """Lines of checks of something, such as a folder of runs; a check that cannot be computed is a line.
 
@@ -99,7 +105,7 @@ def run_checks(
             on_done(name)
         return [replace(line, check=name) for line in lines]
 
-    return [line for lines in each(lines_of, [name for name in checks if name in only or not only]) for line in lines]
+    return [line for lines in mapped(lines_of, [name for name in checks if name in only or not only]) for line in lines]
 
 
 def failures(lines: Iterable[Line]) -> list[Line]:
@@ -127,7 +133,7 @@ def _table(lines: Iterable[Line]) -> str:
     for line in lines:
         judged = f"error {line.error:.1e} of {line.tolerance:.0e}" if isfinite(line.error + line.tolerance) else ""
         pair = [f"{value:.6g}" if isfinite(value) else "-" for value in (line.expected, line.measured)]
-        rows.append([line.verdict, line.what, *pair, line.unit, judged])
+        rows.append([line.verdict, line.quantity, *pair, line.unit, judged])
     return aligned([[*row, "", ""][:6] for row in rows], right=(2, 3))
 
 

@@ -228,9 +228,9 @@ class Setting:
             series = bench.run(prescribed(case, scene))
             forces = np.array([engine.follow(frame) for frame in in_walls(case, series)])
             parts = {"force": slice(0, 3), "torque": slice(3, 6)}
-            pairs = {what: (series.forces[1:, :, part], forces[..., part]) for what, part in parts.items()}
-        for what, both in pairs.items():
-            yield Line(f"{name}: {what}, both engines", 0.0, farthest(*both), EQUAL)
+            pairs = {quantity: (series.forces[1:, :, part], forces[..., part]) for quantity, part in parts.items()}
+        for quantity, both in pairs.items():
+            yield Line(f"{name}: {quantity}, both engines", 0.0, farthest(*both), EQUAL)
 
 
 def in_walls(case: Case, series: Measured) -> FloatArray:
@@ -317,17 +317,17 @@ def scene_lines(bench: Bench) -> Iterator[Line]:
 def restart_lines(bench: Bench) -> Iterator[Line]:
     """Springs and open bridges of pairs and walls continue from a restart file as in an uninterrupted run."""
     beads = [over(FLOOR, -DEEP, R, (0.002, 0.001, 0.0), STILL), *pair(-DEEP, 0.001, (0.001, -0.002, 0.001))]
-    gone = replace(over(FLOOR, -DEEP, S, WAY), centre=(3e-3, 0.0, S - DEEP))
-    scene = standing([*beads, gone, *(_moved(bead, 0.0, 3e-3) for bead in pair(-DEEP, 0.04, STILL))])
+    leaving = replace(over(FLOOR, -DEEP, S, WAY), centre=(3e-3, 0.0, S - DEEP))
+    scene = standing([*beads, leaving, *(_moved(bead, 0.0, 3e-3) for bead in pair(-DEEP, 0.04, STILL))])
     whole = bench.run(prescribed(full_case({}), scene, 1000))
     first = prescribed(full_case({}), scene, 500, restart_to="half.restart")
     carry = bench.run(first).directory / "half.restart"
     second = replace(first, segment=Segment(500, 1000, 0), restart_to=None, restart_from="half.restart")
     forces = bench.run(second, carry).forces[1:, :, :3]
     kept = ("wall spring", 0), ("pair spring", 1), ("open wall bridge", 3), ("open pair bridge", 5)
-    for what, number in kept:
+    for quantity, number in kept:
         error = farthest(forces[:, number], whole.forces[501:, number, :3])
-        yield Line(f"{what}: with and without a restart", 0.0, error, EQUAL)
+        yield Line(f"{quantity}: with and without a restart", 0.0, error, EQUAL)
 
 
 def _moved(bead: Bead, x: float, y: float, speed: float = 0.0) -> Bead:
@@ -400,15 +400,15 @@ def company_lines(bench: Bench) -> Iterator[Line]:
     """A walker in a shared deck against the same walker in a deck of its own; and a repeated run."""
     alone = load_case("fig1b", {"dimers.replicates": 1, "contact.rolling_friction": 0.0})  # which amplifies rounding
     alone = alone.but(run=alone.run.but(cycles=10, cycles_per_segment=10, until_steady=False))
-    other = alone.put("drive.peak_acceleration", 2.0 * alone.drive.peak_acceleration)
+    stronger = alone.put("drive.peak_acceleration", 2.0 * alone.drive.peak_acceleration)
     sloping = alone.put("boundary.tilt", 0.3)
 
     def ran(*cases: Case) -> Measured:
         return bench.run(replace(plan_of(*cases), bead_columns=(*BEAD_COLUMNS, *FORCE_COLUMNS)))
 
-    first, again, together = ran(alone), ran(alone), ran(other, alone, sloping)
-    ways = [series.frames[..., :3] - series.frames[0, :, :3] for series in (first, together)]
-    error = farthest(ways[1][:, 2:4], ways[0][:, :2])
+    first, again, together = ran(alone), ran(alone), ran(stronger, alone, sloping)
+    displacements = [series.frames[..., :3] - series.frames[0, :, :3] for series in (first, together)]
+    error = farthest(displacements[1][:, 2:4], displacements[0][:, :2])
     yield Line("displacement of a walker: shared deck and own deck", 0.0, error, 1e-9)
     same = (first.directory / "beads.bin").read_bytes() == (again.directory / "beads.bin").read_bytes()
     yield Line("a repeated run is bit-identical (0: yes)", 0.0, float(not same), 0.0)

@@ -41,15 +41,15 @@ def compare(sources: Sources) -> dict[str, Any]:
     experiments = list(ruby().experiments)
     cases = {name: dict(zip(experiments, sweep_of(of_facts(name)).cases(), strict=True)) for name in sets()}
     numbers, theory = {name: _by_engine(sources.table(of_facts(name))) for name in sets()}, _by_theory(cases["shipped"])
-    facts = [_fact(one, numbers, theory) for one in ruby().file.observations]
+    facts = [_fact(observation, numbers, theory) for observation in ruby().file.observations]
     counted = [fact["agree"] for fact in facts if not fact["derived"]]
     return {
         "sets": {
-            name: {"agree": sum(one[name] for one in counted), "of": len(counted), "parameters": _parameters(of)}
+            name: {"agree": sum(agrees[name] for agrees in counted), "of": len(counted), "parameters": _parameters(of)}
             for name, of in cases.items()
         },
         "facts": facts,
-        "thresholds": [_known(row) for row in thresholds_with_theory(sources).to_dict("records")],
+        "thresholds": [_finite(row) for row in thresholds_with_theory(sources).to_dict("records")],
         "curve": [
             *_curve(sources, "fig2", "peak_acceleration", lambda peak: f"{peak / ACCELERATION_OF_ONE_G:.3g} g"),
             *_curve(sources, "fig3", "sin_delta", lambda sine: f"sin δ = {sine:.3f}"),
@@ -57,17 +57,17 @@ def compare(sources: Sources) -> dict[str, Any]:
     }
 
 
-def _known(numbers: Mapping[Any, Any]) -> dict[str, float | None]:
-    return {name: float(one) if isfinite(one) else None for name, one in numbers.items()}
+def _finite(numbers: Mapping[Any, Any]) -> dict[str, float | None]:
+    return {name: float(value) if isfinite(value) else None for name, value in numbers.items()}
 
 
 def _parameters(cases: Mapping[str, Case]) -> dict[str, str]:
     """What the calibration varies, by its symbol, as a case file says it."""
     shown = {}
-    for name, one in ruby().file.parameters.items():
-        case = cases[one.experiments[0] if one.experiments else next(iter(cases))]
+    for name, parameter in ruby().file.parameters.items():
+        case = cases[parameter.experiments[0] if parameter.experiments else next(iter(cases))]
         texts = {origin.key: origin.text for origin in case.origins}
-        shown[one.symbol or name] = " and ".join(dict.fromkeys(texts[key] for key in one.keys))
+        shown[parameter.symbol or name] = " and ".join(dict.fromkeys(texts[key] for key in parameter.keys))
     return shown
 
 
@@ -81,21 +81,30 @@ def _by_engine(table: pd.DataFrame) -> Numbers:
 def _by_theory(cases: Mapping[str, Case]) -> Numbers:
     """Speeds by Coulomb friction and drag; NaN for other quantities, and where contacts open."""
     numbers: dict[str, dict[str, float]] = {label: defaultdict(lambda: nan) for label in cases}
-    for quantity in {one.quantity for one in ruby().file.observations}:
+    for quantity in {observation.quantity for observation in ruby().file.observations}:
         values = predicted_column(list(cases.values()), quantity)[0].get(MODEL, np.full(len(cases), nan))
         for label, value in zip(cases, values, strict=True):
             numbers[label][quantity] = float(value)
     return numbers
 
 
-def _fact(one: Observation, numbers: Mapping[str, Numbers], theory: Numbers) -> dict[str, Any]:
+def _fact(observation: Observation, numbers: Mapping[str, Numbers], theory: Numbers) -> dict[str, Any]:
     """A row of the comparison."""
-    values, scale = {name: one.of_numbers(found) for name, found in numbers.items()}, one.unit[1]
+    values, scale = (
+        {name: observation.of_numbers(numbers_of_set) for name, numbers_of_set in numbers.items()},
+        observation.unit[1],
+    )
     return {
-        **{"name": one.name, "title": one.title, "says": one.says, "source": one.source, "derived": one.derived},
-        **{"expected": one.text, "values": _known({name: value * scale for name, value in values.items()})},
-        "agree": {name: one.agrees(value) for name, value in values.items()},
-        **_known({"theory": one.of_numbers(theory) * scale}),
+        **{
+            "name": observation.name,
+            "title": observation.title,
+            "says": observation.says,
+            "source": observation.source,
+            "derived": observation.derived,
+        },
+        **{"expected": observation.text, "values": _finite({name: value * scale for name, value in values.items()})},
+        "agree": {name: observation.agrees(value) for name, value in values.items()},
+        **_finite({"theory": observation.of_numbers(theory) * scale}),
     }
 
 
@@ -107,13 +116,13 @@ def _curve(sources: Sources, sweep: str, column: str, label: Callable[[float], s
     table = sources.table(sweep)
     table = table[table["status"] == "finished"].sort_values("frequency")
     models = predicted_column([case_of(Path(run)) for run in table["run"]], "velocity")[0] if len(table) else {}
-    found = {"engine": table["velocity"], "theory": models.get(MODEL, nan), "curve": models.get(PAPER, nan)}
-    numbers = table[[column]].astype(float).round(_PLACES).assign(**found)
+    models_of_curve = {"engine": table["velocity"], "theory": models.get(MODEL, nan), "curve": models.get(PAPER, nan)}
+    numbers = table[[column]].astype(float).round(_PLACES).assign(**models_of_curve)
     rows = []
     for _, group in numbers.groupby(column):
         slow, fast = (float(group["engine"].iloc[end]) for end in (0, -1))
         ratio = fast / slow if len(group) > 1 and abs(slow) > LEAST_SPEED else nan
-        means = {name: float(group[name].mean()) * 1e3 for name in found}
+        means = {name: float(group[name].mean()) * 1e3 for name in models_of_curve}
         name = f"Fig. {sweep.removeprefix('fig')}, {label(float(group[column].iloc[0]))}"
-        rows.append({"of": name, **_known({**means, "by_frequency": ratio})})
+        rows.append({"of": name, **_finite({**means, "by_frequency": ratio})})
     return rows

@@ -132,7 +132,7 @@ def fig4(sources: Sources) -> Figure:
 
 def _draw_cycles(axes: Axes, trajectory: Group, row: pd.Series[float], letter: str) -> None:
     """Last cycles of the first walker, with the last cycle of the theory, and the mean that the paper measured."""
-    measured = {one.name: one.value for one in ruby().file.observations}
+    measured = {observation.name: observation.value for observation in ruby().file.observations}
     run, motion = trajectory.case.run, gait(trajectory)
     samples = run.samples_per_cycle
     last = slice((run.cycles - _CYCLES) * samples, run.cycles * samples + 1)
@@ -140,9 +140,9 @@ def _draw_cycles(axes: Axes, trajectory: Group, row: pd.Series[float], letter: s
     theory = theory_of_cycles(trajectory)
     for (name, column, marker, colour, size), series, line in zip(_SERIES, values, theory, strict=True):
         label = f"{name}: {row[column] * 1e3:.2f}"
-        if known := measured.get(f"fig4{letter}_{column.removesuffix('_1')}"):
-            axes.axhline(known * 1e3, color=colour, ls=_MEASURED_DASHES, lw=1.0)
-            label += f", measured {known * 1e3:.1f}"
+        if expected := measured.get(f"fig4{letter}_{column.removesuffix('_1')}"):
+            axes.axhline(expected * 1e3, color=colour, ls=_MEASURED_DASHES, lw=1.0)
+            label += f", measured {expected * 1e3:.1f}"
         look: dict[str, Any] = {"color": colour, "ms": size, "mfc": "none", "mew": 0.8, "label": label}
         axes.plot(np.arange(len(series)) / samples, series * 1e3, marker, **look)
         axes.plot(np.arange(len(line)) / (len(line) - 1) * _CYCLES, line * 1e3, color=colour, lw=0.36 * size)
@@ -161,8 +161,10 @@ def theory_of_cycles(trajectory: Group) -> list[FloatArray]:
     # Along x, the substrate accelerates as cos 2πft in the theory, and as -sin 2πft in the engine.
     quarter = sliding.shape[1] // 4
     ahead = quarter if trajectory.walkers[0].facing > 0 else -quarter
-    one = [np.roll(series, 1 - ahead) for series in (velocity, velocity - sliding[0], velocity - sliding[1])]
-    return [np.concatenate([np.tile(series, _CYCLES), series[:1]]) for series in one]
+    series_of_cycle = [
+        np.roll(series, 1 - ahead) for series in (velocity, velocity - sliding[0], velocity - sliding[1])
+    ]
+    return [np.concatenate([np.tile(series, _CYCLES), series[:1]]) for series in series_of_cycle]
 
 
 @styled

@@ -96,11 +96,11 @@ def make_figures(
         If a figure or format does not exist, or a folder is a file.
     """
     require("theory")
-    known = (*FIGURES, COMPARISON)
-    chosen = list(only) or list(known)
+    names = (*FIGURES, COMPARISON)
+    chosen = list(only) or list(names)
     for name in chosen:
-        if name not in known:
-            raise refused("only", f'no figure "{name}"; expected one of {", ".join(known)}')
+        if name not in names:
+            raise refused("only", f'no figure "{name}"; expected one of {", ".join(names)}')
     check_formats(formats)
     for option, folder in (("out", out), ("to", to)):
         if folder.exists() and not folder.is_dir():
@@ -122,14 +122,14 @@ def make_figures(
             left_out[name] = str(missing)
     if COMPARISON not in chosen:
         return Made(files, failed, left_out)
-    found = compare(Sources(out))
+    comparison = compare(Sources(out))
     page, record = to / f"{COMPARISON}.md", to / f"{COMPARISON}.json"
     to.mkdir(parents=True, exist_ok=True)
-    write_text(page, rendered("walkers.paper", "comparison.md.j2", **found))
-    write_json(record, found)
+    write_text(page, rendered("walkers.paper", "comparison.md.j2", **comparison))
+    write_json(record, comparison)
     return Made(
         [*files, page, record],
         failed,
         left_out,
-        {name: (one["agree"], one["of"]) for name, one in found["sets"].items()},
+        {name: (facts["agree"], facts["of"]) for name, facts in comparison["sets"].items()},
     )

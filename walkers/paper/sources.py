@@ -51,7 +51,7 @@ def sweep_of(name: str) -> Sweep:
     """A shipped sweep, or one of `of_facts`."""
     for label, values in sets().items():
         if name == of_facts(label):
-            row = None if values is None else np.array([[values[one] for one in ruby().file.parameters]])
+            row = None if values is None else np.array([[values[parameter] for parameter in ruby().file.parameters]])
             return ruby().sweep(name, row)
     return load_sweep(name)
 
@@ -93,8 +93,8 @@ def thresholds_with_theory(sources: Sources) -> pd.DataFrame:
     Beside it that of the sweep ``fig2-ramp``, ``ramp``, and its resolution, ``within``.
     """
     ends = thresholds(sources.table("fig2-threshold"))
-    cases = [load_case("fig1b", {"drive.frequency": f"{one} Hz"}) for one in ends["drive.frequency"]]
+    cases = [load_case("fig1b", {"drive.frequency": f"{frequency} Hz"}) for frequency in ends["drive.frequency"]]
     shown = ends[["drive.frequency", "gamma0_at_rest", "gamma0_moving"]]
     ramp = sources.table("fig2-ramp").groupby("drive.frequency")[["gamma0_stops_at", "gamma0_stops_within"]].first()
-    found = ramp.reindex(shown["drive.frequency"]).to_numpy(dtype=float).T
-    return shown.assign(theory=[threshold(case) for case in cases], ramp=found[0], within=found[1])
+    ramps = ramp.reindex(shown["drive.frequency"]).to_numpy(dtype=float).T
+    return shown.assign(theory=[threshold(case) for case in cases], ramp=ramps[0], within=ramps[1])

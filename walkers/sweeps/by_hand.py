@@ -113,8 +113,8 @@ def take_in(folder: Path) -> None:
         record, deck = read_json(folder / on_disk.DECK_RECORD_NAME), folder / decks.DECK_NAME
         case, written = on_disk.with_recorded_law(Case.from_dict(record["case"]), folder), str(record["deck"])
         now = deck.read_text(encoding="utf-8", errors="surrogateescape")
-        said = log.read_text(encoding="utf-8", errors="replace")
-        ran, segment, changes = _as_run(case, written, now, said, f"{folder}: the edited deck")
+        log_text = log.read_text(encoding="utf-8", errors="replace")
+        ran, segment, changes = _as_run(case, written, now, log_text, f"{folder}: the edited deck")
         notes = ["run by hand", *([f"the deck was edited: {'; '.join(changes)}"] if changes else [])]
         if deck.stat().st_mtime_ns > log.stat().st_mtime_ns:
             notes.append(f"{decks.DECK_NAME} is newer than {log.name}: if it was edited since, run it again")
@@ -130,11 +130,11 @@ def take_in(folder: Path) -> None:
         raise refused(folder, f"the deck that was run by hand cannot be read ({error})") from error
 
 
-def _as_run(case: Case, written: str, now: str, said: str, source: str) -> tuple[Case, Segment, list[str]]:
+def _as_run(case: Case, written: str, now: str, log_text: str, source: str) -> tuple[Case, Segment, list[str]]:
     """The case that the engine ran, its segment, and the edits, from the deck as written and now, and the log."""
     case = case.for_cycles(case.run.attempts[0])
     before, after = dict(_LINE.findall(written)), dict(_LINE.findall(now))
-    words = (_PRINTED.findall(said) or [""])[-1].split()
+    words = (_PRINTED.findall(log_text) or [""])[-1].split()
     values = {name: float(value) for name, value in zip(words[::2], words[1::2], strict=True)}
     # A number is printed as it stands in its line; a formula gives another number if what it contains was edited.
     follow = {f"amplitude{end}": sine.amplitude for end, sine in _by_suffix(case)}
@@ -156,16 +156,18 @@ def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float]
     document = {name: table for name, table in case.document.items() if name != "uncertain"}
     numbers = {**edited, "time_step": step} if "steps_per_cycle" in edited else edited
     keys = {key: (numbers[name], kind_of(key)) for name, key in _KEYS.items() if name in numbers}
-    changes: dict[str, Any] = {key: f"{one!r} {kind.unit}" if kind else one for key, (one, kind) in keys.items()}
+    changes: dict[str, Any] = {key: f"{value!r} {kind.unit}" if kind else value for key, (value, kind) in keys.items()}
     changes |= {"liquid.viscosity_ratio": 1.0} if "viscosity" in edited else {}
     changes |= {"run.allow_unstable": True} if "run.time_step" in changes else {}
     if cycles != case.run.cycles:
         changes["run.cycles"] = cycles
-        document["run"] = {name: one for name, one in document.get("run", {}).items() if name != "settling_cycles"}
+        document["run"] = {
+            name: setting for name, setting in document.get("run", {}).items() if name != "settling_cycles"
+        }
     # A deck has no Γ0, but the acceleration for the density and the surface tension that it was made for.
-    by_gamma0 = any(one.gamma0 is not None for one in (case.drive, *case.drive.harmonics))
+    by_gamma0 = any(sine.gamma0 is not None for sine in (case.drive, *case.drive.harmonics))
     if (sines := _sines(case, values)) != _sines(case, {}) or by_gamma0:
-        kept = {name: one for name, one in document["drive"].items() if name in ("frame", "ramp")}
+        kept = {name: value for name, value in document["drive"].items() if name in ("frame", "ramp")}
         document["drive"] = {**kept, **(sines[0] if len(sines) == 1 else {"harmonics": sines})}
     ran = Case.read(changed(Case, document, changes), source=source, name=case.name).for_cycles(cycles)
     drive, parts = ran.excitation, case.run.samples_per_cycle
@@ -215,8 +217,8 @@ def _other_changes(written: str, now: str, given: Collection[str]) -> list[str]:
         ]
         for text in (written, now)
     )
-    others = [line for line in after if line not in before] or [line for line in before if line not in after]
-    return [f"{len(others)} other line(s), which are not part of the case, first: {others[0]}"] if others else []
+    lines = [line for line in after if line not in before] or [line for line in before if line not in after]
+    return [f"{len(lines)} other line(s), which are not part of the case, first: {lines[0]}"] if lines else []
 
 
 def _write(
@@ -229,13 +231,13 @@ def _write(
     write_json(folder / on_disk.CASE_NAME, case.as_dict(), at_once=False)
     write_json(folder / decks.LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
     on_disk.write_segment_record(folder, segment, report, by_hand=notes)
-    wanted = before.run
+    planned = before.run
     # Cycles that were enough for the finished run of a case may be too few for an edited deck.
-    doubtful = case.run.cycles < wanted.cycles if wanted.until_steady else case.apart and case != before
+    doubtful = case.run.cycles < planned.cycles if planned.until_steady else case.apart and case != before
     if doubtful and not are_constant(folder):
         reached = f"the velocities are not constant within {percent(CONSTANT)} after {case.run.cycles} cycles"
-        further = f"walkers run continues to {wanted.cycles}: set cycles to {wanted.cycles} and run the deck again"
-        notes.append(f"{reached}; {further if wanted.until_steady else 'set cycles to more and run the deck again'}")
+        further = f"walkers run continues to {planned.cycles}: set cycles to {planned.cycles} and run the deck again"
+        notes.append(f"{reached}; {further if planned.until_steady else 'set cycles to more and run the deck again'}")
         on_disk.write_segment_record(folder, segment, report, by_hand=notes)
     measure(folder)
     about: dict[str, Any] = {"drive_from": segment.drive_from, "segments": 1, "by_hand": notes}

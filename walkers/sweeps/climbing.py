@@ -91,8 +91,8 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
     piles = pd.DataFrame([{name: result[name] for name in ("beads", "large", "driven")} for result in results])
     climbs = pd.concat([result.table("clusters").assign(pile=pile) for pile, result in enumerate(results)])
     climbs = climbs[climbs["climbed"].astype(bool)]
-    each: Any = climbs.assign(run=[runs[pile].name for pile in climbs["pile"]]).to_dict("records")
-    return {**summary(piles, climbs, within), "each": list(map(plain, each))}
+    records: Any = climbs.assign(run=[runs[pile].name for pile in climbs["pile"]]).to_dict("records")
+    return {**summary(piles, climbs, within), "each": list(map(plain, records))}
 
 
 def summary(piles: pd.DataFrame, climbs: pd.DataFrame, within: float | None = None) -> dict[str, Any]:
@@ -182,16 +182,16 @@ def leaders(piles: pd.DataFrame, climbs: pd.DataFrame) -> dict[str, Any]:
         each climbing cluster leads. Both are from 10,000 draws, one-sided; None without climbs.
     """
     draw, led = np.random.default_rng(0), int(climbs["leader_large"].sum())
-    dealt, own = np.zeros(_DRAWS), np.zeros(_DRAWS)
+    led_among_beads, led_in_cluster = np.zeros(_DRAWS), np.zeros(_DRAWS)
     for pile, rows in climbs.groupby("pile"):
         beads, left = piles["beads"][pile], np.full(_DRAWS, piles["large"][pile])  # labels "large" for further leaders
         for place, weight in enumerate(rows["leader"].value_counts().sort_index()):
             is_large = draw.random(_DRAWS) < left / (beads - place)
-            dealt += weight * is_large
+            led_among_beads += weight * is_large
             left -= is_large
         for large, size in zip(rows["large"], rows["size"], strict=True):
-            own += draw.random(_DRAWS) < large / size
-    chances = {"p_among_beads": dealt, "p_among_own": own}
+            led_in_cluster += draw.random(_DRAWS) < large / size
+    chances = {"p_among_beads": led_among_beads, "p_among_own": led_in_cluster}
     return {
         "led_by_large": led,
         "share_of_large": float(piles["large"].sum() / piles["beads"].sum()),
@@ -255,7 +255,9 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
         "interval": interval,
         "estimator": estimator,
         "median": float(half[0]) if len(half) else None,
-        "curve": {name: [one if isfinite(one) else None for one in line.tolist()] for name, line in curve.items()},
+        "curve": {
+            name: [value if isfinite(value) else None for value in line.tolist()] for name, line in curve.items()
+        },
     }
 
 
@@ -298,7 +300,7 @@ def texts_of(climbs: Mapping[str, Any]) -> dict[str, str]:
 
 def describe_climbs(climbs: Sequence[Mapping[str, Any]]) -> str:
     """`texts_of` conditions, one below the other."""
-    blocks = [aligned([[name, text] for name, text in texts_of(one).items()]) for one in climbs]
+    blocks = [aligned([[name, text] for name, text in texts_of(condition).items()]) for condition in climbs]
     note = f"rates per run and second; in brackets {percent(_CONFIDENCE)} confidence"
     return "\n\n".join([*blocks, note])
 
@@ -346,9 +348,11 @@ def _draw_survival(panel: Axes, curve: Mapping[str, Sequence[float | None]]) -> 
 def _draw_climbs(panel: Axes, climbs: Sequence[Mapping[str, Any]]) -> None:
     for where, (key, look) in list(_KINDS.items())[1:]:
         some = [
-            one for one in climbs if one["speed"] is not None and (" " in one["wall_names"]) == (key == "in_corners")
+            climb
+            for climb in climbs
+            if climb["speed"] is not None and (" " in climb["wall_names"]) == (key == "in_corners")
         ]
-        sizes, speeds = [one["size"] for one in some], [one["speed"] * 1e3 for one in some]
+        sizes, speeds = [climb["size"] for climb in some], [climb["speed"] * 1e3 for climb in some]
         panel.plot(sizes, speeds, look, markerfacecolor="none", label=where, clip_on=False)
     panel.set(xlabel="beads", ylabel="speed (mm/s)", xlim=(0.0, None), ylim=(0.0, None))
 
@@ -362,8 +366,8 @@ def _draw_rates(panel: Axes, table: pd.DataFrame) -> None:
         errors = [rates - rows["rate_low"], rows["rate_high"] - rates]
         panel.errorbar(rates, at, xerr=errors, fmt=look, label=where, linestyle="none", markersize=3.0)
     labels = [
-        fill(f"{_in_short(one['condition']) or 'usual'}: {one['climbed']}/{one['runs']} climbed", _LETTERS)
-        for one in first.to_dict("records")
+        fill(f"{_in_short(row['condition']) or 'usual'}: {row['climbed']}/{row['runs']} climbed", _LETTERS)
+        for row in first.to_dict("records")
     ]
     panel.set_yticks(range(len(labels)), list(map(plain_text, labels)))
     panel.set(xlabel="climbs per run and second", xlim=(0.0, None), ylim=(len(labels) - 0.5, -0.5))

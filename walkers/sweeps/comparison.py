@@ -49,17 +49,21 @@ def _pair(
     quantity: str, unit: str, values: Sequence[Any], scatters: Sequence[Any], numerical: float = nan
 ) -> tuple[dict[str, Any], list[str]]:
     """A quantity of both sides, with difference and errors, as JSON (SI units) and cells of text (readable units)."""
-    given = (*values, *scatters)
-    first, second, *errors = (nan if one is None or isinstance(one, str) else float(one) for one in given)
+    quantities = (*values, *scatters)
+    first, second, *errors = (nan if value is None or isinstance(value, str) else float(value) for value in quantities)
     difference = second - first
     names = ("first", "second", "first_scatter", "second_scatter", "difference", "numerical_error")
     numbers = zip(names, (first, second, *errors, difference, numerical), strict=True)
-    contents = {"quantity": quantity, "unit": unit, **{name: one if isfinite(one) else None for name, one in numbers}}
+    contents = {
+        "quantity": quantity,
+        "unit": unit,
+        **{name: value if isfinite(value) else None for name, value in numbers},
+    }
     usual, size = unit_shown(unit)
     printed = [rounded(value * size, usual) for value in (first, second)]
     if abs(difference) < 2e-3 * abs(first):  # digits that are not printed would contradict the printed ones
         difference = (float(printed[1]) - float(printed[0])) / size
-    both = " and ".join(_two_digits(one * size, usual) for one in errors if isfinite(one)) or "-"
+    both = " and ".join(_two_digits(error * size, usual) for error in errors if isfinite(error)) or "-"
     cells = [*printed, _signed(difference * size, usual), both, _two_digits(numerical * size, usual)]
     return contents, [sweeps.with_unit(quantity, usual), *cells]
 
@@ -80,31 +84,35 @@ def compare_runs(first: Side, second: Side) -> Comparison:
     not_run = [side.name for side in (first, second) if side.directory is None]
     parameters, differences = _different([first.case, second.case], names)
     pairs = [] if not_run else _pairs([read(run) for run in runs])
-    apart = [(one, cells) for one, cells in pairs if one["first"] != one["second"]]
+    apart = [(numbers, cells) for numbers, cells in pairs if numbers["first"] != numbers["second"]]
     text = [differences or "the cases are the same"]
-    for one, cells in apart:
-        if one["quantity"] == "cycles" and not differences:
+    for numbers, cells in apart:
+        if numbers["quantity"] == "cycles" and not differences:
             text = [f"{text[0]}, but ran {' and '.join(cells[1:3])} cycles"]
     if apart:
         heads = ["result", *names, "difference", "scatter of copies", "numerical error"]
         text.append(aligned([heads, *(cells for _, cells in apart)]))
-        text += [_times_the_error(one) for one, _ in apart if one["quantity"] in _VELOCITIES and one["numerical_error"]]
-    if same := [one["quantity"] for one, _ in pairs if one["first"] == one["second"]]:
+        text += [
+            _times_the_error(numbers)
+            for numbers, _ in apart
+            if numbers["quantity"] in _VELOCITIES and numbers["numerical_error"]
+        ]
+    if same := [numbers["quantity"] for numbers, _ in pairs if numbers["first"] == numbers["second"]]:
         text.append(f"the same in both: {', '.join(same)}" if apart else "all results are the same")
     text += [f"{name}: no finished run; only the parameters are compared" for name in not_run]
     contents = {"first": first.name, "second": second.name, "parameters": parameters, "not_run": not_run}
-    return Comparison(contents | {"results": [one for one, _ in pairs]}, "\n\n".join(text))
+    return Comparison(contents | {"results": [numbers for numbers, _ in pairs]}, "\n\n".join(text))
 
 
-def _times_the_error(one: Mapping[str, Any]) -> str:
-    times = abs(one["difference"]) / one["numerical_error"]
-    return f"{one['quantity']}: differs by {_two_digits(times, '')} times its numerical error"
+def _times_the_error(numbers: Mapping[str, Any]) -> str:
+    times = abs(numbers["difference"]) / numbers["numerical_error"]
+    return f"{numbers['quantity']}: differs by {_two_digits(times, '')} times its numerical error"
 
 
 def _different(cases: Sequence[Case], names: Sequence[str]) -> tuple[dict[str, list[Any]], str]:
     """The given values by which two cases differ, without derived ones, in SI units, and as text."""
-    flat = [flattened(one) for one in cases]
-    parameters = {key: [one.get(key) for one in flat] for key in differing(flat)}
+    flat = [flattened(case) for case in cases]
+    parameters = {key: [parameters_of_case.get(key) for parameters_of_case in flat] for key in differing(flat)}
     rows = [[key, *(readable(key, value) for value in values)] for key, values in parameters.items()]
     return parameters, aligned([["parameter", *names], *rows]) if rows else ""
 
@@ -118,9 +126,9 @@ def _pairs(results: Sequence[Results]) -> list[tuple[dict[str, Any], list[str]]]
     for name, (unit, _) in sweeps.columns_of(names.difference(ASIDE, little, ["coverage"])).items():
         error = hypot(*(result.get(f"{name}_error", nan) for result in results))
         both = [result.get(name) for result in results], [scatter.get(name) for scatter in scatters]
-        one, cells = _pair(name, unit, *both, error)
-        if one["first"] is not None or one["second"] is not None:
-            pairs.append((one, cells))
+        numbers, cells = _pair(name, unit, *both, error)
+        if numbers["first"] is not None or numbers["second"] is not None:
+            pairs.append((numbers, cells))
     return pairs
 
 
@@ -147,16 +155,16 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
     tables, source = [sweeps.load(directory) for directory in (first, second)], f"{first}, {second}"
     names = [str(table.attrs["sweep"]) for table in tables]
     names = [str(first), str(second)] if names[0] == names[1] else names
-    values, others = (
+    values, values_of_second = (
         {key: sweeps.key_values(table, key) for axis in table.attrs["axes"] for key in axis} for table in tables
     )
-    units = [{key: unit for key, (_, unit) in one.items()} for one in (values, others)]
-    heads = [[*map(sweeps.with_unit, one, one.values())] for one in units]
+    units = [{key: unit for key, (_, unit) in keys.items()} for keys in (values, values_of_second)]
+    heads = [[*map(sweeps.with_unit, units_of_keys, units_of_keys.values())] for units_of_keys in units]
     if units[0] != units[1]:
-        differences = " and ".join(", ".join(one) or "nothing" for one in heads)
+        differences = " and ".join(", ".join(head) or "nothing" for head in heads)
         raise refused(source, f"expected sweeps that vary the same keys in the same units: {differences}")
-    known = [name for name in tables[0].columns if name in tables[1] and tables[0][name].dtype.kind in "fiu"]
-    column = sweeps.find_name("column", column or sweeps.default_column(max(tables, key=sweeps.sides_differ)), known)
+    numeric = [name for name in tables[0].columns if name in tables[1] and tables[0][name].dtype.kind in "fiu"]
+    column = sweeps.find_name("column", column or sweeps.default_column(max(tables, key=sweeps.sides_differ)), numeric)
     at = [table.assign(at=[", ".join(row) for row in sweeps.key_texts(table).to_numpy()]) for table in tables]
     done = [table[table["status"] == "finished"] for table in at]
     both = done[0].merge(done[1], on="at", suffixes=("_first", "_second"))
@@ -169,12 +177,12 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
         numbers, errors = (
             [row.get(f"{name}_{side}") for side in ("first", "second")] for name in (column, scatter_of(column))
         )
-        one, (_, *cells) = _pair(column, unit, numbers, errors)
+        compared, (_, *cells) = _pair(column, unit, numbers, errors)
         point = {key: of_key[row["point_first"]] for key, (of_key, _) in values.items()}
-        points.append({"point": point, **one})
+        points.append({"point": point, **compared})
         lines.append([*map(sweeps.value_text, point.values()), *cells[:-1]])
     usual, size = unit_shown(unit)
-    largest = max((one["difference"] or 0.0 for one in points), key=abs)
+    largest = max((point["difference"] or 0.0 for point in points), key=abs)
     line = f"{len(both)} points in both; largest difference {_signed(largest * size, usual)} {usual}".rstrip()
     unmatched = [len(table) - len(both) for table in tables]
     if any(unmatched):

@@ -265,8 +265,8 @@ class Cleaning:
         kinds["stale lock"] = len(self.locks)
         lines = [aligned(rows[:_MOST_LINES])] if rows else []
         lines += [f"and {len(rows) - _MOST_LINES} more"] if len(rows) > _MOST_LINES else []
-        what = ", ".join(counted(number, kind) for kind, number in kinds.items() if number) or "nothing"
-        return "\n".join([*lines, *self.remarks, f"{what} to remove, {bytes_text(total)}"])
+        removed = ", ".join(counted(number, kind) for kind, number in kinds.items() if number) or "nothing"
+        return "\n".join([*lines, *self.remarks, f"{removed} to remove, {bytes_text(total)}"])
 
 
 def plan_cleaning(out: Path, given: Sequence[Path] = ()) -> Cleaning:
@@ -281,18 +281,18 @@ def plan_cleaning(out: Path, given: Sequence[Path] = ()) -> Cleaning:
     contents = inventory(out)
     is_sweep = contents["kind"] == "sweep"
     runs_of = dict(zip(contents.loc[is_sweep, "name"], contents.loc[is_sweep, "runs"], strict=True))
-    wanted = ~is_sweep & (contents["status"] != "finished")
+    doomed = ~is_sweep & (contents["status"] != "finished")
     if given:
         for sweep_file in out.glob(f"*/{RECORD_NAME}"):
             read_record(sweep_file.parent)  # its runs must be known
         named = pd.Series(contents.index.isin([row for place in given for row in _rows_at(place, contents)]))
         names = {*contents["name"][named]}
-        wanted = named | contents["name"].isin(_with_theirs(names, runs_of) - names)
+        doomed = named | contents["name"].isin(_with_theirs(names, runs_of) - names)
     stays = {
-        "running": wanted & ~is_sweep & (contents["status"] == "running"),
-        "about to be restored": wanted & contents["directory"].map(_waits),
+        "running": doomed & ~is_sweep & (contents["status"] == "running"),
+        "about to be restored": doomed & contents["directory"].map(_waits),
     }
-    remove = contents[wanted & ~stays["running"] & ~stays["about to be restored"]]
+    remove = contents[doomed & ~stays["running"] & ~stays["about to be restored"]]
     going = {*remove["name"]}
     needed = {name: len(going & {*runs}) for name, runs in runs_of.items() if name not in going}
     remarks = [

@@ -235,7 +235,9 @@ class OpenRun:
 
     def finish(self) -> None:
         """Write the manifest, and move the directory to its place."""
-        wall_seconds, loop_seconds = (sum(one[name] for one in self.done) for name in ("wall_seconds", "loop_seconds"))
+        wall_seconds, loop_seconds = (
+            sum(record[name] for record in self.done) for name in ("wall_seconds", "loop_seconds")
+        )
         report = EngineReport(self.done[0]["version"], wall_seconds, loop_seconds, int(self.done[-1]["end"]))
         start = on_disk.drive_from(self.case, self.done) or 0
         rest = [segment["root_mean_square_velocity"] for segment in self.done if segment["end"] <= start]
@@ -280,9 +282,9 @@ def open_locked(
     except Stopped:
         raise
     except (WalkersError, OSError) as failure:
-        said = {"reason": type(failure).__name__, "message": str(failure), "lost": getattr(failure, "lost", 0)}
+        contents = {"reason": type(failure).__name__, "message": str(failure), "lost": getattr(failure, "lost", 0)}
         with suppress(OSError):  # the disk may be full; the message reaches the user anyway
-            write_json(directory / on_disk.FAILURE_NAME, said)
+            write_json(directory / on_disk.FAILURE_NAME, contents)
         raise
 
 
@@ -331,10 +333,10 @@ def _make_together(
             _part(incomplete, tried, deck, report)
             done = [name for name in cases if cycles >= cases[name].run.cycles or _are_constant(incomplete / name)]
             shared = {"first": first, "runs": len(done), "walkers": len(deck.layout.walkers)}
-            own: dict[str, Any] = {"started": started, "drive_from": 0, "segments": 1, "shared_deck": shared}
+            about: dict[str, Any] = {"started": started, "drive_from": 0, "segments": 1, "shared_deck": shared}
             for name in done:
                 measure(incomplete / name)
-                write_manifest(cases[name], name, engine, report, directory=incomplete / name, **own)
+                write_manifest(cases[name], name, engine, report, directory=incomplete / name, **about)
             settle()
             for name in done:
                 on_disk.move_into_place(incomplete / name, out / name)

@@ -25,10 +25,12 @@ class FlatCase(dict[str, Any]):
 
 def flattened(case: Case) -> FlatCase:
     """The values of a case as plain JSON types, by the keys of a case file."""
-    flat = FlatCase((one.key, to_jsonable_python(one.value)) for one in case.origins if one.value is not None)
+    flat = FlatCase(
+        (origin.key, to_jsonable_python(origin.value)) for origin in case.origins if origin.value is not None
+    )
     if case.placed:  # which have no origins, because there may be hundreds
         flat["placed"] = [[*bead.at, bead.radius] for bead in case.placed]
-    flat.given = frozenset(["placed", *(one.key for one in case.origins if one.origin == "given")])
+    flat.given = frozenset(["placed", *(origin.key for origin in case.origins if origin.origin == "given")])
     return flat
 
 
@@ -70,16 +72,18 @@ def differing(cases: Sequence[FlatCase]) -> list[str]:
     return [key for key in varied if any(key in case.given for case in cases)] or varied
 
 
-def short_keys(keys: Sequence[str], others: Iterable[str] = ("name",)) -> list[str]:
+def short_keys(keys: Sequence[str], reserved: Iterable[str] = ("name",)) -> list[str]:
     """The last parts of keys; whole keys where that is also the last part of another key, or one of ``others``."""
     last = [key.rpartition(".")[2] for key in keys]
-    taken = set(others).difference(keys)
-    return [key if one in taken or last.count(one) > 1 else one for key, one in zip(keys, last, strict=True)]
+    taken = set(reserved).difference(keys)
+    return [
+        key if ending in taken or last.count(ending) > 1 else ending for key, ending in zip(keys, last, strict=True)
+    ]
 
 
 def _comparable(value: Any) -> Hashable:
     if isinstance(value, (list, tuple)):
-        return tuple(_comparable(one) for one in value)
+        return tuple(_comparable(item) for item in value)
     return float(f"{value:.12g}") if isinstance(value, float) else value
 
 
@@ -89,28 +93,28 @@ def chosen(cases: Sequence[Mapping[str, Any]], condition: str) -> list[bool]:
     The key may be the end of a key, the value a number with its unit if it has one, a text, or a list as `readable`
     writes it. `InputError` if the condition cannot be read, or no case has such a key.
     """
-    key, _, wanted = (part.strip() for part in condition.partition("="))
-    if not (key and wanted):
+    key, _, text = (part.strip() for part in condition.partition("="))
+    if not (key and text):
         raise refused("where", f'"{condition}": expected KEY=VALUE, such as "drive.frequency=80 Hz"')
     values = [{name: value for name, value in case.items() if f".{name}".endswith(f".{key}")} for case in cases]
     if cases and not any(values):
-        known = ", ".join(dict.fromkeys(name for case in cases for name in case))
-        raise InputError("where", [Problem(key, None, f"no run has such a key; they have {known}")])
+        keys = ", ".join(dict.fromkeys(name for case in cases for name in case))
+        raise InputError("where", [Problem(key, None, f"no run has such a key; they have {keys}")])
     try:
-        return [any(_is(name, value, wanted.strip('"')) for name, value in named.items()) for named in values]
+        return [any(_is(name, value, text.strip('"')) for name, value in named.items()) for named in values]
     except ValueError as error:
         raise refused("where", f'"{condition}": {error}') from error
 
 
-def _is(key: str, value: Any, wanted: str) -> bool:
+def _is(key: str, value: Any, text: str) -> bool:
     """Whether a value is the wanted one; ValueError if that can be no value of its kind."""
-    if wanted in (readable(key, value), str(value)):
+    if text in (readable(key, value), str(value)):
         return True
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return str(value).lower() == wanted.lower()
+        return str(value).lower() == text.lower()
     if kind := kind_of(key):
-        return isclose(units.parse_quantity(wanted, kind), value, rel_tol=1e-6)
+        return isclose(units.parse_quantity(text, kind), value, rel_tol=1e-6)
     try:
-        return isclose(float(wanted), value, rel_tol=1e-6)
+        return isclose(float(text), value, rel_tol=1e-6)
     except ValueError as error:
         raise ValueError("expected a number without a unit") from error

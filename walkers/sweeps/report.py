@@ -32,7 +32,7 @@ def report_sweep(directory: Path, to: Path | None = None) -> Path:
     links = [os.path.relpath(report, path.absolute().parent) if report.is_file() else "" for report in reports]
     svg, left_out = _figure(frame)
     results = [read(run) for run in frame.loc[frame["status"] == "finished", "run"]]
-    rests = {one["key"]: one for result in results for one in result.about["rests_on"] if one["key"] not in frame}
+    rests = {rest["key"]: rest for result in results for rest in result.about["rests_on"] if rest["key"] not in frame}
     cells, same = cells_of(frame.drop(columns="run"), readable_key)
     body = fill(
         "sweep.html.j2",

@@ -226,22 +226,24 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     record = table.describe_sweep(sweep, cases, binary, out)
     if options.site is not None:
         check_path(record.directory)
-    found = table.states(record)
-    final = _failures(record, found, options.final)
-    settled = {point for point, state in enumerate(found) if state.status == "finished"}
+    point_states = table.states(record)
+    final = _failures(record, point_states, options.final)
+    settled = {point for point, state in enumerate(point_states) if state.status == "finished"}
     settled |= {failure.point for failure in final}
     # A shared deck stays well below the time limit, because a single point may be close to it.
     longest = min(LONGEST_SECONDS, 0.5 * (options.time_limit or inf))
     packed = pack(cases, options.decks_at_once, longest)
     decks = [part for deck in packed for part in unfinished_parts(deck.points, cases, settled)]
-    return SweepPlan(record, cases, binary, decks, [state.status for state in found], options, final)
+    return SweepPlan(record, cases, binary, decks, [state.status for state in point_states], options, final)
 
 
-def _failures(record: table.SweepRecord, found: Sequence[table.PointState], reasons: Collection[str]) -> list[Failure]:
+def _failures(
+    record: table.SweepRecord, point_states: Sequence[table.PointState], reasons: Collection[str]
+) -> list[Failure]:
     """The points with such failures."""
     return [
         Failure(point, run, state.reason or "", state.message or "", str(state.directory))
-        for point, (run, state) in enumerate(zip(record.runs, found, strict=True))
+        for point, (run, state) in enumerate(zip(record.runs, point_states, strict=True))
         if state.reason in reasons
     ]
 
@@ -326,12 +328,12 @@ def work(
 
     try:
         look()
-        own = find_engine(str(engine.path))
-        if own.sha256 != engine.sha256:
-            raise EngineDiffers(f"the engine on {node()}, {own.path}, is not the engine that started this sweep")
-        if list(runs) != [run_place(case, own, out).name for case in cases]:
+        local = find_engine(str(engine.path))
+        if local.sha256 != engine.sha256:
+            raise EngineDiffers(f"the engine on {node()}, {local.path}, is not the engine that started this sweep")
+        if list(runs) != [run_place(case, local, out).name for case in cases]:
             raise ProgramDiffers(f"the program on {node()} has another version than the one that started the sweep")
-        return [*make_runs(cases, out, own, on_progress=look, time_limit=time_limit)]
+        return [*make_runs(cases, out, local, on_progress=look, time_limit=time_limit)]
     except (OSError, WalkersError) as error:
         kind, message, directory = type(error), str(error), None
         if isinstance(error, EngineFailure):
@@ -406,7 +408,7 @@ class _Loop:
         self.alone: Counter[tuple[str, str]] = Counter()
         """Failures of points alone, by name and message."""
         self.begin, self.seconds = time.perf_counter(), sum(deck.seconds for deck in plan.decks)
-        self.found = self.done = plan.statuses.count("finished")
+        self.finished_before = self.done = plan.statuses.count("finished")
 
     def run(self, on_progress: Tell) -> list[Failure]:
         """Work until every point is finished or failed; return the failures in the order of the points."""
@@ -415,7 +417,7 @@ class _Loop:
             for deck in self.plan.decks:
                 self._submit(deck)
             while self.decks or self.halves:
-                if self.halves and (self.done > self.found or not self.decks):
+                if self.halves and (self.done > self.finished_before or not self.decks):
                     self._submit(self.halves.pop())
                     continue
                 for future in wait(self.decks, _LOOK_SECONDS, FIRST_COMPLETED).done:
@@ -452,7 +454,7 @@ class _Loop:
 
     def _check_hits(self, failure: Failure, *, alone: bool) -> None:
         """Raise `SweepStopped` if a failure hits every point, or the first points alone in the same way."""
-        at_first, alike = self.done == self.found, (failure.reason, failure.message.partition(" (see ")[0])
+        at_first, alike = self.done == self.finished_before, (failure.reason, failure.message.partition(" (see ")[0])
         if failure.hits == "every point" or (failure.hits == "all at first" and at_first):
             raise SweepStopped(f"{failure.message}; this would hit every point, and the sweep is stopped")
         self.alone[alike] += alone
@@ -467,9 +469,11 @@ class _Loop:
         in_decks = f" in {len(decks)} decks" if 1 < len(decks) < running else ""
         words = [f"{self.done} of {points} points done, {running} running{in_decks}, {failed} failed"]
         elapsed = time.perf_counter() - self.begin
-        if made := self.done - self.found:
-            each = elapsed / made
-            words.append(f"{60.0 / each:.0f} points per minute" if each < 10.0 else f"{duration_text(each)} per point")
+        if finished_now := self.done - self.finished_before:
+            seconds = elapsed / finished_now
+            words.append(
+                f"{60.0 / seconds:.0f} points per minute" if seconds < 10.0 else f"{duration_text(seconds)} per point"
+            )
         waiting = sum(deck.seconds for deck in [*self.decks.values(), *self.halves])
         if waiting < self.seconds:
             words.append(f"{duration_text(waiting / (self.seconds - waiting) * elapsed)} left")

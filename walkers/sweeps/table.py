@@ -150,21 +150,21 @@ def states(record: SweepRecord) -> list[PointState]:
 
 def checked_states(record: SweepRecord) -> list[PointState]:
     """State of each point as from `states`, with its result; finished runs whose result cannot be read have failed."""
-    found = states(record)
-    for number, state in enumerate(found):
+    points = states(record)
+    for number, state in enumerate(points):
         if state.status == "finished" and state.directory is not None:
             try:
-                found[number] = replace(state, result=read(state.directory))
+                points[number] = replace(state, result=read(state.directory))
             except InputError as error:
-                found[number] = PointState("failed", state.directory, UNREADABLE, str(error))
-    return found
+                points[number] = PointState("failed", state.directory, UNREADABLE, str(error))
+    return points
 
 
 def worst_status(points: Iterable[str]) -> str:
     """Status of a sweep from those of its points: running, interrupted or failed if one is, in this order."""
-    found = set(points)
+    statuses = set(points)
     worst = {"running": "running", "missing": "interrupted", "failed": "failed"}
-    return next((status for one, status in worst.items() if one in found), "finished")
+    return next((status for status_of_point, status in worst.items() if status_of_point in statuses), "finished")
 
 
 def state_at(place: Path, directory: Path | None = None) -> PointState:
@@ -215,14 +215,19 @@ def load(directory: str | Path) -> pd.DataFrame:
 
 def columns_of(names: Iterable[str]) -> dict[str, tuple[str, str]]:
     """Unit and meaning of numbers of results, in the order of their declarations."""
-    return {one.name: (one.si_unit, one.meaning) for one in map(declared, ordered(names))}
+    return {quantity.name: (quantity.si_unit, quantity.meaning) for quantity in map(declared, ordered(names))}
 
 
 def _declared(sweep: Sweep) -> list[str]:
     """The numbers of results of a sweep's cases, without those of single beads; none if a case cannot be read."""
     with suppress(InputError):
         groups = [module.NAME for module in modules_of(next(sweep.cases()))]
-        return [one.name for group in [*groups, "drive"] for one in GROUPS[group] if not one.name.endswith("*")]
+        return [
+            quantity.name
+            for group in [*groups, "drive"]
+            for quantity in GROUPS[group]
+            if not quantity.name.endswith("*")
+        ]
     return []
 
 
@@ -235,7 +240,11 @@ def _described(frame: pd.DataFrame, described: Mapping[str, tuple[str, str]]) ->
 def _row(number: int, sweep: Sweep, state: PointState) -> dict[str, Any]:
     row: dict[str, Any] = {"point": number, **(state.result or {})}
     for key, value in zip(sweep.keys, sweep.values[number], strict=True):
-        row |= {f"{key}[{part}]": one for part, one in enumerate(value)} if isinstance(value, list) else {key: value}
+        row |= (
+            {f"{key}[{part}]": component for part, component in enumerate(value)}
+            if isinstance(value, list)
+            else {key: value}
+        )
     row |= {name: getattr(state, name) or "" for name in ("status", "reason", "message")}
     return row | {"lost": state.lost, "run": os.path.relpath(state.directory) if state.directory else ""}
 
@@ -276,14 +285,16 @@ def default_column(frame: pd.DataFrame) -> str:
     return next((name for name in main_columns(frame) if name in frame), "frequency")
 
 
-def find_name(option: str, wanted: str, names: Iterable[str]) -> str:
+def find_name(option: str, word: str, names: Iterable[str]) -> str:
     """Find a name, or the only name that ends with ``.`` and it; `InputError` if there is none or several."""
-    known = list(dict.fromkeys(names))
-    found = [name for name in known if name == wanted] or [name for name in known if name.endswith(f".{wanted}")]
-    if len(found) == 1:
-        return found[0]
-    text = f"expected one of {', '.join(found or known)}{'' if found else suggestion(wanted, known)}"
-    raise refused(option, f'"{wanted}": {text}')
+    candidates = list(dict.fromkeys(names))
+    matches = [name for name in candidates if name == word] or [
+        name for name in candidates if name.endswith(f".{word}")
+    ]
+    if len(matches) == 1:
+        return matches[0]
+    text = f"expected one of {', '.join(matches or candidates)}{'' if matches else suggestion(word, candidates)}"
+    raise refused(option, f'"{word}": {text}')
 
 
 def with_unit(words: str, unit: str | None) -> str:
@@ -333,7 +344,9 @@ def encoded(frame: pd.DataFrame, form: str) -> bytes:
     types = {name: "boolean" for name, kinds in mixed.items() if bool in kinds and str not in kinds}
     types |= {name: "str" for name, kinds in mixed.items() if str in kinds and len(kinds) > 1}
     table = pa.Table.from_pandas(frame.astype(types), preserve_index=False)
-    fields = [one.with_metadata({"unit": units[one.name], "meaning": meanings[one.name]}) for one in table.schema]
+    fields = [
+        field.with_metadata({"unit": units[field.name], "meaning": meanings[field.name]}) for field in table.schema
+    ]
     buffer = io.BytesIO()
     pq.write_table(table.cast(pa.schema(fields, metadata=table.schema.metadata)), buffer, compression="zstd")
     return buffer.getvalue()
@@ -354,8 +367,8 @@ def cells_of(frame: pd.DataFrame, named: Callable[[str], str] | None = None) -> 
     """
     import pandas as pd
 
-    wanted = _SHOWN | (set(SIDES) if sides_differ(frame) else {"velocity", default_column(frame)})
-    names = [name for name in map(str, frame) if name in wanted or not (is_declared(name) or name in _ASIDE)]
+    shown = _SHOWN | (set(SIDES) if sides_differ(frame) else {"velocity", default_column(frame)})
+    names = [name for name in map(str, frame) if name in shown or not (is_declared(name) or name in _ASIDE)]
     varied, cells, same = frame.attrs["varied"], {}, []
     kept = {"point", *varied, *main_columns(frame)} if "status" in names else {*names}
     short = dict(zip(varied, short_keys(varied, names), strict=True))
@@ -399,25 +412,25 @@ def thresholds(frame: pd.DataFrame) -> pd.DataFrame:
 
     if (until_below := frame.attrs["until_below"]) is None:
         raise refused(frame.attrs["sweep"], "the sweep has no descent and therefore no thresholds")
-    *others, lowered = frame.attrs["varied"]
+    *kept, lowered = frame.attrs["varied"]
     rows = []
     for _, points in frame.groupby(frame["point"] // frame[lowered].nunique()):
         finished = points[points["status"] == "finished"]
         slow = finished["velocity"].astype(float).abs() < until_below
-        row = {name: points.iloc[0][name] for name in others}
+        row = {name: points.iloc[0][name] for name in kept}
         for name, part in (("moving", finished[~slow.cummax()].tail(1)), ("at_rest", finished[slow].head(1))):
             row[name] = part.iloc[0][lowered] if len(part) else nan
             row[f"gamma0_{name}"] = part.iloc[0]["gamma0"] if len(part) else nan
         rows.append(row)
     units = frame.attrs["units"]
-    described = {name: (units[name], "varied") for name in others} | {
+    described = {name: (units[name], "varied") for name in kept} | {
         "moving": (units[lowered], f"last {lowered} at which the walkers move"),
         "gamma0_moving": ("", "dimensionless peak force Γ0 of moving"),
         "at_rest": (units[lowered], f"first {lowered} at which the walkers rest"),
         "gamma0_at_rest": ("", "dimensionless peak force Γ0 of at_rest"),
     }
     table = _described(pd.DataFrame(rows), described)
-    table.attrs["varied"] = others
+    table.attrs["varied"] = kept
     return table
 
 

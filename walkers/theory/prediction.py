@@ -220,9 +220,9 @@ def _of_engine(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 def _cells(model: dict[str, Any]) -> list[str]:
     """Cells of the row of a model, and the reason why it has no velocity."""
     velocity, gamma = model["velocity"], model.get("threshold")
-    others = [] if velocity is None else [*model.get("rotation", []), *model.get("sliding", [])[:1]]
+    speeds_of_beads = [] if velocity is None else [*model.get("rotation", []), *model.get("sliding", [])[:1]]
     speeds = ["-" if velocity is None else with_decimals(velocity * 1e3, 3)]
-    speeds += [with_decimals(speed * 1e3, 2) for speed in others]
+    speeds += [with_decimals(speed * 1e3, 2) for speed in speeds_of_beads]
     return [*speeds, *[""] * (4 - len(speeds)), "" if gamma is None else f"{gamma:.3f}", model.get("reason") or ""]
 
 

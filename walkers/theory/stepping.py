@@ -196,14 +196,14 @@ def _settle(table: FloatArray, mu: FloatArray, seconds: float, free: Three, rest
             normal = max(rest[at] + _row(table, _PRESS + at, parallel), 0.0)
             speed = free[at] - seconds * _row(table, _GAIN + at, parallel)
             scale = seconds * table[_GAIN + at, at]
-            wanted = parallel[at] + speed / scale
-            if abs(wanted) <= normal * mu[at]:
+            trial = parallel[at] + speed / scale
+            if abs(trial) <= normal * mu[at]:
                 modes[at] = 0.0
                 for by in range(3):
                     rows[at, by] = table[_GAIN + at, by] / table[_GAIN + at, at]
                 right[at] = speed / scale
                 continue
-            modes[at] = np.sign(wanted)
+            modes[at] = np.sign(trial)
             slope = modes[at] * mu[at]
             for by in range(3):
                 rows[at, by] = -slope * table[_PRESS + at, by]
