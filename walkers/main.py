@@ -141,9 +141,9 @@ def help_of(names: Sequence[str], apps: Sequence[App]) -> str:
     if function := app.default_command:
         text = (inspect.getdoc(function) or "") if not inner else text
         with app.app_stack(apps):
-            arguments = [one for one in app.assemble_argument_collection(parse_docstring=True) if one.show]
-        placed = [_described(one) for one in arguments if one.field_info.is_positional]
-        chosen = [_described(one) for one in arguments if not one.field_info.is_positional]
+            arguments = app.assemble_argument_collection(parse_docstring=True).filter_by(show=True)
+        placed = [_described(argument) for argument in arguments if argument.field_info.is_positional]
+        chosen = [_described(argument) for argument in arguments if not argument.field_info.is_positional]
         usage = "".join(f" {name}" for name, _ in placed)
         usage = f"{usage} |{words}" if inner else usage
         tables = [*([_table("Arguments", placed)] if placed else []), *tables, _table("Options", [*chosen, _HELP_ROW])]
@@ -191,9 +191,10 @@ def _report_stop(stop: BaseException, tokens: list[str]) -> int:
         return stop.code if isinstance(stop.code, int) else 0
     if isinstance(stop, InputError) and stop.source not in tokens:
         stop.args = (str(stop).replace(stop.source, _options_of(stop.source, tokens), 1),)
-    known = ((InputError, 2), (WalkersError, 1), (KeyboardInterrupt, _INTERRUPTED))
-    status = stop.status if isinstance(stop, _Terminated) else next((s for k, s in known if isinstance(stop, k)), None)
-    if status is not None:
+    if isinstance(stop, _Terminated):
+        return _tell(str(stop), stop.status)
+    statuses = {InputError: 2, WalkersError: 1, KeyboardInterrupt: _INTERRUPTED}
+    if status := next((status for kind, status in statuses.items() if isinstance(stop, kind)), 0):
         return _tell(str(stop) or "interrupted", status)
     # The reader of the output, such as head, has closed it; this is not a failure.
     if isinstance(stop if isinstance(stop, OSError) else stop.__context__, BrokenPipeError):
@@ -217,7 +218,8 @@ def _options_of(names: str, tokens: list[str]) -> str:
     """The options of the command for arguments of a function of the package, such as ``begin, end``."""
     _, apps, _ = program().parse_commands(tokens)
     arguments = apps[-1].assemble_argument_collection()
-    options = {one.name[2:]: one.name for one in arguments} | {one.field_info.name: one.name for one in arguments}
+    options = {argument.name[2:]: argument.name for argument in arguments}
+    options |= {argument.field_info.name: argument.name for argument in arguments}
     return ", ".join(options.get(name, name) for name in names.split(", "))
 
 

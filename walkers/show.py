@@ -68,14 +68,14 @@ def predicted_overhead(cases: Iterable[Case]) -> float:
     from walkers.physics.laws.young_laplace import unsolved
 
     cases = list(cases)
-    kinds = {(one.liquid.of_bridges, one.contact.roughness, tuple(sorted(set(one.radii)))) for one in cases}
+    kinds = {(case.liquid.of_bridges, case.contact.roughness, tuple(sorted(set(case.radii)))) for case in cases}
     bridges = [
         bridge
         for liquid, roughness, radii in kinds
         if liquid.law.startswith("young-laplace")
         for place, radius in enumerate(radii)
-        for other in (inf, *radii[place:])
-        for bridge in Surfaces.of(radius, other, liquid, roughness).volumes
+        for second in (inf, *radii[place:])
+        for bridge in Surfaces.of(radius, second, liquid, roughness).volumes
     ]
     return _SOLVING_SECONDS * unsolved(bridges) + _MEASURING_SECONDS * len(cases)
 
@@ -99,7 +99,7 @@ def notes(case: Case) -> list[str]:
     if not (case.loose and case.boundary.closed and case.mixture):
         return lines
     numbers = {"large": case.large, "small": case.count - case.large}
-    lines += [f"no {name} beads; in the paper, large beads lead small ones" for name, one in numbers.items() if not one]
+    lines += [f"no {name} beads; in the paper, large beads lead small ones" for name in numbers if not numbers[name]]
     room = 2.0 * case.boundary.height - _volume(case) / (_LOOSE_PACKING * case.boundary.cross_section)
     if (fastest := room / case.duration) < _FASTEST_CLIMB:
         lines.append(
@@ -119,8 +119,8 @@ def _volume(case: Case) -> float:
 
 def _youngs_modulus(case: Case) -> float | None:
     """Young's modulus of the material of the beads, Pa, if the library has it."""
-    known = library_of(case.document).numbers("materials", case.beads.material or "").get("youngs_modulus")
-    return parse_quantity(known.written, MODULUS) if known else None
+    youngs_modulus = library_of(case.document).numbers("materials", case.beads.material or "").get("youngs_modulus")
+    return parse_quantity(youngs_modulus.written, MODULUS) if youngs_modulus else None
 
 
 def summarise(case: Case) -> dict[str, Any]:
@@ -138,7 +138,7 @@ def summarise(case: Case) -> dict[str, Any]:
     volume = _volume(case)
     modulus = _youngs_modulus(case)
     summary: dict[str, Any] = {
-        "case": {**case.as_dict(), "origins": [asdict(one) for one in case.origins]},
+        "case": {**case.as_dict(), "origins": [asdict(origin) for origin in case.origins]},
         "drive": {name: getattr(drive, name) for name in ("peak_acceleration", "amplitude", "peak_velocity")},
         "beads": {
             "small": case.count - case.large,
@@ -178,22 +178,23 @@ def _liquid(case: Case, volume: float) -> float:
     """Volume of the liquid on all beads, or, if their menisci give it, in the bridges of the walkers, m³."""
     if case.liquid.meniscus_radius is None:
         return volume * case.liquid.volume_fraction
-    return sum(load.surfaces.volume * one.replicates for one in case.walkers for load in contact_loads(case, one))
+    loads = ((load, walkers.replicates) for walkers in case.walkers for load in contact_loads(case, walkers))
+    return sum(load.surfaces.volume * replicates for load, replicates in loads)
 
 
 def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
     """Loads of the contacts of a walker at rest."""
     loads, tension = contact_loads(case, walkers), case.liquid.surface_tension
     contacts = [f"bead {bead} on substrate" for bead, _ in enumerate(walkers.radii, 1)]
-    contacts += [f"bead {other + 1} on bead {one + 1}" for one, other in walkers.pairs]
+    contacts += [f"bead {second + 1} on bead {first + 1}" for first, second in walkers.pairs]
     planes = [capillary_force_limit_at_wall(tension, radius) for radius in walkers.radii]
     columns = {
         "contact": contacts,
-        "bridge_volume": [one.surfaces.volume for one in loads],
-        "capillary_force": [one.pull for one in loads],
+        "bridge_volume": [load.surfaces.volume for load in loads],
+        "capillary_force": [load.pull for load in loads],
         "capillary_force_limit": [*planes, *(None for _ in walkers.pairs)],
-        "rupture_distance": [one.rupture for one in loads],
-        "overlap_at_rest": [one.overlap for one in loads],
+        "rupture_distance": [load.rupture for load in loads],
+        "overlap_at_rest": [load.overlap for load in loads],
     }
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
@@ -223,11 +224,11 @@ def describe(summary: dict[str, Any]) -> str:
         f"amplitude {drive['amplitude'] * 1e3:.4g} mm, peak velocity {drive['peak_velocity'] * 1e3:.4g} mm/s"
     )
     rows = [["contact", "capillary force", "4πγR limit", "bridge", "rupture", "overlap at rest"]]
-    for one in summary["contacts"]:
-        limit = one["capillary_force_limit"]
-        cells = [f"{one['capillary_force'] * 1e6:.4g} µN", f"{limit * 1e6:.4g} µN" if limit else "planes only"]
-        cells += [f"{one['bridge_volume'] * 1e12:.3g} nL", f"{one['rupture_distance'] * 1e6:.3g} µm"]
-        rows.append([f"  {one['contact']}", *cells, f"{one['overlap_at_rest'] * 1e9:.4g} nm"])
+    for contact in summary["contacts"]:
+        limit = contact["capillary_force_limit"]
+        cells = [f"{contact['capillary_force'] * 1e6:.4g} µN", f"{limit * 1e6:.4g} µN" if limit else "planes only"]
+        cells += [f"{contact['bridge_volume'] * 1e12:.3g} nL", f"{contact['rupture_distance'] * 1e6:.3g} µm"]
+        rows.append([f"  {contact['contact']}", *cells, f"{contact['overlap_at_rest'] * 1e9:.4g} nm"])
     lines += [aligned(rows, right=range(1, 6))] if summary["contacts"] else []
     notes = [f"note       {note}" for note in summary["notes"]]
     return "\n".join([*lines, *_text_of_run(summary["time_step"], summary["run"]), *notes])
@@ -236,22 +237,22 @@ def describe(summary: dict[str, Any]) -> str:
 def _text_of_case(case: dict[str, Any]) -> list[str]:
     """A resolved case, one line per value: key, value in the units of a case file, and origin."""
     lines, table = [printable(f"{case['name']}: {case['title']}").rstrip(": ")], None
-    for one in case["origins"]:
-        within, _, key = one["key"].rpartition(".")
+    for value in case["origins"]:
+        within, _, key = value["key"].rpartition(".")
         if within != table:
             table = within
             lines.append(f"  [{table}]")
-        lines.append(f"    {key:24} {one['text']:24} {_whence(one)}".rstrip())
+        lines.append(f"    {key:24} {value['text']:24} {_origin_text(value)}".rstrip())
     return lines
 
 
-def _whence(one: dict[str, Any]) -> str:
+def _origin_text(value: dict[str, Any]) -> str:
     """Origin of a value as text."""
-    origin, source = str(one["origin"]), str(one["source"])
-    ends = f", range {one['range'][0]} to {one['range'][1]}" if one["range"] else ""
-    if origin == "default" and ends and not one["uncertain"]:
+    origin, source = str(value["origin"]), str(value["source"])
+    ends = f", range {value['range'][0]} to {value['range'][1]}" if value["range"] else ""
+    if origin == "default" and ends and not value["uncertain"]:
         return f"guessed ({source or 'not measured'}){ends.replace('range', 'general range')}"
-    ends = f", uncertain{ends}" if one["uncertain"] else ends
+    ends = f", uncertain{ends}" if value["uncertain"] else ends
     if origin in ("calibrated", "assumed"):
         return source + ends
     return (f"{origin}: {source}" if source else origin) + ends

@@ -49,25 +49,25 @@ def catalogue(*, of_others: bool = True) -> list[Entry]:
 
     Raises `InputError` if that library cannot be used.
     """
-    found = list(_of_library(Library(read_library(Path()) if of_others else None)))
-    found += [Entry("not measured", key, numbers={"default": one}) for key, one in unmeasured().items()]
-    found += [Entry("bridge laws", name, text=_summary(name)) for name in LAWS]
+    entries = list(_of_library(Library(read_library(Path()) if of_others else None)))
+    entries += [Entry("not measured", key, numbers={"default": number}) for key, number in unmeasured().items()]
+    entries += [Entry("bridge laws", name, text=_summary(name)) for name in LAWS]
     for kind in COMMANDS:
         files = shipped(kind[:-1]).items()
-        found += [Entry(kind, name, "", {}, str(read_toml(file).get("title", "")), str(file)) for name, file in files]
-    return found if of_others else [one for one in found if not one.place]
+        entries += [Entry(kind, name, "", {}, str(read_toml(file).get("title", "")), str(file)) for name, file in files]
+    return entries if of_others else [entry for entry in entries if not entry.place]
 
 
-def _of_library(known_to: Library) -> Iterator[Entry]:
-    for one in known_to.collections:
-        for name in one.tables.get("materials", ()):
-            yield Entry("materials", name, one.place, known_to.numbers("materials", name))
-        for name in one.tables.get("liquids", ()):
+def _of_library(library: Library) -> Iterator[Entry]:
+    for collection in library.collections:
+        for name in collection.tables.get("materials", ()):
+            yield Entry("materials", name, collection.place, library.numbers("materials", name))
+        for name in collection.tables.get("liquids", ()):
             note = f"at mass_fraction = {HALF[0]}, {quantity_text(HALF[1], TEMPERATURE)}" if name in MIXTURES else ""
-            yield Entry("liquids", name, one.place, known_to.numbers("liquids", name), note)
-        for pair in one.tables.get("surface_pairs", ()):
+            yield Entry("liquids", name, collection.place, library.numbers("liquids", name), note)
+        for pair in collection.tables.get("surface_pairs", ()):
             first, second = pair["materials"]
-            yield Entry("surface pairs", f"{first} on {second}", one.place, known_to.surface_pair(first, second))
+            yield Entry("surface pairs", f"{first} on {second}", collection.place, library.surface_pair(first, second))
 
 
 def _summary(law: str) -> str:
@@ -75,17 +75,17 @@ def _summary(law: str) -> str:
     return text.split('"""')[1].splitlines()[0]
 
 
-def describe(found: Sequence[Entry]) -> str:
+def describe(entries: Sequence[Entry]) -> str:
     """All names as tables; names of other files are marked."""
     lines = []
     for kind, columns in _COLUMNS.items():
         if kind == "not measured":
             lines += ["", NOT_KNOWN]
         rows = [[kind.capitalize(), *(_HEADS.get(column, column.replace("_", " ")) for column in columns), ""]]
-        for one in found:
-            if one.kind == kind:
-                note = f"{one.text} [{one.place}]" if one.place else one.text
-                rows.append([f"  {one.name}", *(_cell(one.numbers, column) for column in columns), note.strip()])
+        for entry in entries:
+            if entry.kind == kind:
+                note = f"{entry.text} [{entry.place}]" if entry.place else entry.text
+                rows.append([f"  {entry.name}", *(_cell(entry.numbers, column) for column in columns), note.strip()])
         lines += ["", aligned(rows)]
     return "\n".join(lines[1:])
 
@@ -93,33 +93,34 @@ def describe(found: Sequence[Entry]) -> str:
 def _cell(numbers: Mapping[str, LibraryNumber], column: str) -> str:
     """A number with its range; of ``viscosity`` whichever of the two there is."""
     keys = ("kinematic_viscosity", "dynamic_viscosity") if column == "viscosity" else (column,)
-    known = next((numbers[key] for key in keys if key in numbers), None)
-    if known is None:
+    number = next((numbers[key] for key in keys if key in numbers), None)
+    if number is None:
         return "-"
-    ends = f" ({known.range[0]} to {known.range[1]})" if known.range else ""
-    return f"{known.written}{ends}"
+    ends = f" ({number.range[0]} to {number.range[1]})" if number.range else ""
+    return f"{number.written}{ends}"
 
 
-def describe_one(found: Sequence[Entry], name: str) -> str:
+def describe_one(entries: Sequence[Entry], name: str) -> str:
     """All entries of a name: numbers with sources, titles and files; `InputError` if there is none."""
-    wanted = [one for one in found if one.name.casefold() == name.casefold()]
-    if not wanted:
-        names = [one.name for one in found]
-        near = [one for one in names if name.casefold() in one.casefold()]
+    matching = [entry for entry in entries if entry.name.casefold() == name.casefold()]
+    if not matching:
+        names = [entry.name for entry in entries]
+        near = [similar for similar in names if name.casefold() in similar.casefold()]
         message = f"; expected one of {', '.join(near)}" if near else suggestion(name, names)
         raise refused(name, f"not in the library{message or '; walkers library lists it'}")
     # A material, and the pairs that it is part of.
-    wanted += [one for one in found if one.kind == "surface pairs" and wanted[0].name in one.name.split(" on ")]
+    pairs = [entry for entry in entries if entry.kind == "surface pairs"]
+    matching += [pair for pair in pairs if matching[0].name in pair.name.split(" on ")]
     lines = []
-    for one in wanted:
-        lines.append(": ".join(filter(None, (one.name, one.text))) + (f" [{one.place}]" if one.place else ""))
-        if one.kind in COMMANDS:
-            lines += [f"  {one.file}" * bool(one.file), f"  walkers {COMMANDS[one.kind]} {one.name}"]
-        width = max(map(len, one.numbers), default=0)
+    for entry in matching:
+        lines.append(": ".join(filter(None, (entry.name, entry.text))) + (f" [{entry.place}]" if entry.place else ""))
+        if entry.kind in COMMANDS:
+            lines += [f"  {entry.file}" * bool(entry.file), f"  walkers {COMMANDS[entry.kind]} {entry.name}"]
+        width = max(map(len, entry.numbers), default=0)
         lines += [
-            f"  {key:{width}}  {_cell(one.numbers, key):28}  {known.source}".rstrip()
-            for key, known in one.numbers.items()
+            f"  {key:{width}}  {_cell(entry.numbers, key):28}  {number.source}".rstrip()
+            for key, number in entry.numbers.items()
         ]
-    if wanted[0].kind == "materials":
-        lines.append(f"The friction of {wanted[0].name} on other wet surfaces is not measured; see walkers library.")
+    if matching[0].kind == "materials":
+        lines.append(f"The friction of {matching[0].name} on other wet surfaces is not measured; see walkers library.")
     return "\n".join(filter(None, lines))

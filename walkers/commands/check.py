@@ -92,12 +92,12 @@ def literature(*only: Annotated[str, Parameter(name="CHECK")], out: Out = DEFAUL
 
 
 @check.command
-def files(what: RunOrSweep, /, *, at: At = At()) -> int:
+def files(name: RunOrSweep, /, *, at: At = At()) -> int:
     """Compare the files of a run, a sweep or an unpacked archive (its folder) with their checksums."""
     from walkers.api import directory_of
     from walkers.archive.verification import verify
 
-    parts = verify(directory_of(what, at.out, at.values))
+    parts = verify(directory_of(name, at.out, at.values))
     print_lines(part.describe() for part in parts)
     return 0 if all(part.passed for part in parts) else 1
 
@@ -177,13 +177,13 @@ def figures(
     from walkers.paper.make import FORMATS, make_figures
     from walkers.sweeps.scheduler import Options
 
-    made = make_figures(out, to, Options(jobs), only=only or (), formats=formats or FORMATS, progress=True, **vars(by))
-    for name, failures in made.failures.items():
+    drawn = make_figures(out, to, Options(jobs), only=only or (), formats=formats or FORMATS, progress=True, **vars(by))
+    for name, failures in drawn.failures.items():
         tell(*(f"{name}: point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
-    tell(*(f"{figure} is left out: {reason}" for figure, reason in made.left_out.items()))
-    print_lines(made.files)
-    print_lines(f"{agree} of {of} facts agree: {name}" for name, (agree, of) in made.counts.items())
-    return 1 if made.failures or made.left_out else 0
+    tell(*(f"{figure} is left out: {reason}" for figure, reason in drawn.left_out.items()))
+    print_lines(drawn.files)
+    print_lines(f"{agree} of {of} facts agree: {name}" for name, (agree, of) in drawn.counts.items())
+    return 1 if drawn.failures or drawn.left_out else 0
 
 
 def calibrate(

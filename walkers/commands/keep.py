@@ -42,7 +42,7 @@ class Options:
 
 
 def export(
-    what: RunOrSweep,
+    name: RunOrSweep,
     /,
     *,
     form: Annotated[Export, Parameter("--to")],
@@ -61,28 +61,28 @@ def export(
     to
         File or folder to write; default: in the run's folder, archives in the current folder. Decks are printed.
     """
-    given = {name: value for name, value in vars(options).items() if value not in (None, False)}
+    given = {option: value for option, value in vars(options).items() if value not in (None, False)}
     orcids = given.pop("orcid", [])
     refuse("--orcid", len(orcids) > len(given.get("authors", [])), "expected an --author for each")
     if "authors" in given:
         from walkers.archive.crate import Author
 
-        given["authors"] = [Author(*one) for one in zip_longest(given["authors"], orcids)]
+        given["authors"] = [Author(*author) for author in zip_longest(given["authors"], orcids)]
     if "dumps" in given:
         given["dumps"] = False
     if form == "deck":
         writer_of(form, given)
-        _export_deck(what, at, to)
+        _export_deck(name, at, to)
         return
-    print(at.load(what).export(form, to, **given))
+    print(at.load(name).export(form, to, **given))
 
 
-def _export_deck(what: str, at: At, output: Path | None) -> None:
+def _export_deck(name: str, at: At, output: Path | None) -> None:
     from walkers.api import case_and_run
     from walkers.sweeps.by_hand import as_run, write_folder
     from walkers.templates.deck import RUN_NAME, render_deck, whole
 
-    case = as_run(*case_and_run(what, at.out, at.values))
+    case = as_run(*case_and_run(name, at.out, at.values))
     if output is None:
         print(render_deck(case, whole(case)).text, end="")
     else:

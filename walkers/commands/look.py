@@ -63,18 +63,18 @@ def _list_points(name: str, out: Path, to: Path | None, as_json: bool) -> None:
     refuse(name, kind == "run", f"is a run: walkers run {name} prints its result")
     refuse(name, kind == "case", f"no sweep in {out}; walkers list shows what is there")
     refuse(name, kind != "sweep", f"not a sweep: expected a folder with a sweep.json (walkers list --out {name}?)")
-    found = Sweep(place)
+    found_sweep = Sweep(place)
     if to is not None:
-        table.write_table_file(found.table(), to)
+        table.write_table_file(found_sweep.table(), to)
         print(to)
     elif as_json:
-        print(table.encoded(found.table(), "json").decode(), end="")
+        print(table.encoded(found_sweep.table(), "json").decode(), end="")
     else:
-        print(found.describe())
+        print(found_sweep.describe())
 
 
 def plot(
-    what: RunOrSweep,
+    name: RunOrSweep,
     /,
     *,
     at: At = At(),
@@ -89,13 +89,13 @@ def plot(
     to
         Runs: folder of the figures. Sweeps: file to write (.png, .pdf, .svg).
     """
-    found = at.load(what)
-    if isinstance(found, walkers.Run):
+    loaded = at.load(name)
+    if isinstance(loaded, walkers.Run):
         refuse_any(vars(options), "is for sweeps")
-        print_lines(found.plot(to, formats or ["png"]))
+        print_lines(loaded.plot(to, formats or ["png"]))
         return
     refuse("--format", bool(formats), "is for runs: a sweep's figure has the format of --to's name")
-    print_lines(found.plot(to, **vars(options)))
+    print_lines(loaded.plot(to, **vars(options)))
 
 
 def render(
@@ -128,7 +128,7 @@ def render(
     print_lines(at.run(run).render(to, images=6 if images is None else images, walker=options.walker))
 
 
-def report(what: RunOrSweep, /, *, at: At = At(), to: Path | None = None) -> None:
+def report(name: RunOrSweep, /, *, at: At = At(), to: Path | None = None) -> None:
     """Write a self-contained HTML report: parameters, results, plots and a 3-D view of the motion.
 
     Parameters
@@ -140,7 +140,7 @@ def report(what: RunOrSweep, /, *, at: At = At(), to: Path | None = None) -> Non
 
     if to is not None:
         check_report(to)
-    print(at.load(what).report(to))
+    print(at.load(name).report(to))
 
 
 def compare(
@@ -161,12 +161,12 @@ def compare(
     y
         Sweeps: column of the table; default: velocity, or climbs for piles.
     """
-    found = walkers.compare(first, second, at.out, at.values, y)
-    print_as(as_json, lambda: found.contents, lambda: found.text)
+    comparison = walkers.compare(first, second, at.out, at.values, y)
+    print_as(as_json, lambda: comparison.contents, lambda: comparison.text)
 
 
 def climb(
-    *what: Annotated[RunOrSweep, Parameter(help="Sweeps, runs or cases of piles.")],
+    *names: Annotated[RunOrSweep, Parameter(help="Sweeps, runs or cases of piles.")],
     at: At = At(),
     within: Seconds | None = None,
     to: Path | None = None,
@@ -183,6 +183,6 @@ def climb(
     """
     from walkers.sweeps.climbing import describe_climbs
 
-    refuse("RUN|SWEEP", not what, "expected sweeps, runs or cases of piles")
-    found = walkers.climb(what, at.out, at.values, within=within, to=to)
-    print_as(as_json, lambda: found, lambda: describe_climbs(found))
+    refuse("RUN|SWEEP", not names, "expected sweeps, runs or cases of piles")
+    climbs = walkers.climb(names, at.out, at.values, within=within, to=to)
+    print_as(as_json, lambda: climbs, lambda: describe_climbs(climbs))

@@ -28,8 +28,8 @@ def _names(context: CompletionContext) -> list[str]:
     from walkers.inputs.reading import shipped
 
     out = Path(context["out"].raw or DEFAULT_OUT)
-    made = sorted(path.parent.name for file in RECORDS.values() for path in out.glob(f"*/{file}"))
-    return [*(path.name for path in Path().glob("*.toml")), *shipped("case"), *made]
+    records = sorted(path.parent.name for file in RECORDS.values() for path in out.glob(f"*/{file}"))
+    return [*(path.name for path in Path().glob("*.toml")), *shipped("case"), *records]
 
 
 AT_LEAST_1 = Number(gte=1)
@@ -70,20 +70,20 @@ class At:
 
         return settings_of(self.changes or ())
 
-    def load(self, what: str) -> FoundRun | Sweep:
+    def load(self, name: str) -> FoundRun | Sweep:
         """The named sweep or run."""
         from walkers.api import load
 
-        return load(what, self.out, self.values)
+        return load(name, self.out, self.values)
 
-    def run(self, what: str) -> FoundRun:
+    def run(self, name: str) -> FoundRun:
         """The named run."""
         from walkers.api import NOT_A_RUN, Run
 
-        found = self.load(what)
-        if not isinstance(found, Run):
-            raise refused(what, NOT_A_RUN["sweep"])
-        return found
+        loaded = self.load(name)
+        if not isinstance(loaded, Run):
+            raise refused(name, NOT_A_RUN["sweep"])
+        return loaded
 
 
 @Parameter(name="*")

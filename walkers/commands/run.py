@@ -102,17 +102,17 @@ def run(
     if accuracy:
         from walkers.sweeps.accuracy import SHARE, times_of
 
-        apply_all(lambda one: times_of(one[0]), loaded)
+        apply_all(times_of, [case for case, _ in loaded])
     if spread:
         from walkers.sweeps.spread import POINTS, describe, spread_sweep
 
         for case, _ in loaded:  # also an unusable range
             list(spread_sweep(case, POINTS if points is None else points, by.engine).cases())
     failed = False
-    for (case, folder), found in zip(loaded, finished, strict=True):
-        tell(*(f"{case.name}: {note}" for note in notes(case) if found is None))
+    for (case, folder), earlier in zip(loaded, finished, strict=True):
+        tell(*(f"{case.name}: {note}" for note in notes(case) if earlier is None))
         try:
-            done = found or walkers.run(case, folder, force=force, progress=True, time_limit=limit, **vars(by))
+            done = earlier or walkers.run(case, folder, force=force, progress=True, time_limit=limit, **vars(by))
         except EngineFailure as failure:
             tell(f"{case.name}: {failure}")
             failed = True
@@ -179,6 +179,6 @@ def sweep(
     done = walkers.sweep(sweep, at.out, changes=at.values, progress=True, **how)
     tell(*(f"point {failure.point}, {failure.run}: {failure.message}" for failure in done.failures))
     print(f"{done.summary()}\n  table      walkers list {done.directory}")
-    same = [one for one in next(loaded.cases()).origins if one.key not in loaded.keys]  # varied keys are in the table
-    print_lines(lines_of_rest(rests_on(same)))
+    origins = next(loaded.cases()).origins  # the table has the values of varied keys
+    print_lines(lines_of_rest(rests_on([origin for origin in origins if origin.key not in loaded.keys])))
     return 1 if done.failures else 0

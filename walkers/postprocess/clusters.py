@@ -97,13 +97,13 @@ def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]]) -> list[Trac
     """Tracks of the clusters of all frames (`held_clusters`; time in s, shape (F,)), in the order of their begins."""
     tracks: list[Track] = []
     alive: list[int] = []
-    for frame, found in enumerate(clusters):
+    for frame, present in enumerate(clusters):
         alive = [number for number in alive if time[frame] - time[tracks[number].frames[-1]] <= MAX_GAP]
         # The larger overlap first: of two tracks that merge, the one with more beads continues.
         shared = []
         for number in alive:
             before = tracks[number].members[-1]
-            for place, (members, _) in enumerate(found):
+            for place, (members, _) in enumerate(present):
                 common = len(before & members)
                 if common >= MIN_OVERLAP * min(len(before), len(members)):
                     shared.append((common, -number, place))
@@ -119,7 +119,7 @@ def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]]) -> list[Trac
             else:
                 taken[place] = number
         alive = [number for number in alive if number not in ended]
-        for place, (members, walls) in enumerate(found):
+        for place, (members, walls) in enumerate(present):
             if place not in taken:
                 taken[place] = len(tracks)
                 alive.append(len(tracks))
@@ -233,8 +233,8 @@ def _qualified(gained: FloatArray) -> list[int] | None:
     risen = gained - least
     lowest = np.maximum.accumulate(np.where(np.diff(least, prepend=np.inf) < 0.0, places, 0))
     farthest = risen == np.maximum.accumulate(risen)
-    found = np.flatnonzero(farthest & (risen >= MIN_RISE) & (places - lowest + 1 >= _FEWEST_FRAMES))
-    return [int(lowest[found[0]]), int(found[0])] if len(found) else None
+    qualifying = np.flatnonzero(farthest & (risen >= MIN_RISE) & (places - lowest + 1 >= _FEWEST_FRAMES))
+    return [int(lowest[qualifying[0]]), int(qualifying[0])] if len(qualifying) else None
 
 
 def _gained(track: Track, time: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -261,11 +261,11 @@ def _speed(seconds: FloatArray, gained: FloatArray) -> tuple[float, float]:
     blocks = min(_MOST_BLOCKS, len(gained) - 1)
     edges = np.linspace(0, len(gained) - 1, blocks + 1).round().astype(int)
     lasted, risen = np.diff(seconds[edges]), np.diff(gained[edges])
-    there = lasted > 0.0
-    if there.sum() < _FEWEST_BLOCKS:
+    timed = lasted > 0.0
+    if timed.sum() < _FEWEST_BLOCKS:
         return speed, np.nan
-    speeds, shares = risen[there] / lasted[there], lasted[there] / lasted[there].sum()
-    return speed, float(np.sqrt((shares**2 * (speeds - speed) ** 2).sum() * there.sum() / (there.sum() - 1)))
+    speeds, shares = risen[timed] / lasted[timed], lasted[timed] / lasted[timed].sum()
+    return speed, float(np.sqrt((shares**2 * (speeds - speed) ** 2).sum() * timed.sum() / (timed.sum() - 1)))
 
 
 def members_of(tracks: Sequence[Track], beads: Beads) -> Columns:
@@ -297,13 +297,13 @@ def assembly_of(tracks: Sequence[Track], climbs: Columns, beads: Beads, bridges:
     rows: list[tuple[Any, ...]] = []
     for number in np.flatnonzero(climbs["climbed"]).tolist():
         until = int(np.searchsorted(beads.time, climbs["qualified"][number]))
-        own = np.array(sorted(tracks[number].members[tracks[number].frames.index(until)]))
+        members = np.array(sorted(tracks[number].members[tracks[number].frames.index(until)]))
         for frame in range(max(beads.first - 1, 0), until + 1):
             pairs, walled = bridges[frame]
-            within = np.searchsorted(own, pairs[np.isin(pairs, own).all(axis=1)])
-            labels, neighbours = connected(len(own), within), np.bincount(within.ravel(), minlength=len(own))
+            within = np.searchsorted(members, pairs[np.isin(pairs, members).all(axis=1)])
+            labels, neighbours = connected(len(members), within), np.bincount(within.ravel(), minlength=len(members))
             joined = (labels == np.bincount(labels).argmax()) & (neighbours > 0)
-            states = (own, beads.bulk[frame][own], walled[own], neighbours, joined)
+            states = (members, beads.bulk[frame][members], walled[members], neighbours, joined)
             rows += [(frame, number, *state) for state in zip(*states, strict=True)]
     kinds = {"frame": int, "track": int, "bead": int, "in_bulk": bool, "at_wall": bool, "neighbours": int}
     return _of_beads(columns_of(rows, **kinds, joined=bool), beads)
@@ -340,11 +340,11 @@ def _parent(tracks: Sequence[Track], number: int, time: FloatArray) -> int:
     """The track that had most of the beads of a track shortly before its begin; -1 for none."""
     first, members = tracks[number].frames[0], tracks[number].members[0]
     best, most = -1, MIN_OVERLAP * len(members)
-    for other, track in enumerate(tracks):
+    for candidate, track in enumerate(tracks):
         before = bisect_left(track.frames, first) - 1
-        if other == number or before < 0 or time[first] - time[track.frames[before]] > MAX_GAP:
+        if candidate == number or before < 0 or time[first] - time[track.frames[before]] > MAX_GAP:
             continue
         shared = len(track.members[before] & members)
         if shared >= most:
-            best, most = other, shared
+            best, most = candidate, shared
     return best

@@ -71,8 +71,8 @@ def errors_seen(errors: Any, values: Any) -> bool:
     """Whether error bars exceed the symbols, if the values fill the axes."""
     import numpy as np
 
-    known, shown = np.asarray(errors)[np.isfinite(errors)], np.asarray(values)[np.isfinite(values)]
-    return bool(len(known) and known.max() > _LEAST_ERROR * np.ptp(shown))
+    finite, shown = np.asarray(errors)[np.isfinite(errors)], np.asarray(values)[np.isfinite(values)]
+    return bool(len(finite) and finite.max() > _LEAST_ERROR * np.ptp(shown))
 
 
 def legend_below(axes: Axes, **options: Any) -> Legend:

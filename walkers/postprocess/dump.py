@@ -94,18 +94,18 @@ class BinaryDump:
         sizes = {sum(count for _, count in frame.parts) for frame in self._frames}
         if len(sizes) > 1:
             raise DumpError(f"{self.path}: the number of beads changes")
-        data = np.empty((len(self), max(sizes, default=0) // len(self.columns), len(self.columns)))
-        for values, frame in zip(data.reshape(len(self), -1) if data.size else (), self._frames, strict=False):
+        stacked = np.empty((len(self), max(sizes, default=0) // len(self.columns), len(self.columns)))
+        for values, frame in zip(stacked.reshape(len(self), -1) if stacked.size else (), self._frames, strict=False):
             np.concatenate([np.frombuffer(self._bytes, float, count, at) for at, count in frame.parts], out=values)
-        if not np.isfinite(data).all():
-            frame, _, column = (places[0] for places in np.nonzero(~np.isfinite(data)))
+        if not np.isfinite(stacked).all():
+            frame, _, column = (places[0] for places in np.nonzero(~np.isfinite(stacked)))
             raise NoNumberError(f"{self.path}: {self.columns[column]} is not a number at step {self.steps[frame]}")
-        return data
+        return stacked
 
-    def write_like(self, data: FloatArray, path: Path) -> None:
+    def write_like(self, stacked: FloatArray, path: Path) -> None:
         """Write a dump of one process: the headers of these frames with other data, shape (frames, rows, columns)."""
         with path.open("wb") as file:
-            for frame, values in zip(self._frames, data, strict=True):
+            for frame, values in zip(self._frames, stacked, strict=True):
                 step, _, *box, columns, _ = _HEADER.unpack_from(self._bytes, frame.start)
                 head = _HEADER.pack(step, len(values), *box, columns, 1) + _COUNT.pack(values.size)
                 file.write(head + values.tobytes())

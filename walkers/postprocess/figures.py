@@ -25,7 +25,7 @@ from walkers.postprocess.drawing import (
 )
 from walkers.postprocess.motion import LEAST_SAMPLES
 from walkers.postprocess.quantities import TABLES, axis, declared, matches
-from walkers.postprocess.sides import sides, ways
+from walkers.postprocess.sides import directions, sides
 from walkers.postprocess.tables import Columns
 from walkers.rounding import rounded
 from walkers.runner.directory import case_of
@@ -52,7 +52,7 @@ _ROLLS = "Walker {number}; a bead rolls without sliding where its curve coincide
 _TRAY = "Paths seen from above; circles: start; beads at the end, to scale"
 FIGURES: Mapping[str, Sequence[Panel]] = {
     "walk": (
-        Panel("cycles", "time", "distance", "walker", "Distance {way}; grey: settling"),
+        Panel("cycles", "time", "distance", "walker", "Distance {direction}; grey: settling"),
         Panel("cycles", "time", "orientation", "walker", "Orientation from {reference}"),
         Panel("cycles", "along", "across", "walker", "Paths of the centres of mass, {seen}"),
     ),
@@ -200,18 +200,18 @@ def walk_figure(case: Case, tables: Tables) -> Figure:
     cycles = cycles | {"orientation": cycles["orientation"] - np.repeat(turned, len(cycles["cycle"]) // len(turned))}
     labels = []
     for row in np.argsort(walkers["walker"]):
-        degrees, side_way = np.degrees(start - turned)[row], ways(uphill=uphill)[int(side[row] < 0)]
+        degrees, side_way = np.degrees(start - turned)[row], directions(uphill=uphill)[int(side[row] < 0)]
         aside = f"{side_way} at {degrees:.0f}°" if abs(degrees) > _ASIDE else side_way
         velocity = rounded(1e3 * walkers["axial_velocity" if uphill else "velocity"][row], "mm/s")
         labels.append(f"{walkers['walker'][row]}: {f'{degrees:.0f}°' if case.meets else aside}, {velocity} mm/s")
-    way = "uphill" if uphill else "along the heading"
+    direction = "uphill" if uphill else "along the heading"
     if uphill:
         names = {"distance": "along", "along": "across", "across": "along"}
         cycles |= {name: cycles[column] for name, column in names.items()}
     reference = "the drive axis" if case.meets else "the direction that the legend names"
     seen = f"{case.boundary.tilted}, seen along its normal" if case.boundary.tilted else "seen from above"
-    looks = [looks_of(labels)] * 3
-    figure, panels = _panels("walk", case, {"cycles": cycles}, looks, way=way, reference=reference, seen=seen)
+    words = {"direction": direction, "reference": reference, "seen": seen}
+    figure, panels = _panels("walk", case, {"cycles": cycles}, [looks_of(labels)] * 3, **words)
     settled = cycles["time"][case.for_cycles(int(cycles["cycle"].max())).run.settled_strobes]
     for axes in panels[:2]:
         axes.axvspan(0.0, float(settled), color="0.93", zorder=0)
@@ -219,7 +219,8 @@ def walk_figure(case: Case, tables: Tables) -> Figure:
         panels[2].invert_xaxis()  # what is on the left is on the left of who goes up
         panels[2].set(xlabel="across the slope, to the left (mm)", ylabel="uphill (mm)")
         panels[0].set_ylabel("uphill (mm)")
-    return _explained(figure, panels, f"walker: {'angle' if case.meets else 'facing'} at the start,\nvelocity {way}")
+    start_word = "angle" if case.meets else "facing"
+    return _explained(figure, panels, f"walker: {start_word} at the start,\nvelocity {direction}")
 
 
 @styled
@@ -306,8 +307,8 @@ def climb_figure(case: Case, tables: Tables) -> Figure:
             if named[track] > MOST_NAMED:
                 look["label"] = f"and {named[-1] - MOST_NAMED} more climbs" if named[track] == MOST_NAMED + 1 else ""
         looks.append(look)
-    if others := [look for look in looks if "label" not in look]:
-        others[0]["label"] = "clusters that\ndid not climb"
+    if not_climbing := [look for look in looks if "label" not in look]:
+        not_climbing[0]["label"] = "clusters that\ndid not climb"
     two = [
         [{"color": "C0", "label": first}, {"color": "C2", "linestyle": "--", "label": second}]
         for first, second in (("all beads", "bulk alone"), ("bridges", "contacts"))

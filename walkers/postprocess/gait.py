@@ -71,12 +71,12 @@ def gait(group: Group) -> Gait:
         "fwbx,fwbx->fwb", group.spin, np.cross(_normals(group), heading[:, :, None])
     )  # fmt: skip
     sliding = [along - turning]
-    for one, other in group.make.pairs:
-        arm = group.position[:, :, one] - group.position[:, :, other]
+    for first, second in group.make.pairs:
+        arm = group.position[:, :, first] - group.position[:, :, second]
         arm[..., 2] = 0.0
         arm *= np.where(np.einsum("fwx,fwx->fw", arm, heading) < 0.0, -1.0, 1.0)[..., None]
         arm /= np.maximum(np.linalg.norm(arm, axis=-1, keepdims=True), 1e-300)
-        spin = radii[one] * group.spin[:, :, one] + radii[other] * group.spin[:, :, other]
+        spin = radii[first] * group.spin[:, :, first] + radii[second] * group.spin[:, :, second]
         sliding.append(-np.einsum("fwx,fwx->fw", spin, np.cross(upward, arm))[..., None])
     velocity = along @ (radii**3 / np.sum(radii**3))
     return Gait(velocity, rotation, np.concatenate(sliding, axis=-1))
@@ -121,8 +121,8 @@ def averages(group: Group) -> Averages:
     for part, (before, after) in enumerate(pairwise(looks)):
         opened.append((before.gap[samples] > 0.0).mean(axis=0))
         for direction, course in group.case.excitation.motions(begin + (part + 0.5) / parts * interval):
-            pull, way = -course[-1], after.mass_centre - before.mass_centre[: len(interval)]
-            work += pull[:, None] * (way @ np.array(direction))
+            pull, displacement = -course[-1], after.mass_centre - before.mass_centre[: len(interval)]
+            work += pull[:, None] * (displacement @ np.array(direction))
     cycles = len(work) // run.samples_per_cycle
     of_cycles = work[: cycles * run.samples_per_cycle].reshape(cycles, run.samples_per_cycle, -1).sum(axis=1)
     mean = gait(group.motion.averaged.group(group.walkers[0].make))
@@ -224,8 +224,8 @@ def postures(group: Group) -> list[str]:
     off = np.abs(group.orientation[:: group.case.run.samples_per_cycle])
     stands = (off[-1] <= UPRIGHT) & (off[-1] <= off[len(off) // 2] + _NO_MORE)
     turned = np.isfinite(turned_over_at(group))
-    found: list[str] = np.select([turned, stands], ["turned_over", "upright"], "leaning").tolist()
-    return found
+    labels: list[str] = np.select([turned, stands], ["turned_over", "upright"], "leaning").tolist()
+    return labels
 
 
 def are_constant(directory: Path) -> bool:
@@ -239,12 +239,12 @@ def are_constant(directory: Path) -> bool:
 
 
 def _is_constant(group: Group) -> bool:
-    found, run = walk(group), group.case.run
+    fit, run = walk(group), group.case.run
     turned = np.abs(np.diff(group.orientation[:: run.samples_per_cycle][run.settled_strobes :], axis=0))
     before, after = turned[: len(turned) // 2].max(axis=0), turned[len(turned) // 2 :].max(axis=0)
     little = (after < _LITTLE) & (after < before + _NO_FASTER)
-    allowed = max(CONSTANT * float(np.abs(found.velocity).max()), REST)
-    agree = np.abs(found.first_half - found.second_half).max() <= allowed
+    allowed = max(CONSTANT * float(np.abs(fit.velocity).max()), REST)
+    agree = np.abs(fit.first_half - fit.second_half).max() <= allowed
     return bool(agree and np.all(little | (after < _FADING * before)))
 
 

@@ -54,8 +54,8 @@ def measure(motion: Motion) -> Measured:
         for event, pairs in (("merged", now - before), ("parted", before - now)):
             rows += [(frames[number], event, *pair, size[number, pair[0]]) for pair in sorted(pairs)]
     table = columns_of(rows, frame=int, event=str, walker=int, other=int, size=int)
-    frame, walker, other = table.pop("frame"), table["walker"], table["other"]
-    cosine = (heading[frame, walker] * heading[frame, other]).sum(axis=-1)
+    frame, walker, partner = table.pop("frame"), table["walker"], table["other"]
+    cosine = (heading[frame, walker] * heading[frame, partner]).sum(axis=-1)
     table |= {"time": motion.time[frame], "angle": np.arccos(np.clip(cosine, -1.0, 1.0))}
     merged = int(np.sum(table["event"] == "merged"))
     numbers = {"merged": merged, "parted": len(frame) - merged, "largest_group": int(size.max())}
@@ -114,8 +114,8 @@ def collective(
         return float(speeds.mean()) if speeds.size else nan
 
     free, joined = mean_speed(alone & ~held), mean_speed(~alone & ~held)
-    way = (centre[-1] - centre[begin]) / (time[-1] - time[begin])
-    slow = np.linalg.norm(way, axis=-1) < _SLOW * free
+    late_velocity = (centre[-1] - centre[begin]) / (time[-1] - time[begin])
+    slow = np.linalg.norm(late_velocity, axis=-1) < _SLOW * free
     return {
         "meeting_rate": 2.0 * merged / (size.shape[1] * float(time[-1] - time[0])),
         "clustered_share": float((~alone[-1]).mean()),

@@ -220,9 +220,9 @@ class Group:
         position, boundary = self.position, self.case.boundary
         heights = [position[..., 2]] if boundary.bare else [wall.distances(position) for wall in boundary.walls]
         gaps = [reduce(np.minimum, heights) - self.radii]
-        for one, other in self.make.pairs:
-            distance = np.linalg.norm(position[:, :, one] - position[:, :, other], axis=-1)
-            gaps.append((distance - (self.radii[one] + self.radii[other]))[..., None])
+        for first, second in self.make.pairs:
+            distance = np.linalg.norm(position[:, :, first] - position[:, :, second], axis=-1)
+            gaps.append((distance - (self.radii[first] + self.radii[second]))[..., None])
         return np.concatenate(gaps, axis=-1)
 
     @cached_property
@@ -305,21 +305,21 @@ def _joined(case: Case, paths: Sequence[Path]) -> Motion:
         record, layout, dump = _opened(path)
         if record["begin"] != (steps[-1] if steps else 0):
             raise DumpError(f"{path}: the segment before it is missing")
-        data = dump.stack()
-        whole = len(data) and not dump.truncated and dump.steps[-1] == record["end"]
+        values = dump.stack()
+        whole = len(values) and not dump.truncated and dump.steps[-1] == record["end"]
         if not whole and (len(paths) > 1 or case.run.rests):
             raise DumpError(f"{path}: its dump is incomplete")
-        if len(data) < 2:
-            raise DumpError(f"{dump.path}: {len(data)} complete frames, too few for a motion")
-        if data.shape[1] != layout.atoms:
-            raise DumpError(f"{path}: {data.shape[1]} rows, expected {layout.atoms}")
+        if len(values) < 2:
+            raise DumpError(f"{dump.path}: {len(values)} complete frames, too few for a motion")
+        if values.shape[1] != layout.atoms:
+            raise DumpError(f"{path}: {values.shape[1]} rows, expected {layout.atoms}")
         first = 1 if steps else 0  # the first frame repeats the last one of the previous segment
-        stacks.append(data[first:])
+        stacks.append(values[first:])
         steps += dump.steps[first:].tolist()
-        frames += [(path, number) for number in range(first, len(data))]
+        frames += [(path, number) for number in range(first, len(values))]
         start = record["drive_from"] if start is None else start
-    data = np.concatenate(stacks) if len(stacks) > 1 else stacks[0]
-    moved = _motion(case, data, np.array(steps, dtype=np.float64), start, layout)
+    values = np.concatenate(stacks) if len(stacks) > 1 else stacks[0]
+    moved = _motion(case, values, np.array(steps, dtype=np.float64), start, layout)
     cycles = record["end"] // case.run.steps_per_cycle if case.run.until_steady else case.run.cycles
     return replace(
         moved,
@@ -330,7 +330,7 @@ def _joined(case: Case, paths: Sequence[Path]) -> Motion:
     )
 
 
-def _motion(case: Case, data: FloatArray, steps: FloatArray, start: int | None, layout: Layout) -> Motion:
+def _motion(case: Case, values: FloatArray, steps: FloatArray, start: int | None, layout: Layout) -> Motion:
     """The motion of frames at these steps; the drive begins at step ``start``, or in the frame after the last one."""
     time = (steps - (steps[-1] + case.run.steps_per_sample if start is None else start)) * case.run.time_step
     shift, speed = prescribed_motion(case.excitation, time)
@@ -340,7 +340,7 @@ def _motion(case: Case, data: FloatArray, steps: FloatArray, start: int | None, 
 
     def vectors(name: str) -> FloatArray:
         column = layout.bead_columns.index(name)
-        return data[:, :, column : column + 3]
+        return values[:, :, column : column + 3]
 
     return Motion(
         case=case,
@@ -350,8 +350,8 @@ def _motion(case: Case, data: FloatArray, steps: FloatArray, start: int | None, 
         spin=vectors("omegax"),
         substrate=shaken[0],
         substrate_velocity=shaken[1],
-        radius=data[0, :, layout.bead_columns.index("radius")],
-        walkers=tuple(replace(one, beads=tuple(bead - 1 for bead in one.beads)) for one in layout.walkers),
+        radius=values[0, :, layout.bead_columns.index("radius")],
+        walkers=tuple(replace(walker, beads=tuple(bead - 1 for bead in walker.beads)) for walker in layout.walkers),
         frames=[],
         truncated=False,
         mean_spin=vectors(MEAN_SPIN_COLUMNS[0]) if MEAN_SPIN_COLUMNS[0] in layout.bead_columns else None,
@@ -426,19 +426,19 @@ def read_bridges(motion: Motion, frames: Collection[int] | None = None) -> Itera
     Raises a `DumpError` if a dump cannot be read or ends early, or if no frame recorded bridges.
     """
     stride = motion.case.run.samples_per_bridge_sample
-    wanted = {place: frame for frame, place in enumerate(motion.frames) if frames is None or frame in frames}
+    frame_at = {place: frame for frame, place in enumerate(motion.frames) if frames is None or frame in frames}
     for segment in dict.fromkeys(segment for segment, _ in motion.frames):
         layout = layout_of(segment)
         pairs = local_frames(segment / layout.pair_bridge_dump, layout.pair_bridge_columns)
         walls = local_frames(segment / layout.wall_bridge_dump, layout.wall_bridge_columns)
         number = -1
         for number, ((_, between), (_, against)) in enumerate(zip(pairs, walls, strict=False)):
-            frame = wanted.pop((segment, stride * number), None)
+            frame = frame_at.pop((segment, stride * number), None)
             if frame is not None:
                 yield _bridges(motion, frame, between, against, layout)
         if number + 1 != layout.bridge_frames:
             raise DumpError(f"{segment}: its bridges hold {number + 1} of {layout.bridge_frames} frames")
-    if frames is None and len(wanted) == len(motion.frames):
+    if frames is None and len(frame_at) == len(motion.frames):
         raise DumpError(f"{motion.directory}: none of its frames recorded bridges")
 
 
@@ -457,7 +457,8 @@ def _bridges(motion: Motion, frame: int, between: FloatArray, against: FloatArra
     arm = place[ids[:, 1]] - place[ids[:, 0]]
     pull = np.einsum("kx,kx->k", between[:, pair("fx") : pair("fx") + 3], arm) / np.linalg.norm(arm, axis=1)
     walls = against[:, wall("wall")].astype(np.int64)
-    normals = np.stack([one.normals(place[beads]) for one in motion.case.boundary.walls])[walls, np.arange(len(walls))]
+    normals = np.stack([surface.normals(place[beads]) for surface in motion.case.boundary.walls])
+    normals = normals[walls, np.arange(len(walls))]
     wall_pull = -np.einsum("mx,mx->m", against[:, wall("fx") : wall("fx") + 3], normals)
     contacts = np.full((len(ids) + len(walls), 3), -1)
     contacts[: len(ids), :2] = np.sort(ids, axis=1)

@@ -71,14 +71,15 @@ def necks_of(
     ``share`` is the width that is drawn over the width of the neck.
     """
     begins, ends = between
-    radius, other = motion.radius[contacts[:, 0]], np.where(contacts[:, 1] < 0, np.inf, motion.radius[contacts[:, 1]])
-    volume = np.vectorize(bridge_volume, [float], excluded=[2])(radius, other, motion.case.liquid.of_bridges)
-    reduced = 1.0 / (1.0 / radius + 1.0 / other)
+    radius = motion.radius[contacts[:, 0]]
+    second_radius = np.where(contacts[:, 1] < 0, np.inf, motion.radius[contacts[:, 1]])
+    volume = np.vectorize(bridge_volume, [float], excluded=[2])(radius, second_radius, motion.case.liquid.of_bridges)
+    reduced = 1.0 / (1.0 / radius + 1.0 / second_radius)
     length = np.linalg.norm(ends - begins, axis=1)
-    beyond = np.where(np.isfinite(other), other, 0.0)
+    beyond = np.where(np.isfinite(second_radius), second_radius, 0.0)
     gap = np.maximum(length - radius - beyond, 0.0)
     wide = np.sqrt(2.0 * reduced * (np.hypot(gap, np.sqrt(volume / (np.pi * reduced))) - gap))
-    wide = share * np.minimum(_ENDS * wide, _WIDEST * np.minimum(radius, other))
+    wide = share * np.minimum(_ENDS * wide, _WIDEST * np.minimum(radius, second_radius))
     along = (ends - begins) / length[:, None]
     first = np.cross(along, np.eye(3)[np.abs(along).argmin(axis=1)])
     first /= np.linalg.norm(first, axis=1, keepdims=True)
@@ -86,7 +87,7 @@ def necks_of(
     out = np.cos(around)[:, None] * first[:, None] + np.sin(around)[:, None] * np.cross(along, first)[:, None]
     # From the surface of the first bead to that of the second, or to the wall.
     low = np.sqrt(radius**2 - wide**2)
-    high = length - np.sqrt(np.where(np.isfinite(other), beyond**2 - wide**2, 0.0))
+    high = length - np.sqrt(np.where(np.isfinite(second_radius), beyond**2 - wide**2, 0.0))
     step = np.linspace(-1.0, 1.0, rings)
     height = (low + high)[:, None] / 2.0 + (high - low)[:, None] / 2.0 * step
     width = wide[:, None] * (_WAIST + (_ENDS - _WAIST) * step**2) / _ENDS

@@ -91,7 +91,7 @@ def declared(name: str) -> Quantity:
         return _DECLARED[name]
     number, _, end = name.rpartition("_")
     if end in _ENDS:  # of a number of one bead
-        return next(one for one in _with_ends(declared(number)) if one.name == name)
+        return next(quantity for quantity in _with_ends(declared(number)) if quantity.name == name)
     return declared_in(name, NUMBERS.values())
 
 
@@ -151,8 +151,9 @@ def in_short(numbers: Mapping[str, Any]) -> str:
     main = headline(numbers)
     if main in ("", "climbs"):
         return counted(numbers[main], "climb") if main else "-"
-    ways = {"axial_velocity": " up the slope", "right_facing": f" facing {'up' if numbers['goes_uphill'] else 'right'}"}
-    return state(numbers) or f"{shown(numbers[main], 'm/s')[0]} mm/s{ways.get(main, '')}"
+    facing = f" facing {'up' if numbers['goes_uphill'] else 'right'}"
+    directions = {"axial_velocity": " up the slope", "right_facing": facing}
+    return state(numbers) or f"{shown(numbers[main], 'm/s')[0]} mm/s{directions.get(main, '')}"
 
 
 def rows(numbers: Mapping[str, Any]) -> list[Row]:
@@ -174,21 +175,21 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
         number = numbers[name]
         if isinstance(number, (bool, str)) or not isfinite(number) or is_error(name):
             continue
-        one = declared(name)
+        quantity = declared(name)
         if name not in hidden and (number or not any(fnmatchcase(name, pattern) for pattern in _IF_ANY)):
-            text, unit = shown(number, one.unit)
-            listed.append(Row(name, _label(one, numbers), text, unit, _errors(numbers, one)))
+            text, unit = shown(number, quantity.unit)
+            listed.append(Row(name, _label(quantity, numbers), text, unit, _errors(numbers, quantity)))
     return listed
 
 
-def _label(one: Quantity, numbers: Mapping[str, Any]) -> str:
+def _label(quantity: Quantity, numbers: Mapping[str, Any]) -> str:
     """Label of a number: on a slope directions are up and down, and means over those that face up are called so."""
     uphill = numbers.get("goes_uphill", False)
-    label = re.sub(r"(\w+) \((\w+)\)", r"\2" if uphill else r"\1", one.label)
+    label = re.sub(r"(\w+) \((\w+)\)", r"\2" if uphill else r"\1", quantity.label)
     if not uphill:
         return label
     label = label.replace("along the drive axis", "up the slope").replace("across the drive axis", "across the slope")
-    return f"{label}, facing up" if numbers.get("facing_left") and _OF_UP in one.meaning else label
+    return f"{label}, facing up" if numbers.get("facing_left") and _OF_UP in quantity.meaning else label
 
 
 def shown(number: float, unit: str) -> tuple[str, str]:
@@ -198,18 +199,18 @@ def shown(number: float, unit: str) -> tuple[str, str]:
     return (with_decimals(value, 3) if usual == "mm/s" else rounded(value, usual)), usual
 
 
-def _errors(numbers: Mapping[str, Any], one: Quantity) -> str:
+def _errors(numbers: Mapping[str, Any], quantity: Quantity) -> str:
     """Scatter or resolution, band and numerical error of a number in its displayed unit."""
     parts = []
-    if isfinite(scatter := numbers.get(one.error, nan)):
-        text = shown(scatter, one.unit)[0]
-        word = "resolution" if one.error.endswith("_within") else "scatter"
-        parts.append(f"{word} {'below 0.001' if text == '0' and one.unit == 'm/s' else text}")
-    low, high = (numbers.get(f"{one.name}_{end}") for end in _BAND)
+    if isfinite(scatter := numbers.get(quantity.error, nan)):
+        text = shown(scatter, quantity.unit)[0]
+        word = "resolution" if quantity.error.endswith("_within") else "scatter"
+        parts.append(f"{word} {'below 0.001' if text == '0' and quantity.unit == 'm/s' else text}")
+    low, high = (numbers.get(f"{quantity.name}_{end}") for end in _BAND)
     if low is not None and high is not None:
-        parts.append(f"band {band_text(low, high, one.unit)}")
-    if isfinite(error := numbers.get(f"{one.name}_error", nan)):
-        text = shown(float(f"{error:.2g}"), one.unit)[0]
+        parts.append(f"band {band_text(low, high, quantity.unit)}")
+    if isfinite(error := numbers.get(f"{quantity.name}_error", nan)):
+        text = shown(float(f"{error:.2g}"), quantity.unit)[0]
         parts.append(f"numerical error {'below 0.001' if text == '0' else text}")
     return ", ".join(parts)
 

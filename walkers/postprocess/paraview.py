@@ -95,8 +95,8 @@ def _earlier(place: Path) -> list[Path]:
         collection, files = place / _COLLECTION, list(place.iterdir())
         listed = _LISTED.findall(collection.read_text("utf-8", "replace") if collection.is_file() else "")
         ours = {_COLLECTION, SCRIPT, *listed} if listed else set()
-        others = sorted({path.name for path in files} - ours)
-        held = f"it holds {others[0]}" if others else ""
+        foreign = sorted({path.name for path in files} - ours)
+        held = f"it holds {foreign[0]}" if foreign else ""
     if held:
         expected = "expected a new or empty folder, or a folder that walkers export has written"
         raise refused(place, f"{expected}; {held}")

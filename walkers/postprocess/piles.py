@@ -108,8 +108,8 @@ def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
     climbed = read_columns(motion.directory, "clusters")["climbed"]
     track = np.full((len(motion.time), motion.case.count), -1, dtype=np.int64)
     frame = np.searchsorted(motion.time, members["time"]).clip(max=len(motion.time) - 1)
-    there = motion.time[frame] == members["time"]  # a motion need not have all frames
-    track[frame[there], members["bead"][there]] = members["track"][there]
+    in_motion = motion.time[frame] == members["time"]  # a motion need not have all frames
+    track[frame[in_motion], members["bead"][in_motion]] = members["track"][in_motion]
     track = track if motion.numbers is None else track[:, motion.numbers]  # a motion need not have all beads
     return track, np.append(climbed, False)[track]
 
@@ -160,8 +160,8 @@ def _surface_cells(position: FloatArray, radius: FloatArray, container: Boundary
     place = np.clip(((position[:, :2] / container.width + 0.5) * across).astype(int), 0, across - 1)
     tops = np.full(across * across, -np.inf)
     np.maximum.at(tops, place[:, 0] * across + place[:, 1], position[:, 2] + radius)
-    found: FloatArray = tops[np.isfinite(tops)]
-    return found
+    highest: FloatArray = tops[np.isfinite(tops)]
+    return highest
 
 
 def segregation(height: FloatArray, large: BoolArray) -> float:

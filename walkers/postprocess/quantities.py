@@ -63,14 +63,14 @@ def unit_shown(unit: str) -> tuple[str, float]:
 def _quantities(entries: Mapping[str, str | list[str]]) -> tuple[Quantity, ...]:
     """Quantities from their entries: lists, or what a table adds to the meaning of a shared column."""
 
-    def one(name: str, entry: str | list[str]) -> Quantity:
+    def quantity_of(name: str, entry: str | list[str]) -> Quantity:
         if isinstance(entry, str):
             unit, label, meaning = _FILE["shared"][name]
             return Quantity(name, unit, label, meaning + entry)
         unit, label, *more = entry
         return Quantity(name, unit, label, *(more or [label]))
 
-    return tuple(one(name, entry) for name, entry in entries.items())
+    return tuple(quantity_of(name, entry) for name, entry in entries.items())
 
 
 TABLES: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(columns) for name, columns in _FILE["tables"].items()}
@@ -81,7 +81,7 @@ NUMBERS: Mapping[str, Quantity] = {quantity.name: quantity for group in GROUPS.v
 """The numbers of results by name."""
 
 
-def declared(name: str, known: Iterable[Quantity]) -> Quantity:
+def declared(name: str, quantities: Iterable[Quantity]) -> Quantity:
     """The quantity of a name; ``rotation_2`` is found as ``rotation_*``, and its label has the number.
 
     `KeyError` if there is none.
@@ -91,7 +91,7 @@ def declared(name: str, known: Iterable[Quantity]) -> Quantity:
     >>> declared("sliding_pair_2", TABLES["walkers"]).label
     'sliding of pair 2 of beads'
     """
-    quantity = next((quantity for quantity in known if quantity.names(name)), None)
+    quantity = next((quantity for quantity in quantities if quantity.names(name)), None)
     if quantity is None:
         raise KeyError(name)
     return replace(quantity, name=name, label=quantity.label.replace("*", name.rpartition("_")[2]))

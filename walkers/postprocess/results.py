@@ -169,7 +169,7 @@ def recorded(directory: Path) -> dict[str, Any]:
     try:
         contents = read_json(directory / RESULT_NAME)
         version, _ = contents.pop("version"), [contents[name] for name in _BESIDE]
-        numbers = {name: nan if one is None else one for name, one in contents["numbers"].items()}
+        numbers = {name: nan if number is None else number for name, number in contents["numbers"].items()}
         if version == VERSION:  # what every reader asks for
             _ = numbers["goes_uphill"], "velocity" in numbers and numbers["facings_differ"]
         contents["numbers"] = numbers
@@ -198,8 +198,8 @@ def ensure_measured(directory: Path) -> None:
 
 def plain(numbers: Mapping[str, Any]) -> dict[str, Any]:
     """Numbers as JSON types: None for those that are not finite."""
-    plain = {name: one.item() if hasattr(one, "item") else one for name, one in numbers.items()}
-    return {name: None if isinstance(one, float) and not isfinite(one) else one for name, one in plain.items()}
+    plain = {name: number.item() if hasattr(number, "item") else number for name, number in numbers.items()}
+    return {name: None if isinstance(value, float) and not isfinite(value) else value for name, value in plain.items()}
 
 
 def text(results: Results, *, cached: bool = False) -> str:
@@ -215,7 +215,7 @@ def text(results: Results, *, cached: bool = False) -> str:
     main, rests, unmeasured = headline(results), results.about["rests_on"], []
     if "velocity" in results and "numerical_error" not in results:
         unmeasured.append("numerical error (--accuracy)")
-    if main and f"{main}_low" not in results and any(one["range"] for one in rests):
+    if main and f"{main}_low" not in results and any(entry["range"] for entry in rests):
         unmeasured.append("band over the ranges of these values (--spread)")
     return "\n".join(
         [

@@ -71,8 +71,8 @@ def gathered(motion: Motion, lane: float = 2.0) -> Motion:
     lane *= max(make.length for make in case.walkers)
     across = np.cross([0.0, 0.0, 1.0], case.drive_axis)
     shift = np.zeros((len(motion.radius), 3))
-    for number, one in enumerate(motion.walkers):
-        shift[list(one.beads)] = -number * lane * across - [*one.origin, 0.0]
+    for number, walker in enumerate(motion.walkers):
+        shift[list(walker.beads)] = -number * lane * across - [*walker.origin, 0.0]
     moved = replace(motion, position=motion.position + shift)
     return moved if case.boundary.bare else moved.of_walkers(moved.walkers[:1])
 
@@ -102,7 +102,7 @@ def rotations_at(turned: FloatArray, frame: float) -> FloatArray:
     from scipy.spatial.transform import Rotation
 
     number, share = int(frame), frame % 1.0
-    begin, end = (Rotation.from_quat(each) for each in turned[[number, number + ceil(share)]])
+    begin, end = (Rotation.from_quat(quaternions) for quaternions in turned[[number, number + ceil(share)]])
     matrices: FloatArray = (Rotation.from_rotvec(share * (end * begin.inv()).as_rotvec()) * begin).as_matrix()
     return matrices
 
@@ -160,7 +160,7 @@ class Scene:
         """Displacement of the camera in a frame, or between two (a fraction), mm."""
         if self.path is None:
             return np.zeros(3)
-        return np.array([np.interp(frame, np.arange(len(self.path)), way) for way in self.path.T])
+        return np.array([np.interp(frame, np.arange(len(self.path)), component) for component in self.path.T])
 
     def height(self, aspect: float) -> float:
         """Height of the picture, mm, for a ratio of width to height."""
@@ -211,8 +211,8 @@ def path_of(motion: Motion, begin: int = 0) -> FloatArray:
         for part, cycle in ((slice(half), slice(len(places))), (slice(-half, None), slice(-len(places), None))):
             slope, level = np.polyfit(places, middle[cycle], 1)
             smooth[part] = level + slope * places[part, None]
-    way: FloatArray = smooth - smooth[begin]
-    return way
+    displacement: FloatArray = smooth - smooth[begin]
+    return displacement
 
 
 def against_gravity(motion: Motion) -> FloatArray:
@@ -294,7 +294,7 @@ def walls_of(motion: Motion) -> list[FloatArray]:
             turns = 2.0 * pi * (np.arange(_SIDES) + 0.5) / _SIDES
             planes += [(wall.radius * out, -out) for out in np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], 1)]
     ends = [(low, axis) for axis in np.eye(3)] + [(high, -axis) for axis in np.eye(3)]
-    points, normals = (np.array(each) for each in zip(*planes, *ends, strict=True))
+    points, normals = (np.array(vectors) for vectors in zip(*planes, *ends, strict=True))
     spaces = np.column_stack([-normals, np.einsum("px,px->p", normals, points)])
     room = HalfspaceIntersection(spaces, inside)
     faces = []
@@ -427,7 +427,7 @@ class Window:
         self._plotter.renderer.remove_actor("necks", render=False)
         if not len(contacts):
             return
-        points, normals = (each.reshape(-1, 3) for each in necks_of(motion, contacts, between, *self._round))
+        points, normals = (array.reshape(-1, 3) for array in necks_of(motion, contacts, between, *self._round))
         necks = pv.PolyData.from_regular_faces(points + shift, triangles_of(len(contacts), *self._round))
         necks.point_data["Normals"] = normals
         necks.point_data.active_normals_name = "Normals"
@@ -471,7 +471,7 @@ class Window:
         import pyvista as pv
 
         toward = self._scene.axes[2]
-        behind = [one for one in faces if np.cross(one[1] - one[0], one[2] - one[1]) @ toward > 0.0]
+        behind = [face for face in faces if np.cross(face[1] - face[0], face[2] - face[1]) @ toward > 0.0]
         walls, along = mesh_of(behind), np.eye(3)[axis]
         low, high = walls.bounds[2 * axis : 2 * axis + 2]
         places = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)

@@ -55,7 +55,7 @@ class _Views(NamedTuple):
     frames: Sequence[int]
     titles: list[str]
     labels: tuple[str, str]
-    said: list[str]
+    heading: list[str]
     scale: float
     columns: int = 0
     origin: tuple[float, float] = (0.0, 0.0)
@@ -112,7 +112,7 @@ def even_labels(time: FloatArray) -> list[str]:
     """Evenly spaced times (s) as text with the required number of decimals."""
     between = float(time[-1] - time[0]) / max(len(time) - 1, 1)
     decimals = next((places for places in range(2, 6) if abs(round(between, places) - between) <= 0.01 * between), 6)
-    return [f"{one:.{decimals}f} s" for one in time]
+    return [f"{moment:.{decimals}f} s" for moment in time]
 
 
 def _views(motion: Motion, frames: Sequence[int]) -> _Views:
@@ -125,11 +125,11 @@ def _views(motion: Motion, frames: Sequence[int]) -> _Views:
     scene = Scene.around(motion, axes, 1.0 if sideways else 1.1, driven, shaken=False)
     wide, tall = np.ptp([scene.low, scene.high], axis=0)[:2]
     names = ("x", "height") if sideways else ("across the slope", "uphill") if boundary.tilt else ("x", "y")
-    said = [motion.case.title or motion.case.name, *([boundary.tilted] if boundary.tilted else [])]
-    said += [", ".join([*scene.explained, EXPLAINED])]
+    heading = [motion.case.title or motion.case.name, *([boundary.tilted] if boundary.tilted else [])]
+    heading += [", ".join([*scene.explained, EXPLAINED])]
     labels = (f"{names[0]} (mm)", f"{names[1]} (mm)")
     scale = max(_VIEW[0] / wide, _VIEW[1] / tall)
-    return _Views(scene, frames, even_labels(motion.time[frames]), labels, said, scale)
+    return _Views(scene, frames, even_labels(motion.time[frames]), labels, heading, scale)
 
 
 def _strips(motion: Motion, frames: Sequence[int]) -> _Views:
@@ -142,11 +142,11 @@ def _strips(motion: Motion, frames: Sequence[int]) -> _Views:
     along = int(motion.case.boundary.tilt > 0.0 if still else extent[1] > extent[0])  # strips are upright, or level
     path, times = middle - middle[0], even_labels(motion.time[frames])
     direction = (("along the drive axis", "across the drive axis"), ("across the slope", "uphill"))[bool(tilted)][along]
-    said = [motion.case.title or motion.case.name, *([f"{tilted}, seen along its normal"] if tilted else [])]
+    heading = [motion.case.title or motion.case.name, *([f"{tilted}, seen along its normal"] if tilted else [])]
     if extent[along] > _LONG * 2.0 * half[along]:
         join = "\n" if along else ", "
-        times = [f"{time}{join}{way:z.1f} mm" for time, way in zip(times, path[:, along], strict=True)]
-        said += [f"centred on the beads; time and displacement {direction}"]
+        times = [f"{time}{join}{distance:z.1f} mm" for time, distance in zip(times, path[:, along], strict=True)]
+        heading += [f"centred on the beads; time and displacement {direction}"]
     else:
         path[:, along] = 0.0
     seen, margin = place - path[:, None], _MARGIN * half[1 - along]
@@ -159,8 +159,8 @@ def _strips(motion: Motion, frames: Sequence[int]) -> _Views:
     scene = Scene(motion, axes, low, high, shaken=False, path=camera)
     labels = ("", f"{direction} (mm)") if along else (f"{direction} (mm)", "")
     origin = (float(middle[0, 0]), float(middle[0, 1]))
-    columns, said = len(frames) if along else 1, [*said, EXPLAINED]
-    return _Views(scene, frames, times, labels, said, _STRIP / narrow, columns, origin)
+    columns, heading = len(frames) if along else 1, [*heading, EXPLAINED]
+    return _Views(scene, frames, times, labels, heading, _STRIP / narrow, columns, origin)
 
 
 def _figure(views: _Views) -> Figure:
@@ -178,7 +178,7 @@ def _figure(views: _Views) -> Figure:
     columns = views.columns or max(range(1, count + 1), key=lambda number: (scale(number), number))
     rows, inches = ceil(count / columns), scale(columns)
     width = columns * (inches * wide + _BESIDE) + 0.8
-    lines = [line for text in views.said for line in wrap(plain_text(text), round(13.0 * width))]
+    lines = [line for text in views.heading for line in wrap(plain_text(text), round(13.0 * width))]
     height = rows * (inches * tall + _BENEATH) + _LINE * len(lines)
     figure, axes = new_figure(width, height, nrows=rows, ncols=columns, squeeze=False, sharex=True, sharey=True)
     figure.set_layout_engine("compressed")

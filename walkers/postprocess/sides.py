@@ -24,14 +24,14 @@ _ACROSS = 0.02
 """Cosine: walkers that start across the drive axis, within about 1°, face as ``facing`` says."""
 
 
-def ways(*, uphill: bool) -> tuple[str, str]:
+def directions(*, uphill: bool) -> tuple[str, str]:
     """Names of the directions along the drive axis, the positive one first."""
     return ("up", "down") if uphill else ("right", "left")
 
 
-def differ(one: float, other: float) -> bool:
+def differ(first: float, second: float) -> bool:
     """Whether the mean velocities (m/s) of the two directions differ; false for NaN."""
-    return abs(one - other) > max(SAME * max(abs(one), abs(other)), STEADY_SPEED)
+    return abs(first - second) > max(SAME * max(abs(first), abs(second)), STEADY_SPEED)
 
 
 def sides(facing: npt.ArrayLike, start_angle: npt.ArrayLike) -> IntArray:

@@ -33,32 +33,32 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) ->
     dump = BinaryDump(directory / layout.bead_dump, layout.bead_columns)
     frames, x = dump.stack(), dump.column("x")
     sampled = frames[:: next(iter(cases.values())).run.samples_per_cycle, :, x : x + 2]
-    centre = np.stack([sampled[:, np.array(one.beads) - 1].mean(axis=1) for one in layout.walkers], axis=1)
+    centre = np.stack([sampled[:, np.array(walker.beads) - 1].mean(axis=1) for walker in layout.walkers], axis=1)
     if came_near(centre, NEAR * max(make.length for case in cases.values() for make in case.walkers)):
         raise WalkersMet("walkers of different cases came close to each other in a shared deck", directory)
     owner, renumbered = (np.zeros(layout.atoms + 1, dtype=np.int64) for _ in range(2))
     walkers = iter(layout.walkers)
     for number, (place, case) in enumerate(cases.items()):
-        own = [next(walkers) for make in case.walkers for _ in range(make.replicates)]
-        old = np.array([bead for walker in own for bead in walker.beads])
+        walkers_of_case = [next(walkers) for make in case.walkers for _ in range(make.replicates)]
+        old = np.array([bead for walker in walkers_of_case for bead in walker.beads])
         new = np.arange(1, len(old) + 1)
         owner[old], renumbered[old] = number, new
-        own_frames = frames[:, old - 1]
-        own_frames[..., dump.column("id")] = new
-        own_frames[..., dump.column("type")] = 1
-        dump.write_like(own_frames, place / layout.bead_dump)
+        frames_of_case = frames[:, old - 1]
+        frames_of_case[..., dump.column("id")] = new
+        frames_of_case[..., dump.column("type")] = 1
+        dump.write_like(frames_of_case, place / layout.bead_dump)
         placed = tuple(
-            replace(one, walker=walker, beads=tuple(renumbered[list(one.beads)].tolist()))
-            for walker, one in enumerate(own)
+            replace(walker, walker=index, beads=tuple(renumbered[list(walker.beads)].tolist()))
+            for index, walker in enumerate(walkers_of_case)
         )
-        own_layout = replace(layout, atoms=len(old), walkers=placed, ranks=1)
-        write_json(place / LAYOUT_NAME, own_layout.as_dict(), at_once=False)
+        layout_of_case = replace(layout, atoms=len(old), walkers=placed, ranks=1)
+        write_json(place / LAYOUT_NAME, layout_of_case.as_dict(), at_once=False)
     for name, columns, ids in (
         (layout.pair_bridge_dump, layout.pair_bridge_columns, ("id1", "id2")),
         (layout.wall_bridge_dump, layout.wall_bridge_columns, ("id",)),
     ):
         bridges = list(local_frames(directory / name, columns))
-        held = [columns.index(one) for one in ids]
+        held = [columns.index(column) for column in ids]
         for number, place in enumerate(cases):
             parts = []
             for step, rows in bridges:

@@ -41,14 +41,14 @@ def write_table(directory: Path, name: str, columns: Columns) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    known = TABLES[name]
-    order = [column for quantity in known for column in columns if quantity.names(column)]
-    missing = {quantity.name for quantity in known if not quantity.name.endswith("_*")} - columns.keys()
+    quantities = TABLES[name]
+    order = [column for quantity in quantities for column in columns if quantity.names(column)]
+    missing = {quantity.name for quantity in quantities if not quantity.name.endswith("_*")} - columns.keys()
     if wrong := missing | columns.keys() - set(order):
         raise KeyError(f"columns of {name} that are missing or not declared: {', '.join(sorted(wrong))}")
     arrays = [_arrow(columns[column]) for column in order]
     fields = [
-        pa.field(column, array.type, metadata=_metadata(declared(column, known)))
+        pa.field(column, array.type, metadata=_metadata(declared(column, quantities)))
         for column, array in zip(order, arrays, strict=True)
     ]
     reals = [field.name for field in fields if pa.types.is_floating(field.type)]

@@ -34,15 +34,15 @@ def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
     """
     return [
         {
-            "key": one.key,
-            "value": one.text,
-            "origin": one.origin,
-            "range": list(one.range) if one.range else None,  # a list, as in the file
-            "logarithmic": one.logarithmic,
-            "guessed": one.guessed,
+            "key": value.key,
+            "value": value.text,
+            "origin": value.origin,
+            "range": list(value.range) if value.range else None,  # a list, as in the file
+            "logarithmic": value.logarithmic,
+            "guessed": value.guessed,
         }
-        for one in origins
-        if one.key in unmeasured() or one.range is not None
+        for value in origins
+        if value.key in unmeasured() or value.range is not None
     ]
 
 
@@ -52,10 +52,10 @@ _HEADS = ("guessed", "uncertain", "given", "calibrated", "assumed", "library", "
 def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
     """The uncertain values of a result (`rests_on`) as text, by origin; those of other materials are guessed."""
     listed: dict[str, list[str]] = {}
-    for one in rests:
-        guess = "guessed" if one["origin"] == "default" else "uncertain"
-        values = listed.setdefault(guess if one["guessed"] else one["origin"], [])
-        values.append(f"{one['key'].partition('.')[2]} {one['value']}")
+    for value in rests:
+        guess = "guessed" if value["origin"] == "default" else "uncertain"
+        values = listed.setdefault(guess if value["guessed"] else value["origin"], [])
+        values.append(f"{value['key'].partition('.')[2]} {value['value']}")
     if "guessed" in listed:
         listed["guessed"][-1] += " (not of these materials and this liquid)"
     texts = [f"  {head:10} {', '.join(listed[head])}" for head in _HEADS if head in listed]
@@ -78,7 +78,7 @@ def bands_of(directory: Path, rests: Sequence[Mapping[str, Any]], numbers: Mappi
     with suppress(OSError, ValueError, KeyError, TypeError):
         spread = read_json(spread_of(directory.resolve()) / SPREAD_NAME)
         drawn, ranges = (
-            {one["key"]: one["range"] for one in part if one["range"]} for part in (spread["varied"], rests)
+            {value["key"]: value["range"] for value in part if value["range"]} for part in (spread["varied"], rests)
         )
         for name, band in spread["bands"].items() if drawn == ranges else ():
             number = numbers.get(name)

@@ -123,15 +123,15 @@ def tables_of(group: Group) -> dict[str, Columns]:
     }
     strobe = run.samples_per_cycle
     time, distance = gait.distance_walked(group)
-    way = group.mass_centre[::strobe] - group.mass_centre[0]
+    displacement = group.mass_centre[::strobe] - group.mass_centre[0]
     work = np.full(distance.shape, nan)
     work[: len(mean.work)] = mean.work
     cycles = {
         "cycle": np.arange(len(time)) * run.cycles_per_sample,
         "time": time,
         "distance": distance,
-        "along": way @ group.drive_axis,
-        "across": way @ group.across_axis,
+        "along": displacement @ group.drive_axis,
+        "across": displacement @ group.across_axis,
         "orientation": group.orientation[::strobe],
         "work": work,
     }
@@ -160,7 +160,8 @@ def _bridges(motion: Motion) -> Columns:
     contact_of: dict[tuple[int, int], int] = {}  # by two beads, or by a bead and −1 for a wall
     for walker in motion.walkers:
         touching = [(bead, -1) for bead in walker.beads]
-        touching += [(walker.beads[one], walker.beads[other]) for one, other in motion.case.walkers[walker.make].pairs]
+        pairs = motion.case.walkers[walker.make].pairs
+        touching += [(walker.beads[lower], walker.beads[upper]) for lower, upper in pairs]
         contact_of |= {ends: number for number, ends in enumerate(touching, 1)}
     parts = [{"frame": np.full(len(bridges), bridges.frame), **bridges.rows()} for bridges in motion.bridges]
     rows = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

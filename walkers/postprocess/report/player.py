@@ -139,11 +139,11 @@ def _thinned(motion: Motion, places: int) -> tuple[Motion, int, list[str]]:
     """The motion that is shown, the stride of the frames, and both as captions."""
     captions, count = [], len(motion.walkers)
     if motion.case.apart:
-        firsts = {one.make: one for one in reversed(motion.walkers)}
-        motion = motion.of_walkers(sorted(firsts.values(), key=lambda one: one.walker))
+        firsts = {walker.make: walker for walker in reversed(motion.walkers)}
+        motion = motion.of_walkers(sorted(firsts.values(), key=lambda walker: walker.walker))
         if len(firsts) < count:
-            each = "" if len(firsts) == 1 else " of each make"
-            captions.append(f"The view shows the first walker{each}; the run has {count} walkers.")
+            of_makes = "" if len(firsts) == 1 else " of each make"
+            captions.append(f"The view shows the first walker{of_makes}; the run has {count} walkers.")
     stride, samples = ceil(len(motion.time) * len(motion.radius) / places), motion.case.run.samples_per_cycle
     # A stride that divides a cycle, or is a multiple of one, gives the same phases in each cycle.
     divisors = (number for number in range(stride, samples + 1) if samples % number == 0)
@@ -184,12 +184,12 @@ def _necks(motion: Motion, place: FloatArray, bridges: list[IntArray], path: Flo
     contacts, held = np.unique(np.concatenate(bridges), axis=0, return_inverse=True)
     if not len(contacts):
         return []
-    there = np.zeros((len(bridges), len(contacts)), dtype=bool)
-    there[np.repeat(np.arange(len(bridges)), [len(each) for each in bridges]), held.ravel()] = True
-    fine = next(each for most, each in _NECKS if there.size < most)
+    bridged = np.zeros((len(bridges), len(contacts)), dtype=bool)
+    bridged[np.repeat(np.arange(len(bridges)), [len(of_frame) for of_frame in bridges]), held.ravel()] = True
+    fine = next(cells for most, cells in _NECKS if bridged.size < most)
     points = np.zeros((len(bridges), len(contacts) * fine[0] * fine[1], 3))
-    for frame, present in enumerate(there):
-        near = np.flatnonzero(there[max(frame - 1, 0) : frame + 2].any(axis=0))
+    for frame, present in enumerate(bridged):
+        near = np.flatnonzero(bridged[max(frame - 1, 0) : frame + 2].any(axis=0))
         width = present[near].astype(float)
         ends = ends_of(motion, place[frame], contacts[near])
         necks = necks_of(motion, contacts[near], ends, *fine, width)[0]

@@ -66,16 +66,16 @@ def report_run(directory: Path, to: Path | None = None, origins: Origins = None,
 def shown_of(case: Case, results: Results, origins: Origins = None) -> dict[str, Any]:
     """Warnings and rows of a result, and parameters of its case, in SI units if no origins are recorded."""
     parameters = [
-        vars(one) | {"range": " … ".join(map(text_of, one.range or ())), "origin": one.word}
-        for one in (case.origins if origins is None else origins)
+        vars(source) | {"range": " … ".join(map(text_of, source.range or ())), "origin": source.word}
+        for source in (case.origins if origins is None else origins)
     ]
-    said = ((key, value) for key, value in dotted(case.as_dict()) if value not in (None, "", [], ()))
+    given = ((key, value) for key, value in dotted(case.as_dict()) if value not in (None, "", [], ()))
     return {
         "warnings": results.warnings,
         "rows": rows(results),
-        "guessed": [one for one in parameters if one["origin"] == "guessed"],
-        "uncertain": [one for one in parameters if one["origin"].endswith("uncertain")],
-        "parameters": parameters or [{"key": key, "text": text_of(value)} for key, value in said],
+        "guessed": [parameter for parameter in parameters if parameter["origin"] == "guessed"],
+        "uncertain": [parameter for parameter in parameters if parameter["origin"].endswith("uncertain")],
+        "parameters": parameters or [{"key": key, "text": text_of(value)} for key, value in given],
     }
 
 
