@@ -1,5 +1,6 @@
 """Recorded shaking and ramps, in both frames and in both engines; thresholds of motion by a ramp."""
 
+import re
 import shutil
 from math import nan, pi
 from pathlib import Path
@@ -13,6 +14,7 @@ from walkers import load_case, run
 from walkers.check.crosscheck import compare
 from walkers.inputs.case import Case
 from walkers.postprocess.motion import boundary_motion
+from walkers.postprocess.numbers import declared
 from walkers.postprocess.sides import REST
 from walkers.postprocess.threshold import _crossed
 from walkers.runner.binary import find_engine
@@ -150,7 +152,9 @@ def test_a_ramp_finds_the_threshold(ramp: list[float], name: str, tmp_path: Path
     found, windows = done.result, done.result.table("ramp")
     moves = windows[windows["velocity"].abs() > REST]["peak_acceleration"]
     assert found[name] == pytest.approx(moves.min() - found[name.replace("_at", "_within")] / 2.0, rel=1e-6)
-    assert "  resolution " in done.describe()
+    first, _, row = done.describe().split("\n")[:3]
+    assert first == f"fig1b: {name.replace('_', ' ')} {found[name] / 9.8:.4g} g"
+    assert re.fullmatch(rf"  {declared(name).label} .*  resolution \S+", row)
     assert found[name] == pytest.approx(0.9 * 9.8, abs=found[name.replace("_at", "_within")])
     assert found[name.replace("_at", "_within")] == pytest.approx(0.4 * 9.8 * 8 / 48)
     assert found[f"gamma0_{name}"] == pytest.approx(0.0857, rel=0.04)

@@ -223,10 +223,10 @@ def describe(summary: dict[str, Any]) -> str:
         f"(g = {ACCELERATION_OF_ONE_G:g} m/s², as in the paper; gravity is {gravity:g} m/s²), "
         f"amplitude {drive['amplitude'] * 1e3:.4g} mm, peak velocity {drive['peak_velocity'] * 1e3:.4g} mm/s"
     )
-    rows = [["contact", "capillary force", "4πγR limit", "bridge", "rupture", "overlap at rest"]]
+    rows = [["contact", "capillary force", "4πγR of a plane", "bridge volume", "rupture gap", "overlap at rest"]]
     for contact in summary["contacts"]:
         limit = contact["capillary_force_limit"]
-        cells = [f"{contact['capillary_force'] * 1e6:.4g} µN", f"{limit * 1e6:.4g} µN" if limit else "planes only"]
+        cells = [f"{contact['capillary_force'] * 1e6:.4g} µN", f"{limit * 1e6:.4g} µN" if limit else "-"]
         cells += [f"{contact['bridge_volume'] * 1e12:.3g} nL", f"{contact['rupture_distance'] * 1e6:.3g} µm"]
         rows.append([f"  {contact['contact']}", *cells, f"{contact['overlap_at_rest'] * 1e9:.4g} nm"])
     lines += [aligned(rows, right=range(1, 6))] if summary["contacts"] else []
@@ -263,14 +263,12 @@ def _text_of_run(step: dict[str, Any], run: dict[str, Any]) -> list[str]:
     lines = [f"time step  {step['step'] * 1e6:.5g} µs, {run['steps_per_cycle']} per cycle"]
     for name, limit in step["limits"].items():
         shown = f"{limit * 1e6:.4g} µs" if limit is not None else "none"
-        share = f"{step['share'][name]:.3f} of it (auto: up to {step['auto'][name]:g})"
-        lines.append(f"  {name:10} limit {shown:>10}, the step is {share}")
+        share = f"{step['share'][name]:.3f} of the limit (\"auto\": at most {step['auto'][name]:g})"
+        lines.append(f"  {name:10} limit {shown:>10}; time step = {share}")
     seconds = run["predicted_seconds"]
     cost = f"{seconds:.1f} s" if seconds < 120.0 else f"{seconds / 60.0:.1f} min"
     segments = f" in {run['segments']} segments" if run["segments"] > 1 else ""
-    most = f"until the velocity is constant within {percent(CONSTANT)}, at most " if run["until_steady"] else ""
-    lines.append(
-        f"run        {most}{run['steps']} steps, {run['simulated_seconds']:.4g} s simulated{segments}, "
-        f"{run['samples']} samples, takes about {cost}"
-    )
-    return lines
+    most = "at most " if run["until_steady"] else ""
+    end = f"; ends when the velocity is constant within {percent(CONSTANT)}" if most else ""
+    simulated = f"{run['steps']} steps, {run['simulated_seconds']:.4g} s simulated{segments}, {run['samples']} samples"
+    return [*lines, f"run        {most}{simulated}{end}; predicted run time {cost}"]

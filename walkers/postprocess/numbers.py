@@ -137,12 +137,19 @@ def fell(numbers: Mapping[str, Any]) -> bool:
 
 
 def state(numbers: Mapping[str, Any]) -> str:
-    """What walkers do where their velocity says little, such as ``at rest``; empty otherwise."""
+    """State of walkers whose mean velocity is not informative, such as ``at rest``; empty otherwise.
+
+    For a drive with a ramp it is the threshold of motion: ``stops at 0.8 g``.
+    """
     if numbers.get("came_apart"):
         return "came apart"
+    thresholds = {verb: numbers.get(f"{verb}_at", nan) for verb in ("stops", "starts")}
+    if texts := [f"{verb} at {' '.join(shown(peak, 'm/s^2'))}" for verb, peak in thresholds.items() if isfinite(peak)]:
+        return ", ".join(texts)
     if isfinite(numbers.get("slow_share", nan)):
-        count, shares = numbers["walkers"], {"slow": numbers["slow_share"], "connected": numbers["clustered_share"]}
-        return ", ".join(f"{round(count * share)} of {count} {does}" for does, share in shares.items())
+        count = numbers["walkers"]
+        slow, clustered = (round(count * numbers[name]) for name in ("slow_share", "clustered_share"))
+        return f"{slow} of {count} walkers slow, {clustered} in clusters"
     return "at rest" if "velocity" in numbers and abs(numbers[headline(numbers)]) < REST else ""
 
 

@@ -127,7 +127,7 @@ def outside_of_the_paper(case: Case) -> str | None:
         *([f"{peak:.3g} g (up to {_LARGEST_PEAK:g} g)"] if peak > (1.0 + 1e-9) * _LARGEST_PEAK else []),
         *([] if slow <= drive.frequency <= fast else [f"{drive.frequency:g} Hz ({slow:g} to {fast:g} Hz)"]),
     ]
-    return f"outside the paper's measurements: {', '.join(beyond)}; no model is tested there" if beyond else None
+    return f"outside the paper's range: {', '.join(beyond)}; the models are not tested there" if beyond else None
 
 
 def _predicted(case: Case, *, viscous: bool) -> dict[str, Any]:
@@ -201,9 +201,9 @@ def describe(prediction: dict[str, Any], result: Mapping[str, Any] | None) -> st
     }
     rows = [["mm/s", "velocity", "rotation 1", "rotation 2", "sliding 1", "Γc", ""]]
     rows += [[name, *_cells(model)] for name, model in models.items()]
-    detaches = f"{end['contact']} opens first, at Γ = {end['gamma']:.3g} of a steady pull"
+    detaches = f"under a steady acceleration, {end['contact']} opens first, at Γ = {end['gamma']:.3g}"
     notes = [
-        ["detachment", f"{detaches} (the peak of an oscillating one may exceed it)"],
+        ["detachment", f"{detaches}; under an oscillating acceleration the peak may be larger"],
         *_describe_alignment(prediction["alignment"]),
     ]
     head = f"Γ0 = {prediction['gamma0']:.3g}, sin δ = {prediction['sin_delta']:.3g}"
@@ -232,7 +232,7 @@ def _describe_alignment(state: dict[str, Any]) -> list[list[str]]:
     rolling = f"small angles {'stay small' if state['stable'] else 'grow'} if the beads roll"
     if state["u"] == 0.0:
         torque = rolling if state["v"] else "no torque toward the axis"
-        return [["alignment", f"Mathieu {equation}, stable up to V = {state['largest_stable_v']:.3g}: {torque}"]]
+        return [["alignment", f"Mathieu {equation} (stable for V < {state['largest_stable_v']:.3g}): {torque}"]]
     slip = "unknown: the axial motion is not periodic"
     if state["rate"] is not None:
         falls = f"turns over after about {state['turns_over_after'] or 0.0:.2g} s (from 1° to 90°)"
