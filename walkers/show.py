@@ -263,7 +263,7 @@ def _text_of_run(step: dict[str, Any], run: dict[str, Any]) -> list[str]:
     lines = [f"time step  {step['step'] * 1e6:.5g} µs, {run['steps_per_cycle']} per cycle"]
     for name, limit in step["limits"].items():
         shown = f"{limit * 1e6:.4g} µs" if limit is not None else "none"
-        share = f"{step['share'][name]:.3f} of the limit (\"auto\": at most {step['auto'][name]:g})"
+        share = f'{step["share"][name]:.3f} of the limit ("auto": at most {step["auto"][name]:g})'
         lines.append(f"  {name:10} limit {shown:>10}; time step = {share}")
     seconds = run["predicted_seconds"]
     cost = f"{seconds:.1f} s" if seconds < 120.0 else f"{seconds / 60.0:.1f} min"
