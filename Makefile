@@ -58,7 +58,7 @@ test: setup cluster chromium .venv/with-dev ## Lint, check types, run the tests 
 	.venv/bin/pytest -q -n 3 --dist worksteal -m "not smoke and not slow"
 
 .PHONY: test-slow
-test-slow: setup paraview .venv/with-dev ## Run what `make test` leaves out: what only a release needs
+test-slow: setup chromium paraview .venv/with-notebooks ## Run what `make test` leaves out: what only a release needs
 	.venv/bin/pytest -q -n 2 -m slow
 
 .PHONY: audit

@@ -47,7 +47,7 @@ from walkers.theory.prediction import predict
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 OPTIONAL: dict[str, list[str]] = PROJECT["optional-dependencies"]
-FOR_USERS = {extra: OPTIONAL[extra] for extra in OPTIONAL if extra not in {"all", "docs", "dev"}}
+FOR_USERS = {extra: OPTIONAL[extra] for extra in OPTIONAL if extra not in {"all", "docs", "dev", "notebooks"}}
 VERSION = "0.1.1.dev7+g0123abc"
 OURS = canonicalize_name(PROJECT["name"])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import threading
 import warnings
+from base64 import b64encode
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -12,6 +13,7 @@ from functools import cached_property
 from html import escape
 from inspect import signature
 from math import isclose
+from mimetypes import guess_type
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
@@ -19,7 +21,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 from walkers import DEFAULT_OUT, RECORDS
 from walkers.errors import InputError, Problem, WalkersError, check_utf8, expected_of, refused
 from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped
-from walkers.progress import Progress, progress_of
+from walkers.progress import Progress, in_notebook, progress_of
 from walkers.runner import directory as on_disk
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import EngineMissing, RunBusy
@@ -183,6 +185,15 @@ def directory_of(reference: str | Path, out: str | Path = DEFAULT_OUT, changes: 
 # --- runs -------------------------------------------------------------------------------------------------------------
 
 
+class Pictures(list[Path]):
+    """Files of pictures, which a notebook shows."""
+
+    def _repr_html_(self) -> str:
+        """The contents of the files: a notebook keeps them. A PDF is shown by its name."""
+        shown = ((escape(path.name), guess_type(path)[0], b64encode(path.read_bytes()).decode()) for path in self)
+        return "".join(f'<p><img alt="{name}" src="data:{kind};base64,{content}">' for name, kind, content in shown)
+
+
 @dataclass(frozen=True)
 class Run:
     """A run: finished, running, interrupted or failed. Its results raise `InputError` until it is finished.
@@ -314,17 +325,17 @@ class Run:
             return f"<p>{escape(self.describe())}</p>"
         return result_html(self.result, self.origins)
 
-    def plot(self, to: str | Path | None = None, formats: str | Sequence[str] = ("png",)) -> list[Path]:
-        """Draw the figures and return their paths; see `walkers.postprocess.figures.plot_run`."""
+    def plot(self, to: str | Path | None = None, formats: str | Sequence[str] = ("png",)) -> Pictures:
+        """Draw the figures and return their files; see `walkers.postprocess.figures.plot_run`."""
         from walkers.postprocess.figures import plot_run
 
-        return plot_run(self.finished_directory, _path(to), formats)
+        return Pictures(plot_run(self.finished_directory, _path(to), formats))
 
-    def render(self, to: str | Path | None = None, *, images: int = 6, walker: int | None = None) -> list[Path]:
+    def render(self, to: str | Path | None = None, *, images: int = 6, walker: int | None = None) -> Pictures:
         """Render pictures at several times; see `walkers.postprocess.series.render_series`."""
         from walkers.postprocess.series import render_series
 
-        return render_series(self.finished_directory, _path(to), images=images, walker=walker)
+        return Pictures(render_series(self.finished_directory, _path(to), images=images, walker=walker))
 
     def film(self, to: str | Path | None = None, *, progress: bool | None = None, **options: Any) -> Path:
         """Render a film with `walkers.postprocess.film_options.FilmOptions`, such as ``slowdown``."""
@@ -622,9 +633,13 @@ class Sweep:
         >>> walkers.sweep("fig4", tmp).figure(x="liquid.name", log="y").axes[0].get_yscale()
         'log'
         """
+        if in_notebook():
+            import matplotlib.pyplot as plt
+
+            plt.switch_backend(plt.rcParams["backend"])  # which tells the notebook how to show figures
         return _figure(self.table(), options)
 
-    def plot(self, to: str | Path | None = None, **options: Any) -> list[Path]:
+    def plot(self, to: str | Path | None = None, **options: Any) -> Pictures:
         """Plot the table to a file as in `figure`; by default in the sweep's directory, named after the column."""
         from walkers.postprocess.drawing import FORMATS, check_place, save_figure
         from walkers.sweeps.figure import column_of
@@ -633,7 +648,8 @@ class Sweep:
         place = _path(to) or self.directory / f"{column_of(table, options.get('y'))}.png"
         check_place(place, *(f".{form}" for form in FORMATS))
         runs = [Path(run).name for run in table.loc[table["status"] == "finished", "run"]]
-        return save_figure(_figure(table, options), place, runs, place.suffix.lower()[1:], str(table.attrs["sweep"]))
+        form = place.suffix.lower()[1:]
+        return Pictures(save_figure(_figure(table, options), place, runs, form, str(table.attrs["sweep"])))
 
     def report(self, to: str | Path | None = None) -> Path:
         """Write a self-contained HTML report; see `walkers.sweeps.report.report_sweep`."""

@@ -26,16 +26,21 @@ Tell = Callable[[Progress], None]
 """A function that is called a few times per second; its exceptions stop what is made."""
 
 
+def in_notebook() -> bool:
+    """Whether this process is the kernel of a notebook."""
+    ipython = sys.modules.get("IPython")
+    return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
+
+
 @contextmanager
 def progress_of(name: str, wanted: bool | None = True) -> Iterator[Tell | None]:
     """Yield a function that shows the progress, or None if it is not wanted (None: it is wanted in notebooks only)."""
-    ipython = sys.modules.get("IPython")
-    in_notebook = ipython is not None and hasattr(ipython.get_ipython(), "kernel")
-    if not (in_notebook if wanted is None else wanted):
+    notebook = in_notebook()
+    if not (notebook if wanted is None else wanted):
         yield None
         return
-    stream, begin, due = sys.stdout if in_notebook else sys.stderr, time.monotonic(), _FIRST_LINE_SECONDS
-    in_place, wide = in_notebook or stream.isatty(), shutil.get_terminal_size().columns - 1
+    stream, begin, due = sys.stdout if notebook else sys.stderr, time.monotonic(), _FIRST_LINE_SECONDS
+    in_place, wide = notebook or stream.isatty(), shutil.get_terminal_size().columns - 1
 
     def show(progress: Progress) -> None:
         nonlocal due

@@ -13,7 +13,7 @@ print(run.describe())
 # %%
 # A picture of one walker at three times. The grid is fixed to the floor.
 
-picture = run.render("runs/first_walk.png", images=3)[0]
+run.render("runs/first_walk.png", images=3)
 
 # %%
 # The tables of a run are pandas data frames in SI units.

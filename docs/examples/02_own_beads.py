@@ -46,7 +46,7 @@ print(run.describe())
 # The result lists the values that have not been measured: here friction, roughness and the liquid. See
 # :doc:`/how-to/own-beads` for the uncertainty that these values cause.
 
-picture = run.render("runs/steel.png", images=3)[0]
+run.render("runs/steel.png", images=3)
 
 # %%
 # Change a value without editing the file:

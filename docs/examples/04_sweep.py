@@ -25,4 +25,4 @@ print(table[["drive.peak_acceleration", "gamma0", "velocity", "steady"]].round(6
 # %%
 # ``plot`` writes a figure of the table; ``figure`` returns it, so that you can change it.
 
-picture = sweep.plot("runs/drive.png", theory=True)[0]
+sweep.plot("runs/drive.png", theory=True)

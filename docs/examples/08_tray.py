@@ -13,7 +13,7 @@ print(run.describe())
 # %%
 # Views from above, at equal time intervals:
 
-picture = run.render("runs/tray.png")[0]
+run.render("runs/tray.png")
 
 # %%
 # The table ``meetings`` lists who merged with whom, and when.

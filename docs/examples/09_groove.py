@@ -33,4 +33,4 @@ plt.show()
 # %%
 # The picture shows the narrowest groove.
 
-picture = sweep.runs[0].render("runs/groove.png", images=3)[0]
+sweep.runs[0].render("runs/groove.png", images=3)

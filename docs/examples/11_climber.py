@@ -29,4 +29,4 @@ figure.tight_layout()
 plt.show()
 
 # %%
-picture = run.render("runs/climber.png")[0]
+run.render("runs/climber.png")

@@ -14,7 +14,7 @@ run = walkers.run("pile-ci")
 print(run.describe())
 
 # %%
-picture = run.render("runs/pile.png")[0]
+run.render("runs/pile.png")
 
 # %%
 # The table ``bed`` has one row per frame.

@@ -46,4 +46,4 @@ print(f"constant: {1e3 * run.result['velocity']:.2f} mm/s")
 print((sweep.table().set_index("liquid.law")["velocity"] * 1e3).round(2).to_string())
 
 # %%
-picture = sweep.plot("runs/laws.png")[0]
+sweep.plot("runs/laws.png")

@@ -13,4 +13,4 @@ table = sweep.table()
 print((1e3 * table[["radius_1", "radius_2", "velocity"]]).assign(sin_delta=table["sin_delta"]).to_string(index=False))
 
 # %%
-picture = sweep.plot("runs/fig3.png", x="sin_delta", theory=True)[0]
+sweep.plot("runs/fig3.png", x="sin_delta", theory=True)

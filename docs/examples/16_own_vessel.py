@@ -38,7 +38,7 @@ case = {
     "run": {"duration": "0.1 s"},
 }
 run = walkers.run(case)
-picture = run.render("runs/funnel.png")[0]
+run.render("runs/funnel.png")
 
 # %%
 # A bowl of facets. A bead that slides in a round bowl without friction comes as high on the other side, after half the
