@@ -14,7 +14,7 @@ _OTHERS = "_ext,examples,gallery,explanation,how-to,reference,engine-reports,ind
 _OPTIONS = {
     "root_doc": "article",
     "exclude_patterns": _OTHERS,
-    "extensions": "sphinx.ext.autodoc,myst_parser,readable",
+    "extensions": "myst_parser,mathml",
     "suppress_warnings": "myst.xref_missing",
 }
 _STYLE = """
@@ -42,7 +42,7 @@ def article(to: Path) -> list[Path]:
         text = (Path(work) / "article.html").read_text("utf-8")
         _, _, body = text.partition('<article class="bd-article">')
         body, _, _ = body.partition("</article>")
-        body = re.sub(r'(?<=src=")[^"]+\.png', lambda found: _inline(Path(work) / found[0]), body)
+        body = re.sub(r'(?<=src=")[^"]+\.png', lambda match: _inline(Path(work) / match[0]), body)
     html, pdf = to / "article.html", to / "article.pdf"
     html.write_text(_PAGE.format("Walkers and climbing piles of wet beads", _STYLE, body), "utf-8")
     how = ["--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer"]

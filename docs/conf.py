@@ -22,7 +22,7 @@ version = release = metadata.version("granular-walkers")
 extensions = [
     *("numpydoc", "sphinx.ext.autodoc", "myst_parser"),
     *("sphinx_copybutton", "sphinx_design", "sphinx_gallery.gen_gallery", "sphinxcontrib.bibtex"),
-    *("readable", "generated", "texts"),  # docs/_ext
+    *("mathml", "generated", "texts"),  # docs/_ext
 ]
 exclude_patterns = ["_ext", "examples", "gallery/**.ipynb"]
 default_role = "py:obj"

@@ -27,7 +27,7 @@ from matplotlib.figure import Figure
 
 from docs import effects, tables
 from walkers import load_case, run, sweep
-from walkers.api import climb
+from walkers.api import Changes, climb
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.file import load_calibration
 from walkers.calibration.report import write_outcome
@@ -41,7 +41,6 @@ from walkers.inputs.sweep import load_sweep
 from walkers.paper.make import COMPARED, FIGURES, make_figures
 from walkers.paper.sources import sweep_of
 from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, save_figure, styled
-from walkers.postprocess.film_options import FilmOptions
 from walkers.postprocess.results import VERSION
 from walkers.runner.files import read_json, write_json, write_text
 from walkers.sweeps.climbing import texts_of
@@ -49,8 +48,6 @@ from walkers.sweeps.scheduler import Options
 from walkers.templates.deck import CONTENT_VERSION
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from walkers.check.scenes import Bench
 
 RECORD = Path("figures") / "made-from.json"
@@ -59,19 +56,12 @@ CHECKED = Path("figures") / "validation.json"
 _BLOCK = re.compile(r"(?ms)(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n)(?P<text>.*?)(?=^```)")
 _FACT = re.compile(r"<!--fact (?P<name>\S+)-->(?P<text>[^<]*)<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
-_CLIMBS = {f"contact.roughness.bead_{other}": "0.2 um" for other in ("bead", "wall")}
+_CLIMBS = {f"contact.roughness.bead_{surface}": "0.2 um" for surface in ("bead", "wall")}
 """The small pile of which clusters climb within its four seconds."""
 _PILES = ("pile-starts", "pile-frictions", "pile-contacts")
 _OF_CLIMBS = (
-    "pile",
-    "climbed",
-    "climbs",
-    "rate",
-    "on plain walls",
-    "in corners",
-    "led by large",
-    "p by chance",
-    "speed (mm/s)",
+    *("pile", "climbed", "climbs", "rate", "on plain walls", "in corners"),
+    *("led by large", "p by chance", "speed (mm/s)"),
 )
 _OF_CALIBRATION = ("calibration.md", "calibration.json", "predictions.png")
 
@@ -92,14 +82,14 @@ def _of_figure(name: str, *files: str, sweeps: Iterable[str]) -> Illustration:
     return Illustration(files, lambda: [case for sweep in sweeps for case in sweep_of(sweep).cases()], make)
 
 
-def _of_run(name: str, case: str, changes: Mapping[str, Any] | None = None, film: Any = None) -> Illustration:
+def _of_run(name: str, case: str, changes: Changes = None, film: Changes = None) -> Illustration:
     """A picture of one run as `walkers render` makes it, or a film."""
     file = f"pictures/{name}.gif" if film else f"pictures/{name}.png"
 
     def make(out: Path, docs: Path) -> None:
         done = run(load_case(case, changes), out)
         if film:
-            done.film(docs / file, **vars(film))
+            done.film(docs / file, **film)
         else:
             done.render(docs / file)
 
@@ -109,7 +99,7 @@ def _of_run(name: str, case: str, changes: Mapping[str, Any] | None = None, film
 def _make_climbs(out: Path, docs: Path) -> None:
     """Figure and table of the climbs in all sweeps of piles."""
     climbs = climb([sweep(name, out).directory for name in _PILES], to=docs / "figures" / "pile-climbs.png")
-    rows = [{name: one[name] for name in _OF_CLIMBS} for one in map(texts_of, climbs)]
+    rows = [{name: texts[name] for name in _OF_CLIMBS} for texts in map(texts_of, climbs)]
     write_text(docs / "figures" / "pile-climbs.md", tables.page(f"walkers climb {' '.join(_PILES)}", rows))
 
 
@@ -179,8 +169,7 @@ def _experiments(bench: Bench) -> Figure:
 
 
 def _make_calibration(out: Path, docs: Path) -> None:
-    found = calibrate(load_calibration("ruby"), out, Options())
-    write_outcome(found, out / "ruby")
+    write_outcome(calibrate(load_calibration("ruby"), out, Options()), out / "ruby")
     for name in _OF_CALIBRATION:
         shutil.copy(out / "ruby" / name, docs / "figures" / name.replace("predictions", "calibration"))
 
@@ -213,7 +202,7 @@ def _of_sweep(name: str, options: Mapping[str, Any]) -> Illustration:
 
     def make(out: Path, docs: Path) -> None:
         done = sweep(name, out)
-        save_figure(done.figure(**options), docs / files[0], [one.directory.name for one in done.runs])
+        save_figure(done.figure(**options), docs / files[0], [point.directory.name for point in done.runs])
         for file in files[1:]:
             write_text(docs / file, tables.page(f"walkers list {name}", _TABLES[name](done.table())))
 
@@ -228,7 +217,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     "walker": _of_run("walker", "fig1b", {"run.cycles": 60}),
     "film": _of_run(
         *("walker", "fig1b", {"run.cycles": 60}),
-        film=FilmOptions(size=(512, 216), fps=20, slowdown=20.0, walker=0, end=0.4),
+        film={"size": (512, 216), "fps": 20, "slowdown": 20.0, "walker": 0, "end": 0.4},
     ),
     "tray": _of_run("tray", "tray"),
     "climber": _of_run("climber", "climber"),
@@ -238,7 +227,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
         _make_climbs,
     ),
     "pile": _of_run("pile", "pile-small", _CLIMBS),
-    **{name: _of_figure(name, f"figures/{name}.png", sweeps=one.sweeps) for name, one in FIGURES.items()},
+    **{name: _of_figure(name, f"figures/{name}.png", sweeps=figure.sweeps) for name, figure in FIGURES.items()},
     **{name: _of_sweep(name, options) for name, options in _SWEEPS.items()},
     "comparison": _of_figure("comparison", "figures/comparison.md", "figures/comparison.json", sweeps=COMPARED),
     "unexplained": Illustration(
@@ -260,7 +249,6 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
 
 def digest(cases: Iterable[Case]) -> str:
     """Twelve hex digits over cases, deck version and version of the results; the engine binary does not count."""
-    cases = list(cases)
     contents = {
         "cases": [case.determinants() for case in cases],
         "decks": CONTENT_VERSION,
@@ -269,19 +257,13 @@ def digest(cases: Iterable[Case]) -> str:
     return hashlib.sha256(json.dumps(contents, sort_keys=True).encode()).hexdigest()[:12]
 
 
-def _recorded(docs: Path) -> dict[str, str]:
-    """The digest of the cases that each file was made from."""
-    return read_json(docs / RECORD) if (docs / RECORD).is_file() else {}
-
-
 def stale(docs: Path) -> dict[str, list[str]]:
     """The illustrations with files that are missing or show other cases than the current ones, and these files."""
-    record, found = _recorded(docs), {}
-    for name, one in ILLUSTRATIONS.items():
-        today = digest(one.cases())
-        files = [file for file in one.files if record.get(file) != today or not (docs / file).is_file()]
-        found |= {name: files} if files else {}
-    return found
+    record, old = read_json(docs / RECORD), {}
+    for name, illustration in ILLUSTRATIONS.items():
+        today = digest(illustration.cases())
+        old[name] = [file for file in illustration.files if record.get(file) != today or not (docs / file).is_file()]
+    return {name: files for name, files in old.items() if files}
 
 
 def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[Path]:
@@ -295,11 +277,11 @@ def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[
     written = []
     for name in only or stale(docs):
         print(f"walkers: {name}", file=sys.stderr)
-        one = ILLUSTRATIONS[name]
-        one.make(out, docs)
-        record = {**_recorded(docs), **dict.fromkeys(one.files, digest(one.cases()))}
+        illustration = ILLUSTRATIONS[name]
+        illustration.make(out, docs)
+        record = read_json(docs / RECORD) | dict.fromkeys(illustration.files, digest(illustration.cases()))
         write_json(docs / RECORD, dict(sorted(record.items())))
-        written += [docs / file for file in one.files]
+        written += [docs / file for file in illustration.files]
     return written + refresh_pages(pages_of(docs), facts(docs), out)
 
 
@@ -312,11 +294,11 @@ def facts(docs: Path) -> dict[str, str]:
     """Numbers that sentences may quote: of comparison and calibration, of `CHECKED`, of the tables of climbs."""
     compared: dict[str, Any] = read_json(docs / "figures" / "comparison.json")
     shipped, counted = next(iter(compared["sets"].items()))
-    values = {one["name"]: one["values"][shipped] for one in compared["facts"]}
+    values = {fact["name"]: fact["values"][shipped] for fact in compared["facts"]}
     numbers = {name: f"{value:.3g}" for name, value in values.items() if value is not None}
     numbers["agree"] = f"{counted['agree']} of {counted['of']}"
-    numbers["threshold"] = f"{np.mean([list(one.values())[1:3] for one in compared['thresholds']]):.2f}"
-    by_frequency = {one["of"]: one["by_frequency"] for one in compared["curve"]}
+    numbers["threshold"] = f"{np.mean([list(row.values())[1:3] for row in compared['thresholds']]):.2f}"
+    by_frequency = {row["of"]: row["by_frequency"] for row in compared["curve"]}
     numbers["by_frequency_5g"] = f"{by_frequency['Fig. 2, 5 g']:.2f}"
     checked = read_json(docs / CHECKED)["lines"]
     numbers |= tables.of_calibration(read_json(docs / "figures" / "calibration.json"))
@@ -348,13 +330,13 @@ def _of_checks(lines: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     }
 
 
-def refresh_pages(pages: Iterable[Path], known: Mapping[str, str], out: Path) -> list[Path]:
+def refresh_pages(pages: Iterable[Path], numbers: Mapping[str, str], out: Path) -> list[Path]:
     """Write the current outputs and numbers into pages; return the pages that changed."""
     changed = []
     for page in pages:
         old = page.read_text("utf-8")
-        new = _FACT.sub(lambda found: f"<!--fact {found['name']}-->{known[found['name']]}<!--/fact-->", old)
-        new = _BLOCK.sub(lambda found: found["head"] + output_of(found["command"], out), new)
+        new = _FACT.sub(lambda fact: f"<!--fact {fact['name']}-->{numbers[fact['name']]}<!--/fact-->", old)
+        new = _BLOCK.sub(lambda block: block["head"] + output_of(block["command"], out), new)
         if without_hashes(new) != without_hashes(old):
             write_text(page, new)
             changed.append(page)
@@ -363,13 +345,12 @@ def refresh_pages(pages: Iterable[Path], known: Mapping[str, str], out: Path) ->
 
 def outputs_in(page: Path) -> dict[str, str]:
     """The commands of a page with their outputs, without the hashes of run names."""
-    found = _BLOCK.finditer(page.read_text("utf-8"))
-    return {one["command"]: without_hashes(one["text"]) for one in found}
+    return {block["command"]: without_hashes(block["text"]) for block in _BLOCK.finditer(page.read_text("utf-8"))}
 
 
 def facts_in(page: Path) -> list[tuple[str, str]]:
     """The names and texts of the facts that a page quotes."""
-    return [(one["name"], one["text"]) for one in _FACT.finditer(page.read_text("utf-8"))]
+    return [(fact["name"], fact["text"]) for fact in _FACT.finditer(page.read_text("utf-8"))]
 
 
 without_hashes = partial(_RUN_HASH.sub, "")
@@ -380,7 +361,7 @@ def output_of(command: str, out: Path) -> str:
     """What a command on a case prints; runs are in ``runs``, wherever that is."""
     _, name, *arguments = shlex.split(command)
     if "--theory" in arguments:
-        run(next(one for one in arguments if not one.startswith("-")), out)  # which it prints beside the models
+        run(next(word for word in arguments if not word.startswith("-")), out)  # which it prints beside the models
     words = [sys.executable, "-m", "walkers.main", name, *arguments, "--out", str(out)]
     words += ["--force"] if name == "run" else []  # else it says that it was run already
     printed = subprocess.run(words, capture_output=True, text=True, check=True).stdout

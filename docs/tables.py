@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -44,8 +44,13 @@ def least_frictions(table: pd.DataFrame) -> list[dict[str, str]]:
 
 def page(command: str, rows: Sequence[Mapping[str, str]]) -> str:
     """A page with a table, below the command that prints its numbers."""
-    lines = [list(rows[0]), ["---"] * len(rows[0]), *(list(row.values()) for row in rows)]
-    return "\n".join([f"# {command}", "", *(f"| {' | '.join(line)} |" for line in lines), ""])
+    return f"# {command}\n\n{markdown(list(rows[0]), (list(row.values()) for row in rows))}"
+
+
+def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table of Markdown."""
+    cells = ([cell.replace("|", "\\|").replace("\n", " ") for cell in row] for row in rows)
+    return "\n".join(f"| {' | '.join(line)} |" for line in (heads, ["---"] * len(heads), *cells)) + "\n"
 
 
 def cells(folder: Path) -> Iterator[tuple[str, str]]:

@@ -10,13 +10,14 @@ from __future__ import annotations
 import json
 import re
 import types
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BeforeValidator
 from pydantic.fields import FieldInfo
 
+from docs.tables import markdown
 from walkers.commands import commands
 from walkers.commands.catalogue import COMMANDS, NOT_KNOWN, catalogue
 from walkers.inputs.case import Case
@@ -25,7 +26,7 @@ from walkers.inputs.resolving import SUPPLIED
 from walkers.inputs.table import Table, example_of, keys_in, table_in
 from walkers.inputs.units import ACCELERATION, AUTO, TEMPERATURE, Kind, kind_in, quantity_text
 from walkers.main import help_of, overview, program
-from walkers.postprocess.quantities import GROUPS, TABLES
+from walkers.postprocess.quantities import GROUPS, TABLES, Quantity
 from walkers.sweeps.table import STATE
 
 if TYPE_CHECKING:
@@ -35,19 +36,12 @@ if TYPE_CHECKING:
 FOLDER = Path(__file__).parents[1] / "reference" / "generated"
 
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤", "min_length": "length ≥", "max_length": "length ≤"}
-_AT_REST = 1e-6  # m/s
 _PAGE = re.compile(r"docs/(\S+?\.md)")
 
 
-def _table(heads: Sequence[str], rows: Iterator[Sequence[str]]) -> str:
-    """A table of Markdown."""
-    cells = ([cell.replace("|", "\\|").replace("\n", " ") for cell in row] for row in rows)
-    lines = [heads, ["---"] * len(heads), *cells]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
-
-
-def _described(columns: Mapping[str, tuple[str, str]]) -> str:
-    return _table(["column", "unit", "meaning"], ((f"`{key}`", unit, text) for key, (unit, text) in columns.items()))
+def _described(title: str, quantities: Iterable[Quantity]) -> str:
+    rows = ((f"`{quantity.name}`", quantity.si_unit, quantity.meaning) for quantity in quantities)
+    return f"### {title}\n\n{markdown(['column', 'unit', 'meaning'], rows)}"
 
 
 # --- keys of a case file ----------------------------------------------------------------------------------------------
@@ -58,20 +52,20 @@ def _expected(hint: Any) -> str:
     if get_origin(hint) is Annotated:
         inner, *notes = get_args(hint)
         bounds = " and ".join(
-            f"{sign} {getattr(one, name):g}"
+            f"{sign} {getattr(bound, name):g}"
             for note in notes
-            for one in (note.metadata if isinstance(note, FieldInfo) else [note])
+            for bound in (note.metadata if isinstance(note, FieldInfo) else [note])
             for name, sign in _BOUNDS.items()
-            if isinstance(getattr(one, name, None), (int, float))
+            if isinstance(getattr(bound, name, None), (int, float))
         )
         refusals = (_refusal(note) for note in notes if isinstance(note, (BeforeValidator, Kind)))
         expected = next(refusals, None) or _expected(inner)
         expected += ', or `"auto"`' if AUTO in notes else ""
         return f"{expected}; {bounds}" if bounds else expected
     if get_origin(hint) is Literal:
-        return "one of " + ", ".join(f'`"{one}"`' for one in get_args(hint))
+        return "one of " + ", ".join(f'`"{value}"`' for value in get_args(hint))
     if get_origin(hint) in (Union, types.UnionType):
-        return " or ".join(_expected(one) for one in get_args(hint) if one is not types.NoneType)
+        return " or ".join(_expected(member) for member in get_args(hint) if member is not types.NoneType)
     if get_origin(hint) is tuple:
         number = "" if ... in get_args(hint) else f" of {len(get_args(hint))}"
         return f"a list{number}, each {_expected(get_args(hint)[0])}"
@@ -123,11 +117,11 @@ def tables_of_keys(model: type[Table] = Case, place: str = "") -> Iterator[tuple
     path = f"{place.strip('[]')}.".lstrip(".")
     keys = [name for name in fields if not below[name]]
     rows = (_row(name, fields[name], supplied=f"{path}{name}" in SUPPLIED) for name in keys)
-    text = _table(["key", "meaning", "expects", "default"], rows)
+    text = markdown(["key", "meaning", "expects", "default"], rows)
     for choice in model.choices:
-        ways = "; ".join(" and ".join(f"`{name}`" for name in way) for way in choice.expressions)
-        needed = choice.required and not any(f"{path}{name}" in SUPPLIED for way in choice.expressions for name in way)
-        text += f"\n{'Exactly' if needed else 'At most'} one of: {ways}.\n"
+        alternatives = "; ".join(" and ".join(f"`{name}`" for name in names) for names in choice.expressions)
+        supplied = any(f"{path}{name}" in SUPPLIED for names in choice.expressions for name in names)
+        text += f"\n{'Exactly' if choice.required and not supplied else 'At most'} one of: {alternatives}.\n"
     yield place or "Top level", text
     for name, inner in below.items():
         if inner:
@@ -141,54 +135,68 @@ def _keys() -> str:
     return text + "".join(f"\n### {place}\n\n{table}" for place, table in tables_of_keys()) + _columns()
 
 
+_COLUMNS = """
+## Columns of the tables of a run
+
+The parquet files contain the units and meanings too. A name with `*` stands for one column per bead or contact:
+`rotation_1`, `rotation_2`, …
+
+"""
+_SWEEPS = """
+## Columns of the table of a sweep
+
+The first columns are the keys that vary.
+
+"""
+_GROUPS = {"walking": "Walkers", "meetings": "Walkers that may meet", "piles": "Piles", "drive": "All sweeps"}
+
+
 def _columns() -> str:
     """Columns of the tables of a run and of a sweep, from where they are declared."""
-    text = (
-        "\n## Columns of the tables of a run\n\nThe parquet files contain the units and meanings too. A name with `*`"
-    )
-    text += " stands for one column per bead or contact: `rotation_1`, `rotation_2`, …\n\n"
-    for name, quantities in TABLES.items():
-        columns = {quantity.name: (quantity.si_unit, quantity.meaning) for quantity in quantities}
-        text += f"### {name}\n\n{_described(columns)}\n"
-    text += "## Columns of the table of a sweep\n\nThe first columns are the keys that vary.\n\n"
-    names = {"walking": "Walkers", "meetings": "Walkers that may meet", "piles": "Piles", "drive": "All sweeps"}
-    for group, head in names.items():
-        columns = {one.name: (one.si_unit, one.meaning) for one in GROUPS[group]}
-        text += f"### {head}\n\n{_described(columns | (STATE if group == 'drive' else {}))}\n"
-    return text
+    runs = [_described(name, quantities) for name, quantities in TABLES.items()]
+    sweeps = [_described(title, GROUPS[group]) for group, title in _GROUPS.items()]
+    status = "".join(f"| `{name}` | {unit} | {meaning} |\n" for name, (unit, meaning) in STATE.items())
+    return _COLUMNS + "\n".join(runs) + _SWEEPS + "\n".join(sweeps) + status
+
+
+_LIBRARY = """# Library
+
+The library of the program. A case can override each number. `walkers library` prints it.
+
+Sources of liquids give the temperature. Densities and moduli of a grade differ by several per cent.
+"""
 
 
 def _library() -> str:
     """The library of materials and liquids with its sources, as ``walkers library`` has it."""
-    text = "# Library\n\nThe library of the program. A case can override each number. `walkers library` prints it.\n"
-    text += "\nSources of liquids give the temperature. Densities and moduli of a grade differ by several per cent.\n"
-    found = catalogue(of_others=False)
+    text, entries = _LIBRARY, catalogue(of_others=False)
     for kind in ("materials", "liquids", "surface pairs"):
         text += f"\n## {kind.capitalize()}\n"
-        for one in (one for one in found if one.kind == kind):
-            text += f"\n### {one.name}\n\n{one.text}\n\n{_sourced(one.numbers)}"
-    guesses = [(one.name, one.numbers["default"]) for one in found if one.kind == "not measured"]
-    rows = ((f"`{name}`", str(known.written), _range(known)) for name, known in guesses)
-    return f"{text}\n## Not measured\n\n{NOT_KNOWN}\n\n{_table(['', 'default', 'range'], rows)}"
+        for entry in (entry for entry in entries if entry.kind == kind):
+            text += f"\n### {entry.name}\n\n{entry.text}\n\n{_sourced(entry.numbers)}"
+    defaults = {entry.name: entry.numbers["default"] for entry in entries if entry.kind == "not measured"}
+    rows = (_numbers(*default) for default in defaults.items())
+    return f"{text}\n## Not measured\n\n{NOT_KNOWN}\n\n{markdown(['', 'default', 'range'], rows)}"
 
 
 def _sourced(numbers: Mapping[str, LibraryNumber]) -> str:
-    linked = {key: _PAGE.sub(r"[docs/\1](../../\1)", known.source) for key, known in numbers.items()}
-    rows = ((f"`{key}`", str(known.written), _range(known), linked[key]) for key, known in numbers.items())
-    return _table(["", "value", "range", "source"], rows)
+    linked = {key: _PAGE.sub(r"[docs/\1](../../\1)", number.source) for key, number in numbers.items()}
+    rows = ((*_numbers(key, number), linked[key]) for key, number in numbers.items())
+    return markdown(["", "value", "range", "source"], rows)
 
 
-def _range(known: LibraryNumber) -> str:
-    return f"{known.range[0]} to {known.range[1]}" if known.range else ""
+def _numbers(key: str, number: LibraryNumber) -> tuple[str, str, str]:
+    """Key, value and range."""
+    return f"`{key}`", str(number.written), f"{number.range[0]} to {number.range[1]}" if number.range else ""
 
 
 def _shipped() -> str:
     """Shipped cases and sweeps with their titles."""
     text = "# Shipped cases, sweeps and calibrations\n\nEvery command accepts these names instead of a file.\n"
     for kind, command in COMMANDS.items():
-        names = [(one.name, one.text) for one in catalogue(of_others=False) if one.kind == kind]
-        rows = [(f"`walkers {command} {name}`", title) for name, title in names]
-        text += f"\n## {kind.capitalize()}\n\n{_table(['', 'title'], rows)}"
+        entries = (entry for entry in catalogue(of_others=False) if entry.kind == kind)
+        rows = ((f"`walkers {command} {entry.name}`", entry.text) for entry in entries)
+        text += f"\n## {kind.capitalize()}\n\n{markdown(['', 'title'], rows)}"
     return text
 
 

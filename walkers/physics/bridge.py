@@ -1,13 +1,13 @@
 """Interface of a bridge law: the pull and the resistances between two surfaces as functions of their gap.
 
 The surfaces 1 and 2 are two spheres, or a sphere and a plane. The unit vector n points from 2 to 1, h is the gap, l1
-and l2 are the distances of the centres from the middle of the contact. Three velocities describe the relative motion:
+and l2 are the distances of the centres from the middle of the contact. Three velocities describe the relative motion::
 
     normal    w = (v1 - v2) · n
     sliding   s = (v1 - v2) - w n + n × (l1 ω1 + l2 ω2)       of the surfaces at the contact
     rolling   q = n × (ω1 - ω2)                               rad/s
 
-A law gives the pull P and the resistances N, S, C and Q as functions of h. The force on 1 and the torque are
+A law gives the pull P and the resistances N, S, C and Q as functions of h. The force on 1 and the torque are::
 
     F = -(P + N w) n - (S s + C q),        M = -(C s + Q q).
 
