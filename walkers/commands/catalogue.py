@@ -28,7 +28,7 @@ COMMANDS = {"cases": "run", "sweeps": "sweep", "calibrations": "calibrate"}
 NOT_KNOWN = """\
 The friction between other pairs of wet surfaces and the values below have not been measured. A case that does not give
 them uses these defaults, and walkers run --spread varies them within these ranges. Both are assumptions for hard,
-smooth surfaces that the liquid wets, not for the materials of a case. One contact angle holds at all bridges, between
+smooth, wetted surfaces, not for the materials of a case. One contact angle holds at all bridges, between
 beads and at the boundary. For other surfaces, give a value and its range in [uncertain]."""
 
 

@@ -165,7 +165,7 @@ def figures(
     jobs: Jobs = None,
     by: By = By(),
 ) -> int:
-    """Draw the paper's figures, and write what it measured or states beside ours. Missing runs are made first.
+    """Draw the paper's figures with our results, and write a table of its facts. Missing runs are made first.
 
     Parameters
     ----------

@@ -94,7 +94,7 @@ def _export_deck(name: str, at: At, output: Path | None) -> None:
 def clean(*runs: RunOrSweep, out: Out = DEFAULT_OUT, yes: Annotated[bool, Parameter(("--yes", "-y"))] = False) -> int:
     """Remove interrupted and failed runs, or the given runs and sweeps. Asks first. Runs in progress stay.
 
-    With a sweep go the runs that no other sweep has, with a run its spread and its accuracy.
+    A sweep is removed with the runs that no other sweep has, a run with its spread and its accuracy.
 
     Parameters
     ----------

@@ -161,11 +161,11 @@ class Walkers(Table):
     angle: units.Angle = key("Angle at the start between the whole walker and that direction.", 0.0)
     angle_spread: units.NonNegativeAngle = key("Range of the random angle at the start: `angle` ± this.", pi / 180.0)
     gap: Annotated[Filled[SignedLength], units.AUTO] = key(
-        "Gap at all contacts at the start, negative for overlap. `auto`: where repulsion and pull balance.", None
+        "Gap at all contacts at the start, negative for overlap. `auto`: repulsion and pull balance.", None
     )
     gap_spread: Number = key("Range of the random factor of the overlap of each walker: 1 ± this.", 0.2, ge=0, lt=1)
     spacing: Annotated[Filled[Length], units.AUTO] = key(
-        "Distance between the walkers. `auto`: they do not meet, or, with `meet`, not touch at the start.", None
+        "Distance between the walkers. `auto`: they do not meet; with `meet`, they do not touch at the start.", None
     )
     meet: units.Flag = key("Whether the walkers may meet. If not, a meeting gives a warning.", False)
 
@@ -308,8 +308,8 @@ class Mixture(Table):
     )
     small: Filled[_Range] = key("Range of radii of the small beads.", None, ["0.3 mm", "0.315 mm"])
     large: Filled[_Range] = key("Range of radii of the large beads.", None, ["0.5 mm", "0.59 mm"])
-    small_diameters: Indirect[_DiameterRange] = key("Instead of `small`.", None, ["0.6 mm", "0.63 mm"])
-    large_diameters: Indirect[_DiameterRange] = key("Instead of `large`.", None, ["1 mm", "1.18 mm"])
+    small_diameters: Indirect[_DiameterRange] = key("Diameters, instead of `small`.", None, ["0.6 mm", "0.63 mm"])
+    large_diameters: Indirect[_DiameterRange] = key("Diameters, instead of `large`.", None, ["1 mm", "1.18 mm"])
     small_share: Number = key("Share of the small beads.", 0.5, ge=0, le=1)
     mixed_by: Literal["mass", "volume", "number"] = key("Quantity that `small_share` refers to.", "mass")
     sizes: Whole = key("Number of different radii in each range.", 4, ge=1, le=20)

@@ -137,7 +137,7 @@ class Boundary(Table):
         None,
         "funnel.stl",
     )
-    scale: Indirect[units.Length] = key("Length of the unit of the mesh, which files do not say.", None, "1 mm")
+    scale: Indirect[units.Length] = key("Length of the unit of the mesh file.", None, "1 mm")
     planes: tuple[Plane, ...] = key("Planes around the beads, up to the `height`, instead of a mesh.", ())
     points: Derived[tuple[Vector, ...]] = ()
     triangles: Derived[tuple[tuple[int, int, int], ...]] = ()

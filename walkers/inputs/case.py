@@ -86,14 +86,12 @@ class Liquid(Table):
     kinematic_viscosity: Indirect[units.KinematicViscosity] = key("Kinematic viscosity.", None)
     dynamic_viscosity: Filled[units.DynamicViscosity] = key("Dynamic viscosity, instead of the kinematic one.", None)
     volume_fraction: Filled[Number] = key(
-        "Volume of liquid on a bead over that of the bead; the bridges share it.", None, 0.01, ge=1e-9, le=0.5
+        "Ratio of the volumes of liquid and bead. The bridges share the liquid.", None, 0.01, ge=1e-9, le=0.5
     )
     meniscus_radius: units.Length | None = key(
         "Radius of the menisci of all bridges, which exchange liquid through the film on a wetted plate.", None, "70 um"
     )
-    viscosity_ratio: Number = key(
-        "Viscosity of the bridges over that of the liquid. It scales the drag of the bridges.", 1.0, ge=0, le=1e4
-    )
+    viscosity_ratio: Number = key("Factor of the viscosity of the bridges. It scales their drag.", 1.0, ge=0, le=1e4)
     contact_angle: units.UpToRightAngle = key(
         "Contact angle at every bridge. A case whose bridges push the beads of a walker apart at rest is refused."
     )

@@ -138,7 +138,7 @@ class Drive(Harmonic):
     ramp: Annotated[
         tuple[tuple[units.NonNegativeDuration, Coefficient], ...], AfterValidator(_increasing), WithJsonSchema(_RAMP)
     ] = key(
-        "Times from the start of the drive, and factors of the displacement then; in between they change evenly.",
+        "Times after the start of the drive and factors of the displacement, which is linear in between.",
         (),
         [["0 s", 1], ["2 s", 0.2]],
     )

@@ -64,12 +64,12 @@ class Run(Table):
     )
     allow_unstable: Annotated[units.Flag, SAME_RUN] = key("Accept a time step beyond a stability limit.", False)
     cycles: Annotated[Filled[_Cycles], AUTO] = key(
-        "Number of drive cycles. `auto`: until the walkers are steady. See [](../cases.md#length-of-a-run).", None, 60
+        "Number of drive cycles. `auto`: until velocities are constant. See [](../cases.md#length-of-a-run).", None, 60
     )
     most_cycles: Indirect[_Cycles] = key('Upper limit for `cycles = "auto"`. Default: 60.', None, 60)
     duration: Indirect[Duration] = key("Duration of the drive, instead of `cycles`. Loose beads need it.", None)
     settling_cycles: Filled[Whole] = key(
-        "Cycles at the start that no mean contains. Default: a third, at most 20.", None, 20, ge=0, le=1_000_000
+        "Cycles at the start, which are not measured. Default: a third, at most 20.", None, 20, ge=0, le=1_000_000
     )
     samples_per_cycle: Filled[_Samples] = key("Samples of the beads per cycle. Default: 20.", None, 20)
     bridge_samples_per_cycle: Indirect[_Samples] = key(
@@ -79,7 +79,7 @@ class Run(Table):
         "Samples per second, instead of per cycle. Default for loose beads: 60.", None, 60, gt=0, le=1e6
     )
     segment: Indirect[Duration] = key(
-        "Length of a segment; a run can continue after the last whole one. Default for loose beads: 0.5 s.", None
+        "Length of a segment; a run can continue after a complete segment. Default for loose beads: 0.5 s.", None
     )
     settled_below: Filled[units.Speed] = key(
         "Root mean square velocity of a settled pile. Default for loose beads: 5 mm/s.", None
@@ -87,7 +87,7 @@ class Run(Table):
     longest_settling: Filled[units.NonNegativeDuration] = key(
         "Longest time for settling before the drive starts. Default for loose beads: 0.5 s.", None
     )
-    ranks: Whole = key("Number of MPI processes. More than one helps large piles only.", 1, ge=1, le=64)
+    ranks: Whole = key("Number of MPI processes. Only large piles are faster with several.", 1, ge=1, le=64)
     seed: Whole = key("Seed of the random perturbations and of poured beads.", 1, ge=0, le=2**63 - 1)
     steps_per_cycle: Derived[int] = 0
     until_steady: Derived[bool] = False
