@@ -148,17 +148,17 @@ def _captions(
     def written(picture: view.Picture, number: int) -> view.Picture:
         page = Image.fromarray(picture)
         draw = ImageDraw.Draw(page)
-        clock, said = f"{times.time[number]:.{decimals}f} s", [speed]
+        clock, lines = f"{times.time[number]:.{decimals}f} s", [speed]
         if scene.path is not None:
-            said.append(f"{scene.moved(times.frame[number]) @ toward:z.1f} mm {direction} from the start")
-        said += [case.boundary.tilted] if case.boundary.tilted else []
-        said += scene.explained
-        said += bridges_text(case).split(", ")  # lines of their own beside the beads
+            lines.append(f"{scene.moved(times.frame[number]) @ toward:z.1f} mm {direction} from the start")
+        lines += [case.boundary.tilted] if case.boundary.tilted else []
+        lines += scene.explained
+        lines += bridges_text(case).split(", ")  # lines of their own beside the beads
         draw.text((edge, edge), clock, "black", large, anchor="lt")
         if above:
-            draw.text((2 * edge + large.getlength(clock), 1.2 * edge), ", ".join(said), "#333333", small, anchor="lt")
+            draw.text((2 * edge + large.getlength(clock), 1.2 * edge), ", ".join(lines), "#333333", small, anchor="lt")
         else:
-            for row, text in enumerate(said):
+            for row, text in enumerate(lines):
                 draw.text((edge, (2.8 + 1.5 * row) * edge), text, "#333333", small, anchor="lt")
         draw.text((edge, level), case.excitation.described(), "#333333", small, anchor="ls")
         if case.boundary.tilted and case.environment.gravity:
@@ -192,9 +192,11 @@ def _write_mp4(path: Path, pictures: Iterator[view.Picture], options: FilmOption
     """Write H.264 with ffmpeg, which does not report a full disk."""
     from imageio_ffmpeg import count_frames_and_secs, write_frames
 
-    index = ["-movflags", "+faststart"]  # at the begin of the file: browsers play it while it loads
+    # The index at the begin of the file: browsers play it while it loads. The preset takes 0.6 of the time of ffmpeg's
+    # own, for files that are larger by a tenth.
+    how = ["-movflags", "+faststart", "-preset", "veryfast"]
     writer = write_frames(
-        path, options.size, fps=options.fps, codec="libx264", quality=7, macro_block_size=2, output_params=index
+        path, options.size, fps=options.fps, codec="libx264", quality=7, macro_block_size=2, output_params=how
     )
     writer.send(None)
     try:
@@ -215,5 +217,5 @@ def _write_gif(path: Path, pictures: Iterator[view.Picture], fps: int, samples: 
     from PIL import Image
 
     palette = Image.fromarray(samples).quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)
-    reduced = (Image.fromarray(one).quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures)
+    reduced = (Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures)
     next(reduced).save(path, save_all=True, append_images=reduced, duration=1000 // fps, loop=0, optimize=False)

@@ -386,6 +386,11 @@ class Window:
         rounds, self._round = next((cells, neck) for most, cells, neck in _FINE if len(radius) < most)
         points, triangles, self._pale = beach_ball(rounds, scene.motion)
         self._beads = _Copies(self._plotter, points, triangles, radius, specular=0.4)
+        look = {"ambient": 0.45, "diffuse": 0.75, "specular": 0.4, "culling": "back", "interpolation": "Phong"}
+        liquid = pv.Property(color=f"#{BLUE:06x}", opacity=OPACITY, **look)
+        self._necks = pv.Actor(mapper=pv.DataSetMapper(), prop=liquid)
+        self._necks.mapper.scalar_visibility = False
+        self._plotter.add_actor(self._necks, reset_camera=False, render=False)
 
     def picture(self, frame: float, bridges: IntArray = NO_BRIDGES) -> Picture:
         """Picture of a frame, or of a time between two frames (a fraction) by cubic interpolation.
@@ -408,7 +413,8 @@ class Window:
         for actor in self._around:
             actor.position = tuple(shift)
         moved = self._scene.moved(frame)
-        self._plotter.camera.position, self._plotter.camera.focal_point = self._place + moved, self._middle + moved
+        self._plotter.camera.SetPosition(self._place + moved)  # pyvista's own also looks for the limits of the scene
+        self._plotter.camera.SetFocalPoint(self._middle + moved)
         self._plotter.render()  # a screenshot alone renders only the first time
         return np.array(self._plotter.screenshot(return_img=True), dtype=np.uint8)
 
@@ -424,16 +430,14 @@ class Window:
         begins, ends = ends_of(motion, place, bridges)
         before = (bridges[:, 2] >= 0) & ((ends - begins) @ self._scene.axes[2] > 0.5 * motion.radius[bridges[:, 0]])
         contacts, between = bridges[~before], (begins[~before], ends[~before])
-        self._plotter.renderer.remove_actor("necks", render=False)
+        self._necks.visibility = bool(len(contacts))
         if not len(contacts):
             return
         points, normals = (array.reshape(-1, 3) for array in necks_of(motion, contacts, between, *self._round))
         necks = pv.PolyData.from_regular_faces(points + shift, triangles_of(len(contacts), *self._round))
         necks.point_data["Normals"] = normals
         necks.point_data.active_normals_name = "Normals"
-        look: dict[str, Any] = {"ambient": 0.45, "diffuse": 0.75, "specular": 0.4, "culling": "back", "name": "necks"}
-        look |= {"color": f"#{BLUE:06x}", "opacity": OPACITY, "render": False, "reset_camera": False}
-        self._plotter.add_mesh(necks, **look).prop.interpolation = "Phong"
+        self._necks.mapper.SetInputData(necks)
 
     def _floor(self, wide: float) -> list[pv.Actor]:
         """A floor with lines that make its motion visible."""
