@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.integrate import solve_ivp
 
 from tests.conftest import call, run_shipped, shipped_sweep
 from tests.printed import letters, spoilt
@@ -27,8 +28,8 @@ from walkers.postprocess.gait import gait
 from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import read_record
 from walkers.text import rendered
-from walkers.theory.mathieu import turning
 from walkers.theory.prediction import alignment_of, motion_of, outside_of_the_paper, pendulum_of, predicted_column
+from walkers.theory.quasistatic import FloatArray
 
 SHORT = {"dimers.replicates": 2, "run.cycles": 8, "run.settling_cycles": 4}
 FEWER: dict[str, dict[str, Any]] = {
@@ -226,12 +227,18 @@ def test_dimers_turn_as_the_pendulum_does_but_as_much_faster_as_their_beads_are_
     trajectory = sources.trajectory(run)
     case = trajectory.case
     begin, end = 3 * case.run.samples_per_cycle, 8 * case.run.samples_per_cycle
-    free = alignment_of(case)
+    free, pendulum = alignment_of(case), pendulum_of(case)
+
+    def slope(theta: float, state: FloatArray, phase: float) -> list[float]:  # Mathieu's, with sin ψ instead of ψ
+        pull = pendulum.u - 4.0 * pendulum.v * np.cos(2.0 * theta + phase)
+        return [state[1], -2.0 * pendulum.damping * state[1] - pull * np.sin(state[0])]
+
     for number, walker in enumerate(trajectory.walkers):
         psi = trajectory.orientation[: end + 1, number]
         theta = np.pi * case.excitation.frequency * trajectory.time[: end + 1]
-        predicted = turning(pendulum_of(case), float(psi[0]), theta, np.pi / 2.0 * walker.facing)
-        turned = (psi[-1] - psi[begin]) / (predicted[-1] - predicted[begin])
+        phase = np.pi / 2.0 * walker.facing
+        solved = solve_ivp(slope, (0.0, theta[-1]), [psi[0], 0.0], t_eval=theta, args=[phase], rtol=1e-8, atol=1e-10)
+        turned = (psi[-1] - psi[begin]) / (solved.y[0, -1] - solved.y[0, begin])
         assert turned == pytest.approx(free["rate"] / free["rolling_rate"], rel=0.3)
 
 

@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from walkers.sweeps.comparison import Comparison
     from walkers.sweeps.scheduler import Failure
     from walkers.sweeps.spread import Spread
-    from walkers.sweeps.table import SweepRecord
 
 Named: TypeAlias = "Case | str | Path | Mapping[str, Any]"
 Changes: TypeAlias = "Mapping[str, Any] | None"
@@ -72,7 +71,7 @@ NOT_A_RUN = {
 class Meaning(NamedTuple):
     """Kind of a name (of `RECORDS`, ``archive``, ``deck``, ``folder``, ``case``), and its path.
 
-    The path of an unfinished run is that of its final directory.
+    The path of an unfinished run is its final directory.
     """
 
     kind: str
@@ -80,10 +79,10 @@ class Meaning(NamedTuple):
 
 
 def find(reference: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Meaning:
-    """What a path, a name in a folder of runs, or the name of a case means; with changes, the case; see `load`.
+    """The meaning of a path, a name in a folder of runs, or the name of a case; with changes it is a case; see `load`.
 
-    Nothing but names is read. A folder does not hide a shipped case of the same name; the file of a sweep means the
-    sweep if it was run.
+    Only names are read. A folder does not hide a shipped case of the same name. The file of a sweep means the sweep if
+    it was run.
     """
     if isinstance(reference, (str, Path)) and not changes:
         with suppress(OSError):  # a name that no file system accepts
@@ -147,13 +146,13 @@ def load(reference: Named, out: str | Path = DEFAULT_OUT, changes: Changes = Non
 
     Parameters
     ----------
-    what
-        The directory of a run or a sweep, its name in ``out``, or a case (resolved, tables, file or shipped name). The
-        run of a case is the one with the installed engine.
+    reference
+        The directory of a run or a sweep, its name in ``out``, or a case (resolved, tables, file or shipped name). For
+        a case, the run with the installed engine.
     out
         Folder of the run directories.
     changes
-        Values that replace those of the case, by dotted keys.
+        Other values of the case, by dotted keys.
 
     Examples
     --------
@@ -164,16 +163,19 @@ def load(reference: Named, out: str | Path = DEFAULT_OUT, changes: Changes = Non
     if kind == "sweep":
         return Sweep(path)
     if kind == "run":
-        return _checked(Run(path))
-    if kind != "case":
+        run = Run(path)
+    elif kind == "case":
+        case, folder = case_at(reference, out, changes)
+        run = Run(on_disk.run_place(case, find_engine(), folder), requested=case)
+        if not (on_disk.is_finished(run.directory) or _is_begun(run.directory)):
+            settings = [f"--set {shlex.quote(f'{key}={value}')}" for key, value in (changes or {}).items()]
+            name = str(reference) if isinstance(reference, (str, Path)) else case.name
+            raise refused(name, f"no finished run in {folder}; first do: walkers run {' '.join([name, *settings])}")
+    else:
         raise refused(reference, NOT_A_RUN[kind].format(reference))
-    case, folder = case_at(reference, out, changes)
-    run = Run(on_disk.run_place(case, find_engine(), folder), requested=case)
-    if on_disk.is_finished(run.directory) or _is_begun(run.directory):
-        return _checked(run)
-    settings = [f"--set {shlex.quote(f'{key}={value}')}" for key, value in (changes or {}).items()]
-    name = str(reference) if isinstance(reference, (str, Path)) else case.name
-    raise refused(name, f"no finished run in {folder}; first do: walkers run {' '.join([name, *settings])}")
+    if on_disk.is_finished(run.check().directory):
+        _ = run.result  # refuses a result that cannot be read
+    return run
 
 
 def directory_of(reference: str | Path, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Path:
@@ -262,7 +264,7 @@ class Run:
 
     @property
     def _state(self) -> str:
-        """The status of an unfinished run, and what to do."""
+        """The status of an unfinished run, and how to continue it."""
         if (status := self.status) == "running":
             return f"running{f': {progress.text}' if (progress := self.progress) else ''}"
         failure = self._files / on_disk.FAILURE_NAME
@@ -537,19 +539,12 @@ def finished_at(reference: Named, out: str | Path) -> Run | None:
 
 
 def _measured(run: Run) -> Run:
-    """The run; that of a finished run is measured again if its result or a table cannot be read."""
+    """The run; a finished run is measured again if its result or a table cannot be read."""
     from walkers.postprocess.results import ensure_measured
 
     if on_disk.is_finished(run.check().directory):
         with _refusing(run.directory, "the run"):
             ensure_measured(run.directory)
-    return run
-
-
-def _checked(run: Run) -> Run:
-    """The run; `InputError` if it cannot be read."""
-    if on_disk.is_finished(run.check().directory):
-        _ = run.result
     return run
 
 
@@ -576,14 +571,11 @@ class Sweep:
 
     directory: Path
     failures: tuple[Failure, ...] = field(default=(), repr=False, compare=False)
-    _record: SweepRecord = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Read the record of the sweep; `InputError` if the directory is none of a sweep."""
-        from walkers.sweeps.table import read_record
-
+        """Make a path of the name of a directory; `InputError` if it has no sweep."""
         object.__setattr__(self, "directory", Path(self.directory))
-        object.__setattr__(self, "_record", read_record(self.directory))
+        _ = self.runs
 
     def __repr__(self) -> str:
         """Name and numbers of points by status in a line."""
@@ -605,7 +597,10 @@ class Sweep:
     @property
     def runs(self) -> list[Run]:
         """The runs of all points, finished or not."""
-        return [Run(self._record.out / name) for name in self._record.runs]
+        from walkers.sweeps.table import read_record
+
+        record = read_record(self.directory)
+        return [Run(record.out / name) for name in record.runs]
 
     def table(self) -> pd.DataFrame:
         """One row per point; see `walkers.sweeps.table.load`."""
@@ -764,7 +759,7 @@ def compare(
     out
         Folder of the run directories.
     changes
-        Values that replace those of the second case, by dotted keys.
+        Other values of the second case, by dotted keys.
     y
         Column of two sweeps; None: ``velocity``, or ``climbs`` for piles.
     """
@@ -807,7 +802,7 @@ def climb(
 
     Parameters
     ----------
-    what
+    references
         Sweeps, runs or cases of piles.
     out, changes
         See `load`.

@@ -1,1 +1,1 @@
-"""Archives: a run or a sweep with all that it was made of, described as an RO-Crate, to be kept and used again."""
+"""Archives: a run or a sweep with its inputs and outputs in one file, described as an RO-Crate."""

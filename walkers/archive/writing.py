@@ -150,7 +150,7 @@ def _check(authors: Sequence[Author], licence: str) -> None:
 
 
 def _write(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, file: File) -> None:
-    """Write a file, and compare what was written with its checksum."""
+    """Write a file, and compare the written bytes with its checksum."""
     entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o100644 << 16
     with file.open() as source, archive.open(entry, "w", force_zip64=True) as copy:
         shutil.copyfileobj(source, copy)
@@ -191,7 +191,7 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
 
 
 def _packed(directory: Path, dumps: bool) -> tuple[str, dict[str, Any], dict[str, File]]:
-    """Place and manifest of a run, and its files by place: those of the manifest, and its case file, if it is known."""
+    """Place and manifest of a run, and its files by place: files of the manifest, and the case file if it is known."""
     manifest, record = read_manifest(directory), directory / MANIFEST_NAME
     case, place = case_of(directory), f"{RUNS}/{directory.resolve().name}"
     files = {name: File.of(name, directory / name, manifest["sha256"].get(name)) for name in manifest["files"]}

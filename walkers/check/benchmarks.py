@@ -27,7 +27,7 @@ READING, STEP, SLIDING = 0.02, 2e-3, 4e-3
 """Tolerances: a point of a printed figure, over its axis; forces and durations at a thousand steps a contact; sliding,
 over the axis, by the step at which a contact begins to slip and by the arm of friction, which the overlap shortens."""
 _STEPS, _LONGEST = 1000, 1.5
-"""Steps of the shortest contact; how long impacts are followed, over the longest elastic one, as damped ones last."""
+"""Steps of the shortest contact; length of a simulation over the longest elastic contact (damped ones are longer)."""
 
 
 class Sphere(NamedTuple):
@@ -40,10 +40,10 @@ class Sphere(NamedTuple):
 
 
 class Speeds(NamedTuple):
-    """Of N spheres at a plane, arrays of shape (N,), m/s.
+    """Speeds of N spheres at a plane, arrays of shape (N,), m/s.
 
-    ``normal`` is that of the centre toward or away from the plane, ``tangential`` that along it, and ``rolling`` is Rω,
-    so that the surface at the contact slides with the difference of the two.
+    ``normal`` is the speed of the centre toward or away from the plane, ``tangential`` its speed along the plane, and
+    ``rolling`` is Rω: the surface at the contact slides at the difference of the last two.
     """
 
     normal: FloatArray
@@ -72,7 +72,7 @@ class Benchmark:
         self.closing = (2.0 if like else 1.0) * before.normal
         mass = sphere.density * 4.0 / 3.0 * pi * sphere.radius**3
         halves, modulus = 2.0 if like else 1.0, reduced_modulus(sphere.youngs_modulus, sphere.poissons_ratio)
-        # Of a rigid plane, E* = E/(1-ν²), twice that of two bodies of this modulus.
+        # At a rigid plane, E* = E/(1-ν²), twice the value for two bodies of this modulus.
         self.impact = Impact(mass / halves, sphere.radius / halves, 2.0 * modulus / halves)
         self.step = self.impact.duration(float(self.closing.max())) / _STEPS
 
@@ -146,7 +146,7 @@ TESTS: Mapping[str, Benchmark] = {
     "4: oxide": Benchmark(_OXIDE, _OBLIQUE, 0.98, 0.092),
     "4: alloy": Benchmark(Sphere(7.0e10, 0.33, 2700.0, 2.5e-3), _OBLIQUE, 0.98, 0.092),
     "5: steel": Benchmark(_STEEL, Speeds.of(5.0, _ALONG * 0.3 * 5.0), 1.0, 0.3),
-    # An impulse changes the velocity of the surface 3.5 times as much as that of the centre.
+    # An impulse changes the velocity of the surface 3.5 times as much as the velocity of the centre.
     "6: alloy": Benchmark(_ALLOY, Speeds.of(0.2, 0.0, -3.5 * 0.4 * 1.5 * 0.2 / _SPIN), 0.5, 0.4),
     "7: alloy": Benchmark(_ALLOY, Speeds.of(0.2, 0.0, 20.0 * 0.1), 0.5, 0.4, like=True),
 }

@@ -22,17 +22,17 @@ from walkers.physics.bridge import FloatArray
 from walkers.physics.laws import rabinovich, soulie, willett, young_laplace
 
 COMPARED = ("fig1b", "climber-dimer")
-"""Cases whose bridges are compared: the liquid of the walkers and that of the piles."""
+"""Cases whose bridges are compared: with the liquid of the walkers, and with the liquid of the piles."""
 WALKED, WALKED_BY = ("fig1b", "fig4a"), ("young-laplace", "willett", "rabinovich", "soulie")
-"""Cases and laws of the velocities; the first law is that of the cases."""
+"""Cases and laws of the velocities; the cases have the first law."""
 _GAPS = 280
 
 
 class Law(NamedTuple):
     """A published law: its ``pull`` (radii, volume, contact angle, gaps → F/γ) and its ``rupture`` distance.
 
-    The default rupture distance is that of Lian et al. (1993), for any radii. ``error`` is the published relative error
-    of the pull at contact, for fits to solutions of the Young–Laplace equation.
+    The default rupture distance is by Lian et al. (1993), for any radii. ``error`` is the published relative error of
+    the pull at contact, for fits to solutions of the Young–Laplace equation.
     """
 
     pull: Callable[[float, float, float, float, FloatArray], FloatArray]
@@ -49,7 +49,7 @@ LAWS = {
 
 
 def pulls() -> Iterator[Line]:
-    """Pull at contact, work and rupture distance of each law over those of Young–Laplace."""
+    """Pull at contact, work and rupture distance of each law, divided by the values of Young–Laplace."""
     for name in COMPARED:
         case = load_case(name)
         large, small = dimer_of(case).radii

@@ -88,7 +88,7 @@ def compare(motions: Sequence[Motion], without: Collection[str] = ()) -> list[Li
 def measured(motion: Motion) -> dict[tuple[str, str], float]:
     """Numbers of a motion by name and unit: means over the walkers of each make, of loose beads, or of a pile.
 
-    Those of a pile are means over the second half of the drive.
+    The numbers of a pile are means over the second half of the drive.
     """
     if motion.case.mixture is not None:
         late = motion.select(slice(int(np.searchsorted(motion.time, motion.time[-1] / 2.0)), None))
@@ -163,7 +163,7 @@ def _advanced(engine: SecondEngine, motion: Motion) -> Iterator[tuple[FloatArray
 
 
 def crosschecks(out: Path) -> Iterator[Line]:
-    """Run cases of all kinds in both engines; errors as of `crosscheck`."""
+    """Run cases of all kinds in both engines; errors: see `crosscheck`."""
     for name, case in full_cases().items():
         for line in crosscheck(case, out, seeds=STARTS if case.mixture else 1):
             yield replace(line, quantity=f"{name}: {line.quantity}")

@@ -37,7 +37,7 @@ class SecondEngine:
         Position (m), velocity (m/s) and spin (rad/s). Touching beads have a bridge; where liquid is conserved, bridges
         between beads form from the next step on, as in LIGGGHTS. Springs are unstretched, films full.
     walls
-        Other walls than those of the case.
+        Walls that replace the walls of the case.
     clock
         Number of the first step; the drive begins with step 0.
     without

@@ -1,7 +1,7 @@
 """Experiments of others in the engine: a thrown bead, two tones, impacts on a wet plate, a wet incline.
 
-Lines are judged where the reference is exact or has the assumptions of the model; the others show what the model lacks.
-Sources and what they measured are in the documentation (``explanation/others``).
+Lines are judged if the reference is exact or has the assumptions of the model; the other lines show missing physics.
+The documentation has the sources and their measurements (``explanation/others``).
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ from walkers.templates.scene import Bead, Scene, loading_of, surface_of
 
 FRICTION, G = 0.2, 9.81
 SLOWS = 3.5 * FRICTION * G  # m/s²; friction slows the surface of a solid sphere 7/2 times as much as its centre
-BASE, CYCLES, FIRST = 80.0, 12, 4  # Hz; cycles that are run, and those of them that are not measured
+BASE, CYCLES, FIRST = 80.0, 12, 4  # Hz; number of cycles, and number of first cycles that are not measured
 PHASES = np.arange(0.0, 180.0, 30.0)  # of the second tone, degrees
-STRENGTHS = np.array([2.0, 4.0, 8.0, 16.0])  # peak acceleration of both tones over that of friction, `SLOWS`
+STRENGTHS = np.array([2.0, 4.0, 8.0, 16.0])  # peak acceleration of both tones over the deceleration `SLOWS`
 GLASS, FILM, ROUGH, RESTITUTION = 2.75e-3, 0.45e-3, 1e-7, 0.97  # radius of a bead, film, roughness, m; of a dry bead
 OILS = np.array([0.25, 0.5, 1.0, 2.0, 4.0]) * 4.6e-3  # viscosities, Pa s
 SPEEDS = np.array([0.25, 0.5, 1.0, 2.0])  # of impacts, m/s
@@ -109,7 +109,7 @@ def thrown(bench: Bench, speed: float = 0.05) -> Iterator[Line]:
 def glide(phase: float, angle: FloatArray | float) -> FloatArray:
     """Velocity by two tones, at a phase of the cycle (rad), without friction; over the speed of the first tone.
 
-    Tones have the frequencies 1:2 and equal accelerations; ``phase`` is that of the second, degrees.
+    Tones have the frequencies 1:2 and equal accelerations; ``phase`` is the phase of the second tone, degrees.
     """
     return np.asarray(-np.cos(angle) - 0.5 * np.cos(2.0 * np.asarray(angle) + radians(phase)))
 
@@ -120,7 +120,7 @@ def weak(phase: float) -> float:
 
 
 def modelled(phase: float, steps: int = 2500) -> FloatArray:
-    """Drift of a mass with Coulomb friction, which stops it at the end of a step if it can; as of `slider`."""
+    """Drift of a mass with Coulomb friction, which can stop it at the end of a step; shape and unit as in `slider`."""
     step, displacement = 2.0 * pi / steps, np.zeros_like(STRENGTHS)
     slip = glide(phase, 0.0) + weak(phase) + displacement
     for number in range(CYCLES * steps):
@@ -133,7 +133,7 @@ def modelled(phase: float, steps: int = 2500) -> FloatArray:
 def slider(bench: Bench, phase: float) -> FloatArray:
     """Mean sliding velocity of a dry bead on the plate by `STRENGTHS`, over the speed of the first tone.
 
-    Its surface moves as a slider with 7/2 times the friction. It starts as it moves in the limit of weak friction.
+    Its surface moves as a slider with 7/2 times the friction. It starts at the velocity of the limit of weak friction.
     """
     plain, start, drift = bench_case(_DRY), float(glide(phase, 0.0)), weak(phase)
     speeds = SLOWS * STRENGTHS / (2.0 * pi * BASE)
@@ -191,7 +191,7 @@ def restitutions(bench: Bench, modulus: float = 7e10, law: str = "young-laplace"
 
 
 def impacts(bench: Bench) -> Iterator[Line]:
-    """Restitution of a glass bead on a wet plate at 1 m/s by viscosity, and what changes it at one Stokes number."""
+    """Restitution of a glass bead on a wet plate at 1 m/s by viscosity; effects of other changes at a Stokes number."""
     (stokes, hard), (_, soft) = restitutions(bench), restitutions(bench, 5e7)
     filled = restitutions(bench, law=f"{__name__}:filmed")[1]
     drag, e = 1.0 / stokes[:, 2], hard[:, 2]

@@ -43,8 +43,8 @@ class Bridges(NamedTuple):
     radius; ``between`` (K, K + 1): index of the bridge between two kinds, and in the last column to walls.
 
     ``volume`` (T,), m³. Where liquid is conserved, two kinds have bridges of several volumes, in steps of √2 from the
-    index on; full films give the volume after a number of ``steps``, else 0. ``full`` (K, K + 1, 2): what full films of
-    the first and second kind contribute to their bridge, m³; ``liquid`` (N,): the liquid of each bead, m³.
+    index on; full films give the volume after a number of ``steps``, else 0. ``full`` (K, K + 1, 2): contributions of
+    full films of the first and second kind to their bridge, m³; ``liquid`` (N,): the liquid of each bead, m³.
     """
 
     spans: FloatArray
@@ -91,10 +91,10 @@ class State(NamedTuple):
     """State of N beads, arrays of shape (N, 3), and of their contacts with each other and W walls.
 
     ``film`` (N,): liquid on a bead, not in bridges, over its whole liquid; ``offered`` (N,): the same at the end of the
-    step before, which all bridges between beads form from. Contacts are those of a bead with one of a higher number, or
-    with a wall (numbered after the beads): ``spring`` (N, N + W, 3) has tangential displacements, m, ``bridge``
-    (N, N + W) the index of the bridge, or -1. ``near`` (N, N) are the beads that may meet before one of them has moved
-    by nearly half the ``skin`` from where they were ``listed`` (N, 3).
+    step before: bridges between beads form from it. A contact has a bead and a bead of a higher number, or a wall
+    (numbered after the beads): ``spring`` (N, N + W, 3) has tangential displacements, m, ``bridge`` (N, N + W) the
+    index of the bridge, or -1. ``near`` (N, N) are the beads that may meet before a bead has moved by nearly half the
+    ``skin`` from its place ``listed`` (N, 3).
     """
 
     position: FloatArray
@@ -176,7 +176,7 @@ def bridge_forces(b: Bridges, bridge: int, gap: float) -> tuple[float, float, fl
 def touch(c: Constants, m: Meeting, spring: FloatArray, moves: bool) -> tuple[float, Vector, Vector]:
     """Normal force (N), tangential force (N) and couple (N m) on the first of two surfaces that overlap.
 
-    The ``spring`` (m) changes if time goes on (``moves``); else forces are those of the state as it is.
+    The ``spring`` (m) changes if time advances (``moves``); otherwise it keeps its length.
     """
     root = sqrt(-m.radius * m.gap)
     elastic = -4.0 / 3.0 * c.modulus * root * m.gap
@@ -248,8 +248,8 @@ def separation(c: Constants, state: State, i: int, j: int) -> tuple[Vector, floa
 def bridge_of(b: Bridges, state: State, i: int, j: int, held: int, gap: float) -> int:
     """Index of the bridge of a pair, or -1; a bridge that forms takes its volume from films, and later returns it.
 
-    It takes in proportion to what the films offer, and returns in proportion to what full ones would. Bridges to walls
-    form after those between beads, from what these have left.
+    It takes liquid in proportion to the films' offers, and returns it in proportion to the contributions of full films.
+    Bridges to walls form after bridges between beads, from the rest of the films.
     """
     beads = b.kind.shape[0]
     wall = j >= beads

@@ -1,4 +1,4 @@
-"""Checks are lines: what is compared, the expected and the measured value, and the tolerance."""
+"""Checks are lines: a quantity, its expected and measured value, and the tolerance."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Line:
 
     @property
     def verdict(self) -> Verdict:
-        """Pass or fail by the tolerance; an error that is no number fails."""
+        """Pass or fail by the tolerance; NaN fails."""
         if self.given or self.tolerance == inf:
             return self.given or Verdict.NOT_JUDGED
         return Verdict.PASS if self.error <= self.tolerance else Verdict.FAIL
@@ -67,7 +67,7 @@ class Line:
         return self.verdict in (Verdict.FAIL, Verdict.ERROR)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain JSON types; numbers that are none become null."""
+        """Plain JSON types; NaN and infinity become null."""
         numbers = {name: getattr(self, name) for name in ("expected", "measured", "error", "tolerance")}
         finite = {name: value if isfinite(value) else None for name, value in numbers.items()}
         return {
@@ -86,10 +86,10 @@ def run_checks(
     on_done: Callable[[str], None] | None = None,
     mapped: Callable[[Callable[[str], list[Line]], Iterable[str]], Iterable[list[Line]]] = map,
 ) -> list[Line]:
-    """Lines of checks of something, such as a folder of runs; a check that cannot be computed is a line.
+    """Lines of checks, which get an argument such as a folder of runs; a check that cannot be computed is a line.
 
-    ``only`` are names, default all; `InputError` for unknown ones. ``on_done`` is told each name. ``each`` is `map`, or
-    that of a pool.
+    ``only`` are names, default all; `InputError` for unknown ones. ``on_done`` gets each name. ``mapped`` is `map`, or
+    the method of a pool.
     """
     for name in only:
         if name not in checks:
@@ -119,7 +119,7 @@ def count(lines: Iterable[Line], verdict: Verdict) -> int:
 
 
 def as_text(lines: Sequence[Line], of: str = "") -> str:
-    """A table below the name of each check, and how many lines pass, after the words ``of``."""
+    """A table below the name of each check, and the number of lines that pass, after the words ``of``."""
     tables = [f"{check}\n{_table(rows)}\n" for check, rows in groupby(lines, lambda line: line.check)]
     passed, failed = count(lines, Verdict.PASS), count(lines, Verdict.FAIL)
     outcome = f"{failed} of {passed + failed} lines fail" if failed else f"all {passed} lines pass"

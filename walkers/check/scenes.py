@@ -140,7 +140,7 @@ def standing(beads: Sequence[Bead], walls: Sequence[Wall] = (FLOOR,)) -> Scene:
 
 
 def recording(steps: int, sample_every: int = 1) -> dict[str, Any]:
-    """Of a plan that records beads with their forces and torques, and bridges at the start and the end only."""
+    """Options of a plan that records beads with their forces and torques, and bridges at the start and the end."""
     every = {"sample_every": sample_every, "bridge_every": steps, "status_every": steps}
     return {"segment": Segment(0, steps, 0), **every, "bead_columns": (*BEAD_COLUMNS, *FORCE_COLUMNS)}
 
@@ -170,7 +170,7 @@ class Measured:
 
 @dataclass
 class Bench:
-    """Runs decks in a folder, until ``stop`` is set; ``version`` is that which the engine prints."""
+    """Runs decks in a folder, until ``stop`` is set; ``version`` is printed by the engine."""
 
     engine: Engine
     folder: Path
@@ -205,7 +205,7 @@ def farthest(measured: FloatArray, expected: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class Setting:
-    """A scene, its case by what it changes in `full_case`, and, if beads move ``freely``, for how many steps."""
+    """A scene, the ``changes`` of `full_case`, and the number of steps if beads move ``freely``."""
 
     beads: Sequence[Bead]
     walls: Sequence[Wall] = (FLOOR,)
@@ -237,7 +237,7 @@ def in_walls(case: Case, series: Measured) -> FloatArray:
     """Frames after the first in the frame of the walls, with the velocities used for the forces."""
     frames = series.frames[1:].copy()
     frames[..., :3] -= prescribed_motion(case.excitation, series.time[1:])[0][:, None]
-    # Velocities are those of half a step before, of beads and of walls.
+    # Velocities of beads and walls are from half a step before.
     frames[..., 3:6] -= prescribed_motion(case.excitation, series.time[1:] - 0.5 * case.run.time_step)[1][:, None]
     return frames
 

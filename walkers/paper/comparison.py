@@ -1,4 +1,4 @@
-"""What the paper measured or states beside ours, for each named parameter set: ``comparison.md`` and ``.json``."""
+"""Comparison with the paper's measurements and statements, for each parameter set: ``comparison.md`` and ``.json``."""
 
 from __future__ import annotations
 
@@ -32,9 +32,10 @@ def compare(sources: Sources) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``sets``: for each parameter set how many facts ``agree``, ``of`` how many, and its ``parameters``. ``facts``:
-        what the paper ``says`` and where (``source``), what is ``expected``, our ``values`` and whether they ``agree``
-        by set, the ``theory`` of the shipped set, and whether the fact is ``derived`` from others and not counted.
+        ``sets``: for each parameter set the number of facts that ``agree``, their number (``of``), and its
+        ``parameters``. ``facts``: the sentence of the paper (``says``) and its ``source``, the ``expected`` value, our
+        ``values`` and whether they ``agree`` by set, the ``theory`` of the shipped set, and whether the fact is
+        ``derived`` from others and not counted.
         ``thresholds``: Γc as from `thresholds_with_theory`. ``curve``: engine and theory beside the one-parameter curve
         of Figs. 2 and 3, which is no measurement, mm/s.
     """
@@ -62,7 +63,7 @@ def _finite(numbers: Mapping[Any, Any]) -> dict[str, float | None]:
 
 
 def _parameters(cases: Mapping[str, Case]) -> dict[str, str]:
-    """What the calibration varies, by its symbol, as a case file says it."""
+    """Texts of the calibrated parameters, as in a case file, by their symbols."""
     shown = {}
     for name, parameter in ruby().file.parameters.items():
         case = cases[parameter.experiments[0] if parameter.experiments else next(iter(cases))]

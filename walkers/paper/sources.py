@@ -27,12 +27,12 @@ _FRICTION_ONLY = {
     **{"friction_wall": 0.311, "friction_slide": 0.311, "friction_bead": 0.083, "rolling_friction": 0.0035},
     **{"roughness": 2000.0, "meniscus_radius": 40.0},
 }
-"""Surfaces so rough that bridges drag little: outside of what the calibration searches, in the units of its file."""
+"""Rough surfaces, so that bridges drag little: outside of the calibration's ranges, in the units of its file."""
 
 
 @cache
 def ruby() -> Calibration:
-    """The calibration with what the paper measured and states."""
+    """The calibration with the paper's measurements and statements."""
     return load_calibration("ruby")
 
 
@@ -88,9 +88,9 @@ class Sources:
 
 
 def thresholds_with_theory(sources: Sources) -> pd.DataFrame:
-    """Γc of the sweep ``fig2-threshold``: the Γ0 at which walkers rest and move, and that of the ``theory``.
+    """Γc of the sweep ``fig2-threshold``: the Γ0 at which walkers rest and move, and Γc of the ``theory``.
 
-    Beside it that of the sweep ``fig2-ramp``, ``ramp``, and its resolution, ``within``.
+    Also Γc of the sweep ``fig2-ramp``, ``ramp``, and its resolution, ``within``.
     """
     ends = thresholds(sources.table("fig2-threshold"))
     cases = [load_case("fig1b", {"drive.frequency": f"{frequency} Hz"}) for frequency in ends["drive.frequency"]]

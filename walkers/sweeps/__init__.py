@@ -1,4 +1,4 @@
-"""Sweeps: many cases at once, packed into decks, spread over the machine or a cluster, and found again.
+"""Sweeps: run many cases in shared decks, on this machine or a cluster; list, compare and draw their results.
 
-Stands on all the packages before it: cases, decks, run directories and what they mean.
+Uses the packages for cases, decks, run directories and results.
 """

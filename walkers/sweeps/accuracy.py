@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 SHARE = 0.01
 """Share of a velocity that the last increase of Young's modulus may change."""
 _TIMES = (1.0, 4.0, 16.0, 64.0, 256.0)
-"""Young's moduli over that of the case. A run with the largest one takes 16 times as long."""
+"""Young's moduli, divided by the modulus of the case. A run with the largest one takes 16 times as long."""
 _KEYS = ("run.time_step", "contact.youngs_modulus")
 _FAMILIES = ("velocity", "right_facing", "left_facing", "axial_", "lateral_", "rotation_", "sliding_")
 """Beginnings of the names of numbers that have a numerical error, all in m/s."""
@@ -41,10 +41,10 @@ _FAMILIES = ("velocity", "right_facing", "left_facing", "axial_", "lateral_", "r
 class Accuracy:
     """Numerical errors of a run, as in its ``accuracy.json``.
 
-    ``sweep`` is the name of the sweep beside the run. ``share`` was asked for, ``change`` is the share that the last
-    increase of Young's modulus changed, to so many ``times`` that of the case; ``reached``: less than asked for.
-    ``errors`` has by names of numbers, in m/s, the changes at ``half_step`` and with the ``stiffer`` beads, and the
-    root of the sum of their squares, ``total``.
+    ``sweep`` is the name of the sweep beside the run. ``share`` is the requested limit of ``change``, the relative
+    change of a velocity by the last increase of Young's modulus; ``reached``: the change is below the limit. ``times``
+    is the largest modulus, divided by the modulus of the case. ``errors`` has for each number, in m/s, the changes at
+    ``half_step`` and with the ``stiffer`` beads, and the root of the sum of their squares, ``total``.
     """
 
     sweep: str
@@ -87,7 +87,7 @@ def measure_accuracy(
 
 
 def times_of(case: Case) -> Sequence[float]:
-    """Possible Young's moduli over that of the case; `InputError` if it has no numerical error that can be measured."""
+    """Possible Young's moduli, divided by the modulus of the case; `InputError` if its error cannot be measured."""
     if not case.walkers:
         text = "no numerical error: loose beads are chaotic, and climb otherwise at any other time step"
         raise refused(case.name, f"{text}; walkers climb gives the scatter over starts (run.seed)")

@@ -136,7 +136,7 @@ def _as_run(case: Case, written: str, now: str, log_text: str, source: str) -> t
     before, after = dict(_LINE.findall(written)), dict(_LINE.findall(now))
     words = (_PRINTED.findall(log_text) or [""])[-1].split()
     values = {name: float(value) for name, value in zip(words[::2], words[1::2], strict=True)}
-    # A number is printed as it stands in its line; a formula gives another number if what it contains was edited.
+    # The engine prints a number as its line has it. A formula gives another number if a parameter in it was edited.
     follow = {f"amplitude{end}": sine.amplitude for end, sine in _by_suffix(case)}
     follow |= {"peak_velocity": case.excitation.peak_velocity, "time_step": case.run.time_step}
     was = {name: float(text) if text[0] != "$" else follow[name] for name, text in before.items() if name in values}
@@ -151,7 +151,7 @@ def _as_run(case: Case, written: str, now: str, log_text: str, source: str) -> t
 
 
 def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float], source: str) -> Case:
-    """The case with the values of a deck's parameters, some of which were edited: changes of its tables."""
+    """The case with the values of a deck's edited parameters."""
     steps, cycles, step = int(values["steps_per_cycle"]), int(values["cycles"]), values["time_step"]
     document = {name: table for name, table in case.document.items() if name != "uncertain"}
     numbers = {**edited, "time_step": step} if "steps_per_cycle" in edited else edited
@@ -194,7 +194,7 @@ def _by_suffix(case: Case) -> list[tuple[str, Any]]:
 
 
 def _sines(case: Case, values: Mapping[str, float]) -> list[dict[str, Any]]:
-    """The sines of a drive with other values as a case file has them; an edited amplitude replaces the acceleration."""
+    """The sines of a drive as tables of a case file, with other values; an edited amplitude gives the acceleration."""
     tables = []
     for end, sine in _by_suffix(case):
         numbers = {name: values.get(f"{name}{end}", getattr(sine, name)) for name in _SINE}
@@ -207,7 +207,7 @@ def _sines(case: Case, values: Mapping[str, float]) -> list[dict[str, Any]]:
 
 
 def _other_changes(written: str, now: str, given: Collection[str]) -> list[str]:
-    """A line about edited commands other than parameters, if there are any."""
+    """A line about other edited commands, if there are any."""
     before, after = (
         [
             command

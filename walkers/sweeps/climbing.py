@@ -37,7 +37,7 @@ FloatArray = npt.NDArray[np.float64]
 _CONFIDENCE = 0.95
 _DRAWS = 10_000
 PARTS = ("on_plain_walls", "in_corners", "out_of_pile")
-"""Subsets of the climbs; the last one without those on a wall since before the drive."""
+"""Subsets of the climbs; the last one leaves out clusters that were on a wall before the drive."""
 _ROW = 2.1  # inches
 _ALIKE = 1e-6  # relative difference below which lengths of runs are equal
 _LETTERS = 44  # of a line in labels of conditions
@@ -56,8 +56,8 @@ def conditions_in(frame: pd.DataFrame) -> Iterator[tuple[str, list[Path]]]:
     Yields
     ------
     tuple of str and list of Path
-        The varied values of a condition but those that half of them or more have, such as ``drive.frequency = 100 Hz``;
-        empty for the usual condition. Its runs.
+        The varied values of a condition, such as ``drive.frequency = 100 Hz``, without values that at least half of the
+        conditions have; empty for the usual condition. Its runs.
     """
     import pandas as pd
 
@@ -98,7 +98,7 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
 def summary(piles: pd.DataFrame, climbs: pd.DataFrame, within: float | None = None) -> dict[str, Any]:
     """`statistics` of all climbs, and of each of `PARTS` by the same time (default: see there)."""
     still = piles["driven"][~piles.index.isin(climbs["pile"])]
-    # A run that ended because a climber left the container shows its first climb as a longer run does.
+    # If a climber left the container, the run ended; a longer run would show the same first climb.
     at = float(still.min() if len(still) else piles["driven"].max()) if within is None else within
     cut = inf if within is None else within
     walls = climbs["wall_names"].map(lambda names: len(names.split()))
@@ -119,8 +119,8 @@ def statistics(piles: pd.DataFrame, climbs: pd.DataFrame, cut: float, at: float)
     cut
         Time of the drive in s up to which climbs count; later parts of runs do not.
     at
-        Time in s by which a pile has climbed or not. By default (see `summary`) it is the end of the shortest run
-        without a climb, which is the longest time at which all runs count.
+        Time in s by which a pile has climbed or not. The default (see `summary`) is the end of the shortest run without
+        a climb: the longest time at which all runs count.
 
     Returns
     -------
@@ -223,7 +223,7 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
 
         ``estimator`` names the interval: ``Clopper-Pearson`` (1934, exact, binomial) for records that are long enough
         or have the event; ``Kaplan-Meier`` (Greenwood's variance of log(-log) of the survival) if records ended before
-        and the interval exists, that is, neither none nor all have climbed.
+        and some, but not all, have climbed.
 
         ``curve``: the share at every ``time`` (s) at which it changes: ``probability``, and ``low`` and ``high``,
         Greenwood's band at all times; None while none or all have climbed.

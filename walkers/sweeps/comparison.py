@@ -30,7 +30,7 @@ _OF_ALL = ("orientation_end", "separated_fraction")
 
 
 class Side(NamedTuple):
-    """One of two that are compared: its name, its case, and the directory of its finished run if there is one."""
+    """A side of a comparison: its name, its case, and the directory of its finished run if there is one."""
 
     name: str
     case: Case
@@ -110,7 +110,7 @@ def _times_the_error(numbers: Mapping[str, Any]) -> str:
 
 
 def _different(cases: Sequence[Case], names: Sequence[str]) -> tuple[dict[str, list[Any]], str]:
-    """The given values by which two cases differ, without derived ones, in SI units, and as text."""
+    """The given values by which two cases differ (not derived values), in SI units, and as text."""
     flat = [flattened(case) for case in cases]
     parameters = {key: [parameters_of_case.get(key) for parameters_of_case in flat] for key in differing(flat)}
     rows = [[key, *(readable(key, value) for value in values)] for key, values in parameters.items()]
@@ -118,7 +118,7 @@ def _different(cases: Sequence[Case], names: Sequence[str]) -> tuple[dict[str, l
 
 
 def _pairs(results: Sequence[Results]) -> list[tuple[dict[str, Any], list[str]]]:
-    """The numbers of two results, without errors, values of the case and conditions, and means that say little."""
+    """The numbers of two results, without errors, values of the case and conditions, and means over both facings."""
     scatters, heads = [_scatters(result) for result in results], {*map(headline, results)}
     little = _VELOCITIES if "axial_velocity" in heads else ("velocity",) if "right_facing" in heads else ()
     names = {name for result in results for name in result if not is_error(name)}

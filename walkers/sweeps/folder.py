@@ -49,7 +49,7 @@ def inventory(out: Path) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row per run (``case-hash``) or sweep, None for what it does not have. Columns are ``kind``, ``name``,
+        One row per run (``case-hash``) or sweep, with None for missing values. Columns are ``kind``, ``name``,
         ``case``, ``status`` (finished, running, failed, or interrupted: a run can be continued, or points of a sweep
         are missing), ``directory``, ``age`` (s, since the end of the run or the last change), ``size`` (bytes of the
         files, for a sweep of its runs), ``reason`` and ``message`` of a failure. A finished run has the ``numbers`` of
@@ -183,7 +183,7 @@ def members(contents: pd.DataFrame) -> pd.Series[bool]:
 
 
 def _beside(name: str) -> str:
-    """Name of the run whose spread or accuracy a sweep is; other names as they are, which no run has."""
+    """Name of the run of a sweep that is its spread or accuracy; empty for other sweeps."""
     return name.removesuffix(SPREAD).removesuffix(ACCURACY) if name.endswith((SPREAD, ACCURACY)) else ""
 
 
@@ -242,14 +242,14 @@ def bytes_text(size: int) -> str:
 
 @dataclass(frozen=True)
 class Cleaning:
-    """What a cleaning removes from a folder: rows of its `inventory`, stale lock files; and remarks to print."""
+    """The plan of a cleaning: the rows of the `inventory` and the stale lock files to remove; remarks to print."""
 
     remove: pd.DataFrame
     locks: Sequence[Path]
     remarks: Sequence[str]
 
     def as_text(self) -> str:
-        """What is removed and kept, with the total size."""
+        """The removed runs and sweeps with the total size, and the remarks."""
         rows, kinds, total = [], Counter[str](), 0
         for row in self.remove.to_dict("records"):
             kind = "sweep" if row["kind"] == "sweep" else f"{row['status']} run"
@@ -272,9 +272,9 @@ class Cleaning:
 def plan_cleaning(out: Path, given: Sequence[Path] = ()) -> Cleaning:
     """Plan a cleaning; nothing is removed.
 
-    If runs and sweeps are ``given`` by their directories, they are removed with what belongs to them alone: runs of
-    these sweeps, spreads and accuracies of these runs. Otherwise interrupted and failed runs are removed. `InputError`
-    if a given directory does not exist, or a sweep in the folder cannot be read.
+    Without ``given`` directories, interrupted and failed runs are removed. Otherwise the given runs and sweeps are
+    removed, with the runs that no other sweep has, and with spreads and accuracies of the removed runs. `InputError` if
+    a given directory does not exist, or a sweep in the folder cannot be read.
     """
     import pandas as pd
 
@@ -314,7 +314,7 @@ def _rows_at(place: Path, contents: pd.DataFrame) -> list[Any]:
 
 
 def _with_theirs(names: set[str], runs_of: Mapping[str, Sequence[str]]) -> set[str]:
-    """Names with those of runs that no other sweep has, and of spreads and accuracies of runs."""
+    """Names, with the names of runs that no other sweep has, and of spreads and accuracies of runs."""
     needed = {run for sweep, runs in runs_of.items() if sweep not in names for run in runs}
     further = {run for sweep in names & runs_of.keys() for run in runs_of[sweep]} - needed
     further |= {sweep for sweep in runs_of if _beside(sweep) in names}
@@ -327,7 +327,7 @@ def _waits(directory: Path) -> bool:
 
 
 def clean(cleaning: Cleaning) -> dict[Path, str]:
-    """Remove what `plan_cleaning` planned; return what is left, with the reason (in progress, or a system error)."""
+    """Carry out a plan; return the directories that are left, with the reason (in progress, or a system error)."""
     left = {}
     for row in cleaning.remove.to_dict("records"):
         place = _place(row["directory"])

@@ -134,7 +134,7 @@ def progress_at(place: Path) -> Progress | None:
 
 
 def progress_in(run: Run, cycles: int, segment: Segment, step: int, seconds: float) -> Progress:
-    """Progress at a step of a segment of the attempt with a number of cycles, so many seconds after its begin."""
+    """Progress at a step of a segment, ``seconds`` after its begin, in the attempt with a number of cycles."""
     before, steps, start = run.steps_until(cycles - 1), run.steps_until(run.cycles), segment.drive_from
     step = max(step, segment.begin)
     done = before + (0 if start is None else step - start)
@@ -185,7 +185,7 @@ class OpenRun:
         for cycles in self.case.run.attempts:
             case = self.case.for_cycles(cycles)
             if self.case.run.until_steady and self.done and self.done[-1]["end"] < case.run.steps:
-                for directory in on_disk.segment_directories(self.directory):  # those of an attempt with fewer cycles
+                for directory in on_disk.segment_directories(self.directory):  # of an attempt with fewer cycles
                     shutil.rmtree(directory)
                 self.done.clear()
             while (segment := self._next_segment(case)).end > segment.begin:

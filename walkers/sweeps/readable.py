@@ -38,19 +38,19 @@ def readable(key: str, value: Any) -> str:
     """A value of `flattened` as a case file has it, such as ``4 g``; a dash for none."""
     if value is None:
         return "-"
-    if key == "environment.gravity":  # the g of accelerations, 9.8 m/s², is that of the paper
+    if key == "environment.gravity":  # the unit g is the paper's 9.8 m/s², not gravity
         return f"{value:.6g} m/s^2"
     return text_of(value, kind_of(key))
 
 
 def kind_of(key: str) -> Kind | None:
-    """What kind of quantity the numbers of a key of a case are, such as ``dimers.radii[0]``; None for pure numbers."""
+    """Kind of quantity of a key of a case, such as ``dimers.radii[0]``; None for pure numbers."""
     return _kinds().get(_ending(key))
 
 
 @cache
 def _kinds() -> Mapping[str, Kind]:
-    """What the numbers of a case are, by the ends of their keys; the others are pure numbers."""
+    """Kinds of quantities by the ends of keys of a case; other keys have pure numbers."""
     fields = [(_ending(key), field) for key, field in keys_of(Case).items()]
     kinds = {name: units.kind_in([*field.metadata, field.annotation]) for name, field in fields}
     return {name: kind for name, kind in kinds.items() if kind is not None}
@@ -64,8 +64,8 @@ def _ending(key: str) -> str:
 def differing(cases: Sequence[FlatCase]) -> list[str]:
     """The keys whose values differ among flattened cases, in the cases' order, without those that follow from others.
 
-    What none of the cases gives itself (a time step that ``"auto"`` chose, the numbers of a liquid that the library
-    knows by name) is left out where something else differs.
+    A value that no case gives itself (a time step that ``"auto"`` chose, the properties of a liquid in the library) is
+    left out if a given value differs.
     """
     keys = dict.fromkeys(key for case in cases for key in case)
     varied = [key for key in keys if len({_comparable(case.get(key)) for case in cases}) > 1]
@@ -73,7 +73,7 @@ def differing(cases: Sequence[FlatCase]) -> list[str]:
 
 
 def short_keys(keys: Sequence[str], reserved: Iterable[str] = ("name",)) -> list[str]:
-    """The last parts of keys; whole keys where that is also the last part of another key, or one of ``others``."""
+    """The last parts of keys; the whole key if another key has the same last part, or if it is ``reserved``."""
     last = [key.rpartition(".")[2] for key in keys]
     taken = set(reserved).difference(keys)
     return [
@@ -107,7 +107,7 @@ def chosen(cases: Sequence[Mapping[str, Any]], condition: str) -> list[bool]:
 
 
 def _is(key: str, value: Any, text: str) -> bool:
-    """Whether a value is the wanted one; ValueError if that can be no value of its kind."""
+    """Whether a value is equal to a value as text; ValueError if the text has another kind."""
     if text in (readable(key, value), str(value)):
         return True
     if isinstance(value, bool) or not isinstance(value, (int, float)):

@@ -51,7 +51,7 @@ def report_sweep(directory: Path, to: Path | None = None) -> Path:
 
 
 def _figure(frame: pd.DataFrame) -> tuple[str, list[str]]:
-    """The figure as SVG, and what it leaves out; an empty text if no point can be drawn."""
+    """The figure as SVG, and the reasons why points are left out; an empty text if no point can be drawn."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", LeftOutWarning)
         try:

@@ -2,12 +2,12 @@
 
 Each deck has a start-up time and a cost per step that do not depend on its contents: few decks are cheaper. Many decks
 use the cores more evenly and give results sooner. Decks are packed by their predicted cost, so that all cores finish
-together. The packing depends on the whole sweep and the number of workers, not on what is finished: an interrupted
+together. The packing depends on the whole sweep and the number of workers, not on the finished points: an interrupted
 sweep continues with the same decks.
 
-Workers are those of a `concurrent.futures.Executor`: threads on this machine, Parsl's workers on a cluster, or any that
-the caller hands over. Parsl repeats a deck whose worker was lost. A deck that fails is repeated here, as two halves;
-until a point is finished, the second half waits for the first. A failure that hits every point stops the sweep.
+A `concurrent.futures.Executor` runs the decks: threads on this machine, Parsl's workers on a cluster, or the caller's
+executor. Parsl repeats a deck whose worker was lost. A deck that fails is repeated here, as two halves; until a point
+is finished, the second half waits for the first. A failure that hits every point stops the sweep.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ class Options:
 
 @dataclass(frozen=True)
 class Failure:
-    """A failed point: number, run, name and message of the failure, directory with what is left of the run, `hits`."""
+    """A failed point: number, run, name and message of the failure, directory of the unfinished run, `hits`."""
 
     point: int
     run: str
@@ -134,7 +134,7 @@ def pack(cases: Sequence[Case], workers: int, longest_seconds: float = LONGEST_S
         length = min(2.0 * max(whole / workers, longest) * 2.0 ** (-trial / 4), longest_seconds)
         plans.append([deck for group in groups.values() for deck in _parted(group, cases, length)])
     spans = [makespan((deck.seconds for deck in plan), workers) for plan in plans]
-    # Of plans that take equally long: the one with the smallest decks.
+    # Among plans that take equally long, choose the smallest decks.
     good = max(number for number, span in enumerate(spans) if span <= _AS_GOOD * min(spans))
     return sorted(plans[good], key=lambda deck: -deck.seconds)
 
@@ -348,7 +348,7 @@ def work(
 
 @contextmanager
 def _workers(options: Options, record: table.SweepRecord) -> Iterator[tuple[Executor, threading.Event | None]]:
-    """The executor of a sweep, with what stops its threads; threads and Parsl's workers end with the context."""
+    """The executor of a sweep, and the event that stops its threads; threads and Parsl's workers end with it."""
     if options.executor is not None:
         yield options.executor, None
         return

@@ -1,8 +1,8 @@
 """Sweeps on disk and as tables.
 
 A sweep's directory contains ``sweep.json``: the tables of the sweep's file and of its base case, and the names of its
-runs. All else follows: the file is expanded again when it is read, and the status of a point is that of its run
-directory. The run directories are beside the sweep's directory, and all sweeps of a folder share them.
+runs. Reading expands the file again. The status of a point is the status of its run directory. The run directories are
+beside the sweep's directory, and all sweeps of a folder share them.
 
 The table has one row per point: the varied keys and the numbers of the run. Lists, figures, reports, comparisons and
 spreads are groupings and prints of it. Its ``attrs`` describe the columns (``units``, ``meanings``) and the sweep
@@ -132,7 +132,8 @@ def read_record(directory: str | Path) -> SweepRecord:
 class PointState:
     """State of a point: finished, failed, running or missing.
 
-    ``directory`` is that of the finished or failed run, ``result`` is from `checked_states`; others describe a failure.
+    ``directory`` is the directory of the finished or failed run. `checked_states` adds the ``result``. ``reason``,
+    ``message`` and ``lost`` describe a failure.
     """
 
     status: str
@@ -161,14 +162,14 @@ def checked_states(record: SweepRecord) -> list[PointState]:
 
 
 def worst_status(points: Iterable[str]) -> str:
-    """Status of a sweep from those of its points: running, interrupted or failed if one is, in this order."""
+    """Status of a sweep from its points: running, interrupted or failed if one is, in this order, or finished."""
     statuses = set(points)
     worst = {"running": "running", "missing": "interrupted", "failed": "failed"}
     return next((status for status_of_point, status in worst.items() if status_of_point in statuses), "finished")
 
 
 def state_at(place: Path, directory: Path | None = None) -> PointState:
-    """State of the run that belongs in a place; with a ``directory`` that of the unfinished run in it."""
+    """State of the run that belongs in a place, or with a ``directory`` of the unfinished run in it."""
     if directory is None and is_finished(place):
         return PointState("finished", place)
     if is_locked(place):
@@ -219,7 +220,7 @@ def columns_of(names: Iterable[str]) -> dict[str, tuple[str, str]]:
 
 
 def _declared(sweep: Sweep) -> list[str]:
-    """The numbers of results of a sweep's cases, without those of single beads; none if a case cannot be read."""
+    """The numbers of results of a sweep's cases, without numbers of single beads; empty if a case cannot be read."""
     with suppress(InputError):
         groups = [module.NAME for module in modules_of(next(sweep.cases()))]
         return [
@@ -272,7 +273,7 @@ def sides_differ(frame: pd.DataFrame) -> bool:
 
 
 def main_columns(frame: pd.DataFrame) -> list[str]:
-    """The main results in order of preference: the `headline` of any point before those of all."""
+    """The main results in order of preference: first the `headline` of a point, then `_RESULTS`."""
     if "velocity" not in frame:
         return list(_RESULTS)
     finished: Any = frame.dropna(subset="velocity").to_dict("records")

@@ -132,34 +132,6 @@ def largest_stable_v() -> float:
     return float(brentq(lambda q: mathieu_b(1, q), 0.5, 1.5)) / 2.0
 
 
-def turning(parameters: Alignment, start: float, angles: npt.ArrayLike, phase: float = 0.0) -> FloatArray:
-    """Orientation of a dimer that starts at rest and rolls sideways without sliding, for any angle to the axis.
-
-    The Mathieu equation with sin ψ instead of ψ, a damped parametric pendulum:
-    d²ψ/dϑ² = -2β dψ/dϑ - [U - 4V cos(2ϑ + phase)] sin ψ.
-
-    Parameters
-    ----------
-    parameters, start
-        U, V and β; ψ at ϑ = 0, rad.
-    angles : ndarray, shape (N,)
-        Increasing ϑ = πft from 0 on; the result is ψ (rad) at these.
-    phase
-        Phase of the drive, rad; at 0 the substrate first accelerates toward the large bead.
-    """
-    from scipy.integrate import solve_ivp
-
-    theta = np.asarray(angles, np.float64)
-
-    def slope(at: float, state: FloatArray) -> list[float]:
-        pull = parameters.u - 4.0 * parameters.v * np.cos(2.0 * at + phase)
-        return [state[1], -2.0 * parameters.damping * state[1] - pull * np.sin(state[0])]
-
-    solution = solve_ivp(slope, (0.0, float(theta[-1])), [start, 0.0], t_eval=theta, rtol=1e-8, atol=1e-10)
-    psi: FloatArray = solution.y[0]
-    return psi
-
-
 def time_to_turn(rate: float) -> float:
     """Seconds from 1° to 90° at dψ/dt = rate sin ψ, in 1/s: ln(tan(ψ2/2)/tan(ψ1/2))/rate."""
     return log(tan(radians(90.0) / 2.0) / tan(_ANGLE / 2.0)) / rate

@@ -9,8 +9,8 @@
 (`walkers.physics.bridge`); the couples do not load contacts. Coulomb's law is set-valued: the friction of a sticking
 contact is the force that keeps it at rest. Steps are implicit (`walkers.theory.stepping`) and find the friction forces
 by a semi-smooth Newton method. Sticking needs no regularisation; steps are short only where a contact begins to stick
-or to slip. F is that of rigid beads; the Coulomb limit of the engine includes contact damping, which vanishes while the
-gap is constant.
+or to slip. F is the normal force of rigid beads; the Coulomb limit of the engine includes contact damping, which
+vanishes while the gap is constant.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Walker:
         first, second = dimer.radii
         meeting = ((first, inf), (second, inf), (first, second))
         resistances = np.array([resistances_at_rest(case, *pair) for pair in meeting]).T
-        resistances[1, 2] *= -1.0 if first > second else 1.0  # that of the smaller bead as body 1
+        resistances[1, 2] *= -1.0 if first > second else 1.0  # computed with the smaller bead as body 1
         law = case.contact.friction
         return cls(
             radii=np.array(dimer.radii)[:, None],

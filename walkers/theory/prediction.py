@@ -211,7 +211,7 @@ def describe(prediction: dict[str, Any], result: Mapping[str, Any] | None) -> st
 
 
 def _of_engine(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """The result of a run as a model; on a slope that of the walkers that face uphill, whom the theory describes."""
+    """The result of a run as a model; on a slope for the walkers that face uphill, as in the theory."""
     both = result["goes_uphill"] and result["facing_right"] and result["facing_left"]
     speeds = {"rotation": [result["rotation_1"], result["rotation_2"]], "sliding": [result["sliding_1"]]}
     return {"engine, facing up" if both else "engine": {"velocity": result["velocity"], **speeds}}

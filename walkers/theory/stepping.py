@@ -131,7 +131,7 @@ def _advance(  # noqa: PLR0913, PLR0917
         x, y, z = start
         start = (x + more * (after[0, 0] - x), y + more * (after[0, 1] - y), z + more * (after[0, 2] - z))
         solved &= _stage(tables[level], mu, drive, effect, terms, now + part, STAGE * part, start, work)
-        if level < LEVELS - 1 and (not solved or _differ(after[_MODE], state[_MODE])):
+        if level < LEVELS - 1 and (not solved or (after[_MODE] != state[_MODE]).any()):
             level += 1
             continue
         if not solved:
@@ -144,11 +144,6 @@ def _advance(  # noqa: PLR0913, PLR0917
         if level and tick % (width * FINER) == 0:
             level -= 1
     return True
-
-
-@njit(cache=True)
-def _differ(a: FloatArray, b: FloatArray) -> bool:
-    return a[0] != b[0] or a[1] != b[1] or a[2] != b[2]
 
 
 @njit(cache=True)
