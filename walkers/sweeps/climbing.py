@@ -17,10 +17,10 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from walkers.errors import refused
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, save_figure, styled
+from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.results import plain, read
 from walkers.rounding import percent
 from walkers.runner.files import write_bytes
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-FloatArray = npt.NDArray[np.float64]
 
 _CONFIDENCE = 0.95
 _DRAWS = 10_000

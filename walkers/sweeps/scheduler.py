@@ -29,7 +29,7 @@ from pathlib import Path
 from platform import node
 from typing import TYPE_CHECKING, TypeAlias
 
-from walkers.errors import InputError, Stopped, WalkersError, check_utf8, refused
+from walkers.errors import InputError, Problem, Stopped, WalkersError, check_utf8, refused
 from walkers.inputs.case import Case
 from walkers.inputs.sweep import Sweep
 from walkers.postprocess.results import ensure_measured
@@ -223,7 +223,9 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     binary = find_engine(engine)
     cases = list(sweep.cases())
     options = options.for_ranks(max(case.run.ranks for case in cases))
-    record = table.describe_sweep(sweep, cases, binary, out)
+    if sweep.until_below is not None and not any(case.walkers for case in cases):
+        raise InputError(sweep.source, [Problem("descend", None, "expected walkers: a pile has no velocity")])
+    record = table.SweepRecord(out / sweep.name, sweep, [run_place(case, binary, out).name for case in cases])
     if options.site is not None:
         check_path(record.directory)
     point_states = table.states(record)

@@ -22,15 +22,13 @@ from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.errors import InputError, Problem, refused, suggestion
-from walkers.inputs.case import Case
+from walkers.errors import InputError, refused, suggestion
 from walkers.inputs.origins import text_of
 from walkers.postprocess.numbers import declared, headline, is_declared, ordered
 from walkers.postprocess.quantities import GROUPS, unit_shown
 from walkers.postprocess.results import Results, modules_of, read
 from walkers.rounding import counted, rounded
-from walkers.runner.binary import Engine
-from walkers.runner.directory import FAILURE_NAME, is_finished, is_locked, run_place, unfinished
+from walkers.runner.directory import FAILURE_NAME, is_finished, is_locked, unfinished
 from walkers.runner.files import json_bytes, read_json, write_bytes, write_json
 from walkers.sweeps.readable import short_keys
 from walkers.text import aligned
@@ -89,13 +87,6 @@ class SweepRecord:
     def out(self) -> Path:
         """Folder of the run directories."""
         return self.directory.parent
-
-
-def describe_sweep(sweep: Sweep, cases: Sequence[Case], engine: Engine, out: Path) -> SweepRecord:
-    """The record of a sweep with resolved points; `InputError` for descents of piles, which have no velocity."""
-    if sweep.until_below is not None and not any(case.walkers for case in cases):
-        raise InputError(sweep.source, [Problem("descend", None, "expected walkers: a pile has no velocity")])
-    return SweepRecord(out / sweep.name, sweep, [run_place(case, engine, out).name for case in cases])
 
 
 def write_record(record: SweepRecord) -> None:

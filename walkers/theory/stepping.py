@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-FloatArray = npt.NDArray[np.float64]
+from walkers.theory.quasistatic import FloatArray
+
 BoolArray = npt.NDArray[np.bool_]
 Three = tuple[float, float, float]
 Effect = Callable[[Three, FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
