@@ -780,10 +780,10 @@ def compare(
         raise refused("y", "is for sweeps")
 
     def side(number: int) -> Side:
-        name, given = names[number], (changes or {}) if number else {}
-        case, directory = case_and_run(name, out, given)
-        label = directory.name if directory and not given and find(name, out).kind == "run" else str(name)
-        return Side(" ".join([label, *(f"{key}={value}" for key, value in given.items())]), case, directory)
+        name, settings = names[number], (changes or {}) if number else {}
+        case, directory = case_and_run(name, out, settings)
+        label = directory.name if directory and not settings and find(name, out).kind == "run" else str(name)
+        return Side(" ".join([label, *(f"{key}={value}" for key, value in settings.items())]), case, directory)
 
     return compare_runs(*apply_all(side, range(2)))
 

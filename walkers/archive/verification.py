@@ -102,8 +102,8 @@ def _compared(folder: Path, listed: Mapping[str, str], left_out: Collection[str]
     """Compare the files of a folder with their listed checksums, by relative path."""
     paths = (path for path in folder.rglob("*") if path.is_symlink() or not path.is_dir() or not any(path.iterdir()))
     paths_by_name = {path.relative_to(folder).as_posix(): path for path in sorted(paths)}
-    now = checksums(folder, [name for name, path in paths_by_name.items() if name in listed and path.is_file()])
-    changed = [name for name, checksum in now.items() if checksum != listed[name]]
+    sums = checksums(folder, [name for name, path in paths_by_name.items() if name in listed and path.is_file()])
+    changed = [name for name, checksum in sums.items() if checksum != listed[name]]
     unlisted = [name for name in paths_by_name if name not in listed and name not in (MANIFEST_NAME, SUMS_NAME)]
     # Everything in the folder of segments is read as a part of the run.
     doubted = [name for name in unlisted if SEGMENTS in Path(name).parts or name.endswith(_READ)]
@@ -112,9 +112,9 @@ def _compared(folder: Path, listed: Mapping[str, str], left_out: Collection[str]
     parents = ((name, name.rpartition("/")[0]) for name in since)
     findings = {
         "changed": changed,
-        "missing": [name for name in listed if name not in now and name not in left_out],
+        "missing": [name for name in listed if name not in sums and name not in left_out],
         "not listed": doubted,
         "made since": list(dict.fromkeys(name if parent in folders else f"{parent}/" for name, parent in parents)),
-        "left out": [name for name in left_out if name not in now],
+        "left out": [name for name in left_out if name not in sums],
     }
-    return Verification(folder.resolve().name, f"{len(now) - len(changed)} files are unchanged", findings)
+    return Verification(folder.resolve().name, f"{len(sums) - len(changed)} files are unchanged", findings)

@@ -46,7 +46,7 @@ def courses(first: Motion, second: Motion) -> Iterator[Line]:
     pile = case.mixture is not None
     name = f"start {case.run.seed}: " if pile else ""
     early = Verdict.FAIL if pile and together < min(1.0, cycles) else None
-    yield Line(f"{name}cycles of the same motion", cycles, together, given=early)
+    yield Line(f"{name}cycles of the same motion", cycles, together, decided=early)
     yield Line(f"{name}largest distance of a bead", 0.0, 1e6 * float(apart.max()), unit="µm")
 
 

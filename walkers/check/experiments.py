@@ -73,9 +73,12 @@ def symmetry(out: Path) -> Iterator[Line]:
         speeds.append(1e3 * run(case, out).result["velocity"])
     odd, even, opposite = speeds
     yield Line("symmetric dimer, tones 2:3: velocity (not zero)", 0.0, even, unit="mm/s")
-    yield Line("symmetric dimer: velocity at 1:3 over that at 2:3", 0.0, odd / even, 1e-3)
+    yield Line("symmetric dimer: velocity at 1:3 over velocity at 2:3", 0.0, odd / even, 1e-3)
     yield Line(
-        "symmetric dimer, 2:3: velocity by the opposite waveform over that by the waveform", -1, opposite / even, 0.01
+        "symmetric dimer, 2:3: velocity by the opposite waveform over velocity by the waveform",
+        -1,
+        opposite / even,
+        0.01,
     )
 
 
@@ -102,7 +105,7 @@ def thrown(bench: Bench, speed: float = 0.05) -> Iterator[Line]:
     frames = followed(bench, [case], [bead], 10 * round(0.15 * ends / case.run.time_step), 10)[:, 0]
     slip, time = frames[:, 3] - R * frames[:, 7], 10.0 * case.run.time_step * np.arange(len(frames))
     slope, start = np.polyfit(time[slip > 0.05 * speed], slip[slip > 0.05 * speed], 1)
-    yield Line("thrown bead: speed of rolling over that of the throw", 5.0 / 7.0, frames[-1, 3] / speed, 1e-3)
+    yield Line("thrown bead: speed of rolling over speed of the throw", 5.0 / 7.0, frames[-1, 3] / speed, 1e-3)
     yield Line("thrown bead: time until it rolls", 2.0 * speed / (7.0 * FRICTION * G), -start / slope, 1e-3, "s")
 
 
@@ -223,5 +226,9 @@ def incline(bench: Bench, radius: float = 1e-3, film: float = 7.5e-5) -> Iterato
     yield Line("bead on a wet incline, no friction: Rω/v", free, rolls[0], 1e-2)
     yield Line("bead on a wet incline, friction 0.2: Rω/v", 1.0, rolls[1], 1e-2)
     yield Line("bead below a wet incline, no friction: Rω/v", free, rolls[2], 1e-2)
-    yield Line("bead below a wet incline, 0.9 of what its bridge holds: hangs", 1.0, float(gaps[3] < film), 0.0)
-    yield Line("bead below a wet incline, 1.1 of what its bridge holds: hangs", 0.0, float(gaps[4] < film), 0.0)
+    yield Line(
+        "bead below a wet incline, 0.9 times the weight that its bridge holds: hangs", 1.0, float(gaps[3] < film), 0.0
+    )
+    yield Line(
+        "bead below a wet incline, 1.1 times the weight that its bridge holds: hangs", 0.0, float(gaps[4] < film), 0.0
+    )

@@ -346,7 +346,7 @@ def kick(c: Constants, state: State) -> None:
 
 
 @compiled
-def advance(c: Constants, state: State, now: int, every: int, frames: FloatArray) -> None:
+def advance(c: Constants, state: State, clock: int, every: int, frames: FloatArray) -> None:
     """Integrate from a step on, ``every`` steps for each of the frames, of shape (F, N, 9)."""
     far = (0.4 * c.skin) ** 2
     look_around(c, state)
@@ -359,7 +359,7 @@ def advance(c: Constants, state: State, now: int, every: int, frames: FloatArray
                 state.position[bead, axis] += c.step * state.velocity[bead, axis]
                 moved += (state.position[bead, axis] - state.listed[bead, axis]) ** 2
             farthest = max(farthest, moved)
-        forces(c, state, now + number + 1, True)
+        forces(c, state, clock + number + 1, True)
         kick(c, state)
         if (number + 1) % every == 0:
             frame = frames[(number + 1) // every - 1]

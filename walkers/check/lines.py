@@ -32,7 +32,7 @@ class Line:
 
     ``expected`` and ``measured`` are in ``unit`` (of two engines: LIGGGHTS and the second engine). ``tolerance`` is the
     largest error that passes, infinite without a judgement. Errors are relative to ``scale``; default: the expected
-    number, or 1 if that is 0. ``given`` is a verdict that does not follow from the error.
+    number, or 1 if that is 0. ``decided`` is a verdict that does not follow from the error.
     """
 
     quantity: str
@@ -41,13 +41,13 @@ class Line:
     tolerance: float = inf
     unit: str = ""
     scale: float | None = None
-    given: Verdict | None = None
+    decided: Verdict | None = None
     check: str = ""
 
     @classmethod
     def without_number(cls, quantity: str, verdict: Verdict) -> Line:
         """A line without a measured value."""
-        return cls(quantity, nan, nan, given=verdict)
+        return cls(quantity, nan, nan, decided=verdict)
 
     @property
     def error(self) -> float:
@@ -57,8 +57,8 @@ class Line:
     @property
     def verdict(self) -> Verdict:
         """Pass or fail by the tolerance; NaN fails."""
-        if self.given or self.tolerance == inf:
-            return self.given or Verdict.NOT_JUDGED
+        if self.decided or self.tolerance == inf:
+            return self.decided or Verdict.NOT_JUDGED
         return Verdict.PASS if self.error <= self.tolerance else Verdict.FAIL
 
     @property
@@ -81,7 +81,7 @@ class Line:
 
 def run_checks(
     checks: Mapping[str, Callable[[T], Iterable[Line]]],
-    given: T,
+    argument: T,
     only: Collection[str] = (),
     on_done: Callable[[str], None] | None = None,
     mapped: Callable[[Callable[[str], list[Line]], Iterable[str]], Iterable[list[Line]]] = map,
@@ -97,7 +97,7 @@ def run_checks(
 
     def lines_of(name: str) -> list[Line]:
         try:
-            lines = list(checks[name](given))
+            lines = list(checks[name](argument))
         except Exception as failure:  # another build of the engine may fail in any way
             reason = str(failure).split(" (see ", 1)[0] or type(failure).__name__
             lines = [Line.without_number(f"could not be computed: {reason}", Verdict.ERROR)]

@@ -391,7 +391,7 @@ def liquid_lines(bench: Bench, ranks: int = 1) -> Iterator[Line]:
     yield Line(
         "films of beads that meet and part, both engines", 0.0, float(np.abs(dump[:, :, -1] - films).max()), 1e-9
     )
-    yield Line("liquid at the end over that at the start", 1.0, engine.liquid() / everything, 1e-9)
+    yield Line("liquid at the end over liquid at the start", 1.0, engine.liquid() / everything, 1e-9)
     yield Line("smallest film", 0.0, float(np.min(films)))
     yield Line("largest film", 1.0, float(np.max(films)))
 

@@ -112,9 +112,9 @@ def take_in(folder: Path) -> None:
     try:
         record, deck = read_json(folder / on_disk.DECK_RECORD_NAME), folder / decks.DECK_NAME
         case, written = on_disk.with_recorded_law(Case.from_dict(record["case"]), folder), str(record["deck"])
-        now = deck.read_text(encoding="utf-8", errors="surrogateescape")
+        edited_text = deck.read_text(encoding="utf-8", errors="surrogateescape")
         log_text = log.read_text(encoding="utf-8", errors="replace")
-        ran, segment, changes = _as_run(case, written, now, log_text, f"{folder}: the edited deck")
+        ran, segment, changes = _as_run(case, written, edited_text, log_text, f"{folder}: the edited deck")
         notes = ["run by hand", *([f"the deck was edited: {'; '.join(changes)}"] if changes else [])]
         if deck.stat().st_mtime_ns > log.stat().st_mtime_ns:
             notes.append(f"{decks.DECK_NAME} is newer than {log.name}: if it was edited since, run it again")
@@ -130,10 +130,10 @@ def take_in(folder: Path) -> None:
         raise refused(folder, f"the deck that was run by hand cannot be read ({error})") from error
 
 
-def _as_run(case: Case, written: str, now: str, log_text: str, source: str) -> tuple[Case, Segment, list[str]]:
+def _as_run(case: Case, written: str, edited_text: str, log_text: str, source: str) -> tuple[Case, Segment, list[str]]:
     """The case that the engine ran, its segment, and the edits, from the deck as written and now, and the log."""
     case = case.for_cycles(case.run.attempts[0])
-    before, after = dict(_LINE.findall(written)), dict(_LINE.findall(now))
+    before, after = dict(_LINE.findall(written)), dict(_LINE.findall(edited_text))
     words = (_PRINTED.findall(log_text) or [""])[-1].split()
     values = {name: float(value) for name, value in zip(words[::2], words[1::2], strict=True)}
     # The engine prints a number as its line has it. A formula gives another number if a parameter in it was edited.
@@ -147,7 +147,7 @@ def _as_run(case: Case, written: str, now: str, log_text: str, source: str) -> t
     }
     ran, rest = _edited(case, values, edited, source) if edited else case, int(values.get("rest_steps", 0))
     changes = [f"{name} {number:g}, was {was[name]:g}" for name, number in edited.items()]
-    return ran, Segment(0, rest + ran.run.steps, rest), [*changes, *_other_changes(written, now, values)]
+    return ran, Segment(0, rest + ran.run.steps, rest), [*changes, *_other_changes(written, edited_text, values)]
 
 
 def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float], source: str) -> Case:
@@ -206,16 +206,16 @@ def _sines(case: Case, values: Mapping[str, float]) -> list[dict[str, Any]]:
     return tables
 
 
-def _other_changes(written: str, now: str, given: Collection[str]) -> list[str]:
+def _other_changes(written: str, edited_text: str, parameters: Collection[str]) -> list[str]:
     """A line about other edited commands, if there are any."""
     before, after = (
         [
             command
             for line in text.splitlines()
             if (command := " ".join(line.partition("#")[0].split()))
-            and not ((parameter := _LINE.match(line)) and parameter[1] in given)
+            and not ((parameter := _LINE.match(line)) and parameter[1] in parameters)
         ]
-        for text in (written, now)
+        for text in (written, edited_text)
     )
     lines = [line for line in after if line not in before] or [line for line in before if line not in after]
     return [f"{len(lines)} other line(s), which are not part of the case, first: {lines[0]}"] if lines else []

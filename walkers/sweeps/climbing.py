@@ -345,12 +345,12 @@ def _draw_survival(panel: Axes, curve: Mapping[str, Sequence[float | None]]) -> 
 
 def _draw_climbs(panel: Axes, climbs: Sequence[Mapping[str, Any]]) -> None:
     for where, (key, look) in list(_KINDS.items())[1:]:
-        some = [
+        climbs_of_kind = [
             climb
             for climb in climbs
             if climb["speed"] is not None and (" " in climb["wall_names"]) == (key == "in_corners")
         ]
-        sizes, speeds = [climb["size"] for climb in some], [climb["speed"] * 1e3 for climb in some]
+        sizes, speeds = [climb["size"] for climb in climbs_of_kind], [climb["speed"] * 1e3 for climb in climbs_of_kind]
         panel.plot(sizes, speeds, look, markerfacecolor="none", label=where, clip_on=False)
     panel.set(xlabel="beads", ylabel="speed (mm/s)", xlim=(0.0, None), ylim=(0.0, None))
 

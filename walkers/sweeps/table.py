@@ -101,22 +101,22 @@ def read_record(directory: str | Path) -> SweepRecord:
     """Read the record in a sweep's directory, and expand the sweep; `InputError` if there is none."""
     from walkers.inputs.sweep import expand
 
-    given, directory = directory, Path(directory).resolve()
+    named, directory = directory, Path(directory).resolve()
     try:
         contents = read_json(directory / RECORD_NAME)
         if contents["format"] != _FORMAT:
             raise ValueError(f"its format is {contents['format']!r}, expected {_FORMAT}")
         base = contents["case"], contents["base"]
-        sweep = expand(contents["file"], source=f"{given}/{RECORD_NAME}", name=directory.name, base=base)
+        sweep = expand(contents["file"], source=f"{named}/{RECORD_NAME}", name=directory.name, base=base)
         runs = contents["runs"]
         if len(runs) != len(sweep.rows) or not all(isinstance(run, str) for run in runs):
             raise ValueError(f"{len(runs)} runs, expected the names of {len(sweep.rows)}")
         return SweepRecord(directory, sweep, runs)
     except (FileNotFoundError, NotADirectoryError) as error:
-        raise refused(given, f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2") from error
+        raise refused(named, f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2") from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         text = f"{RECORD_NAME} cannot be read ({error}); run the sweep again: finished runs are kept"
-        raise refused(given, text) from error
+        raise refused(named, text) from error
 
 
 @dataclass(frozen=True)

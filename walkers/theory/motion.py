@@ -134,8 +134,10 @@ def walk(
     require("theory")
     from walkers.theory.stepping import integrate
 
-    given = (frequency, peak_acceleration, steady_acceleration, walker.scale)
-    drive = np.stack(np.broadcast_arrays(*(np.asarray(value, np.float64).reshape(-1) for value in given))[:3], axis=-1)
+    quantities = (frequency, peak_acceleration, steady_acceleration, walker.scale)
+    drive = np.stack(
+        np.broadcast_arrays(*(np.asarray(value, np.float64).reshape(-1) for value in quantities))[:3], axis=-1
+    )
     friction = np.broadcast_to(walker.friction, (3, len(drive))).T.copy()
     tables = _tables(walker, drive[:, 0] * steps_per_cycle)
     acts, terms = effect or (None, np.zeros((len(drive), 0)))

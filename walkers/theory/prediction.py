@@ -261,21 +261,21 @@ def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, Floa
     is_velocity = column in ("velocity", "right_facing", "left_facing")
     if not is_velocity and family not in ("rotation", "sliding"):
         return {}, {f"the theory has no {column}": len(cases)}
-    whys = [_why_not(case, column) for case in cases]
-    able = [place for place, why in enumerate(whys) if why is None]
-    reasons = Counter(why for why in whys if why)
-    if not able:
+    reasons_by_case = [_why_not(case, column) for case in cases]
+    applicable = [place for place, reason in enumerate(reasons_by_case) if reason is None]
+    reasons = Counter(reason for reason in reasons_by_case if reason)
+    if not applicable:
         return {}, dict(reasons)
     model, paper = np.full(len(cases), np.nan), np.full(len(cases), np.nan)
-    motion = motion_of(*(cases[place] for place in able))
+    motion = motion_of(*(cases[place] for place in applicable))
     values = motion.velocity if is_velocity else getattr(motion, family)[int(number) - 1]
-    unknown = [_why_unknown(motion, of) for of in range(len(able))]
-    model[able] = np.where([why is None for why in unknown], values, np.nan)
-    reasons += Counter(why for why in unknown if why)
-    for place in able if is_velocity else ():
+    unknown = [_why_unknown(motion, walker) for walker in range(len(applicable))]
+    model[applicable] = np.where([reason is None for reason in unknown], values, np.nan)
+    reasons += Counter(reason for reason in unknown if reason)
+    for place in applicable if is_velocity else ():
         case, dimer = cases[place], dimer_of(cases[place])
-        if why := why_not_the_paper(case):
-            reasons[f"{PAPER}: {why}"] += 1
+        if reason := why_not_the_paper(case):
+            reasons[f"{PAPER}: {reason}"] += 1
         else:
             paper[place] = mean_velocity(dimer.gamma0(case.excitation.peak_acceleration), dimer.sin_delta)
     models = {MODEL: model, PAPER: paper}

@@ -75,7 +75,7 @@ def integrate(
     means, leasts = np.zeros((3, count)), np.zeros((3, count))
     repeated, solved = np.zeros(count, np.bool_), np.ones(count, np.bool_)
     series, work = np.zeros((count, steps, 3)), np.zeros((8, 3))
-    for of in range(count):
+    for walker in range(count):
         state, totals = np.zeros((4, 3)), np.full((2, 3), np.inf)
         same, later, low, high = 0.0, np.zeros(3), np.full(3, np.inf), np.full(3, -np.inf)
         for cycle in range(cycles):
@@ -83,11 +83,13 @@ def integrate(
             totals[0], totals[1] = 0.0, np.inf
             for step in range(steps):
                 begin, length = step / steps, 1.0 / steps
-                if not _advance(tables[of], mu[of], drive[of], effect, terms[of], begin, length, state, totals, work):
-                    solved[of] = False
+                if not _advance(
+                    tables[walker], mu[walker], drive[walker], effect, terms[walker], begin, length, state, totals, work
+                ):
+                    solved[walker] = False
                     break
-                series[of, step] = state[_SLIDING]
-            if not solved[of]:
+                series[walker, step] = state[_SLIDING]
+            if not solved[walker]:
                 break
             if cycle >= cycles // 2:
                 later += totals[0] / (cycles - cycles // 2)
@@ -95,11 +97,11 @@ def integrate(
                     low, high = np.minimum(low, mean), np.maximum(high, mean)
             same = _REPEATED * max(1.0, np.abs(totals[0]).max() / _FAST)
             if np.abs(totals[0] - before).max() < same:
-                repeated[of] = True
+                repeated[walker] = True
                 break
-        means[:, of] = totals[0] if repeated[of] else later
-        repeated[of] |= solved[of] and (high - low).max() < _SCATTER * same
-        leasts[:, of] = totals[1]
+        means[:, walker] = totals[0] if repeated[walker] else later
+        repeated[walker] |= solved[walker] and (high - low).max() < _SCATTER * same
+        leasts[:, walker] = totals[1]
     return means, leasts, repeated, solved, series
 
 
@@ -137,9 +139,9 @@ def _advance(  # noqa: PLR0913, PLR0917
             continue
         if not solved:
             return False
-        for at in range(3):
-            totals[0, at] += part / 2.0 * (state[_SLIDING, at] + after[_SLIDING, at])
-            totals[1, at] = min(totals[1, at], after[_NORMAL, at])
+        for contact in range(3):
+            totals[0, contact] += part / 2.0 * (state[_SLIDING, contact] + after[_SLIDING, contact])
+            totals[1, contact] = min(totals[1, contact], after[_NORMAL, contact])
         state[:] = after
         tick += width
         if level and tick % (width * FINER) == 0:
@@ -172,10 +174,12 @@ def _stage(  # noqa: PLR0913, PLR0917
         rest = _less(rest, -1.0, _times(table, _PRESS, forces))
         free = _less(free, seconds, _times(table, _GAIN, forces))
     solved = _settle(table, mu, seconds, free, rest, work)
-    for at in range(3):
-        slips = state[_MODE, at] != 0.0
-        state[_SLIDING, at] = free[at] - seconds * _row(table, _GAIN + at, state[_PARALLEL]) if slips else 0.0
-        state[_NORMAL, at] = rest[at] + _row(table, _PRESS + at, state[_PARALLEL])
+    for contact in range(3):
+        slips = state[_MODE, contact] != 0.0
+        state[_SLIDING, contact] = (
+            free[contact] - seconds * _row(table, _GAIN + contact, state[_PARALLEL]) if slips else 0.0
+        )
+        state[_NORMAL, contact] = rest[contact] + _row(table, _PRESS + contact, state[_PARALLEL])
     return solved
 
 
@@ -188,26 +192,26 @@ def _settle(table: FloatArray, mu: FloatArray, seconds: float, free: Three, rest
     """
     modes, parallel, rows, right = work[_MODE], work[_PARALLEL], work[4:7], work[7]
     for _ in range(_NEWTON_STEPS):
-        for at in range(3):
-            normal = max(rest[at] + _row(table, _PRESS + at, parallel), 0.0)
-            speed = free[at] - seconds * _row(table, _GAIN + at, parallel)
-            scale = seconds * table[_GAIN + at, at]
-            trial = parallel[at] + speed / scale
-            if abs(trial) <= normal * mu[at]:
-                modes[at] = 0.0
-                for by in range(3):
-                    rows[at, by] = table[_GAIN + at, by] / table[_GAIN + at, at]
-                right[at] = speed / scale
+        for contact in range(3):
+            normal = max(rest[contact] + _row(table, _PRESS + contact, parallel), 0.0)
+            speed = free[contact] - seconds * _row(table, _GAIN + contact, parallel)
+            scale = seconds * table[_GAIN + contact, contact]
+            trial = parallel[contact] + speed / scale
+            if abs(trial) <= normal * mu[contact]:
+                modes[contact] = 0.0
+                for column in range(3):
+                    rows[contact, column] = table[_GAIN + contact, column] / table[_GAIN + contact, contact]
+                right[contact] = speed / scale
                 continue
-            modes[at] = np.sign(trial)
-            slope = modes[at] * mu[at]
-            for by in range(3):
-                rows[at, by] = -slope * table[_PRESS + at, by]
-            rows[at, at] += 1.0
-            right[at] = slope * normal - parallel[at]
+            modes[contact] = np.sign(trial)
+            slope = modes[contact] * mu[contact]
+            for column in range(3):
+                rows[contact, column] = -slope * table[_PRESS + contact, column]
+            rows[contact, contact] += 1.0
+            right[contact] = slope * normal - parallel[contact]
         change = _solved(rows, right)
-        for at in range(3):
-            parallel[at] += change[at]
+        for contact in range(3):
+            parallel[contact] += change[contact]
         if max(abs(change[0]), abs(change[1]), abs(change[2])) < _TOLERANCE:
             return True
     return False
@@ -225,9 +229,9 @@ def _times(table: FloatArray, first: int, vector: FloatArray | Three) -> Three:
 
 
 @njit(cache=True)
-def _row(matrix: FloatArray, at: int, vector: FloatArray | Three) -> float:
+def _row(matrix: FloatArray, row: int, vector: FloatArray | Three) -> float:
     """One row of a matrix times a vector."""
-    return matrix[at, 0] * vector[0] + matrix[at, 1] * vector[1] + matrix[at, 2] * vector[2]
+    return matrix[row, 0] * vector[0] + matrix[row, 1] * vector[1] + matrix[row, 2] * vector[2]
 
 
 @njit(cache=True)
