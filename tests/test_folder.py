@@ -151,7 +151,7 @@ def test_clean_keeps_runs_that_other_sweeps_have(out: Path) -> None:
     (out / "beads").rename(out / f"{one}-accuracy")
     shutil.copytree(out / "three", out / f"{one}-spread")
     shown = call("clean", str(finished_places(out)[one]), "--yes", check=True).stdout
-    assert "needed by the sweep three, which would make them again: 1" in shown
+    assert "needed by the sweep three, which would run them again: 1" in shown
     assert before.keys() - finished_places(out).keys() == (runs["beads"] - runs["three"]) | {one}
     assert not [*out.glob(f"{one}-*")]
     assert walkers.load(out / "three").table()["status"].tolist().count("missing") == 1

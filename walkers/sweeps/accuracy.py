@@ -68,7 +68,7 @@ def measure_accuracy(
     possible = times_of(case)
     today = Case.read(case.document, source=directory.name, name=case.name)
     if run_place(today, find_engine(engine), directory.parent).name != directory.name:
-        text = "expected a run of the installed engine and program, and of the library and bridge law as they are now"
+        text = "expected a run with the installed engine and program, and with the present library and bridge law"
         raise refused(directory.name, f"{text}; run its case again")
     for last in range(2, len(possible)):
         sweep = _sweep(case, f"{directory.name}{ACCURACY}", possible[: last + 1])
@@ -89,7 +89,7 @@ def measure_accuracy(
 def times_of(case: Case) -> Sequence[float]:
     """Possible Young's moduli, divided by the modulus of the case; `InputError` if its error cannot be measured."""
     if not case.walkers:
-        text = "no numerical error: loose beads are chaotic, and climb otherwise at any other time step"
+        text = "no numerical error: loose beads are chaotic: their motion is different at any other time step"
         raise refused(case.name, f"{text}; walkers climb gives the scatter over starts (run.seed)")
     possible = [times for times in _TIMES if times * case.contact.youngs_modulus <= STIFFEST * (1.0 + 1e-9)]
     if len(possible) < 3:

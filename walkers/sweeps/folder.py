@@ -296,7 +296,7 @@ def plan_cleaning(out: Path, given: Sequence[Path] = ()) -> Cleaning:
     going = {*remove["name"]}
     needed = {name: len(going & {*runs}) for name, runs in runs_of.items() if name not in going}
     remarks = [
-        f"needed by the sweep {name}, which would make them again: {count}" for name, count in needed.items() if count
+        f"needed by the sweep {name}, which would run them again: {count}" for name, count in needed.items() if count
     ]
     remarks += [f"stays: {rows.sum()} {why}" for why, rows in stays.items() if rows.any()]
     locks = [] if given else sorted(out.glob("*.lock"))

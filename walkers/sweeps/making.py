@@ -293,7 +293,7 @@ def _read_segment(directory: Path) -> dict[str, Any]:
         record = read_json(directory / on_disk.SEGMENT_NAME)
         if record["end"] > record["begin"] and "drive_from" in record:
             return record
-        raise ValueError("begin, end or drive_from make no sense")
+        raise ValueError("begin, end or drive_from is missing or wrong")
     except (OSError, ValueError, KeyError, TypeError) as error:
         message = f"{directory} is damaged ({error}): delete {directory.parent.parent} and repeat the run"
         raise DamagedSegment(message) from error

@@ -286,7 +286,7 @@ def run_sweep(
         check_audit(plan.engine, allow_failed_audit)
     with suppress(InputError):  # no sweep of this name, or none that can be read
         if not set(table.read_record(record.directory).runs) & set(record.runs):
-            text = "replaces a sweep of the same name without common runs; figures and reports there show that one"
+            text = "replaces a sweep of the same name without common runs; figures and reports there show the old one"
             warnings.warn(f"{record.directory}: {text}", SweepReplacedWarning, stacklevel=2)
     table.write_record(record)
     for place in {record.out / run for run in record.runs}:
