@@ -6,17 +6,18 @@ import os
 import re
 import subprocess
 import sys
+from base64 import b64decode
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page
 
+import walkers
 from tests.conftest import wait_for
-from tests.test_report import browser  # noqa: F401
+from tests.test_report import browser, walked_run  # noqa: F401
 from walkers.runner.files import read_json
 
-pytestmark = pytest.mark.slow
 EXAMPLE = Path(__file__).parents[1] / "docs" / "examples" / "01_first_walk.py"
 CELLS = {
     "import walkers\ncase = walkers.load_case('fig1b')\ncase": "chromium-coated glass",
@@ -62,6 +63,14 @@ def run_all(page: Page, address: str) -> set[str]:
     return bars
 
 
+def test_the_value_of_a_cell_contains_its_pictures(walked_run: Path, tmp_path: Path) -> None:  # noqa: F811
+    pictures = walkers.load(walked_run).plot(tmp_path)
+    contents = re.findall('src="data:image/png;base64,([^"]+)"', pictures._repr_html_())
+    assert [b64decode(content) for content in contents] == [path.read_bytes() for path in pictures]
+    assert len(pictures) == 2
+
+
+@pytest.mark.slow
 def test_notebooks_run_in_jupyterlab_and_show_tables_figures_and_beads(
     laboratory: tuple[Path, str],
     browser: Browser,  # noqa: F811
