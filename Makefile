@@ -50,11 +50,11 @@ test test-slow: export PYTHONDONTWRITEBYTECODE :=
 test: setup cluster chromium .venv/with-dev ## Lint, check types, run the tests (a 2-bead smoke test first)
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
-	.venv/bin/mypy
 	.venv/bin/lint-imports
 	.venv/bin/pytest -q -m smoke tests/test_program.py
-	@# Compiles both integrators once; each worker would by itself.
-	@$(WALKERS) show fig1b --theory > /dev/null & .venv/bin/pytest -q tests/test_check.py -k momentum > /dev/null & wait
+	@# Compiles both integrators once, beside the check of types; each worker would by itself.
+	@$(WALKERS) show fig1b --theory > /dev/null & .venv/bin/pytest -q tests/test_check.py -k momentum > /dev/null & \
+	  .venv/bin/mypy; status=$$?; wait; exit $$status
 	.venv/bin/pytest -q -n 3 --dist worksteal -m "not smoke and not slow"
 
 .PHONY: test-slow

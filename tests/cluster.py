@@ -7,7 +7,6 @@ import shutil
 import signal
 import socket
 import subprocess
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -34,7 +33,7 @@ ProctrackType=proctrack/linuxproc
 TaskPlugin=task/none
 SelectType=select/cons_tres
 SelectTypeParameters=CR_Core_Memory
-SchedulerParameters=sched_interval=5,bf_interval=5,batch_sched_delay=0,sched_min_interval=0
+SchedulerParameters=sched_interval=1,bf_interval=1,batch_sched_delay=0,sched_min_interval=0
 DefMemPerCPU=500
 NodeName={host} NodeAddr=127.0.0.1 CPUs={cores} RealMemory={memory} State=UNKNOWN
 PartitionName=main Nodes={host} Default=YES MaxTime=INFINITE State=UP
@@ -77,19 +76,20 @@ def slurm_cluster(folder: Path) -> Iterator[dict[str, str]]:
     configuration.write_text(_CONFIGURATION.format(host=host, folder=folder, cores=cores, memory=memory, ports=ports))
     environment = {**os.environ, "PATH": _PATH, "SLURM_CONF": str(configuration)}
 
-    def idle() -> bool:
-        told = subprocess.run(["sinfo", "-h", "-o", "%T"], env=environment, capture_output=True, check=False)
-        return told.stdout.strip() == b"idle"
+    def asked(program: str, what: str) -> bytes:
+        """What a command of SLURM says; nothing if nobody answers."""
+        told = subprocess.run([program, "-h", "-o", what], env=environment, capture_output=True, check=False)
+        return told.stdout.strip()
 
     try:
         _start_munge(folder / "munge")
         for daemon in (["slurmctld"], ["slurmd", "-N", host]):
             subprocess.run([*daemon, "-f", str(configuration)], check=True, env=environment)
-        wait_for(idle)
+        wait_for(lambda: asked("sinfo", "%T") == b"idle")
         yield environment
     finally:
         subprocess.run(["scancel", "--user", "root"], env=environment, check=False, capture_output=True)
-        time.sleep(1.0)
+        wait_for(lambda: not asked("squeue", "%A"))
         for pid_file in (folder / "slurmd.pid", folder / "slurmctld.pid", folder / "munge" / "pid"):
             with suppress(OSError, ValueError):
                 os.kill(int(pid_file.read_text()), signal.SIGTERM)

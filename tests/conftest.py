@@ -85,6 +85,7 @@ T = TypeVar("T")
 PROGRAM = str(Path(sys.executable).with_name("walkers"))
 SHORT = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
 BRIEF = {"time_step": "2 us", "cycles": 3, "settling_cycles": 1, "samples_per_cycle": 2}
+TINY = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
 LONG = {"time_step": "2 us", "cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
 
 
@@ -215,8 +216,7 @@ LOOKED_THROUGH: dict[str, dict[str, Any]] = {
 @pytest.fixture(scope="session")
 def looked_through(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
     """A folder with the runs of `LOOKED_THROUGH`; who changes it takes a copy."""
-    run = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
-    changes = {"run": run, "dimers": {"replicates": 2, "angle_spread": "1 deg"}}
+    changes = {"run": TINY, "dimers": {"replicates": 2, "angle_spread": "1 deg"}}
 
     def fill(folder: Path) -> None:
         (folder / "base.toml").write_text(to_toml(document(**changes)))
@@ -289,6 +289,13 @@ def finished_places(out: Path) -> dict[str, Path]:
     return {place.name: place for place in places if place.suffix not in (".incomplete", ".replaced")}
 
 
+def bits(out: Path) -> dict[Path, bytes]:
+    """What finished runs computed, by paths: dumps, restart files, tables, results."""
+    kinds = (".bin", ".parquet", ".restart", ".txt", "result.json")
+    files = (path for place in finished_places(out).values() for path in place.rglob("*"))
+    return {path.relative_to(out): path.read_bytes() for path in files if path.name.endswith(kinds)}
+
+
 def engines_in(directory: Path) -> list[int]:
     """Process ids of the engines that work in a directory or below."""
     return processes_in(directory, b"liggghts", b"\0-in\0")  # not ldd, which asks what the engine is linked to
@@ -316,7 +323,7 @@ def wait_for(condition: Callable[[], T | None], seconds: float = PATIENCE) -> T:
         if found := condition():
             return found
         # A look may take the processor from what is waited for.
-        time.sleep(min(max(0.02, time.monotonic() - began), 0.5))
+        time.sleep(min(max(0.02, 4.0 * (time.monotonic() - began)), 0.5))
     raise AssertionError("waited in vain")
 
 

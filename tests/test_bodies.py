@@ -130,7 +130,7 @@ SAME: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         EVERYTHING,
         {
             "dimers": {"diameters": ["1 mm", "0.6 mm"], "replicates": 1},
-            "mixture": {"small_diameters": ["0.6 mm", "0.63 mm"], "large_diameters": ["1 mm", "1.18 mm"], "count": 20},
+            "mixture": BY_DIAMETERS,
             "placed": [{"diameter": "0.8 mm", "at": EVERYTHING["placed"][0]["at"]}],
         },
     ),

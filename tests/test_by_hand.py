@@ -10,11 +10,12 @@ from typing import Any
 import pytest
 
 import walkers
-from tests.conftest import REFERENCE, SHORT, call, document, make_case
+from tests.conftest import REFERENCE, SHORT, call, document, make_case, wait_for
 from walkers import run as run_case
 from walkers.errors import InputError
 from walkers.inputs.case import Case
 from walkers.inputs.table import changed
+from walkers.runner.directory import FIRST_SEGMENT
 from walkers.sweeps.by_hand import take_in, write_folder
 from walkers.sweeps.readable import differing, flattened
 
@@ -29,10 +30,13 @@ def _edit(folder: Path, **values: str) -> None:
     deck.write_text(text)
 
 
-def _run(folder: Path, before: str = "") -> None:
-    """Run a deck as its script says, perhaps by another program."""
-    script = (folder / "run.sh").read_text().replace("exec ", f"exec {before} ", 1)
-    subprocess.run(["sh", "-c", script], cwd=folder, check=False)
+def _run(folder: Path, *, stopped: bool = False) -> None:
+    """Run a deck as its script says, to its end or until it has written frames."""
+    engine = subprocess.Popen(["sh", "run.sh"], cwd=folder)
+    if stopped:
+        wait_for(lambda: (folder / "beads.bin").exists() and (folder / "beads.bin").stat().st_size > 10_000)
+        engine.kill()
+    engine.wait()
 
 
 @pytest.fixture
@@ -49,6 +53,7 @@ def test_a_deck_run_by_hand_is_read_and_says_so(folder: Path, run_directory: Cal
     found, same = run_case(folder), run_case(run_directory(run=SHORT))
     assert found.result.about["by_hand"] == ["run by hand"]
     assert {**found.result, "by_hand": 0} == {**same.result, "by_hand": 0}
+    assert (folder / "beads.bin").read_bytes() == (same.directory / FIRST_SEGMENT / "beads.bin").read_bytes()
     assert ("warning: run by hand" in found.describe(), "(already run)" in found.describe()) == (True, False)
     assert found.case.document == make_case(run=SHORT).document
     for command in ("run", "plot", "export --to vtk", "check files"):
@@ -178,7 +183,7 @@ def test_a_run_by_hand_that_cannot_be_read_is_told_in_one_message(name: str, fol
     _edit(folder, **edits)
     deck = folder / "walker.lig"
     deck.write_text(deck.read_text().replace("pair_coeff      * *", command or "pair_coeff      * *"))
-    _run(folder, "timeout 1" if name == "a run that was stopped" else "")
+    _run(folder, stopped=name == "a run that was stopped")
     with pytest.raises(InputError, match=told) as caught:
         take_in(folder)
     assert len(str(caught.value).splitlines()) == 1

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import walkers
-from tests.conftest import call, document, finished_places, to_toml
+from tests.conftest import TINY, call, document, finished_places, to_toml
 from walkers.inputs.sweep import expand
 from walkers.postprocess.uncertainty import ACCURACY_NAME
 from walkers.runner.directory import case_of, locked
@@ -25,7 +25,6 @@ from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import load
 
 OTHER, FASTER = {"liquid.name": "Si AK10"}, {"drive.frequency": "90 Hz"}
-SHORTEST = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
 
 
 @pytest.fixture
@@ -44,7 +43,7 @@ def _listed(*arguments: str) -> list[dict[str, Any]]:
 
 def _unfinished(name: str, *, failed: bool) -> Path:
     """What is left of a run that failed, or was killed: the same without a word on a failure."""
-    Path(f"{name}.toml").write_text(to_toml(document(run={**SHORTEST, "cycles": 4000})))
+    Path(f"{name}.toml").write_text(to_toml(document(run={**TINY, "cycles": 4000})))
     assert call("run", f"{name}.toml", "--limit", "0.01").returncode == 1
     (left,) = Path("runs").glob(f"{name}-*.incomplete")
     if not failed:
@@ -208,7 +207,7 @@ def test_compared_runs_differ_by_so_many_times_both_their_numerical_errors(
     run_directory: Callable[..., Path], tmp_path: Path
 ) -> None:
     """Errors of 3 and 4 µm/s make 5 µm/s of a difference of -50 µm/s."""
-    run = run_directory(run=SHORTEST)
+    run = run_directory(run=TINY)
     fast, slow = _changed(run, tmp_path, "fast", 1.05e-3, 3e-6), _changed(run, tmp_path, "slow", 1e-3, 4e-6)
     found = compare_runs(fast, slow)
     (velocity,) = (one for one in found.contents["results"] if one["quantity"] == "velocity")
@@ -224,7 +223,7 @@ def test_compared_sweeps_differ_most_at_the_largest_change_of_either_sign(tmp_pa
     sides: list[str] = []
     for friction in (0.05, 0.2):
         contact = {"friction": {"bead_bead": 0.1, "bead_wall": friction}}
-        (tmp_path / "base.toml").write_text(to_toml(document(run=SHORTEST, contact=contact)))
+        (tmp_path / "base.toml").write_text(to_toml(document(run=TINY, contact=contact)))
         sweep = expand(tables, source="t", name=f"rough-{friction}", folder=tmp_path)
         sides.append(str(run_sweep(sweep, tmp_path / "runs", Options(1))[0].directory))
     found = json.loads(call("compare", *sides, "--json", check=True).stdout)
@@ -239,7 +238,7 @@ def test_compared_sweeps_differ_most_at_the_largest_change_of_either_sign(tmp_pa
 
 def test_sweeps_over_lists_of_different_lengths_are_compared_either_way(in_folder: Path) -> None:
     """Clusters of three beads and of two: the longer list has a column that the other sweep has not."""
-    tables = document(run=SHORTEST)
+    tables = document(run=TINY)
     del tables["dimers"]
     radii = ["0.3 mm", "0.2 mm"]
     (in_folder / "base.toml").write_text(

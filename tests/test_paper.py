@@ -60,7 +60,7 @@ def sources(once: Callable[[str, Callable[[Path], object]], Path]) -> Sources:
             whole = sweep_of(name)
             columns = dict(zip(whole.keys, map(list, zip(*whole.rows, strict=True)), strict=True))
             del columns["run.most_cycles"]
-            given = {"case": "fig1b", "set": SHORT, "zip": [columns]}
+            given = {"case": "fig1b", "set": {**SHORT, "dimers.replicates": 1}, "zip": [columns]}
             assert not run_sweep(expand(given, source=name, name=name, folder=out), out, Options(2))[1]
 
     return Sources(once("paper", run))

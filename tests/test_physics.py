@@ -19,7 +19,7 @@ from tests.conftest import call, make_case
 from tests.test_bad_input import LAW
 from walkers import run as run_case
 from walkers.inputs.case import Roughness
-from walkers.inputs.loads import bridge_at_rest, delay, dimer_of
+from walkers.inputs.loads import bridge_at_rest, delay
 from walkers.inputs.reading import load_case
 from walkers.inputs.run import limits_of
 from walkers.physics import reynolds
@@ -393,17 +393,7 @@ def test_an_edited_law_has_other_loads_in_the_same_session(in_folder: Path, monk
     assert [*in_folder.iterdir()] == [file]
 
 
-# --- limits of the time step, Γ0 --------------------------------------------------------------------------------------
-
-
-def test_published_gamma0() -> None:
-    """Of the walker of Fig. 2 at 2 to 6 g, and of those of Fig. 4."""
-    walker = (make_case(drive={"peak_acceleration": f"{acceleration} g"}) for acceleration in (2, 4, 6))
-    found = [
-        dimer_of(case).gamma0(case.excitation.peak_acceleration)
-        for case in (*walker, load_case("fig4a"), load_case("fig4b"))
-    ]
-    assert found == pytest.approx([0.191, 0.381, 0.572, 0.74, 3.5], rel=0.01)
+# --- limits of the time step ------------------------------------------------------------------------------------------
 
 
 def test_time_step_limits_of_the_walker() -> None:

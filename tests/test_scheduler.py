@@ -14,28 +14,24 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import suppress
-from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-import psutil
 import pyarrow.parquet as pq
 import pytest
 
 from tests.cluster import LOCAL, slurm_cluster, why_not
-from tests.conftest import PATIENCE, PROGRAM, call, document, make_case, processes_in, to_toml, wait_for
+from tests.conftest import PATIENCE, PROGRAM, TINY, bits, call, document, finished_places, make_case, to_toml, wait_for
 from walkers.errors import InputError
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.tables import read_table
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import FIRST_SEGMENT, case_of
+from walkers.runner.directory import case_of
 from walkers.runner.failures import WalkersMet
-from walkers.runner.launch import _off_the_network
 from walkers.runner.manifest import read_manifest
 from walkers.sweeps.making import make_runs
 from walkers.sweeps.scheduler import (
@@ -56,7 +52,6 @@ from walkers.templates.deck import render_shared_deck
 from walkers.templates.scene import sharing_key
 
 STEP = {"time_step": "2 us"}
-TINY = {**STEP, "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
 DONE = "finished"
 
 
@@ -74,14 +69,6 @@ def sweep_file(in_folder: Path) -> Callable[..., str]:
 
 def _sweep(*arguments: str) -> subprocess.CompletedProcess[str]:
     return call("sweep", *arguments)
-
-
-def contents_of(out: Path) -> dict[str, dict[str, bytes]]:
-    """What each finished run computed: tables, result and dumps, by the names of runs and files."""
-    manifests = [path for path in out.glob("*/manifest.json") if path.parent.suffix != ".incomplete"]
-    dumps = [str(FIRST_SEGMENT / name) for name in ("beads.bin", "bridges.pairs.txt", "bridges.walls.txt")]
-    kept = (*dumps, "trajectory.parquet", "walkers.parquet", "result.json")
-    return {path.parent.name: {name: (path.parent / name).read_bytes() for name in kept} for path in manifests}
 
 
 def test_points_of_a_shared_deck_are_what_they_are_alone(tmp_path: Path) -> None:
@@ -326,7 +313,7 @@ def test_workers_that_are_handed_over_give_the_same(sweep_file: Callable[..., st
     done = subprocess.run([sys.executable, "script.py"], capture_output=True, text=True, check=True)
     assert "sweep: 2 points, 2 finished" in done.stdout
     _sweep("sweep.toml", "-j", "2", "--out", "here")
-    assert contents_of(in_folder / "runs") == contents_of(in_folder / "here") != {}
+    assert bits(in_folder / "runs") == bits(in_folder / "here") != {}
     with ProcessPoolExecutor(1) as pool:
         worker = pool.submit(os.getpid).result()
         (in_folder / "front").write_text(f'#!/bin/sh\nkill -9 {worker}\nexec liggghts "$@"\n')
@@ -382,50 +369,8 @@ def test_workers_of_another_process_give_the_same(in_folder: Path, front: Callab
     call("sweep", "test.toml", "--out", "here", "-j", "2", "--engine", engine, check=True)  # meanwhile
     _, errors = program.communicate(timeout=PATIENCE)
     assert program.returncode == 0, errors
-    assert contents_of(in_folder / "here") == contents_of(in_folder / "there") != {}
+    assert bits(in_folder / "here") == bits(in_folder / "there") != {}
     assert "WorkerLost" in "".join(log.read_text() for log in in_folder.glob("there/test/parsl/*/parsl.log"))
-
-
-def _reachable(process: psutil.Process) -> Iterator[str]:
-    """What a process listens on, or takes datagrams at, that others than this machine may reach."""
-    devices = Path(f"/proc/{process.pid}/net/dev").read_text().splitlines()[2:]
-    for one in process.net_connections("inet") if [line.split(":")[0].strip() for line in devices] != ["lo"] else ():
-        here = ip_address(one.laddr.ip.partition("%")[0].removeprefix("::ffff:")) if one.laddr else None
-        if here is not None and not here.is_loopback and not one.raddr:
-            yield f"{process.name()} {one.type.name} {one.laddr}"
-
-
-@pytest.mark.parametrize(("site", "ranks"), [("", 2), (LOCAL, 1)])
-def test_nothing_listens_beyond_this_machine(in_folder: Path, site: str, ranks: int) -> None:
-    """Not the program, mpirun and the engines; nor Parsl's interchange, pilots and workers.
-
-    Plain engines of one rank are looked at by `test_stopped`.
-    """
-    if ranks > 1 and not _off_the_network():
-        pytest.skip("mpirun listens on every address where nobody may have a network of his own")
-    settings = {"run.ranks": ranks, "run.duration": "100 s"}
-    sweep = {"case": "pile-ci", "set": settings, "axes": {"run.seed": [1, 2]}}
-    (in_folder / "test.toml").write_text(to_toml(sweep))
-    (in_folder / "site.py").write_text(site)
-    command = [PROGRAM, "sweep", "test.toml", *(["--site", "site.py"] if site else ["-j", "2"])]
-    program = subprocess.Popen(command, start_new_session=True, stderr=subprocess.DEVNULL)
-    found: set[str] = set()
-
-    def looked() -> bool:
-        """Until beads have moved in two processes."""
-        assert program.poll() is None
-        for pid in {*processes_in(in_folder), *(one.pid for one in psutil.Process(program.pid).children(True))}:
-            with suppress(psutil.Error, OSError):
-                found.update(_reachable(psutil.Process(pid)))
-        dumps = [dump for dump in in_folder.glob("runs/**/beads.bin") if dump.stat().st_size > 1000]
-        return len(dumps) * ranks >= 2
-
-    try:
-        wait_for(looked)
-    finally:
-        program.terminate()
-        program.wait(timeout=PATIENCE)
-    assert not found
 
 
 SITE = {"partition": "main", "address": "127.0.0.1", "cores": 1, "jobs": 2, "sbatch": ["--comment=decks"]}
@@ -433,7 +378,7 @@ SITE = {"partition": "main", "address": "127.0.0.1", "cores": 1, "jobs": 2, "sba
 STEPS = [*["2 us"] * 4, "40 us", *["2 us"] * 7]
 ZIP = {"drive.frequency": {"linspace": ["60 Hz", "71 Hz", 12]}, "run.time_step": STEPS}
 SWEEP = {"case": "base.toml", "set": {"run.allow_unstable": True}, "zip": [ZIP]}
-RUN = {"cycles": 40, "settling_cycles": 2, "samples_per_cycle": 5}
+RUN = {"cycles": 16, "settling_cycles": 2, "samples_per_cycle": 5}
 
 
 @pytest.fixture(scope="module")
@@ -467,7 +412,7 @@ def test_a_sweep_through_slurm(cluster: dict[str, str], in_folder: Path, front: 
 
     def has(least: int) -> bool:
         assert first.poll() is None
-        return len(contents_of(in_folder / "cluster")) >= least
+        return len(finished_places(in_folder / "cluster")) >= least
 
     first = start()
     wait_for(lambda: has(2))
@@ -486,7 +431,7 @@ def test_a_sweep_through_slurm(cluster: dict[str, str], in_folder: Path, front: 
     wait_for(lambda: not jobs())
     assert list(load("cluster/test")["status"]) == ["finished"] * 4 + ["failed"] + ["finished"] * 7
     assert call(*command, "local").returncode == 1
-    assert contents_of(in_folder / "cluster") == contents_of(in_folder / "local") != {}
+    assert bits(in_folder / "cluster") == bits(in_folder / "local") != {}
 
 
 def test_ranks_take_cores_of_this_machine_and_of_a_cluster() -> None:

@@ -7,6 +7,8 @@ import shutil
 import signal
 import subprocess
 from collections.abc import Callable
+from contextlib import suppress
+from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +22,10 @@ from tests.conftest import (
     PATIENCE,
     PROGRAM,
     SHORT,
+    bits,
     call,
     document,
     engines_in,
-    finished_places,
     make_case,
     open_run,
     processes_in,
@@ -36,7 +38,7 @@ from walkers.inputs.toml import read_toml
 from walkers.postprocess.results import measure, read
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import RunBusy
-from walkers.runner.launch import ALONE
+from walkers.runner.launch import ALONE, _off_the_network
 
 HALTING = """#!/bin/sh
 if [ -n "$HALT" ]; then
@@ -103,13 +105,6 @@ def stopping(undisturbed: Path, in_folder: Path, monkeypatch: pytest.MonkeyPatch
     return in_folder
 
 
-def bits(out: Path) -> dict[Path, bytes]:
-    """What finished runs computed, by paths: dumps, restart files, tables, results."""
-    kinds = (".bin", ".parquet", ".restart", ".txt", "result.json")
-    files = (path for place in finished_places(out).values() for path in place.rglob("*"))
-    return {path.relative_to(out): path.read_bytes() for path in files if path.name.endswith(kinds)}
-
-
 @pytest.mark.parametrize("name", STOPS)
 def test_stopped_and_gone_on(name: str, stopping: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first engine has ended well by then: its segment or run is kept, and nobody makes it again."""
@@ -124,7 +119,9 @@ def test_stopped_and_gone_on(name: str, stopping: Path, undisturbed: Path, monke
     try:
         engines = wait_for(lambda: _halted(stopping, number) or program.poll() is not None)
         assert program.poll() is None, program.communicate()
-        if "--site" not in command:
+        if "--site" in command:
+            assert not _reachable(program.pid, stopping)
+        else:
             _listens_to_nobody(program.pid)
         if whom == "output":
             shutil.rmtree(out, ignore_errors=True)
@@ -174,6 +171,41 @@ def _listens_to_nobody(program: int) -> None:
     ports = [port for each in family for port in each.net_connections()]
     assert not [port for port in ports if port.status == psutil.CONN_LISTEN]
     assert all(each.environ().items() >= ALONE.items() for each in engines)
+
+
+def _reachable(program: int, folder: Path) -> set[str]:
+    """What a program and those that work in a folder listen on that others than this machine may reach."""
+    found = set()
+    for pid in {*processes_in(folder), *(one.pid for one in psutil.Process(program).children(recursive=True))}:
+        with suppress(psutil.Error, OSError):  # gone by now
+            process, devices = psutil.Process(pid), Path(f"/proc/{pid}/net/dev").read_text().splitlines()[2:]
+            ports = (
+                process.net_connections("inet") if [line.split(":")[0].strip() for line in devices] != ["lo"] else ()
+            )
+            for port in (port for port in ports if port.laddr and not port.raddr):
+                if not ip_address(port.laddr.ip.partition("%")[0].removeprefix("::ffff:")).is_loopback:
+                    found.add(f"{process.name()} {port.type.name} {port.laddr}")
+    return found
+
+
+def test_mpirun_and_its_engines_listen_to_nobody_beyond_this_machine(in_folder: Path) -> None:
+    if not _off_the_network():
+        pytest.skip("mpirun listens on every address where nobody may have a network of his own")
+    command = [PROGRAM, "run", "pile-ci", "--set", "run.ranks=2", "--set", "run.duration=100 s"]
+    program, found = subprocess.Popen(command, start_new_session=True, stderr=subprocess.DEVNULL), set[str]()
+
+    def looked() -> bool:
+        """Until beads have moved."""
+        assert program.poll() is None
+        found.update(_reachable(program.pid, in_folder))
+        return any(dump.stat().st_size > 1000 for dump in in_folder.glob("runs/**/beads.bin"))
+
+    try:
+        wait_for(looked)
+    finally:
+        program.terminate()
+        program.wait(timeout=PATIENCE)
+    assert not found
 
 
 def test_an_engine_that_outlives_its_launcher_keeps_others_away(

@@ -12,7 +12,7 @@ import pytest
 from scipy.stats import qmc, spearmanr
 
 import walkers
-from tests.conftest import REFERENCE, document, make_case, to_toml
+from tests.conftest import REFERENCE, TINY, document, make_case, to_toml
 from tests.test_inputs import GLASS
 from walkers.errors import InputError
 from walkers.inputs.case import Case
@@ -208,9 +208,8 @@ def test_a_spread_has_the_quantiles_and_the_signed_ranks_of_its_draws() -> None:
 
 
 def test_bands_along_a_sweep_are_those_of_each_points_spread(tmp_path: Path) -> None:
-    run = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
     case = tmp_path / "base.toml"
-    case.write_text(to_toml(document(run=run, uncertain={FRICTION: [0.05, 0.3]})))
+    case.write_text(to_toml(document(run=TINY, uncertain={FRICTION: [0.05, 0.3]})))
     tables = {"case": str(case), "axes": {"drive.peak_acceleration": ["3 g", "6 g"]}}
     table = walkers.sweep(tables, tmp_path, spread=4).table()
     for row in table.itertuples():
