@@ -22,7 +22,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
 from walkers.runner.binary import find_engine, plugin_of
 from walkers.runner.directory import write_deck
-from walkers.runner.launch import ALONE, launch
+from walkers.runner.launch import ALONE
 from walkers.templates.deck import Deck, Segment, compose, plan_of
 from walkers.templates.scene import Bead
 
@@ -31,8 +31,6 @@ RATIOS = Path(__file__).with_name("benchmark_ratios.json")
 """User CPU time of decks for the stock engine's model over that of today's, as last measured."""
 PILES = {"pile-200": ("pile-small", 40_000), "pile-1630": ("pile-fig1a", 12_000)}
 """Case and steps of each pile."""
-_TILE, _TILES, _TILE_WIDTH = 500, 10, 5.85
-"""Beads and width (mm) of the shaken piles that side by side, without walls between them, are the large pile."""
 ENGINE = ("liggghts", "-log", "none", "-in")
 SCRIPT = "script.py"
 _STOCK_MODEL = "gran model hertz tangential history cohesion easo/capillary/viscous"
@@ -47,7 +45,7 @@ fix farthest all property/global maxSeparationDistanceRatio scalar 1.2
 
 
 def main() -> None:
-    """CPU time of a step in today's decks and in minimal ones, in turn; medians of several. And a large pile."""
+    """CPU time of a step in today's decks and in minimal ones, in turn; medians of several."""
     ratios = {}
     print("| deck | µs a step: minimal | today | bead-steps/s |\n|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
@@ -65,7 +63,6 @@ def main() -> None:
             ratios[name] = {"minimal": round(of_minimal / of_today, 2)}
             speed = deck.layout.atoms / of_today / 1e6
             print(f"| {name} | {1e6 * of_minimal:.1f} | {1e6 * of_today:.1f} | {speed:.1f} M |", flush=True)
-        print(_large_pile(Path(folder)))
     print(f"before: {RATIOS.read_text('utf-8')}")
     RATIOS.write_text(json.dumps(ratios, indent=2) + "\n", encoding="utf-8")
 
@@ -92,31 +89,6 @@ def compose_from(case: str, steps: int, beads: list[Bead], **settings: object) -
     plan = plan_of(load_case(case, {"run.ranks": 1} | settings), segment=Segment(0, steps, 0))
     scene = replace(plan.scene, beads=tuple(beads))
     return compose(replace(plan, scene=scene, sample_every=steps, bridge_every=steps))
-
-
-def _large_pile(folder: Path) -> str:
-    """What 10 ms of 50,000 beads take on two ranks."""
-    tile = {"mixture.count": _TILE, "boundary.width": f"{_TILE_WIDTH} mm"}
-    one, beads = shaken("pile-fig1a", folder, **tile), []
-    for number in range(_TILES**2):
-        aside = [1e-3 * _TILE_WIDTH * (index - (_TILES - 1) / 2) for index in divmod(number, _TILES)]
-        for bead in one:
-            x, y, z = bead.centre
-            beads.append(replace(bead, id=len(beads) + 1, centre=(x + aside[0], y + aside[1], z)))
-    large = {"mixture.count": len(beads), "boundary.width": f"{_TILES * _TILE_WIDTH} mm", "run.ranks": 2}
-    run = load_case("pile-fig1a", large).run
-    steps = round(0.01 / run.time_step)
-    place = folder / "large"
-    place.mkdir()
-    deck = compose_from("pile-fig1a", steps, beads, **large)
-    write_deck(deck, place)
-    report = launch(deck, place, find_engine())
-    megabytes = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-    speed = len(beads) * steps / report.loop_seconds / 1e6
-    took = f"{report.wall_seconds:.0f} s, of them {report.loop_seconds:.0f} s in {steps} steps"
-    return (
-        f"{len(beads)} beads, 10 ms, 2 ranks: {took} ({speed:.1f} M bead-steps/s); at most {megabytes:.0f} MB a process"
-    )
 
 
 def minimal(deck: Deck, case: Case) -> str:

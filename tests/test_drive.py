@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from dataclasses import replace
 from math import nan, pi
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from walkers.inputs.case import Case
 from walkers.postprocess.motion import boundary_motion
 from walkers.postprocess.numbers import declared
 from walkers.postprocess.sides import REST
-from walkers.postprocess.threshold import _crossed
+from walkers.postprocess.threshold import _crossed, measure
 from walkers.runner.binary import find_engine
 from walkers.sweeps.making import make_runs
 from walkers.templates.scene import sharing_key
@@ -160,6 +161,10 @@ def test_a_ramp_finds_the_threshold(ramp: list[float], name: str, tmp_path: Path
     assert found[f"gamma0_{name}"] == pytest.approx(0.0857, rel=0.04)
     other = {"stops_at": "starts_at", "starts_at": "stops_at"}[name]
     assert np.isnan(found[other])
+    # Whichever way it goes.
+    centre = done.motion.groups[0].mass_centre
+    backward = replace(done.motion, position=done.motion.position - 2.0 * (centre - centre[0]))
+    assert measure(backward).numbers[name] == found[name]
 
 
 @pytest.mark.parametrize(
