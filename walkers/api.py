@@ -818,18 +818,18 @@ def climb(
     if to is not None:
         check_place(Path(to), *(f".{form}" for form in FORMATS), ".csv")
     climbs, runs = [], []
-    for item in apply_all(lambda name: load(name, out, changes), references):
-        source, conditions = [item.directory.name] * (len(references) > 1), iter([("", [item.directory])])
-        if isinstance(item, Sweep):
-            frame = item.table()
+    for run_or_sweep in apply_all(lambda name: load(name, out, changes), references):
+        directory = run_or_sweep.directory
+        conditions = iter([("", [directory])])
+        if isinstance(run_or_sweep, Sweep):
+            frame = run_or_sweep.table()
             conditions, left = conditions_in(frame), int((frame["status"] != "finished").sum())
             if left:
                 text = f"{left} of {len(frame)} points are not finished and left out"
-                warnings.warn(f"{item.directory.name}: {text}", stacklevel=2)
+                warnings.warn(f"{directory.name}: {text}", stacklevel=2)
         for label, paths in conditions:
-            climbs.append(
-                {**summarise_climbs(paths, within), "condition": ", ".join([*source, *filter(None, [label])])}
-            )
+            words = [directory.name] * (len(references) > 1) + [label] * bool(label)
+            climbs.append(summarise_climbs(paths, within) | {"condition": ", ".join(words)})
             runs += [path.name for path in paths]
     if to is not None:
         write_climbs(climbs, runs, Path(to))

@@ -11,6 +11,7 @@ from math import inf, isfinite, nan
 from typing import Any, TypeVar
 
 from walkers.errors import expected_of, refused
+from walkers.postprocess.results import plain
 from walkers.text import aligned
 
 T = TypeVar("T")
@@ -68,15 +69,8 @@ class Line:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types; NaN and infinity become null."""
-        numbers = {name: getattr(self, name) for name in ("expected", "measured", "error", "tolerance")}
-        finite = {name: value if isfinite(value) else None for name, value in numbers.items()}
-        return {
-            "check": self.check,
-            "quantity": self.quantity,
-            "unit": self.unit,
-            **finite,
-            "verdict": str(self.verdict),
-        }
+        names = ("check", "quantity", "unit", "expected", "measured", "error", "tolerance")
+        return plain({name: getattr(self, name) for name in names}) | {"verdict": str(self.verdict)}
 
 
 def run_checks(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping
-from math import isfinite, nan
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from walkers.calibration.observations import LEAST_SPEED, Observation, numbers_o
 from walkers.inputs.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.paper.sources import Sources, of_facts, ruby, sets, sweep_of, thresholds_with_theory
+from walkers.postprocess.results import plain
 from walkers.runner.directory import case_of
 from walkers.theory.prediction import MODEL, PAPER, predicted_column
 
@@ -44,22 +45,19 @@ def compare(sources: Sources) -> dict[str, Any]:
     numbers, theory = {name: _by_engine(sources.table(of_facts(name))) for name in sets()}, _by_theory(cases["shipped"])
     facts = [_fact(observation, numbers, theory) for observation in ruby().file.observations]
     counted = [fact["agree"] for fact in facts if not fact["derived"]]
+    thresholds: Any = thresholds_with_theory(sources).to_dict("records")
     return {
         "sets": {
             name: {"agree": sum(agrees[name] for agrees in counted), "of": len(counted), "parameters": _parameters(of)}
             for name, of in cases.items()
         },
         "facts": facts,
-        "thresholds": [_finite(row) for row in thresholds_with_theory(sources).to_dict("records")],
+        "thresholds": [plain(row) for row in thresholds],
         "curve": [
             *_curve(sources, "fig2", "peak_acceleration", lambda peak: f"{peak / ACCELERATION_OF_ONE_G:.3g} g"),
             *_curve(sources, "fig3", "sin_delta", lambda sine: f"sin δ = {sine:.3f}"),
         ],
     }
-
-
-def _finite(numbers: Mapping[Any, Any]) -> dict[str, float | None]:
-    return {name: float(value) if isfinite(value) else None for name, value in numbers.items()}
 
 
 def _parameters(cases: Mapping[str, Case]) -> dict[str, str]:
@@ -91,21 +89,13 @@ def _by_theory(cases: Mapping[str, Case]) -> Numbers:
 
 def _fact(observation: Observation, numbers: Mapping[str, Numbers], theory: Numbers) -> dict[str, Any]:
     """A row of the comparison."""
-    values, scale = (
-        {name: observation.of_numbers(numbers_of_set) for name, numbers_of_set in numbers.items()},
-        observation.unit[1],
-    )
+    values, scale = {name: observation.of_numbers(of_set) for name, of_set in numbers.items()}, observation.unit[1]
     return {
-        **{
-            "name": observation.name,
-            "title": observation.title,
-            "says": observation.says,
-            "source": observation.source,
-            "derived": observation.derived,
-        },
-        **{"expected": observation.text, "values": _finite({name: value * scale for name, value in values.items()})},
+        **{name: getattr(observation, name) for name in ("name", "title", "says", "source", "derived")},
+        "expected": observation.text,
+        "values": plain({name: value * scale for name, value in values.items()}),
         "agree": {name: observation.agrees(value) for name, value in values.items()},
-        **_finite({"theory": observation.of_numbers(theory) * scale}),
+        **plain({"theory": observation.of_numbers(theory) * scale}),
     }
 
 
@@ -125,5 +115,5 @@ def _curve(sources: Sources, sweep: str, column: str, label: Callable[[float], s
         ratio = fast / slow if len(group) > 1 and abs(slow) > LEAST_SPEED else nan
         means = {name: float(group[name].mean()) * 1e3 for name in models_of_curve}
         name = f"Fig. {sweep.removeprefix('fig')}, {label(float(group[column].iloc[0]))}"
-        rows.append({"of": name, **_finite({**means, "by_frequency": ratio})})
+        rows.append({"of": name, **plain({**means, "by_frequency": ratio})})
     return rows

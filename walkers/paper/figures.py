@@ -161,10 +161,8 @@ def theory_of_cycles(trajectory: Group) -> list[FloatArray]:
     # Along x, the substrate accelerates as cos 2πft in the theory, and as -sin 2πft in the engine.
     quarter = sliding.shape[1] // 4
     ahead = quarter if trajectory.walkers[0].facing > 0 else -quarter
-    series_of_cycle = [
-        np.roll(series, 1 - ahead) for series in (velocity, velocity - sliding[0], velocity - sliding[1])
-    ]
-    return [np.concatenate([np.tile(series, _CYCLES), series[:1]]) for series in series_of_cycle]
+    cycle = np.roll([velocity, velocity - sliding[0], velocity - sliding[1]], 1 - ahead, axis=1)
+    return [np.concatenate([np.tile(series, _CYCLES), series[:1]]) for series in cycle]
 
 
 @styled

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from walkers.errors import refused
 from walkers.postprocess.numbers import ASIDE, headline, is_error, scatter_of
 from walkers.postprocess.quantities import unit_shown
-from walkers.postprocess.results import Results, read
+from walkers.postprocess.results import Results, plain, read
 from walkers.postprocess.sides import alike
 from walkers.rounding import rounded
 from walkers.runner.directory import case_of
@@ -52,13 +52,9 @@ def _pair(
     quantities = (*values, *scatters)
     first, second, *errors = (nan if value is None or isinstance(value, str) else float(value) for value in quantities)
     difference = second - first
-    names = ("first", "second", "first_scatter", "second_scatter", "difference", "numerical_error")
-    numbers = zip(names, (first, second, *errors, difference, numerical), strict=True)
-    contents = {
-        "quantity": quantity,
-        "unit": unit,
-        **{name: value if isfinite(value) else None for name, value in numbers},
-    }
+    names = ("quantity", "unit", "first", "second", "first_scatter", "second_scatter", "difference", "numerical_error")
+    numbers = (quantity, unit, first, second, *errors, difference, numerical)
+    contents = plain(dict(zip(names, numbers, strict=True)))
     usual, size = unit_shown(unit)
     printed = [rounded(value * size, usual) for value in (first, second)]
     if abs(difference) < 2e-3 * abs(first):  # digits that are not printed would contradict the printed ones
@@ -84,29 +80,25 @@ def compare_runs(first: Side, second: Side) -> Comparison:
     not_run = [side.name for side in (first, second) if side.directory is None]
     parameters, differences = _different([first.case, second.case], names)
     pairs = [] if not_run else _pairs([read(run) for run in runs])
-    apart = [(numbers, cells) for numbers, cells in pairs if numbers["first"] != numbers["second"]]
+    apart = [(row, cells) for row, cells in pairs if row["first"] != row["second"]]
     text = [differences or "the cases are the same"]
-    for numbers, cells in apart:
-        if numbers["quantity"] == "cycles" and not differences:
+    for row, cells in apart:
+        if row["quantity"] == "cycles" and not differences:
             text = [f"{text[0]}, but ran {' and '.join(cells[1:3])} cycles"]
     if apart:
         heads = ["result", *names, "difference", "scatter of copies", "numerical error"]
         text.append(aligned([heads, *(cells for _, cells in apart)]))
-        text += [
-            _times_the_error(numbers)
-            for numbers, _ in apart
-            if numbers["quantity"] in _VELOCITIES and numbers["numerical_error"]
-        ]
-    if same := [numbers["quantity"] for numbers, _ in pairs if numbers["first"] == numbers["second"]]:
+        text += [_times_the_error(row) for row, _ in apart if row["quantity"] in _VELOCITIES and row["numerical_error"]]
+    if same := [row["quantity"] for row, _ in pairs if row["first"] == row["second"]]:
         text.append(f"the same in both: {', '.join(same)}" if apart else "all results are the same")
     text += [f"{name}: no finished run; only the parameters are compared" for name in not_run]
     contents = {"first": first.name, "second": second.name, "parameters": parameters, "not_run": not_run}
-    return Comparison(contents | {"results": [numbers for numbers, _ in pairs]}, "\n\n".join(text))
+    return Comparison(contents | {"results": [row for row, _ in pairs]}, "\n\n".join(text))
 
 
-def _times_the_error(numbers: Mapping[str, Any]) -> str:
-    times = abs(numbers["difference"]) / numbers["numerical_error"]
-    return f"{numbers['quantity']}: differs by {_two_digits(times, '')} times its numerical error"
+def _times_the_error(row: Mapping[str, Any]) -> str:
+    times = abs(row["difference"]) / row["numerical_error"]
+    return f"{row['quantity']}: differs by {_two_digits(times, '')} times its numerical error"
 
 
 def _different(cases: Sequence[Case], names: Sequence[str]) -> tuple[dict[str, list[Any]], str]:

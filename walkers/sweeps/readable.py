@@ -76,9 +76,7 @@ def short_keys(keys: Sequence[str], reserved: Iterable[str] = ("name",)) -> list
     """The last parts of keys; the whole key if another key has the same last part, or if it is ``reserved``."""
     last = [key.rpartition(".")[2] for key in keys]
     taken = set(reserved).difference(keys)
-    return [
-        key if ending in taken or last.count(ending) > 1 else ending for key, ending in zip(keys, last, strict=True)
-    ]
+    return [key if end in taken or last.count(end) > 1 else end for key, end in zip(keys, last, strict=True)]
 
 
 def _comparable(value: Any) -> Hashable:

@@ -239,13 +239,11 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
     return SweepPlan(record, cases, binary, decks, [state.status for state in point_states], options, final)
 
 
-def _failures(
-    record: table.SweepRecord, point_states: Sequence[table.PointState], reasons: Collection[str]
-) -> list[Failure]:
+def _failures(record: table.SweepRecord, states: Sequence[table.PointState], reasons: Collection[str]) -> list[Failure]:
     """The points with such failures."""
     return [
         Failure(point, run, state.reason or "", state.message or "", str(state.directory))
-        for point, (run, state) in enumerate(zip(record.runs, point_states, strict=True))
+        for point, (run, state) in enumerate(zip(record.runs, states, strict=True))
         if state.reason in reasons
     ]
 
@@ -304,7 +302,7 @@ def run_sweep(
         raise OutputGone(record.directory)
     if list(table.read_record(record.directory).runs) != list(record.runs):
         raise SweepStopped(f"{record.directory} was replaced by another sweep of the same name; the runs are kept")
-    return record, [*failures, *_failures(record, table.checked_states(record), [table.UNREADABLE])]
+    return record, [*failures, *_failures(record, table.states(record, results=True), [table.UNREADABLE])]
 
 
 # --- workers ----------------------------------------------------------------------------------------------------------
@@ -472,10 +470,8 @@ class _Loop:
         words = [f"{self.done} of {points} points done, {running} running{in_decks}, {failed} failed"]
         elapsed = time.perf_counter() - self.begin
         if finished_now := self.done - self.finished_before:
-            seconds = elapsed / finished_now
-            words.append(
-                f"{60.0 / seconds:.0f} points per minute" if seconds < 10.0 else f"{duration_text(seconds)} per point"
-            )
+            pace = elapsed / finished_now
+            words.append(f"{60.0 / pace:.0f} points per minute" if pace < 10.0 else f"{duration_text(pace)} per point")
         waiting = sum(deck.seconds for deck in [*self.decks.values(), *self.halves])
         if waiting < self.seconds:
             words.append(f"{duration_text(waiting / (self.seconds - waiting) * elapsed)} left")

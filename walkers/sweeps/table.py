@@ -123,7 +123,7 @@ def read_record(directory: str | Path) -> SweepRecord:
 class PointState:
     """State of a point: finished, failed, running or missing.
 
-    ``directory`` is the directory of the finished or failed run. `checked_states` adds the ``result``. ``reason``,
+    ``directory`` is the directory of the finished or failed run, ``result`` its result if it was read. ``reason``,
     ``message`` and ``lost`` describe a failure.
     """
 
@@ -135,15 +135,10 @@ class PointState:
     result: Results | None = None
 
 
-def states(record: SweepRecord) -> list[PointState]:
-    """State of each point, read from the run directories."""
-    return [state_at(record.out / run) for run in record.runs]
-
-
-def checked_states(record: SweepRecord) -> list[PointState]:
-    """State of each point as from `states`, with its result; finished runs whose result cannot be read have failed."""
-    points = states(record)
-    for number, state in enumerate(points):
+def states(record: SweepRecord, *, results: bool = False) -> list[PointState]:
+    """State of each point; with ``results``, runs are read, and finished runs without a readable result have failed."""
+    points = [state_at(record.out / run) for run in record.runs]
+    for number, state in enumerate(points if results else ()):
         if state.status == "finished" and state.directory is not None:
             try:
                 points[number] = replace(state, result=read(state.directory))
@@ -190,7 +185,7 @@ def load(directory: str | Path) -> pd.DataFrame:
     import pandas as pd
 
     record = read_record(directory)
-    sweep, points = record.sweep, checked_states(record)
+    sweep, points = record.sweep, states(record, results=True)
     varied: dict[str, tuple[str, str]] = {}
     for key, unit, values in zip(sweep.keys, sweep.units.values(), zip(*sweep.values, strict=True), strict=True):
         # A key with several numbers, such as the radii, has a column for each.
@@ -214,12 +209,7 @@ def _declared(sweep: Sweep) -> list[str]:
     """The numbers of results of a sweep's cases, without numbers of single beads; empty if a case cannot be read."""
     with suppress(InputError):
         groups = [module.NAME for module in modules_of(next(sweep.cases()))]
-        return [
-            quantity.name
-            for group in [*groups, "drive"]
-            for quantity in GROUPS[group]
-            if not quantity.name.endswith("*")
-        ]
+        return [number.name for group in [*groups, "drive"] for number in GROUPS[group] if number.name[-1] != "*"]
     return []
 
 
@@ -232,11 +222,7 @@ def _described(frame: pd.DataFrame, described: Mapping[str, tuple[str, str]]) ->
 def _row(number: int, sweep: Sweep, state: PointState) -> dict[str, Any]:
     row: dict[str, Any] = {"point": number, **(state.result or {})}
     for key, value in zip(sweep.keys, sweep.values[number], strict=True):
-        row |= (
-            {f"{key}[{part}]": component for part, component in enumerate(value)}
-            if isinstance(value, list)
-            else {key: value}
-        )
+        row |= {f"{key}[{part}]": item for part, item in enumerate(value)} if isinstance(value, list) else {key: value}
     row |= {name: getattr(state, name) or "" for name in ("status", "reason", "message")}
     return row | {"lost": state.lost, "run": os.path.relpath(state.directory) if state.directory else ""}
 
@@ -280,9 +266,7 @@ def default_column(frame: pd.DataFrame) -> str:
 def find_name(option: str, word: str, names: Iterable[str]) -> str:
     """Find a name, or the only name that ends with ``.`` and it; `InputError` if there is none or several."""
     candidates = list(dict.fromkeys(names))
-    matches = [name for name in candidates if name == word] or [
-        name for name in candidates if name.endswith(f".{word}")
-    ]
+    matches = [word] if word in candidates else [name for name in candidates if name.endswith(f".{word}")]
     if len(matches) == 1:
         return matches[0]
     text = f"expected one of {', '.join(matches or candidates)}{'' if matches else suggestion(word, candidates)}"
