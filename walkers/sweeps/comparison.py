@@ -157,7 +157,7 @@ def compare_sweeps(first: Path, second: Path, column: str | None = None) -> Comp
         raise refused(source, f"expected sweeps that vary the same keys in the same units: {differences}")
     numeric = [name for name in tables[0].columns if name in tables[1] and tables[0][name].dtype.kind in "fiu"]
     column = sweeps.find_name("column", column or sweeps.default_column(max(tables, key=sweeps.sides_differ)), numeric)
-    keyed = [table.assign(keyed=[", ".join(row) for row in sweeps.key_texts(table).to_numpy()]) for table in tables]
+    keyed = [table.assign(at=[", ".join(row) for row in sweeps.key_texts(table).to_numpy()]) for table in tables]
     done = [table[table["status"] == "finished"] for table in keyed]
     both = done[0].merge(done[1], on="at", suffixes=("_first", "_second"))
     if both.empty:
