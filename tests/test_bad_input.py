@@ -354,7 +354,7 @@ COMMANDS: list[tuple[str, str]] = [
     ("check fig1b --without magic", "--without magic: expected one of"),
     ("paper figures --only fig9", "fig9"),
     # Mistyped names
-    ("--library mine.toml", "--library: expected a library file, and a command after it"),
+    ("--library", "Parameter --library requires an argument. See: walkers --help"),
     ("new {case}", "exists already"),
     *((f"new '{name}'", f"{name or '.'}: expected a name") for name in ("", ".", "/", "..")),
     ("show fig1b --set 'run.seed=3\nfoo=4'", 'fig1b: --set run.seed = "3\\nfoo=4": expected a whole number'),

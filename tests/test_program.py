@@ -265,7 +265,11 @@ def test_help_names_every_command() -> None:
     for name in (name for name in app if name[0] != "-"):
         assert f"\n  {name} " in shown
         assert call(name, "-h", check=True).stdout == call(name, "--help", check=True).stdout
-        assert all(f"walkers {name} {part} " in call(name, part, "-h", check=True).stdout for part in app[name])
+        assert all(
+            f"walkers {name} {part} " in call(name, part, "-h", check=True).stdout
+            for part in app[name]
+            if part[0] != "-"
+        )
     done = subprocess.run([sys.executable, "-m", "walkers", "-h"], capture_output=True, text=True, check=True)
     assert done.stdout == shown
     assert call("--version", check=True).stdout.splitlines()[1] == f"LIGGGHTS-PUBLIC 3.8.0, {find_engine().path}"

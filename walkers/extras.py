@@ -1,6 +1,7 @@
 """Packages that only some commands need: the extras of ``pyproject.toml``.
 
-They are imported where they are used. What needs an extra calls `require` first, before it computes or writes anything.
+They are imported where they are used. A function that needs an extra calls `require` before it computes or writes
+anything.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ EXTRAS = {
     "report": ("a report or an interactive view", ("k3d",)),
     "theory": ("the theory", ("numba",)),
 }
-"""For each extra: what needs it, and its packages as PyPI names them."""
+"""For each extra: the feature that needs it, and its packages by their names on PyPI."""
 
 
 class ExtraMissing(InputError):

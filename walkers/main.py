@@ -2,39 +2,32 @@
 
 from __future__ import annotations
 
-import inspect
 import os
 import signal
 import subprocess
 import sys
 import textwrap
 import warnings
-from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import FrameType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+from cyclopts import App, CycloptsError, Group, Parameter, UnusedCliTokensError
 
 import walkers.inputs
-from walkers.commands import SECTIONS, commands
-from walkers.errors import InputError, WalkersError, refused, shortened
+from walkers.commands import OPTIONS, commands
+from walkers.errors import InputError, WalkersError, shortened
+from walkers.text import printable
 
 if TYPE_CHECKING:
-    from cyclopts import App
-    from cyclopts.argument import Argument
+    from cyclopts.help import HelpPanel
+    from rich.console import Console, ConsoleOptions
 
 _SUMMARY = "Wet granular walkers, simulated with LIGGGHTS."
-_HELP = ("-h", "--help")
-_HELP_ROW = ("-h, --help", "Show this message and exit.")
-_OPTIONS = {
-    "--library PATH": "Your own library file, before the command; default: library.toml beside the case.",
-    "--version": "Show the versions and exit.",
-    "--install-completion": "Install the completion of commands, options, cases, runs and sweeps for your shell.",
-    **dict([_HELP_ROW]),
-}
-_VALUES = {"bool": "", "float": "NUMBER", "int": "INTEGER", "Path": "PATH", "str": "TEXT"}
-"""For types of options, what the help calls their values."""
+_LIBRARY = "Your own library file; default: library.toml beside the case."
+_COMPLETION = "Install the completion of commands, options, cases, runs and sweeps for your shell."
 _LEFT, _WIDE = 24, 80
 """Largest width of the first column of the help, and width of the help."""
 _LONGEST_MESSAGE = 1000
@@ -66,123 +59,90 @@ def main(arguments: list[str] | None = None) -> NoReturn:
 
 def _status(tokens: list[str]) -> int:
     """Run the program and return its exit status. Unexpected errors are raised."""
-    words = tokens
-    if words and words[0].startswith("--library="):
-        words = [*words[0].split("=", 1), *words[1:]]
     try:
-        if words[:1] == ["--library"]:
-            if len(words) < 3:
-                raise refused("--library", "expected a library file, and a command after it")
-            walkers.inputs.chosen_library, words = Path(words[1]), words[2:]
-        if not words or words[0] in _HELP:
-            outcome: Any = print(overview())
-        elif words[0] == "--version":
-            outcome = print(describe_version())
-        else:
-            outcome = _call(words)
+        outcome = program().meta(tokens)
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt, SystemExit, _Terminated) as stop:
-        return _report_stop(stop, words)
+        return _report_stop(stop, tokens)
     finally:
         walkers.inputs.chosen_library = None  # whoever calls `main` goes on in the same process
     return outcome if isinstance(outcome, int) else 0
 
 
-def overview() -> str:
-    """The help of the program: its commands below their headings."""
-    rows: dict[str, list[tuple[str, str]]] = {"Options": list(_OPTIONS.items())}
-    for command in commands():
-        rows.setdefault(command.heading, []).append((command.name, command.summary))
-    parts = ["Usage: walkers [OPTIONS] COMMAND [ARGS]...", _SUMMARY, *(_table(*item) for item in rows.items())]
-    return "\n\n".join(parts)
+class _PlainHelp:
+    """Help in plain text, with names and their meanings in two columns."""
+
+    def __call__(self, _console: Console, _options: ConsoleOptions, panel: HelpPanel) -> None:
+        """Print the commands, arguments or options below a heading."""
+        defaults = (f" [default: {entry.default}]" * (entry.default not in (None, "False")) for entry in panel.entries)
+        rows = [(", ".join(entry.display_labels_with_metavar), _plain(entry.description)) for entry in panel.entries]
+        left = min(_LEFT, max((len(name) for name, _ in rows), default=0))
+        lines = [f"\n{panel.title}:"] * bool(rows)
+        for (name, meaning), default in zip(rows, defaults, strict=True):
+            first, *more = textwrap.wrap(meaning + default, _WIDE - left - 4) or [""]
+            lines += [f"  {name:{left}}  {first}"] if len(name) <= left else [f"  {name}", f"{'':{left + 4}}{first}"]
+            lines += [f"{'':{left + 4}}{line}" for line in more]
+        print("\n".join(lines), end="\n" * bool(rows))
+
+    def render_usage(self, _console: Console, _options: ConsoleOptions, usage: Any) -> None:
+        """Print the arguments of a command."""
+        print(f"Usage: {_plain(usage)}")
+
+    def render_description(self, _console: Console, _options: ConsoleOptions, description: Any) -> None:
+        """Print the purpose of a command."""
+        print(f"\n{textwrap.fill(_plain(description), _WIDE)}")
 
 
-def _table(heading: str, rows: Iterable[tuple[str, str]]) -> str:
-    """Names and their meanings in two columns."""
-    rows = list(rows)
-    left = min(_LEFT, max(len(name) for name, _ in rows))
-    lines = [f"{heading}:"]
-    for name, text in rows:
-        first, *more = textwrap.wrap(text, _WIDE - left - 4) or [""]
-        lines += [f"  {name:{left}}  {first}"] if len(name) <= left else [f"  {name}", f"{'':{left + 4}}{first}"]
-        lines += [f"{'':{left + 4}}{line}" for line in more]
-    return "\n".join(lines)
+def _plain(text: Any) -> str:
+    """The words of a formatted text."""
+    return str(getattr(text, "primary_renderable", text)).strip()
 
 
 def program() -> App:
-    """The program. A command is imported when it is called."""
-    from cyclopts import App, Parameter
-
+    """The program. A command is imported when it is called; ``meta`` takes the options before a command too."""
     quiet: dict[str, Any] = {"print_error": False, "exit_on_error": False, "suppress_keyboard_interrupt": False}
-    flags: dict[str, Any] = {"help_flags": (), "version_flags": ()}
-    usual = Parameter(negative=())
-    app = App("walkers", _SUMMARY, default_parameter=usual, result_action="return_value", **quiet, **flags)
-    for command in commands():
-        app.command(command.place, name=command.name, **({} if command.name in SECTIONS else flags))
-    app.register_install_completion_command()
+    look: dict[str, Any] = {"help_formatter": _PlainHelp(), "help_format": "plaintext", "group_parameters": OPTIONS}
+    usual: dict[str, Any] = {"default_parameter": Parameter(negative=()), "result_action": "return_value"}
+    app = App("walkers", _SUMMARY, version_flags=(), **usual, **quiet, **look)
+    groups: dict[str, Group] = {}
+    for place, command in enumerate(commands()):
+        group = groups.setdefault(command.heading, Group(command.heading, sort_key=place))
+        app.command(command.place, name=command.name, group=group, sort_key=place, help=command.summary)
+    app.command(print_version, name="--version")
+    app.register_install_completion_command(help=_COMPLETION)
+    for flag in ("--help", "--version", "--install-completion"):
+        app[flag].group = OPTIONS
+
+    @app.meta.default
+    def with_library(
+        *tokens: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
+        library: Annotated[Path | None, Parameter(help=_LIBRARY)] = None,
+    ) -> Any:
+        walkers.inputs.chosen_library = library
+        return app(tokens)
+
     return app
 
 
-def _call(tokens: list[str]) -> Any:
-    """What the command returns that the words name; with ``--help`` its help is printed."""
-    app = program()
-    names, apps, words = app.parse_commands(tokens)
-    if names and (not {*words}.isdisjoint(_HELP) or (not words and names[-1] in SECTIONS)):
-        return print(help_of(names, apps))
-    return app(tokens)
-
-
-def help_of(names: Sequence[str], apps: Sequence[App]) -> str:
-    """The help of a command, from the signature and the docstring of its function."""
-    app = apps[-1]
-    inner = [(name, app[name].help.partition("\n")[0]) for name in app if name not in _HELP and name[0] != "-"]
-    words = " COMMAND [ARGS]..." if inner else ""
-    tables, usage, text = [_table("Commands", inner)] if inner else [], "", app.help
-    if function := app.default_command:
-        text = (inspect.getdoc(function) or "") if not inner else text
-        with app.app_stack(apps):
-            arguments = app.assemble_argument_collection(parse_docstring=True).filter_by(show=True)
-        placed = [_described(argument) for argument in arguments if argument.field_info.is_positional]
-        chosen = [_described(argument) for argument in arguments if not argument.field_info.is_positional]
-        usage = "".join(f" {name}" for name, _ in placed)
-        usage = f"{usage} |{words}" if inner else usage
-        tables = [*([_table("Arguments", placed)] if placed else []), *tables, _table("Options", [*chosen, _HELP_ROW])]
-    head = f"Usage: {' '.join(['walkers', *names])} [OPTIONS]{usage or words}"
-    return "\n\n".join([head, textwrap.fill(text.partition("\n\nParameters\n")[0], _WIDE), *tables])
-
-
-def _described(argument: Argument) -> tuple[str, str]:
-    """Names and values of an argument or an option, and its meaning."""
-    kind, default = str(argument.hint), argument.field_info.default
-    values = argument.parameter.metavar or "|".join(argument.get_choices() or ())
-    values = values or next((word for name, word in _VALUES.items() if name in kind), "")
-    names = sorted({*argument.names} - {*argument.negatives}, key=len)
-    text = argument.parameter.help or ""
-    if default not in (None, False, (), argument.field_info.empty) and not hasattr(default, "__dataclass_fields__"):
-        text += f" [default: {'x'.join(map(str, default)) if isinstance(default, tuple) else default}]" * bool(default)
-    if argument.field_info.is_positional:
-        many = argument.field_info.kind is argument.field_info.VAR_POSITIONAL
-        return f"{names[0]}{'...' * many}" if argument.required or many else f"[{names[0]}]", text
-    return f"{', '.join(names)} {values}".strip(), text
-
-
-def describe_version() -> str:
-    """Versions of the package (with its commit, if known) and of the engine, one per line."""
+def print_version() -> None:
+    """Show the versions of the package (with its commit, if known) and of the engine, and exit."""
     from walkers.runner.binary import find_engine, version_in
     from walkers.runner.failures import EngineMissing
     from walkers.runner.provenance import PROJECT, software
 
     ours = software()
     package = f"{PROJECT} {ours['granular_walkers']}" + (f" (commit {ours['commit']})" if ours["commit"] else "")
+    print(package)
     try:
         path = find_engine().path
     except EngineMissing as missing:
-        return f"{package}\n{missing}"
+        print(missing)
+        return
     version, command = None, [str(path), "-log", "none", "-in", "/dev/null"]
     with TemporaryDirectory() as folder, suppress(OSError, subprocess.TimeoutExpired):  # it writes files there
         how: dict[str, Any] = {"cwd": folder, "stdin": subprocess.DEVNULL, "timeout": _ENGINE_SECONDS}
         version = version_in(subprocess.run(command, capture_output=True, check=False, **how).stdout)
-    return f"{package}\n{version or 'an engine that does not name its version'}, {path}"
+    print(f"{version or 'an engine that does not name its version'}, {path}")
 
 
 def _report_stop(stop: BaseException, tokens: list[str]) -> int:
@@ -202,12 +162,8 @@ def _report_stop(stop: BaseException, tokens: list[str]) -> int:
         return 0
     if isinstance(stop, OSError):  # a given path cannot be read or written
         return _tell(f"{stop.filename}: {stop.strerror}" if stop.filename else str(stop), 2)
-    from cyclopts import CycloptsError, UnusedCliTokensError
-
     if not isinstance(stop, CycloptsError):
         raise stop
-    from walkers.text import printable
-
     unused = stop.unused_tokens if isinstance(stop, UnusedCliTokensError) else None
     message = f"Unexpected: {' '.join(unused)}." if unused else str(stop)
     help_command = " ".join(["walkers", *(stop.command_chain or ()), "--help"])
@@ -216,7 +172,9 @@ def _report_stop(stop: BaseException, tokens: list[str]) -> int:
 
 def _options_of(names: str, tokens: list[str]) -> str:
     """The options of the command for arguments of a function of the package, such as ``begin, end``."""
-    _, apps, _ = program().parse_commands(tokens)
+    names_of_commands = [command.name for command in commands()]
+    begin = next((place for place, word in enumerate(tokens) if word in names_of_commands), 0)
+    _, apps, _ = program().parse_commands(tokens[begin:])
     arguments = apps[-1].assemble_argument_collection()
     options = {argument.name[2:]: argument.name for argument in arguments}
     options |= {argument.field_info.name: argument.name for argument in arguments}

@@ -7,10 +7,12 @@ They are tracked, so that they can be read without a build, which writes them to
 
 from __future__ import annotations
 
+import io
 import json
 import re
 import types
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -25,11 +27,12 @@ from walkers.inputs.library import LibraryNumber
 from walkers.inputs.resolving import SUPPLIED
 from walkers.inputs.table import Table, example_of, keys_in, table_in
 from walkers.inputs.units import ACCELERATION, AUTO, TEMPERATURE, Kind, kind_in, quantity_text
-from walkers.main import help_of, overview, program
+from walkers.main import program
 from walkers.postprocess.quantities import GROUPS, TABLES, Quantity
 from walkers.sweeps.table import STATE
 
 if TYPE_CHECKING:
+    from cyclopts import App
     from sphinx.application import Sphinx
     from sphinx.config import Config
 
@@ -219,13 +222,19 @@ of commands, options, cases, sweeps and runs for bash, zsh and fish; call it aga
 
 def _commands() -> str:
     """Help texts of the program, its commands, and theirs."""
-    text, app = f"{_COMMANDS}```text\n$ walkers --help\n{overview()}\n```\n", program()
-    for command in commands():
-        for part in ((), *((name,) for name in app[command.name])):
-            names, apps, _ = app.parse_commands([command.name, *part])
-            words = " ".join(names)
-            text += f"\n## walkers {words}\n\n```text\n$ walkers {words} --help\n{help_of(names, apps)}\n```\n"
+    text, app = _COMMANDS, program()
+    names: list[list[str]] = [[], *([command.name] for command in commands())]
+    for words in [whole for name in names for whole in ([name] if not name else [name, *_parts(app, *name)])]:
+        head, page = " ".join(["walkers", *words]), io.StringIO()
+        with redirect_stdout(page):
+            app.meta([*words, "--help"])
+        text += f"\n## {head}\n" * bool(words) + f"\n```text\n$ {head} --help\n{page.getvalue()}```\n"
     return text
+
+
+def _parts(app: App, name: str) -> list[list[str]]:
+    """The commands of a command."""
+    return [[name, part] for part in app[name] if part[0] != "-"]
 
 
 PAGES = {"commands": _commands, "tables": _keys, "library": _library, "shipped": _shipped}

@@ -12,7 +12,7 @@ from cyclopts.validators import Number
 
 import walkers
 from walkers import DEFAULT_OUT
-from walkers.commands import SECTIONS
+from walkers.commands import OPTIONS
 from walkers.commands.options import (
     At,
     By,
@@ -32,8 +32,8 @@ from walkers.errors import refused
 if TYPE_CHECKING:
     from walkers.check.lines import Line
 
-check = App(name="check", help=SECTIONS["check"], help_flags=(), version_flags=())
-paper = App(name="paper", help=SECTIONS["paper"], help_flags=(), version_flags=())
+check = App(name="check", version_flags=(), group_parameters=OPTIONS)
+paper = App(name="paper", version_flags=(), group_parameters=OPTIONS)
 
 
 @check.command
@@ -195,7 +195,7 @@ def calibrate(
     jobs: Jobs = None,
     by: By = By(),
 ) -> int:
-    """Calibrate unknown parameters to facts, measured or published. An interrupted calibration continues.
+    """Calibrate unknown parameters to measured or published values. An interrupted calibration continues.
 
     Parameters
     ----------

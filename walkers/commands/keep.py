@@ -14,6 +14,8 @@ from walkers import DEFAULT_OUT
 from walkers.api import Export, writer_of
 from walkers.commands.options import At, Out, RunOrSweep, refuse, tell
 
+_REMOVED = "Runs, with their spreads and accuracies, and sweeps, with the runs that no other sweep has."
+
 
 @Parameter(name="*")
 @dataclass(frozen=True)
@@ -91,10 +93,12 @@ def _export_deck(name: str, at: At, output: Path | None) -> None:
         tell(f"{case.run.attempts[0]} cycles; {case.run.continuation}")
 
 
-def clean(*runs: RunOrSweep, out: Out = DEFAULT_OUT, yes: Annotated[bool, Parameter(("--yes", "-y"))] = False) -> int:
+def clean(
+    *runs: Annotated[RunOrSweep, Parameter(help=_REMOVED)],
+    out: Out = DEFAULT_OUT,
+    yes: Annotated[bool, Parameter(("--yes", "-y"))] = False,
+) -> int:
     """Remove interrupted and failed runs, or the given runs and sweeps. Asks first. Runs in progress stay.
-
-    A sweep is removed with the runs that no other sweep has, a run with its spread and its accuracy.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ Formats = Annotated[list[str] | None, Parameter("--format", help="Format of the 
 @Parameter(name="*")
 @dataclass(frozen=True)
 class At:
-    """Where a case, a run or a sweep is looked up, and the values that replace those of its case.
+    """The folder of runs, and new values of the case.
 
     Parameters
     ----------

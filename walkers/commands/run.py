@@ -86,7 +86,7 @@ def run(
     accuracy
         Also run with smaller time steps and harder beads, and print the numerical error of the result.
     share
-        For --accuracy: share of the velocity that the last increase of Young's modulus may change; default: 0.01.
+        For --accuracy: largest relative change of the velocity by the last increase of Young's modulus; default: 0.01.
     """
     from walkers.api import case_at, finished_at
     from walkers.runner.failures import EngineFailure

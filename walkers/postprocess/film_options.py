@@ -66,7 +66,9 @@ class FilmOptions:
         Film: physical time of the last frame; default: the end of the run.
     """
 
-    size: Annotated[tuple[int, int], Parameter(converter=_size, n_tokens=1, metavar="SIZE")] = _SIZES["720p"]
+    size: Annotated[
+        tuple[int, int], Parameter(converter=_size, n_tokens=1, metavar="SIZE", show_default=lambda _: "720p")
+    ] = _SIZES["720p"]
     fps: int = 25
     slowdown: float | None = None
     walker: int | None = None

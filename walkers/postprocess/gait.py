@@ -43,9 +43,9 @@ _NO_MORE = np.radians(0.5)
 ASTRAY = np.pi / 4.0
 """Largest final angle of a walker that is on the axis, rad."""
 _LITTLE, _FADING, _NO_FASTER = 0.005, 0.9, 1e-4
-"""A walker of constant velocity turns by less than the first angle (rad) per cycle, and in the second half of the run
-by less than the third angle more than in the first half; or by at most the second number times what it turned before.
-"""
+"""A velocity is constant only if the walker stops turning. Its largest rotation per cycle in the second half of the run
+must be below the first angle (rad) and exceed that in the first half by less than the third angle; or it must be at
+most the second number times that in the first half."""
 _PARTS = 10
 """Parts of an interval between samples at which gaps and the force of the drive are evaluated."""
 

@@ -31,8 +31,8 @@ SCRIPT = "show.py"
 """Name of the script that shows an export."""
 _COLLECTION = "walkers.pvd"
 _LISTED = re.compile(r'file="((?:beads|boundary|bridges)_\d+\.vtu)"')
-_WIDE, _AROUND = 16.0 / 9.0, 1.15  # width over height of the view; its extent over that of what the beads reach
-_NECK = 0.45  # radius of what is drawn of a bridge over that of the smallest bead
+_WIDE, _AROUND = 16.0 / 9.0, 1.15  # width over height of the view; extent of the view over that of the motion
+_NECK = 0.45  # drawn radius of a bridge over the radius of the smallest bead
 
 
 def write_vtk(directory: Path, destination: Path | None = None, *, every: int | None = None) -> Path:
@@ -170,7 +170,7 @@ def _walls(motion: Motion) -> meshio.Mesh:
 
 
 def _view(motion: Motion) -> dict[str, Any]:
-    """What the script shows: colours by walker, without walkers by speed, sizes (m), tilt and camera."""
+    """Settings of the script: colours (by walker; without walkers by speed), sizes (m), tilt and camera."""
     scene = Scene.around(motion, camera_axes(motion), _AROUND)
     tall = scene.height(_WIDE)
     camera, middle, up = scene.camera(10.0 * tall)

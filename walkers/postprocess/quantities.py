@@ -1,7 +1,7 @@
-"""What tables contain: name, unit, label and meaning of each column, once.
+"""Name, unit, label and meaning of each column of a table and of each number of a result.
 
-They stand in ``quantities.toml``. Files, axes and the reference take them from here; `walkers.postprocess.numbers` has
-those of results.
+They are declared once, in ``quantities.toml``. Files, axes and the reference take them from here.
+`walkers.postprocess.numbers` formats the numbers of results.
 """
 
 from __future__ import annotations

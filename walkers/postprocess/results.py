@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 VERSION = 1
 """Of all methods together: a result of another version is measured again."""
 _BESIDE = ("case", "drive", "rests_on", "by_hand", "tables", "warnings")
-"""What stands beside the numbers of a result."""
+"""Entries of ``result.json`` beside the numbers."""
 _DRIVE = ("frequency", "peak_acceleration", "peak_velocity", "amplitude")
 
 
@@ -83,7 +83,7 @@ class Results(Mapping[str, Any]):
         return read_table(self.directory, table)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain JSON types: the numbers, None for NaN, and what stands beside them."""
+        """Plain JSON types: the numbers, None for NaN, and `about`."""
         return {**self.about, **plain(self.numbers), "warnings": list(self.warnings)}
 
 
@@ -170,7 +170,7 @@ def recorded(directory: Path) -> dict[str, Any]:
         contents = read_json(directory / RESULT_NAME)
         version, _ = contents.pop("version"), [contents[name] for name in _BESIDE]
         numbers = {name: nan if number is None else number for name, number in contents["numbers"].items()}
-        if version == VERSION:  # what every reader asks for
+        if version == VERSION:  # every reader needs these numbers
             _ = numbers["goes_uphill"], "velocity" in numbers and numbers["facings_differ"]
         contents["numbers"] = numbers
     except FileNotFoundError as error:
@@ -203,7 +203,7 @@ def plain(numbers: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def text(results: Results, *, cached: bool = False) -> str:
-    """A result in lines: what happens, the numbers with their errors, warnings, sources of values, directory.
+    """A result in lines: state or drive, numbers with errors, warnings, origins of values, directory.
 
     ``cached`` results are marked as already run.
     """

@@ -43,8 +43,8 @@ _BEYOND = 6.0  # extent of the floor over that of the picture
 _ELEVATION_OF_ONE, _ELEVATION = radians(35.0), radians(60.0)
 """Elevation of the camera above a floor: for one walker seen from its side, and otherwise."""
 _LONG, _ABOUT = 1.5, 1.4
-"""The camera follows the beads if a view of their whole path is larger by the first factor than a view that follows
-them; the second factor is the margin of that view."""
+"""The camera follows the beads if the view of their whole path is larger than the view that follows them by more than
+the first factor. The second factor is the extent of the following view over the extent of the beads."""
 
 
 def shown_of(motion: Motion, walker: int | None) -> tuple[Motion, bool]:

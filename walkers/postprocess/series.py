@@ -38,11 +38,10 @@ of the floor; inches."""
 _BESIDE, _BENEATH, _LINE = 0.25, 0.75, 0.2
 """Space beside and beneath a view; height of a line of text; inches."""
 _MARGIN, _STILL, _LONG, _ASPECT = 0.25, 0.1, 4.0, 4.5
-"""Edge of a strip over half the width of the walker; displacement of a walker at rest over half its length; number of
-lengths of a path beyond which each strip is centred on the walker; length of a level strip over its width, at least."""
-
-
-_LEFT_OUT = 0.02  # largest part of a run after the last of several evenly spaced times
+"""Margin of a strip over half the width of the walker; largest displacement of a walker at rest over half its length;
+largest length of a path, in lengths of the walker, that one strip shows; smallest length of a level strip over its
+width."""
+_LEFT_OUT = 0.02  # largest share of a run after the last of several evenly spaced times
 
 
 class _Views(NamedTuple):
@@ -76,7 +75,7 @@ def render_series(
     destination
         The PNG to write; ``series.png``, of one walker ``walker.png``, in the run directory if None.
     images
-        Largest number of pictures, evenly spaced through the drive; fewer if the last is then nearer to its end.
+        Largest number of pictures, evenly spaced through the drive; fewer if the last is then closer to its end.
     walker
         Number of a walker to show by itself; None: the first of independent walkers, otherwise all beads.
     """
@@ -91,9 +90,9 @@ def render_series(
 
 
 def even_frames(motion: Motion, count: int) -> list[int]:
-    """Evenly spaced frames from the first of the drive: ``count``, or fewer if the last is then nearer to the end.
+    """Evenly spaced frames from the first of the drive: ``count``, or fewer if the last is then closer to the end.
 
-    They are at the same phase if there are enough cycles; otherwise walkers would appear to move backward.
+    If there are enough cycles, all have the same phase; otherwise walkers would appear to move backward.
     """
     start, cycle = motion.first_driven, motion.case.run.samples_per_cycle
     last = len(motion.time) - 1 - start

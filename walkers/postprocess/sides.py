@@ -13,11 +13,12 @@ if TYPE_CHECKING:
     from walkers.postprocess.dump import BoolArray, IntArray
 
 SAME = 0.05
-"""Mean velocities of the two directions are printed separately if they differ by more than this share …"""
+"""Mean velocities of the two directions are printed separately if their difference exceeds this share of the larger
+velocity, and `STEADY_SPEED`."""
 STEADY_SPEED = 1e-5
-"""… and by more than this, m/s; halves of a run that differ by less are steady."""
+"""m/s. A walker is steady if the velocities of the two halves of its run differ by less."""
 REST = 2e-6
-"""m/s; slower walkers are at rest: velocities that count as constant may differ by as much."""
+"""m/s. Slower walkers are at rest. Velocities that differ by less are constant."""
 SEPARATED = 0.1
 """Share of the time with beads beyond the rupture distance above which a walker came apart."""
 _ACROSS = 0.02

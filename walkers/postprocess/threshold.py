@@ -2,7 +2,7 @@
 
 A window is a few cycles. A walker moves in it if it is faster than `walkers.postprocess.sides.REST`. It stops at the
 end of the last window in which it moves while the drive falls, and starts at the begin of the first one in which it
-moves while the drive rises, if it rests in others. The drive cannot be told more exactly than it changes in a window.
+moves while the drive rises, if it rests in others. The resolution is the change of the drive in this window.
 """
 
 from __future__ import annotations
