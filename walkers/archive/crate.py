@@ -130,7 +130,7 @@ def _simulation(graph: _Graph, contents: Contents, place: str, **agents: Any) ->
     parts = [{"@id": quote(path)} for path in contents.files if path.startswith(folder)]
     graph.add(quote(folder), "Dataset", name=name, description=text, hasPart=parts)
     engine, further_cases = manifest["engine"], int(manifest.get("shared_deck", {}).get("runs", 1)) - 1
-    text = "Discrete element method. The SHA-256 combines those of the executable and libliggghts."
+    text = "Discrete element method. The SHA-256 combines the checksums of the executable and libliggghts."
     more = {"url": ENGINE_HOME, "sha256": engine["sha256"], "description": text}
     binary = graph.software(f"{ENGINE_HOME}#{engine['sha256'][:12]}", "LIGGGHTS", engine["version"], **more)
     return graph.action(

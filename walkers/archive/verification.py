@@ -83,7 +83,7 @@ def _of_run(directory: Path) -> Verification:
         listed = {CASE_NAME: "", **manifest["sha256"]}  # every run has a case
         return _compared(directory, listed, manifest.get("left_out", ()))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        doubt = f"{MANIFEST_NAME} (it, or what it names, cannot be read: {error})"
+        doubt = f"{MANIFEST_NAME} (it, or a file in its list, cannot be read: {error})"
         return Verification(directory.resolve().name, "files are not compared", {"doubtful": [doubt]})
 
 

@@ -128,8 +128,8 @@ def walk(
     effect
         A further effect: a function compiled by numba, and its K parameters of each walker, shape (N, K). It takes the
         sliding velocities (m/s), the normal forces (unit 4πγR̄) and μ of the three contacts at the beginning of each
-        stage of a step, and a walker's parameters. It returns μ, and f and Hᵀm in that unit, which add to those of the
-        bridges and are constant through the stage; take as many steps as they need.
+        stage of a step, and a walker's parameters. It returns μ, f and Hᵀm in that unit; f and Hᵀm add to the forces of
+        the bridges, and all are constant through the stage; take as many steps as they need.
     """
     require("theory")
     from walkers.theory.stepping import integrate
