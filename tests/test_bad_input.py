@@ -296,7 +296,11 @@ RECORDS: list[tuple[str | bytes, dict[str, Any], str]] = [
     (trace(rows=40, step=4.0), {}, "rows are too far apart, or too noisy: leaving out every second one changes the ac"),
     (trace(rows=20), {}, "run.cycles = 24: expected at most 0 cycles: drive.record has no more"),
     (trace(rows=400, step=1e-3), {}, "its rows, 1 us apart, are closer than the time step, 3.88 us"),
-    (trace(), {"repeats": True}, "drive.repeats = true: expected a record whose last row is that of the next period's"),
+    (
+        trace(),
+        {"repeats": True},
+        "drive.repeats = true: expected a record that ends with the first row of the next period",
+    ),
     (trace(), {"frequency": "80 Hz"}, 'drive.record = "record.csv": expected either frequency or record, not both'),
     (trace(), {"peak_acceleration": "1 g"}, "expected either peak_acceleration or record, not both"),
     (trace(), HARMONICS, 'drive.record = "record.csv": expected none beside drive.harmonics'),

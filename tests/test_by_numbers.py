@@ -35,7 +35,7 @@ from walkers.runner.files import write_json
 from walkers.runner.manifest import iso_time
 from walkers.show import describe, summarise
 from walkers.sweeps.making import progress_in
-from walkers.templates.deck import Segment, render_deck, render_shared_deck
+from walkers.templates.deck import Segment, compose, plan_of, render_deck
 from walkers.templates.scene import place
 
 DENSITY, TENSION, LARGE, SMALL = 4000.0, 19.2e-3, 3e-4, 2e-4
@@ -161,7 +161,7 @@ def test_measuring_begins_after_all_of_the_settling_cycles() -> None:
 
 def test_a_deck_of_several_cases_is_watched_with_the_highest_of_their_limits() -> None:
     slow, fast = (make_case(drive={"peak_acceleration": peak}) for peak in ("2 g", "8 g"))
-    assert render_shared_deck([slow, fast]).fastest == render_deck(fast).fastest > 1.1 * render_deck(slow).fastest
+    assert compose(plan_of(slow, fast)).fastest == render_deck(fast).fastest > 1.1 * render_deck(slow).fastest
 
 
 def test_what_show_prints_of_a_case_is_in_its_units() -> None:

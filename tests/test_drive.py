@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import call, document, make_case, to_toml
-from walkers import load_case, run
+from walkers import load_case, load_sweep, run
 from walkers.check.crosscheck import compare
 from walkers.inputs.case import Case
 from walkers.postprocess.motion import boundary_motion
@@ -95,6 +95,9 @@ def test_a_run_has_its_record(tmp_path: Path) -> None:
     """It is named by the numbers, not by the file, and needs no file after: nor its deck and its changed case."""
     case = recorded(tmp_path, sine(40), repeats=True)
     first = run(case, tmp_path)
+    sweep = 'case = "case.toml"\n[axes]\n"drive.record" = ["record.csv"]\n'
+    (tmp_path / "records.toml").write_text(sweep)
+    assert [point.but(title="") for point in load_sweep(tmp_path / "records.toml").cases()] == [case.but(title="")]
     (tmp_path / "other").mkdir()
     shutil.move(tmp_path / "record.csv", tmp_path / "other" / "renamed.csv")
     again = run(case.changed({"drive.record": str(tmp_path / "other" / "renamed.csv")}), tmp_path)

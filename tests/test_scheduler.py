@@ -48,7 +48,7 @@ from walkers.sweeps.scheduler import (
 )
 from walkers.sweeps.site import Slurm, check_path, decks_at, load_site, prepare
 from walkers.sweeps.table import load, thresholds, write_record
-from walkers.templates.deck import render_shared_deck
+from walkers.templates.deck import compose, plan_of
 from walkers.templates.scene import sharing_key
 
 STEP = {"time_step": "2 us"}
@@ -128,9 +128,9 @@ def test_what_may_differ_within_a_deck() -> None:
     assert len({sharing_key(case) for case in [shared[0], *apart]}) == 1 + len(apart)
     rough = [make_case(run=STEP, contact={"rolling_friction": value}) for value in (0.003, 0.006)]
     assert len({*map(sharing_key, rough)}) == 1
-    render_shared_deck(shared)
+    compose(plan_of(*shared))
     with pytest.raises(ValueError, match="cannot share"):
-        render_shared_deck([shared[0], apart[0]])
+        compose(plan_of(shared[0], apart[0]))
 
 
 @pytest.mark.parametrize("workers", [1, 16])

@@ -21,7 +21,7 @@ from walkers.physics.laws import LAWS, by_name
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.templates.bridge_tables import TOLERANCE, RecordedLaw, tabulated
-from walkers.templates.deck import CONTENT_VERSION, Deck, Segment, render_deck, render_shared_deck, settling_steps
+from walkers.templates.deck import CONTENT_VERSION, Deck, Segment, compose, plan_of, render_deck, settling_steps
 from walkers.templates.scene import place
 
 
@@ -87,7 +87,7 @@ def test_a_change_of_what_decks_compute_asks_for_another_version() -> None:
         make_case(contact={"restitution": 0.6}, run={"seed": 2}),
         make_case(**thick, drive={"peak_acceleration": "2 g", "axis": "y"}, boundary={"tilt": "20 deg"}),
     ]
-    decks += [render_shared_deck(shared[:2]), render_shared_deck(shared)]
+    decks += [compose(plan_of(*shared[:2])), compose(plan_of(*shared))]
     piles = [load_case("pile-ci"), load_case("cluster")]
     square = piles[0].boundary
     round_one = Boundary(shape="cylinder", material=square.material, width=square.width, height=square.height)

@@ -16,7 +16,7 @@ from tests.conftest import to_toml
 from walkers.check.crosscheck import compare
 from walkers.check.scenes import DRY, Bench, bench_case, full_case, prescribed, standing
 from walkers.errors import InputError
-from walkers.inputs.boundary import FLOOR, LOOSE, SHARP
+from walkers.inputs.boundary import FLOOR, LOOSE
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
 from walkers.inputs.standing import standing as starts
@@ -65,7 +65,7 @@ def forces_on(bench: Bench, vessel: Vessel, centres: FloatArray, changes: dict[s
     beads = [Bead(0, tuple(centre), R, motion.get("velocity", (0.0, 0.0, 0.0)), motion.get("spin", (0.0, 0.0, 0.0)))
              for centre in centres.tolist()]  # fmt: skip
     case = motion.get("case", bench_case)(changes)
-    return bench.run(prescribed(case, standing(beads, tuple(vessel.facets())), motion.get("steps", 2))).forces[..., :3]
+    return bench.run(prescribed(case, standing(beads, vessel.facets), motion.get("steps", 2))).forces[..., :3]
 
 
 def test_faces_edges_and_corners_repel_as_planes_do(bench: Bench) -> None:
@@ -124,7 +124,7 @@ def test_a_bead_touches_what_is_nearest_around_it_once(bench: Bench, name: str) 
     (found,) = forces_on(bench, extruded(profile), np.array([(x, 0.0, z)]), DRY)[0]
     expected = hertz(DEEP) * np.array([0.0, 0.0, 0.0]) + sum(hertz(DEEP) * np.array([a, 0.0, b]) for a, b in ways)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * hertz(DEEP))
-    walls = tuple(extruded(profile).facets())
+    walls = extruded(profile).facets
     assert sum(float(wall.distances(np.array([x, 0.0, z]))) < R for wall in walls) == len(ways)
 
 
@@ -323,8 +323,8 @@ def test_planes_are_where_no_edge_is_obtuse_and_no_rim_flares() -> None:
     """A plane without end would pull behind an obtuse edge, and go on above the rim of a funnel."""
     hexagon, dodecagon, funnel = prism(6, 4e-3, 8e-3), prism(12, 4e-3, 8e-3), prism(4, 4e-3, 8e-3)
     wide = np.where(funnel.points[:, 2:] > 0.0, [1.1, 1.1, 1.0], 1.0) * funnel.points
-    found = [one.planes(SHARP) for one in (hexagon, dodecagon, Vessel(wide, funnel.triangles))]
-    assert [None if planes is None else len(planes) for planes in found] == [7, None, None]
+    found = [one.planes() for one in (hexagon, dodecagon, Vessel(wide, funnel.triangles))]
+    assert [len(planes) for planes in found] == [7, 0, 0]
 
 
 def test_a_bowl_of_facets_becomes_round(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """The project's errors, all under one root.
 
-`InputError` is what a user can mend in a file or on the command line (exit status 2); everything that goes wrong while
-an engine runs derives from `WalkersError` too and is listed in `walkers.runner.failures` (exit status 1).
+A user can mend an `InputError` in a file or on the command line (exit status 2). Failures of the engine are listed in
+`walkers.runner.failures` (exit status 1).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 _LONGEST_VALUE = 80
 _LONGEST_TEXT = 1000
-"""Letters of a value, and of a file's name or what was expected, that a message quotes."""
+"""Longest quotation of a value, and of a file's name or an expectation, in a message, in letters."""
 
 
 class WalkersError(Exception):
@@ -37,7 +37,7 @@ class Problem:
     """One error of an input.
 
     ``key`` is dotted, such as ``drive.frequency``, and empty for the file as a whole; ``value`` as the user wrote it,
-    None where there is none to quote; ``expected`` says what would have been right.
+    None where there is none to quote; ``expected`` describes right values.
     """
 
     key: str

@@ -1,4 +1,4 @@
-"""Text from templates: decks and reports read as what they give, their numbers filled in."""
+"""Text from templates: decks and reports with their numbers filled in."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ def rendered(package: str, template: str, **values: Any) -> str:
     """The text of a template of a package.
 
     Filters: ``number`` (shortest text that reads back as the same double) and ``numbers`` of several, ``format`` as
-    Python's for numbers, a dash for what is none, ``cell`` for a table's, ``code`` of Python for a value, ``plain`` for
-    a user's text in Markdown. `jinja2.UndefinedError` if it names a value that is not given.
+    Python's for numbers, with a dash for missing ones, ``cell`` for a cell of a table, ``code`` of Python for a value,
+    ``plain`` for a user's text in Markdown. `jinja2.UndefinedError` if it names a value that is not given.
     """
     return environment(package).get_template(template).render(**values)
 
 
 def printable(text: str) -> str:
-    r"""A user's text on one line: white space is a space, and what cannot be seen is written out.
+    r"""A user's text on one line: white space is a space, and invisible characters are written out.
 
     Examples
     --------
@@ -63,7 +63,7 @@ _FILTERS: Mapping[str, Callable[..., Any]] = {
 
 @cache
 def environment(*packages: str, html: bool = False) -> Environment:
-    """What renders the templates of packages; in ``html`` values are escaped."""
+    """The environment that renders templates of packages; in ``html`` values are escaped."""
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
     environment = Environment(

@@ -31,7 +31,7 @@ _DiameterRange = tuple[Diameter, Diameter]
 _FEW = Field(min_length=2, max_length=100)
 MOST_BEADS = 200_000
 _LEAST_LEVER = 0.1
-"""Of a cluster's extent: large and small beads whose centroids are nearer than that give no heading."""
+"""Smallest distance of the centroids of large and small beads that gives a heading, over the extent of a cluster."""
 _TOUCHING = 0.02
 """Radii by which beads that are given places may be apart and still touch."""
 _TOO_SMALL = "a bead is too small to touch two beads that touch each other; expected a larger one"
@@ -142,8 +142,8 @@ class Walkers(Table):
 
     ``meet = true`` says that they may stand and come as near as they like; without it they are replicates. They face
     along the drive axis (right, up a slope), against it (left, down), or every other one (both), but for an ``angle``.
-    The ``gap`` is that of all contacts at the start (negative: touching), where forces balance unless it is given.
-    ``radii`` are those of the beads, first the one that leads (the large one, as in the paper).
+    All contacts have the ``gap`` at the start (negative: touching); without it, forces balance. The first of the
+    ``radii`` belongs to the leading bead (the large one, as in the paper).
     """
 
     if TYPE_CHECKING:
@@ -225,7 +225,7 @@ class Walkers(Table):
 
     @cached_property
     def toward_large(self) -> tuple[float, ...]:
-        """Weights of bead positions in the heading, from the centroid of the small beads to that of the large beads.
+        """Weights of bead positions in the heading, from the centroid of small beads to that of large ones.
 
         Where all beads are alike, or the two centroids nearly coincide, the heading is where the walker was to face.
         """
@@ -257,7 +257,7 @@ class Walkers(Table):
 
 
 class Dimers(Walkers):
-    """``[dimers]``: walkers of two beads, the first of which leads.
+    """``[dimers]``: walkers of two beads. The first bead leads.
 
     Their radii may be given by their mean and the asymmetry parameter sin δ = (R1 - R2)/(R1 + R2).
     """

@@ -11,13 +11,12 @@ from dataclasses import replace
 from functools import lru_cache
 from itertools import count
 from math import ceil, cos, degrees, inf, pi, radians, sin, sqrt
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeAlias
 
 from walkers.errors import Problem
 from walkers.inputs import units
 from walkers.inputs.drive import Vector
-from walkers.inputs.table import SAME_RUN, Derived, Filled, Indirect, Table, key, within
+from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, key, within
 
 if TYPE_CHECKING:
     import numpy as np
@@ -100,6 +99,7 @@ SIZES: Mapping[str, Collection[str]] = {
     "vessel": (),
 }
 """Size keys of each shape."""
+_VESSEL = Choice((("mesh", "scale"), ("planes", "height")))
 _AREAS = {"box": 1.0, "cylinder": pi / 4.0, "octagon": 2.0 * (sqrt(2.0) - 1.0)}
 """Of the cross-sections of containers, in squares of their width."""
 _CORNERS = {"+x+y": (1.0, 1.0), "+x-y": (1.0, -1.0), "-x+y": (-1.0, 1.0), "-x-y": (-1.0, -1.0)}
@@ -148,21 +148,14 @@ class Boundary(Table):
 
     @classmethod
     def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
-        """Sizes that the shape lacks, or that are those of another shape."""
-        yield from super().problems(given, place)
-        vessel = "mesh" if "mesh" in given else "planes" if "planes" in given else ""
-        if vessel and given.get("shape", "vessel") != "vessel":
-            yield Problem(within(place, "shape"), None, f"expected none beside {place}.{vessel}")
-            return
-        shape = "vessel" if vessel else str(given.get("shape", "plane"))
-        if shape == "vessel" and not vessel:
-            yield cls.missing("mesh", place, ", or planes")
-        for name, of in {"scale": "mesh", "height": "planes"}.items():
-            if vessel == of and name not in given:
-                yield cls.missing(name, place)
-        if "scale" in given and vessel != "mesh":
-            yield Problem(within(place, "scale"), None, "expected none without a mesh")
-        sizes = ("height",) if vessel == "planes" else SIZES.get(shape, ())
+        """Sizes that the shape lacks, and sizes of other shapes."""
+        named = next((name for name in ("mesh", "planes", "scale") if name in given), "")
+        shape = str(given.get("shape", "vessel" if named else "plane"))
+        if shape == "vessel":
+            yield from cls.problems_of(_VESSEL, given, place)
+        elif named:
+            yield Problem(within(place, "shape"), None, f"expected none beside {place}.{named}")
+        sizes = ("height",) if "planes" in given else SIZES.get(shape, ())
         for name in ("opening", "width", "height") if shape in SIZES else ():
             if name in sizes and name not in given:
                 yield cls.missing(name, place)
@@ -197,8 +190,12 @@ class Boundary(Table):
     @property
     def walls(self) -> tuple[Wall, ...]:
         """The floor first, if there is one, then the side walls."""
+        if self.triangles:
+            return self.vessel.facets
         if self.shape == "vessel":
-            return _walls_of(self)
+            from walkers.inputs.vessel import named
+
+            return tuple(Flat(plane.point, plane.normal, named(plane.normal, k)) for k, plane in enumerate(self.planes))
         if self.shape == "groove":
             across, up = cos(self.opening / 2.0), sin(self.opening / 2.0)
             return (Flat(BOTTOM.point, (0.0, across, up), "-y"), Flat(BOTTOM.point, (0.0, -across, up), "+y"))
@@ -224,7 +221,7 @@ class Boundary(Table):
         """
         if self.shape == "groove":
             return 1.0 + abs(cos(self.opening))
-        if self.triangles:  # of faces that turn by a small angle, whose normals are nearly one
+        if self.triangles:  # neighbouring faces turn by a small angle: their normals are nearly the same
             return 2.0
         return 2.0 if (self.width or inf) < 2.02 * radius else 1.0
 
@@ -254,7 +251,7 @@ class Boundary(Table):
     def side_clearance(self, places: FloatArray) -> FloatArray:
         """Distance of each place, shape (n, 3), from the nearest side wall, shape (n,), m.
 
-        Among the facets of a vessel it is that from the nearest wall, negative for a place outside.
+        In a vessel of facets it is the distance from the nearest wall, negative for a place outside.
         """
         if self.triangles:
             return self.vessel.clearance(places)
@@ -310,28 +307,14 @@ class Boundary(Table):
         yield from (layer._replace(level=(number + 0.5) * 2.0 * LOOSE * largest) for number in count())
 
 
-def with_meshes(document: Mapping[str, Any], folder: Path = Path(), names: Sequence[object] = ()) -> dict[str, Any]:
-    """The tables of a case with the meshes that they, or others, name in a folder: as numbers, under ``meshes``.
-
-    So a case is whole without these files. Raises `InputError` if one cannot be read.
-    """
-    boundary, meshes = (
-        table if isinstance(table := document.get(name), Mapping) else {} for name in ("boundary", "meshes")
-    )
-    files = {name for name in (*names, boundary.get("mesh")) if isinstance(name, str)}
-    if not (new := sorted(files - meshes.keys())):
-        return {**document}
-    from walkers.inputs.vessel import read_mesh
-
-    return {**document, "meshes": {**meshes, **{name: read_mesh(folder / name) for name in new}}}
-
-
 @lru_cache(maxsize=16)
 def _vessel_of(boundary: Boundary) -> Vessel:
+    import numpy as np
+
     from walkers.inputs.vessel import Vessel, vessel_between
 
     if boundary.triangles:
-        return Vessel.of(boundary.points, boundary.triangles)
+        return Vessel(np.array(boundary.points), np.array(boundary.triangles))
     return vessel_between([(plane.point, plane.normal) for plane in boundary.planes], boundary.height)
 
 
@@ -350,17 +333,6 @@ def _layers_in(boundary: Boundary, largest: float, floor: float) -> tuple[Layer,
     return tuple(layers)
 
 
-@lru_cache(maxsize=16)
-def _walls_of(boundary: Boundary) -> tuple[Wall, ...]:
-    from walkers.inputs.vessel import named
-
-    if boundary.triangles:
-        return tuple(boundary.vessel.facets())
-    return tuple(
-        Flat(plane.point, plane.normal, named(plane.normal, number)) for number, plane in enumerate(boundary.planes)
-    )
-
-
 def _round(value: float) -> float:
-    """Zero for what is zero but for rounding: a wall's weight does not press at all."""
+    """A value, or zero if it differs from zero by rounding only: gravity along a wall has no normal component."""
     return 0.0 if abs(value) < _LEAST else value

@@ -12,7 +12,6 @@ from dataclasses import replace
 from functools import cached_property
 from html import escape
 from math import cos, hypot, inf, isclose, pi, sin
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import BeforeValidator, Field, ValidationError
@@ -21,13 +20,13 @@ from walkers.errors import InputError, Problem, apply_all, refused, shown, unusa
 from walkers.inputs import units
 from walkers.inputs.axes import is_axis, ranges_of
 from walkers.inputs.bodies import MOST_BEADS, Cluster, Dimers, Mixture, PlacedBead, Walkers
-from walkers.inputs.boundary import Boundary, with_meshes
+from walkers.inputs.boundary import Boundary
 from walkers.inputs.drive import AXES, Drive, Excitation, Vector
 from walkers.inputs.keys import MISSING, flatten, parts_of, value_at
 from walkers.inputs.library import library_of
 from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
 from walkers.inputs.origins import Origin, Source, Whence, text_of
-from walkers.inputs.record import with_record
+from walkers.inputs.reading import with_files
 from walkers.inputs.resolving import GIVEN_BY, resolve, supplied
 from walkers.inputs.run import Run, settling_of
 from walkers.inputs.table import (
@@ -60,7 +59,7 @@ _SOFTENED = Annotated[float, replace(units.MODULUS, smallest=5e6, largest=STIFFE
 
 
 class Beads(Table):
-    """``[beads]``: what all beads are made of."""
+    """``[beads]``: the material of all beads."""
 
     material: Indirect[str] = key("Material of all beads, from the library, which gives the density.", None, "ruby")
     density: units.Density = key("Density of the beads.")
@@ -129,7 +128,7 @@ class Roughness(Table):
 
 
 class Contact(Table):
-    """``[contact]``: the model of the contacts; the Young's modulus is that of the softened beads and walls.
+    """``[contact]``: the model of the contacts, with the Young's modulus of softened beads and walls.
 
     The engine requires a restitution above 0.05. The modulus of ``"auto"`` is 50 MPa for loose beads; for walkers it is
     the lowest of 50, 200, 800, ... MPa at which bridges hardly delay the contacts (`walkers.inputs.loads.delay`).
@@ -177,9 +176,9 @@ Ranges = Annotated[dict[str, Any], BeforeValidator(_ranges)]
 """As a sweep's samplers take them: for each key ``{"uniform": [low, high]}`` or ``{"loguniform": [low, high]}``."""
 _BODIES = ("dimers", "clusters", "mixture", "placed")
 _IN_WORDS = ("run.cycles", "run.samples_per_cycle")
-"""Keys whose numbers say less than the words of their sources: ``until constant within 0.2 %, at most 60``."""
+"""Keys with sources in words, which say more than their numbers: ``until constant within 0.2 %, at most 60``."""
 _ABOUT = ("document", "sources", "recorded_law", "uncertain")
-"""Fields that are part of no comparison: where values are from, and the law as its run has recorded it."""
+"""Fields that comparisons leave out: sources of values, and the law as its run has recorded it."""
 
 
 class Case(Table):
@@ -242,9 +241,9 @@ class Case(Table):
     ) -> Case:
         """A case given as the tables of a case file, quantities as strings with units.
 
-        ``source`` is what messages call it; run directories begin with its ``name``; ``changes`` are other values by
+        Messages begin with the ``source``, run directories with the ``name``; ``changes`` are other values by
         dotted keys; ``around``: uncertain ranges must hold the values of the case, which points of sweeps may leave.
-        Raises `InputError` with all that is wrong in the tables, or with what contradicts something else.
+        Raises `InputError` with all problems of the tables, or with the first contradiction between them.
         """
         if changes:
             with blaming_changes(changes):
@@ -253,11 +252,14 @@ class Case(Table):
                     document = changed(cls, document, changes)
                 return cls.read(document, source=source, name=name, around=around)
         with blaming(source, document):
-            document = with_meshes(with_record(document, Path()), Path())
+            document = with_files(document)
+            records = document.pop("records", {})
+            if isinstance(file := value_at(document, ("drive", "record")), str):
+                document["drive"] = {**document["drive"], "record": {"file": file, "rows": records[file]}}
             tables, sources, unknown = supplied(cls, document, library_of(document, source))
             try:
                 case = validated(cls, tables, source, further=[*unknown, *contradictions(cls, tables)])
-            except InputError as error:  # what a wrong name would have given is not missing too
+            except InputError as error:  # keys that a wrong name would have given are not missing too
                 wrong = {problem.key for problem in error.problems if problem.key in GIVEN_BY}
                 given = tuple(begin for name in wrong for begin in GIVEN_BY[name])
                 kept = [
@@ -267,7 +269,7 @@ class Case(Table):
                 ]
                 raise InputError(source, kept) from error
             try:
-                case = resolve(case.but(name=name, document=dict(document), sources=sources))
+                case = resolve(case.but(name=name, document=document, sources=sources))
             except ArithmeticError as error:
                 raise refused(source, f"inconsistent values: {error}") from error
             case._check_uncertain(tables, source, around=around)
@@ -311,8 +313,6 @@ class Case(Table):
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Case:
         """A case from `as_dict` (a run directory's ``case.json``); raises `ValueError` if it is none."""
-        if "walkers" in values:
-            raise ValueError("is of an earlier version of this program: run the case again")
         try:
             return cls.model_validate(values)
         except ValidationError as error:
@@ -398,7 +398,7 @@ class Case(Table):
 
     @property
     def law(self) -> BridgeLaw:
-        """The law of its bridges: the one that its run has recorded, else that of the liquid."""
+        """The law of its bridges: as its run has recorded it, else the law of the liquid."""
         law: BridgeLaw = self.recorded_law or by_name(self.liquid.law)
         return law
 
@@ -441,7 +441,7 @@ class Case(Table):
 
     @cached_property
     def border(self) -> float:
-        """A radius between those of small and large beads, m; infinite for a single class."""
+        """A radius above all small beads and below all large ones, m; infinite for a single class."""
         if self.mixture is not None:
             return (max(self.mixture.small_radii) + min(self.mixture.large_radii)) / 2.0
         sizes = sorted(self.radii)
@@ -466,7 +466,7 @@ class Case(Table):
 
     @cached_property
     def shifted_rows(self) -> int:
-        """Even length of rows of which every second one begins facing left, so that neighbours meet; 0 if none does."""
+        """Even length of the rows of walkers if every second row begins facing left, so that neighbours meet; or 0."""
         if not (
             self.meets
             and any(walkers.facing == "both" and not isclose(walkers.angle_spread, pi) for walkers in self.walkers)

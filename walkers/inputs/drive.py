@@ -1,6 +1,6 @@
 """Drive of the boundary: the table ``[drive]``, and the sum of sines A sin(2π f t + φ) that it stands for.
 
-The cycle of a drive is the common period of its sines; its peak acceleration, and Γ0, are those of the largest.
+The cycle of a drive is the common period of its sines; its peak acceleration, and Γ0, belong to the largest one.
 """
 
 from __future__ import annotations
@@ -111,8 +111,8 @@ class Harmonic(Table):
 class Drive(Harmonic):
     """``[drive]``: one harmonic by its keys, or several as ``[[drive.harmonics]]``.
 
-    In the ``frame`` of the container, as is usual, the beads feel the inertial force; in that of the laboratory the
-    walls move, which they can for one harmonic without a phase, and for a record.
+    In the ``frame`` of the container, as is usual, the beads feel the inertial force; in the frame of the laboratory
+    the walls move, which they can for one harmonic without a phase, and for a record.
     """
 
     choices: ClassVar[tuple[Choice, ...]] = (
@@ -145,7 +145,7 @@ class Drive(Harmonic):
 
     @classmethod
     def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
-        """Keys of a single harmonic beside several, or what every table lacks or says twice."""
+        """Keys of a single harmonic beside several, or contradictions and gaps as of every table."""
         if not given.get("harmonics"):
             yield from super().problems(given, place)
             return
@@ -185,7 +185,7 @@ class Excitation:
 
     @property
     def peak_acceleration(self) -> float:
-        """That of the largest harmonic or of the record at the ramp's largest factor, m/s²."""
+        """Peak acceleration of the largest harmonic or of the record at the ramp's largest factor, m/s²."""
         return self.largest_factor * (self.record.largest(2) if self.record else self.largest.peak_acceleration)
 
     @property
@@ -195,7 +195,7 @@ class Excitation:
 
     @property
     def frequency(self) -> float:
-        """Of the cycle, the common period of the harmonics, Hz; raises `ValueError` if they have none."""
+        """Frequency of the cycle, the common period of the harmonics, Hz; raises `ValueError` if they have none."""
         return (
             self.record.frequencies[0] if self.record else common_frequency([sine.frequency for sine in self.harmonics])
         )

@@ -35,8 +35,8 @@ _OF_MIXTURES = {
 class LibraryNumber(NamedTuple):
     """A number of the library, as a case would write it.
 
-    The ``range`` of an unmeasured number has the ends between which it may lie, that of a calibrated one 5 to 95 % of
-    the posterior; a ``logarithmic`` one is of magnitudes.
+    An unmeasured number may lie anywhere in its ``range``; the range of a calibrated number has 5 to 95 % of the
+    posterior. A ``logarithmic`` range is uniform in the logarithm.
     """
 
     written: Any
@@ -58,8 +58,8 @@ class Collection(NamedTuple):
 class Library:
     """The materials, liquids and surface pairs that a case can name.
 
-    They are those of the user's own library, given by its validated tables, and those that come with the program. No
-    name has two meanings: the user's library cannot redefine a name of the program.
+    They come from the user's own library, given by its validated tables, and from the program. No name has two
+    meanings: the user's library cannot redefine a name of the program.
     """
 
     def __init__(self, users: Mapping[str, Any] | None = None) -> None:

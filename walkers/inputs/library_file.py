@@ -1,4 +1,4 @@
-"""The tables of a library file. It takes time to build their models: only what reads such a file imports this."""
+"""The tables of a library file. Their models take time to build: only readers of such files import this."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def dimer_of(case: Case) -> Dimer:
-    """The dimer of a case whose first walkers are such; raises `ValueError` if they are not."""
+    """The dimer of a case; raises `ValueError` unless its first walkers are dimers."""
     radii = case.walkers[0].radii if case.walkers else ()
     if len(radii) != 2:
         raise ValueError("bodies: expected dimers; the theory is for dimers only")

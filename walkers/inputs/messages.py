@@ -1,4 +1,4 @@
-"""From pydantic's errors to sentences that name key, value and what was expected, by the type of the error."""
+"""From pydantic's errors to sentences with key, value and expectation, by the type of the error."""
 
 from __future__ import annotations
 
@@ -38,16 +38,14 @@ _SENTENCES = {
     **dict.fromkeys(("model_type", "dict_type", "model_attributes_type"), "expected a table [{key}]"),
 }
 """By the type of an error of pydantic, with the values of its context."""
-_ENDED = ("run.silence", "run.log_limit")
-"""Keys of cases of earlier versions."""
 _GIVEN_ELSEWHERE = {"beads": "a material", "liquid": "a liquid", "contact": "surfaces"}
-"""What the library knows that gives keys of these tables."""
+"""Entries of the library that give keys of these tables."""
 
 
 def quoted(document: Mapping[str, Any], parts: Sequence[str | int]) -> str | None:
     """The value at a place of a document, quoted; None if there is none."""
     value = value_at(document, parts)
-    if isinstance(value, Mapping) and "rows" in value:  # of a record, whose file a case names
+    if isinstance(value, Mapping) and "rows" in value:  # a record: a case has the name of its file
         value = value.get("file", value)
     return None if value is MISSING else shown(value)
 
@@ -85,7 +83,7 @@ def blaming_changes(changes: Mapping[str, Any]) -> Iterator[None]:
 def validated(
     model: type[File], document: Mapping[str, Any], source: str, whole: str = "a case", further: Sequence[Problem] = ()
 ) -> File:
-    """Nested tables as a kind of file; ``source`` and ``whole`` are what messages call it, and any of its kind.
+    """Nested tables as a kind of file; messages call it ``source``, and its kind ``whole``.
 
     Raises `InputError` with all that pydantic finds wrong, and with ``further`` problems.
     """
@@ -138,7 +136,7 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
 
 
 def _elsewhere(parts: Sequence[str | int]) -> str:
-    """What else may give a key: a name that the library knows."""
+    """The alternative to a key: a name of the library that gives it."""
     return f", or {named} of the library" if (named := _GIVEN_ELSEWHERE.get(str(parts[0]))) and len(parts) > 1 else ""
 
 
@@ -174,8 +172,6 @@ def check_key(model: type[Table], key: str) -> None:
 
 def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
     *tables, word = location
-    if ".".join(location) in _ENDED:
-        return "expected none: this key has ended; the program limits the engine itself"
     fields = keys_of(file)
     field = fields.get(_place(tables, fields))
     table = table_in(field.annotation) if field else None if tables else file

@@ -1,7 +1,7 @@
 """Origin of each value of a case: the case, the library, a calibration, a default, or other values.
 
 Unmeasured values (friction, drag of the bridges, volume of liquid) are distinguished from known values, with the range
-in which they may lie: a speed that rests on such values is worth no more than they are.
+in which they may lie: a speed that rests on such values is as uncertain as they are.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Origin:
     key: str  # dotted, such as ``contact.friction.bead_wall``
     text: str  # the value as a case file would say it, with its unit
     origin: Whence
-    source: str = ""  # the library's (after its file), or from what the value is derived
+    source: str = ""  # of the library (after its file), or the values from which it is derived
     range: tuple[Any, Any] | None = None  # ends between which an unmeasured or uncertain value may lie, as in a case
     logarithmic: bool = False  # whether the range is of magnitudes
     uncertain: bool = False  # whether the case calls it so

@@ -1,20 +1,20 @@
 """Case files: found, read as TOML, validated and resolved.
 
-Whatever is wrong ends as one `InputError` that names the file, the key, the value and what was expected.
+Every problem ends as an `InputError` with the file, the key, the value and the expectation.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.errors import InputError, check_utf8, refused, shortened, suggestion
-from walkers.inputs.boundary import with_meshes
+from walkers.errors import InputError, check_utf8, refused, shortened, suggestion, unusable
+from walkers.inputs.keys import parts_of, value_at
 from walkers.inputs.library import FILE_NAME, read_library
 from walkers.inputs.messages import blaming
-from walkers.inputs.record import with_record
+from walkers.inputs.record import read_record
 from walkers.inputs.toml import read_toml
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ _COMMANDS = {
     "case.json": "a run's directory: walkers run {}, or plot, render, export",
     "sweep.json": "a sweep's directory: walkers list {}, or plot, report; its file goes to walkers sweep",
 }
-"""What takes which kind of input."""
+"""The commands for each kind of input."""
 
 
 def shipped(kind: str) -> dict[str, Path]:
@@ -67,7 +67,7 @@ def load_case(case: str | Path | Mapping[str, Any], changes: Mapping[str, Any] |
     """
     path = Path("case.toml") if isinstance(case, Mapping) else find_input(case, "case")
     document = case if isinstance(case, Mapping) else read_case(path)
-    # Not above: that there is no such file is told before all that a case may say is built.
+    # Not above: a missing file is reported before the models of a case are built, which takes time.
     from walkers.inputs.case import Case
 
     source = "<case>" if isinstance(case, Mapping) else str(case)
@@ -78,16 +78,46 @@ def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
     """The tables of a case file, the user's own library among them under ``library``.
 
     That is the library beside the file; beside a case that comes with the program it is that in ``folder``, the working
-    directory if None. A case that has a ``[library]`` itself takes no other. The mesh of a vessel is read, too.
+    directory if None. A case that has a ``[library]`` itself takes no other. Its mesh and its record are read, too.
     """
     document = read_toml(path)
     with blaming(str(path), document):
-        document = dict(with_meshes(with_record(document, path.parent), path.parent))
+        document = with_files(document, path.parent)
     if "library" not in document and path.name != FILE_NAME:
         beside = (folder or Path()) if path.parent == _HERE / "cases" else path.parent
         if library := read_library(beside):
             document["library"] = library
     return document
+
+
+def _mesh(path: Path) -> dict[str, Any]:
+    from walkers.inputs.vessel import read_mesh
+
+    return read_mesh(path)
+
+
+_FILES = {"boundary.mesh": ("meshes", _mesh), "drive.record": ("records", read_record)}
+"""Keys that name files, the tables of their contents by these names, and their readers."""
+
+
+def with_files(
+    document: Mapping[str, Any], folder: Path = Path(), values: Iterable[tuple[str, object]] = ()
+) -> dict[str, Any]:
+    """The tables of a case with the contents of the files that they, or other values of keys, name in a folder.
+
+    A case is whole without these files. Raises `InputError` if one cannot be read.
+    """
+    tables, values = dict(document), list(values)
+    for key, (table, read) in _FILES.items():
+        contents = dict(below) if isinstance(below := tables.get(table), Mapping) else {}
+        named = (value_at(document, parts_of(key)), *(value for name, value in values if name == key))
+        for file in dict.fromkeys(value for value in named if isinstance(value, str) and value not in contents):
+            try:
+                contents[file] = read(folder / file)
+            except ValueError as error:
+                raise unusable(key, str(error), file) from error
+        tables |= {table: contents} if contents else {}
+    return tables
 
 
 def is_sweep_file(path: Path) -> bool:

@@ -8,12 +8,11 @@ boundary starts at no displacement and comes back to it at the end. With p rows 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-from walkers.errors import unusable
 from walkers.inputs.table import SAME_RUN, Table
 from walkers.inputs.units import ACCELERATION, TIME, parse_quantity
 
@@ -81,7 +80,7 @@ class Record(Table):
     def frequencies(self) -> tuple[float, float]:
         """Frequency of a cycle, and the highest one in the spectrum, Hz.
 
-        A record that repeats has as many cycles as divide all of its lines; else a cycle is that of the strongest line.
+        A record that repeats has as many cycles as divide all of its lines; else its strongest line gives the cycle.
         """
         import numpy as np
 
@@ -123,7 +122,7 @@ def _spline(rows: npt.NDArray[np.float64], repeats: bool = False) -> PPoly:
 
 
 def record_of(value: object) -> object:
-    """A record from its file's name and its rows, as `with_record` puts them in the place of the name."""
+    """A record from its file's name and its rows, which `Case.read` puts in the place of the name."""
     try:
         rows = tuple((float(time), float(x), float(y), float(z)) for time, x, y, z in value["rows"])  # type: ignore[index]
     except (LookupError, TypeError, ValueError) as error:
@@ -132,28 +131,17 @@ def record_of(value: object) -> object:
     return Record(file=value.get("file", ""), rows=rows)  # type: ignore[attr-defined]
 
 
-def with_record(document: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
-    """Tables of a case with the rows of the record that they name, if they do, by a path relative to a folder."""
-    drive = document.get("drive")
-    name = drive.get("record") if isinstance(drive, Mapping) else None
-    if not isinstance(name, str) or not isinstance(drive, Mapping):
-        return document
-    try:
-        rows = _read(folder / name)
-    except OSError as error:
-        raise unusable("drive.record", f"cannot be read: {error.strerror}", name) from error
-    except ValueError as error:  # its subclasses are of pandas
-        expected = "" if type(error) is ValueError else "expected rows of numbers with commas below a header: "
-        raise unusable("drive.record", f"{expected}{error}".strip(), name) from error
-    return {**document, "drive": {**drive, "record": {"file": name, "rows": rows}}}
-
-
-def _read(path: Path) -> list[list[float]]:
-    """Rows of a file: time, s, and acceleration along x, y and z, m/s²."""
+def read_record(path: Path) -> list[list[float]]:
+    """Rows of a file: time, s, and acceleration along x, y and z, m/s²; raises `ValueError` if it has none."""
     import numpy as np
     import pandas as pd
 
-    table = pd.read_csv(path, skipinitialspace=True, index_col=False)
+    try:
+        table = pd.read_csv(path, skipinitialspace=True, index_col=False)
+    except OSError as error:
+        raise ValueError(f"cannot be read: {error.strerror}") from error
+    except ValueError as error:  # its subclasses are of pandas
+        raise ValueError(f"expected rows of numbers with commas below a header: {error}".strip()) from error
     heads = [text.strip().removesuffix(")").partition("(") for text in table.columns]
     names, kinds = [name.strip() for name, _, _ in heads], dict.fromkeys("xyz", ACCELERATION) | {"time": TIME}
     if names[:1] != ["time"] or len(names) < 2 or len({*names}) < len(names) or not kinds.keys() >= {*names}:
@@ -169,7 +157,7 @@ def _read(path: Path) -> list[list[float]]:
 
 
 def _check(rows: Sequence[Sequence[float]]) -> None:
-    """Raise `ValueError` for rows of which no motion can be made."""
+    """Raise `ValueError` for rows that give no motion."""
     import numpy as np
 
     if not FEWEST <= len(rows) <= MOST:

@@ -1,7 +1,7 @@
-"""What a case file leaves out: values of the library, defaults, and values that follow from others.
+"""Values that a case file leaves out: from the library, defaults, and derived from other values.
 
-`supplied` fills in a document before it is validated. `STEPS` fill in the validated case: each takes a case and gives
-one that knows more; the order is that of the physics. Checks of the bodies come last.
+`supplied` fills in a document before it is validated. `STEPS` fill in the validated case, each a part of it, in the
+order of the physics. Checks of the bodies come last.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ _ROUGHNESS = ("contact.roughness.bead_bead", "contact.roughness.bead_wall")
 _VISCOSITIES = ("liquid.kinematic_viscosity", "liquid.dynamic_viscosity")
 _OF_LIQUIDS = ("liquid.surface_tension", "liquid.density", *_VISCOSITIES)
 _LIQUIDS = ((_OF_LIQUIDS[0], _VISCOSITIES[1]), _OF_LIQUIDS[:3])
-"""What a liquid of its own says: its surface tension, and its dynamic viscosity or density and kinematic viscosity."""
+"""Keys that describe a liquid completely: surface tension, and dynamic viscosity or density and kinematic viscosity."""
 SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_ROUGHNESS, *_OF_SURFACES)
 """Keys that a case may leave out because the library has values or defaults."""
 
@@ -70,7 +70,7 @@ SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_ROUGHNESS, *_OF_SUR
 def supplied(
     model: type[Case], document: Mapping[str, Any], library: Library
 ) -> tuple[dict[str, Any], dict[str, Source], list[Problem]]:
-    """The tables of a case with what they leave out and the library has of the materials and the liquid they name.
+    """The tables of a case with missing values from the library, of the materials and the liquid that they name.
 
     Also the sources of these values, and names that the library does not know.
     """
@@ -81,7 +81,7 @@ def supplied(
     mixture, sources, problem = _mixture(document, liquid)
     problems += problem
     values = _values(library, bead, wall, None if problem else liquid, mixture)
-    # What was calibrated was so with one law of the bridges: with another it is a guess.
+    # Calibrations used one law of the bridges: with another law their numbers are guesses.
     calibrated = liquid if value_at(document, ("liquid", "law")) in (MISSING, DEFAULT_LAW) else None
     tables = {name: value for name, value in document.items() if name not in ("library", "meshes")}
     tables.setdefault("contact", {})
@@ -96,7 +96,7 @@ def supplied(
 def _unknown(
     library: Library, given: set[str], bead: str | None, wall: str | None, liquid: str | None
 ) -> list[Problem]:
-    """Names that are not in the library, of things of which the case does not say all itself."""
+    """Names that are not in the library and that the case does not describe completely itself."""
     described = given.issuperset(_FRICTION)
     problems = []
     for key, name, kind, says_all in (
@@ -137,7 +137,7 @@ def _mixture(
 def _values(
     library: Library, bead: str | None, wall: str | None, liquid: str | None, mixture: tuple[float, float] | None
 ) -> dict[str, LibraryNumber]:
-    """What is usual, and what the library has of materials and a liquid, by the keys of a case."""
+    """Defaults, and numbers of the library for materials and a liquid, by the keys of a case."""
     on_bead, on_wall = library.surface_pair(bead, bead), library.surface_pair(bead, wall)
     of_liquid = library.numbers("liquids", liquid or "", mixture)
     values = {
@@ -192,7 +192,7 @@ def _radii(case: Case) -> Case:
 
 
 def _vessel(case: Case) -> Case:
-    """A vessel of the user's own: its planes, or its points and triangles where it has no planes, and its extent."""
+    """A vessel of the user's own: its planes, or points and triangles if planes cannot describe it; and its extent."""
     boundary = case.boundary
     if boundary.mesh is None and not boundary.planes:
         return case
@@ -204,9 +204,7 @@ def _vessel(case: Case) -> Case:
             vessel = vessel_of(case.document["meshes"][boundary.mesh], boundary.scale)
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise unusable("meshes", f"expected points and triangles of {boundary.mesh}") from error
-        boundary = boundary.but(
-            planes=tuple(Plane(point=at, normal=normal) for at, normal in vessel.planes(SHARP) or ())
-        )
+        boundary = boundary.but(planes=tuple(Plane(point=at, normal=normal) for at, normal in vessel.planes()))
         if not boundary.planes:
             boundary = boundary.but(
                 points=tuple(map(tuple, vessel.points.tolist())), triangles=tuple(map(tuple, vessel.triangles.tolist()))
@@ -277,7 +275,7 @@ def _count(case: Case) -> Case:
 
 
 def _walkers(case: Case) -> Case:
-    """The walkers, whose arrangements are possible."""
+    """The directions of the walkers; impossible arrangements are refused."""
     for key, walkers in case.walkers_by_key.items():
         if walkers.facing in _FACING:
             if not case.boundary.tilt or case.boundary.uphill:
@@ -353,10 +351,10 @@ def _drive(case: Case) -> Case:
 
 
 def _record(case: Case, record: Record) -> Case:
-    """A case with what its record gives in place of a frequency and a peak acceleration."""
+    """A case with the frequency and the peak acceleration of its record."""
     first, last = (record.rows[end][1:] for end in (0, -1))
     if record.repeats and dist(first, last) > _MEET * record.largest(2):
-        raise unusable("drive.repeats", "expected a record whose last row is that of the next period's begin")
+        raise unusable("drive.repeats", "expected a record that ends with the first row of the next period")
     why = "all lines are multiples" if record.repeats else "the strongest line"
     case = case.noted(
         "drive.frequency", f"of the spectrum of the record: {why}", text=f"{case.excitation.frequency:.6g} Hz"

@@ -1,4 +1,4 @@
-"""Length, time step and sampling of a run: the table ``[run]``, and what follows from it and the rest of a case."""
+"""Length, time step and sampling of a run: the table ``[run]``, and the values that follow from the whole case."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FIRST_ATTEMPTS = (12, 24)
 CONSTANT = 0.002
 """Share within which the velocities of the halves of a walker's cycles agree where a run ends early: they are constant.
 
-A walker is called steady at a looser criterion, that of `walkers.postprocess.gait.walk`.
+`walkers.postprocess.gait.walk` calls a walker steady by a looser criterion.
 """
 _SEGMENT_SECONDS = 0.5
 _MOST_CYCLES = 60
@@ -47,7 +47,7 @@ def settling_of(cycles: int) -> int:
 
 
 class Run(Table):
-    """``[run]``: the time step, the length of the run and what is recorded.
+    """``[run]``: the time step, the length and the samples of the run.
 
     Left out, or ``cycles = "auto"``, walkers run until their velocities are constant; loose beads rest before the drive
     (``longest_settling``; None of walkers, which stand from the first). Beads are recorded ``samples_per_cycle`` times
@@ -123,7 +123,7 @@ class Run(Table):
 
     @property
     def continuation(self) -> str:
-        """What `walkers run` does after the cycles tried first; empty for a fixed number of cycles."""
+        """How `walkers run` continues after the first attempt, as text; empty for a fixed number of cycles."""
         constant, most = f"the velocities are not constant within {percent(CONSTANT)}", self.cycles
         further = f"walkers run continues to {most} if {constant}: then set cycles to {most}"
         return further if len(self.attempts) > 1 else ""
@@ -210,7 +210,7 @@ def with_run(case: Case) -> Case:
 
 
 def _sources(run: Run, case: Case, reason: str) -> dict[str, Source]:
-    """Where the values of a run are from that its table does not give."""
+    """Sources of the values of a run that its table does not give."""
     cycles_from, cycles, settling = "from the duration" if run.duration else "not checked earlier", "", ""
     if run.until_steady:
         cycles_from = "checked after 12 and 24 cycles"
@@ -237,7 +237,7 @@ def _sources(run: Run, case: Case, reason: str) -> dict[str, Source]:
 
 
 def _check_drive(case: Case, cycles: int, time_step: float) -> None:
-    """A run is as long as its ramp and not longer than its record, whose rows are not closer than its steps."""
+    """Refuse a run shorter than its ramp or longer than its record, and rows of a record closer than the time step."""
     drive, name = case.excitation, "run.cycles" if case.run.duration is None else "run.duration"
     if drive.record and (apart := drive.record.length / (len(drive.record.rows) - 1)) < time_step:
         rows = f"its rows, {1e6 * apart:.3g} us apart, are closer than the time step, {1e6 * time_step:.3g} us"

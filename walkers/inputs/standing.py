@@ -33,7 +33,7 @@ class StandingBead(NamedTuple):
 class Standing(NamedTuple):
     """Beads that start together; positions relative to the walker's place (chosen by the deck) or to the boundary.
 
-    ``facing`` is +1 along the drive axis or −1, and ``angle`` that to it (rad); 0 and 0 of what is no walker.
+    ``facing`` is +1 along the drive axis or −1, and ``angle`` (rad) is measured from there; both are 0 for loose beads.
     """
 
     beads: tuple[StandingBead, ...]
@@ -43,7 +43,7 @@ class Standing(NamedTuple):
 
 
 def standing(case: Case) -> Iterator[tuple[int, Standing]]:
-    """What stands at the start, each with the number of its body; walkers come first and are numbered through.
+    """Walkers and groups of loose beads at the start, each with the number of its body; walkers come first.
 
     Raises `ValueError` if the beads of a walker cannot stand so.
     """
@@ -62,7 +62,7 @@ def standing(case: Case) -> Iterator[tuple[int, Standing]]:
 def _walkers(case: Case, walkers: Walkers, first: int) -> Iterator[Standing]:
     """Each walker around the contact of its first two beads; ``first``: index of the first walker.
 
-    Its angle and contacts are drawn from a stream of its own, whoever shares the deck.
+    Its angle and contacts are drawn from a stream of its own, independent of the rest of a shared deck.
     """
     x, y, _ = case.drive_axis
     resting = [load.overlap for load in contact_loads(case, walkers)]

@@ -34,11 +34,10 @@ from walkers.inputs.axes import (
     sampled,
     zipped,
 )
-from walkers.inputs.boundary import with_meshes
 from walkers.inputs.case import Case
 from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
-from walkers.inputs.reading import find_input, read_case, shipped
+from walkers.inputs.reading import find_input, read_case, shipped, with_files
 from walkers.inputs.table import Table, alternatives, changed
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import Speed, Whole
@@ -84,7 +83,7 @@ class SweepFile(Table):
     descend: DescendTable | None = None
 
     def all_axes(self) -> list[Axis]:
-        """In the order in which they run, the last one fastest: that of a descent."""
+        """All axes in their order; the last one varies fastest. A descent is last."""
         axes = [*crossed(self.axes), *(zipped(table) for table in self.zip)]
         axes += [one_at_a_time(self.one_at_a_time)] if self.one_at_a_time else []
         axes += [sampled(table.method, table.points, table.seed, table.ranges) for table in self.sample]
@@ -93,7 +92,7 @@ class SweepFile(Table):
 
 @dataclass(frozen=True, repr=False)
 class Sweep:
-    """A base case and its variations: what a sweep file says, and what follows from it.
+    """A base case and its variations.
 
     Attributes
     ----------
@@ -167,7 +166,7 @@ class Sweep:
             with blaming(where):
                 document = changed(Case, self.document, changes)
             case = Case.read(document, source=where, name=self.case_name)
-            # The base case's title may say what does not hold here.
+            # The title of the base case may not hold here.
             yield case.but(title=f"{shortened(self.name)}: {shortened(text)}") if text else case
 
 
@@ -197,7 +196,7 @@ def load_sweep(sweep: str | Path | Mapping[str, Any], changes: Mapping[str, Valu
 
 
 def _name_with(name: str, changes: Mapping[str, Value]) -> str:
-    """Name of a sweep with changes, different from that of the sweep without changes."""
+    """Name of a sweep with changes; it differs from the name without changes."""
     text = ",".join(f"{key}={value}" for key, value in changes.items())
     full = re.sub(r"[^\w.+=,-]+", "_", f"{name},{text}")
     encoded = full.encode("utf-8", "surrogateescape")
@@ -217,7 +216,7 @@ def expand(
 ) -> Sweep:
     """Expand a sweep given as nested tables; raises `InputError` if anything in it cannot be used.
 
-    ``source`` is what messages call it, ``folder`` where a base case given as a file is looked up. With ``base``, the
+    Messages begin with ``source``; files that it names are looked up in ``folder``. With ``base``, the
     name of the base case and its tables, no file is read.
     """
     file = validated(SweepFile, document, source, "a sweep")
@@ -234,9 +233,9 @@ def expand(
                 for alternative in alternatives(Case, key) & {*keys}:
                     raise unusable(key, f"expected one of {key} and {alternative}, which replace each other")
             case_name, given = (path.stem, read_case(path, folder)) if path else base or ("", {})
+            varied = (pair for axis in axes for row in axis.rows for pair in zip(axis.keys, row, strict=True))
+            given = with_files(given, folder, [*settings.items(), *varied])
             tables = changed(Case, given, settings)
-            meshes = [row[keys.index("boundary.mesh")] for row in rows] if "boundary.mesh" in keys else []
-            tables = with_meshes(tables, folder, meshes)
             changed(Case, tables, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:
         raise refused(source, "has infinitely nested tables") from error

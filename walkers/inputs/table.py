@@ -1,7 +1,7 @@
 """Tables of files as frozen models: a file's keys are the fields, values are in SI units.
 
-A table says what excludes what (`Table.choices`), gives its values by dotted keys (`Table.leaves`), and makes copies
-with other values (`Table.but`, `Table.put`).
+A table declares keys that exclude each other (`Table.choices`), gives its values by dotted keys (`Table.leaves`), and
+makes copies with other values (`Table.but`, `Table.put`).
 """
 
 from __future__ import annotations
@@ -142,27 +142,28 @@ class Table(BaseModel):
 
     @classmethod
     def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
-        """What a table that is given at a place says in no way, or in two."""
+        """Contradictions and gaps of a table that is given at a place."""
         for choice in cls.choices:
-            given_by = [
-                names
-                for names in choice.expressions
-                if any(name in given and not is_auto(given[name]) for name in names)
-            ]
-            if len(given_by) > 1:
-                name = next(name for name in given_by[1] if name in given)
-                two = Choice(tuple(given_by[:2])).text
-                yield Problem(within(place, name), None, f"expected either {two}, not both")
-            elif given_by or choice.required:
-                expected = given_by[0] if given_by else choice.expressions[0]
-                alternatives = [names for names in choice.expressions if names is not expected] if not given_by else []
-                alternatives += [(choice.instead,)] if choice.instead else []
-                instead = "".join(f", or {' and '.join(names)}" for names in alternatives)
-                yield from (cls.missing(name, place, instead) for name in expected if name not in given)
+            yield from cls.problems_of(choice, given, place)
+
+    @classmethod
+    def problems_of(cls, choice: Choice, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
+        """The problem of a table that has several expressions of a choice, or a part of one, or none."""
+        begun = [names for names in choice.expressions if any(not is_auto(given.get(name, "auto")) for name in names)]
+        if len(begun) > 1:
+            name = next(name for name in begun[1] if name in given)
+            two = Choice(tuple(begun[:2])).text
+            yield Problem(within(place, name), None, f"expected either {two}, not both")
+        elif begun or choice.required:
+            expected = begun[0] if begun else choice.expressions[0]
+            instead = [" and ".join(names) for names in choice.expressions if not begun and names is not expected]
+            instead += [choice.instead] if choice.instead else []
+            for name in (name for name in expected if name not in given):
+                yield cls.missing(name, place, "".join(f", or {words}" for words in instead))
 
     @classmethod
     def missing(cls, name: str, place: str, instead: str = "") -> Problem:
-        """That a key is missing of a table at a place, with an example, and what may be there instead."""
+        """The problem of a missing key of a table at a place, with an example, and alternatives."""
         return Problem(within(place, name), None, f"missing; expected {example_of(cls.model_fields[name])}{instead}")
 
 
@@ -204,7 +205,7 @@ def table_in(annotation: Any) -> type[Table] | None:
 
 
 def example_of(field: FieldInfo) -> str:
-    """An example of what a key takes: ``such as "80 Hz"``; its type if the field has none."""
+    """An example of a value of a key: ``such as "80 Hz"``; its type if the field has none."""
     if field.examples:
         return f"such as {shown_in_file(field.examples[0])}"
     kind = kind_in([*field.metadata, field.annotation])
@@ -214,7 +215,7 @@ def example_of(field: FieldInfo) -> str:
 
 
 def contradictions(model: type[Table], document: Any, place: str = "") -> Iterator[Problem]:
-    """What the tables of a document say in no way, or in two (`Table.problems`)."""
+    """Contradictions and gaps of the tables of a document (`Table.problems`)."""
     if not isinstance(document, Mapping):
         return
     yield from model.problems({name: value for name, value in document.items() if value != []}, place)
@@ -225,7 +226,7 @@ def contradictions(model: type[Table], document: Any, place: str = "") -> Iterat
 
 
 def alternatives(model: type[Table], name: str) -> set[str]:
-    """Dotted keys that say in other words what a key says."""
+    """Dotted keys that a key excludes."""
     *path, last = parts_of(name)
     if path:
         field = keys_of(model).get(".".join(part for part in path if isinstance(part, str)))
@@ -244,8 +245,8 @@ def alternatives(model: type[Table], name: str) -> set[str]:
 def changed(model: type[Table], document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """A document with other values at dotted keys (``dimers.radii[0]`` for one of a list).
 
-    What a new value says in other words (`Table.choices`) goes, unless it changes too. Raises `InputError` if a list
-    has no such place.
+    Keys that a new one excludes (`Table.choices`) go, unless they change too. Raises `InputError` if a list has no such
+    place.
     """
     tables = copy.deepcopy(dict(document))
     for name, value in changes.items():

@@ -8,7 +8,7 @@ whether the nearest point is in it. A point where facets meet is in one of them 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -16,13 +16,17 @@ from io import StringIO
 from itertools import pairwise
 from math import cos, inf
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from walkers.errors import InputError, unusable
+from walkers.inputs.boundary import SHARP
 from walkers.inputs.drive import Vector
+
+if TYPE_CHECKING:
+    import pyvista as pv
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -50,7 +54,7 @@ class Facet(NamedTuple):
     name: str
 
     def away(self, places: FloatArray) -> FloatArray:
-        """Offset of places from its nearest point, or that of its plane or line, of the shape of the places, m."""
+        """Offset of places from the nearest point of its plane, line or corner, of the shape of the places, m."""
         away, along = places - self.point, np.array(self.along)
         over: FloatArray = (away @ along)[..., None] * along
         return over if self.kind == "face" else away - over
@@ -90,29 +94,24 @@ def _read(path: Path, _changed: int) -> dict[str, Any]:
         triangles = np.concatenate([np.empty((0, 3), dtype=np.int64), *parts])
         exact = [[float(f"{x:.{digits}g}") for x in point] for point in given.tolist()]
     except (Exception, SystemExit) as error:  # meshio ends the process where a file is not of its format
-        raise unusable(
-            "boundary.mesh", "cannot be read: expected a mesh that meshio reads (STL, OBJ, PLY, …)"
-        ) from error
+        raise ValueError("cannot be read: expected a mesh that meshio reads (STL, OBJ, PLY, …)") from error
     return {"points": exact, "triangles": triangles.tolist()}
 
 
 def read_mesh(path: Path) -> dict[str, Any]:
-    """Points (in the file's unit) and triangles of a mesh file; raises `InputError` if it has none."""
+    """Points (in the file's unit) and triangles of a mesh file; raises `ValueError` if it has none."""
     if not path.is_file():
-        raise unusable("boundary.mesh", "no such file; expected a mesh, a path from the case file")
+        raise ValueError("no such file; expected a mesh, a path from the case file")
     mesh = _read(path, path.stat().st_mtime_ns)
     if not 3 < len(mesh["triangles"]) <= MOST_TRIANGLES:
-        actual = f"has {len(mesh['triangles'])} triangles"
-        raise unusable("boundary.mesh", f"{actual}; expected the inner surface of a vessel, 4 to {MOST_TRIANGLES}")
+        expected = f"expected the inner surface of a vessel, 4 to {MOST_TRIANGLES}"
+        raise ValueError(f"has {len(mesh['triangles'])} triangles; {expected}")
     return mesh
 
 
-def _at(point: FloatArray) -> str:
-    return f"({', '.join(f'{1e3 * x + 0.0:.4g}' for x in point)}) mm"
-
-
 def _broken(problem: str, point: FloatArray, expected: str) -> InputError:
-    return unusable("boundary.mesh", f"{problem} at {_at(point)}; expected {expected}")
+    place = ", ".join(f"{1e3 * x + 0.0:.4g}" for x in point)
+    return unusable("boundary.mesh", f"{problem} at ({place}) mm; expected {expected}")
 
 
 @dataclass(frozen=True)
@@ -121,11 +120,6 @@ class Vessel:
 
     points: FloatArray
     triangles: IntArray
-
-    @classmethod
-    def of(cls, points: Sequence[Sequence[float]], triangles: Sequence[Sequence[int]]) -> Vessel:
-        """A vessel of numbers that are known to be one."""
-        return cls(np.array(points, dtype=np.float64), np.array(triangles, dtype=np.int64))
 
     @cached_property
     def normals(self) -> FloatArray:
@@ -148,26 +142,27 @@ class Vessel:
         corners = self.triangles[triangle]
         return int(corners[side]), int(corners[(side + 1) % 3])
 
-    def _spread(self, joins: Callable[[int, int], bool]) -> IntArray:
-        """Number of the first triangle of all that are joined over edges, shape (T,)."""
-        beside: dict[int, list[int]] = defaultdict(list)
-        for pair in self.sharing.values():
-            for triangle, _ in pair:
-                beside[triangle] += [neighbour for neighbour, _ in pair if neighbour != triangle]
-        labels = np.full(len(self.triangles), -1)
-        for seed in range(len(labels)):
-            todo = [seed] if labels[seed] < 0 else []
-            while todo:
-                labels[triangle := todo.pop()] = seed
-                todo += [
-                    neighbour for neighbour in beside[triangle] if labels[neighbour] < 0 and joins(seed, neighbour)
-                ]
-        return labels
+    @cached_property
+    def parts(self) -> IntArray:
+        """Number of the connected part of each triangle, shape (T,)."""
+        pairs = np.array([[triangle for triangle, _ in pair] for pair in self.sharing.values() if len(pair) == 2])
+        return _joined(pairs, len(self.triangles))
 
     @cached_property
     def faces(self) -> IntArray:
         """Number of the first triangle of the face of each: connected ones in a plane."""
-        return self._spread(lambda seed, triangle: float(self.normals[seed] @ self.normals[triangle]) > _COPLANAR)
+        beside: dict[int, list[int]] = defaultdict(list)
+        for pair in self.sharing.values():
+            for triangle, _ in pair:
+                beside[triangle] += [neighbour for neighbour, _ in pair if neighbour != triangle]
+        faces = np.full(len(self.triangles), -1)
+        for seed in range(len(faces)):
+            todo = [seed] if faces[seed] < 0 else []
+            while todo:
+                faces[triangle := todo.pop()] = seed
+                new = [neighbour for neighbour in beside[triangle] if faces[neighbour] < 0]
+                todo += [neighbour for neighbour in new if self.normals[seed] @ self.normals[neighbour] > _COPLANAR]
+        return faces
 
     @cached_property
     def rims(self) -> list[list[int]]:
@@ -196,77 +191,61 @@ class Vessel:
             points.append(self.points[rim].mean(axis=0))
         return Vessel(np.array(points), np.array(triangles))
 
-    def volume(self, level: float = inf, slices: int = 400) -> float:
-        """Volume below a level (m), m³, from the areas of slices."""
-        closed = self.capped
-        low = closed.points[:, 2].min()
-        step = (min(level, self.height) - low) / slices
-        corners = closed.points[closed.triangles]
-        total = 0.0
-        for z in low + (np.arange(slices) + 0.5) * step:
-            up = corners[..., 2] > z
-            cut = corners[up.any(axis=1) & ~up.all(axis=1)]
-            rise = np.roll(cut, -1, axis=1)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                crossing = cut + ((z - cut[..., 2]) / (rise[..., 2] - cut[..., 2]))[..., None] * (rise - cut)
-            above = cut[..., 2] > z
-            goes = np.roll(above, -1, axis=1) & ~above  # from below to above; the other way where it ends
-            comes = above & ~np.roll(above, -1, axis=1)
-            begin, end = crossing[goes], crossing[comes]
-            total += step * 0.5 * abs(float(np.sum(begin[:, 0] * end[:, 1] - begin[:, 1] * end[:, 0])))
-        return total
+    def volume(self, level: float = inf) -> float:
+        """Volume below a level (m), m³."""
+        below = self.capped.surface.clip_closed_surface((0, 0, -1), (0, 0, min(level, self.height)))
+        return float(below.volume)
 
     def clearance(self, places: FloatArray) -> FloatArray:
         """Distance of places from the surface, shape (n,), m, negative outside; above the rim it is open."""
         import pyvista as pv
 
         def distances(vessel: Vessel, of: FloatArray) -> FloatArray:
-            surface = pv.PolyData.from_regular_faces(vessel.points, vessel.triangles.tolist())
-            return np.array(pv.PolyData(of).compute_implicit_distance(surface)["implicit_distance"])
+            return np.array(pv.PolyData(of).compute_implicit_distance(vessel.surface)["implicit_distance"])
 
         below = places.copy()
         below[:, 2] = np.minimum(below[:, 2], self.height - 1e-3 * np.ptp(self.points[:, 2]))
-        clearances: FloatArray = np.copysign(distances(self, places), distances(self.capped, below))
-        return clearances
+        return np.copysign(distances(self, places), distances(self.capped, below))
 
-    @cached_property
+    @property
+    def surface(self) -> pv.PolyData:
+        """The surface as pyvista has it."""
+        import pyvista as pv
+
+        surface: pv.PolyData = pv.PolyData.from_regular_faces(self.points, self.triangles.tolist())
+        return surface
+
+    @property
     def turns(self) -> list[float]:
         """Angle by which the surface turns at each edge between faces, rad; negative where it stands out."""
         angles = []
-        for shared in self.sharing.values():
-            if len(shared) == 2 and self.faces[shared[0][0]] != self.faces[shared[1][0]]:
-                before, after = (number for number, _ in shared)
-                turn = float(np.arccos(np.clip(self.normals[before] @ self.normals[after], -1.0, 1.0)))
-                angles.append(turn if self._inward(*shared[1]) @ self.normals[before] > 0.0 else -turn)
+        for (first, _), second in (pair for pair in self.sharing.values() if len(pair) == 2):
+            if self.faces[first] != self.faces[second[0]]:
+                turn = float(np.arccos(np.clip(self.normals[first] @ self.normals[second[0]], -1.0, 1.0)))
+                angles.append(turn if self._inward(*second) @ self.normals[first] > 0.0 else -turn)
         return angles
 
-    def planes(self, sharp: float) -> list[tuple[Vector, Vector]] | None:
+    def planes(self) -> list[tuple[Vector, Vector]]:
         """Points and normals of the planes that are the same vessel, the floor first.
 
-        None if there are none, if some faces turn at an edge by less than an angle (rad), or if some are not upright at
-        the rim: planes go on above it, where a funnel would be wider.
+        Empty if some faces turn at an edge by less than `SHARP`, or if some are not upright at the rim: planes go on
+        above it, where a funnel would be wider.
         """
         at_rim = np.isin(self.triangles, [point for rim in self.rims for point in rim]).any(axis=1)
-        if min(self.turns) < sharp or len(set(self._spread(lambda *_: True).tolist())) > 1:
-            return None
-        if (np.abs(self.normals[at_rim, 2]) > _UPRIGHT).any():
-            return None
-        planes = []
-        for first in self._in_order():
-            normal = self.normals[first]
-            foot = (normal @ self.points[self.triangles[first, 0]]) * normal
-            planes.append((_vector(foot), _vector(normal)))
-        return planes
+        flared = (np.abs(self.normals[at_rim, 2]) > _UPRIGHT).any()
+        if flared or min(self.turns) < SHARP or self.parts.any():
+            return []
+        normals = [self.normals[face] for face in self._in_order()]
+        points = [self.points[self.triangles[face, 0]] for face in self._in_order()]
+        return [(_vector((n @ x) * n), _vector(n)) for x, n in zip(points, normals, strict=True)]
 
     def _in_order(self) -> list[int]:
         """The faces, first a level one at the bottom, if there is any."""
         faces = list(dict.fromkeys(self.faces.tolist()))
         bottom = _SAME * float(np.ptp(self.points, axis=0).max())
-        level = [face for face in faces if self.normals[face, 2] > _COPLANAR and self._lowest(face) < bottom]
+        tops = {face: self.points[self.triangles[self.faces == face], 2].max() for face in faces}
+        level = [face for face in faces if self.normals[face, 2] > _COPLANAR and tops[face] < bottom]
         return [*level[:1], *(face for face in faces if face not in level[:1])]
-
-    def _lowest(self, face: int) -> float:
-        return float(self.points[self.triangles[self.faces == face], 2].max())
 
     def _inward(self, triangle: int, side: int) -> FloatArray:
         """Unit vector in a triangle across one of its sides."""
@@ -275,9 +254,12 @@ class Vessel:
         unit: FloatArray = across / np.linalg.norm(across)
         return unit
 
-    def facets(self) -> Iterator[Facet]:
+    @cached_property
+    def facets(self) -> tuple[Facet, ...]:
         """Its faces, the floor first, then the edges and corners that stand out."""
-        yield from self._of_faces()
+        return (*self._faces(), *self._edges_and_corners())
+
+    def _edges_and_corners(self) -> Iterator[Facet]:
         standing: list[frozenset[int]] = []
         for edge, shared in self.sharing.items():
             if len(shared) == 2:
@@ -299,7 +281,7 @@ class Vessel:
             cell = tuple((_vector(at), _vector(at - self.points[neighbour]), _CLOSED) for neighbour in neighbours)
             yield Facet("corner", _vector(at), (0.0, 0.0, 0.0), (cell,), f"corner {number}")
 
-    def _of_faces(self) -> Iterator[Facet]:
+    def _faces(self) -> Iterator[Facet]:
         for number, face in enumerate(self._in_order()):
             cells = []
             for triangle in np.flatnonzero(self.faces == face).tolist():
@@ -339,7 +321,13 @@ def vessel_of(mesh: Mapping[str, Any], scale: float) -> Vessel:
 
     Raises `InputError` if it is not the inner surface of one vessel.
     """
-    points, triangles = _merged(np.array(mesh["points"]) * scale, np.array(mesh["triangles"]))
+    return _vessel_of(*(np.array(mesh[name]).tobytes() for name in ("points", "triangles")), scale)
+
+
+@lru_cache(maxsize=16)
+def _vessel_of(point_bytes: bytes, triangle_bytes: bytes, scale: float) -> Vessel:
+    given = np.frombuffer(point_bytes).reshape(-1, 3), np.frombuffer(triangle_bytes, dtype=np.int64).reshape(-1, 3)
+    points, triangles = _merged(scale * given[0], given[1])
     vessel = _oriented(Vessel(points, triangles))
     _check_crossings(vessel)
     if vessel.height <= points[:, 2].min() + _SAME * np.ptp(points):
@@ -351,16 +339,22 @@ def vessel_of(mesh: Mapping[str, Any], scale: float) -> Vessel:
     return Vessel(np.array([[float(f"{x:.12g}") for x in point] for point in points - middle]), vessel.triangles)
 
 
-def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
-    """The points, those that are nearly the same as one, and the triangles that are left, each once."""
+def _joined(pairs: IntArray, count: int) -> IntArray:
+    """Number of the group of each of a count of points or triangles that pairs join, shape (count,)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=(count, count))
+    return np.asarray(connected_components(graph)[1])
+
+
+def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
+    """The points, those that are nearly the same as one, and the triangles that are left, each once."""
     from scipy.spatial import cKDTree
 
     near = _SAME * float(np.ptp(points, axis=0).max())
     pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
-    _, first, same = np.unique(connected_components(graph)[1], return_index=True, return_inverse=True)
+    _, first, same = np.unique(_joined(pairs, len(points)), return_index=True, return_inverse=True)
     triangles = same[triangles]
     sides = points[first][triangles] - np.roll(points[first][triangles], -1, axis=1)
     longest = np.linalg.norm(sides, axis=2).max(axis=1)
@@ -375,40 +369,28 @@ def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArr
 
 def _oriented(vessel: Vessel) -> Vessel:
     """The vessel with all triangles counterclockwise as seen from the beads: within the largest part, about others."""
-    for edge, shared in vessel.sharing.items():
-        if len(shared) > 2:
+    for edge, pair in vessel.sharing.items():
+        if len(pair) > 2:
             middle = vessel.points[[*edge]].mean(axis=0)
-            raise _broken(f"has {len(shared)} triangles at an edge,", middle, "two: give sheets a thickness")
-    flips, parts = np.zeros(len(vessel.triangles), dtype=bool), np.full(len(vessel.triangles), -1)
-    for seed in range(len(parts)):
-        todo, parts[seed] = ([seed], seed) if parts[seed] < 0 else ([], parts[seed])
-        while todo:
-            triangle = todo.pop()
-            for side in range(3):
-                for neighbour, at in vessel.sharing[frozenset(vessel._ends(triangle, side))]:
-                    flipped = flips[triangle] ^ (vessel._ends(triangle, side) == vessel._ends(neighbour, at))
-                    if parts[neighbour] < 0:
-                        parts[neighbour], flips[neighbour] = seed, flipped
-                        todo.append(neighbour)
-                    elif neighbour != triangle and flips[neighbour] != flipped:
-                        where = vessel.points[vessel.triangles[neighbour, 0]]
-                        raise _broken("has a surface of one side alone,", where, "one with an inside and an outside")
-    turned = Vessel(vessel.points, np.where(flips[:, None], vessel.triangles[:, ::-1], vessel.triangles))
-    rims = turned.rims
+            raise _broken(f"has {len(pair)} triangles at an edge,", middle, "two: give sheets a thickness")
+    consistent = vessel.surface.compute_normals(point_normals=False, split_vertices=False, auto_orient_normals=False)
+    turned = Vessel(vessel.points, consistent.regular_faces)
+    for pair in turned.sharing.values():
+        if len(pair) == 2 and turned._ends(*pair[0]) == turned._ends(*pair[1]):
+            where = turned.points[turned.triangles[pair[1][0], 0]]
+            raise _broken("has a surface of one side alone,", where, "one with an inside and an outside")
+    rims, parts = turned.rims, turned.parts
     if len(rims) > 1:
-        low = min(rims, key=lambda rim: float(turned.points[rim, 2].min()))
-        where = turned.points[low[int(turned.points[low, 2].argmin())]]
-        raise _broken(f"has {len(rims)} openings, the lowest", where, "one, at its top: close the others")
-    closed = turned.capped
-    corners = closed.points[closed.triangles]
+        lowest = min((turned.points[rim][turned.points[rim, 2].argmin()] for rim in rims), key=lambda point: point[2])
+        raise _broken(f"has {len(rims)} openings, the lowest", lowest, "one, at its top: close the others")
+    corners = turned.capped.points[turned.capped.triangles]
     volumes = np.einsum("tx,tx->t", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
-    lid = len(closed.triangles) - len(parts)
-    of = np.append(parts, [parts[int(vessel.sharing[frozenset(rims[0][:2])][0][0])]] * lid if lid else [])
-    sizes = {part: float(volumes[of == part].sum()) for part in dict.fromkeys(parts.tolist())}
-    outer = max(sizes, key=lambda part: abs(sizes[part]))
-    if lid and of[-1] != outer:
+    at_rim = parts[turned.sharing[frozenset(rims[0][:2])][0][0]] if rims else 0
+    sizes = np.bincount(np.append(parts, np.full(len(volumes) - len(parts), at_rim)), volumes)
+    outer = int(np.abs(sizes).argmax())
+    if rims and at_rim != outer:
         raise _broken("has an opening in an inner part", turned.points[rims[0][0]], "closed parts within the vessel")
-    back = np.array([(sizes[part] > 0.0) == (part == outer) for part in parts.tolist()])
+    back = (sizes[parts] > 0.0) == (parts == outer)
     return Vessel(turned.points, np.where(back[:, None], turned.triangles[:, ::-1], turned.triangles))
 
 
@@ -434,24 +416,9 @@ def _check_crossings(vessel: Vessel) -> None:
         spans = [np.einsum("nkx,nax->nak", corners_of, axes) for corners_of in (first, second)]
         apart = np.maximum(spans[0].min(2) - spans[1].max(2), spans[1].min(2) - spans[0].max(2))
         for pair in np.flatnonzero(np.where(none, -inf, apart).max(axis=1, initial=-inf) < -slack):
-            where = _crossing(first[pair], second[pair])
+            middle = np.concatenate([first[pair], second[pair]]).mean(axis=0)
             overlap = "overlap in a plane" if level[pair] else "intersect"
-            raise _broken(f"has triangles that {overlap},", where, "a surface that does not cross itself")
-
-
-def _crossing(first: FloatArray, second: FloatArray) -> FloatArray:
-    """A point where a side of a triangle crosses another one; of triangles in a plane the middle between both."""
-    for sides, face in ((first, second), (second, first)):
-        normal = np.cross(face[1] - face[0], face[2] - face[0])
-        for begin, end in zip(sides, np.roll(sides, -1, axis=0), strict=True):
-            out, far = (begin - face[0]) @ normal, (end - face[0]) @ normal
-            if out * far > 0.0 or out == far:
-                continue
-            point: FloatArray = begin + out / (out - far) * (end - begin)
-            if all(np.cross(to - at, point - at) @ normal >= 0.0 for at, to in pairwise([*face, face[0]])):
-                return point
-    middle: FloatArray = (first.mean(axis=0) + second.mean(axis=0)) / 2.0
-    return middle
+            raise _broken(f"has triangles that {overlap},", middle, "a surface that does not cross itself")
 
 
 # --- from planes ------------------------------------------------------------------------------------------------------

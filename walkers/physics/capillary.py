@@ -28,7 +28,7 @@ _AIR_PRESSURE = 101_325.0
 class BridgeLiquid:
     """Numbers of the liquid of bridges, SI units; ``law`` is the name of their law (`walkers.physics.laws`).
 
-    ``viscosity`` is that of the bridges, ``volume_fraction`` the volume of the liquid on a bead over that of the bead.
+    ``viscosity`` belongs to the bridges; ``volume_fraction`` is the liquid on a bead over the volume of the bead.
     If ``meniscus_radius`` (m) is not zero, it gives the volumes of bridges instead (`bridge_volume`).
     Bridges take ``conserved`` liquid from the films of their beads.
     """
@@ -51,9 +51,9 @@ def derjaguin_radius(radius_1: float, radius_2: float) -> float:
 def bridge_volume(radius: float, other_radius: float, liquid: BridgeLiquid) -> float:
     """Volume of a bridge of a bead to a bead or a plane (infinite radius), m³; raises `ValueError` if there is none.
 
-    It is what both surfaces give (`share_of_bead`). Beads on a wetted plate exchange liquid through its film instead,
-    until all menisci have the suction γ/r of one ``meniscus_radius`` r: the volume is that of the touching bridge with
-    this suction, by the Young–Laplace equation.
+    Both surfaces contribute to it (`share_of_bead`). Beads on a wetted plate exchange liquid through its film instead,
+    until all menisci have the suction γ/r of one ``meniscus_radius`` r: the touching bridge with this suction has
+    the volume, by the Young–Laplace equation.
     """
     if liquid.meniscus_radius:
         shape = (*sorted((radius, other_radius)), liquid.contact_angle, liquid.meniscus_radius)
@@ -83,7 +83,7 @@ def cavitation_gap(liquid: BridgeLiquid) -> float:
 
 
 def largest_normal(reduced_radius: float, roughness: float, liquid: BridgeLiquid) -> float:
-    """Upper bound of a bridge's N: that of much liquid between touching surfaces, N s/m; radius and roughness in m."""
+    """Upper bound of a bridge's N, for much liquid between touching surfaces, N s/m; radius and roughness in m."""
     return 6.0 * pi * liquid.viscosity * reduced_radius**2 / (roughness + cavitation_gap(liquid))
 
 

@@ -55,7 +55,7 @@ class TimeStepLimits:
     viscous: float
 
     def recommended(self, *, loose: bool) -> tuple[float, str]:
-        """Largest step (s) within the shares of all limits, for loose beads or walkers; and what determines it."""
+        """Largest step (s) within the shares of all limits, for loose beads or walkers; and the lowest limit."""
         shares = auto_fractions(loose=loose)
         steps = [(shares[name] * at, f"{shares[name]:g} of the {name} limit") for name, at in vars(self).items()]
         longest = LONGEST_WALKER_STEP

@@ -1,4 +1,4 @@
-"""Laws of users: their files are executed, and what they return is checked."""
+"""Laws of users: their files are executed, and the curves that they return are checked."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _curve(law: BridgeLaw, surfaces: Surfaces) -> Curve:
 
 
 def _called(function: Callable[..., Any], *arguments: object) -> Any:
-    """What a user's function returns; `UnusableLawError` for its errors, exits among them."""
+    """The value that a user's function returns; `UnusableLawError` for its errors, exits among them."""
     try:
         return function(*arguments)
     except (UnusableLawError, KeyboardInterrupt):

@@ -152,7 +152,7 @@ def _secure(folder: Path) -> None:
 
 
 def _is_as_compiled(place: Path, fingerprint: str) -> bool:
-    """Whether a compiled model is that of its record, and no other user can write the two."""
+    """Whether a compiled model agrees with its record, and no other user can write the two."""
     record = place.with_suffix(".json")
     with suppress(OSError, ValueError):
         return _is_safe(place) and _is_safe(record) and read_json(record) == _record(place, fingerprint)
@@ -174,7 +174,7 @@ def _check_version(engine: Engine) -> None:
 
 
 def _compile(place: Path, fingerprint: str) -> None:
-    """Compile the model, and write its checksum and what it was compiled from beside it."""
+    """Compile the model, and write its checksum and the fingerprint of its sources beside it."""
     compiler, mpi = shutil.which("g++"), shutil.which("mpicxx")
     if compiler is None or mpi is None or not _HEADERS.is_dir():
         raise ContactModelMissing(f"it is compiled once; install what that needs: apt-get install {_PACKAGES}")

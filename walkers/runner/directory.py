@@ -77,7 +77,7 @@ def name_of(case_name: str) -> str:
 
 
 def is_run_name(name: str) -> bool:
-    """Whether a name may be that of a run directory: it ends in twelve hex digits."""
+    """Whether a run directory may have a name: it ends in twelve hex digits."""
     return re.fullmatch(r".+-[0-9a-f]{12}", name) is not None
 
 
@@ -87,7 +87,7 @@ def unfinished(place: Path) -> Path:
 
 
 def holds_unfinished(directory: Path) -> bool:
-    """Whether a directory is that of an unfinished run: it contains a case, or only files that are written earlier."""
+    """Whether a directory has an unfinished run: it contains a case, or only files that are written earlier."""
     try:
         names = {path.name for path in directory.iterdir()}
     except OSError:  # unreadable
@@ -112,7 +112,7 @@ def _case_in(directory: Path, *_file: int) -> Case:
 
 
 def with_recorded_law(case: Case, directory: Path) -> Case:
-    """A case with the bridges that a directory has of a law of a user, whose file is not executed."""
+    """A case with the bridges of a user's law as a directory has recorded them; the user's file is not executed."""
     if case.liquid.law in LAWS:
         return case
     from walkers.templates.bridge_tables import RecordedLaw
@@ -172,7 +172,7 @@ def is_deck_folder(folder: Path) -> bool:
 
 
 def is_finished(directory: Path) -> bool:
-    """Whether a directory is that of a finished run: it has a manifest."""
+    """Whether a directory has a finished run: it has a manifest."""
     return (directory / MANIFEST_NAME).is_file()
 
 

@@ -21,8 +21,8 @@ _PATIENCE_SECONDS = 20.0
 def software() -> dict[str, Any]:
     """Versions of the program, of Python and of the required packages, as manifests have them; looked up once (30 ms).
 
-    ``commit`` is that of the checkout from which the program runs (`commit_of`), else of the checkout from which it was
-    built, which setuptools-scm adds to the version; None if unknown.
+    ``commit`` belongs to the checkout from which the program runs (`commit_of`), else to the checkout from which it was
+    built (setuptools-scm adds it to the version); None if unknown.
     """
     try:
         version, required = metadata.version(PROJECT), metadata.requires(PROJECT) or []

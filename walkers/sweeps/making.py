@@ -313,7 +313,7 @@ def _make_together(
 ) -> list[str]:
     """Make runs in one deck for a number of cycles; return those with constant velocities or all of their cycles."""
     tried = {name: case.for_cycles(cycles) for name, case in cases.items()}
-    deck, started = decks.render_shared_deck(list(tried.values())), time.time()
+    deck, started = decks.compose(decks.plan_of(*tried.values())), time.time()
     first = next(iter(cases))
     incomplete = on_disk.unfinished(out / first)
     shutil.rmtree(incomplete, ignore_errors=True)

@@ -115,7 +115,7 @@ def bridge_tables(
     """The bridge tables of a deck: one for every two surfaces that may meet (beads of different types never meet).
 
     The surfaces have the contact and the liquid of each atom type of beads, the sizes atom type and radius (m) of the
-    beads; the default law is that of each liquid. Raises `UnusableLawError` as `tabulated`.
+    beads; without a law, each liquid has its own. Raises `UnusableLawError` as `tabulated`.
     """
     parts = ["# Gap (m), pull (N), resistances: normal, sliding (N s/m), coupling (N s), rolling (N m s).\n"]
     for kind, (contact, liquid) in enumerate(surfaces, 1):

@@ -37,7 +37,7 @@ _NAMES = {
     **{"loads": LOADS_NAME, "facets": FACETS_NAME, "run": RUN_NAME, "scale": SCALE_NAME},
 }
 CONTENT_VERSION = 9
-"""Version of what decks compute, part of the names of runs: increase it if a case gives other numbers.
+"""Version of the numbers of decks, part of the names of runs: increase it if a case gives other numbers.
 
 Do not increase it if decks with another text give the same numbers bit for bit.
 """
@@ -55,7 +55,7 @@ Sorting 60 beads into 1.5e9 bins made a run 50 times slower; above 2^31 the engi
 """
 _LEAST_NEIGHBOURS = 100
 _SILENCE = 600.0  # s; piles of 200 beads write some thirty lines a second, those of 20,000 one in four seconds
-_SLOWEST_STEP = 4e-5  # s a bead: thirty times what it takes with two beads alone, a hundred times that in a pile
+_SLOWEST_STEP = 4e-5  # s a bead: thirty times the time with two beads alone, a hundred times the time in a pile
 _LOG_BYTES = 64e6  # walkers write some 50 kB, a segment of a pile as much …
 _LOG_BYTES_PER_CYCLE = 1e4  # … and a cycle some 500 bytes
 _SKIN = 2e-4
@@ -66,7 +66,7 @@ _SKIN = 2e-4
 class Deck:
     """A deck that is ready to run."""
 
-    text: str  # what LIGGGHTS reads
+    text: str  # the input script
     files: Mapping[str, str]  # further input files, name to text
     layout: Layout  # of its output
     box: tuple[Vector, Vector]  # corners of the simulation box, m
@@ -140,11 +140,6 @@ def render_deck(case: Case, segment: Segment | None = None) -> Deck:
     Numbers are in full precision: the shortest text that reads back as the same double.
     """
     return compose(plan_of(case, segment=segment))
-
-
-def render_shared_deck(cases: Sequence[Case]) -> Deck:
-    """Render one deck for the walkers of several cases, in their order; raises `ValueError` as `place`."""
-    return compose(plan_of(*cases))
 
 
 def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:

@@ -35,7 +35,7 @@ class Bead:
     spin: Vector = (0.0, 0.0, 0.0)
     surface: int = 1  # number of its surface in the scene, from 1
     loading: int = 0  # index of its loading in the scene, from 0
-    density: float | None = None  # None: that of the case
+    density: float | None = None  # None: as in the case
 
 
 Loading = tuple[Vector, ...]
@@ -50,7 +50,7 @@ class Scene:
     walls: tuple[Wall, ...]
     lower: Vector
     upper: Vector
-    surfaces: tuple[Surface, ...] = ()  # default: that of the case
+    surfaces: tuple[Surface, ...] = ()  # empty: one, of the case
     loadings: tuple[Loading, ...] = ()
 
 

@@ -2,9 +2,9 @@
 
 It was made for equal spheres of radius R; unequal spheres and planes use the Derjaguin radius, R = 2R*
 (`walkers.physics.capillary.derjaguin_radius`). At a volume of 0.09 R³ on a plane its pull at contact is twice
-Young–Laplace's. They give no rupture distance; that of Lian et al. (1993) is used
-(`walkers.physics.capillary.rupture_distance`). The resistances are those of `walkers.physics.reynolds`. Numbers of
-equations are those in the source of YADE (its ViscElCapPhys).
+Young–Laplace's. They give no rupture distance; Lian et al. (1993) do
+(`walkers.physics.capillary.rupture_distance`). `walkers.physics.reynolds` gives the resistances. Equations are numbered
+as in the source of YADE (its ViscElCapPhys).
 
 References
 ----------

@@ -1,8 +1,8 @@
 """The fit of Willett et al. (2000) to their solutions of the Young–Laplace equation, F = 2πRγ exp(f1 - f2 exp(…)).
 
 It was made for equal spheres of radius R, volumes of 0.1 to 10 per cent of R³ and contact angles up to 50°; unequal
-spheres and planes use the Derjaguin radius, R = 2R* (`walkers.physics.capillary.derjaguin_radius`). The resistances are
-those of `walkers.physics.reynolds`. Coefficients are those in the source of YADE (its ViscElCapPhys).
+spheres and planes use the Derjaguin radius, R = 2R* (`walkers.physics.capillary.derjaguin_radius`).
+`walkers.physics.reynolds` gives the resistances. Coefficients are as in the source of YADE (its ViscElCapPhys).
 
 References
 ----------

@@ -6,7 +6,7 @@ as the square root of the remaining gap, with an infinite slope. It is smooth in
 in t through a few dozen solutions is as accurate as the equation. The user's cache keeps the polynomial of each shape
 of bridge, which saves a tenth of a second.
 
-The resistances are those of `walkers.physics.reynolds`.
+`walkers.physics.reynolds` gives the resistances.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """As young-laplace, but bridges form when the liquid films touch, not when the beads touch.
 
 A film of φ of a bead's volume is R ((1 + φ)^⅓ - 1) thick: 1 µm for a bead of 0.3 mm and φ = 0.01. Between beads a
-bridge forms at a gap of both films, at a wall at that of the bead's alone (nothing is known of the wall's).
+bridge forms at a gap of both films, at a wall at a gap of the bead's film (nothing is known of a film on the wall).
 """
 
 from __future__ import annotations
