@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from tests.conftest import call, document, make_case, to_toml
-from walkers import load_case, load_sweep, run
+from walkers import load_case, run
 from walkers.check.crosscheck import compare
 from walkers.inputs.case import Case
+from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.motion import boundary_motion
 from walkers.postprocess.numbers import declared
 from walkers.postprocess.sides import REST
