@@ -16,8 +16,8 @@ def rendered(package: str, template: str, **values: Any) -> str:
     """The text of a template of a package.
 
     Filters: ``number`` (shortest text that reads back as the same double) and ``numbers`` of several, ``format`` as
-    Python's for numbers, with a dash for missing ones, ``cell`` for a cell of a table, ``code`` of Python for a value,
-    ``plain`` for a user's text in Markdown. `jinja2.UndefinedError` if it names a value that is not given.
+    Python's for numbers, with a dash for missing ones, ``plain`` for a user's text in Markdown.
+    `jinja2.UndefinedError` if it names a value that is not given.
     """
     return environment(package).get_template(template).render(**values)
 
@@ -53,8 +53,6 @@ _FILTERS: Mapping[str, Callable[..., Any]] = {
     "number": lambda value: repr(float(value)),
     "numbers": lambda values: " ".join([repr(float(value)) for value in values]),
     "format": _formatted,
-    "cell": lambda text: str(text).replace("|", "\\|"),
-    "code": repr,
     "plain": _plain,
     "any": any,
     "zip": zip,

@@ -110,7 +110,9 @@ def number_of(key: str, value: Value) -> float:
 
 
 def plain(value: Value) -> Any:
-    """A value without its unit: a number where it is a quantity, else as it is."""
+    """A value, or the values of a list, without unit: a number where it is a quantity, else as it is."""
+    if isinstance(value, list):
+        return [*map(plain, value)]
     quantity = as_quantity(value) if isinstance(value, str) else None
     return quantity[0] if quantity else value
 

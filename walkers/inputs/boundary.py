@@ -155,6 +155,7 @@ class Boundary(Table):
             yield from cls.problems_of(_VESSEL, given, place)
         elif named:
             yield Problem(within(place, "shape"), None, f"expected none beside {place}.{named}")
+            return
         sizes = ("height",) if "planes" in given else SIZES.get(shape, ())
         for name in ("opening", "width", "height") if shape in SIZES else ():
             if name in sizes and name not in given:

@@ -262,11 +262,8 @@ class Case(Table):
             except InputError as error:  # keys that a wrong name would have given are not missing too
                 wrong = {problem.key for problem in error.problems if problem.key in GIVEN_BY}
                 given = tuple(begin for name in wrong for begin in GIVEN_BY[name])
-                kept = [
-                    problem
-                    for problem in error.problems
-                    if problem.value or problem.key in wrong or not problem.key.startswith(given)
-                ]
+                implied = {problem for problem in error.problems if not problem.value and problem.key.startswith(given)}
+                kept = [problem for problem in error.problems if problem.key in wrong or problem not in implied]
                 raise InputError(source, kept) from error
             try:
                 case = resolve(case.but(name=name, document=document, sources=sources))
@@ -282,8 +279,7 @@ class Case(Table):
             try:
                 low, high = (validated(Case, changed(Case, tables, {name: end}), source).value_of(name) for end in ends)
             except InputError as error:
-                problems = [replace(problem, key=f"uncertain.{problem.key}") for problem in error.problems]
-                raise InputError(source, problems) from error
+                raise error.below("uncertain", source) from error
             value = self.value_of(name)
             if value is None and alternatives(Case, name):
                 message = "expected a value that the case has: it says the same in other words"
@@ -467,10 +463,8 @@ class Case(Table):
     @cached_property
     def shifted_rows(self) -> int:
         """Even length of the rows of walkers if every second row begins facing left, so that neighbours meet; or 0."""
-        if not (
-            self.meets
-            and any(walkers.facing == "both" and not isclose(walkers.angle_spread, pi) for walkers in self.walkers)
-        ):
+        both = [walkers for walkers in self.walkers if walkers.facing == "both"]
+        if not self.meets or all(isclose(walkers.angle_spread, pi) for walkers in both):
             return 0
         rows = [x for x, _ in self.boundary.grid(sum(walkers.replicates for walkers in self.walkers), 1.0)]
         length = rows.count(rows[0])

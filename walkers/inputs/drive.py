@@ -49,9 +49,7 @@ def _axis(value: object) -> object:
     if value in (None, "x", "y", "z"):
         return value
     if isinstance(value, (list, tuple)) and len(value) == 3 and any(value):
-        numbers = tuple(
-            float(component) for component in value if type(component) in (int, float) and isfinite(component)
-        )
+        numbers = tuple(float(x) for x in value if type(x) in (int, float) and isfinite(x))
         if len(numbers) == 3:
             return numbers
     raise ValueError("expected 'x', 'y' or 'z', or a direction such as [1, 0, 1]")
@@ -196,9 +194,9 @@ class Excitation:
     @property
     def frequency(self) -> float:
         """Frequency of the cycle, the common period of the harmonics, Hz; raises `ValueError` if they have none."""
-        return (
-            self.record.frequencies[0] if self.record else common_frequency([sine.frequency for sine in self.harmonics])
-        )
+        if self.record:
+            return self.record.frequencies[0]
+        return common_frequency([sine.frequency for sine in self.harmonics])
 
     @property
     def fastest(self) -> float:

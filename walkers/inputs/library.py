@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cache
 from importlib import resources
 from math import sqrt
@@ -118,9 +117,7 @@ def _contents() -> dict[str, Any]:
 def _number(table: Mapping[str, Any], of: Collection, liquids: tuple[str, ...] = ()) -> LibraryNumber:
     source = table.get("source", f"calibrated with {' and '.join(liquids)}" if liquids else "")
     place, ends = ", ".join(filter(None, (of.place, source))), table.get("range")
-    return LibraryNumber(
-        table["value"], place, ends and (ends[0], ends[1]), liquids, of.origin, table.get("log", False)
-    )
+    return LibraryNumber(table["value"], place, ends and tuple(ends), liquids, of.origin, table.get("log", False))
 
 
 def check_library(tables: object, source: str) -> None:
@@ -134,10 +131,8 @@ def check_library(tables: object, source: str) -> None:
     kinds = ("materials", "liquids")
     again = [f"{kind}.{name}" for kind in kinds for name in tables.get(kind, ()) if name in shipped[kind]]
     problems = [Problem(key, None, f"{text}another name") for key in again]
-    materials, pairs = (
-        Library(tables).names("materials"),
-        [sorted(pair["materials"]) for pair in shipped["surface_pairs"]],
-    )
+    materials = Library(tables).names("materials")
+    pairs = [sorted(pair["materials"]) for pair in shipped["surface_pairs"]]
     given = list(pairs)
     for number, names in enumerate(pair["materials"] for pair in tables.get("surface_pairs", ())):
         key, pair = f"surface_pairs[{number}]", sorted(names)
@@ -160,9 +155,7 @@ def library_of(document: Mapping[str, Any], source: str = "") -> Library:
     try:
         check_library(_tables_in(users), source)
     except InputError as error:
-        raise InputError(
-            source, [replace(problem, key=f"library.{problem.key}") for problem in error.problems]
-        ) from error
+        raise error.below("library", source) from error
     return Library(users)
 
 

@@ -87,10 +87,8 @@ def contact_loads(case: Case, walkers: Walkers | None = None) -> list[Load]:
     density, gravity = case.beads.density, case.pressing_gravity
     held = [(radius, inf, bead_volume(radius) * density * gravity) for radius in make.radii]
     loads = []
-    for radius, other_radius, weight in [
-        *held,
-        *((make.radii[first], make.radii[second], 0.0) for first, second in make.pairs),
-    ]:
+    pairs = [(make.radii[first], make.radii[second], 0.0) for first, second in make.pairs]
+    for radius, other_radius, weight in [*held, *pairs]:
         bridge = bridge_at_rest(case, radius, other_radius)
         overlap = hertz_overlap(bridge.pull + weight, bridge.surfaces.reduced_radius, modulus)
         loads.append(bridge._replace(overlap=overlap))

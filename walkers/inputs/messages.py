@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, TypeVar
@@ -50,6 +50,11 @@ def quoted(document: Mapping[str, Any], parts: Sequence[str | int]) -> str | Non
     return None if value is MISSING else shown(value)
 
 
+def _quoting(problems: Iterable[Problem], document: Mapping[str, Any]) -> list[Problem]:
+    """Problems with the values at fault as the document has them."""
+    return [replace(problem, value=problem.value or quoted(document, parts_of(problem.key))) for problem in problems]
+
+
 @contextmanager
 def blaming(source: str, document: Mapping[str, Any] | None = None) -> Iterator[None]:
     """Add to errors that name no source this one, and the value at fault as the document has it."""
@@ -58,10 +63,7 @@ def blaming(source: str, document: Mapping[str, Any] | None = None) -> Iterator[
     except InputError as error:
         if error.source:
             raise
-        blamed = [
-            (problem, problem.value or quoted(document or {}, parts_of(problem.key))) for problem in error.problems
-        ]
-        raise InputError(source, [replace(problem, value=value) for problem, value in blamed]) from error
+        raise InputError(source, _quoting(error.problems, document or {})) from error
 
 
 @contextmanager
@@ -87,10 +89,7 @@ def validated(
 
     Raises `InputError` with all that pydantic finds wrong, and with ``further`` problems.
     """
-    problems = {
-        problem.key: replace(problem, value=problem.value or quoted(document, parts_of(problem.key)))
-        for problem in further
-    }
+    problems = {problem.key: problem for problem in _quoting(further, document)}
     try:
         file = model.model_validate(document, context=WRITTEN)
     except ValidationError as error:
@@ -143,11 +142,11 @@ def _elsewhere(parts: Sequence[str | int]) -> str:
 def _in_a_table(parts: Sequence[str | int], field: FieldInfo | None) -> str:
     """How a table begins; empty for other keys."""
     table = table_in(field.annotation) if field else None
-    texts = (
-        {name: example_of(entry).partition("such as ")[2] for name, entry in keys_in(table).items()} if table else {}
-    )
+    if table is None:
+        return ""
+    texts = {name: example_of(entry).partition("such as ")[2] for name, entry in keys_in(table).items()}
     such = next((f", such as {name} = {text}" for name, text in texts.items() if text), "")
-    return f"a table [{joined(parts)}]{such}" if table else ""
+    return f"a table [{joined(parts)}]{such}"
 
 
 def _place(location: Sequence[str | int], keys: Collection[str]) -> str:

@@ -173,13 +173,10 @@ def with_run(case: Case) -> Case:
         raise unusable("run.time_step", f'{message}"auto", or allow_unstable = true')
     time_step, steps = fit_into_cycle(largest, frequency, samples)
     fewest, most = case.excitation.cycles
-    cycles_needed: float = table.cycles or table.most_cycles or ceil(fewest) or int(min(_MOST_CYCLES, most))
+    needed: float = table.cycles or table.most_cycles or ceil(fewest) or int(min(_MOST_CYCLES, most))
     if table.duration is not None:
-        cycles_needed = table.duration * case.excitation.frequency * (1.0 - 1e-12)
-    cycles, until_steady = (
-        ceil(cycles_needed / cycles_per_sample) * cycles_per_sample,
-        _until_steady(case, cycles_per_sample),
-    )
+        needed = table.duration * case.excitation.frequency * (1.0 - 1e-12)
+    cycles, until_steady = ceil(needed / cycles_per_sample) * cycles_per_sample, _until_steady(case, cycles_per_sample)
     settling = table.settling_cycles
     if settling is None:
         settling = settling_of(cycles) if case.walkers else 0
@@ -267,10 +264,8 @@ def _sampling(case: Case) -> tuple[int, int, int]:
     table = case.run
     samples, cycles_per_sample = table.samples_per_cycle or _SAMPLES, 1
     if table.samples_per_cycle is None and (table.frames_per_second is not None or case.loose):
-        cycles_needed = case.excitation.frequency / (table.frames_per_second or _FRAMES_PER_SECOND)
-        samples, cycles_per_sample = (
-            (round(1.0 / cycles_needed), 1) if cycles_needed < 1.0 else (1, round(cycles_needed))
-        )
+        needed = case.excitation.frequency / (table.frames_per_second or _FRAMES_PER_SECOND)
+        samples, cycles_per_sample = (round(1.0 / needed), 1) if needed < 1.0 else (1, round(needed))
     name, bridges = "run.bridge_samples_per_cycle", table.bridge_samples_per_cycle
     if bridges is None:
         return samples, cycles_per_sample, 1 if case.loose else samples

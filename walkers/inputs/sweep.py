@@ -132,10 +132,7 @@ class Sweep:
     @cached_property
     def values(self) -> list[tuple[Any, ...]]:
         """The points without units."""
-        return [
-            tuple([*map(plain, value)] if isinstance(value, list) else plain(value) for value in row)
-            for row in self.rows
-        ]
+        return [tuple(map(plain, row)) for row in self.rows]
 
     @cached_property
     def units(self) -> dict[str, str | None]:
@@ -188,10 +185,9 @@ def load_sweep(sweep: str | Path | Mapping[str, Any], changes: Mapping[str, Valu
     with blaming_changes(changes or {}):
         expanded = expand(document, source=source, name=name, folder=path.parent)
         text = "varies in this sweep and cannot be set"
-        if problems := [
-            Problem(key, f'"{value}"', text) for key, value in (changes or {}).items() if key in expanded.keys
-        ]:
-            raise InputError(source, problems)
+        varied = {key: value for key, value in (changes or {}).items() if key in expanded.keys}
+        if varied:
+            raise InputError(source, [Problem(key, f'"{value}"', text) for key, value in varied.items()])
     return expanded
 
 

@@ -62,6 +62,11 @@ class Choice(NamedTuple):
         """The expressions, such as ``radii or mean_radius and sin_delta``."""
         return " or ".join(" and ".join(names) for names in self.expressions)
 
+    def excluded_by(self, name: str) -> set[str]:
+        """Keys that a key excludes."""
+        without = [names for names in self.expressions if name not in names]
+        return {key for names in without for key in names} if len(without) < len(self.expressions) else set()
+
 
 class Table(BaseModel):
     """A table of a file. Its fields are the keys; values are in SI units; unknown keys are refused."""
@@ -233,13 +238,7 @@ def alternatives(model: type[Table], name: str) -> set[str]:
         if (table := table_in(field.annotation) if field else None) is None:
             return set()
         model = table
-    expressions = [
-        names
-        for choice in model.choices
-        if any(last in names for names in choice.expressions)
-        for names in choice.expressions
-    ]
-    return {joined([*path, name]) for names in expressions if last not in names for name in names}
+    return {joined([*path, name]) for choice in model.choices for name in choice.excluded_by(str(last))}
 
 
 def changed(model: type[Table], document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -288,10 +288,8 @@ class Vessel:
                 halves = []
                 for side in range(3):
                     begin, end = self._ends(triangle, side)
-                    within = all(
-                        self.faces[neighbour] == face for neighbour, _ in self.sharing[frozenset((begin, end))]
-                    )
-                    within &= len(self.sharing[frozenset((begin, end))]) > 1
+                    pair = self.sharing[frozenset((begin, end))]
+                    within = len(pair) > 1 and all(self.faces[neighbour] == face for neighbour, _ in pair)
                     inward = _vector(self._inward(triangle, side))
                     halves.append((_vector(self.points[begin]), inward, _ACROSS if within else _CLOSED))
                 cells.append(tuple(halves))

@@ -117,9 +117,7 @@ class _Family:
         arcs, pressure, length, curvatures = x[..., :2], x[..., 2:3], x[..., 3:4], np.array(self.curvatures)
         at, slopes = length * _PLACES, curvatures * arcs
         turns = pressure * at
-        (of_slopes, of_halves), (swings, halves) = (
-            _sinc(np.multiply.outer(_HALVES, argument)) for argument in (slopes, turns)
-        )
+        (of_slopes, of_halves), (swings, halves) = (_sinc(np.multiply.outer(_HALVES, x)) for x in (slopes, turns))
         radii, rises = arcs * of_slopes, 0.5 * curvatures * arcs**2 * of_halves**2
         caps = pi / 6.0 * rises * (3.0 * radii**2 + rises**2)
         uprights, outwards = self.ends(slopes, radii)
@@ -342,10 +340,7 @@ def _stable(family: _Family, branch: _Branch, gaps: FloatArray) -> FloatArray:
 
     of_gaps, inside = cubics[:, :, 4].T.tolist(), (knots[pieces] < gaps) & (gaps < knots[-1])
     # At its left end a piece may begin above the gap by rounding.
-    arcs = [
-        brentq(ahead, lows[number], highs[number], (number,)) if inside[number] else lows[number]
-        for number in range(len(gaps))
-    ]
+    arcs = [brentq(ahead, lows[i], highs[i], (i,)) if inside[i] else lows[i] for i in range(len(gaps))]
     near = _cubic(cubics, (np.array(arcs) - lows)[:, None])
     bridges = family.solve(near, _GAP, gaps)
     bridges[gaps >= knots[-1]] = branch.bridges[-1]

@@ -28,11 +28,7 @@ def software() -> dict[str, Any]:
         version, required = metadata.version(PROJECT), metadata.requires(PROJECT) or []
     except metadata.PackageNotFoundError:
         version, required = "not installed", []
-    needed = [
-        match[0]
-        for requirement in required
-        if "extra ==" not in requirement and (match := re.match(r"[\w.-]+", requirement))
-    ]
+    needed = [re.split(r"[^\w.-]", line)[0] for line in required if "extra ==" not in line]
     packages = {}
     for name in needed:
         with suppress(metadata.PackageNotFoundError):

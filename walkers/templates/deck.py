@@ -249,12 +249,11 @@ def _facet(facet: Facet) -> str:
     def numbers(*values: float) -> str:
         return " ".join(repr(float(x)) for x in values)
 
-    cells = (
-        f"{len(cell)}  {'  '.join(numbers(*at, *direction, least) for at, direction, least in cell)}\n"
-        for cell in facet.cells
-    )
-    head = f"{facet.kind} {numbers(*facet.point)}  {numbers(*facet.along)}  {len(facet.cells)}\n"
-    return head + "".join(cells)
+    lines = [f"{facet.kind} {numbers(*facet.point)}  {numbers(*facet.along)}  {len(facet.cells)}\n"]
+    for cell in facet.cells:
+        halves = "  ".join(numbers(*point, *direction, least) for point, direction, least in cell)
+        lines.append(f"{len(cell)}  {halves}\n")
+    return "".join(lines)
 
 
 def _search(plan: Plan) -> dict[str, Any]:
