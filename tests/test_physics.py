@@ -28,7 +28,7 @@ from walkers.physics.capillary import BridgeLiquid, largest_normal, share_of_bea
 from walkers.physics.capillary import rupture_distance as rupture_of_lian
 from walkers.physics.laplace import force_curve, rupture_distance
 from walkers.physics.laws import LAWS, by_name, rabinovich, willett, young_laplace
-from walkers.physics.time_step import AUTO_FRACTIONS, WALKER_FRACTIONS
+from walkers.physics.time_step import FRACTIONS
 from walkers.show import summarise
 
 pytestmark = pytest.mark.filterwarnings("ignore::walkers.physics.laws.ExecutedLawWarning")
@@ -458,7 +458,7 @@ def test_auto_respects_every_limit_with_margin(name: str) -> None:
     """And is no shorter than that asks for: loose beads by their own shares, walkers at most 4 µs."""
     case = load_case(name)
     limits = vars(limits_of(case))
-    shares = AUTO_FRACTIONS if case.loose else WALKER_FRACTIONS
+    shares = FRACTIONS[case.loose]
     assert shares.keys() == limits.keys()
     assert all(0.0 < share <= 0.5 for share in shares.values())
     allowed = min(share * limits[limit] for limit, share in shares.items())

@@ -18,7 +18,7 @@ from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.run import CONSTANT, limits_of
 from walkers.inputs.units import ACCELERATION_OF_ONE_G, MODULUS, parse_quantity
 from walkers.physics.capillary import bead_volume, capillary_force_limit_at_wall
-from walkers.physics.time_step import auto_fractions
+from walkers.physics.time_step import FRACTIONS
 from walkers.rounding import counted, percent
 from walkers.runner.launch import cores_here
 from walkers.templates.deck import RESTING_SEGMENTS, settling_steps
@@ -154,7 +154,7 @@ def summarise(case: Case) -> dict[str, Any]:
             "step": run.time_step,
             "limits": {name: limit if isfinite(limit) else None for name, limit in limits.items()},
             "share": {name: run.time_step / limit for name, limit in limits.items()},
-            "auto": dict(auto_fractions(loose=case.loose)),
+            "auto": dict(FRACTIONS[case.loose]),
         },
         "run": {
             "steps_per_cycle": run.steps_per_cycle,

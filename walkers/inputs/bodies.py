@@ -14,7 +14,7 @@ from itertools import combinations
 from math import acos, asin, atan2, cos, dist, hypot, pi, sin, sqrt
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from walkers.inputs import units
 from walkers.inputs.table import Choice, Filled, Indirect, Table, key
@@ -26,8 +26,6 @@ Apart = Callable[[int, int], float]
 Places = list[tuple[float, float]]
 Pairs = tuple[tuple[int, int], ...]
 _Place = tuple[SignedLength, SignedLength]
-_Range = tuple[Radius, Radius]
-_DiameterRange = tuple[Diameter, Diameter]
 _FEW = Field(min_length=2, max_length=100)
 MOST_BEADS = 200_000
 _LEAST_LEVER = 0.1
@@ -35,6 +33,17 @@ _LEAST_LEVER = 0.1
 _TOUCHING = 0.02
 """Radii by which beads that are given places may be apart and still touch."""
 _TOO_SMALL = "a bead is too small to touch two beads that touch each other; expected a larger one"
+
+
+def _ascending(ends: tuple[float, float]) -> tuple[float, float]:
+    """The ends of a range; raises `ValueError` if the larger one is first."""
+    if ends[0] > ends[1]:
+        raise ValueError("expected the smaller one first")
+    return ends
+
+
+_Range = Annotated[tuple[Radius, Radius], AfterValidator(_ascending)]
+_DiameterRange = Annotated[tuple[Diameter, Diameter], AfterValidator(_ascending)]
 
 
 class Arrangement(NamedTuple):
@@ -160,7 +169,7 @@ class Walkers(Table):
     )
     angle: units.Angle = key("Angle at the start between the whole walker and that direction.", 0.0)
     angle_spread: units.NonNegativeAngle = key("Range of the random angle at the start: `angle` ± this.", pi / 180.0)
-    gap: Annotated[Filled[SignedLength], units.AUTO] = key(
+    gap: Annotated[Filled[Annotated[SignedLength, Field(le=0)]], units.AUTO] = key(
         "Gap at all contacts at the start, negative for overlap. `auto`: repulsion and pull balance.", None
     )
     gap_spread: Number = key("Range of the random factor of the overlap of each walker: 1 ± this.", 0.2, ge=0, lt=1)

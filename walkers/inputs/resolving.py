@@ -258,10 +258,6 @@ def _count(case: Case) -> Case:
     mixture = case.mixture
     if mixture is None:
         return case
-    for name in ("small", "large"):
-        low, high = getattr(mixture, name)
-        if low > high:
-            raise unusable(f"mixture.{name}", "expected the smaller radius first")
     if max(mixture.small_radii) >= min(mixture.large_radii):
         raise unusable("mixture.large", "expected radii above those of the small beads")
     if not case.boundary.closed:
@@ -428,9 +424,6 @@ def _spacing(case: Case) -> Case:
     """The spacing of walkers; starts in which beads overlap are refused."""
     for key, walkers in case.walkers_by_key.items():
         gap = walkers.gap
-        if gap is not None and gap > 0.0:
-            message = "expected zero or less: a bridge forms on contact, so beads with a gap have none"
-            raise unusable(f"{key}.gap", message)
         _check_held(case, walkers)
         overlap = max(load.overlap for load in contact_loads(case, walkers)) if gap is None else -gap
         if overlap * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):

@@ -145,8 +145,8 @@ class Vessel:
     @cached_property
     def parts(self) -> IntArray:
         """Number of the connected part of each triangle, shape (T,)."""
-        pairs = np.array([[triangle for triangle, _ in pair] for pair in self.sharing.values() if len(pair) == 2])
-        return _joined(pairs, len(self.triangles))
+        pairs = [[triangle for triangle, _ in pair] for pair in self.sharing.values() if len(pair) == 2]
+        return _joined(np.array(pairs, dtype=np.int64).reshape(-1, 2), len(self.triangles))
 
     @cached_property
     def faces(self) -> IntArray:
@@ -243,8 +243,8 @@ class Vessel:
         """The faces, first a level one at the bottom, if there is any."""
         faces = list(dict.fromkeys(self.faces.tolist()))
         bottom = _SAME * float(np.ptp(self.points, axis=0).max())
-        tops = {face: self.points[self.triangles[self.faces == face], 2].max() for face in faces}
-        level = [face for face in faces if self.normals[face, 2] > _COPLANAR and tops[face] < bottom]
+        upward = [face for face in faces if self.normals[face, 2] > _COPLANAR]
+        level = [face for face in upward if self.points[self.triangles[self.faces == face], 2].max() < bottom]
         return [*level[:1], *(face for face in faces if face not in level[:1])]
 
     def _inward(self, triangle: int, side: int) -> FloatArray:

@@ -29,21 +29,18 @@ from walkers.physics.contact import reduced_modulus
 if TYPE_CHECKING:  # numpy is not needed for a time step
     from walkers.physics.bridge import Roughness
 
-AUTO_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.2, "hertz": 0.1, "viscous": 0.4}
-"""Largest share of each limit for ``"auto"`` with loose beads. At 0.4 of the viscous limit (2 µs for glycerol), the
-climber and the pile were converged."""
-WALKER_FRACTIONS: Mapping[str, float] = {"rayleigh": 0.4, "hertz": 0.2, "viscous": 0.4}
-"""The same for cases with only walkers, which do not collide with each other: at 0.4 of the Rayleigh limit, velocities
-are within 0.25 % of those at 0.05 (Figs. 1b, 2, 3, 4a, 4b); between 0.59 and 0.71 of the limit they become wrong."""
+FRACTIONS: Mapping[bool, Mapping[str, float]] = {
+    True: {"rayleigh": 0.2, "hertz": 0.1, "viscous": 0.4},
+    False: {"rayleigh": 0.4, "hertz": 0.2, "viscous": 0.4},
+}
+"""Largest share of each limit for ``"auto"``, with loose beads and without. At 0.4 of the viscous limit (2 µs for
+glycerol), the climber and the pile were converged. Walkers alone do not collide with each other: at 0.4 of the Rayleigh
+limit, velocities are within 0.25 % of those at 0.05 (Figs. 1b, 2, 3, 4a, 4b); between 0.59 and 0.71 of the limit they
+become wrong."""
 LONGEST_WALKER_STEP = 4e-6
 """s; longest step of walkers, independent of their stiffness."""
 Bridged = Sequence[tuple[float, Sequence[float], float]]
 """Of each bead its radius, the radii of those that bridges join to it, m, and its damping by walls over that by one."""
-
-
-def auto_fractions(*, loose: bool) -> Mapping[str, float]:
-    """Largest share of each limit for ``"auto"``, with loose beads or only walkers."""
-    return AUTO_FRACTIONS if loose else WALKER_FRACTIONS
 
 
 @dataclass(frozen=True)
@@ -56,7 +53,7 @@ class TimeStepLimits:
 
     def recommended(self, *, loose: bool) -> tuple[float, str]:
         """Largest step (s) within the shares of all limits, for loose beads or walkers; and the lowest limit."""
-        shares = auto_fractions(loose=loose)
+        shares = FRACTIONS[loose]
         steps = [(shares[name] * at, f"{shares[name]:g} of the {name} limit") for name, at in vars(self).items()]
         longest = LONGEST_WALKER_STEP
         return min(steps if loose else [*steps, (longest, f"at most {longest * 1e6:g} us for walkers")])
