@@ -193,8 +193,8 @@ class Vessel:
 
     def volume(self, level: float = inf) -> float:
         """Volume below a level (m), m³."""
-        below = self.capped.surface.clip_closed_surface((0, 0, -1), (0, 0, min(level, self.height)))
-        return float(below.volume)
+        outward = Vessel(self.capped.points, self.capped.triangles[:, ::-1]).surface
+        return float(outward.clip_closed_surface("-z", origin=(0.0, 0.0, min(level, self.height))).volume)
 
     def clearance(self, places: FloatArray) -> FloatArray:
         """Distance of places from the surface, shape (n,), m, negative outside; above the rim it is open."""
