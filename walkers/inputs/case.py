@@ -284,11 +284,8 @@ class Case(Table):
             if value is None and alternatives(Case, name):
                 message = "expected a value that the case has: it says the same in other words"
                 raise InputError(source, [Problem(f"uncertain.{name}", None, message)])
-            if (
-                around
-                and isinstance(value, (int, float))
-                and abs(value - (low + high) / 2.0) > 0.500000001 * (high - low)
-            ):
+            slack = 1e-9 * (high - low)
+            if around and isinstance(value, (int, float)) and not low - slack <= value <= high + slack:
                 text = next((origin.text for origin in self.origins if origin.key == name), str(value))
                 message = f"expected a range that holds the case's own value, {text}"
                 raise InputError(source, [Problem(f"uncertain.{name}", None, message)])

@@ -118,7 +118,9 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
         bound = bound or f"{int(location[-1]) + 1}"
         message = f"has {number} value{'s' * (number != 1)}; expected {bound}{such}"
     elif kind == "missing":
-        message = f"missing; expected {_in_a_table(parts, field) or example}{_elsewhere(parts)}"
+        message = f"missing; expected {_in_a_table(parts, field) or example}"
+        if len(parts) > 1 and (entry := _GIVEN_ELSEWHERE.get(str(parts[0]))):
+            message += f", or {entry} of the library"
     else:
         form = _SENTENCES.get(kind, "expected {example}")
         words = {"example": example, "such": such, "meaning": field.description if field else "", "key": key}
@@ -132,11 +134,6 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
         if field and AUTO in field.metadata and kind != "value_error":
             message += ', or "auto"'
     return Problem(key, quoted(document, parts_of(key)), message)
-
-
-def _elsewhere(parts: Sequence[str | int]) -> str:
-    """The alternative to a key: a name of the library that gives it."""
-    return f", or {named} of the library" if (named := _GIVEN_ELSEWHERE.get(str(parts[0]))) and len(parts) > 1 else ""
 
 
 def _in_a_table(parts: Sequence[str | int], field: FieldInfo | None) -> str:

@@ -58,10 +58,8 @@ class Origin:
 def text_of(value: Any, kind: Kind | None = None) -> str:
     """A value of a case file as text: lists with commas, tables by their keys; numbers of a kind are in SI units."""
     if isinstance(value, (list, tuple)):
-        texts = [text_of(entry, kind) for entry in value]
-        return ", ".join(
-            f"({text})" if isinstance(entry, (list, tuple)) else text for entry, text in zip(value, texts, strict=True)
-        )
+        texts = ((text_of(entry, kind), isinstance(entry, (list, tuple))) for entry in value)
+        return ", ".join(f"({text})" if nested else text for text, nested in texts)
     if isinstance(value, bool):
         return "true" if value else "false"
     if kind is not None and isinstance(value, (int, float)):

@@ -204,12 +204,11 @@ def _vessel(case: Case) -> Case:
             vessel = vessel_of(case.document["meshes"][boundary.mesh], boundary.scale)
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise unusable("meshes", f"expected points and triangles of {boundary.mesh}") from error
-        boundary = boundary.but(planes=tuple(Plane(point=at, normal=normal) for at, normal in vessel.planes()))
-        if not boundary.planes:
-            boundary = boundary.but(
-                points=tuple(map(tuple, vessel.points.tolist())), triangles=tuple(map(tuple, vessel.triangles.tolist()))
-            )
-        case = case.but(boundary=boundary).filled("boundary.height", vessel.height, why)
+        surface: dict[str, Any] = {"planes": tuple(Plane(point=x, normal=normal) for x, normal in vessel.planes())}
+        if not surface["planes"]:
+            arrays = {"points": vessel.points, "triangles": vessel.triangles}
+            surface = {name: tuple(map(tuple, array.tolist())) for name, array in arrays.items()}
+        case = case.but(boundary=boundary.but(**surface)).filled("boundary.height", vessel.height, why)
     else:
         planes, why = _planes(boundary.planes), "of the planes"
         case = case.put("boundary.planes", planes)
