@@ -258,7 +258,7 @@ def test_bridges_drag_rolling_beads_that_nothing_else_holds(trajectory: Moved, f
     inertia = np.diag([dimer.total_mass, *(0.4 * mass for mass in dimer.masses)])
     pushed = np.array([dimer.total_mass * case.excitation.peak_acceleration, 0.0, 0.0])
     answer = np.linalg.solve(1j * case.excitation.largest.angular_frequency * inertia + resistance, pushed)
-    found = np.sqrt(2.0 * np.mean(moved.velocity[settled_samples(moved), 0, :, 0] ** 2, axis=0))
+    found = np.sqrt(2.0 * np.mean(moved.velocity[settled_samples(moved.case.run), 0, :, 0] ** 2, axis=0))
     np.testing.assert_allclose(found, abs(answer[0]), rtol=2e-4)
 
 

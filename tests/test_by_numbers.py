@@ -155,7 +155,7 @@ def test_measuring_begins_after_all_of_the_settling_cycles() -> None:
     tables = {"dimers": {"radii": ["0.3 mm", "0.2 mm"]}}
     case = case_of(**tables, run={"frames_per_second": 40, "cycles": 20, "settling_cycles": 7})
     assert (case.run.cycles_per_sample, case.run.samples_per_cycle, case.run.settled_strobes) == (2, 1, 4)
-    samples = settled_samples(resting(case, 11).group(0))
+    samples = settled_samples(resting(case, 11).group(0).case.run)
     assert (samples.start, samples.stop) == (4, 10)
 
 

@@ -260,6 +260,7 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     assert predicted["ratio"][0] < document["observations"][3]["value"] < predicted.pop("ratio")[2]
     assert not predicted
     runs = {path.name: path.stat().st_mtime_ns for path in out.glob("*/manifest.json")}
+    assert len([*out.glob("*/segments/*/beads.bin")]) == len(seen)  # of the runs that the calibration did not make
     again = calibrate(load_calibration(file), out, Options(2))
     assert {path.name: path.stat().st_mtime_ns for path in out.glob("*/manifest.json")} == runs
     assert json.loads(json.dumps(record_of(again))) == said

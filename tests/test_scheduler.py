@@ -29,6 +29,7 @@ from walkers.inputs.loads import dimer_of
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.tables import read_table
+from walkers.progress import Progress
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import case_of
 from walkers.runner.failures import WalkersMet
@@ -337,6 +338,20 @@ def test_another_sweep_of_the_same_name_is_told(sweep_file: Callable[..., str], 
     record = plan_sweep(first, out / "new", Options(1)).record
     with pytest.raises(SweepStopped, match="same name"):
         run_sweep(edited, out / "new", Options(1), on_progress=lambda _: write_record(record))
+
+
+def test_the_share_of_a_sweep_that_is_done_is_that_of_its_work(sweep_file: Callable[..., str], in_folder: Path) -> None:
+    """Of two points in decks of their own the first costs most: when it is done, so is most of the work, not half."""
+    loaded = load_sweep(sweep_file("[axes]\nrun.cycles = [80, 6]", "uneven"))
+    seen: list[Progress] = []
+    run_sweep(loaded, in_folder / "runs", Options(1), on_progress=seen.append)
+    shares = [progress.share for progress in seen]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert shares[0] < 0.5
+    halfway = [progress for progress in seen if progress.text.startswith("1 of 2 points done")]
+    assert halfway
+    assert all(progress.share > 0.7 and "of the work" in progress.text for progress in halfway)
 
 
 def test_what_parsl_is_told(tmp_path: Path) -> None:

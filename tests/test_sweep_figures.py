@@ -114,13 +114,30 @@ def test_pairs_of_beads_can_be_shown_by_their_asymmetry_and_texts_as_categories(
 def test_samples_have_a_panel_for_each_key(looked_through: Path) -> None:
     directory = looked_through / "sampled"
     table, figure = walkers.load(directory).table(), walkers.load(directory).figure()
-    for axes, key in zip(_panels(figure), ("bead_wall", "bead_bead"), strict=True):
-        assert axes.get_xlabel() == f"friction {key.replace('_', ' ')}"
+    panels = {axes.get_xlabel(): axes for axes in _panels(figure)}
+    assert panels.keys() == {"friction bead wall", "friction bead bead"}
+    for key in ("bead_wall", "bead_bead"):
+        axes = panels[f"friction {key.replace('_', ' ')}"]
         x, y, _ = _drawn(axes)[0]
         order = table.sort_values(f"contact.friction.{key}")
         assert list(x) == pytest.approx(order[f"contact.friction.{key}"].tolist())
         assert list(y) == pytest.approx((order["velocity"] * 1e3).tolist())
         assert axes.containers[0][0].get_linestyle() == "None"  # type: ignore[index]
+
+
+def test_panels_of_a_sample_begin_with_the_strongest_key_and_log_uniform_ranges_have_log_axes() -> None:
+    """Titles have rank correlations, here by hand: the sums of d² of six ranks are 68 and 48."""
+    keys = ("contact.restitution", "contact.friction.bead_wall")
+    rows = [[0.3, 0.1], [0.8, 0.2], [0.4, 0.3], [0.6, 0.4], [0.5, 0.6], [0.7, 0.5]]
+    table = _table(dict.fromkeys(keys, ""), rows, [keys])
+    table.attrs["sampled"] = dict(zip(keys, (False, True), strict=True))
+    table = table.assign(velocity=[6e-3, 5e-3, 4e-3, 3e-3, 2e-3, 1e-3])
+    table.attrs["units"] |= {"velocity": "m/s"}
+    panels = _panels(figure_of(table))
+    assert [axes.get_xlabel() for axes in panels] == ["friction bead wall", "restitution"]
+    assert [axes.get_xscale() for axes in panels] == ["log", "linear"]
+    titles = [axes.get_title(loc="left") for axes in panels]
+    assert titles == ["(a) rank correlation -0.94", "(b) rank correlation -0.37"]
 
 
 def test_keys_that_vary_one_at_a_time_are_each_shown_with_the_usual_others() -> None:

@@ -20,6 +20,7 @@ from walkers.inputs.library import unmeasured
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.sweep import Sweep, expand, load_sweep
 from walkers.postprocess import meetings
+from walkers.postprocess.dump import DumpError
 from walkers.postprocess.numbers import band_text
 from walkers.postprocess.uncertainty import SPREAD_NAME, spread_of
 from walkers.runner.files import read_json
@@ -272,6 +273,14 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     assert sum(spread.counts.values()) == 4
     # The headline has the band from now on, which holds it.
     done, band = walkers.run(case, runs_folder), spread.bands["velocity"]
+    # The report shows the figure; no draw keeps what only pictures read, and a picture says how to get it.
+    assert 'aria-label="spread"' in done.report().read_text("utf-8")
+    assert list(done.directory.rglob("beads.bin"))
+    drawn = [Path(place) for place in table["run"]]
+    assert not [path for place in drawn for path in place.rglob("beads.bin")]
+    assert read_json(drawn[0] / "manifest.json")["left_out"]
+    with pytest.raises(DumpError, match=r"beads\.bin was left out.*walkers run .*--force"):
+        walkers.load(drawn[0]).render()
     assert band["high"] - band["low"] > 1e-4  # m/s
     own, ends = done.result["velocity"], (done.result["velocity_low"], done.result["velocity_high"])
     assert ends == (min(band["low"], own), max(band["high"], own))

@@ -67,7 +67,8 @@ def test_velocity_is_the_strobed_displacement_over_time(moved: Group) -> None:
     assert np.all(walked.steady)
     # Twenty samples a cycle represent the gait: their mean velocity is the displacement a cycle.
     motion = gait(moved)
-    np.testing.assert_allclose(motion.velocity[settled_samples(moved)].mean(axis=0), walked.velocity, rtol=0.03)
+    settled = settled_samples(moved.case.run)
+    np.testing.assert_allclose(motion.velocity[settled].mean(axis=0), walked.velocity, rtol=0.03)
     # Sliding is velocity less rotation: the mass centre moves as its beads do, weighted by their masses.
     weights = moved.radii**3 / np.sum(moved.radii**3)
     np.testing.assert_allclose((motion.sliding[..., :2] + motion.rotation) @ weights, motion.velocity, atol=1e-12)
@@ -211,7 +212,9 @@ def test_means_do_not_depend_on_how_often_is_looked(groups: dict[int, Group]) ->
     np.testing.assert_allclose(few.sliding, many.sliding, atol=5e-3 * scale)
     np.testing.assert_allclose(few.open, many.open, atol=0.01)
     # What many samples say by themselves is near it, what few say is not.
-    sampled = {samples: gait(group).sliding[settled_samples(group)].mean(axis=0) for samples, group in groups.items()}
+    sampled = {
+        samples: gait(group).sliding[settled_samples(group.case.run)].mean(axis=0) for samples, group in groups.items()
+    }
     np.testing.assert_allclose(sampled[200], many.sliding, atol=1e-2 * scale)
     assert np.abs(sampled[20] - many.sliding).max() > 5e-3 * scale
 

@@ -360,7 +360,9 @@ class Run:
         return player_of(self.finished_directory, height=height).plot
 
     def report(self, to: str | Path | None = None) -> Path:
-        """Write a self-contained HTML report; see `walkers.postprocess.report.run.report_run`.
+        """Write a self-contained HTML report, with the figure of the run's spread if it has one.
+
+        See `walkers.postprocess.report.run.report_run`.
 
         Examples
         --------
@@ -368,8 +370,10 @@ class Run:
         'fig1b.html'
         """
         from walkers.postprocess.report.run import report_run
+        from walkers.sweeps.spread import figures_of_spread
 
-        return report_run(self.finished_directory, _path(to), self.origins)
+        figures = figures_of_spread(self.finished_directory)
+        return report_run(self.finished_directory, _path(to), self.origins, figures=figures)
 
     def spread(self, points: int = 32, *, progress: bool | None = None, **how: Any) -> Spread:
         """Run the case with uncertain values drawn from their ranges; see `walkers.sweeps.spread.run_spread`."""

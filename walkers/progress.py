@@ -33,10 +33,10 @@ def in_notebook() -> bool:
 
 
 @contextmanager
-def progress_of(name: str, wanted: bool | None = True) -> Iterator[Tell | None]:
+def progress_of(name: str, shown: bool | None = True) -> Iterator[Tell | None]:
     """Yield a function that shows the progress, or None if it is not wanted (None: it is wanted in notebooks only)."""
     notebook = in_notebook()
-    if not (notebook if wanted is None else wanted):
+    if not (notebook if shown is None else shown):
         yield None
         return
     stream, begin, due = sys.stdout if notebook else sys.stderr, time.monotonic(), _FIRST_LINE_SECONDS

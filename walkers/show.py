@@ -28,12 +28,13 @@ START_UP_SECONDS = 0.04
 _STEP_MICROSECONDS = 0.9
 _WALKER_MICROSECONDS = 0.22
 """Measured: 1.0 µs per step for one walker, 2.2 for 6, 6.2 for 24, 22 for 96, 2.6 for 9 in a tray."""
-_BEAD_STEPS_PER_SECOND = 10.5e6
-"""For loose beads; measured on a quiet core from settled piles on: 11.0 million with 200 beads, 10.2 with 1,630."""
-_SOLVING_SECONDS = 0.1
-"""For each shape of bridge without a cached solution."""
-_MEASURING_SECONDS = 0.037
-"""For the tables and the result of a run."""
+_BEAD_STEPS_PER_SECOND, _PILE_MICROSECONDS = 10.7e6, 1.5
+"""For loose beads, and per step in addition; measured from settled piles on, bead-steps per second: 11.0 million with
+200 beads and 10.2 with 1,630 on a quiet core, 5.7 million with 60 on a busy one."""
+_SOLVING_SECONDS = 0.25
+"""For each shape of bridge without a cached solution: measured 0.2 to 0.3."""
+_MEASURING_SECONDS, _FRAME_MICROSECONDS = 0.037, 30.0
+"""For the tables and the result of a run, and in addition for each bead of walkers in each frame."""
 PROGRAM_SECONDS = 1.5
 """For the imports of a program that runs cases."""
 _LOOSE_PACKING = 0.55
@@ -56,7 +57,8 @@ def predicted_seconds(case: Case, walkers: int | None = None) -> float:
     steps = cycles * run.steps_per_cycle + (RESTING_SEGMENTS * settling_steps(case) if run.rests else 0)
     count = pairs_of_beads(case) if walkers is None else walkers
     if case.loose:
-        seconds_a_step = case.count / (_BEAD_STEPS_PER_SECOND * (1.0 + _GAIN_PER_RANK * (run.ranks - 1)))
+        seconds_a_step = _PILE_MICROSECONDS * 1e-6
+        seconds_a_step += case.count / (_BEAD_STEPS_PER_SECOND * (1.0 + _GAIN_PER_RANK * (run.ranks - 1)))
     else:
         seconds_a_step = (_STEP_MICROSECONDS + _WALKER_MICROSECONDS * count) * 1e-6
     return START_UP_SECONDS * segments + steps * seconds_a_step
@@ -77,7 +79,13 @@ def predicted_overhead(cases: Iterable[Case]) -> float:
         for second in (inf, *radii[place:])
         for bridge in Surfaces.of(radius, second, liquid, roughness).volumes
     ]
-    return _SOLVING_SECONDS * unsolved(bridges) + _MEASURING_SECONDS * len(cases)
+    places = sum(
+        case.count * case.run.attempts[0] / case.run.cycles_per_sample * case.run.samples_per_cycle
+        for case in cases
+        if case.walkers
+    )
+    measuring = _MEASURING_SECONDS * len(cases) + _FRAME_MICROSECONDS * 1e-6 * places
+    return _SOLVING_SECONDS * unsolved(bridges) + measuring
 
 
 def pairs_of_beads(case: Case) -> int:
@@ -163,7 +171,7 @@ def summarise(case: Case) -> dict[str, Any]:
             "samples": run.steps // run.steps_per_sample + 1,
             "until_steady": run.until_steady,
             "segments": -(-run.cycles // run.cycles_per_segment),
-            "predicted_seconds": predicted_seconds(case) + predicted_overhead([case]),
+            "predicted_seconds": PROGRAM_SECONDS + predicted_seconds(case) + predicted_overhead([case]),
         },
     }
     if case.walkers and len(case.walkers[0].radii) == 2:

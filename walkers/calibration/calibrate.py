@@ -51,7 +51,7 @@ class Outcome:
 
     def predicted(self, observation: Observation) -> FloatArray | None:
         """5 %, median and 95 % of what was held out, from the other observations; None for others."""
-        emulator = next((one for one in self.emulators if one.observation is observation), None)
+        emulator = next((emulator for emulator in self.emulators if emulator.observation is observation), None)
         if emulator is None or observation.group not in self.calibration.file.design.held_out:
             return None
         samples = self.held_out.samples
@@ -62,7 +62,7 @@ class Outcome:
 def calibrate(
     calibration: Calibration, out: Path, options: Options, *, progress: bool | None = False, **how: Any
 ) -> Outcome:
-    """Start or continue a calibration; finished runs are not repeated.
+    """Start or continue a calibration; finished runs are not repeated. Runs that are made keep no dumps.
 
     Three sweeps: ``NAME-named``, the sets of the file; ``NAME-round``, a Sobol sequence of sets without the costly
     experiments; and ``NAME-proposed``.
@@ -88,13 +88,15 @@ def calibrate(
     require("calibrate")
     file, failures = calibration.file, dict[str, list[Failure]]()
     design, observations = file.design, file.observations
-    ends = np.array([one.range for one in file.parameters.values()]).T
+    ends = np.array([parameter.range for parameter in file.parameters.values()]).T
     list(calibration.sweep(calibration.name, ends).cases())  # refuses ranges that exceed those of their keys
+
+    kept = replace(options, final=FINAL, dumps=False)
 
     def run(part: str, unit: FloatArray, experiments: Sequence[str] = ()) -> FloatArray:
         sweep = calibration.sweep(f"{calibration.name}-{part}", calibration.values(unit), experiments)
         with progress_of(sweep.name, progress) as advance:
-            record, failed = run_sweep(sweep, out, replace(options, final=FINAL), on_progress=advance, **how)
+            record, failed = run_sweep(sweep, out, kept, on_progress=advance, **how)
         failures.update({sweep.name: failed} if failed else {})
         return _numbers(calibration, experiments or [*calibration.experiments], record.directory, failed)
 
@@ -103,8 +105,10 @@ def calibrate(
     cheap = [label for label in calibration.experiments if label not in calibration.costly]
     unit = np.concatenate([calibration.sets, sobol])
     numbers = np.concatenate([named, run("round", sobol, cheap)])
-    each = zip(observations, numbers.T, strict=True)
-    emulators = [Emulator.of(one, unit, column, design.seed) for one, column in each if not one.costly]
+    columns = zip(observations, numbers.T, strict=True)
+    emulators = [
+        Emulator.of(observation, unit, column, design.seed) for observation, column in columns if not observation.costly
+    ]
     posterior, held_out = (
         Posterior.of(emulators, design.posterior, design.seed, without) for without in ((), design.held_out)
     )
@@ -125,7 +129,9 @@ def _numbers(calibration: Calibration, labels: Sequence[str], sweep: Path, faile
     seen = [numbers_of(run) if status == "finished" else NO_NUMBERS for run, status in states]
     lacking = dict.fromkeys(calibration.experiments, NO_NUMBERS)
     sets = [lacking | dict(zip(labels, seen[at:], strict=False)) for at in range(0, len(seen), len(labels))]
-    return np.array([[one.of_numbers(numbers) for one in calibration.file.observations] for numbers in sets])
+    return np.array(
+        [[observation.of_numbers(numbers) for observation in calibration.file.observations] for numbers in sets]
+    )
 
 
 def nearest(observations: Sequence[Observation], numbers: FloatArray) -> int:
@@ -133,6 +139,6 @@ def nearest(observations: Sequence[Observation], numbers: FloatArray) -> int:
 
     The logarithm limits the weight of a fact that no set reproduces.
     """
-    own = [place for place, one in enumerate(observations) if one.weighed]
-    away = np.array([[observations[place].residual(row[place]) for place in own] for row in numbers])
+    weighed = [place for place, observation in enumerate(observations) if observation.weighed]
+    away = np.array([[observations[place].residual(row[place]) for place in weighed] for row in numbers])
     return int(np.argmin(np.log1p(np.where(np.isnan(away), _MISSING, away) ** 2).sum(axis=1)))

@@ -25,7 +25,7 @@ _KEPT, _AT_ONCE = 4000, 8192
 
 def middle(observation: Observation) -> float:
     """The value of a fact, its only limit, or the middle of both."""
-    return float(np.mean([one for one in observation.limits if np.isfinite(one)]))
+    return float(np.mean([limit for limit in observation.limits if np.isfinite(limit)]))
 
 
 def distances(observation: Observation, numbers: FloatArray) -> FloatArray:
@@ -79,7 +79,9 @@ class Emulator:
         width = np.hypot(1.0, error)
         if self.observation.value is not None:
             return np.asarray(student.logpdf(mean / width, _FREEDOM) - np.log(width))
-        low, high = ((one - middle(self.observation)) / self.observation.deviation for one in self.observation.limits)
+        low, high = (
+            (limit - middle(self.observation)) / self.observation.deviation for limit in self.observation.limits
+        )
         within = student.cdf((high - mean) / width, _FREEDOM) - student.cdf((low - mean) / width, _FREEDOM)
         return np.asarray(np.log(np.maximum(within, 1e-300)))
 
@@ -100,10 +102,14 @@ class Posterior:
     @classmethod
     def of(cls, emulators: Sequence[Emulator], points: int, seed: int, without: Collection[str] = ()) -> Posterior:
         """Weigh points of the prior by the observations that have a weight and are not of the groups ``without``."""
-        used = [one for one in emulators if one.observation.weighed and one.observation.group not in without]
+        used = [
+            emulator
+            for emulator in emulators
+            if emulator.observation.weighed and emulator.observation.group not in without
+        ]
         unit = unit_cube("sobol", used[0].process.n_features_in_, points, seed)
         parts = [unit[at : at + _AT_ONCE] for at in range(0, points, _AT_ONCE)]
-        total = np.concatenate([np.sum([one.log_likelihood(part) for one in used], axis=0) for part in parts])
+        total = np.concatenate([np.sum([emulator.log_likelihood(part) for emulator in used], axis=0) for part in parts])
         return cls(unit, total - logsumexp(total), seed)
 
     @property

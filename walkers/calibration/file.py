@@ -44,11 +44,11 @@ class Parameter(Table):
 
     @field_validator("range", "normal")
     @classmethod
-    def _check(cls, value: tuple[float, float] | None, info: ValidationInfo) -> tuple[float, float] | None:
+    def _check(cls, value: tuple[float, float] | None, validation: ValidationInfo) -> tuple[float, float] | None:
         low, high = value or (1.0, 2.0)
-        if info.field_name == "range" and low >= high:
+        if validation.field_name == "range" and low >= high:
             raise ValueError("expected a smaller and a larger number")
-        if info.data.get("log") and low <= 0.0:
+        if validation.data.get("log") and low <= 0.0:
             raise ValueError("expected numbers above zero: log is that of magnitudes")
         return value
 
@@ -114,20 +114,27 @@ class Calibration:
 
     def values(self, unit: FloatArray) -> FloatArray:
         """Values of the D parameters at points of the unit cube of the prior, shape (N, D)."""
-        each = zip(self.file.parameters.values(), unit.T, strict=True)
-        return np.stack([parameter.values(shares) for parameter, shares in each], axis=1)
+        shares_of = zip(self.file.parameters.values(), unit.T, strict=True)
+        return np.stack([parameter.values(shares) for parameter, shares in shares_of], axis=1)
 
     @cached_property
     def sets(self) -> FloatArray:
         """The named sets as points of the unit cube, shape (S, D)."""
-        known = self.file.parameters.items()
-        rows = [[parameter.unit_of(given[label]) for label, parameter in known] for given in self.file.sets.values()]
-        return np.reshape(np.array(rows, np.float64), (-1, len(known)))
+        parameters = self.file.parameters.items()
+        rows = [
+            [parameter.unit_of(given[label]) for label, parameter in parameters] for given in self.file.sets.values()
+        ]
+        return np.reshape(np.array(rows, np.float64), (-1, len(parameters)))
 
     @property
     def costly(self) -> set[str]:
         """Experiments that only costly observations need."""
-        needed = {label for one in self.file.observations if not one.costly for label in (*one.of, *one.over)}
+        needed = {
+            label
+            for observation in self.file.observations
+            if not observation.costly
+            for label in (*observation.of, *observation.over)
+        }
         return set(self.experiments) - needed
 
     def sweep(self, name: str, values: FloatArray | None = None, experiments: Collection[str] = ()) -> Sweep:
@@ -175,12 +182,12 @@ def load_calibration(calibration: str | Path) -> Calibration:
 def read_calibration(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Calibration:
     """A calibration given as nested tables; parameters and errors as for `walkers.inputs.sweep.expand`."""
     file = validated(CalibrationFile, document, source, "a calibration")
-    own = {label: flatten(table) for label, table in file.experiments.items()}
-    varied = dict.fromkeys(key for keys in own.values() for key in keys)
+    changed_by = {label: flatten(table) for label, table in file.experiments.items()}
+    varied = dict.fromkeys(key for keys in changed_by.values() for key in keys)
     usual = {key: value for key, value in flatten(file.set).items() if key in varied}
     if problems := [*_unknown_names(file), *_contradictions(file), *_problems_of_keys(file, {*varied} - {*usual})]:
         raise InputError(source, problems)
-    return Calibration(name, source, folder, file, {label: usual | keys for label, keys in own.items()})
+    return Calibration(name, source, folder, file, {label: usual | keys for label, keys in changed_by.items()})
 
 
 def _unknown_names(file: CalibrationFile) -> Iterator[Problem]:
@@ -189,29 +196,31 @@ def _unknown_names(file: CalibrationFile) -> Iterator[Problem]:
         (f"parameters.{label}.experiments", parameter.experiments or [], file.experiments, "an experiment")
         for label, parameter in file.parameters.items()
     ]
-    for number, one in enumerate(file.observations):
-        for key, labels in (("of", one.of), ("over", one.over)):
+    for number, observation in enumerate(file.observations):
+        for key, labels in (("of", observation.of), ("over", observation.over)):
             named.append((f"observations[{number}].{key}", labels, file.experiments, "an experiment"))
     named += [(f"sets.{label}", given, file.parameters, "a parameter") for label, given in file.sets.items()]
-    groups = {one.group for one in file.observations}
-    for place, given, known, what in (*named, ("design.held_out", file.design.held_out, groups, "a group")):
+    groups = {observation.group for observation in file.observations}
+    for place, given, names, kind in (*named, ("design.held_out", file.design.held_out, groups, "a group")):
         for name in given:
-            if name not in known:
-                expected = f"expected {what}: one of {', '.join(sorted(known))}{suggestion(name, known)}"
+            if name not in names:
+                expected = f"expected {kind}: one of {', '.join(sorted(names))}{suggestion(name, names)}"
                 yield Problem(place, f'"{name}"', expected)
 
 
 def _contradictions(file: CalibrationFile) -> Iterator[Problem]:
-    names = [one.name for one in file.observations]
-    for number, one in enumerate(file.observations):
-        place, limits = f"observations[{number}]", [one.least, one.most]
-        if names.index(one.name) != number:
-            yield Problem(f"{place}.name", f'"{one.name}"', "expected a name of its own")
-        if one.over and set(one.over) == set(one.of):
+    names = [observation.name for observation in file.observations]
+    for number, observation in enumerate(file.observations):
+        place, limits = f"observations[{number}]", [observation.least, observation.most]
+        if names.index(observation.name) != number:
+            yield Problem(f"{place}.name", f'"{observation.name}"', "expected a name of its own")
+        if observation.over and set(observation.over) == set(observation.of):
             yield Problem(f"{place}.over", None, "expected other experiments than in of: the ratio would be 1")
-        if (one.value is None) == (limits == [None, None]) or one.limits[0] > one.limits[1]:
+        if (observation.value is None) == (limits == [None, None]) or observation.limits[0] > observation.limits[1]:
             yield Problem(place, None, "expected either a value or limits: least, most, or both in this order")
-    if not any(one.weighed and one.group not in file.design.held_out for one in file.observations):
+    if not any(
+        observation.weighed and observation.group not in file.design.held_out for observation in file.observations
+    ):
         yield Problem("observations", None, "expected one that is neither derived, costly nor held out")
     for label, given in file.sets.items():
         for name, parameter in file.parameters.items():
@@ -228,8 +237,10 @@ def _problems_of_keys(file: CalibrationFile, varied: Collection[str]) -> Iterato
         for key in sorted({*varied} - {*flatten(table)}):
             expected = "missing; expected it here or in [set]: other experiments change it"
             yield Problem(f"experiments.{label}.{key}", None, expected)
-        own = [one.keys for one in file.parameters.values() if label in (one.experiments or [label])]
-        for key, number in ((key, sum(key in keys for keys in own)) for key in every):
+        given = [
+            parameter.keys for parameter in file.parameters.values() if label in (parameter.experiments or [label])
+        ]
+        for key, number in ((key, sum(key in keys for keys in given)) for key in every):
             if number != 1:
                 expected = (
                     f"expected one parameter that sets {key} for {label}, or none for any experiment; {number} do"

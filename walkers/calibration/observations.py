@@ -18,9 +18,9 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from walkers.inputs.table import Table
 from walkers.inputs.units import ANGLE, SPEED, WRITTEN, Kind, Number, parse_quantity
-from walkers.postprocess.gait import gait, misalignment, settled_samples, steady_walkers, together
-from walkers.postprocess.motion import read_motion
+from walkers.postprocess.gait import misalignment, settled_samples, steady_walkers, together
 from walkers.postprocess.results import read
+from walkers.runner.directory import case_of
 
 FloatArray = npt.NDArray[np.float64]
 Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_pair_1"]
@@ -75,10 +75,10 @@ class Observation(Table):
 
     @field_validator("value", "least", "most", "deviation", mode="before")
     @classmethod
-    def _number(cls, value: Any, info: ValidationInfo) -> Any:
-        if info.context != WRITTEN:
+    def _number(cls, value: Any, validation: ValidationInfo) -> Any:
+        if validation.context != WRITTEN:
             return value
-        kind = None if info.data.get("over") else kind_of(info.data.get("quantity", "velocity"))
+        kind = None if validation.data.get("over") else kind_of(validation.data.get("quantity", "velocity"))
         if isinstance(value, str) == (kind is None):
             raise ValueError(kind.expectation if kind else "expected a plain number: a ratio or a share has no unit")
         number = parse_quantity(value, kind) if kind else value
@@ -141,11 +141,16 @@ def numbers_of(run: str | Path) -> dict[str, float]:
     walkers, kept = results.table("walkers"), steady_walkers(results)
     numbers = NO_NUMBERS | {name: float(kept[name].mean()) for name in get_args(Speed)}
     if len(kept):
-        group = read_motion(run).groups[0]
-        seen, samples, chosen = gait(group), settled_samples(group), kept.index.to_numpy()
-        velocity, sliding = seen.velocity[samples][:, chosen], seen.sliding[samples][:, chosen]
-        for place, name in enumerate(get_args(Slip)):
-            numbers[name] = float(np.sqrt(np.mean(sliding[..., place] ** 2) / np.mean(velocity**2)))
+        trajectory = results.columns("trajectory")
+        run_made = case_of(results.directory).for_cycles(round(trajectory["cycle"].max())).run
+
+        def square(column: str) -> float:
+            """Mean square over the measured samples of the walkers that count."""
+            course = trajectory[column].reshape(len(walkers), -1).T
+            return float(np.mean(course[settled_samples(run_made)][:, kept.index] ** 2))
+
+        for bead, name in enumerate(get_args(Slip), 1):
+            numbers[name] = float(np.sqrt(square(f"sliding_{bead}") / square("velocity")))
     if len(angles := misalignment(walkers[together(walkers)])):
         numbers |= {"largest_angle": float(angles.max()), "smallest_angle": float(angles.min())}
     return numbers

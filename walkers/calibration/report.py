@@ -24,7 +24,7 @@ BEST_NAME = "best.toml"
 _ENDS = (0.05, 0.5, 0.95)
 
 
-def write_outcome(found: Outcome, to: Path) -> list[Path]:
+def write_outcome(outcome: Outcome, to: Path) -> list[Path]:
     """Write posterior, record, table, best case and figure (``posterior.parquet`` …); return their paths.
 
     Rows of the first are samples of equal weight, columns are the parameters in their units. The case ``best.toml`` is
@@ -33,40 +33,40 @@ def write_outcome(found: Outcome, to: Path) -> list[Path]:
     import pandas as pd
 
     to.mkdir(parents=True, exist_ok=True)
-    record, calibration = record_of(found), found.calibration
-    samples = pd.DataFrame(calibration.values(found.posterior.samples), columns=[*calibration.file.parameters])
+    record, calibration = record_of(outcome), outcome.calibration
+    samples = pd.DataFrame(calibration.values(outcome.posterior.samples), columns=[*calibration.file.parameters])
     files = [to / file for file in ("posterior.parquet", RECORD_NAME, "calibration.md", BEST_NAME)]
     write_bytes(files[0], samples.to_parquet(index=False))
     write_json(files[1], record)
-    write_bytes(files[3], toml_bytes(calibration.case(calibration.values(found.sets[PROPOSED[0]][None])[0])))
+    write_bytes(files[3], toml_bytes(calibration.case(calibration.values(outcome.sets[PROPOSED[0]][None])[0])))
     write_text(files[2], rendered("walkers.calibration", "report.md.j2", found=record))
     sources = [f"{calibration.name}-{part}" for part in ("named", "round", "proposed")]
-    return files + save_figure(draw_facts(found), to / "predictions.png", sources, title=record["title"])
+    return files + save_figure(draw_facts(outcome), to / "predictions.png", sources, title=record["title"])
 
 
-def record_of(found: Outcome) -> dict[str, Any]:
+def record_of(outcome: Outcome) -> dict[str, Any]:
     """Contents of ``calibration.json``; observations in mm/s and degrees."""
-    calibration, known = found.calibration, found.calibration.file.parameters
-    samples = dict(zip(known, calibration.values(found.posterior.samples).T, strict=True))
-    prior = {name: one.values(np.array(_ENDS)).tolist() for name, one in known.items()}
+    calibration, parameters = outcome.calibration, outcome.calibration.file.parameters
+    samples = dict(zip(parameters, calibration.values(outcome.posterior.samples).T, strict=True))
+    prior = {name: parameter.values(np.array(_ENDS)).tolist() for name, parameter in parameters.items()}
     # Parameters that set the same keys in different experiments: where a ratio of 1 is likely, one value would do.
-    alike = [two for two in combinations(known, 2) if known[two[0]].keys == known[two[1]].keys]
-    samples |= {f"{other}/{one}": samples[other] / samples[one] for one, other in alike}
-    rows = [_row(found, place) for place in range(len(calibration.file.observations))]
-    values = calibration.values(np.stack([*found.sets.values()])).tolist()
+    alike = [two for two in combinations(parameters, 2) if parameters[two[0]].keys == parameters[two[1]].keys]
+    samples |= {f"{second}/{first}": samples[second] / samples[first] for first, second in alike}
+    rows = [_row(outcome, place) for place in range(len(calibration.file.observations))]
+    values = calibration.values(np.stack([*outcome.sets.values()])).tolist()
     return {
         "calibration": calibration.name,
         "title": calibration.file.title,
         "observed": "published" if calibration.file.published else "measured",
         "settings": calibration.file.model_dump(mode="json"),
-        "labels": {name: one.label or name for name, one in known.items()},
-        "number": found.number,
-        "sets": {name: dict(zip(known, row, strict=True)) for name, row in zip(found.sets, values, strict=True)},
-        "agree": {name: sum(row["agrees"][name] for row in rows if not row["derived"]) for name in found.sets},
+        "labels": {name: parameter.label or name for name, parameter in parameters.items()},
+        "number": outcome.number,
+        "sets": {name: dict(zip(parameters, row, strict=True)) for name, row in zip(outcome.sets, values, strict=True)},
+        "agree": {name: sum(row["agrees"][name] for row in rows if not row["derived"]) for name in outcome.sets},
         "of": sum(not row["derived"] for row in rows),
         "posterior": {name: [float(end) for end in np.quantile(column, _ENDS)] for name, column in samples.items()},
         "prior": prior,
-        "effective_samples": [one.effective_samples for one in (found.posterior, found.held_out)],
+        "effective_samples": [posterior.effective_samples for posterior in (outcome.posterior, outcome.held_out)],
         "observations": rows,
     }
 
@@ -76,7 +76,7 @@ def summary(record: Mapping[str, Any]) -> str:
     agree = [
         [name, f"{count} of {record['of']} {record['observed']} facts agree"] for name, count in record["agree"].items()
     ]
-    known = [
+    intervals = [
         [record["labels"].get(name, name), "{1:.3g} ({0:.3g} to {2:.3g})".format(*ends)]
         for name, ends in record["posterior"].items()
     ]
@@ -85,39 +85,41 @@ def summary(record: Mapping[str, Any]) -> str:
         note += (
             "; no set agrees with half of the facts: the model, or a fact, is in question, and the intervals say little"
         )
-    return "\n\n".join([aligned(agree), aligned(known), note])
+    return "\n\n".join([aligned(agree), aligned(intervals), note])
 
 
-def _row(found: Outcome, place: int) -> dict[str, Any]:
+def _row(outcome: Outcome, place: int) -> dict[str, Any]:
     """A fact, its number at the sets, and its prediction if it was held out."""
-    one = found.calibration.file.observations[place]
-    (unit, scale), numbers = one.unit, {name: float(row[place]) for name, row in found.numbers.items()}
-    ends = found.predicted(one)
+    observation = outcome.calibration.file.observations[place]
+    (unit, scale), numbers = observation.unit, {name: float(row[place]) for name, row in outcome.numbers.items()}
+    ends = outcome.predicted(observation)
     return {
-        **{name: getattr(one, name) for name in ("name", "group", "title", "derived")},
-        "expected": one.text,
+        **{name: getattr(observation, name) for name in ("name", "group", "title", "derived")},
+        "expected": observation.text,
         "unit": unit,
         "numbers": {name: number * scale if isfinite(number) else None for name, number in numbers.items()},
-        "agrees": {name: one.agrees(number) for name, number in numbers.items()},
-        "emulator_error": next((each.error for each in found.emulators if each.observation is one), None),
+        "agrees": {name: observation.agrees(number) for name, number in numbers.items()},
+        "emulator_error": next(
+            (emulator.error for emulator in outcome.emulators if emulator.observation is observation), None
+        ),
         "predicted": None if ends is None else (ends * scale).tolist(),
     }
 
 
 @styled
-def draw_facts(found: Outcome) -> Figure:
+def draw_facts(outcome: Outcome) -> Figure:
     """Distances from the facts in deviations: of the sets, and predicted for what is held out."""
-    facts = found.calibration.file.observations
+    facts = outcome.calibration.file.observations
     figure, axes = new_figure(TWO_COLUMNS, 0.25 * len(facts) + 1.5)
     places = np.arange(len(facts))[::-1]
     axes.axvspan(-1.0, 1.0, color="0.9", lw=0)
-    for (name, numbers), marker in zip(found.numbers.items(), "os^DvPX*" * len(found.sets), strict=False):
-        away = [one.residual(number) for one, number in zip(facts, numbers, strict=True)]
+    for (name, numbers), marker in zip(outcome.numbers.items(), "os^DvPX*" * len(outcome.sets), strict=False):
+        away = [fact.residual(number) for fact, number in zip(facts, numbers, strict=True)]
         axes.plot(away, places, marker, ms=4, mfc="none", ls="none", label=name)
-    for one, place in zip(facts, places, strict=True):
-        if (ends := found.predicted(one)) is not None:
-            axes.hlines(place - 0.25, one.residual(ends[0]), one.residual(ends[2]), color="k", lw=1.0)
-    axes.set_yticks(places, [one.title for one in facts], fontsize=7)
+    for fact, place in zip(facts, places, strict=True):
+        if (ends := outcome.predicted(fact)) is not None:
+            axes.hlines(place - 0.25, fact.residual(ends[0]), fact.residual(ends[2]), color="k", lw=1.0)
+    axes.set_yticks(places, [fact.title for fact in facts], fontsize=7)
     axes.set(xlabel="distance from the fact/deviation (lines: predicted)", ylim=(-0.8, len(facts) - 0.2))
     axes.set_xscale("symlog", linthresh=3.0)
     figure.legend(loc="outside upper center", ncols=2)

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from walkers.inputs.run import CONSTANT
+from walkers.inputs.run import CONSTANT, Run
 from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
 from walkers.postprocess.motion import Group, between, read_motion
 from walkers.postprocess.sides import REST, SEPARATED, STEADY_SPEED
@@ -112,7 +112,7 @@ def averages(group: Group) -> Averages:
     work are evaluated ten times per interval between samples by cubic interpolation (with less than eight samples per
     cycle, gaps at the samples).
     """
-    run, samples = group.case.run, settled_samples(group)
+    run, samples = group.case.run, settled_samples(group.case.run)
     parts = _PARTS if group.motion.follows_cycles else 1
     opened, begin, interval = [], group.time[:-1], np.diff(group.time)
     work = np.full((len(interval), len(group.walkers)), 0.0 if parts > 1 else np.nan)
@@ -199,9 +199,8 @@ def fit_slopes(time: FloatArray, values: FloatArray) -> FloatArray:
     return np.asarray(time @ (values - values.mean(axis=0)) / np.sum(time**2))
 
 
-def settled_samples(group: Group) -> slice:
+def settled_samples(run: Run) -> slice:
     """The samples of whole cycles after the settling ones; each phase occurs equally often."""
-    run = group.case.run
     samples = run.samples_per_cycle
     return slice(run.settled_strobes * samples, run.cycles // run.cycles_per_sample * samples)
 

@@ -290,6 +290,9 @@ def _opened(path: Path) -> tuple[dict[str, Any], Layout, BinaryDump]:
         record = {name: record[name] for name in ("begin", "end", "drive_from")}
         place = path
         layout = layout_of(path)
+        if not (path / layout.bead_dump).exists():
+            why = "was left out, as the dumps of calibrations, spreads and some archives; to make the run again"
+            raise DumpError(f"{path / layout.bead_dump} {why}: walkers run {run_of(path)} --force")
         return record, layout, BinaryDump(path / layout.bead_dump, layout.bead_columns)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DumpError(f"{place}: cannot be read ({error})") from error

@@ -99,7 +99,7 @@ def _stacked(parts: Sequence[Columns]) -> Columns:
 def tables_of(group: Group) -> dict[str, Columns]:
     """Tables ``trajectory``, ``walkers`` and ``cycles`` of the walkers of one make, one walker after the other."""
     run, seen, mean = group.case.run, gait.gait(group), gait.averages(group)
-    samples, beads = gait.settled_samples(group), len(group.radii)
+    samples, beads = gait.settled_samples(run), len(group.radii)
     reach = np.array([load.rupture for load in contact_loads(group.case, group.make)[beads:]])
     starts = ("walker", "make", "facing", "start_angle")
     walkers = {

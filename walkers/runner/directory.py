@@ -35,7 +35,16 @@ from walkers.runner.files import fsync_path, link_or_copy, read_json, write_byte
 from walkers.runner.launch import EngineReport
 from walkers.runner.manifest import FORMAT, MANIFEST_NAME, check_unchanged, checksums, iso_time, read_manifest, sums_of
 from walkers.runner.provenance import software
-from walkers.templates.deck import BRIDGES_NAME, CONTENT_VERSION, DECK_NAME, LAYOUT_NAME, Deck, Segment, tables_of
+from walkers.templates.deck import (
+    BRIDGES_NAME,
+    CONTENT_VERSION,
+    DECK_NAME,
+    LAYOUT_NAME,
+    RESTART_NAME,
+    Deck,
+    Segment,
+    tables_of,
+)
 from walkers.templates.layout import Layout
 
 CASE_NAME = "case.json"
@@ -164,6 +173,19 @@ def files_of_segments(directory: Path) -> list[str]:
     files = [path for segment in segments for path in segment.iterdir() if path.is_file()]
     by_hand = [directory] == segments  # with tables and pictures beside
     return [path.relative_to(directory).as_posix() for path in files if not by_hand or path.name in dumps]
+
+
+def leave_out_dumps(directory: Path) -> None:
+    """Remove dumps and restart files of a finished, measured run, which its manifest names as left out from then on.
+
+    The run must be locked. Results and tables stay; pictures, films and other measurements need the run made again.
+    """
+    layout, contents = layout_of(segment_directories(directory)[0]), read_manifest(directory)
+    dumps = {layout.bead_dump, layout.pair_bridge_dump, layout.wall_bridge_dump, RESTART_NAME}
+    names = [name for name in contents["files"] if Path(name).name in dumps]
+    write_json(directory / MANIFEST_NAME, {**contents, "left_out": names})
+    for name in names:
+        (directory / name).unlink(missing_ok=True)
 
 
 def is_deck_folder(folder: Path) -> bool:

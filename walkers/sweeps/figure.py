@@ -66,7 +66,8 @@ _FEW_TICKS = 6  # largest number of x values that all have ticks
 class Factor:
     """A property in which points differ: its keys, its label, and a number (in its unit) or a text for each point.
 
-    Each key of a sample is a factor. Points of a sample do not share values.
+    Each key of a sample is a factor. Points of a sample do not share values. Those of log-uniform ranges have an axis
+    with a logarithmic scale (``is_log``).
     """
 
     keys: tuple[str, ...]
@@ -74,6 +75,7 @@ class Factor:
     values: Sequence[Any]
     is_number: bool
     is_sample: bool = False
+    is_log: bool = False
     unit: str = ""
 
     @property
@@ -126,11 +128,11 @@ def figure_of(table: pd.DataFrame, options: FigureOptions = FigureOptions(), pre
     column = column_of(table, options.y)
     done = table[table["status"] == "finished"]
     counts = Counter(table["status"][table["status"] != "finished"])
-    others = status_text(counts)
+    unfinished = status_text(counts)
     if done.empty:
-        raise refused(str(table.attrs["sweep"]), f"no point is finished ({others or 'there is none'})")
+        raise refused(str(table.attrs["sweep"]), f"no point is finished ({unfinished or 'there is none'})")
     if counts:
-        _tell(f"{sum(counts.values())} of {len(table)} points left out: {others}")
+        _tell(f"{sum(counts.values())} of {len(table)} points left out: {unfinished}")
     if empty := int(done[column].isna().sum()):
         _tell(f"{empty} of {len(done)} finished points have no {column}")
     *layout, undistinguished = layout_of(table, done, options)
@@ -143,9 +145,9 @@ def figure_of(table: pd.DataFrame, options: FigureOptions = FigureOptions(), pre
     return _draw(done, column, layout, theory, down=None if options.y else FACING_DOWN.get(column), log=log)
 
 
-def column_of(table: pd.DataFrame, wanted: str | None) -> str:
+def column_of(table: pd.DataFrame, name: str | None) -> str:
     """The column of a name, by default the main result; `InputError` if there is none."""
-    return find_name("y", wanted, table.columns) if wanted else default_column(table)
+    return find_name("y", name, table.columns) if name else default_column(table)
 
 
 def _tell(message: str) -> None:
@@ -172,23 +174,27 @@ def _of_axis(table: pd.DataFrame, keys: Sequence[str]) -> list[Factor]:
             values = [value_text(value, unit) for value in values]
         label = with_unit(readable_key(key), unit if is_number else "")
         factor = Factor((key,), label, values, is_number, unit=(unit or "") if is_number else "")
+        factor = replace(factor, is_log=table.attrs.get("sampled", {}).get(key, False))
         if len(factor.levels) > 1:
             factors.append(factor)
     if len(factors) < 2:
         return factors
-    if not all(one.is_number for one in factors):  # the texts of one key that distinguishes all levels, or of all keys
-        texts = [Factor(one.keys, one.name, [*map(one.text, one.values)], is_number=False) for one in factors]
+    if not all(factor.is_number for factor in factors):
+        # The texts of one key that distinguishes all levels, or of all keys.
+        texts = [
+            Factor(factor.keys, factor.name, [*map(factor.text, factor.values)], is_number=False) for factor in factors
+        ]
         whole = joined(texts)
-        first = next((one for one in texts if len(one.levels) == len(whole.levels)), whole)
+        first = next((factor for factor in texts if len(factor.levels) == len(whole.levels)), whole)
         return [_with(first, factors)]
-    steps = np.diff(np.unique(np.array([one.values for one in factors]).T, axis=0), axis=0)
+    steps = np.diff(np.unique(np.array([factor.values for factor in factors]).T, axis=0), axis=0)
     together = (steps[:, 0] > 0.0).all() and ((steps > 0.0).all(axis=0) | (steps < 0.0).all(axis=0)).all()
-    return [_with(factors[0], factors)] if together else [replace(one, is_sample=True) for one in factors]
+    return [_with(factors[0], factors)] if together else [replace(factor, is_sample=True) for factor in factors]
 
 
 def _with(first: Factor, factors: Sequence[Factor]) -> Factor:
     """A factor that stands for others too, which its label names."""
-    rest = [key for one in factors for key in one.keys if key not in first.keys]
+    rest = [key for factor in factors for key in factor.keys if key not in first.keys]
     words = (
         f"and {len(rest)} further keys with it"
         if len(rest) > 2
@@ -211,7 +217,7 @@ def joined(factors: Sequence[Factor]) -> Factor:
     """Several factors as one whose levels are texts; a single factor as it is."""
     if len(factors) == 1:
         return factors[0]
-    columns = [[one.text(level, by_name=not one.unit) for level in one.values] for one in factors]
+    columns = [[factor.text(level, by_name=not factor.unit) for level in factor.values] for factor in factors]
     keys = tuple(key for factor in factors for key in factor.keys)
     texts = [", ".join(row) for row in zip(*columns, strict=True)]
     return Factor(keys, ", ".join(factor.name for factor in factors), texts, False)
@@ -251,40 +257,50 @@ def layout_of(
         not distinguish.
     """
     places = table.index.get_indexer(rows.index).tolist()
-    left = factors = [replace(one, values=[one.values[place] for place in places]) for one in factors_of(table)]
-    asked = {}
+    left = factors = [
+        replace(factor, values=[factor.values[place] for place in places]) for factor in factors_of(table)
+    ]
+    chosen = {}
     for option, name in (("x", options.x), ("hue", options.hue), ("panels", options.panels)):
         if name is not None and not (name == _NONE and option != "x"):
-            found = find_name(option, name, [*(key for one in factors for key in one.keys), *table.columns])
-            given = next((one for one in factors if found in one.keys), None)
-            if given is None and rows[found].map(lambda value: isinstance(value, str)).all():
-                given = Factor((found,), readable_key(found), rows[found].tolist(), False)
-            asked[option] = given or _numbers(rows, found, option)
-            left = [one for one in left if not _same(one, asked[option])]
-    samples = [one for one in left if one.is_sample]
-    left = [one for one in left if not one.is_sample]
-    undistinguished = [one.name for one in samples] if "x" in asked else []
-    along = [asked["x"]] if "x" in asked else samples
+            column = find_name(option, name, [*(key for factor in factors for key in factor.keys), *table.columns])
+            given = next((factor for factor in factors if column in factor.keys), None)
+            if given is None and rows[column].map(lambda value: isinstance(value, str)).all():
+                given = Factor((column,), readable_key(column), rows[column].tolist(), False)
+            chosen[option] = given or _numbers(rows, column, option)
+            left = [factor for factor in left if not _same(factor, chosen[option])]
+    samples = [factor for factor in left if factor.is_sample]
+    left = [factor for factor in left if not factor.is_sample]
+    undistinguished = [factor.name for factor in samples] if "x" in chosen else []
+    along = [chosen["x"]] if "x" in chosen else samples
     if not along:
-        ranked = [one for one in left if one.is_number] or left or [_numbers(rows, "point", "x")]
-        along = [max(ranked, key=lambda one: (one.keys[0] not in SEEDS, len(one.levels)))]
-    left = [one for one in left if one not in along and one.keys[0] not in SEEDS]
-    left.sort(key=lambda one: -len(one.levels))
-    colours = asked.get("hue") or (left.pop(0) if left and options.hue is None else None)
-    apart = asked.get("panels")
+        ranked = [factor for factor in left if factor.is_number] or left or [_numbers(rows, "point", "x")]
+        along = [max(ranked, key=lambda factor: (factor.keys[0] not in SEEDS, len(factor.levels)))]
+    left = [factor for factor in left if factor not in along and factor.keys[0] not in SEEDS]
+    left.sort(key=lambda factor: -len(factor.levels))
+    colours = chosen.get("hue") or (left.pop(0) if left and options.hue is None else None)
+    apart = chosen.get("panels")
     if len(along) > 1 and apart is not None:
         raise refused("panels", "expected x too: the samples have a panel for each key")
     if options.panels is None and left and len(along) == 1:
-        while prod(len(one.levels) for one in left) > _MOST_PANELS:
+        while prod(len(factor.levels) for factor in left) > _MOST_PANELS:
             undistinguished.append(left.pop(0 if len(left[0].levels) > _MOST_PANELS else -1).name)
         apart, left = joined(left) if left else None, []
-    return along, colours, apart, [*undistinguished, *(one.name for one in left)]
+    return along, colours, apart, [*undistinguished, *(factor.name for factor in left)]
 
 
-def _same(one: Factor, other: Factor) -> bool:
+def _same(first: Factor, second: Factor) -> bool:
     """Whether two factors distinguish the same points, such as Γ0 and the acceleration."""
-    pairs = len(set(zip(one.values, other.values, strict=True)))
-    return one.keys == other.keys or pairs == len(one.levels) == len(other.levels)
+    pairs = len(set(zip(first.values, second.values, strict=True)))
+    return first.keys == second.keys or pairs == len(first.levels) == len(second.levels)
+
+
+def rank_correlation(first: Any, second: Any) -> float:
+    """Spearman's correlation of two columns, the correlation of their ranks; 0 if one is constant."""
+    import pandas as pd
+
+    rank = pd.Series(first, dtype=float).rank().corr(pd.Series(second, dtype=float).rank())
+    return 0.0 if np.isnan(rank) else float(rank)
 
 
 class _Theory:
@@ -322,7 +338,9 @@ class _Theory:
             for remark in remarks.keys() - self.remarks.keys():
                 _tell(f"the theory's curve has gaps: {remark}")
         along = (
-            list(cases) if name == key else [unit_shown(units[name])[1] * derived(one)[name] for one in cases.values()]
+            list(cases)
+            if name == key
+            else [unit_shown(units[name])[1] * derived(moved)[name] for moved in cases.values()]
         )
         return np.array(along), {model: self.factor * values for model, values in predicted.items()}
 
@@ -355,22 +373,26 @@ def _draw(
 ) -> Figure:
     """Draw a column with the factors of `layout_of`."""
     along, hue, panels = layout
-    if "x" in log and not all(one.is_number for one in along):
+    if "x" in log and not all(factor.is_number for factor in along):
         raise refused("log", f"{along[0].label} has no numbers")
     label, points = _points(done, column, down)
     parts = [(x, _with_usual_others(x, along), "") for x in along]
+    if len(along) > 1 and all(x.keys[0] in done.attrs.get("sampled", {}) for x in along):
+        influence = {x.keys: rank_correlation(x.values, points["value"]) for x in along}
+        parts = [(x, shown, f"rank correlation {influence[x.keys]:+.2f}") for x, shown, _ in parts]
+        parts.sort(key=lambda part: -abs(influence[part[0].keys]))
     if panels is not None:
-        parts = [(along[0], _where(panels, one), panels.text(one, by_name=True)) for one in panels.levels]
+        parts = [(along[0], _where(panels, level), panels.text(level, by_name=True)) for level in panels.levels]
     looks, scale = _looks(hue, hollow=theory is not None)
     columns = min(len(parts), 2 if len(parts) in (2, 4) else 3)
     rows = ceil(len(parts) / columns)
     width, height = TWO_COLUMNS, 4.2 if len(parts) == 1 else 6.0 / columns * rows + 0.9
     shared = {"sharey": True, "sharex": len(along) == 1}
     figure, grid = new_figure(width, height, nrows=rows, ncols=columns, squeeze=False, **shared)
-    for axes, (number, (x, here, name)) in zip(grid.flat, enumerate(parts), strict=False):
+    for axes, (number, (x, drawn, name)) in zip(grid.flat, enumerate(parts), strict=False):
         for place, (level, look) in enumerate(looks.items()):
             aside = 0.0 if x.is_number else (place - (len(looks) - 1) / 2.0) * min(0.12, 0.6 / len(looks))
-            _series(axes, x, here & _where(hue, level), aside, points, theory, look)
+            _series(axes, x, drawn & _where(hue, level), aside, points, theory, look)
         if np.nanmin(points.drop(columns="error")) <= 0.0 <= np.nanmax(points.drop(columns="error")):
             axes.axhline(0.0, color="0.4", lw=0.6, zorder=0)
         axes.set_title(plain_text(name))
@@ -385,21 +407,21 @@ def _draw(
     for axes in grid.flat[len(parts) :]:
         axes.set_axis_off()
     _legend(figure, grid, hue, looks, scale, list(theory.values) if theory else [], down="down" in points)
-    said = [done.attrs["title"]]
+    texts = [done.attrs["title"]]
     if "low" in points:
-        said.append("bands: 5 to 95 % over the uncertain values")
+        texts.append("bands: 5 to 95 % over the uncertain values")
     if points["error"].notna().any():
         banded = "low" in points or {*unmeasured()} & {*done.attrs["varied"]}
         bars = SCATTER.partition(" (")[0] if banded else SCATTER
-        said.append(bars + ("" if errors_seen(points["error"], points["value"]) else ", smaller than the symbols"))
-    figure.suptitle(plain_text("\n".join(line for one in said for line in wrap(one, round(14.0 * width)))))
+        texts.append(bars + ("" if errors_seen(points["error"], points["value"]) else ", smaller than the symbols"))
+    figure.suptitle(plain_text("\n".join(line for text in texts for line in wrap(text, round(14.0 * width)))))
     return figure
 
 
 def _with_usual_others(x: Factor, along: Sequence[Factor]) -> npt.NDArray[np.bool_]:
     """Which points a panel shows: all, or of keys that vary one at a time those with the usual values of the others."""
-    usual = {one.keys: Counter(one.values).most_common(1)[0][0] for one in along}
-    changed = {one.keys: np.array([value != usual[one.keys] for value in one.values]) for one in along}
+    usual = {factor.keys: Counter(factor.values).most_common(1)[0][0] for factor in along}
+    changed = {factor.keys: np.array([value != usual[factor.keys] for value in factor.values]) for factor in along}
     number = np.sum([*changed.values()], axis=0)
     return np.array((number > 1).any() | changed[x.keys] | (number == 0))
 
@@ -430,7 +452,7 @@ def _looks(factor: Factor | None, *, hollow: bool) -> tuple[dict[Any, dict[str, 
 def _series(
     axes: Axes,
     x: Factor,
-    here: npt.NDArray[np.bool_],
+    drawn: npt.NDArray[np.bool_],
     aside: float,
     points: pd.DataFrame,
     theory: _Theory | None,
@@ -440,8 +462,8 @@ def _series(
 
     Symbols of different colours are side by side in their category.
     """
-    places = np.array(x.values if x.is_number else [x.levels.index(one) for one in x.values], float) + aside
-    rows = np.flatnonzero(here)
+    places = np.array(x.values if x.is_number else [x.levels.index(level) for level in x.values], float) + aside
+    rows = np.flatnonzero(drawn)
     rows = rows[np.argsort(places[rows], kind="stable")]
     at, shown = places[rows], points.iloc[rows]
     is_course = x.is_number and not x.is_sample and x.keys[0] not in SEEDS
@@ -479,6 +501,7 @@ def _scale_x(axes: Axes, x: Factor, log: str) -> None:
         axes.set_xticks(range(len(x.levels)), [plain_text(level) for level in x.levels], **slanted)
         axes.set_xlim(-0.6, len(x.levels) - 0.4)
         return
+    log = f"x{log}" if x.is_log else log
     if "x" in log:
         axes.set_xscale("log")
     apart = np.diff(x.levels) > 0.08 * (x.levels[-1] - x.levels[0])
@@ -499,7 +522,7 @@ def _scale_y(axes: Axes, points: pd.DataFrame, theory: Sequence[FloatArray], log
         return
     values, errors = points["value"], points["error"].fillna(0.0)
     shown = np.concatenate(
-        [values - errors, values + errors, *theory, *(points[one] for one in _ALSO if one in points)]
+        [values - errors, values + errors, *theory, *(points[name] for name in _ALSO if name in points)]
     )
     low, high = float(np.nanmin(shown)), float(np.nanmax(shown))
     if (values.dropna() % 1.0 == 0.0).all():  # counts

@@ -68,6 +68,7 @@ def make_runs(
     engine: Engine,
     *,
     force: bool = False,
+    dumps: bool = True,
     on_progress: Tell | None = None,
     time_limit: float | None = None,
 ) -> dict[str, bool]:
@@ -82,6 +83,8 @@ def make_runs(
         Cases that may share a deck (`walkers.templates.scene`).
     force
         Make all runs again; a run is replaced when the new one is finished.
+    dumps
+        Whether runs that are made keep their dumps (`walkers.runner.directory.leave_out_dumps`).
     on_progress, time_limit
         Called while the engine runs. Limit of the wall time in s for each segment.
 
@@ -112,6 +115,9 @@ def make_runs(
                     done = _make_together(left, cycles, out, engine, locks, on_progress, time_limit)
                     runs |= dict.fromkeys(done, True)
                 left = {name: case for name, case in left.items() if name not in runs}
+        for place in missing if not dumps else ():
+            if place.name in runs:
+                on_disk.leave_out_dumps(place)
     return runs
 
 
@@ -131,6 +137,15 @@ def progress_at(place: Path) -> Progress | None:
     except (OSError, ValueError, KeyError, TypeError, WalkersError):
         return None
     return progress_in(run, cycles, Segment(begin, begin, start), step, seconds)
+
+
+def share_at(place: Path) -> float:
+    """Share of the steps that are done of a run, or of the shared deck whose first run has this place; 0 if unknown."""
+    shared = on_disk.unfinished(place) / DECK_FOLDER
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        return last_step(shared / decks.OUTPUT_NAME) / on_disk.layout_of(shared).steps
+    progress = progress_at(place)
+    return progress.share if progress else 0.0
 
 
 def progress_in(run: Run, cycles: int, segment: Segment, step: int, seconds: float) -> Progress:

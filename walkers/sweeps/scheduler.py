@@ -41,7 +41,7 @@ from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, Outp
 from walkers.runner.launch import cores_here
 from walkers.show import PROGRAM_SECONDS, pairs_of_beads, predicted_overhead, predicted_seconds
 from walkers.sweeps import table
-from walkers.sweeps.making import check_audit, make_runs
+from walkers.sweeps.making import check_audit, make_runs, share_at
 from walkers.sweeps.site import check_path, decks_at, prepare
 from walkers.templates.scene import sharing_key
 
@@ -73,7 +73,7 @@ class Options:
 
     An ``executor`` that is handed over runs as many decks at once as there are ``workers``. Failures with the names
     ``final`` are never repeated by a later call, because the engine would fail again. ``time_limit`` is the wall time
-    in s that an engine may take.
+    in s that an engine may take. Without ``dumps`` the runs that are made keep only results and tables.
     """
 
     workers: int | None = None
@@ -82,6 +82,7 @@ class Options:
     time_limit: float | None = None
     final: frozenset[str] = frozenset()
     ranks: int = 1
+    dumps: bool = True
 
     @property
     def decks_at_once(self) -> int:
@@ -319,6 +320,7 @@ def work(
     out: Path,
     engine: Engine,
     time_limit: float | None,
+    dumps: bool = True,
 ) -> Report:
     """Make the runs of a deck on a worker, until ``stop`` is set. Known failures are returned, not raised."""
 
@@ -333,7 +335,7 @@ def work(
             raise EngineDiffers(f"the engine on {node()}, {local.path}, is not the engine that started this sweep")
         if list(runs) != [run_place(case, local, out).name for case in cases]:
             raise ProgramDiffers(f"the program on {node()} has another version than the one that started the sweep")
-        return [*make_runs(cases, out, local, on_progress=look, time_limit=time_limit)]
+        return [*make_runs(cases, out, local, dumps=dumps, on_progress=look, time_limit=time_limit)]
     except (OSError, WalkersError) as error:
         kind, message, directory = type(error), str(error), None
         if isinstance(error, EngineFailure):
@@ -405,6 +407,8 @@ class _Loop:
         """Submitted decks."""
         self.halves: list[PlannedDeck] = []
         """Second halves of failed decks, while no point is finished."""
+        self.shares: dict[PlannedDeck, float] = {}
+        """Shares of running decks that are done."""
         self.alone: Counter[tuple[str, str]] = Counter()
         """Failures of points alone, by name and message."""
         self.begin, self.seconds = time.perf_counter(), sum(deck.seconds for deck in plan.decks)
@@ -435,7 +439,7 @@ class _Loop:
     def _submit(self, deck: PlannedDeck) -> None:
         plan = self.plan
         runs, cases = [self.record.runs[point] for point in deck.points], [plan.cases[point] for point in deck.points]
-        how = (self.record.out, plan.engine, plan.options.time_limit)
+        how = (self.record.out, plan.engine, plan.options.time_limit, plan.options.dumps)
         self.decks[self.executor.submit(work, self.stop, runs, cases, *how)] = deck
 
     def _take_in(self, deck: PlannedDeck, report: Report) -> None:
@@ -472,7 +476,12 @@ class _Loop:
         if finished_now := self.done - self.finished_before:
             pace = elapsed / finished_now
             words.append(f"{60.0 / pace:.0f} points per minute" if pace < 10.0 else f"{duration_text(pace)} per point")
-        waiting = sum(deck.seconds for deck in [*self.decks.values(), *self.halves])
-        if waiting < self.seconds:
-            words.append(f"{duration_text(waiting / (self.seconds - waiting) * elapsed)} left")
-        return Progress((self.done + failed) / max(points, 1), ", ".join(words))
+        for deck in decks:  # between the segments of a run nothing is known
+            share = share_at(self.record.out / self.record.runs[deck.points[0]])
+            self.shares[deck] = max(self.shares.get(deck, 0.0), share)
+        left = [deck.seconds * (1.0 - self.shares.get(deck, 0.0)) for deck in (*self.decks.values(), *self.halves)]
+        share = max(0.0, 1.0 - sum(left) / self.seconds) if self.seconds else 1.0
+        words.append(f"{100.0 * share:.0f} % of the work")
+        if 0.0 < share < 1.0:
+            words.append(f"{duration_text((1.0 / share - 1.0) * elapsed)} left")
+        return Progress(share, ", ".join(words))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
 from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.errors import check_limits, refused, unusable
+from walkers.errors import InputError, check_limits, refused, unusable
 from walkers.inputs.axes import Range, ranges_of, unit_cube, written
 from walkers.inputs.case import Case
 from walkers.inputs.library import unmeasured
@@ -24,12 +26,14 @@ from walkers.rounding import rounded
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.runner.files import write_json
+from walkers.sweeps.figure import LeftOutWarning, figure_of, rank_correlation
 from walkers.sweeps.readable import kind_of
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
 from walkers.sweeps.table import load, main_columns
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 POINTS = 32
 """Enough points for 5 and 95 %, and for the strongest rank correlations; a power of two, for Sobol's sequence."""
@@ -72,20 +76,20 @@ class Spread:
         return contents
 
 
-def _range_of(one: Origin) -> dict[str, list[Any]]:
+def _range_of(value: Origin) -> dict[str, list[Any]]:
     """The range of a value for the sampler of a sweep; the value of the case is the median."""
-    name, (low, high) = "loguniform" if one.logarithmic else "uniform", one.range or (None, None)
-    ends: Range = ranges_of({one.key: {name: [low, high]}})[one.key]
-    kind = kind_of(one.key)
+    name, (low, high) = "loguniform" if value.logarithmic else "uniform", value.range or (None, None)
+    ends: Range = ranges_of({value.key: {name: [low, high]}})[value.key]
+    kind = kind_of(value.key)
     try:
         unit = parse_quantity(f"1 {ends.unit}", kind) if kind and ends.unit else 1.0
-        own = (parse_quantity(one.text, kind) if kind and ends.unit else float(one.text)) / unit
+        usual = (parse_quantity(value.text, kind) if kind and ends.unit else float(value.text)) / unit
     except ValueError:  # a value that the program computes, such as a time step
         return {name: [low, high]}
-    if not ends.low * (1.0 - 1e-9) <= own <= ends.high * (1.0 + 1e-9):
-        message = f"expected a range that holds the case's own value, {one.text}"
-        raise unusable(f"uncertain.{one.key}", message, [low, high])
-    return {name: [low, written(min(max(own, ends.low), ends.high), ends.unit), high]}
+    if not ends.low * (1.0 - 1e-9) <= usual <= ends.high * (1.0 + 1e-9):
+        message = f"expected a range that holds the case's own value, {value.text}"
+        raise unusable(f"uncertain.{value.key}", message, [low, high])
+    return {name: [low, written(min(max(usual, ends.low), ends.high), ends.unit), high]}
 
 
 def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> Sweep:
@@ -97,12 +101,12 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
     import numpy as np
 
     check_limits("points", points, 2, 4096)
-    varied = [one for one in case.origins if one.range is not None]
+    varied = [value for value in case.origins if value.range is not None]
     if not varied:
         message = "no value is uncertain: give ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
         raise refused(case.name, message)
     with blaming(case.name, case.document):
-        ranges = {one.key: _range_of(one) for one in varied}
+        ranges = {value.key: _range_of(value) for value in varied}
 
     def likeness(seed: int) -> float:
         cube = unit_cube("sobol", len(varied), points, seed)
@@ -123,14 +127,15 @@ def run_spread(
 ) -> Spread:
     """Run a case with all unmeasured values drawn from their ranges, and write the bands beside the sweep's record.
 
-    The case must be as read from a file. Other arguments: see `walkers.sweeps.scheduler.run_sweep`. From then on, texts
-    and reports of the case's run contain the bands.
+    The case must be as read from a file. Runs that are made keep no dumps, which only pictures need. Other arguments:
+    see `walkers.sweeps.scheduler.run_sweep`. From then on, texts and reports of the case's run contain the bands.
 
     Notes
     -----
     Values are drawn independently. Calibrated values are correlated (docs/explanation/calibration.md): for them, the
     band is wider than that of the posterior.
     """
+    options = replace(options, dumps=False)
     record, failures = run_sweep(spread_sweep(case, points, engine), out, options, engine=engine, **how)
     spread = spread_in(load(record.directory), case, record.directory, failures)
     write_json(record.directory / SPREAD_NAME, {**spread.as_dict(), "directory": record.directory.name})
@@ -147,13 +152,15 @@ def spread_in(table: pd.DataFrame, case: Case, directory: Path, failures: Sequen
         counts = {"forward": int((speeds > REST).sum()), "backward": int((speeds < -REST).sum())}
         counts |= {"at_rest": int((speeds.abs() <= REST).sum()), "separated": len(table) - len(together)}
     shown = [main_columns(together)[0]] if "velocity" in table else [name for name in MAIN if name in table]
-    varied = tuple(one for one in case.origins if one.range is not None)
+    varied = tuple(value for value in case.origins if value.range is not None)
     return Spread(
         directory=directory,
         varied=varied,
-        held=tuple(one for one in case.origins if one.key in unmeasured() and one.range is None),
+        held=tuple(value for value in case.origins if value.key in unmeasured() and value.range is None),
         bands={name: _band(together[name].dropna()) for name in shown if together[name].notna().any()},
-        depends={name: _ranks(together[together[name].notna()], name, [one.key for one in varied]) for name in shown},
+        depends={
+            name: _ranks(together[together[name].notna()], name, [value.key for value in varied]) for name in shown
+        },
         counts=counts,
         failures=tuple(failures),
     )
@@ -168,22 +175,34 @@ def _ranks(table: pd.DataFrame, name: str, keys: Sequence[str]) -> dict[str, flo
     """Rank correlations of a column with each key, the strongest first, without insignificant ones."""
     if len(table) < LEAST_PER_VALUE * len(keys) or table[name].nunique() < 2:
         return {}
-    ranks = {key: float(table[key].rank().corr(table[name].rank())) for key in keys}
+    ranks = {key: rank_correlation(table[key], table[name]) for key in keys}
     certain = {key: rank for key, rank in ranks.items() if abs(rank) > 2.0 / sqrt(len(table) - 1)}
-    return dict(sorted(certain.items(), key=lambda one: -abs(one[1])))
+    return dict(sorted(certain.items(), key=lambda item: -abs(item[1])))
+
+
+def figures_of_spread(run: Path) -> dict[str, Figure]:
+    """The figure of the spread of a run, for its report; none if it has no spread, or no draw is finished."""
+    directory = spread_of(run.resolve())
+    if (directory / SPREAD_NAME).is_file():
+        with suppress(InputError), warnings.catch_warnings():
+            warnings.simplefilter("ignore", LeftOutWarning)
+            return {"spread": figure_of(load(directory))}
+    return {}
 
 
 def describe(spread: Spread) -> str:
     """A spread in a few lines: mm, mm/s."""
     points = max((band["points"] for band in spread.bands.values()), default=0)
     lines = [f"  spread     {points} draws; values drawn independently from their ranges, median: value of the case"]
-    lines += [f"{'':13}{one.key} {one.text} ({' to '.join(map(str, one.range or ()))})" for one in spread.varied]
+    lines += [
+        f"{'':13}{value.key} {value.text} ({' to '.join(map(str, value.range or ()))})" for value in spread.varied
+    ]
     if spread.held:
-        text = ", ".join(f"{one.key} {one.text}" for one in spread.held)
+        text = ", ".join(f"{value.key} {value.text}" for value in spread.held)
         lines.append(f"    fixed    {text}; to vary these values, add ranges in [uncertain]")
     for name, band in spread.bands.items():
         unit, factor = unit_shown(declared(name).unit)
-        texts = {end: rounded(float(f"{one * factor:.3g}"), unit) for end, one in band.items()}
+        texts = {end: rounded(float(f"{number * factor:.3g}"), unit) for end, number in band.items()}
         ends = "{low} to {high} {unit} (5 to 95 %), median {median}; smallest {smallest}, largest {largest}"
         lines.append(f"    {declared(name).label:8} {ends.format(unit=unit, **texts)}")
         ranks = ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items())
@@ -192,7 +211,7 @@ def describe(spread: Spread) -> str:
             text = "too few draws for rank correlations; the band is approximate"
         lines.append(f"{'':13}{text}")
     words = _WORDS | (_ON_A_SLOPE if {"right_facing", "axial_velocity"} & spread.bands.keys() else {})
-    found = [f"{count} {words[name]}" for name, count in spread.counts.items() if count]
-    found += [f"{len(spread.failures)} failed, not in the band"] if spread.failures else []
-    lines += [f"    draws    {', '.join(found)}"] if found else []
+    draws = [f"{count} {words[name]}" for name, count in spread.counts.items() if count]
+    draws += [f"{len(spread.failures)} failed, not in the band"] if spread.failures else []
+    lines += [f"    draws    {', '.join(draws)}"] if draws else []
     return "\n".join([*lines, f"    table    {spread.directory}"])

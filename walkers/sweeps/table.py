@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, refused, suggestion
+from walkers.inputs.axes import ranges_of
 from walkers.inputs.origins import text_of
 from walkers.postprocess.numbers import declared, headline, is_declared, ordered
 from walkers.postprocess.quantities import GROUPS, unit_shown
@@ -180,7 +181,8 @@ def load(directory: str | Path) -> pd.DataFrame:
     DataFrame
         One row per point, in the order of the sweep. Columns are ``point``, the keys that vary (in the unit of the
         sweep file), and (SI units) the numbers of results (`walkers.postprocess.quantities.NUMBERS`) and `STATE`.
-        ``attrs["units"]`` maps columns to units, ``attrs["meanings"]`` to their meanings. Unfinished points have NaN.
+        ``attrs["units"]`` maps columns to units, ``attrs["meanings"]`` to their meanings; ``attrs["sampled"]`` says of
+        the keys that are drawn from ranges whether these are log-uniform. Unfinished points have NaN.
     """
     import pandas as pd
 
@@ -197,6 +199,8 @@ def load(directory: str | Path) -> pd.DataFrame:
     frame = _described(pd.DataFrame(rows, columns=list(described)), described)
     frame.attrs |= {"sweep": sweep.name, "title": sweep.title or sweep.name, "until_below": sweep.until_below}
     frame.attrs |= {"varied": list(varied), "axes": [axis.keys for axis in sweep.axes]}
+    samples = [ranges_of(sample["ranges"]) for sample in sweep.file.get("sample", [])]
+    frame.attrs["sampled"] = {key: span.logarithmic for ranges in samples for key, span in ranges.items()}
     return frame
 
 

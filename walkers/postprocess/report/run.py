@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from walkers.extras import require
 from walkers.inputs.case import Case
@@ -21,11 +22,21 @@ from walkers.runner.directory import case_of
 from walkers.runner.files import write_text
 from walkers.runner.manifest import read_manifest
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 Origins = tuple[Origin, ...] | None
 """Sources of the values of a case; None: as recorded in the run."""
 
 
-def report_run(directory: Path, to: Path | None = None, origins: Origins = None, *, largest: int = LARGEST) -> Path:
+def report_run(
+    directory: Path,
+    to: Path | None = None,
+    origins: Origins = None,
+    *,
+    figures: Mapping[str, Figure] = {},
+    largest: int = LARGEST,
+) -> Path:
     """Write the report of a run as a self-contained HTML file.
 
     `InputError` if the file is no HTML file in an existing folder, `walkers.postprocess.dump.DumpError` if the dumps
@@ -37,6 +48,8 @@ def report_run(directory: Path, to: Path | None = None, origins: Origins = None,
         The run directory; the sources of the values of its case.
     to
         The file; None: ``report.html`` in the run directory.
+    figures
+        Figures to show beside those of the run, such as that of its spread.
     largest
         Size in bytes that the file must not reach: the player shows fewer frames of runs of many beads.
     """
@@ -51,7 +64,7 @@ def report_run(directory: Path, to: Path | None = None, origins: Origins = None,
         "summary": f"{caption(motion.case)}.",
         "shown": shown_of(motion.case, results, origins),
         "manifest": read_manifest(directory),
-        "figures": {name: svg_of(figure) for name, figure in figures_of(results).items()},
+        "figures": {name: svg_of(figure) for name, figure in {**figures_of(results), **figures}.items()},
     }
     places, page = 2 * MOST_PLACES, ""
     while not page or (len(page.encode()) >= largest and places > len(motion.radius)):
