@@ -176,13 +176,14 @@ def files_of_segments(directory: Path) -> list[str]:
 
 
 def leave_out_dumps(directory: Path) -> None:
-    """Remove dumps and restart files of a finished, measured run, which its manifest names as left out from then on.
+    """Remove what only pictures and further measurements read, of a finished, measured run that is locked.
 
-    The run must be locked. Results and tables stay; pictures, films and other measurements need the run made again.
+    Dumps, restart files and the forces of bridges, which the engine has read, go; the manifest says that they were left
+    out. Results, tables and decks stay.
     """
     layout, contents = layout_of(segment_directories(directory)[0]), read_manifest(directory)
-    dumps = {layout.bead_dump, layout.pair_bridge_dump, layout.wall_bridge_dump, RESTART_NAME}
-    names = [name for name in contents["files"] if Path(name).name in dumps]
+    dumps = {layout.bead_dump, layout.pair_bridge_dump, layout.wall_bridge_dump, RESTART_NAME, BRIDGES_NAME}
+    names = [name for name in contents["files"] if "/" in name and Path(name).name in dumps]
     write_json(directory / MANIFEST_NAME, {**contents, "left_out": names})
     for name in names:
         (directory / name).unlink(missing_ok=True)

@@ -492,7 +492,7 @@ def _model_look(number: int, is_line: bool, colour: Any) -> dict[str, Any]:
 
 def _scale_x(axes: Axes, x: Factor, log: str) -> None:
     """Scale of the x axis; names of categories (slanted if long); ticks at the values of x if there are few."""
-    from matplotlib.ticker import MaxNLocator
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
     if not x.is_number:
         slanted: dict[str, Any] = (
@@ -508,6 +508,11 @@ def _scale_x(axes: Axes, x: Factor, log: str) -> None:
     if len(x.levels) <= _FEW_TICKS and apart.all() and not x.is_sample:
         axes.set_xticks(x.levels, [f"{x.exact(level):.4g}" for level in x.levels])
         axes.set_xticks([], minor=True)
+    elif x.is_log:
+        ticks = (1.0, 2.0, 5.0) if x.levels[-1] < 20.0 * x.levels[0] else (1.0,)
+        axes.xaxis.set_major_locator(LogLocator(subs=ticks))
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter(NullFormatter())
     elif "x" not in log:  # long numbers would overlap in panels side by side
         whole = all(float(level).is_integer() for level in x.levels)
         axes.xaxis.set_major_locator(MaxNLocator(4 if x.is_sample else "auto", steps=[1, 2, 5, 10], integer=whole))
