@@ -509,7 +509,7 @@ def _scale_x(axes: Axes, x: Factor, log: str) -> None:
         axes.set_xticks(x.levels, [f"{x.exact(level):.4g}" for level in x.levels])
         axes.set_xticks([], minor=True)
     elif x.is_log:
-        ticks = (1.0, 2.0, 5.0) if x.levels[-1] < 20.0 * x.levels[0] else (1.0,)
+        ticks = (1.0, 2.0, 5.0) if x.levels[-1] < 40.0 * x.levels[0] else (1.0,)
         axes.xaxis.set_major_locator(LogLocator(subs=ticks))
         axes.xaxis.set_major_formatter("{x:g}")
         axes.xaxis.set_minor_formatter(NullFormatter())
