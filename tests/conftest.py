@@ -76,9 +76,9 @@ for _kept in _KEPT.glob("bridge-*"):  # a copy: a link to it is not loaded
     shutil.copy(_kept, _OURS)
 
 _LONGEST = (
-    *("test_a_sweep_through_slurm", "test_a_sweeps_points_open_reports", "[pilots", "[a pile, killed]"),
-    *("test_known_parameters_are_found", "test_a_dimer_on_the_axis_climbs", "test_mandatory_packages"),
-    *("test_workers_of_another_process", "test_figures_and_comparison", "test_piles_agree_until"),
+    *("test_a_sweep_through_slurm", "test_figures_and_comparison", "[pilots", "test_a_sweeps_points_open_reports"),
+    *("test_known_parameters_are_found", "test_mandatory_packages", "[a pile, killed]"),
+    *("test_workers_of_another_process", "test_the_installed_engine_passes", "test_a_dimer_on_the_axis_climbs"),
 )
 """Parts of the names of tests that take more than a few seconds, the longest first."""
 T = TypeVar("T")
