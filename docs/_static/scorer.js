@@ -1,11 +1,11 @@
 // What the search of the site shows and in which order: headings that contain the words, then pages by how often they
-// contain them, those that explain first; beside each page its text at the first of these places. docs/_ext/texts.py
-// writes TEXTS.
+// contain them; pages that explain first, pages made from code last. Beside each page stands its text at the first of
+// these places. docs/_ext/texts.py writes TEXTS.
 const WORDS = (new URLSearchParams(location.search).get("q") || "").toLowerCase().split(/\s+/).filter(Boolean);
 const AROUND = 80; // characters before and after the word
 const FIRST = [
   [/^(explanation|tutorial)/, 3], [/^explanation\/physics/, 4],
-  [/^(reference\/generated|reference\/python|gallery|figures|engine-reports)/, -3],
+  [/^(reference\/generated\/(tables|commands|shipped)|reference\/python|gallery|figures|engine-reports)/, -25],
 ];
 
 function places(text) {
@@ -22,10 +22,10 @@ function excerpt(text) {
 
 var Scorer = {
   score: (result) => {
-    const [name, , , description, score, , kind] = result;
+    const [name, , anchor, description, score, , kind] = result;
     const text = TEXTS[name] || "";
     const prior = FIRST.filter(([pages]) => pages.test(name)).reduce((sum, [, more]) => sum + more, 0);
-    if (kind === "title") return 20 + score + prior;
+    if (kind === "title") return (anchor ? 20 : 25) + score + prior;
     if (kind !== "text") return score + prior;
     if (!description) result[3] = excerpt(text);
     return 5 * (1 - Math.exp(-places(text) / 10)) + score + prior;
