@@ -136,10 +136,6 @@ def report(name: RunOrSweep, /, *, at: At = At(), to: Path | None = None) -> Non
     to
         HTML file to write; default: report.html in the folder of the run or sweep.
     """
-    from walkers.postprocess.report.page import check_report
-
-    if to is not None:
-        check_report(to)
     print(at.load(name).report(to))
 
 

@@ -247,11 +247,6 @@ def _is_constant(group: Group) -> bool:
     return bool(agree and np.all(little | (after < _FADING * before)))
 
 
-def on_axis(walkers: pd.DataFrame) -> pd.Series[bool]:
-    """Whether walkers of a table ``walkers`` end near the direction given by facing."""
-    return walkers["orientation_end"].abs() < ASTRAY
-
-
 def misalignment(walkers: pd.DataFrame) -> FloatArray:
     """Angles to the drive axis at the end, in either direction, 0 to 90 degrees, of a table ``walkers``."""
     ends = np.degrees(walkers["orientation_end"].to_numpy())
@@ -272,6 +267,5 @@ def steady_walkers(results: Results) -> pd.DataFrame:
     walkers = results.table("walkers")
     kept = together(walkers)
     if results.get("sin_delta") != 0.0:
-        kept &= walkers["steady"] & on_axis(walkers)
-    chosen: pd.DataFrame = walkers[kept]
-    return chosen
+        kept &= walkers["steady"] & (walkers["orientation_end"].abs() < ASTRAY)
+    return walkers.loc[kept]

@@ -22,7 +22,7 @@ from walkers.postprocess import piles
 from walkers.postprocess.clusters import connected
 from walkers.postprocess.motion import Bridges, Motion, read_bridges, read_motion
 from walkers.postprocess.necks import ends_of
-from walkers.postprocess.scene import Scene, camera_axes, fans_of, gathered, walls_of
+from walkers.postprocess.scene import Scene, camera_axes, gathered, mesh_of, walls_of
 
 if TYPE_CHECKING:
     import meshio
@@ -165,8 +165,8 @@ def _walls(motion: Motion) -> meshio.Mesh:
     """The walls as triangles; two walls share no points."""
     import meshio
 
-    faces = walls_of(motion)
-    return meshio.Mesh(np.concatenate(faces), {"triangle": fans_of(faces)})
+    walls = mesh_of(walls_of(motion)).triangulate()
+    return meshio.Mesh(np.asarray(walls.points), {"triangle": walls.regular_faces})
 
 
 def _view(motion: Motion) -> dict[str, Any]:

@@ -311,16 +311,8 @@ def mesh_of(faces: Sequence[FloatArray]) -> pv.PolyData:
     """A mesh of polygons, given their corners."""
     import pyvista as pv
 
-    points, sizes = np.concatenate(faces), np.array([len(corners) for corners in faces])
-    cells = np.insert(np.arange(len(points)), np.cumsum(sizes) - sizes, sizes)
-    return pv.PolyData(points, faces=cells)
-
-
-def fans_of(faces: Sequence[FloatArray]) -> IntArray:
-    """Corners of the triangles of convex polygons whose points are numbered one after the other, shape (T, 3)."""
-    ends = np.cumsum([len(face) for face in faces])
-    firsts = [(end - len(face), end) for face, end in zip(faces, ends, strict=True)]
-    return np.array([(first, corner - 1, corner) for first, end in firsts for corner in range(first + 2, end)])
+    corners = np.split(np.arange(sum(map(len, faces))), np.cumsum([len(face) for face in faces])[:-1])
+    return pv.PolyData.from_irregular_faces(np.concatenate(faces), corners)
 
 
 def floor_lines(low: FloatArray, high: FloatArray, step: float) -> FloatArray:

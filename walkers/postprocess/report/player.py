@@ -226,9 +226,10 @@ def _walls(motion: Motion, step: float) -> list[Any]:
         some = [corners for corners in faces if (np.ptp(corners[:, 2]) < 1e-6) == level]
         if not some:
             continue
-        points = (np.concatenate(some) - [0.0, 0.0, 2e-3 * level]).astype(np.float32)  # below beads that touch it
+        mesh = view.mesh_of(some).triangulate()
+        points = (mesh.points - [0.0, 0.0, 2e-3 * level]).astype(np.float32)  # below beads that touch it
         look = {"color": _FLOOR, "side": "double", "roughness": 1.0, "name": "floor" if level else "wall"}
-        parts.append(k3d.mesh(points, view.fans_of(some).astype(np.uint32), opacity=1.0 if level else 0.12, **look))
+        parts.append(k3d.mesh(points, mesh.regular_faces.astype(np.uint32), opacity=1.0 if level else 0.12, **look))
     if motion.case.boundary.bare:
         low, high = faces[0].min(axis=0), faces[0].max(axis=0)
         step = max(step, view.round_below(float(np.ptp([low, high])) / _MOST_LINES))

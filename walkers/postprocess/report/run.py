@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.extras import require
 from walkers.inputs.case import Case
-from walkers.inputs.keys import dotted
 from walkers.inputs.origins import Origin, text_of
 from walkers.postprocess.caption import caption
 from walkers.postprocess.figures import figures_of
@@ -77,18 +76,17 @@ def report_run(
 
 
 def shown_of(case: Case, results: Results, origins: Origins = None) -> dict[str, Any]:
-    """Warnings and rows of a result, and parameters of its case, in SI units if no origins are recorded."""
+    """Warnings and rows of a result, and parameters of its case with their origins."""
     parameters = [
         vars(source) | {"range": " … ".join(map(text_of, source.range or ())), "origin": source.word}
         for source in (case.origins if origins is None else origins)
     ]
-    given = ((key, value) for key, value in dotted(case.as_dict()) if value not in (None, "", [], ()))
     return {
         "warnings": results.warnings,
         "rows": rows(results),
         "guessed": [parameter for parameter in parameters if parameter["origin"] == "guessed"],
         "uncertain": [parameter for parameter in parameters if parameter["origin"].endswith("uncertain")],
-        "parameters": parameters or [{"key": key, "text": text_of(value)} for key, value in given],
+        "parameters": parameters,
     }
 
 
