@@ -311,8 +311,9 @@ def mesh_of(faces: Sequence[FloatArray]) -> pv.PolyData:
     """A mesh of polygons, given their corners."""
     import pyvista as pv
 
-    corners = np.split(np.arange(sum(map(len, faces))), np.cumsum([len(face) for face in faces])[:-1])
-    return pv.PolyData.from_irregular_faces(np.concatenate(faces), corners)
+    points, sizes = np.concatenate(faces), np.array([len(corners) for corners in faces])
+    cells = np.insert(np.arange(len(points)), np.cumsum(sizes) - sizes, sizes)
+    return pv.PolyData(points, faces=cells)
 
 
 def floor_lines(low: FloatArray, high: FloatArray, step: float) -> FloatArray:
