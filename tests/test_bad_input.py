@@ -63,7 +63,7 @@ CASES: list[tuple[dict[str, Any], str]] = [
     ({"liquid": {"meniscus_radius": "70 um"}}, "expected either volume_fraction or meniscus_radius, not both"),
     ({"liquid": {"volume_fraction": None, "meniscus_radius": "70 um"},
       "uncertain": {"liquid.volume_fraction": [0.1, 0.2]}},
-     "uncertain.liquid.volume_fraction: expected a value that the case has"),
+     "uncertain.liquid.volume_fraction: expected liquid.meniscus_radius, which the case has instead"),
     ({"liquid": {"volume_fraction": None, "meniscus_radius": "1 mm"}},
      'liquid.meniscus_radius = "1 mm": expected menisci that fit between the surfaces: no bridge between'),
     ({"liquid": {"volume_fraction": None, "meniscus_radius": "70 um", "law": "young-laplace-films"}},

@@ -281,8 +281,8 @@ class Case(Table):
             except InputError as error:
                 raise error.below("uncertain", source) from error
             value = self.value_of(name)
-            if value is None and alternatives(Case, name):
-                message = "expected a value that the case has: it says the same in other words"
+            if value is None and (instead := sorted(key for key in alternatives(Case, name) if self.value_of(key))):
+                message = f"expected {' or '.join(instead)}, which the case has instead"
                 raise InputError(source, [Problem(f"uncertain.{name}", None, message)])
             slack = 1e-9 * (high - low)
             if around and isinstance(value, (int, float)) and not low - slack <= value <= high + slack:
