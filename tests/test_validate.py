@@ -92,7 +92,9 @@ def test_restitution_on_a_wet_plate_falls_with_the_drag(in_folder: Path) -> None
         straight, limit, *shown = experiments.impacts(bench)
     assert [straight.verdict, limit.verdict] == [Verdict.PASS, Verdict.PASS]
     assert {line.verdict for line in shown} == {Verdict.NOT_JUDGED}
-    assert {line.what.count("St = 332") for line in shown[1:]} == {1}, "m over 6πηR² v: 2.75 mm, 2.5 g/cm³, 4.6 mPa s"
+    assert {line.quantity.count("St = 332") for line in shown[1:]} == {1}, (
+        "m over 6πηR² v: 2.75 mm, 2.5 g/cm³, 4.6 mPa s"
+    )
     assert shown[-1].measured < 0.5 * shown[-1].expected, "a softened bead loses more"
 
 
@@ -121,7 +123,7 @@ def test_one_failed_line_fails_all_checks() -> None:
         (replace(GOOD, expected=0.0, measured=0.2), Verdict.FAIL),
         (replace(BAD, scale=10.0), Verdict.PASS),
         (replace(BAD, tolerance=inf), Verdict.NOT_JUDGED),
-        (replace(GOOD, given=Verdict.FAIL), Verdict.FAIL),
+        (replace(GOOD, decided=Verdict.FAIL), Verdict.FAIL),
     ):
         assert line.verdict is verdict
     lines = (GOOD, replace(GOOD, check="second"), BAD)

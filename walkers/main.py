@@ -23,7 +23,6 @@ from walkers.text import printable
 
 if TYPE_CHECKING:
     from cyclopts.help import HelpPanel
-    from rich.console import Console, ConsoleOptions
 
 _SUMMARY = "Wet granular walkers, simulated with LIGGGHTS."
 _LIBRARY = "Your own library file; default: library.toml beside the case."
@@ -72,7 +71,7 @@ def _status(tokens: list[str]) -> int:
 class _PlainHelp:
     """Help in plain text, with names and their meanings in two columns."""
 
-    def __call__(self, _console: Console, _options: ConsoleOptions, panel: HelpPanel) -> None:
+    def __call__(self, _console: object, _options: object, panel: HelpPanel) -> None:
         """Print the commands, arguments or options below a heading."""
         defaults = (f" [default: {entry.default}]" * (entry.default not in (None, "False")) for entry in panel.entries)
         rows = [(", ".join(entry.display_labels_with_metavar), _plain(entry.description)) for entry in panel.entries]
@@ -84,11 +83,11 @@ class _PlainHelp:
             lines += [f"{'':{left + 4}}{line}" for line in more]
         print("\n".join(lines), end="\n" * bool(rows))
 
-    def render_usage(self, _console: Console, _options: ConsoleOptions, usage: Any) -> None:
+    def render_usage(self, _console: object, _options: object, usage: Any) -> None:
         """Print the arguments of a command."""
         print(f"Usage: {_plain(usage)}")
 
-    def render_description(self, _console: Console, _options: ConsoleOptions, description: Any) -> None:
+    def render_description(self, _console: object, _options: object, description: Any) -> None:
         """Print the purpose of a command."""
         print(f"\n{textwrap.fill(_plain(description), _WIDE)}")
 
@@ -121,6 +120,7 @@ def program() -> App:
         walkers.inputs.chosen_library = library
         return app(tokens)
 
+    app.meta.suppress_keyboard_interrupt = False
     return app
 
 

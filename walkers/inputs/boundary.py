@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import count
-from math import ceil, cos, degrees, inf, pi, radians, sin, sqrt
+from math import ceil, cos, degrees, inf, pi, sin, sqrt
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeAlias
 
 from walkers.errors import Problem
@@ -31,9 +31,6 @@ LOOSE = 1.03
 """Pitch of the places from which beads are poured, in diameters of the largest bead."""
 _SLOPE = f'{units.NOT_NEGATIVE}; boundary.uphill = "180 deg" turns the slope'
 _LEAST = 1e-13
-SHARP = radians(44.9)
-"""Faces of a convex vessel that turn by less at an edge cannot be planes without end: a bead near one of them would
-have a bridge to the other behind the edge. Its gap there is R/cos - R, at 45° 0.41 R, beyond the reach of bridges."""
 _RIM = 2e-4
 """m; the simulation box of a container reaches this far beyond its walls."""
 

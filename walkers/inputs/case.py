@@ -25,8 +25,8 @@ from walkers.inputs.drive import AXES, Drive, Excitation, Vector
 from walkers.inputs.keys import MISSING, flatten, parts_of, value_at
 from walkers.inputs.library import library_of
 from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
+from walkers.inputs.named_files import with_files
 from walkers.inputs.origins import Origin, Source, Whence, text_of
-from walkers.inputs.reading import with_files
 from walkers.inputs.resolving import GIVEN_BY, resolve, supplied
 from walkers.inputs.run import Run, settling_of
 from walkers.inputs.table import (

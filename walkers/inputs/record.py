@@ -122,7 +122,7 @@ def _spline(rows: npt.NDArray[np.float64], repeats: bool = False) -> PPoly:
 
 
 def record_of(value: object) -> object:
-    """A record from its file's name and its rows, which `Case.read` puts in the place of the name."""
+    """A record from its file's name and its rows, which stand in the place of the name in a case."""
     try:
         rows = tuple((float(time), float(x), float(y), float(z)) for time, x, y, z in value["rows"])  # type: ignore[index]
     except (LookupError, TypeError, ValueError) as error:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.errors import Problem, expected_of, shown, unusable
 from walkers.inputs.bodies import ARRANGEMENTS, MOST_BEADS, Cluster, Walkers, touching
-from walkers.inputs.boundary import BOTTOM, SHARP, Plane
+from walkers.inputs.boundary import BOTTOM, Plane
 from walkers.inputs.drive import common_frequency, unit_vector
 from walkers.inputs.keys import MISSING, parts_of, value_at
 from walkers.inputs.library import Library, LibraryNumber, unmeasured
@@ -229,6 +229,8 @@ def _vessel(case: Case) -> Case:
 
 def _planes(planes: Sequence[Plane]) -> tuple[Plane, ...]:
     """The planes with normals of length one, a level one through the origin first."""
+    from walkers.inputs.vessel import SHARP
+
     units = []
     for number, plane in enumerate(planes):
         try:

@@ -37,7 +37,8 @@ from walkers.inputs.axes import (
 from walkers.inputs.case import Case
 from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
-from walkers.inputs.reading import find_input, read_case, shipped, with_files
+from walkers.inputs.named_files import with_files
+from walkers.inputs.reading import find_input, read_case, shipped
 from walkers.inputs.table import Table, alternatives, changed
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import Speed, Whole

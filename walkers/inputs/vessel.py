@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from io import StringIO
 from itertools import pairwise
-from math import cos, inf
+from math import cos, inf, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,7 +22,6 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.errors import InputError, unusable
-from walkers.inputs.boundary import SHARP
 from walkers.inputs.drive import Vector
 
 if TYPE_CHECKING:
@@ -32,6 +31,9 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 Half = tuple[Vector, Vector, float]
 """A point, a direction and a bound: a place is in it if its offset from the point is above the bound along it."""
+SHARP = radians(44.9)
+"""Faces of a convex vessel that turn by less at an edge cannot be planes without end: a bead near one of them would
+have a bridge to the other behind the edge. Its gap there is R/cos - R, at 45° 0.41 R, beyond the reach of bridges."""
 MOST_TRIANGLES = 20_000
 _SAME = 1e-6
 """Of the extent of a surface: points that are nearer are one."""
