@@ -58,7 +58,7 @@ _FACT = re.compile(r"<!--fact (?P<name>\S+)-->(?P<text>[^<]*)<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
 _CLIMBS = {f"contact.roughness.bead_{surface}": "0.2 um" for surface in ("bead", "wall")}
 """The small pile of which clusters climb within its four seconds."""
-_PILES = ("pile-starts", "pile-frictions", "pile-contacts")
+_PILES = ("pile-starts", "pile-frictions", "pile-contacts", "pile-paper")
 _OF_CLIMBS = (
     *("pile", "climbed", "climbs", "rate", "on plain walls", "in corners"),
     *("led by large", "p by chance", "speed (mm/s)"),

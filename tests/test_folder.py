@@ -258,4 +258,5 @@ def test_values_of_all_kinds_are_shown_as_they_can_be_written() -> None:
     for key, value in flattened(walkers.load_case("fig1b")).items():
         assert chosen([{key: value}], f"{key}={readable(key, value)}") == [True], key
     values = {"boundary.opening": 1.0, "liquid.temperature": 293.15, "contact.friction.bead_wall": 0.2}
-    assert [readable(key, value) for key, value in values.items()] == ["57.2958 deg", "20 degC", "0.2"]
+    texts = [readable(key, value) for key, value in {**values, "drive.ramp": [[0.0, 1.0], [1.2, 0.5]]}.items()]
+    assert texts == ["57.2958 deg", "20 degC", "0.2", "(0 s, 1), (1.2 s, 0.5)"]

@@ -40,6 +40,8 @@ def readable(key: str, value: Any) -> str:
         return "-"
     if key == "environment.gravity":  # the unit g is the paper's 9.8 m/s², not gravity
         return f"{value:.6g} m/s^2"
+    if key == "drive.ramp":  # pairs of a time and a pure number
+        return ", ".join(f"({text_of(time, kind_of(key))}, {text_of(factor)})" for time, factor in value)
     return text_of(value, kind_of(key))
 
 
