@@ -25,6 +25,7 @@ from walkers import Run, load_case
 from walkers.archive.crate import PAPER, describe_crate
 from walkers.archive.writing import Contents, contents_of, write_archive
 from walkers.inputs.case import Case
+from walkers.runner.directory import leave_out_dumps
 from walkers.runner.manifest import FileChanged, read_manifest
 from walkers.runner.provenance import software
 from walkers.sweeps.table import load
@@ -202,6 +203,16 @@ def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
     assert (gone[0], sum("(missing: point " in line for line in gone)) == ("angles: 0 points have a run", 2)
     refused = call("export", str(there), "--to", "archive", "-o", str(tmp_path / "two.zip"))
     assert (refused.returncode, "2 of 2 points are not finished" in refused.stderr) == (2, True)
+
+
+def test_a_run_without_dumps_keeps_its_results_and_is_whole(run: Path) -> None:
+    """All that only pictures read has gone, as of draws of a spread; the check says that it was left out."""
+    leave_out_dumps(run)
+    names = ("beads.bin", "bridges.pairs.txt", "bridges.txt", "bridges.walls.txt", "state.restart")
+    assert not [path for path in run.rglob("*") if path.name in names]
+    left = [line.split("/")[-1] for line in _verified(run) if line.startswith("  left out ")]
+    assert sorted(left) == [name for name in names if name != "state.restart"]
+    assert Run(run).result["velocity"] == Run(run).result.table("walkers")["velocity"].mean()
 
 
 def test_an_archive_that_cannot_be_made_leaves_the_older_one(run: Path, archive: Path, tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Bad input: one line for each mistake, with file, key, value and expectation; exit status 2; nothing is written."""
 
+import json
 import shlex
 from collections.abc import Callable
 from itertools import pairwise
@@ -110,6 +111,10 @@ CASES: list[tuple[dict[str, Any], str]] = [
          'run.cycles = "auto": expected a number of cycles: with drive.ramp no velocity is constant'),
     )),
     # Bodies and boundaries
+    ({"dimers": {"gap": "1 um"}}, 'dimers.gap = "1 um": expected at most 0, or "auto"'),
+    *(({"mixture": {**MIXTURE, "small": None, key: ends}},
+       f"mixture.{key} = {json.dumps(ends)}: expected the smaller one first")
+      for key, ends in (("small", ["0.32 mm", "0.3 mm"]), ("small_diameters", ["0.63 mm", "0.6 mm"]))),
     ({"dimers": {"gap": "-50 um"}}, "overlap by more than 2 % of the smallest radius: expected -4 um or more"),
     ({"dimers": {"replicates": 2, "spacing": "0.5 mm"}}, 'dimers.spacing = "0.5 mm": neighbouring walkers would touch'),
     ({"dimers": {"replicates": 9, "spacing": "1 mm", "meet": True}},

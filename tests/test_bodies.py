@@ -106,6 +106,15 @@ def test_beads_of_a_cluster_touch_as_its_arrangement_says(shape: str) -> None:
     assert make.length == pytest.approx(max(extents), rel=2e-3)
 
 
+@pytest.mark.parametrize("gap", [0.0, -1.0])
+def test_beads_begin_with_the_gap_that_is_given(gap: float) -> None:
+    """In um; a gap of zero is not that of balance."""
+    scene, _ = place((of_tables(cluster("chain", "Ls", replicates=1, gap_spread=0.0, gap=f"{gap} um")),))
+    first, second = scene.beads
+    distance = np.linalg.norm(np.subtract(first.centre, second.centre))
+    assert distance - first.radius - second.radius == pytest.approx(1e-6 * gap, abs=1e-12)
+
+
 def test_pairs_of_beads_are_numbered_along_the_arrangement_and_head_to_the_large_one() -> None:
     """The last pair closes a ring, none a fan. Of s-L-s and alike beads the design gives the heading."""
     shapes = (("ring", "ssss"), ("fan", "s" * 7), ("raft", "s" * 7))

@@ -26,6 +26,7 @@ from walkers.postprocess import meetings
 from walkers.postprocess.films import speed_text
 from walkers.postprocess.gait import averages, fit_slopes, settled_samples, turned_over_at
 from walkers.postprocess.motion import Bridges, Motion
+from walkers.postprocess.numbers import in_short
 from walkers.postprocess.piles import _joined, _of_climbs, _state_of
 from walkers.postprocess.report.player import _points
 from walkers.postprocess.scene import Scene, rotations_at, turned_in
@@ -33,7 +34,7 @@ from walkers.postprocess.uncertainty import SPREAD_NAME, bands_of, spread_of
 from walkers.postprocess.walking import _scatter, tables_of
 from walkers.runner.files import write_json
 from walkers.runner.manifest import iso_time
-from walkers.show import describe, summarise
+from walkers.show import describe, predicted_overhead, summarise
 from walkers.sweeps.making import progress_in
 from walkers.templates.deck import Segment, compose, plan_of, render_deck
 from walkers.templates.scene import place
@@ -177,6 +178,18 @@ def test_what_show_prints_of_a_case_is_in_its_units() -> None:
     assert f" {1e12 * 0.5 * 0.01 * 4.0 / 3.0 * pi * LARGE**3:.3g} nL" in wall  # half of the bead's liquid
     assert f" {1e6 * bridge_at_rest(case, LARGE, inf).rupture:.3g} µm " in wall
     assert wall.endswith(f" {1e9 * contact_loads(case)[0].overlap:.4g} nm")
+    pile = describe(summarise(case_of(**PILE)))
+    for shown, share in ((text, 0.4), (pile, 0.2)):  # of the Rayleigh limit: walkers alone do not collide
+        (limit,) = (line for line in shown.splitlines() if line.startswith("  rayleigh"))
+        assert limit.endswith(f'("auto": at most {share})')
+
+
+def test_measuring_takes_as_long_as_a_run_has_places_of_beads_in_its_first_attempt() -> None:
+    """Of twelve beads of walkers in 20 frames of each of 12 cycles; the beads of a pile have no tables."""
+    law = {"liquid.law": "rabinovich"}
+    walkers, pile = load_case("fig1b", law), case_of(**PILE).changed(law)
+    assert (walkers.count, walkers.run.attempts) == (12, (12, 24, 60))
+    assert predicted_overhead([walkers, pile]) == pytest.approx(2 * 0.037 + 30e-6 * 12 * 20 * 12)
 
 
 def test_the_speed_of_a_run_that_goes_on_is_that_of_this_call() -> None:
@@ -324,6 +337,12 @@ def test_the_numbers_of_climbs() -> None:
     assert _of_climbs(clusters) == {"climbs": 2, "onset": 0.5, "speed": 2e-3, "highest": 5e-3, "led_by_large": 1}
     none = {"climbs": 0, "onset": np.nan, "speed": np.nan, "highest": np.nan, "led_by_large": 0}
     assert _of_climbs({name: column[2:] for name, column in clusters.items()}) == pytest.approx(none, nan_ok=True)
+
+
+def test_a_ramp_down_and_up_has_two_thresholds() -> None:
+    """The short text has both of them instead of the mean velocity."""
+    numbers = {"velocity": 1e-3, "walkers": 1, "stops_at": 7.84, "starts_at": 8.82, "goes_uphill": False}
+    assert in_short(numbers) == "stops at 0.8 g, starts at 0.9 g"
 
 
 def test_slow_motion_in_words() -> None:

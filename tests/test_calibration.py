@@ -17,6 +17,7 @@ from scipy.stats import t as student
 
 from tests.conftest import call, to_toml
 from tests.printed import spoilt
+from walkers import run
 from walkers.calibration.calibrate import PROPOSED, Outcome, calibrate, nearest
 from walkers.calibration.emulator import LARGEST, Emulator, Posterior, middle
 from walkers.calibration.file import Calibration, Parameter, load_calibration, read_calibration
@@ -275,6 +276,17 @@ def test_a_bead_that_cannot_slide_rolls_and_one_without_friction_is_dragged(tmp_
     assert rough["slip_1"] < 0.02
     assert smooth["slip_1"] > 5.0 * rough["slip_1"]
     assert rough["velocity"] == pytest.approx(rough["rotation_1"] + rough["sliding_1"], rel=0.02)
+
+
+def test_a_run_that_ended_early_slides_as_one_of_so_many_cycles(tmp_path: Path) -> None:
+    """Of which the first third is left out."""
+    early = run(load_case("fig1b", {"dimers.replicates": 1}), tmp_path)
+    cycles = round(early.result.table("trajectory")["cycle"].max())
+    assert cycles < early.case.run.cycles
+    given = {"dimers.replicates": 1, "run.cycles": cycles, "run.settling_cycles": cycles // 3}
+    fixed = numbers_of(run(load_case("fig1b", given), tmp_path).directory)
+    assert numbers_of(early.directory) == pytest.approx(fixed, rel=1e-6, nan_ok=True)
+    assert fixed["slip_1"] > 0.0
 
 
 LONE = {"name": "v", "group": "v", "of": ["slow"], "value": "1 mm/s", "deviation": "1 mm/s"}

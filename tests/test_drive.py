@@ -112,6 +112,17 @@ def test_a_run_has_its_record(tmp_path: Path) -> None:
     assert call("show", str(first.directory), check=True).stdout.count("record") > 1
 
 
+def test_a_sweep_over_records_reads_each_of_them(tmp_path: Path) -> None:
+    """Also those that its base case does not name, beside the sweep."""
+    case = recorded(tmp_path, sine(40), repeats=True)
+    for rows in (44, 48):
+        (tmp_path / f"{rows}.csv").write_text(sine(rows))
+    (tmp_path / "records.toml").write_text('case = "case.toml"\n[axes]\n"drive.record" = ["44.csv", "48.csv"]\n')
+    expected = [case.changed({"drive.record": str(tmp_path / f"{rows}.csv")}) for rows in (44, 48)]
+    found = load_sweep(tmp_path / "records.toml").cases()
+    assert [point.determinants() for point in found] == [of.determinants() for of in expected]
+
+
 def test_what_shares_a_deck_has_one_record_and_one_ramp(tmp_path: Path) -> None:
     """Walkers with other frictions do, and move as they would alone."""
     other = {"contact.friction.bead_wall": 0.2}

@@ -16,6 +16,7 @@ from playwright.sync_api import Browser, Page
 import walkers
 from tests.conftest import wait_for
 from tests.test_report import browser, walked_run  # noqa: F401
+from walkers.api import Pictures
 from walkers.runner.files import read_json
 
 EXAMPLE = Path(__file__).parents[1] / "docs" / "examples" / "01_first_walk.py"
@@ -68,6 +69,14 @@ def test_the_value_of_a_cell_contains_its_pictures(walked_run: Path, tmp_path: P
     contents = re.findall('src="data:image/png;base64,([^"]+)"', pictures._repr_html_())
     assert [b64decode(content) for content in contents] == [path.read_bytes() for path in pictures]
     assert len(pictures) == 2
+
+
+def test_pictures_of_a_cell_have_the_format_of_their_file(tmp_path: Path) -> None:
+    """A browser shows no SVG that is called a PNG."""
+    pictures = Pictures(tmp_path / name for name in ("a.png", "b.svg"))
+    for path in pictures:
+        path.write_bytes(b"")
+    assert re.findall("data:([^;]+);", pictures._repr_html_()) == ["image/png", "image/svg+xml"]
 
 
 @pytest.mark.slow

@@ -31,10 +31,11 @@ from walkers.postprocess.motion import read_motion
 from walkers.postprocess.tables import read_table
 from walkers.progress import Progress
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import case_of
+from walkers.runner.directory import case_of, unfinished
 from walkers.runner.failures import WalkersMet
+from walkers.runner.files import write_json
 from walkers.runner.manifest import read_manifest
-from walkers.sweeps.making import make_runs
+from walkers.sweeps.making import DECK_FOLDER, make_runs, share_at
 from walkers.sweeps.scheduler import (
     LONGEST_SECONDS,
     MOST_WALKERS,
@@ -49,7 +50,7 @@ from walkers.sweeps.scheduler import (
 )
 from walkers.sweeps.site import Slurm, check_path, decks_at, load_site, prepare
 from walkers.sweeps.table import load, thresholds, write_record
-from walkers.templates.deck import compose, plan_of
+from walkers.templates.deck import LAYOUT_NAME, OUTPUT_NAME, compose, plan_of
 from walkers.templates.scene import sharing_key
 
 STEP = {"time_step": "2 us"}
@@ -352,6 +353,18 @@ def test_the_share_of_a_sweep_that_is_done_is_that_of_its_work(sweep_file: Calla
     halfway = [progress for progress in seen if progress.text.startswith("1 of 2 points done")]
     assert halfway
     assert all(progress.share > 0.7 and "of the work" in progress.text for progress in halfway)
+
+
+def test_the_share_of_a_shared_deck_is_that_of_its_steps(tmp_path: Path) -> None:
+    """As its engine says beside the first of its runs; before that none is known."""
+    cases = [make_case(drive={"peak_acceleration": peak}) for peak in ("2 g", "4 g")]
+    deck, place = compose(plan_of(*cases)), tmp_path / "first"
+    assert share_at(place) == 0.0
+    folder = unfinished(place) / DECK_FOLDER
+    folder.mkdir(parents=True)
+    write_json(folder / LAYOUT_NAME, deck.layout.as_dict())
+    (folder / OUTPUT_NAME).write_text(f" {deck.layout.steps // 4} 4 0.05 {'0.001 ' * 6}\n")
+    assert share_at(place) == pytest.approx(0.25, rel=1e-3)
 
 
 def test_what_parsl_is_told(tmp_path: Path) -> None:
