@@ -241,3 +241,10 @@ def test_walkers_up_and_down_a_slope_both_converge(tmp_path: Path) -> None:
     times, change = next((16.0 * 4.0**place, one) for place, one in enumerate(changes) if one < 0.01)
     assert found.times == times
     assert found.change == pytest.approx(change, rel=0.02)
+
+
+def test_the_plan_of_a_sweep_has_the_runs_of_its_spread(in_folder: Path) -> None:
+    plan = call("sweep", "fig4", "--dry-run", "--spread", "--points", "4", check=True).stdout
+    assert "points     2: " in plan
+    assert "8 more runs, predicted " in plan
+    assert not Path("runs").exists()

@@ -161,9 +161,10 @@ def sweep(
     """
     from walkers.inputs.sweep import load_sweep
     from walkers.postprocess.uncertainty import lines_of_rest, rests_on
+    from walkers.show import predicted_overhead, predicted_seconds
     from walkers.sweeps.scheduler import Options, plan_sweep
     from walkers.sweeps.site import load_site
-    from walkers.sweeps.spread import POINTS
+    from walkers.sweeps.spread import POINTS, spread_sweep
 
     refuse("--points", points is not None and not spread, "is for --spread")
     loaded = load_sweep(sweep, at.values)
@@ -173,6 +174,11 @@ def sweep(
     if dry_run:
         options = Options(jobs, load_site(site) if site else None)
         print(plan_sweep(loaded, at.out, options, by.engine).as_text())
+        if spread:
+            count = POINTS if points is None else points
+            draws = [draw for case in loaded.cases() for draw in spread_sweep(case, count, by.engine).cases()]
+            seconds = predicted_overhead(draws) + sum(predicted_seconds(draw) * draw.run.ranks for draw in draws)
+            print(f"  spread     {len(draws)} more runs, predicted {seconds:.0f} core-seconds if none is finished")
         return 0
     how = {"jobs": jobs, "site": site, "time_limit": limit, **vars(by)}
     how["spread"] = (POINTS if points is None else points) if spread else 0
