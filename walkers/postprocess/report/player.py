@@ -227,7 +227,7 @@ def _walls(motion: Motion, step: float) -> list[Any]:
         if not some:
             continue
         mesh = view.mesh_of(some).triangulate()
-        points = (mesh.points - [0.0, 0.0, 2e-3 * level]).astype(np.float32)  # below beads that touch it
+        points = np.asarray(mesh.points - [0.0, 0.0, 2e-3 * level], dtype=np.float32)  # below beads that touch it
         look = {"color": _FLOOR, "side": "double", "roughness": 1.0, "name": "floor" if level else "wall"}
         parts.append(k3d.mesh(points, mesh.regular_faces.astype(np.uint32), opacity=1.0 if level else 0.12, **look))
     if motion.case.boundary.bare:
