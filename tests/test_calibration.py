@@ -401,6 +401,7 @@ _SET = {"friction": 0.1, "drag": 1.0}
         ("observations/0/of", ["slo"], r'observations\[0\]\.of.*"slo".*slow'),
         ("observations/3/over", ["fast"], r"observations\[3\]\.over: expected other experiments"),
         ("observations/0/value", 1.0, r"observations\[0\]\.value.*speed"),
+        ("observations/0/group", 1, r"^bad\.toml: observations\[0\]\.group = 1: expected [^;\n]*$"),  # no title missing
         ("observations/0/least", "1 mm/s", r"observations\[0\]: expected either a value or limits"),
         ("observations/3/value", "1 mm/s", r"observations\[3\]\.value.*ratio"),
         ("observations/3/derived", 3, r"observations\[3\]\.derived"),

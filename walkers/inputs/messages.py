@@ -93,7 +93,9 @@ def validated(
     try:
         file = model.model_validate(document, context=WRITTEN)
     except ValidationError as error:
-        refused = [_problem_of(details, document, model, whole) for details in error.errors()]
+        # A default that follows from a wrong value is no problem of its own.
+        causes = (details for details in error.errors() if details["type"] != "default_factory_not_called")
+        refused = [_problem_of(details, document, model, whole) for details in causes]
         problems = {problem.key: problem for problem in refused} | problems
     if problems:
         raise InputError(source, list(problems.values()))
