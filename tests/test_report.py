@@ -290,13 +290,21 @@ def test_a_sweeps_points_open_reports_in_which_beads_play_pause_and_turn(
 
     stopped = wait_for(pause)
     paused = rested(page, begin)
-    box = page.locator(".scene").bounding_box()
-    assert box is not None
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x + 90, y + 30, steps=4)
-    page.mouse.up()
+
+    def turn() -> bool:
+        """Whether the mouse has turned the scene; a busy page may lose what the mouse does before it listens."""
+        scene = page.locator(".scene:visible").first
+        scene.scroll_into_view_if_needed()
+        box = scene.bounding_box()
+        assert box is not None
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + 90, y + 30, steps=4)
+        page.mouse.up()
+        return rested(page) != paused
+
+    wait_for(turn)
     turned = rested(page, begin, paused)
     assert time.text_content() == stopped  # turned, not played
     page.get_by_role("button", name="onto the floor").click()

@@ -343,7 +343,7 @@ def test_another_sweep_of_the_same_name_is_told(sweep_file: Callable[..., str], 
 
 def test_the_share_of_a_sweep_that_is_done_is_that_of_its_work(sweep_file: Callable[..., str], in_folder: Path) -> None:
     """Of two points in decks of their own the first costs most: when it is done, so is most of the work, not half."""
-    loaded = load_sweep(sweep_file("[axes]\nrun.cycles = [80, 6]", "uneven"))
+    loaded = load_sweep(sweep_file("[axes]\nrun.cycles = [600, 100]", "uneven"))
     seen: list[Progress] = []
     run_sweep(loaded, in_folder / "runs", Options(1), on_progress=seen.append)
     shares = [progress.share for progress in seen]
