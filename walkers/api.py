@@ -598,7 +598,7 @@ class Sweep:
 
         return worst_status(self.table()["status"])
 
-    @property
+    @cached_property
     def runs(self) -> list[Run]:
         """The runs of all points, finished or not."""
         from walkers.sweeps.table import read_record

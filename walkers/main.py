@@ -172,9 +172,7 @@ def _report_stop(stop: BaseException, tokens: list[str]) -> int:
 
 def _options_of(names: str, tokens: list[str]) -> str:
     """The options of the command for arguments of a function of the package, such as ``begin, end``."""
-    names_of_commands = [command.name for command in commands()]
-    begin = next((place for place, word in enumerate(tokens) if word in names_of_commands), 0)
-    _, apps, _ = program().parse_commands(tokens[begin:])
+    _, apps, _ = program().parse_commands(tokens)
     arguments = apps[-1].assemble_argument_collection()
     options = {argument.name[2:]: argument.name for argument in arguments}
     options |= {argument.field_info.name: argument.name for argument in arguments}

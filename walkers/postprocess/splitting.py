@@ -66,5 +66,5 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) ->
                 part[:, held] = renumbered[part[:, held].astype(np.int64)]
                 parts.append((step, part))
             write_local_dump(place / name, columns, parts)
-    for name in (layout.bead_dump, layout.pair_bridge_dump, layout.wall_bridge_dump, LAYOUT_NAME):
+    for name in (*layout.dumps, LAYOUT_NAME):
         (directory / name).unlink()

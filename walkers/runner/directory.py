@@ -166,10 +166,7 @@ def run_of(segment: Path) -> Path:
 def files_of_segments(directory: Path) -> list[str]:
     """Input and output files of the engine for a run, as paths within its directory."""
     segments = segment_directories(directory)
-    layouts = map(layout_of, segments[:1])
-    dumps = {
-        name for layout in layouts for name in (layout.bead_dump, layout.pair_bridge_dump, layout.wall_bridge_dump)
-    }
+    dumps = {name for segment in segments[:1] for name in layout_of(segment).dumps}
     files = [path for segment in segments for path in segment.iterdir() if path.is_file()]
     by_hand = [directory] == segments  # with tables and pictures beside
     return [path.relative_to(directory).as_posix() for path in files if not by_hand or path.name in dumps]
@@ -181,8 +178,8 @@ def leave_out_dumps(directory: Path) -> None:
     Dumps, restart files and the forces of bridges, which the engine has read, go; the manifest says that they were left
     out. Results, tables and decks stay.
     """
-    layout, contents = layout_of(segment_directories(directory)[0]), read_manifest(directory)
-    dumps = {layout.bead_dump, layout.pair_bridge_dump, layout.wall_bridge_dump, RESTART_NAME, BRIDGES_NAME}
+    contents = read_manifest(directory)
+    dumps = {*layout_of(segment_directories(directory)[0]).dumps, RESTART_NAME, BRIDGES_NAME}
     names = [name for name in contents["files"] if "/" in name and Path(name).name in dumps]
     write_json(directory / MANIFEST_NAME, {**contents, "left_out": names})
     for name in names:

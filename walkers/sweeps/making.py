@@ -121,11 +121,14 @@ def make_runs(
     return runs
 
 
-def progress_at(place: Path) -> Progress | None:
-    """Progress of a run from its files, with the wall time of its segment; None for shared decks and at the start."""
+def progress_at(place: Path, case: Case | None = None) -> Progress | None:
+    """Progress of a run from its files, with the wall time of its segment; None for shared decks and at the start.
+
+    The case is read as well, unless it is given.
+    """
     directory = on_disk.unfinished(place)
     try:
-        case = on_disk.case_of(directory)
+        case = case or on_disk.case_of(directory)
         done = [_read_segment(path) for path in on_disk.segment_directories(directory)]
         (folder,) = (directory / on_disk.SEGMENTS).glob("*.new")
         run = case.run
@@ -139,12 +142,12 @@ def progress_at(place: Path) -> Progress | None:
     return progress_in(run, cycles, Segment(begin, begin, start), step, seconds)
 
 
-def share_at(place: Path) -> float:
+def share_at(place: Path, case: Case | None = None) -> float:
     """Share of the steps that are done of a run, or of the shared deck whose first run has this place; 0 if unknown."""
     shared = on_disk.unfinished(place) / DECK_FOLDER
     with suppress(OSError, ValueError, KeyError, TypeError):
         return last_step(shared / decks.OUTPUT_NAME) / on_disk.layout_of(shared).steps
-    progress = progress_at(place)
+    progress = progress_at(place, case)
     return progress.share if progress else 0.0
 
 

@@ -477,7 +477,7 @@ class _Loop:
             pace = elapsed / finished_now
             words.append(f"{60.0 / pace:.0f} points per minute" if pace < 10.0 else f"{duration_text(pace)} per point")
         for deck in decks:  # between the segments of a run nothing is known
-            share = share_at(self.record.out / self.record.runs[deck.points[0]])
+            share = share_at(self.record.out / self.record.runs[deck.points[0]], self.plan.cases[deck.points[0]])
             self.shares[deck] = max(self.shares.get(deck, 0.0), share)
         left = [deck.seconds * (1.0 - self.shares.get(deck, 0.0)) for deck in (*self.decks.values(), *self.halves)]
         share = max(0.0, 1.0 - sum(left) / self.seconds) if self.seconds else 1.0

@@ -68,6 +68,11 @@ class Layout:
         header = 8 + 8 + 4 + 6 * 4 + 6 * 8 + 4 + 4 + 4 * self.ranks
         return self.frames * (header + 8 * self.atoms * len(self.bead_columns))
 
+    @property
+    def dumps(self) -> tuple[str, str, str]:
+        """Names of the dumps of beads and of bridges."""
+        return self.bead_dump, self.pair_bridge_dump, self.wall_bridge_dump
+
     def bridge_terms(self) -> dict[str, Any]:
         """What the engine calls the columns of bridges, and the options that give those between beads."""
         pairs = " ".join(PAIR_BRIDGES).split()
