@@ -22,9 +22,10 @@ function excerpt(text) {
 
 var Scorer = {
   score: (result) => {
-    const [name, , anchor, description, score, , kind] = result;
+    const [name, title, anchor, description, score, , kind] = result;
     const text = TEXTS[name] || "";
-    const prior = FIRST.filter(([pages]) => pages.test(name)).reduce((sum, [, more]) => sum + more, 0);
+    const named = WORDS.every((word) => title.toLowerCase().includes(word)) ? 10 : 0; // of a page about all of them
+    const prior = FIRST.filter(([pages]) => pages.test(name)).reduce((sum, [, more]) => sum + more, named);
     if (kind === "title") return (anchor ? 20 : 25) + score + prior;
     if (kind !== "text") return score + prior;
     if (!description) result[3] = excerpt(text);
