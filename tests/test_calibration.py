@@ -99,7 +99,7 @@ def known(unit: FloatArray) -> FloatArray:
     return np.stack([3.0 + 2.0 * x + np.sin(3.0 * y), 1.0 + x * y], axis=1)
 
 
-DESIGN, TRUTH = unit_cube("sobol", 2, 64, 1), np.array([[0.4, 0.6]])
+DESIGN, TRUTH = unit_cube(2, 64, 1), np.array([[0.4, 0.6]])
 
 
 @pytest.fixture(scope="module")

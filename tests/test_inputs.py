@@ -155,7 +155,7 @@ ODD: dict[str, dict[str, Any]] = {
     "harmonics": {"drive": {"harmonics": HARMONICS}},
     "aslant": {"drive": {**REFERENCE["drive"], "axis": [1, 0, 2], "waveform": "sawtooth", "phase": "10 deg"}},
     "places": {"clusters": [{"diameters": ["0.6 mm", "0.4 mm"], "at": [["0.2 mm", "0 mm"], ["-0.29 mm", "0 mm"]]}]},
-    "mean": {"dimers": {"mean_radius": "0.25 mm", "sin_delta": 0.2, "gap": "auto"}, "run": {"cycles": "auto"}},
+    "mean": {"dimers": {"mean_radius": "0.25 mm", "sin_delta": 0.2, "spacing": "auto"}, "run": {"cycles": "auto"}},
     "placed": {"placed": [{"diameter": "2 mm", "at": ["19 mm", "0 mm", "1 mm"]}], "run": {"duration": "0.1 s"}},
     "uncertain": {"uncertain": {"dimers.radii[1]": ["0.1 mm", "0.3 mm"], "contact": {"restitution": [0.2, 0.4]}}},
     "slope": {"boundary": {"material": "glass", "tilt": "20 deg", "uphill": "180 deg"}},

@@ -153,17 +153,6 @@ def test_the_polynomial_is_the_equation(given: tuple[float, float, float, float]
     assert curve.forces(gaps).pull == pytest.approx(exact.forces, abs=1e-7 * exact.forces[0])
 
 
-def test_bridges_may_form_where_films_touch() -> None:
-    """An even film of a hundredth of a bead's volume is R φ/3 thick, to a third of φ."""
-    liquid = BridgeLiquid(surface_tension=0.061, viscosity=0.12, volume_fraction=0.01, contact_angle=0.0)
-    rough = Roughness(bead_bead=1e-6, bead_wall=1e-6)
-    at_wall, between = (Surfaces.of(3e-4, other, liquid, rough) for other in (inf, 5e-4))
-    films = by_name("young-laplace-films")
-    assert films(at_wall).formation == pytest.approx(1e-6, rel=0.004)
-    assert films(between).formation == pytest.approx(8e-6 / 3.0, rel=0.004)
-    assert films(between).rupture == by_name("young-laplace")(between).rupture
-
-
 def test_rabinovichs_pull_at_contact() -> None:
     """By hand, of spheres of 1, V = 0.001, θ = 0.7: α² = √(2V/π), F = 2π (cos θ + sin α sin(θ + α))."""
     assert rabinovich.pull(1.0, 1.0, 1e-3, 0.7, np.zeros(1)) == pytest.approx([5.5580], rel=1e-4)

@@ -60,20 +60,10 @@ class _Graph(dict[str, dict[str, Any]]):
         self.setdefault(identifier, {"@id": identifier, "@type": kind, **properties})
         return {"@id": identifier}
 
-    def software(self, identifier: str, name: str, version: str, /, **more: Any) -> Reference:
-        return self.add(identifier, "SoftwareApplication", name=name, softwareVersion=version, **more)
-
     def action(self, name: str, text: str, instrument: Reference, ended: str, /, **more: Any) -> Reference:
         """What a program has done."""
         more |= {"endTime": moment(ended), "actionStatus": "http://schema.org/CompletedActionStatus"}
         return self.add(f"#{quote(name)}", "CreateAction", name=name, description=text, instrument=instrument, **more)
-
-    def as_list(self) -> list[dict[str, Any]]:
-        """The entities; by the specification, lists have more than one item."""
-        return [
-            {key: value[0] if isinstance(value, list) and len(value) == 1 else value for key, value in entity.items()}
-            for entity in self.values()
-        ]
 
 
 def describe_crate(contents: Contents, authors: Sequence[Author], licence: str) -> dict[str, Any]:
@@ -104,8 +94,12 @@ def describe_crate(contents: Contents, authors: Sequence[Author], licence: str) 
         ],
         **({"author": people} if people else {}),
     )
+    entities = [  # by the specification, lists have more than one item
+        {key: value[0] if isinstance(value, list) and len(value) == 1 else value for key, value in entity.items()}
+        for entity in graph.values()
+    ]
     # This version of the context has no checksums.
-    return {"@context": [f"{CRATE}/context", {"sha256": "http://schema.org/sha256"}], "@graph": graph.as_list()}
+    return {"@context": [f"{CRATE}/context", {"sha256": "http://schema.org/sha256"}], "@graph": entities}
 
 
 def _with_role(contents: Contents, *roles: str, folder: str = "") -> list[Reference]:
@@ -119,8 +113,8 @@ def _describe_file(graph: _Graph, place: str, file: File) -> Reference:
         size = opened.seek(0, 2)
     path = Path(place)
     media = _MEDIA.get(path.suffix, "application/octet-stream" if file.role == "dump" else "text/plain")
-    about = {"name": path.name, "description": file.meaning, "encodingFormat": media}
-    return graph.add(quote(place), "File", **about, contentSize=str(size), sha256=file.sha256)
+    about = {"name": path.name, "encodingFormat": media, "contentSize": str(size), "sha256": file.sha256}
+    return graph.add(quote(place), "File", **about)
 
 
 def _simulation(graph: _Graph, contents: Contents, place: str, **agents: Any) -> Reference:
@@ -131,12 +125,12 @@ def _simulation(graph: _Graph, contents: Contents, place: str, **agents: Any) ->
     graph.add(quote(folder), "Dataset", name=name, description=text, hasPart=parts)
     engine, further_cases = manifest["engine"], int(manifest.get("shared_deck", {}).get("runs", 1)) - 1
     text = "Discrete element method. The SHA-256 combines the checksums of the executable and libliggghts."
-    more = {"url": ENGINE_HOME, "sha256": engine["sha256"], "description": text}
-    binary = graph.software(f"{ENGINE_HOME}#{engine['sha256'][:12]}", "LIGGGHTS", engine["version"], **more)
+    more = {"name": "LIGGGHTS", "softwareVersion": engine["version"], "url": ENGINE_HOME, "description": text}
+    binary = f"{ENGINE_HOME}#{engine['sha256'][:12]}"
     return graph.action(
         f"Simulation of {name}",
         f"The engine runs the deck{f', together with {further_cases} other cases' if further_cases else ''}.",
-        binary,
+        graph.add(binary, "SoftwareApplication", **more, sha256=engine["sha256"]),
         manifest["finished"],
         startTime=moment(manifest["started"]),
         object=_with_role(contents, "case", "deck", folder=folder),
@@ -155,7 +149,7 @@ def _analysis(graph: _Graph, contents: Contents, **agents: Any) -> Reference:
     return graph.action(
         f"Tables of {contents.name}",
         "Analysis of the dumps: tables and results.",
-        graph.software(f"#{PROJECT}", PROJECT, version, description=text),
+        graph.add(f"#{PROJECT}", "SoftwareApplication", name=PROJECT, softwareVersion=version, description=text),
         max(ends),
         object=_with_role(contents, "case", "dump", "record"),
         result=_with_role(contents, "table", "result"),

@@ -9,6 +9,7 @@ import shutil
 import zipfile
 from collections.abc import Mapping, Sequence
 from datetime import datetime
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -26,51 +27,32 @@ from walkers.text import printable, rendered
 README_NAME = "README.md"
 RUNS = "runs"
 """Folder of the run directories in an archive: the default folder of the program."""
-_MEANINGS = {
-    CASE_NAME: ("case", "the resolved case: every number that determines the run, SI units"),
-    MANIFEST_NAME: ("record", "provenance: versions, machine, times, and checksums of all files"),
-    RECORD_NAME: ("record", "the points of the sweep: varied keys, derived quantities, names of the runs"),
-    "result.json": ("result", "the result of the run, SI units"),
-    "accuracy.json": ("result", "numerical errors of the run: of its time step and of its softened beads, SI units"),
-    "walker.lig": ("deck", "the deck: input script of the engine"),
-    "law.py": ("deck", "the file of the user's bridge law"),
-    "bridges.txt": ("deck", "forces of each bridge against its gap, which the engine reads"),
-    "loads.txt": ("deck", "gravity and drive of each bead, if they differ between beads"),
-    "run.sh": ("deck", "script that runs the deck by hand"),
-    "scale.awk": ("deck", "script that scales the forces of bridges if the deck is edited"),
-    "deck.json": ("deck", "the case and the deck as they were written, before they were run by hand"),
-    "layout.json": ("deck", "columns of the dumps; which bead belongs to which walker"),
-    "engine.log": ("output", "the log of the engine"),
-    "segment.json": ("output", "first and last step of the segment, and its cost"),
-    "beads.bin": ("dump", "positions, velocities and spins of the beads, LIGGGHTS binary dump; columns in layout.json"),
-    "bridges.pairs.txt": ("dump", "bridges between beads, frame by frame, text"),
-    "bridges.walls.txt": ("dump", "bridges between beads and walls, frame by frame, text"),
-    "state.restart": ("dump", "restart file of the engine, from which the next segment continues"),
-    "table.csv": ("table", "the table of the sweep, one row per point, units in the header"),
-    README_NAME: ("", "description for readers"),
+_ROLES: Mapping[str, Sequence[str]] = {
+    "case": (CASE_NAME, "*.toml"),
+    "record": (MANIFEST_NAME, RECORD_NAME),
+    "dump": ("beads.bin", "bridges.*.txt", "state.restart"),
+    "deck": ("walker.lig", "layout.json", "deck.json", "law.py", "run.sh", "scale.awk", "*.txt"),
+    "table": ("table.csv", "*.parquet"),
+    "result": ("result.json", "accuracy.json"),
 }
-_OF_SUFFIX = {
-    ".parquet": ("table", "a table; units and meanings of its columns are in the field metadata"),
-    ".toml": ("case", "the file of the case, including changes by --set, or of the sweep"),
-}
-_REST = ("output", "other output of the engine")
+"""Roles of files in the actions of the crate, by their names; the first that fits. Others are output of the engine."""
 
 
 class File(NamedTuple):
-    """A file of an archive: source or contents, SHA-256, role (in the actions of the crate) and meaning."""
+    """A file of an archive: source or contents, SHA-256, and role in the actions of the crate."""
 
     source: Path | bytes
     sha256: str
     role: str
-    meaning: str
 
     @classmethod
     def of(cls, place: str, source: Path | bytes, sha256: str | None = None) -> File:
         """A file, whose checksum is computed if no manifest has it."""
         if sha256 is None:
             sha256 = hashlib.sha256(source).hexdigest() if isinstance(source, bytes) else checksum(source)
-        path = Path(place)
-        return cls(source, sha256, *_MEANINGS.get(path.name, _OF_SUFFIX.get(path.suffix, _REST)))
+        name = Path(place).name
+        roles = (role for role, names in _ROLES.items() if any(fnmatch(name, pattern) for pattern in names))
+        return cls(source, sha256, next(roles, "output"))
 
     def open(self) -> BinaryIO:
         """The contents, to be read."""

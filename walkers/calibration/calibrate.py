@@ -101,7 +101,7 @@ def calibrate(
         return _numbers(calibration, experiments or [*calibration.experiments], record.directory, failed)
 
     named = run("named", calibration.sets) if file.sets else np.zeros((0, len(observations)))
-    sobol = unit_cube("sobol", len(file.parameters), design.points, design.seed)
+    sobol = unit_cube(len(file.parameters), design.points, design.seed)
     cheap = [label for label in calibration.experiments if label not in calibration.costly]
     unit = np.concatenate([calibration.sets, sobol])
     numbers = np.concatenate([named, run("round", sobol, cheap)])

@@ -107,7 +107,7 @@ class Posterior:
             for emulator in emulators
             if emulator.observation.weighed and emulator.observation.group not in without
         ]
-        unit = unit_cube("sobol", used[0].process.n_features_in_, points, seed)
+        unit = unit_cube(used[0].process.n_features_in_, points, seed)
         parts = [unit[at : at + _AT_ONCE] for at in range(0, points, _AT_ONCE)]
         total = np.concatenate([np.sum([emulator.log_likelihood(part) for emulator in used], axis=0) for part in parts])
         return cls(unit, total - logsumexp(total), seed)

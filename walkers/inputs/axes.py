@@ -1,7 +1,6 @@
 """Axes of a sweep: lists, spaced values, zipped values, and samplers.
 
-An axis is a set of keys with, for each of its points, one value a key, which a case file could say. To add a way of
-writing an axis, add it to `values_of`.
+An axis is a set of keys with, for each of its points, one value a key, which a case file could say.
 """
 
 from __future__ import annotations
@@ -173,15 +172,12 @@ def one_at_a_time(table: Mapping[str, Any]) -> Axis:
     return Axis(tuple(usual), tuple(tuple((usual | change).values()) for change in changes))
 
 
-def sampled(method: str, points: int, seed: int, ranges: Mapping[str, Any]) -> Axis:
-    """Points of a sampler of `scipy.stats.qmc` in the ranges of several keys (`ranges_of`).
-
-    The method is ``sobol`` (best for a power of two), ``halton`` or ``latin-hypercube``, scrambled with the seed.
-    """
+def sampled(points: int, seed: int, ranges: Mapping[str, Any]) -> Axis:
+    """Points of Sobol's sequence, scrambled with the seed, in the ranges of several keys (`ranges_of`)."""
     ends = ranges_of(ranges)
     if not ends:
         raise unusable("sample.ranges", "expected keys and their ranges", dict(ranges))
-    shares = zip(unit_cube(method, len(ends), points, seed).T, ends.items(), strict=True)
+    shares = zip(unit_cube(len(ends), points, seed).T, ends.items(), strict=True)
     return Axis.of(
         {key: [written(float(number), span.unit) for number in span.at(share)] for share, (key, span) in shares}
     )
@@ -215,16 +211,14 @@ def ranges_of(ranges: Mapping[str, Any]) -> dict[str, Range]:
     return spans
 
 
-def unit_cube(method: str, dimensions: int, points: int, seed: int) -> npt.NDArray[np.float64]:
-    """Points of a sampler in the unit cube, shape (points, dimensions); as for `sampled`."""
+def unit_cube(dimensions: int, points: int, seed: int) -> npt.NDArray[np.float64]:
+    """Points of Sobol's sequence in the unit cube, shape (points, dimensions), scrambled with a seed."""
     import numpy as np
     from scipy.stats import qmc
 
-    name = {"sobol": "Sobol", "halton": "Halton", "latin-hypercube": "LatinHypercube"}[method]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # a number of points that is no power of two is the user's choice
-        cube: npt.NDArray[np.float64] = getattr(qmc, name)(d=dimensions, rng=np.random.default_rng(seed)).random(points)
-    return cube
+        return np.asarray(qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(points))
 
 
 def combinations(axes: Sequence[Axis]) -> tuple[tuple[str, ...], list[tuple[Value, ...]]]:

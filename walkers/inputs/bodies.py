@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from itertools import combinations
-from math import acos, asin, atan2, cos, dist, hypot, pi, sin, sqrt
+from math import acos, asin, cos, dist, hypot, pi, sin, sqrt
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field
@@ -122,26 +122,11 @@ def touching(places: Sequence[tuple[float, float]], radii: Sequence[float], slac
     return tuple(pairs)
 
 
-def _sites(number: int) -> Places:
-    """So many sites of a hexagonal lattice: the origin, the one behind it, and on around it; their distance is 1."""
-    reach = range(-10, 11)  # of 100 sites the outermost is six away
-    sites = [(row + column / 2.0, column * sqrt(0.75)) for row in reach for column in reach]
-    return sorted(sites, key=lambda at: (round(hypot(*at), 6), round(atan2(-at[1], -at[0]) % (2.0 * pi), 6)))[:number]
-
-
-def _raft(radii: Sequence[float], apart: Apart) -> Places:
-    if len(set(radii)) > 1:
-        raise ValueError("expected the same radius for all beads of a raft")
-    size = apart(0, 1)
-    return [(size * (0.5 + along), size * aside) for along, aside in _sites(len(radii))]
-
-
 ARRANGEMENTS: Mapping[str, Arrangement] = {
     "chain": Arrangement(_chain, 2, "one behind the other, the first in front"),
     "fan": Arrangement(_fan, 2, "the first in front, the others side by side behind it"),
     "diamond": Arrangement(_diamond, 4, "one in front, two side by side behind it, one at the back", most=4),
     "ring": Arrangement(_ring, 3, "in a ring, the first in front"),
-    "raft": Arrangement(_raft, 3, "of one radius, on a hexagonal lattice, the first in the middle"),
 }
 """Arrangements by their names in case files."""
 
@@ -151,8 +136,8 @@ class Walkers(Table):
 
     ``meet = true`` says that they may stand and come as near as they like; without it they are replicates. They face
     along the drive axis (right, up a slope), against it (left, down), or every other one (both), but for an ``angle``.
-    All contacts have the ``gap`` at the start (negative: touching); without it, forces balance. The first of the
-    ``radii`` belongs to the leading bead (the large one, as in the paper).
+    At the start, forces balance at all contacts. The first of the ``radii`` belongs to the leading bead (the large one,
+    as in the paper).
     """
 
     if TYPE_CHECKING:
@@ -169,9 +154,6 @@ class Walkers(Table):
     )
     angle: units.Angle = key("Angle at the start between the whole walker and that direction.", 0.0)
     angle_spread: units.NonNegativeAngle = key("Range of the random angle at the start: `angle` ± this.", pi / 180.0)
-    gap: Annotated[Filled[Annotated[SignedLength, Field(le=0)]], units.AUTO] = key(
-        "Gap at all contacts at the start, negative for overlap. `auto`: repulsion and pull balance.", None
-    )
     gap_spread: Number = key("Range of the random factor of the overlap of each walker: 1 ± this.", 0.2, ge=0, lt=1)
     spacing: Annotated[Filled[Length], units.AUTO] = key(
         "Distance between the walkers. `auto`: they do not meet; with `meet`, they do not touch at the start.", None
@@ -266,10 +248,7 @@ class Walkers(Table):
 
 
 class Dimers(Walkers):
-    """``[dimers]``: walkers of two beads. The first bead leads.
-
-    Their radii may be given by their mean and the asymmetry parameter sin δ = (R1 - R2)/(R1 + R2).
-    """
+    """``[dimers]``: walkers of two beads."""
 
     choices: ClassVar = (Choice((("radii",), ("diameters",), ("mean_radius", "sin_delta"))),)
     arrangement: ClassVar[str] = "chain"
@@ -291,7 +270,7 @@ class Cluster(Walkers):
         "Radii of the beads. The first bead leads.", None, _THREE[0]
     )
     diameters: Indirect[Annotated[tuple[Diameter, ...], _FEW]] = key("Diameters, instead of `radii`.", None, _THREE[1])
-    arrangement: str = key("`chain`, `fan`, `diamond`, `ring` or `raft`. See [](../cases.md#bodies).", "", "fan")
+    arrangement: str = key("`chain`, `fan`, `diamond` or `ring`. See [](../cases.md#bodies).", "", "fan")
     at: Annotated[tuple[_Place, ...], Field(max_length=100)] = key(
         "Place of each bead, distance ahead and to the left, instead of an arrangement.",
         (),
@@ -305,10 +284,7 @@ def beside(radius: float, neighbour: float) -> list[tuple[float, list[float]]]:
 
 
 class Mixture(Table):
-    """``[mixture]``: beads that are poured: two classes, each a range of radii filled with ``sizes`` constant radii.
-
-    Each of these radii occurs equally often (the engine is given no distributions).
-    """
+    """``[mixture]``: poured beads of two classes, each of ``sizes`` radii within a range, which occur equally often."""
 
     choices: ClassVar = (
         Choice((("small",), ("small_diameters",))),
@@ -320,7 +296,7 @@ class Mixture(Table):
     small_diameters: Indirect[_DiameterRange] = key("Diameters, instead of `small`.", None, ["0.6 mm", "0.63 mm"])
     large_diameters: Indirect[_DiameterRange] = key("Diameters, instead of `large`.", None, ["1 mm", "1.18 mm"])
     small_share: Number = key("Share of the small beads.", 0.5, ge=0, le=1)
-    mixed_by: Literal["mass", "volume", "number"] = key("Quantity that `small_share` refers to.", "mass")
+    mixed_by: Literal["mass", "number"] = key("Quantity that `small_share` refers to.", "mass")
     sizes: Whole = key("Number of different radii in each range.", 4, ge=1, le=20)
     count: Filled[Whole] = key("Number of beads.", None, 200, ge=1, le=MOST_BEADS)
     fill_height: Indirect[Length] = key("Height of the bed, instead of a number of beads.", None, "3 mm")
@@ -335,25 +311,20 @@ class Mixture(Table):
         """The radii of the large beads, m."""
         return _middles(self.large, self.sizes)
 
-    @property
-    def _shares(self) -> tuple[float, float]:
+    @cached_property
+    def share_and_volume(self) -> tuple[float, float]:
         """Share of the small beads by number, and the mean volume of a bead, m³."""
         volumes = [sum(map(bead_volume, radii)) / len(radii) for radii in (self.small_radii, self.large_radii)]
         share = self.small_share
-        if self.mixed_by != "number":  # one density: by mass is by volume
+        if self.mixed_by == "mass":
             by_number = [share / volumes[0], (1.0 - share) / volumes[1]]
             share = by_number[0] / sum(by_number)
         return share, share * volumes[0] + (1.0 - share) * volumes[1]
 
-    @property
-    def mean_volume(self) -> float:
-        """Mean volume of a bead, m³."""
-        return self._shares[1]
-
     @cached_property
     def counts(self) -> tuple[int, int]:
         """Numbers of small and of large beads."""
-        few = round(self.count * self._shares[0])
+        few = round(self.count * self.share_and_volume[0])
         return few, self.count - few
 
     @property

@@ -1,7 +1,6 @@
 """Boundaries: planes, channels, grooves, containers, vessels of the user's own (`walkers.inputs.vessel`).
 
-Most have a floor, the plane z = 0 in their own frame, and may have side walls. To add one, name it in `Shape` and
-`SIZES`, and give it `Boundary.walls` and `Boundary.room`.
+Most have a floor, the plane z = 0 in their own frame, and may have side walls.
 """
 
 from __future__ import annotations

@@ -24,10 +24,9 @@ from walkers.inputs.boundary import Boundary
 from walkers.inputs.drive import AXES, Drive, Excitation, Vector
 from walkers.inputs.keys import MISSING, flatten, parts_of, value_at
 from walkers.inputs.library import library_of
-from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
-from walkers.inputs.named_files import with_files
+from walkers.inputs.messages import blaming, check_key, validated
 from walkers.inputs.origins import Origin, Source, Whence, text_of
-from walkers.inputs.resolving import GIVEN_BY, resolve, supplied
+from walkers.inputs.resolving import NAMES, resolve, supplied
 from walkers.inputs.run import Run, settling_of
 from walkers.inputs.table import (
     SAME_RUN,
@@ -41,6 +40,7 @@ from walkers.inputs.table import (
     contradictions,
     key,
 )
+from walkers.inputs.toml import with_files
 from walkers.inputs.units import Coefficient, Number, kind_in
 from walkers.physics.capillary import DEFAULT_LAW, BridgeLiquid
 from walkers.physics.laws import by_name
@@ -66,12 +66,7 @@ class Beads(Table):
 
 
 class Liquid(Table):
-    """``[liquid]``: a name from the library, numbers, or both (numbers take precedence).
-
-    If liquid is ``conserved``, a bridge takes its volume from the films of its beads and gives it back when it breaks
-    (Shi and McCarthy 2008); otherwise its volume does not depend on other bridges. ``law`` is one of
-    `walkers.physics.laws`, or your own function, ``file.py:function``.
-    """
+    """``[liquid]``: a name from the library, numbers, or both (numbers take precedence)."""
 
     choices: ClassVar = (
         Choice((("dynamic_viscosity",), ("kinematic_viscosity",)), instead="a liquid of the library"),
@@ -246,11 +241,9 @@ class Case(Table):
         Raises `InputError` with all problems of the tables, or with the first contradiction between them.
         """
         if changes:
-            with blaming_changes(changes):
-                with blaming(source):
-                    apply_all(lambda name: check_key(cls, name), changes)
-                    document = changed(cls, document, changes)
-                return cls.read(document, source=source, name=name, around=around)
+            with blaming(source):
+                apply_all(lambda name: check_key(cls, name), changes)
+                document = changed(cls, document, changes)
         with blaming(source, document):
             document = with_files(document)
             records = document.pop("records", {})
@@ -259,11 +252,10 @@ class Case(Table):
             tables, sources, unknown = supplied(cls, document, library_of(document, source))
             try:
                 case = validated(cls, tables, source, further=[*unknown, *contradictions(cls, tables)])
-            except InputError as error:  # keys that a wrong name would have given are not missing too
-                wrong = {problem.key for problem in error.problems if problem.key in GIVEN_BY}
-                given = tuple(begin for name in wrong for begin in GIVEN_BY[name])
-                implied = {problem for problem in error.problems if not problem.value and problem.key.startswith(given)}
-                kept = [problem for problem in error.problems if problem.key in wrong or problem not in implied]
+            except InputError as error:  # what a wrong name would have given is not missing too
+                wrong = {problem.key for problem in error.problems if problem.key in NAMES and problem.value}
+                wrong |= {problem.key for problem in unknown}
+                kept = [problem for problem in error.problems if not wrong or problem.value or problem.key in wrong]
                 raise InputError(source, kept) from error
             try:
                 case = resolve(case.but(name=name, document=document, sources=sources))
@@ -305,9 +297,12 @@ class Case(Table):
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Case:
-        """A case from `as_dict` (a run directory's ``case.json``); raises `ValueError` if it is none."""
+        """A case from `as_dict` (a run directory's ``case.json``); raises `ValueError` if it is none.
+
+        Keys of earlier versions of the program are left out.
+        """
         try:
-            return cls.model_validate(values)
+            return cls.model_validate(values, extra="ignore")
         except ValidationError as error:
             first = error.errors()[0]
             raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error

@@ -66,22 +66,6 @@ def blaming(source: str, document: Mapping[str, Any] | None = None) -> Iterator[
         raise InputError(source, _quoting(error.problems, document or {})) from error
 
 
-@contextmanager
-def blaming_changes(changes: Mapping[str, Any]) -> Iterator[None]:
-    """Say in errors which keys are at fault as a change by ``--set``, not in the file."""
-    try:
-        yield
-    except InputError as error:
-        given = [parts_of(key) for key in changes]
-        parts = [parts_of(problem.key) for problem in error.problems]
-        ours = [any(of and of[: len(key)] == key[: len(of)] for key in given) for of in parts]
-        if not any(ours):
-            raise
-        problems = zip(error.problems, ours, strict=True)
-        named = [replace(problem, key=f"--set {problem.key}") if of else problem for problem, of in problems]
-        raise InputError(error.source, named) from error
-
-
 def validated(
     model: type[File], document: Mapping[str, Any], source: str, whole: str = "a case", further: Sequence[Problem] = ()
 ) -> File:

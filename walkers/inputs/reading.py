@@ -10,11 +10,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.errors import InputError, check_utf8, refused, shortened, suggestion
+from walkers.errors import InputError, check_utf8, refused, shortened, suggestion, unusable
+from walkers.inputs.keys import MISSING, value_at
 from walkers.inputs.library import FILE_NAME, read_library
 from walkers.inputs.messages import blaming
-from walkers.inputs.named_files import with_files
-from walkers.inputs.toml import read_toml
+from walkers.inputs.toml import read_toml, with_files
 
 if TYPE_CHECKING:
     from walkers.inputs.case import Case
@@ -81,6 +81,11 @@ def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
     """
     document = read_toml(path)
     with blaming(str(path), document):
+        mesh = value_at(document, ("boundary", "mesh"))
+        of_archive = value_at(document, ("meshes", mesh)) is not MISSING  # whose case has its mesh
+        for table in {"records", "meshes"} - ({"meshes"} if of_archive else set()):
+            if table in document:
+                raise unusable(table, "unknown key: the program reads this table from a file that the case names")
         document = with_files(document, path.parent)
     if "library" not in document and path.name != FILE_NAME:
         beside = (folder or Path()) if path.parent == _HERE / "cases" else path.parent

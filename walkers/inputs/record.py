@@ -29,7 +29,10 @@ _COARSE = 0.1
 """Largest change by leaving out every second row, root mean square; a sine does with six rows a period."""
 _FAINT = 0.05
 """Share of the strongest amplitude in the spectrum below which others do not count."""
-_HEADER = 'expected a header of a time and accelerations along x, y or z, such as "time (ms), x (g), z (m/s^2)"'
+_HEADER = (
+    "expected a header of a time and accelerations along x, y or z, with commas between them, such as "
+    '"time (ms), x (g), z (m/s^2)"'
+)
 
 
 class Record(Table):

@@ -45,11 +45,6 @@ _FACING = {"up": "right", "down": "left"}
 """The words for climbers."""
 NAMES = ("beads.material", "boundary.material", "liquid.name")
 """Keys whose values are names of the library."""
-GIVEN_BY: Mapping[str, tuple[str, ...]] = {
-    **{NAMES[0]: ("beads.", "contact."), NAMES[1]: ("contact.",), NAMES[2]: ("liquid.",)},
-    **dict.fromkeys(("liquid.mass_fraction", "liquid.temperature"), ("liquid.",)),
-}
-"""Begins of the keys that the library gives to a case by a key."""
 _FRICTION = ("contact.friction.bead_bead", "contact.friction.bead_wall", "contact.rolling_friction")
 _OF_SURFACES = (
     *("liquid.meniscus_radius", "liquid.volume_fraction", "liquid.contact_angle"),
@@ -264,7 +259,7 @@ def _count(case: Case) -> Case:
     if not case.boundary.closed:
         raise unusable("boundary.shape", 'expected a container, such as "box": a mixture is poured into it')
     if mixture.count is None:
-        count = round(_PACKING * case.boundary.volume(mixture.fill_height) / mixture.mean_volume)
+        count = round(_PACKING * case.boundary.volume(mixture.fill_height) / mixture.share_and_volume[1])
         if not 1 <= count <= MOST_BEADS:
             raise unusable("mixture.fill_height", f"that takes {count} beads; expected 1 to {MOST_BEADS}")
         case = case.filled("mixture.count", count, "from the fill_height")
@@ -424,18 +419,11 @@ def _uphill(case: Case) -> Case:
 def _spacing(case: Case) -> Case:
     """The spacing of walkers; starts in which beads overlap are refused."""
     for key, walkers in case.walkers_by_key.items():
-        gap = walkers.gap
         _check_held(case, walkers)
-        overlap = max(load.overlap for load in contact_loads(case, walkers)) if gap is None else -gap
+        overlap = max(load.overlap for load in contact_loads(case, walkers))
         if overlap * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):
-            blamed, remedy = "contact.youngs_modulus", f"a larger modulus, or {key}.gap"
-            if gap is not None:
-                least = -0.02e6 * min(walkers.radii) / (1.0 + walkers.gap_spread)
-                blamed, remedy = f"{key}.gap", f"{least:.3g} um or more"
-            message = f"the beads overlap by more than 2 % of the smallest radius: expected {remedy}"
-            raise unusable(blamed, message)
-        if gap is None:
-            case = case.noted(f"{key}.gap", "where the forces at rest balance", text="auto")
+            message = "expected a larger one: at rest the beads overlap by more than 2 % of the smallest radius"
+            raise unusable("contact.youngs_modulus", message)
         # Beads of different walkers may touch, but not overlap, if they are meant to meet.
         least = (1.0 if walkers.meet else 1.5) * walkers.length
         if walkers.spacing is None:
@@ -466,20 +454,6 @@ def _gravity(case: Case) -> Case:
 
 
 STEPS: Sequence[Callable[[Case], Case]] = (
-    *(
-        _radii,
-        _vessel,
-        _viscosity,
-        _count,
-        _walkers,
-        _drive,
-        _surfaces,
-        _law,
-        _modulus,
-        with_run,
-        _uphill,
-        _spacing,
-        check_bodies,
-        _gravity,
-    ),
+    *(_radii, _vessel, _viscosity, _count, _walkers, _drive, _surfaces, _law, _modulus, with_run),
+    *(_uphill, _spacing, check_bodies, _gravity),
 )

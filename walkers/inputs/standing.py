@@ -71,7 +71,7 @@ def _walkers(case: Case, walkers: Walkers, first: int) -> Iterator[Standing]:
         facing = {"right": 1, "left": -1}.get(walkers.facing, 1 if (number + row) % 2 == 0 else -1)
         turn, press = _draws(case.run.seed, number)
         angle, factor = walkers.angle + walkers.angle_spread * turn, 1.0 + walkers.gap_spread * press
-        overlaps = [(overlap if walkers.gap is None else -walkers.gap) * factor for overlap in resting]
+        overlaps = [overlap * factor for overlap in resting]
         heading = atan2(y, x) + angle + (0.0 if facing > 0 else pi)
         pressed = zip(walkers.radii, overlaps, strict=False)  # the first overlaps are those with the floor
         heights = [case.boundary.rest_height(radius - overlap) for radius, overlap in pressed]

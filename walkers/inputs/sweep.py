@@ -36,11 +36,10 @@ from walkers.inputs.axes import (
 )
 from walkers.inputs.case import Case
 from walkers.inputs.keys import Value, flatten
-from walkers.inputs.messages import blaming, blaming_changes, check_key, validated
-from walkers.inputs.named_files import with_files
+from walkers.inputs.messages import blaming, check_key, validated
 from walkers.inputs.reading import find_input, read_case, shipped
 from walkers.inputs.table import Table, alternatives, changed
-from walkers.inputs.toml import read_toml
+from walkers.inputs.toml import read_toml, with_files
 from walkers.inputs.units import Speed, Whole
 from walkers.rounding import counted
 
@@ -49,9 +48,9 @@ _SHOWN = 20
 
 
 class SampleTable(Table):
-    """``[[sample]]``: a sampler of scipy.stats.qmc over ranges of keys."""
+    """``[[sample]]``: points of Sobol's sequence, best a power of two, over ranges of keys."""
 
-    method: Literal["sobol", "halton", "latin-hypercube"] = "sobol"
+    method: Literal["sobol"] = "sobol"
     points: Annotated[Whole, Field(ge=1, le=MOST_POINTS)]
     seed: Annotated[Whole, Field(ge=0)] = 1
     ranges: dict[str, Any]
@@ -87,43 +86,23 @@ class SweepFile(Table):
         """All axes in their order; the last one varies fastest. A descent is last."""
         axes = [*crossed(self.axes), *(zipped(table) for table in self.zip)]
         axes += [one_at_a_time(self.one_at_a_time)] if self.one_at_a_time else []
-        axes += [sampled(table.method, table.points, table.seed, table.ranges) for table in self.sample]
+        axes += [sampled(table.points, table.seed, table.ranges) for table in self.sample]
         return axes + ([self.descend.axis()] if self.descend else [])
 
 
 @dataclass(frozen=True, repr=False)
 class Sweep:
-    """A base case and its variations.
+    """A base case and its variations."""
 
-    Attributes
-    ----------
-    name
-        That of its file, and of its directory.
-    source
-        What messages call it.
-    case_name, base
-        Name of the base case, with which the runs' directories begin, and the tables of its file.
-    file
-        Tables of the sweep file.
-    document
-        Tables of the base case, changed by ``[set]``.
-    axes
-        Keys that vary, and their values.
-    rows
-        The points: one value a key.
-    until_below
-        The speed (m/s) below which walkers are at rest on the last axis, if that is a descent.
-    """
-
-    name: str
-    source: str
-    case_name: str
-    base: Mapping[str, Any]
-    file: Mapping[str, Any]
-    document: Mapping[str, Any]
-    axes: Sequence[Axis]
-    rows: Sequence[tuple[Value, ...]]
-    until_below: float | None
+    name: str  # of its file, and of its directory
+    source: str  # what messages call it
+    case_name: str  # with which the runs' directories begin
+    base: Mapping[str, Any]  # tables of the file of the base case
+    file: Mapping[str, Any]  # tables of the sweep file
+    document: Mapping[str, Any]  # tables of the base case, changed by ``[set]``
+    axes: Sequence[Axis]  # keys that vary, and their values
+    rows: Sequence[tuple[Value, ...]]  # the points: one value a key
+    until_below: float | None  # speed (m/s) below which walkers are at rest on the last axis, if that is a descent
 
     @property
     def title(self) -> str:
@@ -183,12 +162,10 @@ def load_sweep(sweep: str | Path | Mapping[str, Any], changes: Mapping[str, Valu
                 raise unusable("set", "expected a table of keys")
             document = {**document, "set": {**settings_in(document.get("set", {})), **changes}}
         name = _name_with(name, changes)
-    with blaming_changes(changes or {}):
-        expanded = expand(document, source=source, name=name, folder=path.parent)
+    expanded = expand(document, source=source, name=name, folder=path.parent)
+    if varied := {key: value for key, value in (changes or {}).items() if key in expanded.keys}:
         text = "varies in this sweep and cannot be set"
-        varied = {key: value for key, value in (changes or {}).items() if key in expanded.keys}
-        if varied:
-            raise InputError(source, [Problem(key, f'"{value}"', text) for key, value in varied.items()])
+        raise InputError(source, [Problem(key, f'"{value}"', text) for key, value in varied.items()])
     return expanded
 
 

@@ -1,16 +1,20 @@
-"""TOML files as users write them."""
+"""TOML files as users write them, and the files that they name."""
 
 from __future__ import annotations
 
 import stat
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from walkers.errors import refused
+from walkers.errors import refused, unusable
+from walkers.inputs.keys import parts_of, value_at
 
 _MOST_BYTES = 16 << 20
+_FILES = {"boundary.mesh": ("meshes", "vessel", "read_mesh"), "drive.record": ("records", "record", "read_record")}
+"""Keys that name files, the tables of their contents by these names, and their readers."""
 
 
 def toml_bytes(tables: Mapping[str, Any]) -> bytes:
@@ -34,3 +38,23 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise refused(path, f"not TOML: {error}") from error
     except OSError as error:
         raise refused(path, f"cannot be read: {error.strerror}") from error
+
+
+def with_files(
+    document: Mapping[str, Any], folder: Path = Path(), values: Iterable[tuple[str, object]] = ()
+) -> dict[str, Any]:
+    """The tables of a case with the contents of the files that they, or other values of keys, name in a folder.
+
+    A case is whole without these files. Raises `InputError` if one cannot be read.
+    """
+    tables, values = dict(document), list(values)
+    for key, (table, module, reader) in _FILES.items():
+        contents = dict(below) if isinstance(below := tables.get(table), Mapping) else {}
+        named = (value_at(document, parts_of(key)), *(value for name, value in values if name == key))
+        for file in dict.fromkeys(value for value in named if isinstance(value, str) and value not in contents):
+            try:
+                contents[file] = getattr(import_module(f"walkers.inputs.{module}"), reader)(folder / file)
+            except ValueError as error:
+                raise unusable(key, str(error), file) from error
+        tables |= {table: contents} if contents else {}
+    return tables

@@ -6,7 +6,6 @@ import os
 import platform
 import re
 import subprocess
-import threading
 from contextlib import suppress
 from functools import cache
 from importlib import metadata
@@ -36,11 +35,6 @@ def software() -> dict[str, Any]:
     version, _, built = version.partition("+")
     commit = commit_of(Path(__file__).resolve().parents[2]) or built.removeprefix("g") or None
     return {"granular_walkers": version, "commit": commit, "python": platform.python_version(), "packages": packages}
-
-
-def look_ahead() -> None:
-    """Look up `software` in a thread while the program waits for an engine."""
-    threading.Thread(target=software, daemon=True).start()
 
 
 def commit_of(checkout: Path) -> str | None:

@@ -32,7 +32,6 @@ from walkers.runner.failures import AuditFailed, BeadsOverTheTop, UnauditedEngin
 from walkers.runner.files import fsync_path, link_or_copy, read_json, settle, write_json
 from walkers.runner.launch import EngineReport, check_room, last_step, launch
 from walkers.runner.manifest import write_manifest
-from walkers.runner.provenance import look_ahead
 from walkers.templates import deck as decks
 from walkers.templates.deck import Deck, Segment
 
@@ -199,7 +198,6 @@ class OpenRun:
 
         Complete segments are kept if the engine fails.
         """
-        look_ahead()
         for cycles in self.case.run.attempts:
             case = self.case.for_cycles(cycles)
             if self.case.run.until_steady and self.done and self.done[-1]["end"] < case.run.steps:
@@ -344,7 +342,6 @@ def _make_together(
             for name, case in [(".", cases[first]), *cases.items()]:
                 (incomplete / name).mkdir(exist_ok=True)
                 on_disk.write_case(incomplete / name, case)
-            look_ahead()
             tell = _teller(cases[first].run, cycles, decks.next_segment(tried[first]), on_progress)
             folder = incomplete / DECK_FOLDER
             report = launch(deck, folder, engine, on_step=tell, time_limit=time_limit, keep_open=locks)

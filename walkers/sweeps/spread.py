@@ -109,7 +109,7 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
         ranges = {value.key: _range_of(value) for value in varied}
 
     def likeness(seed: int) -> float:
-        cube = unit_cube("sobol", len(varied), points, seed)
+        cube = unit_cube(len(varied), points, seed)
         return float(np.abs(np.corrcoef(cube.T) - np.eye(len(varied))).max())
 
     seed = min(_SEEDS, key=likeness) if len(varied) > 1 else _SEEDS[0]
