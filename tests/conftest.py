@@ -10,10 +10,9 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout, suppress
 from itertools import islice
 from pathlib import Path
@@ -25,9 +24,7 @@ from tomli_w import dumps as to_toml
 from walkers import run as run_case
 from walkers.archive.writing import write_archive
 from walkers.cache import make_cache_folder
-from walkers.inputs.axes import is_axis
 from walkers.inputs.case import Case
-from walkers.inputs.keys import flatten
 from walkers.inputs.origins import Origin
 from walkers.inputs.reading import shipped
 from walkers.inputs.sweep import expand
@@ -64,17 +61,6 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 # MPI processes that wait for each other give way to others meanwhile: on a busy machine they are ten times as fast so.
 os.environ["OMPI_MCA_mpi_yield_when_idle"] = "1"  # noqa: SIM112
-# The user's cache is not ours to read or write, for audits of the engine are kept there; but for what is named by all
-# that it depends on: solutions of an equation, of a tenth of a second, and the compiled contact model, of four.
-_SOLVED = ("young-laplace", "menisci")
-_KEPT, _ = (make_cache_folder(name).parent for name in _SOLVED)
-os.environ["XDG_CACHE_HOME"] = tempfile.mkdtemp(prefix="walkers-tests-")
-_OURS = make_cache_folder()
-for _name in _SOLVED:
-    (_OURS / _name).symlink_to(_KEPT / _name)
-for _kept in _KEPT.glob("bridge-*"):  # a copy: a link to it is not loaded
-    shutil.copy(_kept, _OURS)
-
 _LONGEST = (
     *("test_a_sweep_through_slurm", "test_figures_and_comparison", "[pilots", "test_a_sweeps_points_open_reports"),
     *("test_known_parameters_are_found", "test_mandatory_packages", "[a pile, killed]"),
@@ -159,6 +145,25 @@ def once(session_folder: Path) -> Callable[[str, Callable[[Path], object]], Path
         return folder
 
     return filled
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cache(once: Callable[[str, Callable[[Path], object]], Path]) -> None:
+    """A cache of the session's own, for audits of the engine are kept in that of the user.
+
+    It has of it what is named by all that it depends on: solutions of equations, a tenth of a second each, and the
+    compiled contact model, four seconds.
+    """
+
+    def fill_it(folder: Path) -> None:
+        kept = make_cache_folder()
+        (own := folder / kept.name).mkdir()
+        for name in ("young-laplace", "menisci"):
+            (own / name).symlink_to(make_cache_folder(name))
+        for model in kept.glob("bridge-*"):  # a copy: a link to it is not loaded
+            shutil.copy(model, own)
+
+    os.environ["XDG_CACHE_HOME"] = str(once("cache", fill_it))
 
 
 @pytest.fixture(scope="session")
@@ -351,23 +356,6 @@ def call(*arguments: str, check: bool = False, folder: Path | None = None) -> su
     if check:
         assert done.returncode == 0, done.stderr
     return done
-
-
-def shipped_sweep(name: str, settings: Mapping[str, Any], axes: Mapping[str, Any]) -> dict[str, Any]:
-    """The file of a shipped sweep with further settings, and other values on some of its axes if it has any."""
-    given = read_toml(shipped("sweep")[name])
-    given["set"] = {**flatten(given.get("set", {}), lambda _: False), **settings}
-    if "axes" in given:
-        given["axes"] = {**flatten(given["axes"], is_axis), **axes}
-    return given
-
-
-def run_shipped(name: str, given: dict[str, Any], out: Path) -> None:
-    """Run what `shipped_sweep` gave, under the sweep's name; no point may fail."""
-    _, failures = run_sweep(
-        expand(given, source=name, name=name, folder=shipped("sweep")[name].parent), out, Options(2)
-    )
-    assert not failures
 
 
 @contextmanager

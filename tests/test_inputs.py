@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from jsonschema import Draft202012Validator
 
 import walkers
 from tests.conftest import REFERENCE, call, document, make_case, origins, to_toml
@@ -179,6 +178,8 @@ def test_a_case_is_kept_as_json(name: str) -> None:
 
 def test_the_schema_refuses_what_the_program_refuses(in_folder: Path) -> None:
     """And keeps all shipped cases; a new case may name it, and is a case as it was without."""
+    from jsonschema import Draft202012Validator  # three seconds, of one worker
+
     assert call("new", "mine", "cluster", "--schema", check=True).stdout == "mine.toml\ncase.schema.json\n"
     assert Path("mine.toml").read_text().startswith("#:schema case.schema.json\n\n")
     assert load_case("mine").determinants() == load_case("cluster").determinants()
