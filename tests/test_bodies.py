@@ -222,9 +222,8 @@ def test_substrate_moves_as_prescribed(trajectory: Moved, axis: str, frame: str)
     moved = trajectory(drive={"axis": axis, "frame": frame}, run={"cycles": 4, "settling_cycles": 1})
     drive, motion, along = moved.case.excitation, moved.motion, "xyz".index(axis)
     phase = drive.largest.angular_frequency * moved.time
-    places, speeds = motion.substrate, motion.substrate_velocity[:, along]
+    places = motion.substrate
     np.testing.assert_allclose(places[:, along], drive.amplitude * np.sin(phase), atol=1e-9 * drive.amplitude + 1e-15)
-    np.testing.assert_allclose(speeds, drive.peak_velocity * np.cos(phase), atol=1e-9 * drive.peak_velocity)
     assert not np.any(np.delete(places, along, axis=1))
     assert np.abs(moved.velocity[0]).max() < 1e-12
 

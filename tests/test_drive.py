@@ -16,7 +16,8 @@ from walkers.check.crosscheck import compare
 from walkers.inputs.case import Case
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.motion import boundary_motion
-from walkers.postprocess.numbers import declared
+from walkers.postprocess.numbers import rows, state
+from walkers.postprocess.quantities import declared
 from walkers.postprocess.sides import REST
 from walkers.postprocess.threshold import _crossed, measure
 from walkers.runner.binary import find_engine
@@ -115,10 +116,10 @@ def test_a_run_has_its_record(tmp_path: Path) -> None:
 def test_a_sweep_over_records_reads_each_of_them(tmp_path: Path) -> None:
     """Also those that its base case does not name, beside the sweep."""
     case = recorded(tmp_path, sine(40), repeats=True)
-    for rows in (44, 48):
-        (tmp_path / f"{rows}.csv").write_text(sine(rows))
+    for count in (44, 48):
+        (tmp_path / f"{count}.csv").write_text(sine(count))
     (tmp_path / "records.toml").write_text('case = "case.toml"\n[axes]\n"drive.record" = ["44.csv", "48.csv"]\n')
-    expected = [case.changed({"drive.record": str(tmp_path / f"{rows}.csv")}) for rows in (44, 48)]
+    expected = [case.changed({"drive.record": str(tmp_path / f"{count}.csv")}) for count in (44, 48)]
     found = load_sweep(tmp_path / "records.toml").cases()
     assert [point.determinants() for point in found] == [of.determinants() for of in expected]
 
@@ -171,6 +172,10 @@ def test_a_ramp_finds_the_threshold(ramp: list[float], name: str, tmp_path: Path
     first, _, row = done.describe().split("\n")[:3]
     assert first == f"fig1b: {name.replace('_', ' ')} {found[name] / 9.8:.4g} g"
     assert re.fullmatch(rf"  {declared(name).label} .*  resolution \S+", row)
+    # Means over a drive that changes say nothing, nor does it that they are not steady.
+    assert (found["steady"], found.warnings) == (0, [])
+    assert not {"velocity", "rotation_1", "work", "steady"} & {row.name for row in rows(found)}
+    assert state({**found, name: nan}) == "no threshold within the ramp"
     assert found[name] == pytest.approx(0.9 * 9.8, abs=found[name.replace("_at", "_within")])
     assert found[name.replace("_at", "_within")] == pytest.approx(0.4 * 9.8 * 8 / 48)
     assert found[f"gamma0_{name}"] == pytest.approx(0.0857, rel=0.04)

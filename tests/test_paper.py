@@ -29,7 +29,8 @@ from walkers.postprocess.gait import gait
 from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep
 from walkers.sweeps.table import read_record, write_record
 from walkers.text import rendered
-from walkers.theory.prediction import alignment_of, motion_of, outside_of_the_paper, pendulum_of, predicted_column
+from walkers.theory.mathieu import alignment
+from walkers.theory.prediction import alignment_of, motion_of, outside_of_the_paper, predicted_column
 from walkers.theory.quasistatic import FloatArray
 
 SHORT = {"dimers.replicates": 2, "run.cycles": 8, "run.settling_cycles": 4}
@@ -229,7 +230,7 @@ def test_dimers_turn_as_the_pendulum_does_but_as_much_faster_as_their_beads_are_
     trajectory = sources.trajectory(run)
     case = trajectory.case
     begin, end = 3 * case.run.samples_per_cycle, 8 * case.run.samples_per_cycle
-    free, pendulum = alignment_of(case), pendulum_of(case)
+    free, pendulum = alignment_of(case), alignment(case)
 
     def slope(theta: float, state: FloatArray, phase: float) -> list[float]:  # Mathieu's, with sin ψ instead of ψ
         pull = pendulum.u - 4.0 * pendulum.v * np.cos(2.0 * theta + phase)

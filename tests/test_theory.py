@@ -10,23 +10,21 @@ from typing import Any
 import numpy as np
 import pytest
 from numba import njit
+from scipy.special import mathieu_a, mathieu_b
 
 from tests.conftest import call, document, make_case, to_toml
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of, resistances_at_rest
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.toml import read_toml
-from walkers.physics.dimer import Dimer
 from walkers.postprocess.gait import gait
 from walkers.postprocess.motion import Group
 from walkers.postprocess.results import read
 from walkers.postprocess.tables import read_table
-from walkers.theory.mathieu import Alignment, alignment, is_stable, largest_stable_v, time_to_turn
+from walkers.theory.mathieu import LARGEST_STABLE_V, Alignment, alignment, time_to_turn
 from walkers.theory.motion import Walker, walk
 from walkers.theory.prediction import alignment_of, describe, motion_of, predict, threshold
 from walkers.theory.quasistatic import CONTACTS, FloatArray, detachment, mass_asymmetry, mean_velocity
-
-RUBY = Dimer((0.3e-3, 0.2e-3), 4000.0, 19.2e-3)
 
 
 @pytest.mark.parametrize("radii", [["0.3 mm", "0.2 mm"], ["0.2 mm", "0.3 mm"]])
@@ -175,19 +173,21 @@ def test_a_prediction_names_the_contact_that_opens() -> None:
 
 def test_mathieu_parameters_of_the_papers_drives() -> None:
     """All below the 0.4 that the paper states, within the stable interval of ±0.45."""
-    large = Dimer((0.6e-3, 0.3e-3), 4000.0, 19.2e-3)
-    found = [alignment(dimer, f, 98.0).v for dimer, f in ((RUBY, 60.0), (RUBY, 80.0), (large, 80.0))]
-    assert found == pytest.approx([0.35, 0.20, 0.17], abs=0.006)
-    assert largest_stable_v() == pytest.approx(0.454, abs=5e-4)
+    drives = [("fig1b", 60), ("fig1b", 80), ("fig4b", 80)]
+    cases = [load_case(name, {"drive": {"frequency": f"{f} Hz", "peak_acceleration": "10 g"}}) for name, f in drives]
+    assert [alignment(case).v for case in cases] == pytest.approx([0.35, 0.20, 0.17], abs=0.006)
 
 
 def _growth(u: float, v: float, damping: float = 0.0) -> float:
     return Alignment(u, v, damping).growth
 
 
-def test_the_chart_of_stability_is_that_of_floquets_exponents() -> None:
+def test_small_angles_stay_small_where_the_mathieu_equation_is_stable() -> None:
+    """Between its characteristic values a_n(q) and b_(n+1)(q), q = 2V and a = U."""
     for u, v in ((0.0, 0.3), (0.0, 0.5), (0.5, 0.1), (-0.1, 0.3), (-0.5, 0.3), (1.0, 0.2), (2.5, 0.4)):
-        assert bool(is_stable(u, v)) == (_growth(u, v) < 1e-6), (u, v)
+        stable = any(mathieu_a(n, 2.0 * v) < u < mathieu_b(n + 1, 2.0 * v) for n in range(6))
+        assert Alignment(u, v).stable == stable, (u, v)
+    assert float(mathieu_b(1, 2.0 * LARGEST_STABLE_V)) == pytest.approx(0.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.1, 0.5, 2.0])
@@ -198,7 +198,7 @@ def test_the_damped_mathieu_equation_has_its_known_limits(damping: float) -> Non
     assert _growth(1.03 * border, 0.05, damping) > 1e-6
     assert _growth(0.97 * border, 0.05, damping) < 1e-6
     assert Alignment(0.97 * border, 0.05, damping).stable
-    assert (_growth(0.0, 0.99 * largest_stable_v()) < 1e-6) & (_growth(0.0, 1.01 * largest_stable_v()) > 1e-2)
+    assert (_growth(0.0, 0.99 * LARGEST_STABLE_V) < 1e-6) & (_growth(0.0, 1.01 * LARGEST_STABLE_V) > 1e-2)
 
 
 def climber(viscosity: float, tilt: str = "90 deg", **drive: str) -> Case:

@@ -21,7 +21,8 @@ from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
 from walkers.inputs.units import parse_quantity
 from walkers.postprocess.motion import read_motion
-from walkers.postprocess.numbers import declared, fell, headline, ordered, rows
+from walkers.postprocess.numbers import fell, headline, rows
+from walkers.postprocess.quantities import declared, ordered
 from walkers.postprocess.results import headlines
 from walkers.postprocess.tables import read_columns
 from walkers.postprocess.uncertainty import SPREAD_NAME, spread_of
@@ -98,6 +99,8 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     for some, column in (([result], "right_facing"), ([level], "velocity"), ([result, turned], "axial_velocity")):
         assert default_column(pd.DataFrame([dict(one) for one in some])) == headline(some[-1]) == column
     assert not fell({"goes_uphill": True, "climbs": 0})  # a pile
+    # Nor has any walker the mean angle of those that turned over and those that did not.
+    assert ["orientation_end" in {row.name for row in rows(one)} for one in ({**result}, turned)] == [True, False]
 
 
 def test_clusters_on_a_slope_are_averaged_by_the_way_they_face_and_lean_by_how_far_they_turned(tmp_path: Path) -> None:

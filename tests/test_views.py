@@ -97,9 +97,9 @@ def test_bridges_are_lines_with_force_and_gap(directory: Path, moved: Group, col
 def test_walkers_are_exported_side_by_side_once_a_cycle_with_the_script_that_shows_them(
     directory: Path, moved: Group, tmp_path: Path
 ) -> None:
-    script = walkers.load(directory).export("paraview", tmp_path / "vtk")
-    assert script.read_bytes() == files("walkers.postprocess").joinpath("show.py.txt").read_bytes()
-    collection = script.with_name("walkers.pvd")
+    collection = walkers.load(directory).export("vtk", tmp_path / "vtk")
+    script = files("walkers.postprocess").joinpath("show.py.txt").read_bytes()
+    assert collection.with_name("show.py").read_bytes() == script
     np.testing.assert_allclose(pv.get_reader(collection).time_values, np.arange(9) / 80.0)
     points = [pv.read(collection.parent / f"beads_{frame:06d}.vtu").points for frame in (0, 80)]
     walked = (points[1] - points[0]).reshape(2, 2, 3)
@@ -339,8 +339,8 @@ def test_walls_are_whole_wherever_the_beads_are(motion: Motion, boundary: Bounda
 @pytest.mark.slow
 def test_pvpython_shows_spheres_bridges_and_floor(filmed: Path, tmp_path: Path) -> None:
     """With ParaView and Xvfb, 1.4 GB, which ``make test-slow`` installs."""
-    script = walkers.load(filmed).export("paraview", tmp_path / "vtk")
-    script = script.parent.rename(tmp_path / "moved") / script.name  # the files are found beside it
+    collection = walkers.load(filmed).export("vtk", tmp_path / "vtk")
+    script = collection.parent.rename(tmp_path / "moved") / "show.py"  # the files are found beside it
     picture = tmp_path / "walkers.png"
     command = ["xvfb-run", "-a", "pvpython", str(script), str(picture), "0.05"]
     for _ in range(3):  # under load it may not wait long enough for its screen

@@ -25,9 +25,8 @@ from walkers.postprocess.dump import DumpError
 from walkers.postprocess.figures import figures_of
 from walkers.postprocess.gait import averages, gait, settled_samples, walk
 from walkers.postprocess.motion import Group, read_bridges, read_motion
-from walkers.postprocess.numbers import declared, rows
-from walkers.postprocess.quantities import TABLES, axis
-from walkers.postprocess.quantities import declared as declared_column
+from walkers.postprocess.numbers import rows
+from walkers.postprocess.quantities import TABLES, axis, declared, matches
 from walkers.postprocess.results import read
 from walkers.postprocess.sides import sides
 from walkers.postprocess.tables import read_columns, read_table, write_table
@@ -158,6 +157,36 @@ def test_on_slopes_rows_and_figures_are_by_the_way_up(run_directory: RunDirector
         (settling,) = axes.patches
         ends = settling.get_extents().transformed(axes.transData.inverted())
         assert ends.x1 == pytest.approx(1e-3 * first["time"][2])
+
+
+_STEEL = {
+    **{"beads.material": "chrome steel", "dimers.radii": ["0.8 mm", "0.5 mm"], "liquid.name": "ethylene glycol"},
+    **{"boundary.material": "PTFE", "drive.peak_acceleration": "2 g", "dimers.angle": "1 deg", "dimers.replicates": 1},
+}
+
+
+def test_a_run_that_ends_before_its_walker_turns_over_says_how_long_it_must_be(runs_folder: Path) -> None:
+    """Of steel on PTFE; ruby stands on a gentle slope."""
+    shorts = [
+        walkers.run(load_case("fig1b", {"boundary.tilt": "4 deg", "run.cycles": cycles, **changes}), runs_folder)
+        for cycles, changes in ((40, _STEEL), (24, {"dimers.replicates": 1}))
+    ]
+    assert [run.result["turned_over"] for run in shorts] == [0, 0]
+    (warning,) = shorts[0].result.warnings
+    assert "1 walker facing up turns faster and faster" in warning
+    assert not shorts[1].result.warnings
+    cycles = int(warning.rpartition("= ")[2])
+    assert 60 <= cycles <= 400
+    longer = walkers.run(shorts[0].case.changed({"run.cycles": cycles}), runs_folder)
+    (turned,) = longer.walkers["turned_at"]
+    assert 0.5 < turned * longer.case.excitation.frequency / cycles < 0.8
+    assert "turn over after the end" not in " ".join(longer.result.warnings)
+
+
+def test_progress_says_when_results_are_measured(tmp_path: Path) -> None:
+    told: list[Progress] = []
+    make_runs([Case.read(document(run=SHORT), name="short")], tmp_path, find_engine(), on_progress=told.append)
+    assert told[-1] == Progress(1.0, "measuring")
 
 
 def test_walkers_that_come_close_are_reported(moved: Group) -> None:
@@ -345,11 +374,13 @@ def test_each_file_has_what_is_declared(run_directory: Callable[..., Path], pile
     assert files.keys() == TABLES.keys()
     for name, path in files.items():
         schema, known = pq.read_schema(path), TABLES[name]
-        places = [next(place for place, one in enumerate(known) if one.names(column)) for column in schema.names]
+        places = [
+            next(place for place, one in enumerate(known) if matches(one.name, column)) for column in schema.names
+        ]
         assert places == sorted(places)
         assert set(places) == set(range(len(known)))
         for field in schema:
-            quantity = declared_column(field.name, known)
+            quantity = declared(field.name, name)
             unit, label = quantity.si_unit.encode(), quantity.label.encode()
             expected = {b"unit": unit, b"units": unit, b"long_name": label, b"meaning": quantity.meaning.encode()}
             assert field.metadata == expected
@@ -362,7 +393,7 @@ def test_each_file_has_what_is_declared(run_directory: Callable[..., Path], pile
     assert axis("trajectory", "sliding_pair_3") == ("sliding of pair 3 of beads (mm/s)", 1e3)
     for name in ("rotation_x", "gap_1_2", "speed"):
         with pytest.raises(KeyError):
-            declared_column(name, TABLES["trajectory"])
+            declared(name, "trajectory")
 
 
 @pytest.mark.parametrize("rows", [0, 9])

@@ -47,11 +47,10 @@ if TYPE_CHECKING:
 
 Named: TypeAlias = "Case | str | Path | Mapping[str, Any]"
 Changes: TypeAlias = "Mapping[str, Any] | None"
-Export = Literal["deck", "vtk", "paraview", "lammps", "archive"]
+Export = Literal["deck", "vtk", "lammps", "archive"]
 EXPORTS = {
     "deck": "walkers.sweeps.by_hand:write_folder",
     "vtk": "walkers.postprocess.paraview:write_vtk",
-    "paraview": "walkers.postprocess.paraview:write_vtk",
     "lammps": "walkers.postprocess.trajectory_files:write_trajectory",
     "archive": "walkers.archive.writing:write_archive",
 }
@@ -414,10 +413,10 @@ class Run:
         Parameters
         ----------
         form
-            ``vtk``, ``paraview``, ``lammps``, ``archive`` or ``deck``.
+            ``vtk``, ``lammps``, ``archive`` or ``deck``.
         to
-            The file, or the folder for ``vtk``, ``paraview`` and ``deck``. None: in the run directory, for ``archive``
-            and ``deck`` in the current folder.
+            The file, or the folder for ``vtk`` and ``deck``. None: in the run directory, for ``archive`` and ``deck``
+            in the current folder.
 
         Examples
         --------
@@ -429,8 +428,7 @@ class Run:
             from walkers.sweeps.by_hand import as_run
 
             return write(as_run(self.case, self.directory), place or Path(f"{self.directory.name}-deck"))
-        written = write(self.finished_directory, place, **options)
-        return written.with_name("show.py") if form == "paraview" else written
+        return write(self.finished_directory, place, **options)
 
 
 def writer_of(form: str, options: Iterable[str] = ()) -> Callable[..., Path]:

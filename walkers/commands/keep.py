@@ -25,7 +25,7 @@ class Options:
     Parameters
     ----------
     every
-        vtk, paraview, lammps: write every Nth sample; default: one per cycle; for lammps and piles all.
+        vtk, lammps: write every Nth sample; default: one per cycle; for lammps and piles all.
     dumps
         archive: leave out the engine's dumps; tables and results are included.
     authors
@@ -52,14 +52,14 @@ def export(
     at: At = At(),
     options: Options = Options(),
 ) -> None:
-    """Write a run for other programs: LIGGGHTS deck, VTK, ParaView, LAMMPS dump, or an archive to publish.
+    """Write a run for other programs: LIGGGHTS deck, VTK for ParaView, LAMMPS dump, or an archive to publish.
 
     Parameters
     ----------
     form
-        Format of the export. deck: LIGGGHTS deck of the case. vtk, paraview: .vtu files, their .pvd and a ParaView
-        script; prints the .pvd or the script. lammps: the trajectory as a LAMMPS dump, for OVITO, ASE, MDAnalysis.
-        archive: an RO-Crate (.zip) to publish.
+        Format of the export. deck: LIGGGHTS deck of the case. vtk: .vtu files, their .pvd, and the script show.py that
+        shows them in ParaView. lammps: the trajectory as a LAMMPS dump, for OVITO, ASE, MDAnalysis. archive: an
+        RO-Crate (.zip) to publish.
     to
         File or folder to write; default: in the run's folder, archives in the current folder. Decks are printed.
     """

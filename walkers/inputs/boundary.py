@@ -180,11 +180,6 @@ class Boundary(Table):
         return f"{self.shape} tilted by {degrees(self.tilt):.4g}°" if self.tilt else ""
 
     @property
-    def pull(self) -> str:
-        """Component of gravity down the slope, as text: ``g sin 60°``; ``g`` for a wall."""
-        return "g" if self.tilt > 1.57 else f"g sin {degrees(self.tilt):.4g}°"
-
-    @property
     def walls(self) -> tuple[Wall, ...]:
         """The floor first, if there is one, then the side walls."""
         if self.triangles:

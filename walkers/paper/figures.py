@@ -1,4 +1,4 @@
-"""Figs. 1b, 2, 3 and 4 of the paper by engine and theory, and alignment."""
+"""Figs. 1b, 2, 3 and 4 of the paper by engine and theory."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkers.inputs.loads import dimer_of
-from walkers.paper.sources import Sources, described, ruby, sweep_of, thresholds_with_theory
+from walkers.paper.sources import Sources, described, ruby, thresholds_with_theory
 from walkers.postprocess.drawing import (
     ONE_COLUMN,
     TWO_COLUMNS,
@@ -22,7 +21,6 @@ from walkers.postprocess.necks import bridges_at
 from walkers.postprocess.scene import Scene, Window, axes_toward
 from walkers.sweeps.figure import figure_of
 from walkers.sweeps.figure_options import FigureOptions
-from walkers.theory.mathieu import alignment, is_stable
 from walkers.theory.prediction import MODEL, motion_of, predicted_column
 from walkers.theory.quasistatic import FloatArray, translation
 
@@ -44,8 +42,6 @@ _SERIES = (
 )
 """Fig. 4: name, column of a sweep's table, marker, colour, and size, so that none hides another."""
 _MEASURED_DASHES = (0, (6, 2, 1, 2))
-_LARGEST_V = 0.4
-"""Of the Mathieu equation, "for all of the parameters investigated in this work" (the paper)."""
 
 
 @styled
@@ -163,43 +159,3 @@ def theory_of_cycles(trajectory: Group) -> list[FloatArray]:
     ahead = quarter if trajectory.walkers[0].facing > 0 else -quarter
     cycle = np.roll([velocity, velocity - sliding[0], velocity - sliding[1]], 1 - ahead, axis=1)
     return [np.concatenate([np.tile(series, _CYCLES), series[:1]]) for series in cycle]
-
-
-@styled
-def fig_alignment(sources: Sources) -> Figure:
-    """ψ(t) of asymmetric and symmetric dimers from several starts, and where small angles stay small."""
-    from matplotlib import colormaps
-    from matplotlib.ticker import MultipleLocator
-
-    table, dark_to_green = sources.finished("alignment"), colormaps["viridis"]
-    figure, axes = new_figure(TWO_COLUMNS, 3.2, ncols=3)
-    for panel, symmetric in zip(axes, (False, True), strict=False):
-        for _, row in table[(table["sin_delta"] == 0.0) == symmetric].iterrows():
-            trajectory, angle = sources.trajectory(row["run"]), row["dimers.angle"]
-            strobe = trajectory.case.run.samples_per_cycle
-            psi = np.degrees(trajectory.orientation[::strobe])
-            lines = panel.plot(trajectory.time[::strobe], psi, color=dark_to_green(0.8 * angle / 90.0))
-            lines[0].set_label(f"{angle:g}°")
-        panel.set(xlabel="time (s)", ylabel=r"orientation $\psi$ (°)")
-        panel.yaxis.set_major_locator(MultipleLocator(30.0 if np.ptp(panel.get_ylim()) < 200.0 else 180.0))
-    axes[0].set_title("asymmetric:\nalong the axis, ψ = 0, ±180°")
-    axes[1].set_title("symmetric:\nacross the axis, ψ = ±90°")
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, title="started at an angle of", loc="outside lower center", ncols=len(labels))
-    _draw_chart(axes[2])
-    letter_panels(axes)
-    figure.suptitle("; ".join(dict.fromkeys(described(sources.trajectory(run).case) for run in table["run"])))
-    return figure
-
-
-def _draw_chart(axes: Axes) -> None:
-    """The stable region of the (V, U) plane, after McLachlan, with the drives of the paper's sweeps in it."""
-    v, u = np.meshgrid(np.linspace(0.0, 0.8, 321), np.linspace(-0.4, 1.0, 281))
-    axes.contourf(v, u, is_stable(u, v), levels=[0.5, 1.5], colors=["0.87"])
-    for name, marker in (("fig2", "o"), ("fig3", "s"), ("fig4", "D")):
-        drives = [(dimer_of(case), case.excitation) for case in sweep_of(name).cases()]
-        points = [alignment(dimer, drive.frequency, drive.peak_acceleration).v for dimer, drive in drives]
-        axes.plot(points, np.zeros(len(points)), marker, mfc="none", ms=4, label=f"Fig. {name[3:]}")
-    axes.axvline(_LARGEST_V, color="0.45", ls="-.", lw=0.8, label="paper's bound, 0.4")
-    axes.set(xlabel="V", ylabel="U", title="grey: small angles\nstay small")
-    legend_below(axes, ncols=2, columnspacing=1.0, handlelength=1.8)

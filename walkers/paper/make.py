@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from walkers.errors import refused
 from walkers.extras import require
 from walkers.paper.comparison import compare
-from walkers.paper.figures import fig1b, fig2_threshold, fig3, fig4, fig_alignment, of_sweep
+from walkers.paper.figures import fig1b, fig2_threshold, fig3, fig4, of_sweep
 from walkers.paper.sources import NothingFinishedError, Sources, of_facts, sets, sweep_of
 from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.progress import progress_of
@@ -43,10 +43,6 @@ FIGURES = {
     ),
     "fig3": Drawing(fig3, ("fig3",), "Fig. 3: velocity against asymmetry"),
     "fig4": Drawing(fig4, ("fig4",), "Fig. 4: rotation of the beads through two cycles"),
-    "alignment": Drawing(fig_alignment, ("alignment",), "Alignment with the shaking axis and across it"),
-    "sensitivity": Drawing(
-        partial(of_sweep, name="sensitivity"), ("sensitivity",), "Velocities with one parameter changed at a time"
-    ),
 }
 COMPARISON = "comparison"
 COMPARED = (*map(of_facts, sets()), "fig2-threshold", "fig2-ramp", "fig2", "fig3")

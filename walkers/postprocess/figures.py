@@ -24,7 +24,7 @@ from walkers.postprocess.drawing import (
     styled,
 )
 from walkers.postprocess.motion import LEAST_SAMPLES
-from walkers.postprocess.quantities import TABLES, axis, declared, matches
+from walkers.postprocess.quantities import axis, declared, matches
 from walkers.postprocess.sides import directions, sides
 from walkers.postprocess.tables import Columns
 from walkers.rounding import rounded
@@ -131,11 +131,11 @@ def draw(axes: Axes, table: str, columns: Columns, x: str, y: str, by: str, look
     lines = [(name, series == value) for name in names for value in np.unique(series)]
     for (name, rows), look in zip(lines, looks, strict=True):
         factor = axis(table, name)[1]
-        given = {"label": declared(name, TABLES[table]).label} if len(names) > 1 else {}
+        given = {"label": declared(name, table).label} if len(names) > 1 else {}
         axes.plot(x_factor * columns[x][rows], factor * columns[name][rows], **{**given, **look})
     axes.set(xlabel=x_label, ylabel=axis(table, names[0])[0])
     for name, limits, widen in ((x, axes.dataLim.intervalx, axes.set_xlim), (y, axes.dataLim.intervaly, axes.set_ylim)):
-        least = LEAST.get(declared(name.split()[0], TABLES[table]).unit, 0.0)
+        least = LEAST.get(declared(name.split()[0], table).unit, 0.0)
         if np.isfinite(limits).all() and np.ptp(limits) < least:
             widen(*(limits.mean() + np.array([-0.5, 0.5]) * least))
 
@@ -235,7 +235,7 @@ def gait_figure(case: Case, tables: Tables) -> Figure:
     widths, colours = np.linspace(6.0, 1.1, len(names)), [_PALE, *(f"C{n}" for n in range(1, 99))]
     looks = [{"color": colour, "linewidth": width} for colour, width in zip(colours, widths, strict=False)]
     for look, name in zip(looks, names, strict=True):
-        label, mean = declared(name, TABLES["trajectory"]).label, rounded(1e3 * walkers[name][0], "mm/s")
+        label, mean = declared(name, "trajectory").label, rounded(1e3 * walkers[name][0], "mm/s")
         look["label"] = f"{label}\n(mean of the run {mean} mm/s)"
     figure, (axes,) = _panels("gait", case, {"trajectory": smooth}, [looks], number=number)
     axes.axhline(0.0, color="0.4", lw=0.6)

@@ -142,7 +142,7 @@ def _captions(
     decimals = max(0, ceil(-log10(float(np.diff(times.time).max(initial=0.0)) or 1.0) - 1e-9))
     speed = speed_text(times.slowdown) + (", stroboscopic" if times.stroboscopic else "")
     bar = view.round_below(wide / 5.0 / pixels_per_mm)
-    toward, direction = named_direction(scene.motion)
+    toward, direction = view.named_direction(scene.motion)
     left, right, level, thick = wide - edge - bar * pixels_per_mm, wide - edge, tall - edge, max(2, edge // 8)
 
     def written(picture: view.Picture, number: int) -> view.Picture:
@@ -171,14 +171,6 @@ def _captions(
         return np.asarray(page)
 
     return written
-
-
-def named_direction(motion: Motion) -> tuple[FloatArray, str]:
-    """Direction of the displacement that is written into pictures, and its name."""
-    if view.from_the_side(motion.case):
-        return view.against_gravity(motion), "up"
-    right, up, _ = view.plan_axes(motion, np.array(motion.case.drive_axis))
-    return (up, "uphill") if motion.case.boundary.tilt else (right, "along the drive axis")
 
 
 def speed_text(slowdown: float) -> str:

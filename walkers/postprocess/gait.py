@@ -26,7 +26,7 @@ import numpy as np
 from walkers.inputs.run import CONSTANT, Run
 from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
 from walkers.postprocess.motion import Group, between, read_motion
-from walkers.postprocess.sides import REST, SEPARATED, STEADY_SPEED
+from walkers.postprocess.sides import REST, SEPARATED, STEADY_SPEED, sides
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,6 +46,8 @@ _LITTLE, _FADING, _NO_FASTER = 0.005, 0.9, 1e-4
 """A velocity is constant only if the walker stops turning. Its largest rotation per cycle in the second half of the run
 must be below the first angle (rad) and exceed that in the first half by less than the third angle; or it must be at
 most the second number times that in the first half."""
+_NOTHING = 1e-4
+"""Increase of the mean angle, rad, that counts as none."""
 _PARTS = 10
 """Parts of an interval between samples at which gaps and the force of the drive are evaluated."""
 
@@ -210,6 +212,23 @@ def turned_over_at(group: Group) -> FloatArray:
     strobe = group.case.run.samples_per_cycle
     over = np.abs(group.orientation[::strobe] - group.orientation[0]) > np.pi / 2.0
     return np.where(over.any(axis=0), group.time[::strobe][over.argmax(axis=0)], np.nan)
+
+
+def turns_over_after(group: Group) -> FloatArray:
+    """Time after the end of the run at which walkers turn over that face up and still stand, s; NaN for others.
+
+    Small angles grow exponentially, and dψ/dt = rate · sin ψ. A walker will turn over if its mean angle in the last
+    third of the measured cycles exceeds that in the second third by more than 5 %, and grows faster than before.
+    """
+    run = group.case.run
+    angle = np.abs(group.orientation[:: run.samples_per_cycle][run.settled_strobes :])
+    first, second, last = (part.mean(axis=0) for part in np.array_split(angle, 3))
+    up = sides([walker.facing for walker in group.walkers], [walker.start_angle for walker in group.walkers]) > 0
+    grows = (last > (1.0 + STEADY_DIFFERENCE) * second) & (last - second > np.maximum(second - first, _NOTHING))
+    third = len(angle) / 3.0 * run.cycles_per_sample / group.case.excitation.frequency
+    with np.errstate(divide="ignore", invalid="ignore"):
+        left = third * np.log(1.0 / np.tan(angle[-1] / 2.0)) / np.log(last / second)
+    return np.where(up & grows & np.isnan(turned_over_at(group)), np.maximum(left, 0.0), np.nan)
 
 
 def postures(group: Group) -> list[str]:

@@ -27,7 +27,7 @@ LEAST_SAMPLES = 8
 NEAR = 1.5
 """Walkers whose centres of mass come closer than this multiple of their length have met."""
 _OF_BEADS = ("position", "velocity", "spin", "mean_spin")
-_OF_FRAMES = (*_OF_BEADS, "time", "substrate", "substrate_velocity", "frames")
+_OF_FRAMES = (*_OF_BEADS, "time", "substrate", "frames")
 
 
 @dataclass(frozen=True, repr=False)
@@ -42,8 +42,8 @@ class Motion:
             Time since the start of the drive, s; negative while the beads come to rest.
         position, velocity, spin : ndarray, shape (F, N, 3)
             Position and velocity of the centres; angular velocity, rad/s.
-        substrate, substrate_velocity : ndarray, shape (F, 3)
-            Displacement and velocity of the boundary in the laboratory, for both frames of the drive, m and m/s.
+        substrate : ndarray, shape (F, 3)
+            Displacement of the boundary in the laboratory, for both frames of the drive, m.
         radius : ndarray, shape (N,)
         walkers
             The walkers with the indices of their beads, from 0.
@@ -63,7 +63,6 @@ class Motion:
     velocity: FloatArray
     spin: FloatArray
     substrate: FloatArray
-    substrate_velocity: FloatArray
     radius: FloatArray
     walkers: tuple[PlacedWalker, ...]
     frames: list[tuple[Path, int]]
@@ -339,7 +338,6 @@ def _motion(case: Case, values: FloatArray, steps: FloatArray, start: int | None
     shift, speed = prescribed_motion(case.excitation, time)
     if start:  # in the last frame at rest the walls do not move yet
         speed[time == 0.0] = 0.0
-    shaken = (shift, speed) if case.drive.frame == "lab" else boundary_motion(case.excitation, time)
 
     def vectors(name: str) -> FloatArray:
         column = layout.bead_columns.index(name)
@@ -351,8 +349,7 @@ def _motion(case: Case, values: FloatArray, steps: FloatArray, start: int | None
         position=vectors("x") - shift[:, None],
         velocity=vectors("vx") - speed[:, None],
         spin=vectors("omegax"),
-        substrate=shaken[0],
-        substrate_velocity=shaken[1],
+        substrate=boundary_motion(case.excitation, time)[0],
         radius=values[0, :, layout.bead_columns.index("radius")],
         walkers=tuple(replace(walker, beads=tuple(bead - 1 for bead in walker.beads)) for walker in layout.walkers),
         frames=[],
@@ -363,9 +360,8 @@ def _motion(case: Case, values: FloatArray, steps: FloatArray, start: int | None
 
 def prescribed_motion(drive: Excitation, time: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Displacement and velocity of the walls in the frame of the drive, m and m/s, shape (F, 3)."""
-    if drive.frame == "lab":
-        return boundary_motion(drive, time)
-    return np.zeros((len(time), 3)), np.zeros((len(time), 3))
+    displacement, velocity = boundary_motion(drive, time)
+    return (displacement, velocity) if drive.frame == "lab" else (0.0 * displacement, 0.0 * velocity)
 
 
 def boundary_motion(drive: Excitation, time: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from math import isfinite, nan
 from typing import TYPE_CHECKING, Any
 
-from walkers.postprocess.quantities import GROUPS, NUMBERS, Quantity, unit_shown
-from walkers.postprocess.quantities import declared as declared_in
+from walkers.postprocess.quantities import GROUPS, Quantity, declared, is_error, ordered, unit_shown
 from walkers.postprocess.sides import REST
 from walkers.rounding import counted, rounded, with_decimals
 
@@ -21,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a module measures of a run: tables, numbers (SI units, by the names of `NUMBERS`), reasons to doubt them.
+    """What a module measures: tables, numbers (SI units, names of `quantities.GROUPS`), reasons to doubt them.
 
     A number that is not defined is None or NaN.
     """
@@ -44,23 +42,6 @@ class Row:
 
 MAIN = ("velocity", "right_facing", "axial_velocity", "climbs", "highest", "speed")
 """Main numbers, of which a spread measures bands."""
-_BAND = {"low": "5 %", "high": "95 %"}
-_ENDS = {
-    **{name: (share, f"{share} of the draws over the ranges of uncertain values") for name, share in _BAND.items()},
-    "error": ("numerical error", "numerical error, of time step and stiffness"),
-}
-"""Ends of names of bands and of numerical errors, as in ``velocity_low``: words of their labels, meaning."""
-
-
-def _with_ends(number: Quantity) -> Iterator[Quantity]:
-    """A number, both ends of its band, and its numerical error."""
-    yield number
-    for end, (words, meaning) in _ENDS.items():
-        name, label, meant = f"{number.name}_{end}", f"{number.label}, {words}", f"{meaning}: {number.meaning}"
-        yield Quantity(name, number.unit, label, meant)
-
-
-_DECLARED = {quantity.name: quantity for number in NUMBERS.values() for quantity in _with_ends(number)}
 ASIDE = frozenset(
     {
         *("scatter", "smallest", "largest", "right_scatter", "left_scatter", "numerical_error"),
@@ -78,44 +59,16 @@ _HIDDEN = ASIDE | {
 """Numbers that rows leave out, because others count."""
 _OF_UP = "on a slope of those that started facing up"
 """Ends the meaning of a number that leaves out walkers that face down."""
+_OF_RAMP = (
+    *("velocity", "*_facing", "*_velocity", "velocity_make_*", "rotation_*", "sliding_*", "open_*"),
+    *("work", "cost_of_transport", "steady*", "orientation_end"),
+)
+"""Means over a run that rows leave out if a ramp changes the drive."""
 _IF_ANY = (
     *("events_*", "open_*", "separated_fraction", "turned_round"),
     *("leaning", "turned_over", "upright", "climbing", "descending"),
 )
 """Numbers that rows leave out if they are zero."""
-
-
-def declared(name: str) -> Quantity:
-    """The quantity of a number; ``velocity_low`` is an end of the band of ``velocity``. `KeyError` if there is none."""
-    if name in _DECLARED:
-        return _DECLARED[name]
-    number, _, end = name.rpartition("_")
-    if end in _ENDS:  # of a number of one bead
-        return next(quantity for quantity in _with_ends(declared(number)) if quantity.name == name)
-    return declared_in(name, NUMBERS.values())
-
-
-def is_error(name: str) -> bool:
-    """Whether a number is an end of the band of another, or its numerical error."""
-    return name.rpartition("_")[2] in _ENDS
-
-
-def is_declared(name: str) -> bool:
-    """Whether a name is that of a number of a result."""
-    with suppress(KeyError):
-        return bool(declared(name))
-    return False
-
-
-def scatter_of(name: str) -> str:
-    """Name of the number that is the scatter or the error of another; empty if there is none."""
-    return declared(name).error if is_declared(name) else ""
-
-
-def ordered(names: Iterable[str]) -> list[str]:
-    """Names of numbers in the order of their declarations; both ends of a band follow the number."""
-    places = {name: place for place, name in enumerate(_DECLARED)}
-    return sorted(names, key=lambda name: (places.get(re.sub(r"_\d+(?=_|$)", "_*", name), places.get(name, -1)), name))
 
 
 def headline(numbers: Mapping[str, Any]) -> str:
@@ -146,6 +99,8 @@ def state(numbers: Mapping[str, Any]) -> str:
     thresholds = {verb: numbers.get(f"{verb}_at", nan) for verb in ("stops", "starts")}
     if texts := [f"{verb} at {' '.join(shown(peak, 'm/s^2'))}" for verb, peak in thresholds.items() if isfinite(peak)]:
         return ", ".join(texts)
+    if "stops_at" in numbers:
+        return "no threshold within the ramp"
     if isfinite(numbers.get("slow_share", nan)):
         count = numbers["walkers"]
         slow, clustered = (round(count * numbers[name]) for name in ("slow_share", "clustered_share"))
@@ -166,7 +121,8 @@ def in_short(numbers: Mapping[str, Any]) -> str:
 def rows(numbers: Mapping[str, Any]) -> list[Row]:
     """The numbers of a result as text, in displayed units, in the order of their declarations.
 
-    Velocities of walkers that came apart are left out, as is the mean of two directions that differ.
+    Means that say nothing about any walker are left out: velocities of walkers that came apart, of two directions that
+    differ or under a ramp; orientations of walkers of which some turned round.
     """
     main, hidden = headline(numbers), set(_HIDDEN)
     if main == "axial_velocity" or (main == "right_facing" and numbers["goes_uphill"]):
@@ -177,13 +133,17 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
         hidden.add("velocity")
     if numbers.get("came_apart"):
         hidden |= {"velocity", "right_facing", "left_facing", "lateral_velocity", "axial_velocity", "axial_left_facing"}
+    if 0 < numbers.get("turned_round", 0) < numbers.get("walkers", 0):
+        hidden.add("orientation_end")
+    if "stops_at" in numbers:
+        hidden |= {name for name in numbers if any(fnmatchcase(name, pattern) for pattern in _OF_RAMP)}
     listed = []
-    for name in ordered(numbers):
+    for name in ordered(numbers.keys() - hidden):
         number = numbers[name]
         if isinstance(number, (bool, str)) or not isfinite(number) or is_error(name):
             continue
-        quantity = declared(name)
-        if name not in hidden and (number or not any(fnmatchcase(name, pattern) for pattern in _IF_ANY)):
+        if number or not any(fnmatchcase(name, pattern) for pattern in _IF_ANY):
+            quantity = declared(name)
             text, unit = shown(number, quantity.unit)
             listed.append(Row(name, _label(quantity, numbers), text, unit, _errors(numbers, quantity)))
     return listed
@@ -213,7 +173,7 @@ def _errors(numbers: Mapping[str, Any], quantity: Quantity) -> str:
         text = shown(scatter, quantity.unit)[0]
         word = "resolution" if quantity.error.endswith("_within") else "scatter"
         parts.append(f"{word} {'below 0.001' if text == '0' and quantity.unit == 'm/s' else text}")
-    low, high = (numbers.get(f"{quantity.name}_{end}") for end in _BAND)
+    low, high = (numbers.get(f"{quantity.name}_{end}") for end in ("low", "high"))
     if low is not None and high is not None:
         parts.append(f"band {band_text(low, high, quantity.unit)}")
     if isfinite(error := numbers.get(f"{quantity.name}_error", nan)):

@@ -60,6 +60,7 @@ def write_vtk(directory: Path, destination: Path | None = None, *, every: int | 
     motion = read_motion(directory)
     motion = gathered(motion) if motion.case.boundary.bare else motion
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
+    root.set("view", json.dumps(_view(motion.driven)))
     entries = ElementTree.SubElement(root, "Collection")
     place.parent.mkdir(parents=True, exist_ok=True)
     try:
@@ -67,8 +68,6 @@ def write_vtk(directory: Path, destination: Path | None = None, *, every: int | 
             new = Path(beside, "vtk")
             new.mkdir()
             for frame, meshes in _frames(motion, every or motion.case.run.samples_per_cycle):
-                if not len(entries):
-                    root.set("view", json.dumps(_view(motion.driven)))
                 for part, (kind, mesh) in enumerate(meshes.items()):
                     entry = {"timestep": repr(float(motion.time[frame])), "part": str(part), "name": kind}
                     entry["file"] = f"{kind}_{frame:06d}.vtu"
@@ -81,23 +80,18 @@ def write_vtk(directory: Path, destination: Path | None = None, *, every: int | 
                 path.unlink()
             new.rename(place)  # refused by the system if the folder is not empty
     except OSError as error:
-        if error.filename is None:  # a disk that is full does not say which
-            error.filename = str(destination)
+        error.filename = error.filename or str(destination)  # a disk that is full does not say which
         raise
     return destination / _COLLECTION
 
 
 def _earlier(place: Path) -> list[Path]:
     """Files of an earlier export in a folder, as its .pvd lists them; InputError if there is anything else."""
-    files: list[Path] = []
-    held = "it is a symbolic link" if place.is_symlink() else "it is a file" if place.is_file() else ""
-    if not held and place.exists():
-        collection, files = place / _COLLECTION, list(place.iterdir())
-        listed = _LISTED.findall(collection.read_text("utf-8", "replace") if collection.is_file() else "")
-        ours = {_COLLECTION, SCRIPT, *listed} if listed else set()
-        foreign = sorted({path.name for path in files} - ours)
-        held = f"it holds {foreign[0]}" if foreign else ""
-    if held:
+    collection, files = place / _COLLECTION, list(place.iterdir()) if place.is_dir() else []
+    listed = _LISTED.findall(collection.read_text("utf-8", "replace") if collection.is_file() else "")
+    foreign = sorted({path.name for path in files} - ({_COLLECTION, SCRIPT, *listed} if listed else set()))
+    held = f"it holds {foreign[0]}" if foreign else "it is a file" if place.is_file() else ""
+    if held := "it is a symbolic link" if place.is_symlink() else held:
         expected = "expected a new or empty folder, or a folder that walkers export has written"
         raise refused(place, f"{expected}; {held}")
     return files
@@ -105,13 +99,11 @@ def _earlier(place: Path) -> list[Path]:
 
 def _frames(motion: Motion, every: int) -> Iterator[tuple[int, dict[str, meshio.Mesh]]]:
     """Frames of the drive, each with its meshes ``beads``, ``boundary`` and, if there are any, ``bridges``."""
-    recorded = read_bridges(motion)
-    bridges = next(recorded, None)
+    frames = range(motion.first_driven, len(motion.time), every)
+    recorded = read_bridges(motion, frames)
+    bridges, walls = next(recorded, None), _walls(motion)
     tracks = piles.tracks_of(motion) if piles.applies(motion.case) else None
-    walls = _walls(motion)
-    for frame in range(motion.first_driven, len(motion.time), every):
-        while bridges is not None and bridges.frame < frame:
-            bridges = next(recorded, None)
+    for frame in frames:
         meshes = {"beads": _beads(motion, frame), "boundary": walls.copy()}
         meshes["boundary"].points += motion.substrate[frame]
         if bridges is not None and bridges.frame == frame:
@@ -121,6 +113,7 @@ def _frames(motion: Motion, every: int) -> Iterator[tuple[int, dict[str, meshio.
                 meshes["beads"].point_data |= {"component": component, "track": track, "is_climber": climber}
             if len(bridges):  # meshio does not read empty arrays
                 meshes["bridges"] = _bridges(motion, bridges)
+            bridges = next(recorded, None)
         yield frame, meshes
 
 

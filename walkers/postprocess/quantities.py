@@ -6,14 +6,24 @@ They are declared once, in ``quantities.toml``. Files, axes and the reference ta
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 from walkers.rounding import SHOWN_UNITS
 
 _FILE = tomllib.loads(Path(__file__).with_name("quantities.toml").read_text("utf-8"))
+_BAND = "of the draws over the ranges of uncertain values"
+ENDS = {
+    "low": ("5 %", f"5 % {_BAND}"),
+    "high": ("95 %", f"95 % {_BAND}"),
+    "error": ("numerical error", "numerical error, of time step and stiffness"),
+}
+"""Ends of names of bands and of numerical errors, as in ``velocity_low``: words of their labels, meaning."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +33,7 @@ class Quantity:
     Attributes
     ----------
     name
-        Its name; one that ends in ``_*`` has one per bead or contact: ``rotation_1``, ``rotation_2``, …
+        Its name; with a ``*`` there is one per bead or contact: ``rotation_1``, ``rotation_2``, …
     unit
         SI unit; ``share`` for a number that is shown in per cent.
     label
@@ -40,24 +50,10 @@ class Quantity:
     meaning: str
     error: str = ""
 
-    def names(self, name: str) -> bool:
-        """Whether it is the column or number of this name."""
-        return matches(self.name, name)
-
     @property
     def si_unit(self) -> str:
         """The unit of the stored number: a share has none."""
         return "" if self.unit == "share" else self.unit
-
-
-def matches(pattern: str, name: str) -> bool:
-    """Whether a name is the pattern, or has a number in place of its ``*``: ``rotation_2`` of ``rotation_*``."""
-    return name == pattern or (pattern.endswith("_*") and name.removeprefix(pattern[:-1]).isdigit())
-
-
-def unit_shown(unit: str) -> tuple[str, float]:
-    """The displayed unit of an SI unit, and how many of it one SI unit is."""
-    return SHOWN_UNITS.get(unit, (unit, 1.0))
 
 
 def _quantities(entries: Mapping[str, str | list[str]]) -> tuple[Quantity, ...]:
@@ -77,24 +73,67 @@ TABLES: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(columns) for nam
 """The columns of the tables of runs, in their order."""
 GROUPS: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(group) for name, group in _FILE["numbers"].items()}
 """The numbers of results: of each module of `walkers.postprocess.results.modules_of`, and of all."""
-NUMBERS: Mapping[str, Quantity] = {quantity.name: quantity for group in GROUPS.values() for quantity in group}
-"""The numbers of results by name."""
+_NUMBERS = [
+    quantity
+    for number in (number for group in GROUPS.values() for number in group)
+    for quantity in (
+        number,
+        *(
+            Quantity(f"{number.name}_{end}", number.unit, f"{number.label}, {words}", f"{meaning}: {number.meaning}")
+            for end, (words, meaning) in ENDS.items()
+        ),
+    )
+]
+"""The numbers of results, each with both ends of its band and its numerical error."""
 
 
-def declared(name: str, quantities: Iterable[Quantity]) -> Quantity:
-    """The quantity of a name; ``rotation_2`` is found as ``rotation_*``, and its label has the number.
+def matches(pattern: str, name: str) -> bool:
+    """Whether a name is the pattern, or has a number in place of its ``*``: ``rotation_2`` of ``rotation_*``."""
+    return bool(re.fullmatch(pattern.replace("*", r"\d+"), name))
 
-    `KeyError` if there is none.
+
+@cache
+def declared(name: str, table: str = "") -> Quantity:
+    """The quantity of a number of a result, or of a column of a table; `KeyError` if there is none.
 
     Examples
     --------
-    >>> declared("sliding_pair_2", TABLES["walkers"]).label
-    'sliding of pair 2 of beads'
+    >>> declared("sliding_pair_2", "walkers").label, declared("rotation_1_low").label
+    ('sliding of pair 2 of beads', 'rotation of bead 1, 5 %')
     """
-    quantity = next((quantity for quantity in quantities if quantity.names(name)), None)
-    if quantity is None:
-        raise KeyError(name)
-    return replace(quantity, name=name, label=quantity.label.replace("*", name.rpartition("_")[2]))
+    for quantity in TABLES[table] if table else _NUMBERS:
+        if matches(quantity.name, name):
+            number = re.search(r"_(\d+)", name) if "*" in quantity.name else None
+            return replace(quantity, name=name, label=quantity.label.replace("*", number[1] if number else "*"))
+    raise KeyError(name)
+
+
+def is_declared(name: str) -> bool:
+    """Whether a name is that of a number of a result."""
+    with suppress(KeyError):
+        return bool(declared(name))
+    return False
+
+
+def is_error(name: str) -> bool:
+    """Whether a number is an end of the band of another, or its numerical error."""
+    return name.rpartition("_")[2] in ENDS
+
+
+def scatter_of(name: str) -> str:
+    """Name of the number that is the scatter or the error of another; empty if there is none."""
+    return declared(name).error if is_declared(name) else ""
+
+
+def ordered(names: Iterable[str]) -> list[str]:
+    """Names of numbers in the order of their declarations; both ends of a band follow the number."""
+    places = {quantity.name: place for place, quantity in enumerate(_NUMBERS)}
+    return sorted(names, key=lambda name: (places.get(re.sub(r"_\d+(?=_|$)", "_*", name), places.get(name, -1)), name))
+
+
+def unit_shown(unit: str) -> tuple[str, float]:
+    """The displayed unit of an SI unit, and how many of it one SI unit is."""
+    return SHOWN_UNITS.get(unit, (unit, 1.0))
 
 
 def axis(table: str, name: str) -> tuple[str, float]:
@@ -105,6 +144,6 @@ def axis(table: str, name: str) -> tuple[str, float]:
     >>> axis("members", "height"), axis("walkers", "open_2")
     (('height (mm)', 1000.0), ('bead 2 off its wall (%)', 100.0))
     """
-    quantity = declared(name, TABLES[table])
+    quantity = declared(name, table)
     unit, factor = unit_shown(quantity.unit)
     return f"{quantity.label} ({unit})" if unit else quantity.label, factor

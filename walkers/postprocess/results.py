@@ -213,7 +213,7 @@ def text(results: Results, *, cached: bool = False) -> str:
     table = [(row.label, row.text, row.unit, row.error) for row in rows(results)]
     label, value, unit = (max((len(row[place]) for row in table), default=0) for place in range(3))
     main, rests, unmeasured = headline(results), results.about["rests_on"], []
-    if "velocity" in results and "numerical_error" not in results:
+    if "velocity" in results and not {"numerical_error", "stops_at"} & results.keys():
         unmeasured.append("numerical error (--accuracy)")
     if main and f"{main}_low" not in results and any(entry["range"] for entry in rests):
         unmeasured.append("band over the ranges of these values (--spread)")

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.errors import refused
-from walkers.postprocess.quantities import TABLES, Quantity, declared
+from walkers.postprocess.quantities import TABLES, Quantity, declared, matches
 from walkers.runner.files import beside
 
 if TYPE_CHECKING:
@@ -42,13 +42,13 @@ def write_table(directory: Path, name: str, columns: Columns) -> None:
     import pyarrow.parquet as pq
 
     quantities = TABLES[name]
-    order = [column for quantity in quantities for column in columns if quantity.names(column)]
+    order = [column for quantity in quantities for column in columns if matches(quantity.name, column)]
     missing = {quantity.name for quantity in quantities if not quantity.name.endswith("_*")} - columns.keys()
     if wrong := missing | columns.keys() - set(order):
         raise KeyError(f"columns of {name} that are missing or not declared: {', '.join(sorted(wrong))}")
     arrays = [_arrow(columns[column]) for column in order]
     fields = [
-        pa.field(column, array.type, metadata=_metadata(declared(column, quantities)))
+        pa.field(column, array.type, metadata=_metadata(declared(column, name)))
         for column, array in zip(order, arrays, strict=True)
     ]
     reals = [field.name for field in fields if pa.types.is_floating(field.type)]

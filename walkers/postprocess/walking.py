@@ -23,8 +23,10 @@ from walkers.postprocess.motion import NEAR, Group, Motion, came_near
 from walkers.postprocess.numbers import Measured
 from walkers.postprocess.sides import REST, SAME, SEPARATED, STEADY_SPEED, alike, differ, sides
 from walkers.postprocess.tables import Columns, numbered
-from walkers.rounding import percent
+from walkers.rounding import counted, percent
 
+_LONGER = 1.5
+"""Cycles of a run in which walkers turn over, over those until they have turned by 90°."""
 NAME = "walking"
 """Group of its numbers, see `walkers.postprocess.quantities.GROUPS`."""
 
@@ -69,21 +71,32 @@ def measure(motion: Motion) -> Measured:
         numbers[f"velocity_make_{number}"] = float(velocity.mean())
         numbers[f"walkers_make_{number}"] = len(of_make["velocity"])
         numbers[f"steady_make_{number}"] = int(np.sum(of_make["steady"]))
-    return Measured({**tables, "bridges": _bridges(motion)}, numbers, tuple(_doubts(numbers)))
+    doubts = (*_doubts(numbers, ramp=bool(case.drive.ramp)), *(_falls(groups) if case.goes_uphill else ()))
+    return Measured({**tables, "bridges": _bridges(motion)}, numbers, doubts)
 
 
-def _doubts(numbers: Mapping[str, Any]) -> Iterable[str]:
-    """Reasons to doubt the velocity."""
-    if (lacking := numbers["walkers"] - numbers["steady"]) and not numbers["meets"]:  # on trays walkers stop
+def _doubts(numbers: Mapping[str, Any], *, ramp: bool) -> Iterable[str]:
+    """Reasons to doubt the velocity; on trays walkers stop, and a ramp changes the drive."""
+    if (lacking := numbers["walkers"] - numbers["steady"]) and not (numbers["meets"] or ramp):
         unsteady = f"{lacking} of {numbers['walkers']} walkers {'is' if lacking == 1 else 'are'} not steady"
         yield f"{unsteady}: the velocity depends on the length of the run"
     if numbers["came_apart"]:
         share = percent(round(numbers["separated_fraction"], 2))
         yield f"walkers came apart: beads are beyond the rupture distance for {share} of the time"
-    if numbers["depends_on_start"]:
+    if numbers["depends_on_start"] and not ramp:
         yield f"steady copies differ by more than {percent(SAME)}: the velocity depends on the start"
     if numbers["walkers_met"] and not numbers["meets"]:
         yield "walkers came close to each other and are not independent: increase the spacing"
+
+
+def _falls(groups: Sequence[Group]) -> Iterable[str]:
+    """A warning if walkers that face up a slope have not turned over yet, but will."""
+    left = np.concatenate([gait.turns_over_after(group) for group in groups])
+    if count := int(np.isfinite(left).sum()):
+        run, frequency = groups[0].case.run, groups[0].case.excitation.frequency
+        cycles = float(f"{_LONGER * (run.cycles + frequency * np.nanmax(left)):.2g}")
+        turn = f"{counted(count, 'walker')} facing up {'turns' if count == 1 else 'turn'} faster and faster"
+        yield f"{turn} and will turn over after the end of the run: set run.cycles = {cycles:.0f}"
 
 
 def _stacked(parts: Sequence[Columns]) -> Columns:

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.errors import refused
-from walkers.postprocess.numbers import ASIDE, headline, is_error, scatter_of
-from walkers.postprocess.quantities import unit_shown
+from walkers.postprocess.numbers import ASIDE, headline
+from walkers.postprocess.quantities import is_error, scatter_of, unit_shown
 from walkers.postprocess.results import Results, plain, read
 from walkers.postprocess.sides import alike
 from walkers.rounding import rounded

@@ -19,8 +19,7 @@ from walkers.errors import InputError, refused
 from walkers.inputs.case import Case
 from walkers.inputs.library import unmeasured
 from walkers.postprocess.drawing import TWO_COLUMNS, errors_seen, letter_panels, new_figure, plain_text, styled
-from walkers.postprocess.numbers import declared, is_declared, scatter_of
-from walkers.postprocess.quantities import unit_shown
+from walkers.postprocess.quantities import declared, is_declared, scatter_of, unit_shown
 from walkers.postprocess.results import derived
 from walkers.runner.directory import case_of
 from walkers.sweeps.figure_options import FigureOptions

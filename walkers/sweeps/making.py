@@ -104,6 +104,8 @@ def make_runs(
             ((place, case),) = missing.items()
             with open_locked(case, engine, place, locks, anew=force) as opened:
                 opened.make(on_progress=on_progress, time_limit=time_limit)
+                if on_progress is not None:
+                    on_progress(Progress(1.0, "measuring"))
                 measure(opened.directory)
                 opened.finish()
             runs[place.name] = True

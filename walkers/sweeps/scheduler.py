@@ -56,6 +56,8 @@ LONGEST_SECONDS = 60.0
 _TRIALS = 24
 _AS_GOOD = 1.02
 _LOOK_SECONDS = 0.25
+_MEASURING = 0.995
+"""Share of the work of the engine from which on running points count as being measured."""
 _MOST_ALIKE = 3  # points that fail alone in the same way, before any point is finished
 
 
@@ -481,7 +483,7 @@ class _Loop:
             self.shares[deck] = max(self.shares.get(deck, 0.0), share)
         left = [deck.seconds * (1.0 - self.shares.get(deck, 0.0)) for deck in (*self.decks.values(), *self.halves)]
         share = max(0.0, 1.0 - sum(left) / self.seconds) if self.seconds else 1.0
-        words.append(f"{100.0 * share:.0f} % of the work")
+        words.append("measuring" if running and share >= _MEASURING else f"{100.0 * share:.0f} % of the work")
         if 0.0 < share < 1.0:
             words.append(f"{duration_text((1.0 / share - 1.0) * elapsed)} left")
         return Progress(share, ", ".join(words))

@@ -18,8 +18,8 @@ from walkers.inputs.messages import blaming
 from walkers.inputs.origins import Origin
 from walkers.inputs.sweep import Sweep, expand
 from walkers.inputs.units import parse_quantity
-from walkers.postprocess.numbers import MAIN, declared
-from walkers.postprocess.quantities import unit_shown
+from walkers.postprocess.numbers import MAIN
+from walkers.postprocess.quantities import declared, unit_shown
 from walkers.postprocess.sides import REST, SEPARATED
 from walkers.postprocess.uncertainty import LEAST_PER_VALUE, SPREAD_NAME, spread_of
 from walkers.rounding import rounded

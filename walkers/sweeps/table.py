@@ -25,8 +25,8 @@ from typing import TYPE_CHECKING, Any
 from walkers.errors import InputError, refused, suggestion
 from walkers.inputs.axes import ranges_of
 from walkers.inputs.origins import text_of
-from walkers.postprocess.numbers import declared, headline, is_declared, ordered
-from walkers.postprocess.quantities import GROUPS, unit_shown
+from walkers.postprocess.numbers import headline
+from walkers.postprocess.quantities import GROUPS, declared, is_declared, ordered, unit_shown
 from walkers.postprocess.results import Results, modules_of, read
 from walkers.rounding import counted, rounded
 from walkers.runner.directory import FAILURE_NAME, is_finished, is_locked, unfinished

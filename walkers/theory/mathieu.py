@@ -25,7 +25,6 @@ from math import log, pi, radians, sqrt, tan
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import mathieu_a, mathieu_b
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
@@ -33,10 +32,10 @@ from walkers.physics.dimer import Dimer
 from walkers.theory.motion import Walker, walk
 from walkers.theory.quasistatic import FloatArray, inertia_matrix, normal_force_matrix, rolling_matrix, translation
 
+LARGEST_STABLE_V = 0.454
+"""Largest V with stable small angles on a level substrate: the characteristic value b1(q = 2V) is zero."""
 _NEUTRAL = 1e-6
 """Growth per unit of ϑ, or multiplier minus one, that counts as zero."""
-_BANDS = 6
-"""Number of stability intervals that are examined, from the lowest."""
 _SLOWEST = 1e-4
 """m/s; a contact that slides more slowly resists sideways sliding as at this speed."""
 _STEPS = 256
@@ -56,8 +55,8 @@ class Alignment:
 
     @property
     def stable(self) -> bool:
-        """Whether small angles stay small without damping; with damping they decay."""
-        return bool(is_stable(self.u, self.v)) if self.damping == 0.0 else self.growth <= _NEUTRAL
+        """Whether small angles stay small; with damping they decay."""
+        return self.growth <= _NEUTRAL
 
     @property
     def growth(self) -> float:
@@ -70,37 +69,22 @@ class Alignment:
         return float(np.log(np.abs(_multipliers(slopes, pi / steps)).max()) / pi)
 
 
-def alignment(
-    dimer: Dimer,
-    frequency: float,
-    peak_acceleration: float,
-    steady_acceleration: float = 0.0,
-    rolling_resistance: float = 0.0,
-) -> Alignment:
-    """U, V and β of a dimer.
+def alignment(case: Case) -> Alignment:
+    """The equation of a case's dimer, damped by its bridges to the substrate.
 
-    Parameters
-    ----------
-    dimer
-        The beads, the large one first.
-    frequency, peak_acceleration
-        Of the drive, Hz and m/s².
-    steady_acceleration
-        Acceleration that pulls the beads along the axis, m/s², positive from the small bead to the large one: the
-        weight of a climber with its large bead below, which hangs as from a pivot (U > 0). A climber that leads with
-        its large bead stands on its head (U < 0), and only the drive keeps it upright.
-    rolling_resistance
-        Σ Q of the bridges to the substrate (`walkers.physics.bridge`), N m s.
+    A climber that leads with its large bead stands on its head (U < 0), and only the drive keeps it upright; with its
+    large bead below it hangs as from a pivot (U > 0).
     """
+    dimer, drive, pi_f = dimer_of(case), case.excitation, pi * case.excitation.frequency
     (first, second), masses = dimer.radii, dimer.masses
     lever = (first - second) / (2.0 * sqrt(first * second))
     moment = masses[0] * first**2 + masses[1] * second**2
-    inverse_radius = (masses[0] * first + masses[1] * second) / moment
-    per_acceleration = 5.0 / 7.0 * lever * inverse_radius / (pi * frequency) ** 2
+    per_acceleration = 5.0 / 7.0 * lever * (masses[0] * first + masses[1] * second) / moment / pi_f**2
+    rolling_resistance = float(Walker.of_case(case).resistances[2, :2].sum())
     return Alignment(
-        steady_acceleration * per_acceleration,
-        peak_acceleration * per_acceleration / 4.0,
-        5.0 / 7.0 * rolling_resistance / moment / (2.0 * pi * frequency),
+        -case.axial_gravity * per_acceleration,
+        drive.peak_acceleration * per_acceleration / 4.0,
+        5.0 / 7.0 * rolling_resistance / moment / (2.0 * pi_f),
     )
 
 
@@ -112,24 +96,6 @@ def _multipliers(slopes: FloatArray, step: float) -> npt.NDArray[np.complex128]:
     for change in expm(slopes * step):
         period = change @ period
     return np.linalg.eigvals(period).astype(np.complex128)
-
-
-def is_stable(u: npt.ArrayLike, v: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-    """Whether all solutions of the Mathieu equation are bounded; U and V of shapes that broadcast.
-
-    They are between the characteristic values a_n(q) and b_{n+1}(q) with q = 2V, a = U.
-    """
-    a, q = np.broadcast_arrays(np.asarray(u, np.float64), 2.0 * np.abs(np.asarray(v, np.float64)))
-    inside = [(mathieu_a(n, q) < a) & (a < mathieu_b(n + 1, q)) for n in range(_BANDS)]
-    stable: npt.NDArray[np.bool_] = np.any(inside, axis=0)
-    return stable
-
-
-def largest_stable_v() -> float:
-    """Largest V with stable small angles on a level substrate: 0.454."""
-    from scipy.optimize import brentq
-
-    return float(brentq(lambda q: mathieu_b(1, q), 0.5, 1.5)) / 2.0
 
 
 def time_to_turn(rate: float) -> float:

@@ -12,9 +12,10 @@ import numpy as np
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
+from walkers.postprocess.results import plain
 from walkers.rounding import with_decimals
 from walkers.text import aligned
-from walkers.theory.mathieu import Alignment, alignment, largest_stable_v, time_to_turn, turning_rate
+from walkers.theory.mathieu import LARGEST_STABLE_V, alignment, time_to_turn, turning_rate
 from walkers.theory.motion import Motion, Walker, walk
 from walkers.theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, FloatArray, detachment, mean_velocity
 
@@ -70,7 +71,7 @@ def threshold(case: Case, *, viscous: bool = True) -> float:
     check_applies(case)
     dimer, walker = dimer_of(case), Walker.of_case(case, viscous=viscous)
     if dimer.sin_delta == 0.0:
-        return float("nan")
+        return nan
     low, high = 0.0, float(detachment(dimer.sin_delta).gamma)
     for _ in range(_ROUNDS):
         trials = np.linspace(low, high, _TRIALS)
@@ -79,7 +80,7 @@ def threshold(case: Case, *, viscous: bool = True) -> float:
         motion = walk(walker, case.excitation.frequency, accelerations, steady_acceleration=pull)
         moves = np.abs(motion.velocity) > MOVING
         if not moves.any():
-            return float("nan")
+            return nan
         first = int(np.argmax(moves))
         low, high = float(trials[max(first - 1, 0)]), float(trials[first])
     return (low + high) / 2.0
@@ -100,7 +101,7 @@ def predict(case: Case) -> dict[str, Any]:
     return {
         "gamma0": gamma0,
         "sin_delta": dimer.sin_delta,
-        "paper": {"friction": FRICTION_OF_THE_PAPER, "velocity": _number(linear), "reason": reason},
+        "paper": plain({"friction": FRICTION_OF_THE_PAPER, "velocity": linear, "reason": reason}),
         "coulomb": _predicted(case, viscous=False),
         "viscous": _predicted(case, viscous=True),
         "detachment": {"gamma": float(end.gamma), "contact": CONTACTS[int(end.contact)]},
@@ -132,13 +133,14 @@ def outside_of_the_paper(case: Case) -> str | None:
 
 def _predicted(case: Case, *, viscous: bool) -> dict[str, Any]:
     motion = motion_of(case, viscous=viscous)
-    return {
-        "velocity": _number(float(motion.velocity[0])) if motion.periodic[0] else None,
+    numbers = {
+        "velocity": float(motion.velocity[0]) if motion.periodic[0] else nan,
         "rotation": motion.rotation[:, 0].tolist(),
         "sliding": motion.sliding[:, 0].tolist(),
         "reason": _why_unknown(motion, 0),
-        "threshold": _number(threshold(case, viscous=viscous)),
+        "threshold": threshold(case, viscous=viscous),
     }
+    return plain(numbers)
 
 
 def _why_unknown(motion: Motion, of: int) -> str | None:
@@ -150,17 +152,6 @@ def _why_unknown(motion: Motion, of: int) -> str | None:
     if motion.opened[of]:
         return f"{CONTACTS[int(np.argmin(motion.smallest_normal_force[:, of]))]} would open"
     return None
-
-
-def _number(value: float) -> float | None:
-    return value if np.isfinite(value) else None
-
-
-def pendulum_of(case: Case) -> Alignment:
-    """The Mathieu equation of a case's dimer, damped by its bridges."""
-    rolling = float(Walker.of_case(case).resistances[2, :2].sum())
-    drive = (case.excitation.frequency, case.excitation.peak_acceleration)
-    return alignment(dimer_of(case), *drive, -case.axial_gravity, rolling)
 
 
 def alignment_of(case: Case) -> dict[str, Any]:
@@ -175,14 +166,14 @@ def alignment_of(case: Case) -> dict[str, Any]:
         None if the axial motion is not periodic; whether the dimer ``stands``; ``turns_over_after``, s from 1° to 90°.
     """
     drive = case.excitation
-    mathieu = pendulum_of(case)
+    mathieu = alignment(case)
     rate = turning_rate(case) if drive.peak_acceleration > 0.0 else None
     return {
         "u": mathieu.u,
         "v": mathieu.v,
         "damping": mathieu.damping,
         "stable": mathieu.stable,
-        "largest_stable_v": largest_stable_v(),
+        "largest_stable_v": LARGEST_STABLE_V,
         "rolling_rate": mathieu.growth * pi * drive.frequency,
         "rate": rate,
         "stands": None if rate is None else rate <= GROWS,
