@@ -174,7 +174,7 @@ def test_a_prediction_names_the_contact_that_opens() -> None:
 def test_mathieu_parameters_of_the_papers_drives() -> None:
     """All below the 0.4 that the paper states, within the stable interval of ±0.45."""
     drives = [("fig1b", 60), ("fig1b", 80), ("fig4b", 80)]
-    cases = [load_case(name, {"drive": {"frequency": f"{f} Hz", "peak_acceleration": "10 g"}}) for name, f in drives]
+    cases = [load_case(name, {"drive.frequency": f"{f} Hz", "drive.peak_acceleration": "10 g"}) for name, f in drives]
     assert [alignment(case).v for case in cases] == pytest.approx([0.35, 0.20, 0.17], abs=0.006)
 
 

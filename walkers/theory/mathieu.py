@@ -32,7 +32,7 @@ from walkers.physics.dimer import Dimer
 from walkers.theory.motion import Walker, walk
 from walkers.theory.quasistatic import FloatArray, inertia_matrix, normal_force_matrix, rolling_matrix, translation
 
-LARGEST_STABLE_V = 0.454
+LARGEST_STABLE_V = 0.45402316686747424
 """Largest V with stable small angles on a level substrate: the characteristic value b1(q = 2V) is zero."""
 _NEUTRAL = 1e-6
 """Growth per unit of ϑ, or multiplier minus one, that counts as zero."""
