@@ -127,13 +127,13 @@ CASES: list[tuple[dict[str, Any], str]] = [
      "the radii differ too much: the beads do not touch"),
     ({"boundary": {"tilt": "-5 deg"}}, 'must be zero or more; boundary.uphill = "180 deg" turns the slope'),
     ({**cluster("fan", "0.3 mm", "0.2 mm", "0.2 mm"), "boundary": {"shape": "channel", "width": "0.7 mm"}},
-     "do not fit between the walls of the channel; expected a wider boundary"),
+     "do not fit between the walls of the channel; expected fewer, a smaller spacing or a wider boundary"),
     ({"placed": [bead("1 mm", "9 mm"), bead("0.1 mm", "30 mm"), bead("0.5 mm", "10.4 mm")]},
      "overlaps with placed[0] by 0.1 mm; expected their centres 1.5 mm apart, where they touch"),
     ({"placed": [bead("1 mm", "9 mm", "0.9 mm")]}, "expected a bead within the boundary"),
     # What is missing
     ({"dimers": None}, "dimers: missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]"),
-    ({"boundary": None}, 'boundary: missing; expected a table [boundary], such as material = "'),
+    ({"boundary": None}, 'boundary: missing; expected a table [boundary]'),
     ({"liquid": {"name": None, "kinematic_viscosity": "5 mm^2/s", "surface_tension": "20 mN/m"}},
      "liquid.density: missing; expected the liquid's density beside its kinematic_viscosity"),
     ({"dimers": {"radii": None}, "clusters": [{}], "mixture": {}, "beads": {"material": None}, "liquid": {"name": None},
@@ -156,7 +156,10 @@ CASES: list[tuple[dict[str, Any], str]] = [
 ]  # fmt: skip
 LIBRARIES: list[tuple[str, str]] = [
     ('[materials.mine]\ndensity = "2 g/cm^3"', 'density = "2 g/cm^3": expected { value = ..., source = "..." }'),
-    ('[materials.mine]\ndensity = { value = "2 g/cm^3" }', 'density.source: missing; expected such as "weighed"'),
+    (
+        '[materials.mine]\ndensity = { value = "2 g/cm^3" }',
+        'source: missing; expected a value such as "weighed"',
+    ),
     ("[material.mine]", 'library.toml: material = {"mine": {}}: unknown key; a library takes '),
     (material("glass"), "materials.glass: is in the library of"),
     (material("m", range=["3 g/cm^3", "4 g/cm^3"]), "expected two ends with the value between them"),
@@ -208,7 +211,7 @@ VESSELS: list[tuple[str | None, dict[str, Any], dict[str, Any], str]] = [
     ("", {**OF_MESH, "mesh": "bad.toml"}, {}, 'boundary.mesh = "bad.toml": cannot be read'),
     (obj(SQUARE, []), OF_MESH, {}, 'boundary.mesh = "own.obj": has 0 triangles; expected the inner surface'),
     (obj([(0.0, 0.0, 0.0)] * 8, OPEN_BOX), OF_MESH, {}, "has no triangles of any size"),
-    (obj(SQUARE, OPEN_BOX), {"mesh": "own.obj"}, {}, 'boundary.scale: missing; expected such as "1 mm"'),
+    (obj(SQUARE, OPEN_BOX), {"mesh": "own.obj"}, {}, 'boundary.scale: missing; expected a value such as "1 mm"'),
     (obj(SQUARE, OPEN_BOX), {**OF_MESH, "shape": "box"}, {}, "expected none beside boundary.mesh"),
     (obj(SQUARE, OPEN_BOX), {**OF_MESH, "height": "3 mm"}, {}, 'boundary.height = "3 mm": expected none of a vessel'),
     (obj(SQUARE, SIDES), OF_MESH, {}, "has 2 openings, the lowest at (-2, -2, 0) mm; expected one, at its top"),

@@ -390,5 +390,5 @@ def test_walkers_in_a_vessel_walk_as_on_a_plane(tmp_path: Path) -> None:
     vessel = Case.read({**plane.document, "boundary": of}, name="vessel")
     speeds = [walkers.run(case, tmp_path).result["velocity"] for case in (plane, vessel)]
     assert speeds[1] == pytest.approx(speeds[0], rel=1e-6)
-    with pytest.raises(InputError, match="do not fit between the walls of the vessel; expected at most"):
+    with pytest.raises(InputError, match="do not fit between the walls of the vessel; expected fewer"):
         vessel.changed({"dimers.replicates": 30, "dimers.meet": True})

@@ -107,7 +107,7 @@ def _default(field: FieldInfo) -> str:
 
 def _row(name: str, field: FieldInfo, *, supplied: bool) -> tuple[str, str, str, str]:
     """Key, meaning, what it expects with an example, default."""
-    example = example_of(field)
+    example = example_of(field).removeprefix("a value ")
     expected = _expected(Annotated[field.annotation, *field.metadata, "at least one annotation"])
     expected += f"; {example}" if example.startswith("such as") and example not in expected else ""
     return f"`{name}`", str(field.description), expected, "from the library" if supplied else _default(field)

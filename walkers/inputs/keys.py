@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from typing import Any
@@ -54,18 +54,6 @@ def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool] = lambda _:
             raise unusable(twice.pop(), "is given twice; expected one value")
         flat |= below
     return flat
-
-
-def dotted(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
-    """Values of nested tables by dotted keys, entries of lists of tables one by one."""
-    if isinstance(value, Mapping):
-        for name, below in value.items():
-            yield from dotted(below, f"{key}.{name}" if key else name)
-    elif isinstance(value, list) and value and isinstance(value[0], Mapping):
-        for number, entry in enumerate(value):
-            yield from dotted(entry, f"{key}[{number}]")
-    else:
-        yield key, value
 
 
 def settings_of(words: Iterable[str]) -> dict[str, Value]:

@@ -9,7 +9,6 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
-from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from walkers.errors import InputError, Problem, shown, suggestion, unusable
@@ -93,7 +92,7 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
     parts: tuple[str | int, ...] = location[:-1] if of_list else location
     key, field = joined(parts), keys_of(file).get(_place(parts, keys_of(file)))
     example = example_of(field) if field else "a value"
-    such = f", {example}" if example.startswith("such as") else ""
+    such = f", {example.removeprefix('a value ')}" if example.startswith("a value such as") else ""
     if kind == "extra_forbidden":
         message = _unknown_key([str(part) for part in location if isinstance(part, str)], file, whole)
     elif of_list or kind in ("too_long", "too_short"):
@@ -104,7 +103,7 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
         bound = bound or f"{int(location[-1]) + 1}"
         message = f"has {number} value{'s' * (number != 1)}; expected {bound}{such}"
     elif kind == "missing":
-        message = f"missing; expected {_in_a_table(parts, field) or example}"
+        message = f"missing; expected {f'a table [{key}]' if field and table_in(field.annotation) else example}"
         if len(parts) > 1 and (entry := _GIVEN_ELSEWHERE.get(str(parts[0]))):
             message += f", or {entry} of the library"
     else:
@@ -120,16 +119,6 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
         if field and AUTO in field.metadata and kind != "value_error":
             message += ', or "auto"'
     return Problem(key, quoted(document, parts_of(key)), message)
-
-
-def _in_a_table(parts: Sequence[str | int], field: FieldInfo | None) -> str:
-    """How a table begins; empty for other keys."""
-    table = table_in(field.annotation) if field else None
-    if table is None:
-        return ""
-    texts = {name: example_of(entry).partition("such as ")[2] for name, entry in keys_in(table).items()}
-    such = next((f", such as {name} = {text}" for name, text in texts.items() if text), "")
-    return f"a table [{joined(parts)}]{such}"
 
 
 def _place(location: Sequence[str | int], keys: Collection[str]) -> str:

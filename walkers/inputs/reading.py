@@ -105,24 +105,22 @@ def find_input(name: str | Path, kind: str) -> Path:
     Raises `InputError` if there is neither, or if it is known to be of another kind: with the command that takes it.
     """
     check_utf8(name)
-    path, of_kind = Path(name), shipped(kind)
-    with suppress(OSError):
-        if not path.exists() and str(name) not in of_kind and Path(f"{name}.toml").is_file():
-            path = Path(f"{name}.toml")
-    actual = None if str(name) in of_kind else _kind_of(path)
-    if actual not in (None, kind):
-        raise refused(name, f"is {_COMMANDS[str(actual)].format(name)}")
+    text, path, of_kind = str(name), Path(name), shipped(kind)
     try:
-        if path.is_file() or (path.exists() and str(name) not in of_kind):
+        if text in of_kind and not path.is_file():
+            return of_kind[text]
+        if not path.exists() and Path(f"{name}.toml").is_file():
+            path = Path(f"{name}.toml")
+        if (actual := _kind_of(path)) not in (None, kind):
+            raise refused(name, f"is {_COMMANDS[str(actual)].format(name)}")
+        if path.exists():
             if path.stem in (".", ".."):  # of "...toml"
                 raise refused(name, "expected a name before .toml")
             return path
     except OSError as error:
-        raise refused(shortened(str(name)), f"cannot be read: {error.strerror}") from error
-    if str(name) in of_kind:
-        return of_kind[str(name)]
+        raise refused(shortened(text), f"cannot be read: {error.strerror}") from error
     missing = "no such file, run or sweep" if kind == "case" else "no such file"
-    raise refused(name, f"{missing}, nor a shipped {kind} ({', '.join(of_kind)}){suggestion(str(name), of_kind)}")
+    raise refused(name, f"{missing}, nor a shipped {kind} ({', '.join(of_kind)}){suggestion(text, of_kind)}")
 
 
 def _kind_of(path: Path) -> str | None:

@@ -160,10 +160,7 @@ def limits_of(case: Case) -> TimeStepLimits:
 
 
 def with_run(case: Case) -> Case:
-    """The case with the time step, the length and the sampling of its run.
-
-    Raises `InputError` if they contradict each other, or the time step is beyond its limits.
-    """
+    """The case with the time step, the length and the sampling of its run."""
     table, frequency, loose, limits = case.run, case.excitation.frequency, case.loose, limits_of(case)
     samples, cycles_per_sample, samples_per_bridge_sample = _sampling(case)
     largest, reason = limits.recommended(loose=loose) if table.time_step is None else (table.time_step, "given")
@@ -181,12 +178,7 @@ def with_run(case: Case) -> Case:
     if settling is None:
         settling = settling_of(cycles) if case.walkers else 0
     rest = table.longest_settling if table.longest_settling is not None else _LONGEST_SETTLING * loose
-    _check_length(case, cycles, settling, cycles_per_sample)
-    _check_drive(case, cycles, time_step)
     most = MOST_STEPS // steps - (ceil((rest + 1.0) * frequency) if rest else 0)
-    if cycles > most:
-        name, longest = ("cycles", f"{most}") if table.duration is None else ("duration", f"{most // frequency:g} s")
-        raise unusable(f"run.{name}", f"expected at most {longest}: the engine counts steps up to 2^31")
     segment = table.segment if table.segment is not None else _SEGMENT_SECONDS if loose else inf
     # Segments end with a sample, so that each begins where the last one ended.
     samples_of_segment = max(1, round(min(segment * frequency, cycles) / cycles_per_sample))
@@ -203,6 +195,7 @@ def with_run(case: Case) -> Case:
         settled_below=(table.settled_below or _SETTLED_BELOW) if rest else None,
         longest_settling=rest or None,
     )
+    _check_length(case, run, most)
     return case.but(run=run, sources={**case.sources, **_sources(run, case, reason)})
 
 
@@ -233,30 +226,28 @@ def _sources(run: Run, case: Case, reason: str) -> dict[str, Source]:
     return sources
 
 
-def _check_drive(case: Case, cycles: int, time_step: float) -> None:
-    """Refuse a run shorter than its ramp or longer than its record, and rows of a record closer than the time step."""
-    drive, name = case.excitation, "run.cycles" if case.run.duration is None else "run.duration"
-    if drive.record and (apart := drive.record.length / (len(drive.record.rows) - 1)) < time_step:
-        rows = f"its rows, {1e6 * apart:.3g} us apart, are closer than the time step, {1e6 * time_step:.3g} us"
+def _check_length(case: Case, run: Run, longest: float) -> None:
+    """Refuse a run that is too short or too long for what is measured, for its drive, or for the engine (cycles)."""
+    drive, cycles, settling, every = case.excitation, run.cycles, run.settling_cycles, run.cycles_per_sample
+    (fewest, most), name = drive.cycles, "run.cycles" if run.duration is None else "run.duration"
+    if cycles < 2:
+        raise unusable(name, f"expected at least two cycles of the drive, {2.0 / drive.frequency:.4g} s")
+    if cycles - settling < 2:
+        raise unusable("run.settling_cycles", f"expected at most cycles - 2 = {cycles - 2}")
+    if case.walkers and cycles // every <= run.settled_strobes:
+        message = f"expected more: one frame in {every} cycles leaves none after {settling} settling cycles"
+        raise unusable("run.frames_per_second", message)
+    if drive.record and (apart := drive.record.length / (len(drive.record.rows) - 1)) < run.time_step:
+        rows = f"its rows, {1e6 * apart:.3g} us apart, are closer than the time step, {1e6 * run.time_step:.3g} us"
         raise unusable("drive.record", f"{rows}; expected fewer rows, or a shorter run.time_step", drive.record.file)
-    fewest, most = drive.cycles
     if cycles < fewest:
         raise unusable(name, f"expected at least {ceil(fewest)} cycles, {drive.ramp[-1][0]:g} s, of drive.ramp")
     if cycles > most + 1e-9:
         message = "drive.record has no more; drive.repeats = true repeats one that ends as it begins"
         raise unusable(name, f"expected at most {int(most)} cycles: {message}")
-
-
-def _check_length(case: Case, cycles: int, settling: int, cycles_per_sample: int) -> None:
-    """At least two cycles are measured, and one frame of walkers."""
-    if cycles < 2:
-        name = "run.duration" if case.run.duration is not None else "run.cycles"
-        raise unusable(name, f"expected at least two cycles of the drive, {2.0 / case.excitation.frequency:.4g} s")
-    if cycles - settling < 2:
-        raise unusable("run.settling_cycles", f"expected at most cycles - 2 = {cycles - 2}")
-    if case.walkers and cycles // cycles_per_sample <= -(-settling // cycles_per_sample):
-        message = f"expected more: one frame in {cycles_per_sample} cycles leaves none after {settling} settling cycles"
-        raise unusable("run.frames_per_second", message)
+    if cycles > longest:
+        limit = f"{longest}" if run.duration is None else f"{longest // drive.frequency:g} s"
+        raise unusable(name, f"expected at most {limit}: the engine counts steps up to 2^31")
 
 
 def _sampling(case: Case) -> tuple[int, int, int]:
@@ -277,10 +268,7 @@ def _sampling(case: Case) -> tuple[int, int, int]:
 
 
 def _until_steady(case: Case, cycles_per_sample: int) -> bool:
-    """Whether a run may end when its velocities are constant; not if the case gives its length or segments.
-
-    Raises `InputError` if a case asks for both.
-    """
+    """Whether a run may end when its velocities are constant; not if the case gives its length or segments."""
     table = case.run
     until = ["cycles"] if "cycles" in table.model_fields_set and table.cycles is None else []
     until += ["most_cycles"] if table.most_cycles is not None else []

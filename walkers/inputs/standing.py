@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
-from itertools import islice
 from math import atan2, cos, dist, inf, pi, sin
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -43,15 +42,14 @@ class Standing(NamedTuple):
 
 
 def standing(case: Case) -> Iterator[tuple[int, Standing]]:
-    """Walkers and groups of loose beads at the start, each with the number of its body; walkers come first.
-
-    Raises `ValueError` if the beads of a walker cannot stand so.
-    """
-    first = 0
+    """Walkers and groups of loose beads at the start, each with the number of its body; walkers come first."""
+    first, keys = 0, [*case.walkers_by_key]
     for number, body in enumerate(case.bodies):
         if isinstance(body, Walkers):
-            for walker in _walkers(case, body, first):
-                yield number, walker
+            try:
+                yield from ((number, walker) for walker in _walkers(case, body, first))
+            except ValueError as error:  # in a groove
+                raise unusable(f"{keys[number]}.radii", str(error)) from error
             first += body.replicates
         else:
             yield number, _poured(case, body)
@@ -174,66 +172,39 @@ class _Held(NamedTuple):
 
 def _check_places(case: Case) -> None:
     """Walkers and beads that are placed: between the walls, and not within each other."""
-    placed = (_Held(f"placed[{number}]", bead.at, bead.radius) for number, bead in enumerate(case.placed))
-    beads = [*_standing_walkers(case), *placed]
+    keys = [key for key, walkers in case.walkers_by_key.items() for _ in range(walkers.replicates)]
+    grid = case.boundary.grid(len(keys), max(walkers.spacing for walkers in case.walkers)) if keys else []
+    beads: list[_Held] = []
+    for number, (key, (x, y), walkers) in enumerate(zip(keys, grid, standing(case), strict=False)):
+        held = walkers[1].beads
+        beads += [_Held(key, (x + bead.x, y + bead.y, bead.z), bead.radius, number) for bead in held]
+    beads += [_Held(f"placed[{number}]", bead.at, bead.radius) for number, bead in enumerate(case.placed)]
     _check_walls(case, beads)
     if case.placed or case.meets:
         _check_overlaps(beads)
 
 
-def _standing_walkers(case: Case, most: int | None = None) -> list[_Held]:
-    """The beads of all walkers, or of the first ones alone."""
-    keys = [key for key, walkers in case.walkers_by_key.items() for _ in range(walkers.replicates)][:most]
-    walkers: list[Standing] = []
-    try:
-        walkers.extend(walker for _, walker in islice(standing(case), len(keys)))
-    except ValueError as error:
-        raise unusable(f"{keys[len(walkers)]}.radii", str(error)) from error
-    grid = case.boundary.grid(len(keys), max(walkers.spacing for walkers in case.walkers)) if keys else []
-    return [
-        _Held(key, (x + bead.x, y + bead.y, bead.z), bead.radius, number)
-        for number, (key, (x, y), walker) in enumerate(zip(keys, grid, walkers, strict=True))
-        for bead in walker.beads
-    ]
-
-
 def _check_walls(case: Case, beads: list[_Held]) -> None:
+    import numpy as np
+
     boundary, top = case.boundary, case.boundary.height or inf
     largest = max((max(walkers.radii) for walkers in case.walkers), default=0.0)
     if boundary.width is not None and boundary.width < 2.0 * (1.0 - OVERLAP) * largest:
         raise unusable("boundary.width", f"expected more than a bead's diameter, {2e3 * largest:.4g} mm")
-    for bead, out in zip(beads, _outside(case, beads), strict=True):
-        too_high = bead.place[2] + bead.radius > top
+    places = np.array([bead.place for bead in beads])
+    clearances = boundary.side_clearance(places)
+    if boundary.triangles and case.walkers:  # they stand on its floor
+        clearances = np.where(np.isfinite(boundary.walls[0].distances(places)), clearances, -1.0)
+    for bead, clear in zip(beads, clearances, strict=True):
+        out, too_high = clear < (1.0 - OVERLAP) * bead.radius, bead.place[2] + bead.radius > top
         if bead.walker >= 0 and out:
-            most = _most_walkers(case)
-            message = f"the walkers do not fit between the walls of the {boundary.shape}; expected {most}"
-            raise unusable(f"{bead.key}.replicates", message)
+            message = f"the walkers do not fit between the walls of the {boundary.shape}; expected fewer"
+            raise unusable(f"{bead.key}.replicates", f"{message}, a smaller spacing or a wider boundary")
         if bead.walker >= 0 and too_high:
             least = f"{1e3 * (bead.place[2] + bead.radius):.4g} mm"
             raise unusable("boundary.height", f"too low for the walkers of {bead.key}; expected at least {least}")
         if bead.walker < 0 and (out or too_high or bead.place[2] < (1.0 - OVERLAP) * bead.radius):
             raise unusable(f"{bead.key}.at", "expected a bead within the boundary")
-
-
-def _outside(case: Case, beads: list[_Held]) -> list[bool]:
-    """Whether each bead is within a side wall."""
-    import numpy as np
-
-    places, boundary = np.array([bead.place for bead in beads]), case.boundary
-    clearances = boundary.side_clearance(places)
-    if boundary.triangles and case.walkers:  # they stand on its floor
-        clearances = np.where(np.isfinite(boundary.walls[0].distances(places)), clearances, -1.0)
-    return [clear < (1.0 - OVERLAP) * bead.radius for bead, clear in zip(beads, clearances, strict=True)]
-
-
-def _most_walkers(case: Case) -> str:
-    """How many walkers would fit, of a case with some outside."""
-    spacing = max(walkers.spacing for walkers in case.walkers)
-    few, many = 0, sum(walkers.replicates for walkers in case.walkers)
-    while many - few > 1:
-        number = (few + many) // 2
-        few, many = (few, number) if any(_outside(case, _standing_walkers(case, number))) else (number, many)
-    return f"at most {few} at a spacing of {1e3 * spacing:.4g} mm" if few else "a wider boundary"
 
 
 def _check_overlaps(beads: list[_Held]) -> None:

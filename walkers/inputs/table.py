@@ -16,9 +16,9 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError, PydanticUndefined
 
-from walkers.errors import Problem, unusable
+from walkers.errors import Problem, shown, unusable
 from walkers.inputs.keys import joined, parts_of
-from walkers.inputs.units import WRITTEN, is_auto, kind_in, shown_in_file
+from walkers.inputs.units import WRITTEN, is_auto, kind_in
 
 T = TypeVar("T")
 SAME_RUN = "same run"
@@ -195,13 +195,6 @@ def keys_of(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
     return keys
 
 
-@cache
-def _tables_in(model: type[Table]) -> Mapping[str, type[Table]]:
-    """The keys of a table that hold tables, alone or in a list."""
-    tables = {name: table_in(field.annotation) for name, field in keys_in(model).items()}
-    return {name: table for name, table in tables.items() if table is not None}
-
-
 def table_in(annotation: Any) -> type[Table] | None:
     """The table that a field holds, alone, in a tuple or by names."""
     if isinstance(annotation, type) and issubclass(annotation, Table):
@@ -210,12 +203,12 @@ def table_in(annotation: Any) -> type[Table] | None:
 
 
 def example_of(field: FieldInfo) -> str:
-    """An example of a value of a key: ``such as "80 Hz"``; its type if the field has none."""
+    """An example of a value of a key: ``a value such as "80 Hz"``; its type if the field has none."""
     if field.examples:
-        return f"such as {shown_in_file(field.examples[0])}"
+        return f"a value such as {shown(field.examples[0])}"
     kind = kind_in([*field.metadata, field.annotation])
     if kind:
-        return f'such as "{kind.example}"'
+        return f'a value such as "{kind.example}"'
     return _TYPES.get(get_origin(field.annotation) or field.annotation, "a value")
 
 
@@ -224,7 +217,9 @@ def contradictions(model: type[Table], document: Any, place: str = "") -> Iterat
     if not isinstance(document, Mapping):
         return
     yield from model.problems({name: value for name, value in document.items() if value != []}, place)
-    for name, inner in _tables_in(model).items():
+    for name, field in keys_in(model).items():
+        if (inner := table_in(field.annotation)) is None:
+            continue
         below, where = document.get(name), within(place, name)
         for number, entry in enumerate(below if isinstance(below, list) else [below]):
             yield from contradictions(inner, entry, f"{where}[{number}]" if isinstance(below, list) else where)

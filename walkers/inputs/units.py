@@ -6,7 +6,6 @@ Radians are not pure numbers, so that "500 rad/s" is not read as 500 Hz.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -168,15 +167,6 @@ def kind_in(annotations: Iterable[Any]) -> Kind | None:
         if (kind := annotation if isinstance(annotation, Kind) else kind_in(get_args(annotation))) is not None:
             return kind
     return None
-
-
-def shown_in_file(value: Any) -> str:
-    """A value as a TOML file has it: text in quotes, tables in braces."""
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{name} = {shown_in_file(entry)}" for name, entry in value.items()) + " }"
-    if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(shown_in_file, value))}]"
-    return json.dumps(value, ensure_ascii=False)
 
 
 POSITIVE, NOT_NEGATIVE = "more than zero", "zero or more"

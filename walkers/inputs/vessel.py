@@ -77,10 +77,12 @@ class Facet(NamedTuple):
         return np.asarray(away / np.linalg.norm(away, axis=-1, keepdims=True))
 
 
-@lru_cache(maxsize=64)
-def _read(path: Path, _changed: int) -> dict[str, Any]:
+def read_mesh(path: Path) -> dict[str, Any]:
+    """Points (in the file's unit) and triangles of a mesh file; raises `ValueError` if it has none."""
     import meshio
 
+    if not path.is_file():
+        raise ValueError("no such file; expected a mesh, a path from the case file")
     try:
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             mesh = meshio.read(path)
@@ -97,18 +99,10 @@ def _read(path: Path, _changed: int) -> dict[str, Any]:
         exact = [[float(f"{x:.{digits}g}") for x in point] for point in given.tolist()]
     except (Exception, SystemExit) as error:  # meshio ends the process where a file is not of its format
         raise ValueError("cannot be read: expected a mesh that meshio reads (STL, OBJ, PLY, …)") from error
-    return {"points": exact, "triangles": triangles.tolist()}
-
-
-def read_mesh(path: Path) -> dict[str, Any]:
-    """Points (in the file's unit) and triangles of a mesh file; raises `ValueError` if it has none."""
-    if not path.is_file():
-        raise ValueError("no such file; expected a mesh, a path from the case file")
-    mesh = _read(path, path.stat().st_mtime_ns)
-    if not 3 < len(mesh["triangles"]) <= MOST_TRIANGLES:
+    if not 3 < len(triangles) <= MOST_TRIANGLES:
         expected = f"expected the inner surface of a vessel, 4 to {MOST_TRIANGLES}"
-        raise ValueError(f"has {len(mesh['triangles'])} triangles; {expected}")
-    return mesh
+        raise ValueError(f"has {len(triangles)} triangles; {expected}")
+    return {"points": exact, "triangles": triangles.tolist()}
 
 
 def _broken(problem: str, point: FloatArray, expected: str) -> InputError:
@@ -235,7 +229,7 @@ class Vessel:
         """
         at_rim = np.isin(self.triangles, [point for rim in self.rims for point in rim]).any(axis=1)
         flared = (np.abs(self.normals[at_rim, 2]) > _UPRIGHT).any()
-        if flared or min(self.turns) < SHARP or self.parts.any():
+        if flared or min(self.turns) < SHARP:
             return []
         normals = [self.normals[face] for face in self._in_order()]
         points = [self.points[self.triangles[face, 0]] for face in self._in_order()]

@@ -54,25 +54,13 @@ class Roughness(Protocol):
 
 @dataclass(frozen=True)
 class Surfaces:
-    """Two surfaces with a bridge between them.
+    """Two surfaces with a bridge between them."""
 
-    Attributes
-    ----------
-    radius, other_radius
-        Radius of the bead, or of the smaller one of two beads; radius of the other bead, infinite for a plane; m.
-    volume
-        Volume of the bridge, m³.
-    liquid
-        Liquid of the bridge.
-    roughness
-        Gap that remains for the liquid between surfaces that touch at their asperities, m.
-    """
-
-    radius: float
-    other_radius: float
-    volume: float
+    radius: float  # of the bead, or of the smaller one of two beads, m
+    other_radius: float  # of the other bead, infinite for a plane, m
+    volume: float  # of the bridge, m³
     liquid: BridgeLiquid
-    roughness: float
+    roughness: float  # gap that remains for the liquid between surfaces that touch at their asperities, m
 
     @classmethod
     def of(cls, radius: float, other_radius: float, liquid: BridgeLiquid, roughness: Roughness) -> Surfaces:
@@ -111,17 +99,13 @@ class Surfaces:
 
 @dataclass(frozen=True)
 class Forces:
-    """Pull and resistances of the module at given gaps, each of shape (n,).
+    """Pull and resistances of the module at given gaps, each of shape (n,)."""
 
-    ``pull`` is P in N; ``normal`` and ``sliding`` are N and S in N s/m; ``coupling`` is C in N s; ``rolling`` is Q in
-    N m s.
-    """
-
-    pull: FloatArray
-    normal: FloatArray
-    sliding: FloatArray
-    coupling: FloatArray
-    rolling: FloatArray
+    pull: FloatArray  # P, N
+    normal: FloatArray  # N, N s/m
+    sliding: FloatArray  # S, N s/m
+    coupling: FloatArray  # C, N s
+    rolling: FloatArray  # Q, N m s
 
     def columns(self) -> FloatArray:
         """Shape (N, 5), in the order of the attributes."""
@@ -130,25 +114,13 @@ class Forces:
 
 @dataclass(frozen=True)
 class Curve:
-    """The law for two given surfaces; raises `UnusableLawError` if its gaps are none.
+    """The law for two given surfaces; raises `UnusableLawError` if its gaps are none."""
 
-    Attributes
-    ----------
-    forces
-        Function that gives the `Forces` at gaps from 0 to ``rupture``, in m.
-    rupture, formation
-        Gap at which the bridge breaks, and gap below which it forms (0: the surfaces must touch), m.
-    scale
-        Gap over which the forces vary near contact, m. A kink may be there. 0 stands for `Surfaces.roughness`.
-    pull
-        Function that gives the pull alone, N, for laws whose resistances are expensive to compute.
-    """
-
-    forces: Callable[[FloatArray], Forces]
-    rupture: float
-    formation: float = 0.0
-    scale: float = 0.0
-    pull: Callable[[FloatArray], FloatArray] | None = None
+    forces: Callable[[FloatArray], Forces]  # at gaps from 0 to ``rupture``, m
+    rupture: float  # gap at which the bridge breaks, m
+    formation: float = 0.0  # gap below which it forms, m; 0: the surfaces must touch
+    scale: float = 0.0  # gap over which forces vary near contact, where a kink may be, m; 0: `Surfaces.roughness`
+    pull: Callable[[FloatArray], FloatArray] | None = None  # alone, N, if resistances are expensive to compute
 
     def __post_init__(self) -> None:
         """Refuse gaps that are no numbers, or not in their order."""
