@@ -335,8 +335,7 @@ COMMANDS: list[tuple[str, str]] = [
     ("render {sweep}", "is a sweep: expected one of its runs"),
     ("plot {archive}", "an archive: unpack it"),
     ("list {run}", "is a run: walkers run "),
-    ("compare {sweep} {run}", "is a sweep; expected another sweep"),
-    ("compare {sweep} {other}", "vary the same keys"),
+    ("compare {sweep} {run}", "is a sweep's directory: walkers list"),
     ("climb {sweep}", "expected a finished run of a pile"),
     ("check files .", "expected a run directory"),
     # What is not there, cannot be read or makes no sense

@@ -14,15 +14,12 @@ import pytest
 
 import walkers
 from tests.conftest import TINY, call, document, finished_places, to_toml
-from walkers.inputs.sweep import expand
 from walkers.postprocess.uncertainty import ACCURACY_NAME
 from walkers.runner.directory import case_of, locked
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.sweeps.comparison import Side, compare_runs
-from walkers.sweeps.readable import chosen, flattened, readable
-from walkers.sweeps.scheduler import Options, run_sweep
-from walkers.sweeps.table import load
+from walkers.sweeps.readable import readable
 
 OTHER, FASTER = {"liquid.name": "Si AK10"}, {"drive.frequency": "90 Hz"}
 
@@ -75,14 +72,13 @@ def test_list_has_all_runs_and_sweeps_with_their_results(out: Path) -> None:
     assert [again[row["name"]]["numbers"] for row in rows] == [row["numbers"] for row in rows]
 
 
-def test_list_selects_by_values_and_has_a_column_for_each_that_differs(out: Path) -> None:
-    runs = _listed(
-        "--where", "drive.frequency=0.08 kHz", "--where", "friction.bead_wall=0.1", "--where", "radii=0.3 mm, 0.2 mm"
-    )
+def test_list_has_a_column_for_each_value_that_differs(out: Path) -> None:
+    runs = [row for row in _listed() if row["kind"] == "run"]
     assert {row["varies"]["drive.peak_acceleration"] for row in runs} == {19.6, 39.2, 58.8}
-    head, *lines = call("list", "--where", "friction.bead_wall=0.2", check=True).stdout.splitlines()
-    assert head.split() == ["base", "(6)", "status", "result", "age", "size", "frequency", "peak_acceleration"]
-    assert all("mm/s" in line and " Hz " in line for line in lines[:6])
+    lines = call("list", "--all", check=True).stdout.splitlines()
+    (head,) = (line.split() for line in lines if line.startswith("base ("))
+    assert head[2:6] == ["status", "result", "age", "size"]
+    assert {"frequency", "peak_acceleration", "bead_wall"} <= {*head}
     # Runs of sweeps are hidden, but not a run with a spread.
     run = Path(walkers.load(out / "grid").table()["run"][0]).name
     assert run not in call("list", check=True).stdout
@@ -176,20 +172,6 @@ def test_compare_tells_parameters_and_results_of_two_runs(out: Path) -> None:
         assert found["second"] == "base.toml drive.frequency=90Hz" == found["not_run"][0]
 
 
-def test_compare_matches_the_points_of_two_sweeps(out: Path) -> None:
-    """Whatever their order; one sweep has points that the other has not."""
-    keys = ["drive.frequency", "drive.peak_acceleration"]
-    tables = [walkers.load(out / name).table().set_index(keys) for name in ("grid", "rough")]
-    found = json.loads(call("compare", "grid", "rough", "--json", check=True).stdout)
-    assert found["parameters"] == {"contact.friction.bead_wall": [0.1, 0.2]}
-    assert found["unmatched"] == [2, 0]
-    assert len(found["points"]) == 4
-    for one in found["points"]:
-        at = tuple(one["point"][key] for key in keys)
-        assert (one["first"], one["second"]) == tuple(table.loc[at, "velocity"] for table in tables)
-    assert "4 points in both" in call("compare", "grid", "rough", check=True).stdout
-
-
 def _changed(run: Path, to: Path, name: str, speed: float, error: float) -> Side:
     """A copy of a run whose result has another velocity and numerical error (m/s), as if measured so."""
     shutil.copytree(run, to / name)
@@ -217,46 +199,8 @@ def test_compared_runs_differ_by_so_many_times_both_their_numerical_errors(
     assert re.search(r"\nvelocity \(mm/s\) +1\.05 +1 +-0\.05 ", found.text)
 
 
-def test_compared_sweeps_differ_most_at_the_largest_change_of_either_sign(tmp_path: Path) -> None:
-    """With more friction the walker is faster under a weak drive, and slower by more under a strong one."""
-    tables = {"case": "base.toml", "axes": {"drive.peak_acceleration": ["3 g", "6 g"]}}
-    sides: list[str] = []
-    for friction in (0.05, 0.2):
-        contact = {"friction": {"bead_bead": 0.1, "bead_wall": friction}}
-        (tmp_path / "base.toml").write_text(to_toml(document(run=TINY, contact=contact)))
-        sweep = expand(tables, source="t", name=f"rough-{friction}", folder=tmp_path)
-        sides.append(str(run_sweep(sweep, tmp_path / "runs", Options(1))[0].directory))
-    found = json.loads(call("compare", *sides, "--json", check=True).stdout)
-    away = [one["difference"] for one in found["points"]]
-    speeds = [load(Path(side))["velocity"] for side in sides]
-    assert away == pytest.approx(list(speeds[1] - speeds[0]))
-    assert away[0] > 1e-4
-    assert away[1] < -1.05 * away[0]
-    told = call("compare", *sides, check=True).stdout
-    assert f"2 points in both; largest difference {1e3 * away[1]:.4g} mm/s" in told
-
-
-def test_sweeps_over_lists_of_different_lengths_are_compared_either_way(in_folder: Path) -> None:
-    """Clusters of three beads and of two: the longer list has a column that the other sweep has not."""
-    tables = document(run=TINY)
-    del tables["dimers"]
-    radii = ["0.3 mm", "0.2 mm"]
-    (in_folder / "base.toml").write_text(
-        to_toml({**tables, "clusters": [{"radii": radii, "arrangement": "chain", "replicates": 1}]})
-    )
-    for name, levels in (("long", [[*radii, "0.2 mm"], radii]), ("short", [radii, ["0.3 mm", "0.25 mm"]])):
-        Path(f"{name}.toml").write_text(f'case = "base.toml"\naxes."clusters[0].radii" = {json.dumps(levels)}\n')
-        call("sweep", f"{name}.toml", check=True)
-    for names in (["long", "short"], ["short", "long"]):
-        found = json.loads(call("compare", *names, "--json", check=True).stdout)
-        assert [len(one["point"]["clusters[0].radii"]) for one in found["points"]] == [2]
-        assert found["points"][0]["difference"] == 0.0
-
-
-def test_values_of_all_kinds_are_shown_as_they_can_be_written() -> None:
+def test_values_are_shown_as_a_case_file_has_them() -> None:
     """Keys with the same last part too: of friction and of roughness."""
-    for key, value in flattened(walkers.load_case("fig1b")).items():
-        assert chosen([{key: value}], f"{key}={readable(key, value)}") == [True], key
     values = {"boundary.opening": 1.0, "liquid.temperature": 293.15, "contact.friction.bead_wall": 0.2}
     texts = [readable(key, value) for key, value in {**values, "drive.ramp": [[0.0, 1.0], [1.2, 0.5]]}.items()]
     assert texts == ["57.2958 deg", "20 degC", "0.2", "(0 s, 1), (1.2 s, 0.5)"]

@@ -281,12 +281,13 @@ def test_a_function_gives_what_its_command_prints(looked_through: Path) -> None:
     out = ["--out", str(looked_through)]
     printed = json.loads(call("show", "fig1b", "--theory", "--json", *out, check=True).stdout)
     assert json.loads(json.dumps(walkers.predict("fig1b", looked_through))) == printed
-    printed = json.loads(call("compare", "grid", "rough", "--json", *out, check=True).stdout)
-    assert json.loads(json.dumps(walkers.compare("grid", "rough", looked_through).contents)) == printed
-    with pytest.raises(InputError, match=r"^changes: is for runs and cases$"):
-        walkers.compare("grid", "rough", looked_through, {"run.seed": 2})
-    refused = call("compare", "grid", "rough", "--set", "run.seed=2", *out).stderr
-    assert refused == "walkers: --set: is for runs and cases\n"
+    runs = [Path(run).name for run in walkers.load("grid", looked_through).table()["run"][:2]]
+    printed = json.loads(call("compare", *runs, "--json", *out, check=True).stdout)
+    assert json.loads(json.dumps(walkers.compare(*runs, looked_through).contents)) == printed
+    with pytest.raises(InputError, match=r"grid: is a sweep.s directory: walkers list"):
+        walkers.compare("grid", "rough", looked_through)
+    refused = call("list", "grid", "--all", *out).stderr
+    assert refused == "walkers: --all: is for folders, not for a sweep\n"
 
 
 def test_the_package_claims_one_name_and_exports_few_that_are_documented() -> None:

@@ -16,7 +16,7 @@ from math import isclose
 from mimetypes import guess_type
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from walkers import DEFAULT_OUT, RECORDS
 from walkers.errors import InputError, Problem, WalkersError, check_utf8, expected_of, refused
@@ -59,7 +59,7 @@ NOT_A_RUN = {
     "folder": "not a finished run: expected a folder with a manifest.json",
     "deck": "is a deck that was run by hand; first do: walkers run {}",
     "calibration": "a calibration's outcome: its report is calibration.md",
-    "sweep": "is a sweep: expected one of its runs; walkers list, plot, report and compare take sweeps",
+    "sweep": "is a sweep: expected one of its runs; walkers list, plot and report take sweeps",
     "archive": "an archive: unpack it and give a run or a sweep in it",
 }
 
@@ -67,42 +67,32 @@ NOT_A_RUN = {
 # --- names ------------------------------------------------------------------------------------------------------------
 
 
-class Meaning(NamedTuple):
-    """Kind of a name (of `RECORDS`, ``archive``, ``deck``, ``folder``, ``case``), and its path.
+def find(reference: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> tuple[str, Path]:
+    """Kind (of `RECORDS`, ``archive``, ``deck``, ``folder``, ``case``) and path of what a name means; see `load`.
 
-    The path of an unfinished run is its final directory.
-    """
-
-    kind: str
-    path: Path
-
-
-def find(reference: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Meaning:
-    """The meaning of a path, a name in a folder of runs, or the name of a case; with changes it is a case; see `load`.
-
-    Only names are read. A folder does not hide a shipped case of the same name. The file of a sweep means the sweep if
-    it was run.
+    Only names are read. With changes it is a case. A folder does not hide a shipped case of the same name. The file of
+    a sweep means the sweep if it was run. The path of an unfinished run is its final directory.
     """
     if isinstance(reference, (str, Path)) and not changes:
         with suppress(OSError):  # a name that no file system accepts
             return next(_meanings(Path(reference), Path(out)))
-    return Meaning("case", Path(out))
+    return "case", Path(out)
 
 
-def _meanings(path: Path, out: Path) -> Iterator[Meaning]:
+def _meanings(path: Path, out: Path) -> Iterator[tuple[str, Path]]:
     is_shipped = str(path) in shipped("case")
     for place in (path, out / path):
-        yield from (Meaning(kind, place) for kind, file in RECORDS.items() if (place / file).is_file())
+        yield from ((kind, place) for kind, file in RECORDS.items() if (place / file).is_file())
         bare = place.parent / place.name.removesuffix(on_disk.UNFINISHED)
         if on_disk.is_run_name(bare.name) and _is_begun(bare):
-            yield Meaning("run", bare)
+            yield "run", bare
         if on_disk.is_deck_folder(place) and not is_shipped:
-            yield Meaning("deck", place)
+            yield "deck", place
     if (out / path.stem / RECORDS["sweep"]).is_file() and is_sweep_file(path):
-        yield Meaning("sweep", out / path.stem)
+        yield "sweep", out / path.stem
     if path.suffix == ".zip" and path.is_file():
-        yield Meaning("archive", path)
-    yield Meaning("folder" if path.is_dir() and not is_shipped else "case", path)
+        yield "archive", path
+    yield "folder" if path.is_dir() and not is_shipped else "case", path
 
 
 def _is_begun(place: Path) -> bool:
@@ -179,8 +169,8 @@ def load(reference: Named, out: str | Path = DEFAULT_OUT, changes: Changes = Non
 
 def directory_of(reference: str | Path, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Path:
     """The directory that a user names, whatever it contains; for a case, the directory of its run."""
-    meaning = find(reference, out, changes)
-    return load(reference, out, changes).directory if meaning.kind == "case" else meaning.path
+    kind, path = find(reference, out, changes)
+    return load(reference, out, changes).directory if kind == "case" else path
 
 
 # --- runs -------------------------------------------------------------------------------------------------------------
@@ -384,16 +374,9 @@ class Run:
             return run_spread(case, self.directory.parent, options, points=points, on_progress=advance, **how)
 
     def accuracy(self, share: float = 0.01, *, progress: bool | None = None, **how: Any) -> Accuracy:
-        """Measure the numerical errors of a run of walkers, which are part of its result from then on.
+        """Measure the numerical errors, which are part of the result from then on.
 
-        Parameters
-        ----------
-        share
-            Share of a velocity that the last increase of Young's modulus may change.
-        progress
-            Show the progress; None: only in notebooks.
-        how
-            ``engine`` and ``allow_failed_audit``, see `run`.
+        The last increase of Young's modulus changes velocities by less than a ``share``. Other arguments: see `run`.
 
         Examples
         --------
@@ -410,13 +393,8 @@ class Run:
     def export(self, form: Export, to: str | Path | None = None, **options: Any) -> Path:
         """Write the run for other programs; the functions of `EXPORTS` take the options, such as ``every``.
 
-        Parameters
-        ----------
-        form
-            ``vtk``, ``lammps``, ``archive`` or ``deck``.
-        to
-            The file, or the folder for ``vtk`` and ``deck``. None: in the run directory, for ``archive`` and ``deck``
-            in the current folder.
+        ``to`` is a file, or the folder for ``vtk`` and ``deck``. None: in the run directory, for ``archive`` and ``deck``
+        in the current folder.
 
         Examples
         --------
@@ -735,9 +713,9 @@ def sweep(
     with progress_of(points.name, progress) as advance:
         record, failures = run_sweep(points, folder, options, on_progress=advance, **how)
     failed = {failure.point for failure in failures}
-    for number, case in enumerate(points.cases()) if spread else ():
-        if number not in failed:
-            with progress_of(f"{points.name}, spread of point {number}", progress) as advance:
+    for number, case in enumerate(points.cases(), 1) if spread else ():
+        if number - 1 not in failed:
+            with progress_of(f"{points.name}, spread {number} of {len(points.rows)}", progress) as advance:
                 failures += run_spread(case, folder, options, points=spread, on_progress=advance, **how).failures
     return Sweep(record.directory, tuple(failures))
 
@@ -750,44 +728,31 @@ def compare(
     second: str | Path | None = None,
     out: str | Path = DEFAULT_OUT,
     changes: Mapping[str, Any] | None = None,
-    y: str | None = None,
 ) -> Comparison:
-    """Compare two runs or cases in parameters and results, or two sweeps point by point.
+    """Compare two runs or cases in parameters and results.
 
     Parameters
     ----------
     first, second
-        Runs, cases or sweeps, named as for `load`; ``second`` None: the first.
+        Runs or cases, named as for `load`; ``second`` None: the first.
     out
         Folder of the run directories.
     changes
         Other values of the second case, by dotted keys.
-    y
-        Column of two sweeps; None: ``velocity``, or ``climbs`` for piles.
     """
     from walkers.errors import apply_all
-    from walkers.sweeps.comparison import Side, compare_runs, compare_sweeps
+    from walkers.sweeps.comparison import Side, compare_runs
 
     if second is None and not changes:
-        raise refused(first, "expected a second run or sweep, or changed values (--set KEY=VALUE)")
-    names = (first, first if second is None else second)
-    sweeps = {name: path for name in names for kind, path in [find(name, out)] if kind == "sweep"}
-    if len(sweeps) == len(set(names)):
-        if changes:
-            raise refused("changes", "is for runs and cases")
-        return compare_sweeps(sweeps[names[0]], sweeps[names[1]], y)
-    for name in sweeps:
-        raise refused(name, "is a sweep; expected another sweep to compare with")
-    if y is not None:
-        raise refused("y", "is for sweeps")
+        raise refused(first, "expected a second run, or changed values (--set KEY=VALUE)")
 
-    def side(number: int) -> Side:
-        name, settings = names[number], (changes or {}) if number else {}
-        case, directory = case_and_run(name, out, settings)
-        label = directory.name if directory and not settings and find(name, out).kind == "run" else str(name)
-        return Side(" ".join([label, *(f"{key}={value}" for key, value in settings.items())]), case, directory)
+    def side(name: str | Path, changes: Changes) -> Side:
+        case, directory = case_and_run(name, out, changes)
+        label = directory.name if directory and not changes and find(name, out)[0] == "run" else str(name)
+        return Side(" ".join([label, *(f"{key}={value}" for key, value in (changes or {}).items())]), case, directory)
 
-    return compare_runs(*apply_all(side, range(2)))
+    named = ((first, None), (first if second is None else second, changes))
+    return compare_runs(*apply_all(lambda of: side(*of), named))
 
 
 def climb(

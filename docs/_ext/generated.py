@@ -27,7 +27,7 @@ from walkers.inputs.library import LibraryNumber
 from walkers.inputs.resolving import SUPPLIED
 from walkers.inputs.table import Table, example_of, keys_in, table_in
 from walkers.inputs.units import ACCELERATION, AUTO, TEMPERATURE, Kind, kind_in, quantity_text
-from walkers.main import program
+from walkers.main import print_help, program
 from walkers.postprocess.quantities import GROUPS, TABLES, Quantity
 from walkers.sweeps.table import STATE
 
@@ -227,7 +227,7 @@ def _commands() -> str:
     for words in [whole for name in names for whole in ([name] if not name else [name, *_parts(app, *name)])]:
         head, page = " ".join(["walkers", *words]), io.StringIO()
         with redirect_stdout(page):
-            app.meta([*words, "--help"])
+            app.meta([*words, "--help"]) if words else print_help()
         text += f"\n## {head}\n" * bool(words) + f"\n```text\n$ {head} --help\n{page.getvalue()}```\n"
     return text
 

@@ -66,6 +66,10 @@ class Parameter(Table):
         middle, scale = np.log(self.normal[0]) if self.log else self.normal[0], self.normal[1]
         return truncnorm((low - middle) / scale, (high - middle) / scale, middle, scale)
 
+    def written(self, value: float) -> Value:
+        """A value as a case file has it."""
+        return f"{value:.6g} {self.unit}" if self.unit else float(f"{value:.6g}")
+
     def values(self, unit: FloatArray) -> FloatArray:
         """The values below which these shares of the prior lie."""
         scaled = np.asarray(self._prior.ppf(unit))
@@ -101,10 +105,7 @@ class CalibrationFile(Table):
 
 @dataclass(frozen=True)
 class Calibration:
-    """A calibration file with its name, what messages call it, and its folder.
-
-    ``experiments`` has, for each, values of all keys that any experiment changes.
-    """
+    """A calibration file with its name, what messages call it, its folder, and all keys of its experiments."""
 
     name: str
     source: str
@@ -120,28 +121,18 @@ class Calibration:
     @cached_property
     def sets(self) -> FloatArray:
         """The named sets as points of the unit cube, shape (S, D)."""
-        parameters = self.file.parameters.items()
-        rows = [
-            [parameter.unit_of(given[label]) for label, parameter in parameters] for given in self.file.sets.values()
-        ]
+        parameters, sets = self.file.parameters, self.file.sets.values()
+        rows = [[parameter.unit_of(given[label]) for label, parameter in parameters.items()] for given in sets]
         return np.reshape(np.array(rows, np.float64), (-1, len(parameters)))
 
     @property
     def costly(self) -> set[str]:
         """Experiments that only costly observations need."""
-        needed = {
-            label
-            for observation in self.file.observations
-            if not observation.costly
-            for label in (*observation.of, *observation.over)
-        }
-        return set(self.experiments) - needed
+        cheap = [observation for observation in self.file.observations if not observation.costly]
+        return set(self.experiments) - {label for fact in cheap for label in (*fact.of, *fact.over)}
 
     def sweep(self, name: str, values: FloatArray | None = None, experiments: Collection[str] = ()) -> Sweep:
-        """The sweep of experiments (default: all), for every parameter set (N, D) or with the case's own values.
-
-        `InputError` if a key of the file is no key of a case, or its case has no dimers.
-        """
+        """The sweep of experiments (default: all), for every parameter set (N, D) or with the case's own values."""
         points = [
             {**self.experiments[label], **self._changes(label, row)}
             for row in ([None] if values is None else values)
@@ -165,16 +156,12 @@ class Calibration:
         changes: dict[str, Value] = {}
         for parameter, value in zip(self.file.parameters.values(), [] if row is None else row, strict=False):
             if label in (parameter.experiments or [label]):
-                given = f"{value:.6g} {parameter.unit}" if parameter.unit else float(f"{value:.6g}")
-                changes |= dict.fromkeys(parameter.keys, given)
+                changes |= dict.fromkeys(parameter.keys, parameter.written(value))
         return changes
 
 
 def load_calibration(calibration: str | Path) -> Calibration:
-    """Read a calibration file, or a shipped calibration such as ``ruby``.
-
-    Raises `InputError` if there is no such file or anything in it cannot be used.
-    """
+    """Read a calibration file, or a shipped calibration such as ``ruby``; `InputError` if it cannot be used."""
     path = find_input(calibration, "calibration")
     return read_calibration(read_toml(path), source=str(calibration), name=path.stem, folder=path.parent)
 

@@ -11,24 +11,30 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.calibration.calibrate import PROPOSED, Outcome
+from walkers.calibration.file import Calibration
+from walkers.calibration.observations import FloatArray
+from walkers.inputs.axes import is_axis
+from walkers.inputs.keys import flatten
 from walkers.inputs.toml import toml_bytes
 from walkers.postprocess.drawing import TWO_COLUMNS, new_figure, save_figure, styled
 from walkers.runner.files import write_bytes, write_json, write_text
 from walkers.text import aligned, rendered
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 RECORD_NAME = "calibration.json"
 BEST_NAME = "best.toml"
 _ENDS = (0.05, 0.5, 0.95)
+_DIGITS = 4
+"""Of numbers in the best case: more than the facts determine."""
 
 
 def write_outcome(outcome: Outcome, to: Path) -> list[Path]:
-    """Write posterior, record, table, best case and figure (``posterior.parquet`` …); return their paths.
+    """Write posterior (samples of equal weight, columns in the units of the parameters), record, table, case, figure.
 
-    Rows of the first are samples of equal weight, columns are the parameters in their units. The case ``best.toml`` is
-    that of the first experiment at the highest posterior.
+    The case ``best.toml`` is that of the first experiment at the highest posterior.
     """
     import pandas as pd
 
@@ -38,10 +44,29 @@ def write_outcome(outcome: Outcome, to: Path) -> list[Path]:
     files = [to / file for file in ("posterior.parquet", RECORD_NAME, "calibration.md", BEST_NAME)]
     write_bytes(files[0], samples.to_parquet(index=False))
     write_json(files[1], record)
-    write_bytes(files[3], toml_bytes(calibration.case(calibration.values(outcome.sets[PROPOSED[0]][None])[0])))
+    write_bytes(files[3], toml_bytes(best_case(calibration, outcome.sets[PROPOSED[0]], samples)))
     write_text(files[2], rendered("walkers.calibration", "report.md.j2", found=record))
     sources = [f"{calibration.name}-{part}" for part in ("named", "round", "proposed")]
     return files + save_figure(draw_facts(outcome), to / "predictions.png", sources, title=record["title"])
+
+
+def best_case(calibration: Calibration, best: FloatArray, samples: pd.DataFrame) -> dict[str, Any]:
+    """Tables of the case of the first experiment at a point (D,), each value uncertain within 5 to 95 % of samples."""
+    parameters, first = calibration.file.parameters, next(iter(calibration.experiments))
+    values = dict(zip(parameters, map(_short, calibration.values(best[None])[0]), strict=True))
+    tables = calibration.case(np.array([*values.values()]))
+    ranges = flatten(tables.get("uncertain", {}), is_axis)
+    for name, parameter in parameters.items():
+        low, high = map(_short, samples[name].quantile(_ENDS[::2]))
+        ends = [min(low, values[name]), max(high, values[name])]
+        if ends[0] < ends[1] and first in (parameter.experiments or [first]):
+            written = [parameter.written(end) for end in ends]
+            ranges |= dict.fromkeys(parameter.keys, {"loguniform": written} if parameter.log else written)
+    return {**tables, "uncertain": ranges}
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.{_DIGITS}g}")
 
 
 def record_of(outcome: Outcome) -> dict[str, Any]:
@@ -74,7 +99,8 @@ def record_of(outcome: Outcome) -> dict[str, Any]:
 def summary(record: Mapping[str, Any]) -> str:
     """The facts that agree at each set, and the interval of each parameter, from `record_of`."""
     agree = [
-        [name, f"{count} of {record['of']} {record['observed']} facts agree"] for name, count in record["agree"].items()
+        [name, f"{count} of {record['of']} {record['observed']} facts agree within their deviation"]
+        for name, count in record["agree"].items()
     ]
     intervals = [
         [record["labels"].get(name, name), "{1:.3g} ({0:.3g} to {2:.3g})".format(*ends)]

@@ -11,8 +11,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from cyclopts import Group
-
 GROUPS = {"run": "Run", "look": "Look at results", "keep": "Keep and share", "check": "Check and calibrate"}
 """The modules, with their headings in the help."""
 SECTIONS = {
@@ -20,8 +18,6 @@ SECTIONS = {
     "paper": "Compare with the published results: figures and numbers.",
 }
 """Commands with commands of their own, in the module ``check``."""
-OPTIONS = Group("Options")
-"""Heading of the options in the help."""
 _FUNCTION = re.compile(r'\n\ndef ([a-z]\w*)\(.*?"""(.+?)\n', re.DOTALL)
 """A public function without a decorator, and the first line of its docstring."""
 

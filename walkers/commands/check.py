@@ -12,7 +12,6 @@ from cyclopts.validators import Number
 
 import walkers
 from walkers import DEFAULT_OUT
-from walkers.commands import OPTIONS
 from walkers.commands.options import (
     At,
     By,
@@ -32,8 +31,8 @@ from walkers.errors import refused
 if TYPE_CHECKING:
     from walkers.check.lines import Line
 
-check = App(name="check", version_flags=(), group_parameters=OPTIONS)
-paper = App(name="paper", version_flags=(), group_parameters=OPTIONS)
+check = App(name="check", version_flags=())
+paper = App(name="paper", version_flags=())
 
 
 @check.command

@@ -117,7 +117,7 @@ def clean(
 
     plan = plan_cleaning(out, apply_all(place_of, runs))
     print(plan.as_text())
-    if plan.remove.empty and not plan.locks:
+    if not (plan.remove or plan.locks):
         return 0
     if not yes:
         refuse("--yes", not sys.stdin.isatty(), "expected, because there is no terminal to ask for confirmation")

@@ -20,7 +20,6 @@ def list_(
     *,
     out: Out = DEFAULT_OUT,
     every: Annotated[bool, Parameter("--all")] = False,
-    where: Annotated[list[str] | None, Parameter(metavar="KEY=VALUE")] = None,
     to: Path | None = None,
     as_json: Json = False,
 ) -> None:
@@ -32,27 +31,19 @@ def list_(
         A sweep (name or folder): print the status of its points and its table.
     every
         Include the runs of sweeps.
-    where
-        Only runs with this value, such as "drive.frequency=80 Hz". Repeatable.
     to
         Write the table of the sweep, with units, to this file (.csv, .parquet, .json).
     """
     from walkers.sweeps import folder
 
     if sweep is not None:
-        refuse_any({"where": where, "all": every}, "is for folders, not for a sweep")
+        refuse("--all", every, "is for folders, not for a sweep")
         _list_points(sweep, out, to, as_json)
         return
     refuse("--to", to is not None, "expected a sweep, whose table is written")
     contents = folder.inventory(out)
-    shown = folder.select(contents, where or ())
-    if not (every or where):
-        shown = contents[~folder.members(contents)]
-    print_as(
-        as_json,
-        lambda: folder.as_json(shown),
-        lambda: folder.as_text(shown, 0 if where else len(contents) - len(shown)),
-    )
+    shown = contents if every else folder.without_members(contents)
+    print_as(as_json, lambda: folder.as_json(shown), lambda: folder.as_text(shown, len(contents) - len(shown)))
 
 
 def _list_points(name: str, out: Path, to: Path | None, as_json: bool) -> None:
@@ -140,24 +131,21 @@ def report(name: RunOrSweep, /, *, at: At = At(), to: Path | None = None) -> Non
 
 
 def compare(
-    first: RunOrSweep,
-    second: Annotated[str | None, Parameter(name="RUN|SWEEP")] = None,
+    first: Run,
+    second: Annotated[str | None, Parameter(name="RUN")] = None,
     /,
     *,
     at: At = At(),
-    y: str | None = None,
     as_json: Json = False,
 ) -> None:
-    """Compare two runs or cases in parameters and results, or two sweeps point by point; --set changes the second case.
+    """Compare two runs or cases in parameters and results; --set changes the second case.
 
     Parameters
     ----------
     second
-        Another run or sweep, named in the same way; default: the first with the values of --set.
-    y
-        Sweeps: column of the table; default: velocity, or climbs for piles.
+        Another run or case, named in the same way; default: the first with the values of --set.
     """
-    comparison = walkers.compare(first, second, at.out, at.values, y)
+    comparison = walkers.compare(first, second, at.out, at.values)
     print_as(as_json, lambda: comparison.contents, lambda: comparison.text)
 
 

@@ -9,7 +9,6 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from walkers.errors import check_limits, refused
-from walkers.inputs.units import DURATION, parse_quantity
 
 _NUMBER = re.compile(r"[\d.]+(e[-+]?\d+)?", re.IGNORECASE)
 _SIZES = {"360p": (640, 360), "480p": (854, 480), "720p": (1280, 720), "1080p": (1920, 1080)}
@@ -27,6 +26,8 @@ def parse_size(text: str) -> tuple[int, int]:
 
 def parse_time(option: str, text: str) -> float:
     """Read the physical time of an option, such as ``0.1 s`` or a number, in s; otherwise `InputError`."""
+    from walkers.inputs.units import DURATION, parse_quantity
+
     try:
         return parse_quantity(f"{text} s" if _NUMBER.fullmatch(text) else text, DURATION)
     except ValueError as error:

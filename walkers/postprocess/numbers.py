@@ -113,9 +113,13 @@ def in_short(numbers: Mapping[str, Any]) -> str:
     main = headline(numbers)
     if main in ("", "climbs"):
         return counted(numbers[main], "climb") if main else "-"
-    facing = f" facing {'up' if numbers['goes_uphill'] else 'right'}"
-    directions = {"axial_velocity": " up the slope", "right_facing": facing}
-    return state(numbers) or f"{shown(numbers[main], 'm/s')[0]} mm/s{directions.get(main, '')}"
+    if text := state(numbers):
+        return text
+    text = f"{shown(numbers[main], 'm/s')[0]} mm/s"
+    if main == "right_facing":
+        right, left = ("up", "down") if numbers["goes_uphill"] else ("right", "left")
+        return f"{text} facing {right}, {shown(numbers['left_facing'], 'm/s')[0]} facing {left}"
+    return f"{text} up the slope" if main == "axial_velocity" else text
 
 
 def rows(numbers: Mapping[str, Any]) -> list[Row]:

@@ -1,7 +1,7 @@
 """Decks that are run by hand: write the folder of a deck, and make a run directory of it after the run.
 
 The folder becomes the run directory and its only segment. ``deck.json`` contains the original case and deck. The engine
-prints the parameters that it reads: a deck with edited parameters gives the case with other values of these keys.
+prints the parameters that it reads: those that were edited are other values of keys of the case, other edits are named.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 
 from walkers.errors import refused
 from walkers.inputs.case import Case
-from walkers.inputs.run import CONSTANT
+from walkers.inputs.run import CONSTANT, settling_of
 from walkers.inputs.table import changed
 from walkers.physics.laws import source_of
 from walkers.postprocess.dump import DumpError
@@ -27,24 +27,23 @@ from walkers.runner import directory as on_disk
 from walkers.runner.binary import find_engine, plugin_of, write_run_script
 from walkers.runner.failures import EngineFailure, MissingFrames
 from walkers.runner.files import read_json, write_json
-from walkers.runner.launch import EngineReport, judge
+from walkers.runner.launch import judge
 from walkers.runner.manifest import MANIFEST_NAME, read_manifest, write_manifest
-from walkers.sweeps.readable import kind_of
+from walkers.sweeps.readable import flattened, kind_of
 from walkers.templates import deck as decks
-from walkers.templates.deck import Deck, Segment
+from walkers.templates.deck import Segment
 from walkers.templates.parameters import PRINTED, suffixes
 
 _LOGS = (decks.OUTPUT_NAME, "log.liggghts")
 """Output of the engine by `write_run_script`, and the default log of LIGGGHTS."""
 _PRINTED = re.compile(rf"^{PRINTED} (.+)$", re.MULTILINE)
-_LINE = re.compile(r"^variable +(\w+) string (\S+)", re.MULTILINE)
+_LINE = re.compile(r"^variable +(\w+) string ")
 _SAME = 1e-9
-_SINE = {"frequency": "Hz", "peak_acceleration": "m/s^2", "phase": "rad"}
+_OF_SINES = ("frequency", "peak_acceleration", "phase")
 _KEYS: Mapping[str, str] = {
     "gravity": "environment.gravity",
     "density": "beads.density",
     "viscosity": "liquid.dynamic_viscosity",
-    "time_step": "run.time_step",
     **{f"friction_{pair}": f"contact.friction.{pair}" for pair in ("bead_bead", "bead_wall")},
     **{name: f"contact.{name}" for name in ("youngs_modulus", "poissons_ratio", "restitution", "rolling_friction")},
 }
@@ -98,29 +97,15 @@ def take_in(folder: Path) -> None:
 
     `InputError` if the deck was not run, is still running, or failed; or its files cannot be read.
     """
-    logs = [folder / name for name in _LOGS if (folder / name).is_file()]
-    try:
-        ages = {path: path.stat().st_mtime_ns for path in [folder / decks.DECK_NAME, *logs, folder / MANIFEST_NAME]}
-        if max(ages.values()) == ages[folder / MANIFEST_NAME]:
-            return
-    except OSError:  # it is no run directory yet
-        pass
+    deck, logs = folder / decks.DECK_NAME, [folder / name for name in _LOGS if (folder / name).is_file()]
     if not logs:
         expected = f"expected a log of the engine, {' or '.join(_LOGS)}"
         raise refused(folder, f"the deck was not run ({expected}); do: cd {folder} && sh {decks.RUN_NAME}")
-    log = max(logs, key=lambda path: path.stat().st_mtime_ns)
+    log, manifest = max(logs, key=_age), folder / MANIFEST_NAME
+    if manifest.is_file() and _age(manifest) >= max(_age(deck), _age(log)):
+        return
     try:
-        record, deck = read_json(folder / on_disk.DECK_RECORD_NAME), folder / decks.DECK_NAME
-        case, written = on_disk.with_recorded_law(Case.from_dict(record["case"]), folder), str(record["deck"])
-        edited_text = deck.read_text(encoding="utf-8", errors="surrogateescape")
-        log_text = log.read_text(encoding="utf-8", errors="replace")
-        ran, segment, changes = _as_run(case, written, edited_text, log_text, f"{folder}: the edited deck")
-        notes = ["run by hand", *([f"the deck was edited: {'; '.join(changes)}"] if changes else [])]
-        if deck.stat().st_mtime_ns > log.stat().st_mtime_ns:
-            notes.append(f"{decks.DECK_NAME} is newer than {log.name}: if it was edited since, run it again")
-        rendered = decks.render_deck(ran, segment)
-        report = judge(rendered, folder, log)
-        _write(folder, ran, rendered, segment, replace(report, wall_seconds=report.loop_seconds), notes, case)
+        _measure(folder, deck, log)
     except MissingFrames as failure:
         why = "the engine that was started by hand still runs or was stopped, or its dump was cut later"
         raise refused(folder, f"{why}: {failure}") from failure
@@ -130,84 +115,105 @@ def take_in(folder: Path) -> None:
         raise refused(folder, f"the deck that was run by hand cannot be read ({error})") from error
 
 
-def _as_run(case: Case, written: str, edited_text: str, log_text: str, source: str) -> tuple[Case, Segment, list[str]]:
-    """The case that the engine ran, its segment, and the edits, from the deck as written and now, and the log."""
-    case = case.for_cycles(case.run.attempts[0])
-    before, after = dict(_LINE.findall(written)), dict(_LINE.findall(edited_text))
-    words = (_PRINTED.findall(log_text) or [""])[-1].split()
+def _age(path: Path) -> int:
+    return path.stat().st_mtime_ns
+
+
+def _measure(folder: Path, deck: Path, log: Path) -> None:
+    """Write the files of a run directory: case, layout, segment, tables, result, last the manifest."""
+    from walkers.postprocess.gait import are_constant
+
+    record = read_json(folder / on_disk.DECK_RECORD_NAME)
+    before = on_disk.with_recorded_law(Case.from_dict(record["case"]), folder)
+    words = (_PRINTED.findall(log.read_text(encoding="utf-8", errors="replace")) or [""])[-1].split()
     values = {name: float(value) for name, value in zip(words[::2], words[1::2], strict=True)}
-    # The engine prints a number as its line has it. A formula gives another number if a parameter in it was edited.
-    follow = {f"amplitude{end}": sine.amplitude for end, sine in _by_suffix(case)}
-    follow |= {"peak_velocity": case.excitation.peak_velocity, "time_step": case.run.time_step}
-    was = {name: float(text) if text[0] != "$" else follow[name] for name, text in before.items() if name in values}
-    edited = {
-        name: values[name]
-        for name, number in was.items()
-        if (after.get(name) != before[name] if before[name][0] == "$" else values[name] != number)
+    case, edits = _ran(before.for_cycles(before.run.attempts[0]), values, f"{folder}: the edited deck")
+    edits += _other_edits(record["deck"], deck.read_text(encoding="utf-8", errors="surrogateescape"), values)
+    rest = int(values.get("rest_steps", 0))
+    segment = Segment(0, rest + case.run.steps, rest)
+    rendered = decks.render_deck(case, segment)
+    report = judge(rendered, folder, log)
+    report = replace(report, wall_seconds=report.loop_seconds)
+    notes = ["run by hand", *([f"the deck was edited: {'; '.join(edits)}"] if edits else [])]
+    if _age(deck) > _age(log):
+        notes.append(f"{deck.name} is newer than {log.name}: if it was edited since, run it again")
+    (folder / MANIFEST_NAME).unlink(missing_ok=True)
+    write_json(folder / on_disk.CASE_NAME, case.as_dict(), at_once=False)
+    write_json(folder / decks.LAYOUT_NAME, rendered.layout.as_dict(), at_once=False)
+    on_disk.write_segment_record(folder, segment, report, by_hand=notes)
+    planned = before.run
+    # Cycles that were enough for the finished run of a case may be too few for an edited deck.
+    doubtful = case.run.cycles < planned.cycles if planned.until_steady else case.apart and case != before
+    if doubtful and not are_constant(folder):
+        reached = f"the velocities are not constant within {percent(CONSTANT)} after {case.run.cycles} cycles"
+        further = f"walkers run continues to {planned.cycles}: set cycles to {planned.cycles} and run the deck again"
+        notes.append(f"{reached}; {further if planned.until_steady else 'set cycles to more and run the deck again'}")
+        on_disk.write_segment_record(folder, segment, report, by_hand=notes)
+    measure(folder)
+    about: dict[str, Any] = {"drive_from": rest, "segments": 1, "by_hand": notes}
+    write_manifest(case, folder.name, None, report, started=time.time(), directory=folder, **about)
+
+
+def _parameters(case: Case, values: Mapping[str, float]) -> tuple[dict[str, str], dict[str, float]]:
+    """Keys of a case by the parameters of its deck, and the numbers that these have unless they are edited."""
+    flat, sines, run = flattened(case), case.excitation.harmonics, case.run
+    keys, was = dict(_KEYS), {name: float(flat.get(key, 0.0)) for name, key in _KEYS.items()}
+    was |= {"viscosity": case.liquid.of_bridges.viscosity, "rest_steps": decks.whole(case).drive_from or 0}
+    was |= {"steps_per_cycle": run.steps_per_cycle, "cycles": run.cycles, "cycle_frequency": case.excitation.frequency}
+    for place, (end, sine) in enumerate(zip(suffixes(len(sines)), sines, strict=True)):
+        table = "drive" if len(sines) == 1 else f"drive.harmonics[{place}]"
+        keys |= {f"{name}{end}": f"{table}.{name}" for name in _OF_SINES}
+        was |= {f"{name}{end}": getattr(sine, name) for name in _OF_SINES}
+        # What follows from parameters follows from their new values.
+        frequency, peak = (values.get(f"{name}{end}", getattr(sine, name)) for name in _OF_SINES[:2])
+        turning = 2.0 * pi * frequency
+        was |= {f"amplitude{end}": peak / turning**2, f"peak_velocity{end}": peak / turning}
+    now = {**was, **values}
+    was["time_step"] = 1.0 / (now["frequency" if len(sines) == 1 else "cycle_frequency"] * now["steps_per_cycle"])
+    return keys, was
+
+
+def _ran(case: Case, values: Mapping[str, float], source: str) -> tuple[Case, list[str]]:
+    """The case that the engine ran, from the parameters that it printed, and the parameters that were edited."""
+    keys, was = _parameters(case, values)
+    edited = [name for name in values if name in was and not isclose(values[name], was[name], rel_tol=_SAME)]
+    edits = [f"{name} {values[name]:g}, was {was[name]:g}" for name in edited]
+    if not edited:
+        return case, edits
+    step, steps, cycles = values["time_step"], int(values["steps_per_cycle"]), int(values["cycles"])
+    numbers = {key: values[name] for name, key in keys.items() if name in edited}
+    for name, key in keys.items():  # a deck has no Γ0: the acceleration is that for the density for which it was made
+        if key.endswith("peak_acceleration") and case.document["drive"].get("waveform", "sine") == "sine":
+            end = name.removeprefix("peak_acceleration")
+            own = values[f"amplitude{end}"] * (2.0 * pi * values[f"frequency{end}"]) ** 2
+            numbers[key] = own if f"amplitude{end}" in edited else values[name]
+    changes: dict[str, Any] = {
+        key: f"{number!r} {kind.unit}" if (kind := kind_of(key)) else number for key, number in numbers.items()
     }
-    ran, rest = _edited(case, values, edited, source) if edited else case, int(values.get("rest_steps", 0))
-    changes = [f"{name} {number:g}, was {was[name]:g}" for name, number in edited.items()]
-    return ran, Segment(0, rest + ran.run.steps, rest), [*changes, *_other_changes(written, edited_text, values)]
-
-
-def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float], source: str) -> Case:
-    """The case with the values of a deck's edited parameters."""
-    steps, cycles, step = int(values["steps_per_cycle"]), int(values["cycles"]), values["time_step"]
-    document = {name: table for name, table in case.document.items() if name != "uncertain"}
-    numbers = {**edited, "time_step": step} if "steps_per_cycle" in edited else edited
-    keys = {key: (numbers[name], kind_of(key)) for name, key in _KEYS.items() if name in numbers}
-    changes: dict[str, Any] = {key: f"{value!r} {kind.unit}" if kind else value for key, (value, kind) in keys.items()}
-    changes |= {"liquid.viscosity_ratio": 1.0} if "viscosity" in edited else {}
-    changes |= {"run.allow_unstable": True} if "run.time_step" in changes else {}
-    if cycles != case.run.cycles:
+    if "viscosity" in edited:
+        changes["liquid.viscosity_ratio"] = 1.0
+    if "steps_per_cycle" in edited:
+        changes |= {"run.time_step": f"{step!r} s", "run.allow_unstable": True}
+    if "cycles" in edited:
         changes["run.cycles"] = cycles
-        document["run"] = {
-            name: setting for name, setting in document.get("run", {}).items() if name != "settling_cycles"
-        }
-    # A deck has no Γ0, but the acceleration for the density and the surface tension that it was made for.
-    by_gamma0 = any(sine.gamma0 is not None for sine in (case.drive, *case.drive.harmonics))
-    if (sines := _sines(case, values)) != _sines(case, {}) or by_gamma0:
-        kept = {name: value for name, value in document["drive"].items() if name in ("frame", "ramp")}
-        document["drive"] = {**kept, **(sines[0] if len(sines) == 1 else {"harmonics": sines})}
-    ran = Case.read(changed(Case, document, changes), source=source, name=case.name).for_cycles(cycles)
-    drive, parts = ran.excitation, case.run.samples_per_cycle
-    if not isclose(step * steps * drive.frequency, 1.0, rel_tol=_SAME) or steps % parts:
+        if case.apart:
+            changes["run.settling_cycles"] = settling_of(cycles)
+    ran = Case.read(changed(Case, case.document, changes), source=source, name=case.name).for_cycles(cycles)
+    frequency, parts = ran.excitation.frequency, case.run.samples_per_cycle
+    if not isclose(step * steps * frequency, 1.0, rel_tol=_SAME) or steps % parts:
         raise ValueError(
-            f"{steps} steps of {step:g} s are not one cycle of {drive.frequency:g} Hz in {parts} equal parts: "
+            f"{steps} steps of {step:g} s are not one cycle of {frequency:g} Hz in {parts} equal parts: "
             f"edit steps_per_cycle (a multiple of {parts}); time_step follows from it and the frequency"
-        )
-    if not isclose(start := values.get("peak_velocity", drive.peak_velocity), drive.peak_velocity, rel_tol=_SAME):
-        raise ValueError(
-            f"beads start at peak_velocity {start:g} m/s, but the walls at {drive.peak_velocity:g} m/s: edit "
-            "peak_acceleration or frequency, from which amplitude and peak_velocity follow"
         )
     for key, walkers in case.walkers_by_key.items():
         ran = ran.put(f"{key}.spacing", walkers.spacing)
     sampling = {name: getattr(case.run, name) for name in ("cycles_per_sample", "samples_per_bridge_sample")}
-    run = ran.run.but(time_step=step, steps_per_cycle=steps, cycles=cycles, samples_per_cycle=parts, **sampling)
-    return ran.but(run=run)
+    lasts = {"time_step": step, "steps_per_cycle": steps, "cycles": cycles, "samples_per_cycle": parts}
+    return ran.but(run=ran.run.but(**lasts, **sampling)), edits
 
 
-def _by_suffix(case: Case) -> list[tuple[str, Any]]:
-    sines = case.excitation.harmonics
-    return list(zip(suffixes(len(sines)), sines, strict=True))
-
-
-def _sines(case: Case, values: Mapping[str, float]) -> list[dict[str, Any]]:
-    """The sines of a drive as tables of a case file, with other values; an edited amplitude gives the acceleration."""
-    tables = []
-    for end, sine in _by_suffix(case):
-        numbers = {name: values.get(f"{name}{end}", getattr(sine, name)) for name in _SINE}
-        implied = values.get(f"amplitude{end}", 0.0) * (2.0 * pi * numbers["frequency"]) ** 2
-        if implied and not isclose(implied, numbers["peak_acceleration"], rel_tol=_SAME):
-            numbers["peak_acceleration"] = implied
-        axis = sine.axis if isinstance(sine.axis, str) else [*sine.axis]
-        tables.append({"axis": axis, **{name: f"{number!r} {_SINE[name]}" for name, number in numbers.items()}})
-    return tables
-
-
-def _other_changes(written: str, edited_text: str, parameters: Collection[str]) -> list[str]:
-    """A line about other edited commands, if there are any."""
+def _other_edits(written: str, edited_text: str, parameters: Collection[str]) -> list[str]:
+    """A line about edited commands that set no parameter, if there are any."""
     before, after = (
         [
             command
@@ -219,26 +225,3 @@ def _other_changes(written: str, edited_text: str, parameters: Collection[str]) 
     )
     lines = [line for line in after if line not in before] or [line for line in before if line not in after]
     return [f"{len(lines)} other line(s), which are not part of the case, first: {lines[0]}"] if lines else []
-
-
-def _write(
-    folder: Path, case: Case, deck: Deck, segment: Segment, report: EngineReport, notes: list[str], before: Case
-) -> None:
-    """Write the files of a run directory of a deck, exported for ``before``: tables, result, last the manifest."""
-    from walkers.postprocess.gait import are_constant
-
-    (folder / MANIFEST_NAME).unlink(missing_ok=True)
-    write_json(folder / on_disk.CASE_NAME, case.as_dict(), at_once=False)
-    write_json(folder / decks.LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
-    on_disk.write_segment_record(folder, segment, report, by_hand=notes)
-    planned = before.run
-    # Cycles that were enough for the finished run of a case may be too few for an edited deck.
-    doubtful = case.run.cycles < planned.cycles if planned.until_steady else case.apart and case != before
-    if doubtful and not are_constant(folder):
-        reached = f"the velocities are not constant within {percent(CONSTANT)} after {case.run.cycles} cycles"
-        further = f"walkers run continues to {planned.cycles}: set cycles to {planned.cycles} and run the deck again"
-        notes.append(f"{reached}; {further if planned.until_steady else 'set cycles to more and run the deck again'}")
-        on_disk.write_segment_record(folder, segment, report, by_hand=notes)
-    measure(folder)
-    about: dict[str, Any] = {"drive_from": segment.drive_from, "segments": 1, "by_hand": notes}
-    write_manifest(case, folder.name, None, report, started=time.time(), directory=folder, **about)

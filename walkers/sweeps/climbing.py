@@ -44,18 +44,15 @@ _KINDS = {"all": ("", "ko"), "plain walls": ("on_plain_walls", "C1s"), "corners"
 _COLUMNS = (
     *("condition", "where", "runs", "seconds", "within", "climbed", "probability", "probability_low"),
     *("probability_high", "estimator", "median", "climbs", "rate", "rate_low", "rate_high", "dispersion"),
-    *("led_by_large", "share_of_large", "p_among_beads", "p_among_own"),
+    *("led_by_large", "share_of_large", "p_among_beads"),
 )
 
 
 def conditions_in(frame: pd.DataFrame) -> Iterator[tuple[str, list[Path]]]:
-    """The finished runs of piles in a sweep's table by conditions: groups that differ in nothing but their seeds.
+    """The finished runs of piles in a sweep's table by conditions, groups that differ in nothing but their seeds.
 
-    Yields
-    ------
-    tuple of str and list of Path
-        The varied values of a condition, such as ``drive.frequency = 100 Hz``, without values that at least half of the
-        conditions have; empty for the usual condition. Its runs.
+    Each has its varied values, such as ``drive.frequency = 100 Hz``, without those that at least half of the conditions
+    have; empty for the usual condition.
     """
     import pandas as pd
 
@@ -72,13 +69,9 @@ def conditions_in(frame: pd.DataFrame) -> Iterator[tuple[str, list[Path]]]:
 
 
 def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[str, Any]:
-    """`statistics` of the climbs in run directories of piles that differ only in their seed, and of their `PARTS`.
+    """`summary` of the climbs in run directories of piles that differ only in their seed.
 
-    Returns
-    -------
-    dict
-        The items of `statistics`; ``each`` climb as in the table ``clusters``, whenever it qualified, with the name of
-        its run; and for each of `PARTS` the statistics of these climbs alone, by the same time.
+    ``each`` has all climbs as in the table ``clusters``, whenever they qualified, with the names of their runs.
     """
     import pandas as pd
 
@@ -94,7 +87,10 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
 
 
 def summary(piles: pd.DataFrame, climbs: pd.DataFrame, within: float | None = None) -> dict[str, Any]:
-    """`statistics` of all climbs, and of each of `PARTS` by the same time (default: see there)."""
+    """`statistics` of all climbs, and of each of `PARTS` by the same time.
+
+    Its default is the end of the shortest run without a climb: the longest time at which all runs count.
+    """
     still = piles["driven"][~piles.index.isin(climbs["pile"])]
     # If a climber left the container, the run ended; a longer run would show the same first climb.
     at = float(still.min() if len(still) else piles["driven"].max()) if within is None else within
@@ -117,21 +113,16 @@ def statistics(piles: pd.DataFrame, climbs: pd.DataFrame, cut: float, at: float)
     cut
         Time of the drive in s up to which climbs count; later parts of runs do not.
     at
-        Time in s by which a pile has climbed or not. The default (see `summary`) is the end of the shortest run without
-        a climb: the longest time at which all runs count.
+        Time in s by which a pile has climbed or not.
 
     Returns
     -------
     dict
-        ``within`` (s, ``at``), ``runs`` and ``seconds`` (of drive, of all runs up to ``cut``). For the first climbs:
-        the items of `survival`, and ``first_rate`` with its ``first_rate_interval`` (1/s, first climbs divided by the
-        time until them: the rate, if waiting times are exponentially distributed).
-
-        For all climbs that qualified in this time: ``climbs``; ``rate`` (1/s, of one start) with the exact Poisson
-        ``rate_interval``; ``dispersion``, variance divided by mean of the number of climbs of a run (1 for independent
-        climbs; None if lengths of runs differ by more than a tenth); ``times`` and ``onsets`` (s, when the first climb
-        of each run qualified and began), ``speeds`` (m/s), ``heights`` (m, of the leaders at the end), ``sizes``; and
-        the items of `leaders`.
+        ``within`` (s, ``at``), ``runs`` and ``seconds`` (of drive, of all runs up to ``cut``); for first climbs the
+        items of `survival`, ``times`` and ``onsets`` (s, when they qualified and began). For all climbs: their number,
+        ``rate`` (1/s, of one start) with the exact Poisson ``rate_interval``, ``dispersion`` (variance over mean of the
+        number of climbs of a run; None if lengths of runs differ by more than a tenth), ``speeds`` (m/s), ``heights``
+        (m, of the leaders at the end), ``sizes``, and the items of `leaders`.
     """
     watched = piles["driven"].astype(float).clip(upper=cut)
     counted = climbs[climbs["qualified"] <= cut]
@@ -144,9 +135,8 @@ def statistics(piles: pd.DataFrame, climbs: pd.DataFrame, cut: float, at: float)
         "runs": len(piles),
         "seconds": float(watched.sum()),
         **survival(np.array(first, dtype=float), np.array(watched, dtype=float), at),
-        **_rate("first_rate", len(firsts), float(np.minimum(first, watched).sum())),
         "climbs": len(counted),
-        **_rate("rate", len(counted), float(watched.sum())),
+        **_rate(len(counted), float(watched.sum())),
         "dispersion": float(numbers.var() / numbers.mean()) if alike else None,
         "times": firsts["qualified"].tolist(),
         "onsets": firsts["onset"].tolist(),
@@ -157,74 +147,54 @@ def statistics(piles: pd.DataFrame, climbs: pd.DataFrame, cut: float, at: float)
     }
 
 
-def _rate(name: str, events: int, seconds: float) -> dict[str, Any]:
+def _rate(events: int, seconds: float) -> dict[str, Any]:
     """Rate of events, 1/s, with the exact 95 % interval (Garwood 1936); None if the time is zero."""
     from scipy.stats import chi2
 
     if seconds <= 0.0:
-        return {name: None, f"{name}_interval": None}
+        return {"rate": None, "rate_interval": None}
     tail = (1.0 - _CONFIDENCE) / 2.0
     ends = chi2.ppf((tail, 1.0 - tail), (2 * events, 2 * events + 2)) / 2.0  # NaN: no lower end without events
-    return {name: events / seconds, f"{name}_interval": (np.nan_to_num(ends) / seconds).tolist()}
+    return {"rate": events / seconds, "rate_interval": (np.nan_to_num(ends) / seconds).tolist()}
 
 
 def leaders(piles: pd.DataFrame, climbs: pd.DataFrame) -> dict[str, Any]:
     """Test whether large beads lead climbs more often than expected by chance; parameters as of `statistics`.
 
-    Returns
-    -------
-    dict
-        ``led_by_large`` climbs; ``share_of_large`` in the beads of all runs; ``p_among_beads``, the probability of at
-        least as many climbs led by large beads if the labels "large" and "small" are permuted within each run (a bead
-        that leads twice counts twice: climbs of one run are not independent); ``p_among_own``, the same if any bead of
-        each climbing cluster leads. Both are from 10,000 draws, one-sided; None without climbs.
+    ``led_by_large`` climbs; ``share_of_large`` in the beads of all runs; ``p_among_beads``: one-sided probability, from
+    10,000 draws, of at least as many if the labels "large" and "small" are permuted within each run. A bead that leads
+    twice counts twice: climbs of one run are not independent. None without climbs.
     """
     draw, led = np.random.default_rng(0), int(climbs["leader_large"].sum())
-    led_among_beads, led_in_cluster = np.zeros(_DRAWS), np.zeros(_DRAWS)
+    drawn = np.zeros(_DRAWS)
     for pile, rows in climbs.groupby("pile"):
         beads, left = piles["beads"][pile], np.full(_DRAWS, piles["large"][pile])  # labels "large" for further leaders
         for place, weight in enumerate(rows["leader"].value_counts().sort_index()):
             is_large = draw.random(_DRAWS) < left / (beads - place)
-            led_among_beads += weight * is_large
+            drawn += weight * is_large
             left -= is_large
-        for large, size in zip(rows["large"], rows["size"], strict=True):
-            led_in_cluster += draw.random(_DRAWS) < large / size
-    chances = {"p_among_beads": led_among_beads, "p_among_own": led_in_cluster}
     return {
         "led_by_large": led,
         "share_of_large": float(piles["large"].sum() / piles["beads"].sum()),
-        **{
-            name: float((1 + (drawn >= led).sum()) / (1 + _DRAWS)) if len(climbs) else None
-            for name, drawn in chances.items()
-        },
+        "p_among_beads": float((1 + (drawn >= led).sum()) / (1 + _DRAWS)) if len(climbs) else None,
     }
 
 
 def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any]:
-    """Probability that an event has happened by a time, from records of different lengths (Kaplan-Meier).
+    """Probability that an event has happened by a time, from N records of different lengths (Kaplan-Meier).
 
-    Parameters
-    ----------
-    first : ndarray, shape (N,)
-        Time of the event in each record, s; infinite if there is none. Later events than the record's end are ignored.
-    watched : ndarray, shape (N,)
-        Length of each record, s.
-    at
-        The time, s.
+    ``first`` are the times of the event in each record (infinite without one; times after its end are ignored),
+    ``watched`` the lengths of the records, in s, shape (N,).
 
     Returns
     -------
     dict
-        ``climbed`` (records with the event by then), ``ended`` (records that ended before, without it);
-        ``probability`` of the event by then with its ``interval`` (95 %), both None if no record is long enough;
-        ``median`` (s, time by which half have it; None if not reached), ``censored`` (records that ended without it).
-
-        ``estimator`` names the interval: ``Clopper-Pearson`` (1934, exact, binomial) for records that are long enough
-        or have the event; ``Kaplan-Meier`` (Greenwood's variance of log(-log) of the survival) if records ended before
-        and some, but not all, have climbed.
-
-        ``curve``: the share at every ``time`` (s) at which it changes: ``probability``, and ``low`` and ``high``,
-        Greenwood's band at all times; None while none or all have climbed.
+        ``climbed`` (records with the event by then), ``ended`` (before, without it), ``censored`` (ended without it at
+        any time), ``median`` (s, time by which half have it; None if not reached); ``probability`` with its 95 %
+        ``interval``, None if no record is long enough. ``estimator`` of the interval: ``Clopper-Pearson`` (1934, exact,
+        binomial), or ``Kaplan-Meier`` (Greenwood's variance of log(-log) of the survival) if records ended before and
+        some, but not all, have climbed. ``curve``: ``probability`` and Greenwood's band, ``low`` and ``high``, at every
+        ``time`` (s) at which the share changes.
     """
     from scipy.stats import CensoredData, binomtest, ecdf
 
@@ -269,9 +239,6 @@ def texts_of(climbs: Mapping[str, Any]) -> dict[str, str]:
     def between(values: Sequence[float], factor: float = 1.0) -> str:
         return f"{factor * min(values):.2g} to {factor * max(values):.2g}" if values else "–"
 
-    def chance(value: float | None) -> str:
-        return "–" if value is None else f"{max(value, 2.0 / _DRAWS):.2g}"
-
     return {
         "pile": climbs["condition"] or "usual",
         "climbed": f"{climbs['climbed']} of {climbs['runs']}",
@@ -287,8 +254,7 @@ def texts_of(climbs: Mapping[str, Any]) -> dict[str, str]:
         "dispersion": "–" if climbs["dispersion"] is None else f"{climbs['dispersion']:.2g}",
         "led by large": f"{climbs['led_by_large']} of {climbs['climbs']}",
         "large beads (%)": f"{100.0 * climbs['share_of_large']:.0f}",
-        "p by chance": chance(climbs["p_among_beads"]),
-        "p in the cluster": chance(climbs["p_among_own"]),
+        "p by chance": "–" if climbs["p_among_beads"] is None else f"{max(climbs['p_among_beads'], 2.0 / _DRAWS):.2g}",
         "beads": between(climbs["sizes"]),
         "height (mm)": between(climbs["heights"], 1e3),
         "speed (mm/s)": between(climbs["speeds"], 1e3),
@@ -377,15 +343,7 @@ def _in_short(condition: str) -> str:
 
 
 def write_climbs(climbs: Sequence[Mapping[str, Any]], runs: Sequence[str], to: Path) -> None:
-    """Write the results of `walkers.api.climb` as a table or as a figure.
-
-    Parameters
-    ----------
-    climbs, runs
-        The results for each condition; the names of their runs.
-    to
-        A .csv file for the table (SI units), or a figure (`walkers.postprocess.drawing.FORMATS`).
-    """
+    """Write the results of `walkers.api.climb` from ``runs`` as a table (.csv, SI units) or as a figure."""
     if to.suffix == ".csv":
         write_bytes(to, table_of(climbs).to_csv(index=False).encode())
     else:

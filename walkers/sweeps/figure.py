@@ -5,24 +5,24 @@ from __future__ import annotations
 import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import ceil, prod
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import numpy.typing as npt
 
-from walkers.errors import InputError, refused
+from walkers.errors import expected_of, refused
 from walkers.inputs.case import Case
 from walkers.inputs.library import unmeasured
 from walkers.postprocess.drawing import TWO_COLUMNS, errors_seen, letter_panels, new_figure, plain_text, styled
 from walkers.postprocess.quantities import declared, is_declared, scatter_of, unit_shown
-from walkers.postprocess.results import derived
+from walkers.postprocess.uncertainty import SPREAD_NAME, spread_of
 from walkers.runner.directory import case_of
-from walkers.sweeps.figure_options import FigureOptions
+from walkers.runner.files import read_json
+from walkers.sweeps.figure_options import FigureOptions, Log
 from walkers.sweeps.table import (
     FACING_DOWN,
     SEEDS,
@@ -51,10 +51,7 @@ _DOWN: dict[str, Any] = {"marker": "v", "color": "0.3", "label": "started facing
 _MOST_PANELS = 12
 _MARKERS = "osD^vXP<>*"
 _MODELS = (("--", "_"), (":", "+"))  # line of each model, and its symbol if points are not joined
-_CURVE = 61  # points of a model's curve
-_OF_SHAPE = ("radii", "volume_fraction", "meniscus_radius", "contact_angle")
-"""Ends of the keys that change the shape of bridges, each of which takes a tenth of a second to solve."""
-_MOST_COLOURS = 12  # numbers with more values have a colour scale instead of a legend
+_MOST_COLOURS = 10  # of the style
 _ROUNDING = 1e-12  # relative to the largest number
 _LEAST_RANGE = 1e-4  # smallest range of the y axis relative to the mean, so that rounding errors are not shown
 _LETTERS = 26  # letters of a line of a y label
@@ -124,6 +121,8 @@ def figure_of(table: pd.DataFrame, options: FigureOptions = FigureOptions(), pre
         Means; bars are the scatter over copies where the table has it. The axis of a key has the unit of the sweep
         file; other columns are in mm, mm/s, g (9.8 m/s²) and degrees. A `LeftOutWarning` reports what is left out.
     """
+    if options.log and options.log not in get_args(Log):
+        raise refused("log", f"{options.log!r}: {expected_of(options.log, get_args(Log))}")
     column = column_of(table, options.y)
     done = table[table["status"] == "finished"]
     counts = Counter(table["status"][table["status"] != "finished"])
@@ -137,11 +136,9 @@ def figure_of(table: pd.DataFrame, options: FigureOptions = FigureOptions(), pre
     *layout, undistinguished = layout_of(table, done, options)
     if undistinguished:
         _tell(f"not distinguished: {'; '.join(undistinguished)}")
-    log = options.log or ""
-    theory = _Theory(predict, done, column, log) if predict else None
-    if theory and not theory.values:  # it was said why
-        theory = None
-    return _draw(done, column, layout, theory, down=None if options.y else FACING_DOWN.get(column), log=log)
+    theory = _predicted(done, column, predict) if predict else {}
+    down = None if options.y else FACING_DOWN.get(column)
+    return _draw(done, column, layout, theory, down=down, log=options.log or "")
 
 
 def column_of(table: pd.DataFrame, name: str | None) -> str:
@@ -302,46 +299,13 @@ def rank_correlation(first: Any, second: Any) -> float:
     return 0.0 if np.isnan(rank) else float(rank)
 
 
-class _Theory:
-    """Predictions of models for the points, and between them, in the displayed unit."""
-
-    def __init__(self, predict: Predict, done: pd.DataFrame, column: str, log: str) -> None:
-        self.predict, self.done, self.column, self.log = predict, done, column, log
-        self.cases = [case_of(Path(run)) for run in done["run"]]
-        self.factor = unit_shown(done.attrs["units"].get(column) or "")[1]
-        predicted, self.remarks = predict(self.cases, column)
-        self.values = {model: self.factor * values for model, values in predicted.items()}
-        for remark, number in self.remarks.items():
-            _tell(f"{number} of {len(done)} points: {remark}")
-
-    def curves(self, rows: npt.NDArray[np.int64], x: Factor) -> tuple[FloatArray, dict[str, FloatArray]]:
-        """Values of x and the predictions there, between points that differ in one key; none if they take too long.
-
-        If x is no key, such as Γ0, the key that varies is changed.
-        """
-        points, case, units = self.done.iloc[rows], self.cases[rows[0]], self.done.attrs["units"]
-        moving, name = [key for key in self.done.attrs["varied"] if points[key].nunique() > 1], x.keys[0]
-        if len(moving) != 1 or not case.document or not (name in moving or name in derived(case)):
-            return np.array([]), {}
-        (key,) = moving
-        if key.endswith(_OF_SHAPE) or points[key].dtype.kind not in "if":
-            return np.array([]), {}
-        low, high = points[key].min(), points[key].max()
-        is_log = "x" in self.log and low > 0.0
-        cases: dict[float, Case] = {}
-        for place in (np.geomspace if is_log else np.linspace)(low, high, _CURVE).tolist():
-            with suppress(InputError, ValueError):  # a value that no case may have
-                cases[place] = case.changed({key: f"{place!r} {units[key]}" if units[key] else place})
-        predicted, remarks = self.predict(list(cases.values()), self.column)
-        if not all(np.isfinite(values).all() for values in predicted.values()):
-            for remark in remarks.keys() - self.remarks.keys():
-                _tell(f"the theory's curve has gaps: {remark}")
-        along = (
-            list(cases)
-            if name == key
-            else [unit_shown(units[name])[1] * derived(moved)[name] for moved in cases.values()]
-        )
-        return np.array(along), {model: self.factor * values for model, values in predicted.items()}
+def _predicted(done: pd.DataFrame, column: str, predict: Predict) -> dict[str, FloatArray]:
+    """Predictions of models at the points, in the displayed unit."""
+    predicted, remarks = predict([case_of(Path(run)) for run in done["run"]], column)
+    for remark, number in remarks.items():
+        _tell(f"{number} of {len(done)} points: {remark}")
+    factor = unit_shown(done.attrs["units"].get(column) or "")[1]
+    return {model: factor * values for model, values in predicted.items()}
 
 
 def _points(done: pd.DataFrame, column: str, down: str | None) -> tuple[str, pd.DataFrame]:
@@ -362,13 +326,26 @@ def _points(done: pd.DataFrame, column: str, down: str | None) -> tuple[str, pd.
     return label, points
 
 
+def _draws(done: pd.DataFrame, column: str) -> str:
+    """Numbers of draws of the spreads at the points: ``32``, or ``30 to 32`` if some failed or came apart."""
+    places = [spread_of(Path(run)) / SPREAD_NAME for run in done.loc[done[f"{column}_low"].notna(), "run"]]
+    numbers = [read_json(place)["bands"][column]["points"] for place in places]
+    return " to ".join(map(str, sorted({min(numbers), max(numbers)})))
+
+
 _ALSO = ("down", "low", "high")
 """Columns of `_points` that are drawn beside the values and their errors."""
 
 
 @styled
 def _draw(
-    done: pd.DataFrame, column: str, layout: Sequence[Any], theory: _Theory | None, *, down: str | None, log: str
+    done: pd.DataFrame,
+    column: str,
+    layout: Sequence[Any],
+    theory: Mapping[str, FloatArray],
+    *,
+    down: str | None,
+    log: str,
 ) -> Figure:
     """Draw a column with the factors of `layout_of`."""
     along, hue, panels = layout
@@ -382,7 +359,7 @@ def _draw(
         parts.sort(key=lambda part: -abs(influence[part[0].keys]))
     if panels is not None:
         parts = [(along[0], _where(panels, level), panels.text(level, by_name=True)) for level in panels.levels]
-    looks, scale = _looks(hue, hollow=theory is not None)
+    looks = _looks(hue, hollow=bool(theory))
     columns = min(len(parts), 2 if len(parts) in (2, 4) else 3)
     rows = ceil(len(parts) / columns)
     width, height = TWO_COLUMNS, 4.2 if len(parts) == 1 else 6.0 / columns * rows + 0.9
@@ -402,13 +379,13 @@ def _draw(
             axes.set_ylabel(plain_text("\n".join(wrap(label, _LETTERS))))
         _scale_x(axes, x, log)
     letter_panels(grid.flat[: len(parts)] if len(parts) > 1 else ())
-    _scale_y(grid[0, 0], points, list(theory.values.values())[:1] if theory else [], log)
+    _scale_y(grid[0, 0], points, [*theory.values()][:1], log)
     for axes in grid.flat[len(parts) :]:
         axes.set_axis_off()
-    _legend(figure, grid, hue, looks, scale, list(theory.values) if theory else [], down="down" in points)
+    _legend(figure, grid, hue, looks, list(theory), down="down" in points)
     texts = [done.attrs["title"]]
     if "low" in points:
-        texts.append("bands: 5 to 95 % over the uncertain values")
+        texts.append(f"bands: 5 to 95 % of {_draws(done, column)} draws of the uncertain values")
     if points["error"].notna().any():
         banded = "low" in points or {*unmeasured()} & {*done.attrs["varied"]}
         bars = SCATTER.partition(" (")[0] if banded else SCATTER
@@ -430,22 +407,20 @@ def _where(factor: Factor | None, level: Any) -> npt.NDArray[np.bool_]:
     return np.array([value == level for value in factor.values] if factor else True)
 
 
-def _looks(factor: Factor | None, *, hollow: bool) -> tuple[dict[Any, dict[str, Any]], Any]:
-    """Colours and symbols of the levels of a factor; for many numbers also their colour scale."""
+def _looks(factor: Factor | None, *, hollow: bool) -> dict[Any, dict[str, Any]]:
+    """Colours and symbols of the levels of a factor."""
     from matplotlib import colormaps
-    from matplotlib.colors import Normalize
 
     levels: list[Any] = factor.levels if factor else [None]
-    many, looks = len(levels) > _MOST_COLOURS, {}
-    scale = Normalize(levels[0], levels[-1]) if many and factor and factor.is_number else None
-    shades = colormaps["viridis"](scale(levels)) if scale else colormaps["turbo"](np.linspace(0.0, 0.92, len(levels)))
+    many = colormaps["turbo"](np.linspace(0.0, 0.92, len(levels))) if len(levels) > _MOST_COLOURS else None
+    looks = {}
     for place, level in enumerate(levels):
-        colour = shades[place] if many else f"C{place}"
+        colour = f"C{place}" if many is None else many[place]
         # Symbols that are drawn later are smaller, so that those of coinciding points are seen.
-        size = 4.5 if scale else 4.5 + min(1.0, 4.0 / len(levels)) * (len(levels) - 1 - place)
-        marker = "o" if scale else _MARKERS[place % len(_MARKERS)]
+        size = 4.5 + min(1.0, 4.0 / len(levels)) * (len(levels) - 1 - place)
+        marker = _MARKERS[place % len(_MARKERS)]
         looks[level] = {"marker": marker, "color": colour, "mfc": "none" if hollow else colour, "ms": size}
-    return looks, scale
+    return looks
 
 
 def _series(
@@ -454,7 +429,7 @@ def _series(
     drawn: npt.NDArray[np.bool_],
     aside: float,
     points: pd.DataFrame,
-    theory: _Theory | None,
+    theory: Mapping[str, FloatArray],
     look: Mapping[str, Any],
 ) -> None:
     """Means with error bars, joined by lines unless there is a theory, and the predictions of the theory.
@@ -477,11 +452,8 @@ def _series(
     if "down" in shown:
         shape = {"marker": _DOWN["marker"], "mfc": "none", "ls": "--" if is_line else "none"}
         axes.plot(at, shown["down"], lw=0.9, **{**look, **shape})
-    along, curves = theory.curves(rows, x) if theory and is_line else (at, {})
-    for number, (model, values) in enumerate(theory.values.items() if theory else ()):
-        has_curve = model in curves
-        curve = (along, curves[model]) if has_curve else (at, values[rows])
-        axes.plot(*curve, zorder=1, **_model_look(number, has_curve, look["color"]))
+    for number, values in enumerate(theory.values()):
+        axes.plot(at, values[rows], zorder=1, **_model_look(number, is_line, look["color"]))
 
 
 def _model_look(number: int, is_line: bool, colour: Any) -> dict[str, Any]:
@@ -543,19 +515,15 @@ def _legend(
     grid: npt.NDArray[Any],
     hue: Factor | None,
     looks: Mapping[Any, Mapping[str, Any]],
-    scale: Any,
     models: Sequence[str],
     *,
     down: bool,
 ) -> None:
-    """A legend of colours and lines below all panels, or a colour scale beside them."""
-    from matplotlib.cm import ScalarMappable
+    """A legend of colours and lines below all panels."""
     from matplotlib.lines import Line2D
 
     given: list[dict[str, Any]] = []
-    if hue is not None and scale is not None:
-        figure.colorbar(ScalarMappable(scale, "viridis"), ax=grid, label=plain_text(hue.label))
-    elif hue is not None:
+    if hue is not None:
         given = [{"ls": "none", "label": plain_text(hue.text(level)), **look} for level, look in looks.items()]
     if down:
         given += [{"ls": "none", **_UP}, {"ls": "none", "mfc": "none", **_DOWN}]
@@ -565,6 +533,6 @@ def _legend(
     if given:
         longest = max(len(look["label"]) for look in given)
         columns = max(1, min(len(given), int(13.0 * figure.get_figwidth() / (longest + 6))))
-        title = plain_text(hue.name) if hue is not None and scale is None else None
+        title = plain_text(hue.name) if hue is not None else None
         handles = [Line2D([], [], **look) for look in given]
         figure.legend(handles=handles, loc="outside lower center", title=title, ncols=columns)

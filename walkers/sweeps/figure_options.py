@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 from cyclopts import Parameter
 
-from walkers.errors import refused
-
-_LOG = Literal["x", "y", "xy"]
+Log = Literal["x", "y", "xy"]
 
 
 @Parameter(name="*")
 @dataclass(frozen=True)
 class FigureOptions:
     """What the figure of a sweep shows.
-
-    `InputError` if ``log`` is no choice.
 
     Parameters
     ----------
@@ -39,10 +35,5 @@ class FigureOptions:
     y: str | None = None
     hue: str | None = None
     panels: str | None = None
-    log: _LOG | None = None
+    log: Log | None = None
     theory: bool = False
-
-    def __post_init__(self) -> None:
-        """Check what does not depend on a table."""
-        if self.log not in (None, *get_args(_LOG)):
-            raise refused("log", f"{self.log!r}: expected one of {', '.join(get_args(_LOG))}")

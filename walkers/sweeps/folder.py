@@ -1,6 +1,6 @@
 """Contents of a folder of runs: runs and sweeps with their status; listing and removal.
 
-Listing opens no dumps and no tables: a folder of ten thousand runs takes seconds.
+Listing opens no dumps and no tables, and does without pandas: a folder of ten thousand runs takes seconds.
 
 Runs in progress are never removed: removal holds the lock of the run. The manifest of a finished run is removed first:
 after an interruption the rest is no finished run, and the next removal takes it.
@@ -11,12 +11,12 @@ from __future__ import annotations
 import shutil
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from stat import S_ISDIR
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeAlias
 
 from walkers.errors import InputError, refused
 from walkers.inputs.case import Case
@@ -28,14 +28,13 @@ from walkers.runner import directory as on_disk
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.sweeps.making import progress_at
-from walkers.sweeps.readable import FlatCase, chosen, differing, flattened, readable, short_keys
+from walkers.sweeps.readable import FlatCase, differing, flattened, readable, short_keys
 from walkers.sweeps.table import RECORD_NAME, read_record, state_at, states, status_text, worst_status
 from walkers.text import aligned
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-COLUMNS = (
+Row: TypeAlias = dict[str, Any]
+"""A run or a sweep, see `inventory`."""
+_COLUMNS = (
     *("kind", "name", "case", "status", "directory", "age", "size", "reason", "message"),
     *("velocity", "result", "numbers", "points", "runs", "parameters"),
 )
@@ -43,22 +42,15 @@ _SIZES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
 _MOST_LINES = 40
 
 
-def inventory(out: Path) -> pd.DataFrame:
-    """All runs and sweeps in a folder, sweeps first, sorted by name.
+def inventory(out: Path) -> list[Row]:
+    """All runs (``case-hash``) and sweeps in a folder, sweeps first, sorted by name; None for missing values.
 
-    Returns
-    -------
-    DataFrame
-        One row per run (``case-hash``) or sweep, with None for missing values. Columns are ``kind``, ``name``,
-        ``case``, ``status`` (finished, running, failed, or interrupted: a run can be continued, or points of a sweep
-        are missing), ``directory``, ``age`` (s, since the end of the run or the last change), ``size`` (bytes of the
-        files, for a sweep of its runs), ``reason`` and ``message`` of a failure. A finished run has the ``numbers`` of
-        its result (SI units), the main ones as text in ``result``, and for walkers the main ``velocity`` (m/s). A sweep
-        has numbers of ``points`` by status and the names of its ``runs``. ``parameters`` are the values of the case
-        (`walkers.sweeps.readable.flattened`), for a sweep the number of values of each varied key.
+    ``status`` is finished, running, failed, or interrupted: a run can be continued, or points of a sweep are missing.
+    ``age`` is in s, since the end of the run or the last change, ``size`` in bytes of the files, for a sweep of its
+    runs. A finished run has the ``numbers`` of its result (SI units), the main ones as text in ``result``, and for
+    walkers the main ``velocity`` (m/s). A sweep has numbers of ``points`` by status and the names of its ``runs``.
+    ``parameters`` are the values of the case (`flattened`), for a sweep the number of values of each varied key.
     """
-    import pandas as pd
-
     if out.exists() and not out.is_dir():
         raise refused(out, "expected a folder of runs, this is a file")
     folders = sorted(path for path in out.iterdir() if path.is_dir()) if out.exists() else []
@@ -70,12 +62,11 @@ def inventory(out: Path) -> pd.DataFrame:
         if place not in listed and on_disk.is_locked(place):
             runs.append(_row("run", place.name, place, "running", age=0.0, size=0))
     sweeps = [sweep for path in folders if (sweep := _sweep(path, runs, now)) is not None]
-    runs.sort(key=lambda run: (run["name"], run["status"] != "finished"))
-    return pd.DataFrame([*sweeps, *runs], columns=list(COLUMNS), dtype=object)
+    return [*sweeps, *sorted(runs, key=lambda run: (run["name"], run["status"] != "finished"))]
 
 
-def _row(kind: str, name: str, directory: Path, status: str, **values: Any) -> dict[str, Any]:
-    blank = dict.fromkeys(COLUMNS) | {"result": "-", "parameters": FlatCase(), "case": name.rpartition("-")[0]}
+def _row(kind: str, name: str, directory: Path, status: str, **values: Any) -> Row:
+    blank = dict.fromkeys(_COLUMNS) | {"result": "-", "parameters": FlatCase(), "case": name.rpartition("-")[0]}
     return blank | {"kind": kind, "name": name, "directory": directory, "status": status} | values
 
 
@@ -84,7 +75,7 @@ def _place(directory: Path) -> Path:
     return directory.with_name(directory.name.removesuffix(on_disk.UNFINISHED).removesuffix(on_disk.REPLACED))
 
 
-def _run(path: Path, now: float) -> dict[str, Any] | None:
+def _run(path: Path, now: float) -> Row | None:
     place = _place(path)
     finished = place == path and (path / MANIFEST_NAME).is_file()
     if not (finished or on_disk.is_run_name(place.name)):  # a user's folder
@@ -137,7 +128,7 @@ def weigh(path: Path) -> tuple[int, float]:
     return sum(size.values()), newest
 
 
-def _sweep(path: Path, runs: Sequence[Mapping[str, Any]], now: float) -> dict[str, Any] | None:
+def _sweep(path: Path, runs: Sequence[Row], now: float) -> Row | None:
     try:
         record = read_record(path)
     except InputError:
@@ -165,21 +156,10 @@ def run_text(directory: Path) -> str:
 # --- listing ----------------------------------------------------------------------------------------------------------
 
 
-def select(contents: pd.DataFrame, where: Sequence[str]) -> pd.DataFrame:
-    """The runs for which all conditions hold, such as ``drive.frequency=80 Hz``; without conditions all rows.
-
-    `InputError` if a condition cannot be read, or no run has such a key.
-    """
-    for text in where:
-        contents = contents[contents["kind"] == "run"]
-        contents = contents[chosen([*contents["parameters"]], text)]
-    return contents
-
-
-def members(contents: pd.DataFrame) -> pd.Series[bool]:
-    """Whether a row is a run of a sweep, and has no spread and no accuracy of its own."""
-    runs = {run for names in contents["runs"].dropna() for run in names}
-    return contents["name"].isin(runs - {_beside(name) for name in contents["name"]})
+def without_members(contents: Sequence[Row]) -> list[Row]:
+    """Contents without runs of sweeps, unless they have a spread or an accuracy of their own."""
+    runs = {run for row in contents for run in row["runs"] or ()} - {_beside(row["name"]) for row in contents}
+    return [row for row in contents if row["name"] not in runs]
 
 
 def _beside(name: str) -> str:
@@ -187,49 +167,51 @@ def _beside(name: str) -> str:
     return name.removesuffix(SPREAD).removesuffix(ACCURACY) if name.endswith((SPREAD, ACCURACY)) else ""
 
 
-def _by_case(contents: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame, list[str]]]:
+def _by_case(contents: Sequence[Row]) -> Iterator[tuple[str, list[Row], list[str]]]:
     """The runs of each case, and the keys by which they differ."""
-    for case, runs in contents[contents["kind"] == "run"].groupby("case", sort=False):
-        yield str(case), runs, differing([parameters for parameters in runs["parameters"] if parameters])
+    for case in dict.fromkeys(row["case"] for row in contents if row["kind"] == "run"):
+        runs = [row for row in contents if row["kind"] == "run" and row["case"] == case]
+        yield case, runs, differing([row["parameters"] for row in runs if row["parameters"]])
 
 
-def as_json(contents: pd.DataFrame) -> list[dict[str, Any]]:
+def as_json(contents: Sequence[Row]) -> list[dict[str, Any]]:
     """Rows as JSON objects, SI units; for a run, ``varies`` has the values by which runs of its case differ."""
-    keys = {case: keys for case, _, keys in _by_case(contents)}
-    return [
-        {str(name): str(value) if name == "directory" else value for name, value in row.items() if name != "parameters"}
-        | {"varies": {key: values.get(key) for key in (values if row["kind"] == "sweep" else keys[row["case"]])}}
-        for row, values in zip(contents.to_dict("records"), contents["parameters"], strict=True)
-    ]
+    differ, rows = {case: keys for case, _, keys in _by_case(contents)}, []
+    for row in contents:
+        values = row["parameters"]
+        varies = {key: values.get(key) for key in (values if row["kind"] == "sweep" else differ[row["case"]])}
+        rows.append({**row, "directory": str(row["directory"]), "varies": varies})
+        del rows[-1]["parameters"]
+    return rows
 
 
-def as_text(contents: pd.DataFrame, hidden: int = 0) -> str:
+def as_text(contents: Sequence[Row], hidden: int = 0) -> str:
     """Rows as text: sweeps, then the runs of each case with a column for each key by which they differ; mm/s.
 
     The last line states the number of ``hidden`` runs of sweeps.
     """
-    sweeps = contents[contents["kind"] == "sweep"]
-    points = sweeps["points"].map(status_text)
-    varied = sweeps["parameters"].map(lambda keys: ", ".join(f"{key} ({number})" for key, number in keys.items()))
-    columns = {"sweep": sweeps["name"], "points": points, **_weight(sweeps), "case": sweeps["case"]}
-    blocks = [_lines({**columns, "varies (values)": varied})] if len(sweeps) else []
+    sweeps, blocks = [row for row in contents if row["kind"] == "sweep"], []
+    if sweeps:
+        heads, rows = ["sweep", "points", "age", "size", "case", "varies (values)"], []
+        for row in sweeps:
+            varied = ", ".join(f"{key} ({number})" for key, number in row["parameters"].items())
+            rows.append([row["name"], status_text(row["points"]), *_weight(row), row["case"], varied])
+        blocks.append(aligned([heads, *rows]))
     for case, runs, keys in _by_case(contents):
-        status = runs["status"] + runs["reason"].map(lambda reason: f": {reason}" if reason else "")
-        columns = {f"{case} ({len(runs)})": runs["name"], "status": status, "result": runs["result"], **_weight(runs)}
-        for key, head in zip(keys, short_keys(keys), strict=True):
-            columns[head] = runs["parameters"].map(lambda values, key=key: readable(key, values.get(key)))
-        blocks.append(_lines(columns))
-    total = [counted(len(sweeps), "sweep")] * bool(len(sweeps)) + [counted(len(contents) - len(sweeps), "run")]
+        heads, rows = [f"{case} ({len(runs)})", "status", "result", "age", "size", *short_keys(keys)], []
+        for row in runs:
+            status = ": ".join(filter(None, (row["status"], row["reason"])))
+            values = [readable(key, row["parameters"].get(key)) for key in keys]
+            rows.append([row["name"], status, row["result"], *_weight(row), *values])
+        blocks.append(aligned([heads, *rows]))
+    total = [counted(len(sweeps), "sweep")] * bool(sweeps) + [counted(len(contents) - len(sweeps), "run")]
     more = f"; not shown: {hidden} runs of sweeps (--all)" if hidden else ""
-    return "\n\n".join([*blocks, f"{', '.join(total)}, {bytes_text(sum(contents['size']))}{more}"])
+    size = bytes_text(sum(row["size"] for row in contents))
+    return "\n\n".join([*blocks, f"{', '.join(total)}, {size}{more}"])
 
 
-def _weight(rows: pd.DataFrame) -> dict[str, pd.Series[Any]]:
-    return {"age": rows["age"].map(duration_text), "size": rows["size"].map(bytes_text)}
-
-
-def _lines(columns: Mapping[str, pd.Series[Any]]) -> str:
-    return aligned([list(columns), *map(list, zip(*columns.values(), strict=True))])
+def _weight(row: Row) -> list[str]:
+    return [duration_text(row["age"]), bytes_text(row["size"])]
 
 
 def bytes_text(size: int) -> str:
@@ -244,14 +226,14 @@ def bytes_text(size: int) -> str:
 class Cleaning:
     """The plan of a cleaning: the rows of the `inventory` and the stale lock files to remove; remarks to print."""
 
-    remove: pd.DataFrame
+    remove: Sequence[Row]
     locks: Sequence[Path]
     remarks: Sequence[str]
 
     def as_text(self) -> str:
         """The removed runs and sweeps with the total size, and the remarks."""
         rows, kinds, total = [], Counter[str](), 0
-        for row in self.remove.to_dict("records"):
+        for row in self.remove:
             kind = "sweep" if row["kind"] == "sweep" else f"{row['status']} run"
             size, why = row["size"], row["reason"] or ("" if row["status"] == "finished" else "can be continued")
             if row["directory"].is_symlink():
@@ -270,50 +252,44 @@ class Cleaning:
 
 
 def plan_cleaning(out: Path, given: Sequence[Path] = ()) -> Cleaning:
-    """Plan a cleaning; nothing is removed.
+    """Plan to remove interrupted and failed runs, or ``given`` ones; nothing is removed yet.
 
-    Without ``given`` directories, interrupted and failed runs are removed. Otherwise the given runs and sweeps are
-    removed, with the runs that no other sweep has, and with spreads and accuracies of the removed runs. `InputError` if
-    a given directory does not exist, or a sweep in the folder cannot be read.
+    With given runs and sweeps go the runs that no other sweep has, and the spreads and accuracies of these runs.
+    `InputError` if a given directory does not exist, or a sweep in the folder cannot be read.
     """
-    import pandas as pd
-
     contents = inventory(out)
-    is_sweep = contents["kind"] == "sweep"
-    runs_of = dict(zip(contents.loc[is_sweep, "name"], contents.loc[is_sweep, "runs"], strict=True))
-    doomed = ~is_sweep & (contents["status"] != "finished")
+    runs_of = {row["name"]: row["runs"] for row in contents if row["kind"] == "sweep"}
+    doomed = [row for row in contents if row["kind"] == "run" and row["status"] != "finished"]
     if given:
         for sweep_file in out.glob(f"*/{RECORD_NAME}"):
             read_record(sweep_file.parent)  # its runs must be known
-        named = pd.Series(contents.index.isin([row for place in given for row in _rows_at(place, contents)]))
-        names = {*contents["name"][named]}
-        doomed = named | contents["name"].isin(_with_theirs(names, runs_of) - names)
-    stays = {
-        "running": doomed & ~is_sweep & (contents["status"] == "running"),
-        "about to be restored": doomed & contents["directory"].map(_waits),
-    }
-    remove = contents[doomed & ~stays["running"] & ~stays["about to be restored"]]
-    going = {*remove["name"]}
+        named = {row["directory"]: row["name"] for place in given for row in _rows_at(place, contents)}
+        theirs = _with_theirs({*named.values()}, runs_of) - {*named.values()}
+        doomed = [row for row in contents if row["directory"] in named or row["name"] in theirs]
+    running = [row for row in doomed if row["kind"] == "run" and row["status"] == "running"]
+    waiting = [row for row in doomed if row not in running and _waits(row["directory"])]
+    remove = [row for row in doomed if row not in (*running, *waiting)]
+    going = {row["name"] for row in remove}
     needed = {name: len(going & {*runs}) for name, runs in runs_of.items() if name not in going}
     remarks = [
         f"needed by the sweep {name}, which would run them again: {count}" for name, count in needed.items() if count
     ]
-    remarks += [f"stays: {rows.sum()} {why}" for why, rows in stays.items() if rows.any()]
+    stays = {"running": running, "about to be restored": waiting}
+    remarks += [f"stays: {len(rows)} {why}" for why, rows in stays.items() if rows]
     locks = [] if given else sorted(out.glob("*.lock"))
     stale = [lock for lock in locks if on_disk.is_run_name(lock.stem) and not on_disk.is_locked(lock.with_suffix(""))]
     return Cleaning(remove, stale, remarks)
 
 
-def _rows_at(place: Path, contents: pd.DataFrame) -> list[Any]:
+def _rows_at(place: Path, contents: Sequence[Row]) -> list[Row]:
     """Rows of a directory, or of a place at which a run belongs."""
     for find in (Path, _place):
-        places = contents["directory"].map(lambda path, find=find: find(path).resolve())
-        if (rows := places == place.resolve()).any():
-            return list(contents.index[rows])
+        if rows := [row for row in contents if find(row["directory"]).resolve() == place.resolve()]:
+            return rows
     raise refused(place, "no run or sweep in the folder of runs (see walkers list)")
 
 
-def _with_theirs(names: set[str], runs_of: Mapping[str, Sequence[str]]) -> set[str]:
+def _with_theirs(names: set[str], runs_of: Mapping[str, Collection[str]]) -> set[str]:
     """Names, with the names of runs that no other sweep has, and of spreads and accuracies of runs."""
     needed = {run for sweep, runs in runs_of.items() if sweep not in names for run in runs}
     further = {run for sweep in names & runs_of.keys() for run in runs_of[sweep]} - needed
@@ -329,22 +305,23 @@ def _waits(directory: Path) -> bool:
 def clean(cleaning: Cleaning) -> dict[Path, str]:
     """Carry out a plan; return the directories that are left, with the reason (in progress, or a system error)."""
     left = {}
-    for row in cleaning.remove.to_dict("records"):
-        place = _place(row["directory"])
-        with on_disk.locked([] if row["kind"] == "sweep" else [place]) as ours:
-            if not (ours or row["kind"] == "sweep"):
-                left[row["directory"]] = "kept: a process is computing it"
+    for row in cleaning.remove:
+        directory, is_sweep = row["directory"], row["kind"] == "sweep"
+        place = _place(directory)
+        with on_disk.locked([] if is_sweep else [place]) as ours:
+            if not (ours or is_sweep):
+                left[directory] = "kept: a process is computing it"
                 continue
             try:
-                if row["kind"] == "run":
+                if not is_sweep:
                     on_disk.recover(place)
-                if row["directory"].is_symlink():
-                    row["directory"].unlink()
-                elif row["directory"].exists():
-                    (row["directory"] / MANIFEST_NAME).unlink(missing_ok=True)
-                    shutil.rmtree(row["directory"])
+                if directory.is_symlink():
+                    directory.unlink()
+                elif directory.exists():
+                    (directory / MANIFEST_NAME).unlink(missing_ok=True)
+                    shutil.rmtree(directory)
             except OSError as error:
-                left[row["directory"]] = f"cannot be removed whole: {error.strerror or error} ({error.filename})"
+                left[directory] = f"cannot be removed whole: {error.strerror or error} ({error.filename})"
     with on_disk.locked(lock.with_suffix("") for lock in cleaning.locks if lock.exists()):
         pass  # a lock file goes with its lock
     return left

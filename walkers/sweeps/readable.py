@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from functools import cache
-from math import isclose
 from typing import Any
 
 from pydantic_core import to_jsonable_python
 
-from walkers.errors import InputError, Problem, refused
 from walkers.inputs import units
 from walkers.inputs.case import Case
 from walkers.inputs.origins import text_of
@@ -85,36 +83,3 @@ def _comparable(value: Any) -> Hashable:
     if isinstance(value, (list, tuple)):
         return tuple(_comparable(item) for item in value)
     return float(f"{value:.12g}") if isinstance(value, float) else value
-
-
-def chosen(cases: Sequence[Mapping[str, Any]], condition: str) -> list[bool]:
-    """Which flattened cases have a value, ``KEY=VALUE`` as a user writes it: ``frequency=80 Hz``.
-
-    The key may be the end of a key, the value a number with its unit if it has one, a text, or a list as `readable`
-    writes it. `InputError` if the condition cannot be read, or no case has such a key.
-    """
-    key, _, text = (part.strip() for part in condition.partition("="))
-    if not (key and text):
-        raise refused("where", f'"{condition}": expected KEY=VALUE, such as "drive.frequency=80 Hz"')
-    values = [{name: value for name, value in case.items() if f".{name}".endswith(f".{key}")} for case in cases]
-    if cases and not any(values):
-        keys = ", ".join(dict.fromkeys(name for case in cases for name in case))
-        raise InputError("where", [Problem(key, None, f"no run has such a key; they have {keys}")])
-    try:
-        return [any(_is(name, value, text.strip('"')) for name, value in named.items()) for named in values]
-    except ValueError as error:
-        raise refused("where", f'"{condition}": {error}') from error
-
-
-def _is(key: str, value: Any, text: str) -> bool:
-    """Whether a value is equal to a value as text; ValueError if the text has another kind."""
-    if text in (readable(key, value), str(value)):
-        return True
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return str(value).lower() == text.lower()
-    if kind := kind_of(key):
-        return isclose(units.parse_quantity(text, kind), value, rel_tol=1e-6)
-    try:
-        return isclose(float(text), value, rel_tol=1e-6)
-    except ValueError as error:
-        raise ValueError("expected a number without a unit") from error

@@ -4,10 +4,10 @@ A sweep's directory contains ``sweep.json``: the tables of the sweep's file and 
 runs. Reading expands the file again. The status of a point is the status of its run directory. The run directories are
 beside the sweep's directory, and all sweeps of a folder share them.
 
-The table has one row per point: the varied keys and the numbers of the run. Lists, figures, reports, comparisons and
-spreads are groupings and prints of it. Its ``attrs`` describe the columns (``units``, ``meanings``) and the sweep
-(``sweep``, ``title``, ``varied``: columns of the varied keys, ``axes``: keys that vary together, ``until_below``: the
-speed (m/s) at which descents end, or None).
+The table has one row per point: the varied keys and the numbers of the run. Lists, figures, reports and spreads are
+groupings and prints of it. Its ``attrs`` describe the columns (``units``, ``meanings``) and the sweep
+(``sweep``, ``title``, ``varied``: columns of the varied keys, ``axes``: keys that vary together, ``sampled``: whether
+keys that are drawn from ranges are log-uniform, ``until_below``: the speed (m/s) at which descents end, or None).
 """
 
 from __future__ import annotations
@@ -176,13 +176,8 @@ def state_at(place: Path, directory: Path | None = None) -> PointState:
 def load(directory: str | Path) -> pd.DataFrame:
     """The table of a sweep in a directory such as ``runs/fig2``; `InputError` if there is no sweep.
 
-    Returns
-    -------
-    DataFrame
-        One row per point, in the order of the sweep. Columns are ``point``, the keys that vary (in the unit of the
-        sweep file), and (SI units) the numbers of results (`walkers.postprocess.quantities.NUMBERS`) and `STATE`.
-        ``attrs["units"]`` maps columns to units, ``attrs["meanings"]`` to their meanings; ``attrs["sampled"]`` says of
-        the keys that are drawn from ranges whether these are log-uniform. Unfinished points have NaN.
+    Columns are ``point``, the keys that vary (in the unit of the sweep file), and in SI units the numbers of results
+    (`walkers.postprocess.quantities.NUMBERS`; NaN for unfinished points) and `STATE`.
     """
     import pandas as pd
 
@@ -234,11 +229,7 @@ def _row(number: int, sweep: Sweep, state: PointState) -> dict[str, Any]:
 def groups(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
     """The points of a sweep's table in groups that differ in nothing but their seeds.
 
-    Yields
-    ------
-    tuple of dict and DataFrame
-        Values of the varied columns that distinguish the groups (units as in the table), and the rows of the group, in
-        the order of the sweep. Nothing distinguishes them if only seeds vary: then there is one group.
+    Each has the values of the varied columns that distinguish it (none if only seeds vary), and its rows.
     """
     keys = [name for name in frame.attrs["varied"] if name not in SEEDS and frame[name].nunique(dropna=False) > 1]
     if not keys:
@@ -347,10 +338,12 @@ def cells_of(frame: pd.DataFrame, named: Callable[[str], str] | None = None) -> 
     """
     import pandas as pd
 
+    main = main_columns(frame)
     shown = _SHOWN | (set(SIDES) if sides_differ(frame) else {"velocity", default_column(frame)})
+    shown |= {f"{name}_{end}" for name in main for end in ("low", "high")}
     names = [name for name in map(str, frame) if name in shown or not (is_declared(name) or name in _ASIDE)]
     varied, cells, same = frame.attrs["varied"], {}, []
-    kept = {"point", *varied, *main_columns(frame)} if "status" in names else {*names}
+    kept = {"point", *varied, *main} if "status" in names else {*names}
     short = dict(zip(varied, short_keys(varied, names), strict=True))
     for name in names:
         unit, factor = frame.attrs["units"][name], 1.0
@@ -379,15 +372,7 @@ def short_text(frame: pd.DataFrame) -> str:
 
 
 def thresholds(frame: pd.DataFrame) -> pd.DataFrame:
-    """The ends of the descents in a sweep's table; `InputError` if it has none.
-
-    Returns
-    -------
-    DataFrame
-        One row per descent: the other varied keys; ``at_rest`` and ``moving``, the first value of the lowered key at
-        which the walkers rest and the last one before it at which they move (NaN if there is none); and
-        ``gamma0_moving`` and ``gamma0_at_rest``, the dimensionless peak forces Γ0 at these values.
-    """
+    """The ends of the descents in a sweep's table, a row each, NaN where there is none; `InputError` if it has none."""
     import pandas as pd
 
     if (until_below := frame.attrs["until_below"]) is None:
