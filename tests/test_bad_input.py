@@ -436,7 +436,7 @@ def place(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[str], Pat
         if name == "run":
             run = {"cycles": 8, "settling_cycles": 2, "samples_per_cycle": 20}
             return Path(request.getfixturevalue("run_directory")(dimers={"replicates": 2}, run=run))
-        names = {"runs": ".", "sweep": "grid", "other": "three", "case": "../base.toml"}
+        names = {"runs": ".", "sweep": "grid", "case": "../base.toml"}
         return Path(request.getfixturevalue("looked_through") / names[name]).resolve()
 
     return found

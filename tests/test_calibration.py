@@ -253,9 +253,13 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
         assert [middle, said["sets"][PROPOSED[0]][name]] == pytest.approx([true, true], rel=0.25), name
         assert f"{middle:.3g} ({low:.3g} to {high:.3g})" in summary
     assert said["agree"]["guess"] < said["agree"][PROPOSED[0]]
-    assert f"{said['agree']['guess']} of 5 measured facts agree" in summary
+    assert f"{said['agree']['guess']} of 5 measured facts agree within their deviation" in summary
     best, values = load_case(to / "best.toml"), said["sets"][PROPOSED[0]]
-    assert best.contact.friction.bead_wall == pytest.approx(values["friction"], rel=1e-5)
+    assert best.contact.friction.bead_wall == pytest.approx(values["friction"], rel=1e-3)
+    for key, name in (("contact.friction.bead_bead", "friction"), ("liquid.viscosity_ratio", "drag")):
+        low, _, high = said["posterior"][name]
+        ends = min(low, values[name]), max(high, values[name])
+        assert best.uncertain[key]["loguniform"] == pytest.approx(ends, rel=1e-3)
     assert list(pd.read_parquet(to / "posterior.parquet").columns) == list(TRUE)
     predicted = {row["name"]: row["predicted"] for row in said["observations"] if row["predicted"]}
     assert predicted["ratio"][0] < document["observations"][3]["value"] < predicted.pop("ratio")[2]

@@ -209,13 +209,16 @@ def test_bands_along_a_sweep_are_those_of_each_points_spread(tmp_path: Path) -> 
     case = tmp_path / "base.toml"
     case.write_text(to_toml(document(run=TINY, uncertain={FRICTION: [0.05, 0.3]})))
     tables = {"case": str(case), "axes": {"drive.peak_acceleration": ["3 g", "6 g"]}}
-    table = walkers.sweep(tables, tmp_path, spread=4).table()
+    sweep = walkers.sweep(tables, tmp_path, spread=4)
+    table = sweep.table()
     for row in table.itertuples():
         spread = read_json(spread_of(tmp_path / Path(row.run).name) / SPREAD_NAME)["bands"]["velocity"]
         assert row.velocity_low == min(spread["low"], row.velocity)
         assert row.velocity_high == max(spread["high"], row.velocity)
         assert row.velocity_low < row.velocity_high
     assert table["velocity_high"].is_monotonic_increasing
+    assert "velocity_low (mm/s)  velocity_high (mm/s)" in sweep.describe()
+    assert sweep.figure().get_suptitle().endswith("bands: 5 to 95 % of 4 draws of the uncertain values")
 
 
 def test_points_that_differ_in_their_seed_alone_are_a_group() -> None:

@@ -76,7 +76,8 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     assert "velocity" not in shown
     for name in ("axial_velocity", "axial_left_facing"):
         assert float(shown[name]) == float(rounded(1e3 * result[name], "mm/s"))
-    assert " mm/s facing up " in as_text(inventory(tmp_path))
+    up, down = (rounded(1e3 * result[name], "mm/s") for name in ("right_facing", "left_facing"))
+    assert f" {up} mm/s facing up, {down} facing down " in as_text(inventory(tmp_path))
     # The band of a spread is that of one side.
     own = result["right_facing"]
     spread = spread_of(done.directory.resolve())

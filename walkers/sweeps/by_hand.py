@@ -185,8 +185,8 @@ def _ran(case: Case, values: Mapping[str, float], source: str) -> tuple[Case, li
     for name, key in keys.items():  # a deck has no Γ0: the acceleration is that for the density for which it was made
         if key.endswith("peak_acceleration") and case.document["drive"].get("waveform", "sine") == "sine":
             end = name.removeprefix("peak_acceleration")
-            own = values[f"amplitude{end}"] * (2.0 * pi * values[f"frequency{end}"]) ** 2
-            numbers[key] = own if f"amplitude{end}" in edited else values[name]
+            implied = values[f"amplitude{end}"] * (2.0 * pi * values[f"frequency{end}"]) ** 2
+            numbers[key] = implied if f"amplitude{end}" in edited else values[name]
     changes: dict[str, Any] = {
         key: f"{number!r} {kind.unit}" if (kind := kind_of(key)) else number for key, number in numbers.items()
     }
