@@ -393,8 +393,8 @@ class Run:
     def export(self, form: Export, to: str | Path | None = None, **options: Any) -> Path:
         """Write the run for other programs; the functions of `EXPORTS` take the options, such as ``every``.
 
-        ``to`` is a file, or the folder for ``vtk`` and ``deck``. None: in the run directory, for ``archive`` and ``deck``
-        in the current folder.
+        ``to`` is a file, for ``vtk`` and ``deck`` a folder. None: in the run directory, for ``archive`` and ``deck`` in
+        the current folder.
 
         Examples
         --------

@@ -177,7 +177,7 @@ def load(directory: str | Path) -> pd.DataFrame:
     """The table of a sweep in a directory such as ``runs/fig2``; `InputError` if there is no sweep.
 
     Columns are ``point``, the keys that vary (in the unit of the sweep file), and in SI units the numbers of results
-    (`walkers.postprocess.quantities.NUMBERS`; NaN for unfinished points) and `STATE`.
+    (NaN for unfinished points) and `STATE`.
     """
     import pandas as pd
 
