@@ -43,8 +43,10 @@ figures: setup .venv/with-theory ## The paper's figures, and its facts beside ou
 calibrate: setup .venv/with-calibrate ## Calibrate friction and drag to the published numbers (CALIBRATION=ruby); goes on where it was interrupted
 	@$(WALKERS) calibrate $(CALIBRATION) --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
 
-# Tests start hundreds of Python processes; each would compile its imports where the environment forbids bytecode.
+# Tests start hundreds of Python processes; each would compile its imports where the environment forbids bytecode. Tests
+# that run beside others have no cores for the threads of NumPy's libraries.
 test test-slow: export PYTHONDONTWRITEBYTECODE :=
+test test-slow: export OMP_NUM_THREADS := 1
 
 .PHONY: test
 test: setup cluster chromium .venv/with-dev ## Lint, check types, run the tests (a 2-bead smoke test first)

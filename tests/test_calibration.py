@@ -198,7 +198,7 @@ strong = { drive.peak_acceleration = "6 g" }
 friction = 0.2
 drag     = 1.0
 [design]
-points   = 24
+points   = 16
 seed     = 2
 held_out = ["r"]
 """)
@@ -245,7 +245,7 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     ]
     assert "| fact | measured |" in (to / "calibration.md").read_text()
     said = json.loads((to / "calibration.json").read_text())
-    assert (said["number"], said["of"], len(said["observations"])) == (25, 5, 6)
+    assert (said["number"], said["of"], len(said["observations"])) == (17, 5, 6)
     assert said["effective_samples"][0] > 400.0
     for name, true in TRUE.items():
         low, middle, high = said["posterior"][name]
@@ -298,7 +298,7 @@ LONE = {"name": "v", "group": "v", "of": ["slow"], "value": "1 mm/s", "deviation
 
 def test_beads_that_came_apart_are_no_walker(tmp_path: Path) -> None:
     """They roll fast, each for itself; there is nothing to be observed."""
-    few = {"dimers": {"replicates": 1}, "run": {"cycles": 40, "settling_cycles": 20, "samples_per_cycle": 10}}
+    few = {"dimers": {"replicates": 1}, "run": {"cycles": 28, "settling_cycles": 20, "samples_per_cycle": 10}}
     wet = {"liquid": {"volume_fraction": 0.01, "law": "soulie"}, "contact": {"rolling_friction": 0.003}}
     strong = {"slow": {"drive.peak_acceleration": "10 g"}}
     found = small(tmp_path, case="fig4b", experiments=strong, observations=[LONE], design={}, set=few | wet)

@@ -11,12 +11,14 @@ import shutil
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from io import BytesIO
 from itertools import pairwise
 from math import nan, pi
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 from scipy.spatial.transform import Rotation
 
@@ -213,8 +215,8 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture
 def visit(browser: Browser) -> Iterator[Callable[..., Page]]:
     """Open a file; what it asked a network for, and what it complained of, is looked at in the end."""
-    # A processor draws each pixel: a quarter of them.
-    context = browser.new_context(offline=True, viewport={"width": 480, "height": 420}, device_scale_factor=0.5)
+    # A processor draws each pixel: a sixteenth of them.
+    context = browser.new_context(offline=True, viewport={"width": 480, "height": 420}, device_scale_factor=0.25)
     context.set_default_timeout(MILLISECONDS)
     asked: list[str] = []
     complaints: list[str] = []
@@ -253,30 +255,24 @@ def rested(page: Page, *others: bytes) -> bytes:
     return wait_for(same)
 
 
-def begun(page: Page) -> bytes:
-    """The first picture of a scene, which plays after."""
-    page.wait_for_selector(".scene[data-ready]")
-    begin = rested(page)
-    assert (page.locator(".play").text_content(), page.locator(".time").text_content()) == ("Play", "0.0000 s")
-    page.locator(".slower").select_option("1000")  # a busy machine shows a frame in seconds
-    page.locator(".play").click()
-    expect(page.locator(".play")).to_have_text("Pause")
-    wait_for(lambda: picture(page) != begin)
-    return begin
-
-
-def test_a_pile_plays(pile_report: Path, visit: Callable[..., Page]) -> None:
-    begun(visit(pile_report))
-
-
-def test_a_sweeps_points_open_reports_in_which_beads_play_pause_and_turn(
-    swept_report: Path, visit: Callable[..., Page]
+def test_a_pile_is_drawn_and_a_sweeps_points_open_reports_in_which_beads_play_pause_and_turn(
+    pile_report: Path, swept_report: Path, visit: Callable[..., Page]
 ) -> None:
+    page = visit(pile_report)
+    page.wait_for_selector(".scene[data-ready]")
+    wait_for(lambda: len(np.unique(Image.open(BytesIO(picture(page))))) > 9)
+    page.close()
     page = visit(swept_report, ready=False)
     assert page.evaluate("window.hostile") is None
     assert page.locator("h1").text_content() == HOSTILE
     page.locator("table.sweep a").click()
-    begin, play, time = begun(page), page.locator(".play"), page.locator(".time")
+    page.wait_for_selector(".scene[data-ready]")
+    begin, play, time = rested(page), page.locator(".play"), page.locator(".time")
+    assert (play.text_content(), time.text_content()) == ("Play", "0.0000 s")
+    page.locator(".slower").select_option("1000")  # a busy machine shows a frame in seconds
+    play.click()
+    expect(play).to_have_text("Pause")
+    wait_for(lambda: picture(page) != begin)
 
     def pause() -> str | None:
         """The time at which it pauses; it goes on if that is the beginning, to which it returns."""

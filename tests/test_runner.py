@@ -344,7 +344,7 @@ STRANGE_ENGINES = {
 def test_strange_engines_are_ended_and_told(front: Front, tmp_path: Path, name: str) -> None:
     script, kind, told = STRANGE_ENGINES[name]
     # An engine starts within seconds even on a busy machine.
-    bounds = {"silence": {"says nothing": 0.5, "stops saying anything": 8.0}.get(name, 60.0), "log_limit": 2e6}
+    bounds = {"silence": {"says nothing": 0.5, "stops saying anything": 4.0}.get(name, 60.0), "log_limit": 2e6}
     with pytest.raises(kind, match=told) as failure:
         _launch(make_case(run=SHORT), tmp_path / "runs", engine=front(script), time_limit=PATIENCE, **bounds)
     assert "last line" not in str(failure.value)

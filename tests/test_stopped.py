@@ -61,6 +61,7 @@ FILES: dict[str, dict[str, Any]] = {
     },
 }
 FILES["pile"]["liquid"] |= {"conserved": True, "law": "willett"}
+FILES["pile"]["mixture"] |= {"count": 20}
 SWEEP, SITE = "sweep sweep.toml -j 2", "sweep sweep.toml --site site.py"
 STOPS: dict[str, tuple[str, int, str, str, int, str]] = {
     # Command, engines at that time, signals, to whom, exit status, last line.
@@ -73,7 +74,6 @@ STOPS: dict[str, tuple[str, int, str, str, int, str]] = {
     "a sweep, Ctrl-C": (SWEEP, 2, "INT", "group", 130, "interrupted"),
     "a sweep, killed": (SWEEP, 2, "KILL", "program", -9, ""),
     "a sweep, output removed": (SWEEP, 2, "", "output", 1, "was removed while it was written"),
-    "pilots, Ctrl-C": (SITE, 2, "INT", "group", 130, "interrupted"),
     "pilots, killed": (SITE, 2, "KILL", "program", -9, ""),
 }
 
