@@ -240,7 +240,7 @@ VESSELS: list[tuple[str | None, dict[str, Any], dict[str, Any], str]] = [
 ]  # fmt: skip
 """Mesh, boundary, other tables, and what is said."""
 LAW = """
-import dataclasses, random, sys
+import dataclasses, sys
 import numpy as np
 from walkers.physics.bridge import Curve, Forces
 
@@ -260,7 +260,6 @@ LAWS: list[tuple[str, str]] = [
     ("def law(surfaces): return Curve(lambda gaps: gaps, 1e-4)", "forces are ndarray; expected"),
     ("def law(surfaces): return Curve(lambda gaps: forces(gaps, np.nan), 1e-4)", "the pull is not a number"),
     ("def law(surfaces): return Curve(lambda gaps: forces(gaps, 1j), 1e-4)", "the pull has type complex128"),
-    ("K = random.random()\ndef law(surfaces): return Curve(lambda gaps: forces(gaps, K), 1e-4)", "other numbers"),
 ]
 LONG = "x" * 100_000
 

@@ -16,8 +16,7 @@ from walkers.inputs.keys import Value, flatten
 from walkers.inputs.units import as_quantity
 
 if TYPE_CHECKING:
-    import numpy as np
-    import numpy.typing as npt
+    from walkers.physics.bridge import FloatArray
 
 MOST_POINTS = 1_000_000
 _SPACINGS = ("linspace", "geomspace")
@@ -36,7 +35,7 @@ class Range(NamedTuple):
     logarithmic: bool
     median: float | None = None
 
-    def at(self, shares: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def at(self, shares: FloatArray) -> FloatArray:
         """Quantiles of the range."""
         import numpy as np
 
@@ -211,7 +210,7 @@ def ranges_of(ranges: Mapping[str, Any]) -> dict[str, Range]:
     return spans
 
 
-def unit_cube(dimensions: int, points: int, seed: int) -> npt.NDArray[np.float64]:
+def unit_cube(dimensions: int, points: int, seed: int) -> FloatArray:
     """Points of Sobol's sequence in the unit cube, shape (points, dimensions), scrambled with a seed."""
     import numpy as np
     from scipy.stats import qmc

@@ -47,15 +47,15 @@ _DiameterRange = Annotated[tuple[Diameter, Diameter], AfterValidator(_ascending)
 
 
 class Arrangement(NamedTuple):
-    """Arrangement of ``fewest`` to ``most`` beads: positions from radii and `Apart`."""
+    """Positions of ``fewest`` to ``most`` beads, from radii and `Apart`."""
 
     places: Callable[[Sequence[float], Apart], Places]
     fewest: int
-    meaning: str
     most: int = 100
 
 
 def _chain(radii: Sequence[float], apart: Apart) -> Places:
+    """One behind the other, the first in front."""
     along = [apart(0, 1) * radii[0] / (radii[0] + radii[1])]
     for bead in range(len(radii) - 1):
         along.append(along[-1] - apart(bead, bead + 1))
@@ -123,10 +123,10 @@ def touching(places: Sequence[tuple[float, float]], radii: Sequence[float], slac
 
 
 ARRANGEMENTS: Mapping[str, Arrangement] = {
-    "chain": Arrangement(_chain, 2, "one behind the other, the first in front"),
-    "fan": Arrangement(_fan, 2, "the first in front, the others side by side behind it"),
-    "diamond": Arrangement(_diamond, 4, "one in front, two side by side behind it, one at the back", most=4),
-    "ring": Arrangement(_ring, 3, "in a ring, the first in front"),
+    "chain": Arrangement(_chain, 2),
+    "fan": Arrangement(_fan, 2),
+    "diamond": Arrangement(_diamond, 4, most=4),
+    "ring": Arrangement(_ring, 3),
 }
 """Arrangements by their names in case files."""
 

@@ -18,12 +18,8 @@ from walkers.inputs.drive import Vector
 from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, key, within
 
 if TYPE_CHECKING:
-    import numpy as np
-    import numpy.typing as npt
-
     from walkers.inputs.vessel import Facet, Vessel
-
-    FloatArray = npt.NDArray[np.float64]
+    from walkers.physics.bridge import FloatArray
 
 FLOOR = "floor"
 LOOSE = 1.03
@@ -98,7 +94,12 @@ SIZES: Mapping[str, Collection[str]] = {
 _VESSEL = Choice((("mesh", "scale"), ("planes", "height")))
 _AREAS = {"box": 1.0, "cylinder": pi / 4.0, "octagon": 2.0 * (sqrt(2.0) - 1.0)}
 """Of the cross-sections of containers, in squares of their width."""
-_CORNERS = {"+x+y": (1.0, 1.0), "+x-y": (1.0, -1.0), "-x+y": (-1.0, 1.0), "-x-y": (-1.0, -1.0)}
+_ACROSS = {"-y": (0.0, 1.0), "+y": (0.0, -1.0)}
+_BOX = {"-x": (1.0, 0.0), "+x": (-1.0, 0.0), **_ACROSS}
+_CUT = sqrt(0.5)
+_CORNERS = {"+x+y": (-_CUT, -_CUT), "+x-y": (-_CUT, _CUT), "-x+y": (_CUT, -_CUT), "-x-y": (_CUT, _CUT)}
+_SIDES_OF = {"channel": _ACROSS, "box": _BOX, "octagon": {**_BOX, **_CORNERS}}
+"""Flat side walls by their names: normals in the plane of the floor, from which each is half of the width."""
 
 
 class Plane(Table):
@@ -191,19 +192,13 @@ class Boundary(Table):
         if self.shape == "groove":
             across, up = cos(self.opening / 2.0), sin(self.opening / 2.0)
             return (Flat(BOTTOM.point, (0.0, across, up), "-y"), Flat(BOTTOM.point, (0.0, -across, up), "+y"))
-        walls: list[Wall] = [BOTTOM]
         half = (self.width or inf) / 2.0
         if self.shape == "cylinder":
-            walls += [Round(half)]
-        if self.shape in ("box", "octagon"):
-            walls += [Flat((-half, 0.0, 0.0), (1.0, 0.0, 0.0), "-x"), Flat((half, 0.0, 0.0), (-1.0, 0.0, 0.0), "+x")]
-        if self.shape in ("channel", "box", "octagon"):
-            walls += [Flat((0.0, -half, 0.0), (0.0, 1.0, 0.0), "-y"), Flat((0.0, half, 0.0), (0.0, -1.0, 0.0), "+y")]
-        if self.shape == "octagon":  # as a box, and walls across its corners
-            for name, corner in _CORNERS.items():
-                x, y = (sqrt(0.5) * along for along in corner)
-                walls.append(Flat((half * x, half * y, 0.0), (-x, -y, 0.0), name))
-        return tuple(walls)
+            return BOTTOM, Round(half)
+        sides = _SIDES_OF.get(self.shape, {})
+        return BOTTOM, *(
+            Flat((-half * x + 0.0, -half * y + 0.0, 0.0), (x, y, 0.0), name) for name, (x, y) in sides.items()
+        )
 
     def damping(self, radius: float) -> float:
         """Damping of a bead of a radius (m) by the walls that it touches at once, over that by one of them.

@@ -22,11 +22,9 @@ from walkers.inputs.table import Choice, Filled, Indirect, Table, key
 from walkers.inputs.units import Angle, Coefficient
 
 if TYPE_CHECKING:
-    import numpy as np
-    import numpy.typing as npt
     from scipy.interpolate import PPoly
 
-    FloatArray = npt.NDArray[np.float64]
+    from walkers.physics.bridge import FloatArray
 
 Vector = tuple[float, float, float]
 Frame = Literal["lab", "container"]

@@ -17,9 +17,9 @@ from walkers.inputs.table import SAME_RUN, Table
 from walkers.inputs.units import ACCELERATION, TIME, parse_quantity
 
 if TYPE_CHECKING:
-    import numpy as np
-    import numpy.typing as npt
     from scipy.interpolate import PPoly
+
+    from walkers.physics.bridge import FloatArray
 
 FEWEST, MOST = 16, 100_000
 """Numbers of rows."""
@@ -98,7 +98,7 @@ class Record(Table):
             cycles = peak + 0.5 * float((left - right) / (left - 2.0 * top + right))
         return cycles / self.length, float(high[-1]) / self.length
 
-    def motion(self, time: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def motion(self, time: FloatArray) -> FloatArray:
         """Displacement, velocity and acceleration along x, y and z at times (s), shape (3, N, 3)."""
         import numpy as np
 
@@ -106,14 +106,14 @@ class Record(Table):
         return np.stack([self.course(time, order, extrapolate=beyond) for order in range(3)])
 
 
-def course_text(times: npt.NDArray[np.float64], powers: npt.NDArray[np.float64], repeats: bool = False) -> str:
+def course_text(times: FloatArray, powers: FloatArray, repeats: bool = False) -> str:
     """A course as the engine reads it: a period or 0, then each piece's time and powers, given the highest first."""
     powers = powers[::-1].tolist() + [[0.0] * powers.shape[1]] * (6 - len(powers))
     rows = zip(times.tolist(), *powers, strict=False)
     return "\n".join([repr(float(times[-1] * repeats)), *(" ".join(map(repr, row)) for row in rows)]) + "\n"
 
 
-def _spline(rows: npt.NDArray[np.float64], repeats: bool = False) -> PPoly:
+def _spline(rows: FloatArray, repeats: bool = False) -> PPoly:
     """The acceleration through rows, shape (N, 4), without its mean."""
     from scipy.interpolate import CubicSpline
 

@@ -280,8 +280,7 @@ def _walkers(case: Case) -> Case:
 
 
 def _check_arrangement(cluster: Cluster, key: str) -> None:
-    name = cluster.arrangement
-    arrangement = ARRANGEMENTS.get(name)
+    name, arrangement = cluster.arrangement, ARRANGEMENTS.get(cluster.arrangement)
     if arrangement is None:
         raise unusable(f"{key}.arrangement", expected_of(name, ARRANGEMENTS))
     key = f"{key}.radii"

@@ -38,7 +38,6 @@ class Standing(NamedTuple):
     beads: tuple[StandingBead, ...]
     facing: int = 0
     angle: float = 0.0
-    walks: bool = False
 
 
 def standing(case: Case) -> Iterator[tuple[int, Standing]]:
@@ -78,7 +77,7 @@ def _walkers(case: Case, walkers: Walkers, first: int) -> Iterator[Standing]:
             StandingBead(along * ahead - aside * left, along * left + aside * ahead, *rest)
             for (along, aside), *rest in zip(walkers.places(heights, overlaps), heights, walkers.radii, strict=True)
         ]
-        yield Standing(tuple(beads), facing, angle, walks=True)
+        yield Standing(tuple(beads), facing, angle)
 
 
 @lru_cache(maxsize=4096)

@@ -160,7 +160,7 @@ def load_sweep(sweep: str | Path | Mapping[str, Any], changes: Mapping[str, Valu
         with blaming(source):
             if not isinstance(document.get("set", {}), Mapping):
                 raise unusable("set", "expected a table of keys")
-            document = {**document, "set": {**settings_in(document.get("set", {})), **changes}}
+            document = {**document, "set": {**flatten(document.get("set", {})), **changes}}
         name = _name_with(name, changes)
     expanded = expand(document, source=source, name=name, folder=path.parent)
     if varied := {key: value for key, value in (changes or {}).items() if key in expanded.keys}:
@@ -197,12 +197,11 @@ def expand(
     path = None if base else _base(file.case, source, folder)
     try:
         with blaming(source):
-            axes, settings = file.all_axes(), settings_in(file.set)
+            axes, settings = file.all_axes(), flatten(file.set)
             keys, rows = combinations(axes)
-            for key in keys:
-                if key == "title":
-                    raise unusable(key, f"expected another key, for {key} does not determine a run")
-            apply_all(partial(check_key, Case), [key for key in (*settings, *keys) if key != "library"])
+            if "title" in keys:
+                raise unusable("title", "expected another key, for title does not determine a run")
+            apply_all(partial(check_key, Case), (*settings, *keys))
             for key in keys:
                 for alternative in alternatives(Case, key) & {*keys}:
                     raise unusable(key, f"expected one of {key} and {alternative}, which replace each other")
@@ -215,12 +214,6 @@ def expand(
         raise refused(source, "has infinitely nested tables") from error
     until = file.descend.until_below if file.descend else None
     return Sweep(name, source, case_name, given, document, tables, axes, rows, until)
-
-
-def settings_in(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Dotted keys of a case's tables, the user's own library in them as it is."""
-    library = {"library": tables["library"]} if "library" in tables else {}
-    return library | flatten({key: value for key, value in tables.items() if key != "library"})
 
 
 def _base(case: str, source: str, folder: Path) -> Path:

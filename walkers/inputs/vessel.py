@@ -23,11 +23,11 @@ import numpy.typing as npt
 
 from walkers.errors import InputError, unusable
 from walkers.inputs.drive import Vector
+from walkers.physics.bridge import FloatArray
 
 if TYPE_CHECKING:
     import pyvista as pv
 
-FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 Half = tuple[Vector, Vector, float]
 """A point, a direction and a bound: a place is in it if its offset from the point is above the bound along it."""

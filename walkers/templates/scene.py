@@ -106,20 +106,20 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
     surfaces = tuple(dict.fromkeys(surface_of(case) for case in cases))
     loadings = tuple(dict.fromkeys(loading_of(case) for case in cases))
     bodies = [(case, make, body) for case in cases for make, body in standing(case)]
-    walking = sum(body.walks for _, _, body in bodies)
+    walking = sum(bool(body.facing) for _, _, body in bodies)
     spacing = max((walkers.spacing for case in cases for walkers in case.walkers), default=0.0)
     boundary = cases[0].boundary
     grid = boundary.grid(walking, spacing) if walking else []
     walkers: list[PlacedWalker] = []
     beads: list[Bead] = []
     for case, make, body in bodies:
-        x, y = origin = grid[len(walkers)] if body.walks else (0.0, 0.0)
+        x, y = origin = grid[len(walkers)] if body.facing else (0.0, 0.0)
         surface, loading = 1 + surfaces.index(surface_of(case)), loadings.index(loading_of(case))
         ids = tuple(range(1 + len(beads), 1 + len(beads) + len(body.beads)))
         for number, bead in zip(ids, body.beads, strict=True):
             centre = (x + bead.x, y + bead.y, bead.z)
             beads.append(Bead(number, centre, bead.radius, surface=surface, loading=loading))
-        if body.walks:
+        if body.facing:
             walkers.append(PlacedWalker(len(walkers), make, ids, body.facing, body.angle, origin))
     room = _room(cases, grid, spacing)
     return Scene(tuple(beads), boundary.walls, *room, surfaces, loadings), tuple(walkers)

@@ -73,9 +73,9 @@ def source_sha256(name: str) -> str | None:
 @lru_cache(maxsize=64)
 def _of_user(name: str, place: str, file: Path | None, sha256: str | None) -> BridgeLaw:
     """A user's law with this content (``sha256``) of its file."""
-    from walkers.physics.user_law import checked, loaded
+    from walkers.physics.user_law import loaded
 
     del sha256
     if not place.startswith("walkers."):
         warnings.warn(f"executes {file or place}, the bridge law of the case", ExecutedLawWarning, stacklevel=3)
-    return checked(loaded(name, place))
+    return loaded(name, place)
