@@ -86,6 +86,26 @@ def test_list_has_a_column_for_each_value_that_differs(out: Path) -> None:
     assert f"\n{run}  finished" in call("list", check=True).stdout
 
 
+@pytest.mark.parametrize(
+    ("where", "number"),
+    [
+        (("drive.frequency=0.08 kHz", "friction.bead_wall=0.1", "radii=0.3 mm, 0.2 mm"), 4),
+        (("friction.bead_wall=0.2",), 6),
+        (("friction.bead_wall=0.3",), 0),
+        (("colour=red",), '"colour=red": no run has such a key'),
+        (("friction.bead_wall=5 mm",), 'friction.bead_wall=5 mm": expected a number without a unit'),
+    ],
+    ids=str,
+)
+def test_list_selects_by_values(out: Path, where: tuple[str, ...], number: int | str) -> None:
+    ended = call("list", "--json", *(word for condition in where for word in ("--where", condition)))
+    if isinstance(number, str):
+        assert number in ended.stderr
+        assert ended.returncode == 2
+    else:
+        assert len(json.loads(ended.stdout)) == number
+
+
 def test_a_resting_walker_is_called_so_everywhere(out: Path) -> None:
     Path("rest.toml").write_text('case = "base.toml"\n[axes]\ndrive.peak_acceleration = ["0.2 g", "0.3 g"]\n')
     call("sweep", "rest.toml", check=True)

@@ -20,6 +20,7 @@ def list_(
     *,
     out: Out = DEFAULT_OUT,
     every: Annotated[bool, Parameter("--all")] = False,
+    where: Annotated[list[str] | None, Parameter(metavar="KEY=VALUE")] = None,
     to: Path | None = None,
     as_json: Json = False,
 ) -> None:
@@ -31,19 +32,24 @@ def list_(
         A sweep (name or folder): print the status of its points and its table.
     every
         Include the runs of sweeps.
+    where
+        Only runs with this value, such as "drive.frequency=80 Hz". Repeatable.
     to
         Write the table of the sweep, with units, to this file (.csv, .parquet, .json).
     """
     from walkers.sweeps import folder
 
     if sweep is not None:
-        refuse("--all", every, "is for folders, not for a sweep")
+        refuse_any({"where": where, "all": every}, "is for folders, not for a sweep")
         _list_points(sweep, out, to, as_json)
         return
     refuse("--to", to is not None, "expected a sweep, whose table is written")
     contents = folder.inventory(out)
     shown = contents if every else folder.without_members(contents)
-    print_as(as_json, lambda: folder.as_json(shown), lambda: folder.as_text(shown, len(contents) - len(shown)))
+    hidden = len(contents) - len(shown)
+    if where:
+        shown, hidden = folder.select(contents, where), 0
+    print_as(as_json, lambda: folder.as_json(shown), lambda: folder.as_text(shown, hidden))
 
 
 def _list_points(name: str, out: Path, to: Path | None, as_json: bool) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import ceil, prod
 from pathlib import Path
@@ -14,11 +15,12 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 import numpy.typing as npt
 
-from walkers.errors import expected_of, refused
+from walkers.errors import InputError, expected_of, refused
 from walkers.inputs.case import Case
 from walkers.inputs.library import unmeasured
 from walkers.postprocess.drawing import TWO_COLUMNS, errors_seen, letter_panels, new_figure, plain_text, styled
 from walkers.postprocess.quantities import declared, is_declared, scatter_of, unit_shown
+from walkers.postprocess.results import derived
 from walkers.postprocess.uncertainty import SPREAD_NAME, spread_of
 from walkers.runner.directory import case_of
 from walkers.runner.files import read_json
@@ -51,6 +53,9 @@ _DOWN: dict[str, Any] = {"marker": "v", "color": "0.3", "label": "started facing
 _MOST_PANELS = 12
 _MARKERS = "osD^vXP<>*"
 _MODELS = (("--", "_"), (":", "+"))  # line of each model, and its symbol if points are not joined
+_CURVE = 61  # points of a model's curve
+_OF_SHAPE = ("radii", "volume_fraction", "meniscus_radius", "contact_angle")
+"""Ends of the keys that change the shape of bridges, each of which takes a tenth of a second to solve."""
 _MOST_COLOURS = 10  # of the style
 _ROUNDING = 1e-12  # relative to the largest number
 _LEAST_RANGE = 1e-4  # smallest range of the y axis relative to the mean, so that rounding errors are not shown
@@ -136,9 +141,9 @@ def figure_of(table: pd.DataFrame, options: FigureOptions = FigureOptions(), pre
     *layout, undistinguished = layout_of(table, done, options)
     if undistinguished:
         _tell(f"not distinguished: {'; '.join(undistinguished)}")
-    theory = _predicted(done, column, predict) if predict else {}
-    down = None if options.y else FACING_DOWN.get(column)
-    return _draw(done, column, layout, theory, down=down, log=options.log or "")
+    log, down = options.log or "", None if options.y else FACING_DOWN.get(column)
+    theory = _Theory.at_points(done, column, log, predict) if predict else None
+    return _draw(done, column, layout, theory, down=down, log=log)
 
 
 def column_of(table: pd.DataFrame, name: str | None) -> str:
@@ -299,13 +304,48 @@ def rank_correlation(first: Any, second: Any) -> float:
     return 0.0 if np.isnan(rank) else float(rank)
 
 
-def _predicted(done: pd.DataFrame, column: str, predict: Predict) -> dict[str, FloatArray]:
-    """Predictions of models at the points, in the displayed unit."""
-    predicted, remarks = predict([case_of(Path(run)) for run in done["run"]], column)
-    for remark, number in remarks.items():
-        _tell(f"{number} of {len(done)} points: {remark}")
-    factor = unit_shown(done.attrs["units"].get(column) or "")[1]
-    return {model: factor * values for model, values in predicted.items()}
+@dataclass(frozen=True)
+class _Theory:
+    """Predictions of models for the points (``values``, in the displayed unit), and between them."""
+
+    predict: Predict
+    done: pd.DataFrame
+    column: str
+    log: str
+    values: Mapping[str, FloatArray]
+
+    @classmethod
+    def at_points(cls, done: pd.DataFrame, column: str, log: str, predict: Predict) -> _Theory | None:
+        """The theory of the points; None if it has no such number, which a warning says."""
+        predicted, remarks = predict([case_of(Path(run)) for run in done["run"]], column)
+        for remark, number in remarks.items():
+            _tell(f"{number} of {len(done)} points: {remark}")
+        factor = unit_shown(done.attrs["units"].get(column) or "")[1]
+        values = {model: factor * values for model, values in predicted.items()}
+        return cls(predict, done, column, log, values) if values else None
+
+    def curves(self, rows: npt.NDArray[np.int64], x: Factor) -> tuple[FloatArray, Mapping[str, FloatArray]]:
+        """Values of x and the predictions there: a fine curve if the points differ in one number, else the points.
+
+        If x is no key, such as Γ0, the key that varies is changed.
+        """
+        units, points = self.done.attrs["units"], self.done.iloc[rows]
+        places = np.array(x.values, float)[rows], {model: values[rows] for model, values in self.values.items()}
+        moving = [key for key in self.done.attrs["varied"] if points[key].nunique() > 1]
+        if len(moving) != 1 or points[moving[0]].dtype.kind not in "if" or moving[0].endswith(_OF_SHAPE):
+            return places
+        (key,), case = moving, case_of(Path(points["run"].iloc[0]))
+        space = np.geomspace if "x" in self.log and points[key].min() > 0.0 else np.linspace
+        cases: list[tuple[float, Case]] = []
+        for value in space(points[key].min(), points[key].max(), _CURVE).tolist():
+            with suppress(InputError, ValueError):  # a value that no case may have
+                cases.append((value, case.changed({key: f"{value!r} {units[key] or ''}".strip()})))
+        if not cases or not (x.keys[0] == key or x.keys[0] in derived(case)):
+            return places
+        predicted, _ = self.predict([moved for _, moved in cases], self.column)
+        factors = [unit_shown(units.get(name) or "")[1] for name in (x.keys[0], self.column)]
+        along = [value if x.keys[0] == key else factors[0] * derived(moved)[x.keys[0]] for value, moved in cases]
+        return np.array(along), {model: factors[1] * values for model, values in predicted.items()}
 
 
 def _points(done: pd.DataFrame, column: str, down: str | None) -> tuple[str, pd.DataFrame]:
@@ -342,7 +382,7 @@ def _draw(
     done: pd.DataFrame,
     column: str,
     layout: Sequence[Any],
-    theory: Mapping[str, FloatArray],
+    theory: _Theory | None,
     *,
     down: str | None,
     log: str,
@@ -379,10 +419,10 @@ def _draw(
             axes.set_ylabel(plain_text("\n".join(wrap(label, _LETTERS))))
         _scale_x(axes, x, log)
     letter_panels(grid.flat[: len(parts)] if len(parts) > 1 else ())
-    _scale_y(grid[0, 0], points, [*theory.values()][:1], log)
+    _scale_y(grid[0, 0], points, list(theory.values.values())[:1] if theory else [], log)
     for axes in grid.flat[len(parts) :]:
         axes.set_axis_off()
-    _legend(figure, grid, hue, looks, list(theory), down="down" in points)
+    _legend(figure, grid, hue, looks, list(theory.values) if theory else [], down="down" in points)
     texts = [done.attrs["title"]]
     if "low" in points:
         texts.append(f"bands: 5 to 95 % of {_draws(done, column)} draws of the uncertain values")
@@ -429,7 +469,7 @@ def _series(
     drawn: npt.NDArray[np.bool_],
     aside: float,
     points: pd.DataFrame,
-    theory: Mapping[str, FloatArray],
+    theory: _Theory | None,
     look: Mapping[str, Any],
 ) -> None:
     """Means with error bars, joined by lines unless there is a theory, and the predictions of the theory.
@@ -452,8 +492,11 @@ def _series(
     if "down" in shown:
         shape = {"marker": _DOWN["marker"], "mfc": "none", "ls": "--" if is_line else "none"}
         axes.plot(at, shown["down"], lw=0.9, **{**look, **shape})
-    for number, values in enumerate(theory.values()):
-        axes.plot(at, values[rows], zorder=1, **_model_look(number, is_line, look["color"]))
+    if theory is None:
+        return
+    along, models = theory.curves(rows, x) if is_line else (at, {m: v[rows] for m, v in theory.values.items()})
+    for number, values in enumerate(models.values()):
+        axes.plot(along, values, zorder=1, **_model_look(number, is_line, look["color"]))
 
 
 def _model_look(number: int, is_line: bool, colour: Any) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import shutil
 import time
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +28,7 @@ from walkers.runner import directory as on_disk
 from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.sweeps.making import progress_at
-from walkers.sweeps.readable import FlatCase, differing, flattened, readable, short_keys
+from walkers.sweeps.readable import FlatCase, differing, flattened, has_value, readable, short_keys
 from walkers.sweeps.table import RECORD_NAME, read_record, state_at, states, status_text, worst_status
 from walkers.text import aligned
 
@@ -160,6 +160,17 @@ def without_members(contents: Sequence[Row]) -> list[Row]:
     """Contents without runs of sweeps, unless they have a spread or an accuracy of their own."""
     runs = {run for row in contents for run in row["runs"] or ()} - {_beside(row["name"]) for row in contents}
     return [row for row in contents if row["name"] not in runs]
+
+
+def select(contents: Sequence[Row], where: Iterable[str]) -> list[Row]:
+    """The runs with all values (`has_value`); `InputError` if a condition cannot be read, or no run has its key."""
+    runs = [row for row in contents if row["kind"] == "run"]
+    for condition in where:
+        answers = [has_value(row["parameters"], condition) for row in runs]
+        if runs and all(answer is None for answer in answers):
+            raise refused("where", f'"{condition}": no run has such a key')
+        runs = [row for row, answer in zip(runs, answers, strict=True) if answer]
+    return runs
 
 
 def _beside(name: str) -> str:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from functools import cache
+from math import isclose
 from typing import Any
 
 from pydantic_core import to_jsonable_python
 
+from walkers.errors import refused
 from walkers.inputs import units
 from walkers.inputs.case import Case
 from walkers.inputs.origins import text_of
@@ -41,6 +43,30 @@ def readable(key: str, value: Any) -> str:
     if key == "drive.ramp":  # pairs of a time and a pure number
         return ", ".join(f"({text_of(time, kind_of(key))}, {text_of(factor)})" for time, factor in value)
     return text_of(value, kind_of(key))
+
+
+def has_value(case: Mapping[str, Any], condition: str) -> bool | None:
+    """Whether a flattened case has a value, ``KEY=VALUE`` as a case file has it, such as ``frequency=80 Hz``.
+
+    The key may be the end of a key. None if there is no such key. `InputError` if the condition cannot be read.
+    """
+    key, _, text = (part.strip() for part in condition.partition("="))
+    if not (key and text):
+        raise refused("where", f'"{condition}": expected KEY=VALUE, such as "drive.frequency=80 Hz"')
+    values = {name: value for name, value in case.items() if f".{name}".endswith(f".{key}")}
+    return any(_is(name, value, text.strip('"')) for name, value in values.items()) if values else None
+
+
+def _is(key: str, value: Any, text: str) -> bool:
+    """Whether a value is equal to a value as text, in any unit of its kind."""
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not number or text == str(value):
+        return text.lower() in (readable(key, value).lower(), str(value).lower())
+    kind = kind_of(key)
+    try:
+        return isclose(units.parse_quantity(text, kind) if kind else float(text), value, rel_tol=1e-6)
+    except ValueError as error:
+        raise refused("where", f'"{key}={text}": {error if kind else "expected a number without a unit"}') from error
 
 
 def kind_of(key: str) -> Kind | None:
