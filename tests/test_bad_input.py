@@ -1,6 +1,5 @@
 """Bad input: one line for each mistake, with file, key, value and expectation; exit status 2; nothing is written."""
 
-import json
 import shlex
 from collections.abc import Callable
 from itertools import pairwise
@@ -67,13 +66,10 @@ CASES: list[tuple[dict[str, Any], str]] = [
      "uncertain.liquid.volume_fraction: expected liquid.meniscus_radius, which the case has instead"),
     ({"liquid": {"volume_fraction": None, "meniscus_radius": "1 mm"}},
      'liquid.meniscus_radius = "1 mm": expected menisci that fit between the surfaces: no bridge between'),
-    ({"contact": {"roughness": {"bead_wall": "0 nm"}}}, 'contact.roughness.bead_wall = "0 nm": expected'),
     ({"contact": {"roughness": {"bead_bead": "2.1 um"}}},
      'contact.roughness.bead_bead = "2.1 um": expected 2 um or less, a hundredth of a bead\'s radius'),
     ({"contact": {"restitution": 1.2}}, "contact.restitution = 1.2: expected at most 1"),
-    ({"drive": {"axis": "w"}}, "drive.axis = \"w\": expected 'x', 'y' or 'z'"),
     ({"run": {"cycles": "allways"}}, 'run.cycles = "allways": expected a whole number, or "auto"'),
-    ({"placed": [{"radius": "1 mm", "at": ["1 mm", "1 mm"]}]}, '"1 mm"]: has 2 values; expected 3, such as ["5 mm", '),
     # Keys
     ({"liquid": {"volume_fracton": 0.01}}, 'liquid.volume_fracton = 0.01: unknown key; [liquid] takes name, '),
     ({"dimers": {"seed": 2}}, 'did you mean "run.seed"'),
@@ -81,9 +77,6 @@ CASES: list[tuple[dict[str, Any], str]] = [
     # What contradicts something else
     ({"drive": {"gamma0": 0.5}}, "drive.gamma0 = 0.5: expected either peak_acceleration or gamma0, not both"),
     ({"drive": {**HARMONICS, "peak_acceleration": None}}, "beside drive.harmonics: write drive.harmonics[0].frequency"),
-    ({"run": {"duration": "1 s"}}, 'run.duration = "1 s": expected either cycles or duration, not both'),
-    ({"clusters": [{**WALKER, "arrangement": "chain", "diameters": ["0.6 mm", "0.4 mm"]}]},
-     'clusters[0].diameters = ["0.6 mm", "0.4 mm"]: expected either radii or diameters, not both'),
     ({"drive": {"phase": "10 deg", "frame": "lab"}}, 'drive.frame = "lab": expected "container"'),
     ({"drive": {"harmonics": [{**HARMONICS["harmonics"][0], "frequency": f"{tone} Hz"} for tone in (80, 81.3)],
       "frequency": None, "peak_acceleration": None}}, "expected frequencies with a common period"),
@@ -102,16 +95,13 @@ CASES: list[tuple[dict[str, Any], str]] = [
     *(({"drive": {"ramp": ramp}, **more}, told) for ramp, more, told in (
         ([["0 s", 1], ["0 s", 0.5]], {}, "drive.ramp = [[\"0 s\", 1], [\"0 s\", 0.5]]: expected times that increase"),
         ([["0 s", -1]], {}, "drive.ramp[0][1] = -1: expected at least 0"),
-        ([["-1 s", 1]], {}, 'drive.ramp[0][0] = "-1 s": expected a duration with its unit'),
-        ([["0 s"]], {}, 'drive.ramp[0] = ["0 s"]: has 1 value; expected 2'),
         ([["0 s", 1], ["2 s", 0.5]], {}, "run.cycles = 24: expected at least 160 cycles, 2 s, of drive.ramp"),
         ([["0 s", 1], ["2 s", 0.5]], {"run": {"cycles": "auto", "settling_cycles": None}},
          'run.cycles = "auto": expected a number of cycles: with drive.ramp no velocity is constant'),
     )),
     # Bodies and boundaries
-    *(({"mixture": {**MIXTURE, "small": None, key: ends}},
-       f"mixture.{key} = {json.dumps(ends)}: expected the smaller one first")
-      for key, ends in (("small", ["0.32 mm", "0.3 mm"]), ("small_diameters", ["0.63 mm", "0.6 mm"]))),
+    ({"mixture": {**MIXTURE, "small": None, "small_diameters": ["0.63 mm", "0.6 mm"]}},
+     'mixture.small_diameters = ["0.63 mm", "0.6 mm"]: expected the smaller one first'),
     ({"contact": {"youngs_modulus": "5 MPa"}, "liquid": {"surface_tension": "9 N/m"}},
      'contact.youngs_modulus = "5 MPa": expected a larger one: at rest the beads overlap by more than 2 %'),
     ({"dimers": {"replicates": 2, "spacing": "0.5 mm"}}, 'dimers.spacing = "0.5 mm": neighbouring walkers would touch'),
@@ -130,7 +120,6 @@ CASES: list[tuple[dict[str, Any], str]] = [
      "do not fit between the walls of the channel; expected fewer, a smaller spacing or a wider boundary"),
     ({"placed": [bead("1 mm", "9 mm"), bead("0.1 mm", "30 mm"), bead("0.5 mm", "10.4 mm")]},
      "overlaps with placed[0] by 0.1 mm; expected their centres 1.5 mm apart, where they touch"),
-    ({"placed": [bead("1 mm", "9 mm", "0.9 mm")]}, "expected a bead within the boundary"),
     # What is missing
     ({"dimers": None}, "dimers: missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]"),
     ({"boundary": None}, 'boundary: missing; expected a table [boundary]'),
@@ -208,7 +197,6 @@ CUP = [plane(0, 0, 1), *(plane(-x, -y, 0, at=(f"{2 * x} mm", f"{2 * y} mm", "0 m
 VESSELS: list[tuple[str | None, dict[str, Any], dict[str, Any], str]] = [
     (None, OF_MESH, {}, 'boundary.mesh = "own.obj": no such file; expected a mesh'),
     ("v a b c", OF_MESH, {}, 'boundary.mesh = "own.obj": cannot be read: expected a mesh that meshio reads'),
-    ("", {**OF_MESH, "mesh": "bad.toml"}, {}, 'boundary.mesh = "bad.toml": cannot be read'),
     (obj(SQUARE, []), OF_MESH, {}, 'boundary.mesh = "own.obj": has 0 triangles; expected the inner surface'),
     (obj([(0.0, 0.0, 0.0)] * 8, OPEN_BOX), OF_MESH, {}, "has no triangles of any size"),
     (obj(SQUARE, OPEN_BOX), {"mesh": "own.obj"}, {}, 'boundary.scale: missing; expected a value such as "1 mm"'),
@@ -216,21 +204,18 @@ VESSELS: list[tuple[str | None, dict[str, Any], dict[str, Any], str]] = [
     (obj(SQUARE, OPEN_BOX), {**OF_MESH, "height": "3 mm"}, {}, 'boundary.height = "3 mm": expected none of a vessel'),
     (obj(SQUARE, SIDES), OF_MESH, {}, "has 2 openings, the lowest at (-2, -2, 0) mm; expected one, at its top"),
     (obj(turned(SQUARE), OPEN_BOX), OF_MESH, {}, "is open at its lowest point, at (-2, 2, -4) mm; expected a closed"),
-    (obj(SQUARE, OPEN_BOX[:-1]), OF_MESH, {}, "is open at its lowest point, at (-2, 2, 0) mm"),
     (obj(SQUARE, [*OPEN_BOX, (1, 3, 7, 5)]), OF_MESH, {}, "has 3 triangles at an edge, at (0, 0, 0) mm; expected two"),
     (beside([(x + 1.5, y, z) for x, y, z in INNER]), OF_MESH, {}, "has triangles that intersect, at (1.917, 0.5"),
     (beside([(x, y, z - 1.0) for x, y, z in INNER]), OF_MESH, {}, "has triangles that overlap in a plane, at ("),
     (obj(SQUARE, OPEN_BOX), {**OF_MESH, "scale": "1 m"}, {},
      'boundary.scale = "1 m": the vessel is 4 m wide and the beads 0.6 mm; expected 1 to 1000 beads across'),
     (obj(SQUARE, OPEN_BOX), OF_MESH, BALL_IN_WALL, "placed[0].at = "),
-    (beside(INNER), OF_MESH, {**BALL, "placed": [bead("0.2 mm", "0.2 mm", "1.3 mm")]}, "placed[0].at = "),
     (obj([*SQUARE[4:], (0, 0, 0)], [(1, 2, 5), (2, 3, 5), (3, 4, 5), (4, 1, 5)]), OF_MESH, {},
      "has no level floor at its bottom, on which walkers stand"),
     (None, {"planes": CUP}, {}, "boundary.height: missing"),
     (None, {"planes": [plane(0, 0, 1, at=("0 mm", "0 mm", "1 mm")), *CUP[1:]], "height": "5 mm"}, {},
      "have their lowest point at z = 1 mm; expected 0 mm"),
     (None, {"planes": CUP[1:], "height": "5 mm"}, {}, ": are open toward -z"),
-    (None, {"planes": CUP[:-1], "height": "5 mm"}, {}, ": are open toward -y"),
     (None, {"planes": [*CUP, plane(0, 0, -1)], "height": "5 mm"}, {}, ": enclose nothing"),
     (None, {"planes": [*CUP, plane(0, 0, 0)], "height": "5 mm"}, {}, "planes[5].normal = [0, 0, 0]: expected a"),
     (None, {"planes": [*CUP, plane(0, 1, 2)], "height": "5 mm"}, {},
@@ -259,7 +244,6 @@ LAWS: list[tuple[str, str]] = [
     ("def law(surfaces): return Curve(forces, 1e-4, 2e-4)", "forms at a gap of 0.0002 m; expected 0 to its rupture"),
     ("def law(surfaces): return Curve(lambda gaps: gaps, 1e-4)", "forces are ndarray; expected"),
     ("def law(surfaces): return Curve(lambda gaps: forces(gaps, np.nan), 1e-4)", "the pull is not a number"),
-    ("def law(surfaces): return Curve(lambda gaps: forces(gaps, 1j), 1e-4)", "the pull has type complex128"),
 ]
 LONG = "x" * 100_000
 
@@ -280,22 +264,14 @@ RECORDS: list[tuple[str | bytes, dict[str, Any], str]] = [
     ),
     (trace("t (ms), x (g)"), {}, "expected a header of a time and accelerations"),
     (trace("time (ms), x (g)").replace(",", ";"), {}, "along x, y or z, with commas between them"),
-    (trace("x (g), time (ms)"), {}, "expected a header of a time and accelerations"),
-    (trace("time (ms), x (g), x (g)"), {}, "expected a header of a time and accelerations"),
     ("", {}, "expected rows of numbers with commas below a header: No columns"),
     (b"\xff\xfe", {}, "expected rows of numbers with commas below a header: 'utf-8' codec"),
     (trace(row_7="3.0, 1.0, 2.0"), {}, "Expected 2 fields in line 8, saw 3"),
-    (trace(row_7="3.0"), {}, "row 7: expected a number in each column"),
     (trace(row_7="3.0, nan"), {}, "row 7: expected a number in each column, accelerations up to 10000 m/s²"),
     (
         trace(row_7="2.5, 1.0"),
         {},
         "row 7 is 0 ms after the one before; expected times that increase without gaps, abou",
-    ),
-    (
-        trace(row_7="3.9, 1.0"),
-        {},
-        "row 7 is 1.4 ms after the one before; expected times that increase without gaps, ab",
     ),
     (trace(rows=9), {}, "has 9 rows; expected 16 to 100000"),
     (trace(rows=40, step=4.0), {}, "rows are too far apart, or too noisy: leaving out every second one changes the ac"),
@@ -307,9 +283,7 @@ RECORDS: list[tuple[str | bytes, dict[str, Any], str]] = [
         "drive.repeats = true: expected a record that ends with the first row of the next period",
     ),
     (trace(), {"frequency": "80 Hz"}, 'drive.record = "record.csv": expected either frequency or record, not both'),
-    (trace(), {"peak_acceleration": "1 g"}, "expected either peak_acceleration or record, not both"),
     (trace(), HARMONICS, 'drive.record = "record.csv": expected none beside drive.harmonics'),
-    (trace(), {"axis": "x"}, 'drive.record = "record.csv": expected either axis or record, not both'),
     (trace(), {"record": "none.csv"}, 'drive.record = "none.csv": cannot be read: No such file or directory'),
 ]
 FILES: list[tuple[Files, str, str]] = [
@@ -339,11 +313,11 @@ COMMANDS: list[tuple[str, str]] = [
     ("check files .", "expected a run directory"),
     # What is not there, cannot be read or makes no sense
     *((f"{command} fig1b", "no finished run in runs; first do: walkers run fig1b") for command in READING),
-    *((f"{command} .", "not a finished run") for command in READING),
-    *((f"{command} folder.html", "manifest.json cannot be read") for command in READING[:-1]),
+    ("plot .", "not a finished run"),
+    ("plot folder.html", "manifest.json cannot be read"),
     *((f"sweep {what}", "") for what in ("bad_sweep.toml", "nosuch", "fig2 --site nosite.toml", "fig2 --out {case}")),
     *((f"{command} fig1b --set 'drive.frequency=70 mm'", 'fig1b: drive.frequency = "70 mm": expected a frequency')
-      for command in ("show", "run", "export --to deck", "show --theory", "plot", "report", "check")),
+      for command in ("show", "run", "plot", "check")),
     *((f"{command} fig1b --set liquid.volume_fraction=0.02 --set 'liquid.contact_angle=88 deg'",
        'fig1b: liquid.contact_angle = "88 deg": expected')
       for command in ("show", "run", "run --spread")),
@@ -364,7 +338,7 @@ COMMANDS: list[tuple[str, str]] = [
     # Mistyped names
     ("--library", "Parameter --library requires an argument. See: walkers --help"),
     ("new {case}", "exists already"),
-    *((f"new '{name}'", f"{name or '.'}: expected a name") for name in ("", ".", "/", "..")),
+    *((f"new '{name}'", f"{name or '.'}: expected a name") for name in ("", "..")),
     ("show fig1b --set 'run.seed=3\nfoo=4'", 'fig1b: run.seed = "3\\nfoo=4": expected a whole number'),
     ("run {case} plain", "plain: is a folder without a run"),
     ("clean nonsense --yes --out {runs}", "nonsense: no such file, run or sweep"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations
-from math import cos, dist, inf, pi, radians, sin
+from math import cos, dist, pi, radians, sin
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +16,12 @@ import walkers
 from tests.conftest import REFERENCE, make_case
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
-from walkers.inputs.loads import contact_loads, dimer_of, resistances_at_rest
+from walkers.inputs.loads import contact_loads
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.standing import standing
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.figures import figures_of
-from walkers.postprocess.gait import postures, settled_samples, turned_over_at
+from walkers.postprocess.gait import postures, turned_over_at
 from walkers.postprocess.meetings import collective
 from walkers.postprocess.motion import Group, read_motion
 from walkers.postprocess.results import read
@@ -225,35 +225,6 @@ def test_substrate_moves_as_prescribed(trajectory: Moved, axis: str, frame: str)
     np.testing.assert_allclose(places[:, along], drive.amplitude * np.sin(phase), atol=1e-9 * drive.amplitude + 1e-15)
     assert not np.any(np.delete(places, along, axis=1))
     assert np.abs(moved.velocity[0]).max() < 1e-12
-
-
-@pytest.mark.parametrize("frame", ["lab", "container"])
-def test_bridges_drag_rolling_beads_that_nothing_else_holds(trajectory: Moved, frame: str) -> None:
-    """Without friction the bridges' resistances and inertia alone: M du/dt = -K u - M a(t), u = (v, R1 ω1, R2 ω2).
-
-    Along x and about y: n × y is -x at the floor; between the beads, where both go at v, only they slide.
-    """
-    moved = trajectory(
-        liquid={"viscosity_ratio": 20.0},
-        contact={"friction": {"bead_bead": 0.0, "bead_wall": 0.0}},
-        drive={"peak_acceleration": "1 g", "frame": frame},
-        run={"cycles": 20, "settling_cycles": 10},
-    )
-    case, dimer = moved.case, dimer_of(moved.case)
-    (large, small), resistance = dimer.radii, np.zeros((3, 3))
-    for radius, other, slides, rolls in (
-        (large, inf, [1.0, -1.0, 0.0], [0.0, -1.0 / large, 0.0]),
-        (small, inf, [1.0, 0.0, -1.0], [0.0, 0.0, -1.0 / small]),
-        (small, large, [0.0, 1.0, 1.0], [0.0, -1.0 / large, 1.0 / small]),
-    ):
-        sliding, coupling, rolling = resistances_at_rest(case, radius, other)
-        motions = np.array([slides, rolls])
-        resistance += motions.T @ np.array([[sliding, coupling], [coupling, rolling]]) @ motions
-    inertia = np.diag([dimer.total_mass, *(0.4 * mass for mass in dimer.masses)])
-    pushed = np.array([dimer.total_mass * case.excitation.peak_acceleration, 0.0, 0.0])
-    answer = np.linalg.solve(1j * case.excitation.largest.angular_frequency * inertia + resistance, pushed)
-    found = np.sqrt(2.0 * np.mean(moved.velocity[settled_samples(moved.case.run), 0, :, 0] ** 2, axis=0))
-    np.testing.assert_allclose(found, abs(answer[0]), rtol=2e-4)
 
 
 @pytest.mark.parametrize("frequency", ["73 Hz", "74 Hz"])

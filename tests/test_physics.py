@@ -129,17 +129,6 @@ def test_rupture_is_the_end_of_the_branch(given: tuple[float, float, float, Any]
     assert (last[0] - last[2]) / (last[1] - last[2]) == pytest.approx(2.0, rel=0.01)
 
 
-def test_bridges_that_cannot_be_are_refused() -> None:
-    for radii, volume, angle, gap, told in (
-        ((1.0, -1.0), 0.1, 0.0, 0.0, "expected positive numbers"),
-        ((inf, inf), 0.1, 0.0, 0.0, "expected positive numbers"),
-        ((1.0, 1.0), 0.1, 4.0, 0.0, "contact angles"),
-        ((1.0, 1.0), 0.1, 0.0, -0.1, "gaps"),
-    ):
-        with pytest.raises(ValueError, match=told):
-            force_curve(*radii, volume, angle, [gap])
-
-
 # --- pulls by name ----------------------------------------------------------------------------------------------------
 
 
@@ -454,23 +443,3 @@ def test_auto_respects_every_limit_with_margin(name: str) -> None:
     longest = allowed if case.loose else min(allowed, 4e-6)
     # A cycle is so many whole samples of whole steps: a little less than what is allowed.
     assert 0.97 * longest < case.run.time_step <= longest
-
-
-def test_an_open_bridge_pulls_with_the_capillary_force(tmp_path: Path) -> None:
-    """Shaken vertically beyond what bridges hold, contacts open: the force is the law's at the gap."""
-    case = make_case(
-        drive={"axis": "z", "peak_acceleration": "20 g"},
-        liquid={"dynamic_viscosity": "1e-9 mPa*s"},
-        run={"cycles": 10, "settling_cycles": 2, "bridge_samples_per_cycle": 20},
-    )
-    bridges = run_case(case, tmp_path).table("bridges")
-    # Until the beads first part, 5 ms on: then their bridge's liquid is shared out anew and the volumes change.
-    opened = bridges[~bridges["touching"] & (bridges["time"] < 5e-3)]
-    assert set(opened["contact"]) >= {1, 3}  # a bead on the substrate and bead on bead
-    large, small = case.walkers[0].radii
-    ends = {1: (large, inf), 2: (small, inf), 3: (small, large)}
-    for contact, gap, found in opened[["contact", "gap", "normal_force"]].itertuples(index=False):
-        surfaces = Surfaces.of(*ends[contact], case.liquid.of_bridges, case.contact.roughness)
-        curve = by_name(case.liquid.law)(surfaces)
-        assert gap < curve.rupture
-        assert found == pytest.approx(curve.forces(np.array([gap])).pull[0], rel=1e-6)
