@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pytest
 
 from walkers.postprocess import clusters
-from walkers.postprocess.clusters import Beads, Track, bulk_of, climbs_of, connected
+from walkers.postprocess.clusters import Beads, Track, assembly_of, bulk_of, climbs_of, connected
 from walkers.postprocess.motion import Bridges
 from walkers.postprocess.piles import segregation
 from walkers.postprocess.tables import Columns
@@ -175,6 +175,21 @@ def test_how_a_cluster_begins_and_ends(freed: int, let_go: range, fallen: range,
     )
     assert scene.events == [(event, 0, -1) for event in events]
     assert [climb.out_of_pile for climb in scene.climbs] == [freed > 4]  # a tenth of a second
+
+
+def test_where_the_beads_of_a_climb_came_from() -> None:
+    """Two on a wall; a third leaves the pile and joins them at 1 s; they climb from 2 s on."""
+    pairs = [[(20, 21), (21, 22) if now >= 1.0 else (22, 19), (23, 19)] for now in TIME]
+    scene = seen(3e-3 * np.clip(TIME[:, None] - 2.0, 0.0, None) * [1.0, 1.0, 1.0, 0.0], joined=pairs.__getitem__)
+    joined = [(np.array([*pairwise(BULK), *some], dtype=np.int32), np.arange(24) == 20) for some in pairs]
+    rows = rows_of(assembly_of(scene.tracks, scene.table, scene.beads, joined))
+    assert max(row.time for row in rows) == scene.climbs[0].qualified > 2.0
+    of_third = [row for row in rows if row.bead == 22]
+    assert [row.in_bulk for row in of_third] == [row.time < 1.0 for row in of_third]
+    assert all(row.joined != row.in_bulk for row in of_third)
+    assert {row.bead for row in rows} == {20, 21, 22}
+    assert {row.bead for row in rows if row.at_wall} == {20}
+    assert [row.neighbours for row in rows[-3:]] == [1, 2, 1]
 
 
 def test_what_comes_later_does_not_change_when_a_climb_qualified() -> None:

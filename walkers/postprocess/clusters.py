@@ -30,6 +30,9 @@ from walkers.postprocess.tables import Columns, columns_of
 Cluster = tuple[frozenset[int], frozenset[int]]
 """Beads of a cluster in a frame, and side walls that hold it."""
 
+Joined = tuple[IntArray, BoolArray]
+"""Pairs of joined beads of a frame, shape (K, 2), and whether each bead is joined to a side wall, shape (N,)."""
+
 MIN_RISE = 2e-3
 """Smallest rise of a climb, m: about two diameters of the paper's large beads."""
 MAX_GAP = 0.1
@@ -272,10 +275,38 @@ def members_of(tracks: Sequence[Track], beads: Beads) -> Columns:
         for number, track in enumerate(tracks)
         for frame, members in zip(track.frames, track.members, strict=True)
     )
-    rows = ((frame, number, bead) for frame, members, number in clusters for bead in members)
-    columns = columns_of(rows, frame=int, track=int, bead=int)
+    return _of_beads(
+        columns_of(
+            ((frame, number, bead) for frame, members, number in clusters for bead in members),
+            frame=int,
+            track=int,
+            bead=int,
+        ),
+        beads,
+    )
+
+
+def _of_beads(columns: Columns, beads: Beads) -> Columns:
+    """Columns with the time of their frames, and class and height of their beads."""
     frame, bead = columns.pop("frame"), columns["bead"]
     return columns | {"time": beads.time[frame], "large": beads.large[bead], "height": beads.height[frame, bead]}
+
+
+def assembly_of(tracks: Sequence[Track], climbs: Columns, beads: Beads, bridges: Sequence[Joined]) -> Columns:
+    """Table ``assembly``: state of the beads of each climb in each frame, from rest until it qualifies."""
+    rows: list[tuple[Any, ...]] = []
+    for number in np.flatnonzero(climbs["climbed"]).tolist():
+        until = int(np.searchsorted(beads.time, climbs["qualified"][number]))
+        members = np.array(sorted(tracks[number].members[tracks[number].frames.index(until)]))
+        for frame in range(max(beads.first - 1, 0), until + 1):
+            pairs, walled = bridges[frame]
+            within = np.searchsorted(members, pairs[np.isin(pairs, members).all(axis=1)])
+            labels, neighbours = connected(len(members), within), np.bincount(within.ravel(), minlength=len(members))
+            joined = (labels == np.bincount(labels).argmax()) & (neighbours > 0)
+            states = (members, beads.bulk[frame][members], walled[members], neighbours, joined)
+            rows += [(frame, number, *state) for state in zip(*states, strict=True)]
+    kinds = {"frame": int, "track": int, "bead": int, "in_bulk": bool, "at_wall": bool, "neighbours": int}
+    return _of_beads(columns_of(rows, **kinds, joined=bool), beads)
 
 
 def events_of(tracks: Sequence[Track], climbs: Columns, beads: Beads) -> Columns:

@@ -11,7 +11,7 @@ import numpy as np
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
 from walkers.postprocess import clusters
-from walkers.postprocess.clusters import Beads, Cluster
+from walkers.postprocess.clusters import Beads, Cluster, Joined
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import FLOOR, Bridges, Motion, read_bridges
 from walkers.postprocess.numbers import Measured
@@ -38,14 +38,15 @@ def derived(case: Case) -> dict[str, float]:
 def measure(motion: Motion) -> Measured:
     """Tables and numbers of the bed and of the clusters."""
     case = motion.case
-    rows, bulks, held = [], [], []
+    rows, bulks, held, joined = [], [], [], []
     for bridges in read_bridges(motion):
         labels = clusters.connected(len(motion.radius), bridges.beads)
         bulks.append(clusters.bulk_of(labels, bridges, heap=case.mixture is not None))
         # While the pile settles, most beads are free of the bulk.
         driven = motion.time[bridges.frame] >= 0.0
         held.append(list(clusters.held_clusters(labels, bridges, bulks[-1])) if driven else [])
-        rows.append(_state_of(motion, bridges, bulks[-1], held[-1]))
+        joined.append(_joined(bridges, len(motion.radius)))
+        rows.append(_state_of(motion, bridges, joined[-1], bulks[-1], held[-1]))
     bed, walls = {name: np.array([row[name] for row in rows]) for name in rows[0]}, case.boundary.walls
     beads = Beads(
         time=motion.time,
@@ -64,6 +65,7 @@ def measure(motion: Motion) -> Measured:
         "clusters": climbs,
         "events": events,
         "members": clusters.members_of(tracks, beads),
+        "assembly": clusters.assembly_of(tracks, climbs, beads, joined),
     }
     counts = {f"events_{event}": int(np.sum(events["event"] == event)) for event in clusters.EVENTS}
     numbers = {"clusters": len(tracks), **counts, **_of_climbs(climbs), **_of_bed(motion, bed)}
@@ -112,15 +114,24 @@ def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
     return track, np.append(climbed, False)[track]
 
 
-def _state_of(motion: Motion, bridges: Bridges, bulk: BoolArray, held: Sequence[Cluster]) -> dict[str, Any]:
+def _joined(bridges: Bridges, count: int) -> Joined:
+    """The joined beads of a frame."""
+    at_wall = np.zeros(count, dtype=np.bool_)
+    beads, walls = bridges.at_walls
+    at_wall[beads[walls != FLOOR]] = True
+    return bridges.beads.astype(np.int32), at_wall
+
+
+def _state_of(
+    motion: Motion, bridges: Bridges, joined: Joined, bulk: BoolArray, held: Sequence[Cluster]
+) -> dict[str, Any]:
     """State of a pile in a frame from its bulk and the held clusters."""
     frame = bridges.frame
     position, radius, large = motion.position[frame], motion.radius, motion.large
     # Cells of the cross-section are about four large radii wide. Without a bulk the floor is the surface.
     tops = _surface_cells(position[bulk], radius[bulk], motion.case.boundary, 4.0 * float(radius.max()))
     low, middle, high = (float(value) for value in np.percentile(tops if len(tops) else [0.0], (10.0, 50.0, 90.0)))
-    pairs, (beads, walls) = len(bridges.beads), bridges.at_walls
-    at_wall = np.unique(beads[walls != FLOOR])
+    pairs = len(bridges.beads)
     touching = int((bridges.gap[:pairs] <= 0.0).sum())
     return {
         "time": float(motion.time[frame]),
@@ -136,8 +147,8 @@ def _state_of(motion: Motion, bridges: Bridges, bulk: BoolArray, held: Sequence[
         "opened": pairs - touching,
         "mean_force": float(bridges.force[:pairs].mean()) if pairs else 0.0,
         "bulk": int(bulk.sum()),
-        "at_wall": len(at_wall),
-        "large_at_wall": int(large[at_wall].sum()),
+        "at_wall": int(joined[1].sum()),
+        "large_at_wall": int((joined[1] & large).sum()),
         "clusters": len(held),
         "highest": max([middle, *(float(position[bead, 2]) for members, _ in held for bead in members)]),
     }
