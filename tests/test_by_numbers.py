@@ -74,7 +74,6 @@ def resting(case: Case, frames: int | None = None) -> Motion:
         velocity=nothing,
         spin=nothing,
         substrate=nothing[:, 0],
-        substrate_velocity=nothing[:, 0],
         radius=np.array([bead.radius for bead in scene.beads]),
         walkers=tuple(replace(one, beads=tuple(bead - 1 for bead in one.beads)) for one in placed),
         frames=[(Path("made-up"), number) for number in range(count)],
