@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from itertools import pairwise
 from math import hypot
 from pathlib import Path
@@ -145,7 +144,8 @@ def test_walkers_that_came_apart_have_no_velocity_anywhere_in_the_text(runs_fold
     done = walkers.run(load_case("fig1b"), runs_folder)
     columns = read_columns(done.directory, "walkers")
     columns["separated_fraction"] = columns["separated_fraction"] + 0.5
-    apart = replace(done.result, numbers={**done.result.numbers, **_velocities(columns, done.case)})
+    apart = done.result
+    apart |= _velocities(columns, done.case)
     assert apart["came_apart"]
     assert headlines(apart)[0].endswith(": came apart")
     assert "velocity" in [row.name for row in rows(done.result)]

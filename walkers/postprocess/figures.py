@@ -38,7 +38,10 @@ if TYPE_CHECKING:
 
 
 class Panel(NamedTuple):
-    """A plot: its table, x, y (one column or several), the column with the number of the line, title, inches high."""
+    """A plot: its table, x, y, the column with the number of the line, title, inches high.
+
+    ``y`` may be several columns, separated by blanks; ``rotation_*`` are those of all beads.
+    """
 
     table: str
     x: str
@@ -112,30 +115,23 @@ def plot_run(directory: Path, destination: Path | None = None, formats: str | Se
     ]
 
 
-def draw(axes: Axes, table: str, columns: Columns, x: str, y: str, by: str, looks: Sequence[Mapping[str, Any]]) -> None:
-    """Draw columns of a table against another, with labels and units of `walkers.postprocess.quantities`.
-
-    Parameters
-    ----------
-    axes, table, columns
-        The axes; the name of the table and its columns, SI units.
-    x, y, by
-        Columns. ``y`` may be several, separated by blanks; one that ends in ``*`` is all that begin so. There is a line
-        for each column ``y`` and each value of ``by``; an empty ``by`` has one value.
-    looks
-        Options of `matplotlib.axes.Axes.plot` for each line.
-    """
-    x_label, x_factor = axis(table, x)
-    names = [name for part in y.split() for name in columns if matches(part, name)]
-    series = columns[by] if by else np.zeros(len(columns[x]), dtype=np.int64)
+def _draw(axes: Axes, panel: Panel, columns: Columns, looks: Sequence[Mapping[str, Any]]) -> None:
+    """Draw a panel: a line with its look for each column ``y`` and each value of ``by``."""
+    x_label, x_factor = axis(panel.table, panel.x)
+    names = [name for part in panel.y.split() for name in columns if matches(part, name)]
+    series = columns[panel.by] if panel.by else np.zeros(len(columns[panel.x]), dtype=np.int64)
     lines = [(name, series == value) for name in names for value in np.unique(series)]
     for (name, rows), look in zip(lines, looks, strict=True):
-        factor = axis(table, name)[1]
-        given = {"label": declared(name, table).label} if len(names) > 1 else {}
-        axes.plot(x_factor * columns[x][rows], factor * columns[name][rows], **{**given, **look})
-    axes.set(xlabel=x_label, ylabel=axis(table, names[0])[0])
-    for name, limits, widen in ((x, axes.dataLim.intervalx, axes.set_xlim), (y, axes.dataLim.intervaly, axes.set_ylim)):
-        least = LEAST.get(declared(name.split()[0], table).unit, 0.0)
+        factor = axis(panel.table, name)[1]
+        given = {"label": declared(name, panel.table).label} if len(names) > 1 else {}
+        axes.plot(x_factor * columns[panel.x][rows], factor * columns[name][rows], **{**given, **look})
+    axes.set(xlabel=x_label, title=panel.title)
+    axes.set_ylabel("\n".join(wrap(axis(panel.table, names[0])[0], round(_LETTERS_OF_AN_INCH * panel.height))))
+    for name, limits, widen in (
+        (panel.x, axes.dataLim.intervalx, axes.set_xlim),
+        (names[0], axes.dataLim.intervaly, axes.set_ylim),
+    ):
+        least = LEAST.get(declared(name, panel.table).unit, 0.0)
         if np.isfinite(limits).all() and np.ptp(limits) < least:
             widen(*(limits.mean() + np.array([-0.5, 0.5]) * least))
 
@@ -165,9 +161,7 @@ def _panels(
     figure, grid = new_figure(TWO_COLUMNS, sum(heights), nrows=len(heights), height_ratios=heights, squeeze=False)
     panels = list(grid[:, 0])
     for axes, panel, look in zip(panels, FIGURES[name], looks, strict=True):
-        draw(axes, panel.table, tables[panel.table], panel.x, panel.y, panel.by, look)
-        axes.set_ylabel("\n".join(wrap(axes.get_ylabel(), round(_LETTERS_OF_AN_INCH * panel.height))))
-        axes.set_title(panel.title.format(**words))
+        _draw(axes, panel._replace(title=panel.title.format(**words)), tables[panel.table], look)
     for upper, lower in pairwise(panels):
         if upper.get_xlabel() == lower.get_xlabel():
             upper.sharex(lower)
@@ -180,8 +174,7 @@ def _panels(
 
 def _explained(figure: Figure, panels: Sequence[Axes], title: str = "") -> Figure:
     """The figure with letters and a legend of the lines of its first panel."""
-    lines, labels = panels[0].get_legend_handles_labels()
-    figure.legend(lines, labels, loc="outside right center", title=title)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right center", title=title)
     letter_panels(panels if len(panels) > 1 else ())
     figure.align_ylabels()
     return figure

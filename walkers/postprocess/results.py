@@ -6,8 +6,7 @@ three functions: ``applies(case)``; ``derived(case)``, numbers that follow from 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from math import isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,16 +35,15 @@ _BESIDE = ("case", "drive", "rests_on", "by_hand", "tables", "warnings")
 _DRIVE = ("frequency", "peak_acceleration", "peak_velocity", "amplitude")
 
 
-@dataclass(frozen=True)
-class Results(Mapping[str, Any]):
+class Results(dict[str, Any]):
     """The result of a run: numbers in SI units by name; NaN if one is not defined.
+
+    With both ends of bands (``velocity_low``, ``velocity_high``) and numerical errors if these exist.
 
     Attributes
     ----------
     directory
         The run directory.
-    numbers
-        The numbers, with both ends of bands (``velocity_low``, ``velocity_high``) and numerical errors if these exist.
     warnings
         Reasons to doubt the numbers.
     about
@@ -53,22 +51,11 @@ class Results(Mapping[str, Any]):
         that was run by hand), ``tables`` (their names).
     """
 
-    directory: Path = field(compare=False)
-    numbers: Mapping[str, Any]
-    warnings: Sequence[str]
-    about: Mapping[str, Any]
-
-    def __getitem__(self, name: str) -> Any:
-        """A number."""
-        return self.numbers[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """The names of the numbers."""
-        return iter(self.numbers)
-
-    def __len__(self) -> int:
-        """How many numbers there are."""
-        return len(self.numbers)
+    def __init__(
+        self, directory: Path, numbers: Mapping[str, Any], warnings: Sequence[str], about: Mapping[str, Any]
+    ) -> None:
+        super().__init__(numbers)
+        self.directory, self.warnings, self.about = directory, warnings, about
 
     def columns(self, table: str) -> Columns:
         """A table as arrays."""
@@ -84,7 +71,7 @@ class Results(Mapping[str, Any]):
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types: the numbers, None for NaN, and `about`."""
-        return {**self.about, **plain(self.numbers), "warnings": list(self.warnings)}
+        return {**self.about, **plain(self), "warnings": list(self.warnings)}
 
 
 def modules_of(case: Case) -> list[Any]:
@@ -232,9 +219,9 @@ def text(results: Results, *, cached: bool = False) -> str:
 
 def headlines(results: Results) -> list[str]:
     """The case, its drive, and the state of its walkers."""
-    drive, numbers = results.about["drive"], results.numbers
-    if all(isfinite(numbers.get(name, nan)) for name in ("gamma0", "sin_delta")):
-        drive += f", Γ0 = {numbers['gamma0']:.3g}, sin δ = {numbers['sin_delta']:.3g}"
-    if does := state(numbers):
+    drive = results.about["drive"]
+    if all(isfinite(results.get(name, nan)) for name in ("gamma0", "sin_delta")):
+        drive += f", Γ0 = {results['gamma0']:.3g}, sin δ = {results['sin_delta']:.3g}"
+    if does := state(results):
         return [f"{results.about['case']}: {does}", drive]
     return [f"{results.about['case']}: {drive}"]

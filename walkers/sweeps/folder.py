@@ -105,7 +105,7 @@ def _result(path: Path) -> dict[str, Any]:
         results = read(path)
     except InputError as error:
         return {"reason": error.problems[0].expected}
-    notes, numbers, main = results.about["by_hand"], plain(results.numbers), headline(results)
+    notes, numbers, main = results.about["by_hand"], plain(results), headline(results)
     return {
         "numbers": numbers,
         "result": in_short(results),

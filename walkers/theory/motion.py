@@ -54,8 +54,8 @@ class Walker:
         return (self.radii[0] - self.radii[1]) / self.radii.sum(axis=0)  # type: ignore[no-any-return]
 
     @classmethod
-    def of_case(cls, case: Case, *, viscous: bool = True) -> Walker:
-        """The walker of a case: friction, weight, and pulls and (if viscous) resistances of its bridges."""
+    def of_case(cls, case: Case) -> Walker:
+        """The walker of a case: friction, weight, and pulls and resistances of its bridges."""
         dimer, unit = dimer_of(case), dimer_of(case).capillary_scale
         pulls = np.array([load.pull for load in contact_loads(case)])
         forces = pulls + np.array([*dimer.masses, 0.0]) * case.pressing_gravity
@@ -70,7 +70,7 @@ class Walker:
             force_unit=np.array([unit]),
             at_rest=(forces / unit)[:, None],
             friction=np.array([law.bead_wall, law.bead_wall, law.bead_bead])[:, None],
-            resistances=resistances[..., None] * viscous,
+            resistances=resistances[..., None],
         )
 
     @classmethod

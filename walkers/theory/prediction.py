@@ -35,14 +35,14 @@ _FREQUENCIES, _LARGEST_PEAK, _LARGEST_GAMMA0 = (60.0, 90.0), 10.0, 3.5
 """Their drives: Hz, g of 9.8 m/s² (both Fig. 2), and Γ0 (Fig. 4b)."""
 
 
-def motion_of(*cases: Case, viscous: bool = True) -> Motion:
-    """The motions of the walkers of cases, aligned with the drive, with the same pulls of bridges as in the engine.
+def motion_of(*cases: Case) -> Motion:
+    """The motions of the walkers of cases, aligned with the drive, with the same bridges as in the engine.
 
-    If ``viscous``, bridges also resist sliding and rolling. Errors as for `check_applies`.
+    Errors as for `check_applies`.
     """
     check_applies(*cases)
     return walk(
-        Walker.joined([Walker.of_case(case, viscous=viscous) for case in cases]),
+        Walker.joined([Walker.of_case(case) for case in cases]),
         [case.excitation.frequency for case in cases],
         [case.excitation.peak_acceleration for case in cases],
         steady_acceleration=[case.axial_gravity for case in cases],
@@ -62,14 +62,14 @@ def check_applies(*cases: Case) -> None:
             raise ValueError("boundary.uphill: the theory is for planes tilted along the drive")
 
 
-def threshold(case: Case, *, viscous: bool = True) -> float:
+def threshold(case: Case) -> float:
     """Γc: the smallest Γ0 at which the walker of a case (as for `motion_of`) moves at the frequency of the case.
 
     The tolerance is 1e-4 of the range in which contacts stay closed. NaN if the walker does not move there, and for a
     symmetric dimer.
     """
     check_applies(case)
-    dimer, walker = dimer_of(case), Walker.of_case(case, viscous=viscous)
+    dimer, walker = dimer_of(case), Walker.of_case(case)
     if dimer.sin_delta == 0.0:
         return nan
     low, high = 0.0, float(detachment(dimer.sin_delta).gamma)
@@ -102,8 +102,7 @@ def predict(case: Case) -> dict[str, Any]:
         "gamma0": gamma0,
         "sin_delta": dimer.sin_delta,
         "paper": plain({"friction": FRICTION_OF_THE_PAPER, "velocity": linear, "reason": reason}),
-        "coulomb": _predicted(case, viscous=False),
-        "viscous": _predicted(case, viscous=True),
+        "viscous": _predicted(case),
         "detachment": {"gamma": float(end.gamma), "contact": CONTACTS[int(end.contact)]},
         "alignment": alignment_of(case),
     }
@@ -131,14 +130,14 @@ def outside_of_the_paper(case: Case) -> str | None:
     return f"outside the paper's range: {', '.join(beyond)}; the models are not tested there" if beyond else None
 
 
-def _predicted(case: Case, *, viscous: bool) -> dict[str, Any]:
-    motion = motion_of(case, viscous=viscous)
+def _predicted(case: Case) -> dict[str, Any]:
+    motion = motion_of(case)
     numbers = {
         "velocity": float(motion.velocity[0]) if motion.periodic[0] else nan,
         "rotation": motion.rotation[:, 0].tolist(),
         "sliding": motion.sliding[:, 0].tolist(),
         "reason": _why_unknown(motion, 0),
-        "threshold": threshold(case, viscous=viscous),
+        "threshold": threshold(case),
     }
     return plain(numbers)
 
@@ -182,53 +181,42 @@ def alignment_of(case: Case) -> dict[str, Any]:
 
 
 def describe(prediction: dict[str, Any], result: Mapping[str, Any] | None) -> str:
-    """A prediction as a table, with the result of the engine if it exists."""
-    end, outside = prediction["detachment"], prediction.get("outside")
+    """A prediction as a table, with the result of the engine if it exists; on a slope of the walkers that face up."""
+    paper, end, state = (prediction[name] for name in ("paper", "detachment", "alignment"))
     models = {
-        f"paper's fit, κ = {prediction['paper']['friction'] * 1e-3:g} s/mm": prediction["paper"],
-        "Coulomb friction": prediction["coulomb"],
+        f"paper's fit, κ = {paper['friction'] * 1e-3:g} s/mm": paper,
         "Coulomb friction and drag": prediction["viscous"],
-        **(_of_engine(result) if result else {"engine": {"velocity": None, "reason": "run it: walkers run CASE"}}),
+        "engine": {"velocity": None, "reason": "run it: walkers run CASE"},
     }
+    if result:
+        speeds = {"rotation": [result["rotation_1"], result["rotation_2"]], "sliding": [result["sliding_1"]]}
+        both = result["goes_uphill"] and result["facing_right"] and result["facing_left"]
+        del models["engine"]
+        models["engine, facing up" if both else "engine"] = {"velocity": result["velocity"], **speeds}
     rows = [["mm/s", "velocity", "rotation 1", "rotation 2", "sliding 1", "Γc", ""]]
-    rows += [[name, *_cells(model)] for name, model in models.items()]
+    for name, model in models.items():
+        velocity, gamma = model["velocity"], model.get("threshold")
+        of_beads = [*model.get("rotation", []), *model.get("sliding", [])[:1]] if velocity is not None else []
+        speeds_shown = ["-" if velocity is None else with_decimals(velocity * 1e3, 3)]
+        speeds_shown += [with_decimals(speed * 1e3, 2) for speed in of_beads]
+        cells = [*speeds_shown, *[""] * (4 - len(speeds_shown)), "" if gamma is None else f"{gamma:.3f}"]
+        rows.append([name, *cells, model.get("reason") or ""])
     detaches = f"under a steady acceleration, {end['contact']} opens first, at Γ = {end['gamma']:.3g}"
-    notes = [
-        ["detachment", f"{detaches}; under an oscillating acceleration the peak may be larger"],
-        *_describe_alignment(prediction["alignment"]),
-    ]
-    head = f"Γ0 = {prediction['gamma0']:.3g}, sin δ = {prediction['sin_delta']:.3g}"
-    return "\n".join([head, *([outside] if outside else []), aligned(rows, right=range(1, 6)), aligned(notes)])
-
-
-def _of_engine(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """The result of a run as a model; on a slope for the walkers that face uphill, as in the theory."""
-    both = result["goes_uphill"] and result["facing_right"] and result["facing_left"]
-    speeds = {"rotation": [result["rotation_1"], result["rotation_2"]], "sliding": [result["sliding_1"]]}
-    return {"engine, facing up" if both else "engine": {"velocity": result["velocity"], **speeds}}
-
-
-def _cells(model: dict[str, Any]) -> list[str]:
-    """Cells of the row of a model, and the reason why it has no velocity."""
-    velocity, gamma = model["velocity"], model.get("threshold")
-    speeds_of_beads = [] if velocity is None else [*model.get("rotation", []), *model.get("sliding", [])[:1]]
-    speeds = ["-" if velocity is None else with_decimals(velocity * 1e3, 3)]
-    speeds += [with_decimals(speed * 1e3, 2) for speed in speeds_of_beads]
-    return [*speeds, *[""] * (4 - len(speeds)), "" if gamma is None else f"{gamma:.3f}", model.get("reason") or ""]
-
-
-def _describe_alignment(state: dict[str, Any]) -> list[list[str]]:
-    """`alignment_of` as texts; with a second text if a force acts along the axis."""
     equation = ", ".join(f"{name} = {state[key]:.3g}" for name, key in (("U", "u"), ("V", "v"), ("β", "damping")))
     rolling = f"small angles {'stay small' if state['stable'] else 'grow'} if the beads roll"
+    notes = [["detachment", f"{detaches}; under an oscillating acceleration the peak may be larger"]]
     if state["u"] == 0.0:
         torque = rolling if state["v"] else "no torque toward the axis"
-        return [["alignment", f"Mathieu {equation} (stable for V < {state['largest_stable_v']:.3g}): {torque}"]]
-    slip = "unknown: the axial motion is not periodic"
-    if state["rate"] is not None:
-        falls = f"turns over after about {state['turns_over_after'] or 0.0:.2g} s (from 1° to 90°)"
-        slip = f"{'stands' if state['stands'] else falls}; small angles grow by {state['rate']:.3g}/s"
-    return [["alignment", f"Mathieu {equation}: {rolling}"], ["with slip", slip]]
+        notes += [["alignment", f"Mathieu {equation} (stable for V < {state['largest_stable_v']:.3g}): {torque}"]]
+    else:
+        slip = "unknown: the axial motion is not periodic"
+        if state["rate"] is not None:
+            falls = f"turns over after about {state['turns_over_after'] or 0.0:.2g} s (from 1° to 90°)"
+            slip = f"{'stands' if state['stands'] else falls}; small angles grow by {state['rate']:.3g}/s"
+        notes += [["alignment", f"Mathieu {equation}: {rolling}"], ["with slip", slip]]
+    head = f"Γ0 = {prediction['gamma0']:.3g}, sin δ = {prediction['sin_delta']:.3g}"
+    outside = [prediction["outside"]] if prediction.get("outside") else []
+    return "\n".join([head, *outside, aligned(rows, right=range(1, 6)), aligned(notes)])
 
 
 def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, FloatArray], dict[str, int]]:

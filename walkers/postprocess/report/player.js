@@ -31,9 +31,7 @@
       this.find(".when").step = (this.end - this.begin) / 1000;
       this.find(".play").addEventListener("click", () => this.play(!this.playing));
       this.find(".when").addEventListener("input", (event) => { this.play(false); this.show(Number(event.target.value)); });
-      for (const button of element.querySelectorAll("[data-camera]")) {
-        button.addEventListener("click", () => this.instance?.setCamera(JSON.parse(button.dataset.camera)));
-      }
+      this.find(".first").addEventListener("click", (event) => this.instance?.setCamera(JSON.parse(event.target.dataset.camera)));
       this.show(this.begin);
     }
 

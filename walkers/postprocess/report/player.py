@@ -37,15 +37,11 @@ _GRID = 2.0**-13
 
 @dataclass(frozen=True)
 class Player:
-    """A K3D plot (a widget in notebooks), its first and last time (s), and captions.
-
-    ``cameras`` are positions, targets (mm) and upward directions of cameras, by name.
-    """
+    """A K3D plot (a widget in notebooks), its first and last time (s), and captions."""
 
     plot: k3d.Plot
     begin: float
     end: float
-    cameras: dict[str, list[float]]
     captions: list[str]
 
 
@@ -71,7 +67,6 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
         shown = replace(shown, position=shown.position - 1e-3 * path[:, None])
         captions.append("The view follows the beads.")
     colours = scene.colours(np.any(scene.pointed_out[::stride], axis=0)).round() @ [0x10000, 0x100, 1]
-    cameras = cameras_of(motion, scene.path)
     look: dict[str, Any] = {"grid_visible": False, "axes": ["x", "y", "z"], "background_color": 0xFFFFFF}
     plot = k3d.plot(height=height, name=motion.case.name, fps=30.0, camera_fov=_VIEW, camera_auto_fit=False, **look)
     if scene.turned is None:
@@ -86,53 +81,30 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
         for part in boundary:
             part.model_matrix = _series(shown, back)
     if motion.case.boundary.tilted and motion.case.environment.gravity:
-        boundary.append(_gravity(scene))
-        captions.append(f"{motion.case.boundary.tilted.capitalize()}; the arrow shows the direction of gravity.")
+        captions.append(f"{motion.case.boundary.tilted.capitalize()}; gravity points down at first.")
     for part in [*boundary, *beads, *_necks(shown, motion.position[::stride], bridges, path)]:
         plot += part
-    plot.fps_meter, plot.camera = False, next(iter(cameras.values()))
+    plot.fps_meter, plot.camera = False, camera_of(motion, scene.path)
     # K3D's own player plays the run in 12 s.
     plot.time = begin = float(shown.time[0])
     end = float(shown.time[-1])
     plot.time_speed = (end - begin) / 12.0 or 1.0
-    return Player(plot, begin, end, cameras, captions)
+    return Player(plot, begin, end, captions)
 
 
-def cameras_of(motion: Motion, path: FloatArray | None = None) -> dict[str, list[float]]:
-    """Cameras (`Player.cameras`) that see everything, with gravity downward.
+def camera_of(motion: Motion, path: FloatArray | None = None) -> list[float]:
+    """Position, target (mm) and upward direction of a camera that sees everything, with gravity downward.
 
     ``path`` is subtracted from the positions of the beads (`walkers.postprocess.scene.Scene`).
     """
-    upward, sideways = view.against_gravity(motion), view.from_the_side(motion.case)
-    first = (
-        np.array([-0.25, -1.0, 0.2 if sideways else 2.0])
-        if motion.case.boundary.closed
-        else view.camera_axes(motion)[2]
-    )
-    views = {
-        "as at first": view.axes_toward(first, upward),
-        "from the side": view.axes_toward(np.array([0.0, -1.0, 0.0]), upward),
-        "onto the floor": view.plan_axes(motion, np.array([1.0, 0.0, 0.0])),
-    }
-    cameras = {}
-    for name, axes in views.items():
-        seen = view.Scene.around(motion, axes, _AROUND, shaken=False, path=path)
-        distance = seen.height(_ASPECT) / 2.0 / tan(radians(_VIEW / 2.0)) + float(seen.high[2] - seen.low[2]) / 2.0
-        place, middle, up = seen.camera(distance)
-        cameras[name] = np.concatenate([place, middle, up]).tolist()
-    return cameras
-
-
-def _gravity(scene: view.Scene) -> Any:
-    """An arrow in the direction of gravity, at the left edge of the first view."""
-    import k3d
-
-    long = 0.3 * scene.height(_ASPECT)
-    side = max(float(scene.high[0] - scene.low[0]) / 2.0, 0.4 * _ASPECT * scene.height(_ASPECT))
-    down = -view.against_gravity(scene.motion)
-    origin = scene.camera(0.0)[1] - side * scene.axes[0] - long / 2.0 * down
-    look = {"color": 0x1D2429, "head_size": 1.7 * long, "line_width": 0.04 * long}
-    return k3d.vectors(*np.array([[origin], [long * down]], dtype=np.float32), name="gravity", **look)
+    toward = view.camera_axes(motion)[2]
+    if motion.case.boundary.closed:
+        toward = np.array([-0.25, -1.0, 0.2 if view.from_the_side(motion.case) else 2.0])
+    axes = view.axes_toward(toward, view.against_gravity(motion))
+    seen = view.Scene.around(motion, axes, _AROUND, shaken=False, path=path)
+    distance = seen.height(_ASPECT) / 2.0 / tan(radians(_VIEW / 2.0)) + float(seen.high[2] - seen.low[2]) / 2.0
+    place, middle, up = seen.camera(distance)
+    return [*place.tolist(), *middle.tolist(), *up.tolist()]
 
 
 def _thinned(motion: Motion, places: int) -> tuple[Motion, int, list[str]]:
