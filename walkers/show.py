@@ -125,12 +125,6 @@ def _volume(case: Case) -> float:
     return sum(map(bead_volume, case.all_radii))
 
 
-def _youngs_modulus(case: Case) -> float | None:
-    """Young's modulus of the material of the beads, Pa, if the library has it."""
-    youngs_modulus = library_of(case.document).numbers("materials", case.beads.material or "").get("youngs_modulus")
-    return parse_quantity(youngs_modulus.written, MODULUS) if youngs_modulus else None
-
-
 def summarise(case: Case) -> dict[str, Any]:
     """Everything that ``walkers show`` prints, SI units.
 
@@ -144,7 +138,7 @@ def summarise(case: Case) -> dict[str, Any]:
     """
     run, drive, limits = case.run, case.excitation, vars(limits_of(case))
     volume = _volume(case)
-    modulus = _youngs_modulus(case)
+    modulus = library_of(case.document).numbers("materials", case.beads.material or "").get("youngs_modulus")
     summary: dict[str, Any] = {
         "case": {**case.as_dict(), "origins": [asdict(origin) for origin in case.origins]},
         "drive": {name: getattr(drive, name) for name in ("peak_acceleration", "amplitude", "peak_velocity")},
@@ -154,7 +148,7 @@ def summarise(case: Case) -> dict[str, Any]:
             "mass": volume * case.beads.density,
             "volume": volume,
             "liquid": _liquid(case, volume),
-            "stiffness_ratio": case.contact.youngs_modulus / modulus if modulus else None,
+            "stiffness_ratio": modulus and case.contact.youngs_modulus / parse_quantity(modulus.written, MODULUS),
         },
         "notes": notes(case),
         "contacts": [contact for walkers in case.walkers for contact in _contacts(case, walkers)],

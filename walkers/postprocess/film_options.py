@@ -15,8 +15,9 @@ _SIZES = {"360p": (640, 360), "480p": (854, 480), "720p": (1280, 720), "1080p": 
 _LEAST = 64
 
 
-def parse_size(text: str) -> tuple[int, int]:
+def _size(_type: Any, tokens: Any) -> tuple[int, int]:
     """Read a size such as ``720p`` or ``1280x720`` as width and height in pixels; otherwise `InputError`."""
+    text = tokens[0].value
     if numbers := re.fullmatch(r"(\d{2,4})x(\d{2,4})", text.strip().lower()):
         return int(numbers[1]), int(numbers[2])
     if text not in _SIZES:
@@ -24,22 +25,15 @@ def parse_size(text: str) -> tuple[int, int]:
     return _SIZES[text]
 
 
-def parse_time(option: str, text: str) -> float:
+def _seconds(_type: Any, tokens: Any) -> float:
     """Read the physical time of an option, such as ``0.1 s`` or a number, in s; otherwise `InputError`."""
     from walkers.inputs.units import DURATION, parse_quantity
 
+    option, text = tokens[0].keyword, tokens[0].value
     try:
         return parse_quantity(f"{text} s" if _NUMBER.fullmatch(text) else text, DURATION)
     except ValueError as error:
         raise refused(option, f'{text!r}: expected a time such as "0.1 s"') from error
-
-
-def _size(_type: Any, tokens: Any) -> tuple[int, int]:
-    return parse_size(tokens[0].value)
-
-
-def _seconds(_type: Any, tokens: Any) -> float:
-    return parse_time(tokens[0].keyword, tokens[0].value)
 
 
 Seconds = Annotated[float, Parameter(converter=_seconds, metavar="TIME")]

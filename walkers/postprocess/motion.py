@@ -412,13 +412,6 @@ class Bridges:
         return {**ends, "gap": self.gap, "normal_force": self.force, "touching": self.gap <= 0.0}
 
 
-def frames_with_bridges(motion: Motion) -> IntArray:
-    """Indices of the frames of a motion that recorded its bridges."""
-    stride = motion.case.run.samples_per_bridge_sample
-    recorded = (frame for frame, (_, number) in enumerate(motion.frames) if number % stride == 0)
-    return np.fromiter(recorded, dtype=np.int64)
-
-
 def read_bridges(motion: Motion, frames: Collection[int] | None = None) -> Iterator[Bridges]:
     """The bridges between the beads of a motion in each frame that recorded them, or in some of these frames.
 

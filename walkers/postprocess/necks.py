@@ -19,7 +19,7 @@ from walkers.inputs.boundary import Flat, Round
 from walkers.inputs.case import Case
 from walkers.physics.capillary import bridge_volume
 from walkers.postprocess.dump import FloatArray, IntArray
-from walkers.postprocess.motion import Motion, frames_with_bridges, read_bridges
+from walkers.postprocess.motion import Motion, read_bridges
 
 BLUE, OPACITY = 0x3FA0FF, 0.8
 """Colour of necks; they are translucent."""
@@ -32,7 +32,8 @@ _WIDEST = 0.9  # largest width of a neck over that of the smaller bead
 
 def bridges_at(motion: Motion, frames: npt.ArrayLike) -> list[IntArray]:
     """Contacts of the recorded bridges that are nearest in time to each of some frames."""
-    frames, recorded = np.asarray(frames), frames_with_bridges(motion)
+    frames, stride = np.asarray(frames), motion.case.run.samples_per_bridge_sample
+    recorded = np.array([frame for frame, (_, number) in enumerate(motion.frames) if number % stride == 0])
     if not len(recorded):
         return [NO_BRIDGES] * len(frames)
     nearest = recorded[np.abs(np.subtract.outer(frames, recorded)).argmin(axis=1)].tolist()

@@ -159,9 +159,10 @@ class Scene:
 
     def moved(self, frame: float) -> FloatArray:
         """Displacement of the camera in a frame, or between two (a fraction), mm."""
+        number, share = int(frame), frame % 1.0
         if self.path is None:
             return np.zeros(3)
-        return np.array([np.interp(frame, np.arange(len(self.path)), component) for component in self.path.T])
+        return (1.0 - share) * self.path[number] + share * self.path[number + ceil(share)]  # type: ignore[no-any-return]
 
     def height(self, aspect: float) -> float:
         """Height of the picture, mm, for a ratio of width to height."""
@@ -203,15 +204,11 @@ class Scene:
 
 def path_of(motion: Motion, begin: int = 0) -> FloatArray:
     """Displacement of the centre of the beads since a frame, smoothed over a cycle, mm, shape (F, 3)."""
+    from scipy.signal import savgol_filter
+
     middle = 1e3 * motion.position.mean(axis=1)
     half = min(motion.case.run.samples_per_cycle, len(middle) - 1) // 2
-    places = np.arange(2 * half + 1.0)
-    smooth = middle.copy()
-    if half:  # the mean over a cycle; straight lines at both ends
-        smooth[half:-half] = np.lib.stride_tricks.sliding_window_view(middle, len(places), axis=0).mean(axis=-1)
-        for part, cycle in ((slice(half), slice(len(places))), (slice(-half, None), slice(-len(places), None))):
-            slope, level = np.polyfit(places, middle[cycle], 1)
-            smooth[part] = level + slope * places[part, None]
+    smooth: FloatArray = savgol_filter(middle, 2 * half + 1, min(half, 1), axis=0)
     displacement: FloatArray = smooth - smooth[begin]
     return displacement
 
@@ -406,13 +403,12 @@ class Window:
         from PIL import Image
 
         motion, shift, number = self._scene.motion, np.zeros(3), int(frame)
-        place, time, share = motion.position[number], motion.time[number], frame - number
+        place, share, turned = motion.position[number], frame - number, self._scene.turned
         if share:
             place = between(motion.select(slice(number, number + 2)), share)[0]
-            time += share * (motion.time[number + 1] - time)
         if self._scene.shaken:
-            shift = 1e3 * boundary_motion(motion.case.excitation, np.array([time]))[0][0]
-        turned = self._scene.turned
+            time = np.interp([frame], np.arange(len(motion.time)), motion.time)
+            shift = 1e3 * boundary_motion(motion.case.excitation, time)[0][0]
         self._beads.colour(self._scene.colours(self._scene.pointed_out[number])[self._pale].swapaxes(0, 1))
         self._beads.move(1e3 * place + shift, None if turned is None else rotations_at(turned, frame))
         if self._bare:
@@ -449,20 +445,15 @@ class Window:
         self._necks.mapper.SetInputData(necks)
 
     def _floor(self, wide: float) -> list[pv.Actor]:
-        """A floor with lines that make its motion visible."""
+        """Lines that make the motion of a floor visible, which is as bright as the background."""
         import pyvista as pv
 
         path = np.zeros((1, 3)) if self._scene.path is None else self._scene.path
         half, middle = _BEYOND * wide / 2.0, self._middle * [1.0, 1.0, 0.0]
         low, high = middle + path.min(axis=0) - half, middle + path.max(axis=0) + half
-        size, centre = high - low, (low + high) / 2.0 * [1.0, 1.0, 0.0]
-        floor = pv.Plane(center=centre - [0.0, 0.0, 2e-3 * wide], i_size=size[0], j_size=size[1])
         lines = pv.line_segments_from_points(floor_lines(low, high, round_below(wide / 8.0)))
         lines.translate([0.0, 0.0, -1e-3 * wide], inplace=True)
-        return [
-            self._plotter.add_mesh(floor, color=_GROUND, lighting=False),
-            self._plotter.add_mesh(lines, color=_LINES, line_width=3, lighting=False),
-        ]
+        return [self._plotter.add_mesh(lines, color=_LINES, line_width=3, lighting=False)]
 
     def _walls(self, wide: float) -> list[pv.Actor]:
         """Walls behind the beads and, slightly nearer to the camera, the edges of all walls."""

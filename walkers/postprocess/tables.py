@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.errors import refused
-from walkers.postprocess.quantities import TABLES, Quantity, declared, matches
+from walkers.postprocess.quantities import TABLES, declared, matches
 from walkers.runner.files import beside
 
 if TYPE_CHECKING:
@@ -47,10 +47,12 @@ def write_table(directory: Path, name: str, columns: Columns) -> None:
     if wrong := missing | columns.keys() - set(order):
         raise KeyError(f"columns of {name} that are missing or not declared: {', '.join(sorted(wrong))}")
     arrays = [_arrow(columns[column]) for column in order]
-    fields = [
-        pa.field(column, array.type, metadata=_metadata(declared(column, name)))
-        for column, array in zip(order, arrays, strict=True)
-    ]
+    fields = []
+    for column, array in zip(order, arrays, strict=True):
+        quantity = declared(column, name)
+        unit = quantity.si_unit  # ``units`` and ``long_name`` are attributes of the CF conventions
+        metadata = {"unit": unit, "meaning": quantity.meaning, "units": unit, "long_name": quantity.label}
+        fields.append(pa.field(column, array.type, metadata=metadata))
     reals = [field.name for field in fields if pa.types.is_floating(field.type)]
     with beside(directory / f"{name}.parquet") as new:
         pq.write_table(
@@ -60,12 +62,6 @@ def write_table(directory: Path, name: str, columns: Columns) -> None:
             use_dictionary=[field.name for field in fields if field.name not in reals],
             use_byte_stream_split=reals,
         )
-
-
-def _metadata(quantity: Quantity) -> dict[str, str]:
-    """Metadata of a field; ``units`` and ``long_name`` are attributes of the CF conventions."""
-    unit = quantity.si_unit
-    return {"unit": unit, "meaning": quantity.meaning, "units": unit, "long_name": quantity.label}
 
 
 def _arrow(values: npt.NDArray[Any]) -> Any:

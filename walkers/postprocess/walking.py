@@ -27,6 +27,7 @@ from walkers.rounding import counted, percent
 
 _LONGER = 1.5
 """Cycles of a run in which walkers turn over, over those until they have turned by 90°."""
+_OF_BEADS = ("rotation_", "sliding_", "open_")
 NAME = "walking"
 """Group of its numbers, see `walkers.postprocess.quantities.GROUPS`."""
 
@@ -52,10 +53,11 @@ def measure(motion: Motion) -> Measured:
     case, groups = motion.case, motion.groups
     of_makes = [tables_of(group) for group in groups]
     tables = {name: _stacked([tables[name] for tables in of_makes]) for name in of_makes[0]}
-    walkers = tables["walkers"]
+    walkers, first = tables["walkers"], of_makes[0]["walkers"]
+    first_up = alike(first, uphill=case.goes_uphill)
     numbers = {
         **_velocities(walkers, case),
-        **_of_beads(of_makes[0]["walkers"], case),
+        **{name: _mean(values[first_up]) for name, values in first.items() if name.startswith(_OF_BEADS)},
         "walkers_met": walkers_met(groups),
         "meets": case.meets,
         "cycles": case.run.cycles,
@@ -238,12 +240,6 @@ def _velocities(walkers: Columns, case: Case) -> dict[str, Any]:
         "came_apart": separated > SEPARATED and not case.meets,
         "facings_differ": not one_heading and differ(*facings),
     }
-
-
-def _of_beads(walkers: Columns, case: Case) -> dict[str, float]:
-    """Rotation, sliding and open contacts of the walkers of a make, on a slope of those that face up."""
-    families, meant = ("rotation_", "sliding_", "open_"), alike(walkers, uphill=case.goes_uphill)
-    return {name: _mean(column[meant]) for name, column in walkers.items() if name.startswith(families)}
 
 
 def _work(groups: Sequence[Group], cycles: Columns, walkers: Columns) -> dict[str, float]:
