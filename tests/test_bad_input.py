@@ -13,11 +13,9 @@ import pytest
 from tests.conftest import call, document, to_toml
 
 Files = dict[str, str | bytes]
-WALKER = {"radii": ["0.3 mm", "0.2 mm"]}
 MIXTURE = {"small": ["0.3 mm", "0.315 mm"], "large": ["0.5 mm", "0.59 mm"], "count": 20}
 HARMONICS = {"harmonics": [{"frequency": "80 Hz", "peak_acceleration": "1 g"}]}
 NO_SINE = {"frequency": None, "peak_acceleration": None, "record": "record.csv"}
-MEETING = {"radii": ["0.4 mm", "0.25 mm"], "meet": True, "replicates": 4}
 
 
 def cluster(arrangement: str, *radii: str) -> dict[str, Any]:
@@ -100,6 +98,8 @@ CASES: list[tuple[dict[str, Any], str]] = [
          'run.cycles = "auto": expected a number of cycles: with drive.ramp no velocity is constant'),
     )),
     # Bodies and boundaries
+    (box("1.5 mm", "9 mm", mixture=MIXTURE, dimers=None, run={"seed": 1}), "boundary.width = "),
+    ({"liquid": {"conserved": True}}, "liquid.conserved = true: "),
     ({"mixture": {**MIXTURE, "small": None, "small_diameters": ["0.63 mm", "0.6 mm"]}},
      'mixture.small_diameters = ["0.63 mm", "0.6 mm"]: expected the smaller one first'),
     ({"contact": {"youngs_modulus": "5 MPa"}, "liquid": {"surface_tension": "9 N/m"}},

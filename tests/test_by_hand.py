@@ -77,9 +77,7 @@ EDITED: dict[str, tuple[dict[str, Any], dict[str, str], dict[str, Any]]] = {
         {"friction_bead_wall": "0.2", "restitution": "0.5"},
         {"contact.friction.bead_wall": 0.2, "contact.restitution": 0.5},
     ),
-    "viscosity": ({}, {"viscosity": "0.0092"}, {"liquid.dynamic_viscosity": "9.2 mPa*s"}),
     "length": ({}, {"cycles": "9"}, {"run.cycles": 9, "run.settling_cycles": 3}),
-    "frequency": ({}, {"frequency": "70.0"}, {"drive.frequency": "70 Hz"}),
     "frequency of a ramp": (
         {"drive": {**REFERENCE["drive"], "ramp": [["0.01 s", 0.5], ["0.06 s", 1.25]]}},
         {"frequency": "70.0"},

@@ -39,8 +39,8 @@ from walkers.sweeps.making import progress_in
 from walkers.templates.deck import Segment, compose, plan_of, render_deck
 from walkers.templates.scene import place
 
-DENSITY, TENSION, LARGE, SMALL = 4000.0, 19.2e-3, 3e-4, 2e-4
-"""Of the reference case: kg/m³, N/m, m, m."""
+DENSITY, LARGE, SMALL = 4000.0, 3e-4, 2e-4
+"""Of the reference case: kg/m³, m, m."""
 FLOOR, SIDE = 0, 3
 FEW = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
 PILE: dict[str, Any] = {

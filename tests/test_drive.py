@@ -97,9 +97,6 @@ def test_a_run_has_its_record(tmp_path: Path) -> None:
     """It is named by the numbers, not by the file, and needs no file after: nor its deck and its changed case."""
     case = recorded(tmp_path, sine(40), repeats=True)
     first = run(case, tmp_path)
-    sweep = 'case = "case.toml"\n[axes]\n"drive.record" = ["record.csv"]\n'
-    (tmp_path / "records.toml").write_text(sweep)
-    assert [point.but(title="") for point in load_sweep(tmp_path / "records.toml").cases()] == [case.but(title="")]
     (tmp_path / "other").mkdir()
     shutil.move(tmp_path / "record.csv", tmp_path / "other" / "renamed.csv")
     again = run(case.changed({"drive.record": str(tmp_path / "other" / "renamed.csv")}), tmp_path)

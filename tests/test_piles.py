@@ -145,24 +145,6 @@ def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(tm
     assert finished.motion.position[-1, 2:, 2].max() < 7e-3
 
 
-@pytest.mark.parametrize(
-    ("changes", "key"),
-    [
-        ({"mixture": {"count": None}}, "mixture.count"),
-        ({"mixture": {"fill_height": "3 mm"}}, "expected either count or fill_height"),
-        ({"mixture": {"large": ["0.29 mm", "0.4 mm"]}}, "mixture.large"),
-        ({"mixture": {"small": ["0.32 mm", "0.3 mm"]}}, "mixture.small"),
-        ({"boundary": {"width": "1.5 mm"}}, "boundary.width"),
-        ({"boundary": {"height": "2 mm"}}, "boundary.height"),
-        ({"run": {"duration": "9000 s"}}, "run.duration"),
-        ({"dimers": {"radii": ["0.5 mm", "0.3 mm"], "replicates": 1}, "liquid": {"conserved": True}}, "conserved"),
-    ],
-)
-def test_a_bad_pile_is_told_by_its_key(changes: dict[str, dict[str, Any]], key: str) -> None:
-    with pytest.raises(InputError, match=re.escape(key)):
-        small(**changes)
-
-
 @pytest.mark.parametrize(("mixed_by", "counts"), [("mass", (80, 10)), ("number", (45, 45))])
 def test_a_share_is_of_what_a_mixture_is_mixed_by(mixed_by: str, counts: tuple[int, int]) -> None:
     """Beads of twice the radius have eight times the volume, and the mass; the share is a half, of 90 beads."""

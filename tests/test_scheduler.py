@@ -26,14 +26,11 @@ from tests.conftest import PATIENCE, PROGRAM, TINY, bits, call, document, finish
 from walkers.errors import InputError
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.sweep import load_sweep
-from walkers.postprocess.motion import read_motion
-from walkers.postprocess.tables import read_table
 from walkers.progress import Progress
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import case_of, unfinished
 from walkers.runner.failures import WalkersMet
 from walkers.runner.files import write_json
-from walkers.runner.manifest import read_manifest
 from walkers.sweeps.making import DECK_FOLDER, make_runs, share_at
 from walkers.sweeps.scheduler import (
     LONGEST_SECONDS,
@@ -69,33 +66,6 @@ def sweep_file(in_folder: Path) -> Callable[..., str]:
 
 def _sweep(*arguments: str) -> subprocess.CompletedProcess[str]:
     return call("sweep", *arguments)
-
-
-def test_points_of_a_shared_deck_are_what_they_are_alone(tmp_path: Path) -> None:
-    """Other radii, frictions, restitution, starts, shapes, drives: the same to rounding, ordinary run directories."""
-    run = {**TINY, "cycles": 8, "settling_cycles": 2}
-    fan = {"radii": ["0.3 mm", "0.2 mm", "0.2 mm"], "arrangement": "fan", "replicates": 2}
-    cases = [
-        make_case(run=run),
-        make_case(run=run, contact={"friction": {"bead_bead": 0.05, "bead_wall": 0.2}, "restitution": 0.6}),
-        make_case(run=run, dimers={"radii": ["0.35 mm", "0.2 mm"], "angle": "20 deg", "replicates": 3}),
-        make_case(run=run, clusters=[fan]),  # dimers and clusters
-        make_case(run=run, drive={"peak_acceleration": "3 g", "axis": "y"}, dimers={"radii": ["0.25 mm", "0.25 mm"]}),
-    ]
-    together = make_runs(cases, tmp_path / "together", find_engine())
-    for case, name in zip(cases, together, strict=True):
-        assert [make_runs([case], tmp_path / "alone", find_engine()) for _ in range(2)] == [{name: True}, {name: False}]
-        there, alone = tmp_path / "together" / name, tmp_path / "alone" / name
-        motion, motion_alone = read_motion(there), read_motion(alone)
-        assert motion.case == motion_alone.case == case
-        for one, other in zip(motion.groups, motion_alone.groups, strict=True):
-            way, way_alone = one.position - one.position[0], other.position - other.position[0]
-            assert np.abs(way - way_alone).max() < 1e-12
-        for table in ("walkers", "bridges"):
-            left, right = read_table(there, table), read_table(alone, table)
-            pd.testing.assert_frame_equal(left, right, check_exact=False, rtol=1e-6, atol=1e-9)
-        assert read_manifest(there)["shared_deck"] == {"first": next(iter(together)), "runs": 5, "walkers": 9}
-        assert {path.name for path in alone.rglob("*")} <= {path.name for path in there.rglob("*")}
 
 
 def test_walkers_that_meet_are_taken_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

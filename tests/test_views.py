@@ -159,6 +159,11 @@ def test_figures_of_runs_come_in_other_formats_and_can_be_printed(directory: Pat
     names = [f"{name}.{form}" for name in ("walk", "gait") for form in ("pdf", "svg", "png")]
     assert [path.name for path in paths] == names
     assert all(directory.name.encode() in path.read_bytes() for path in paths)
+    pdf = paths[0].read_bytes()
+    assert b"/FontFile2" in pdf  # TrueType, embedded
+    assert b"/Type3" not in pdf
+    assert plot_run(directory, tmp_path, "pdf")[0].read_bytes() == pdf
+    assert not list(tmp_path.glob("*.new"))
     figures = figures_of(read(directory))
     assert [spoilt(figure) + letters(figure) for figure in figures.values()] == [["a", "b", "c"], []]
     looks = looks_of([str(number) for number in range(MOST_NAMED + 3)])

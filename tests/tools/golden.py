@@ -1,13 +1,12 @@
 """Golden numbers: what shipped cases and sweeps compute, to compare before and after a change of the program.
 
     python tests/tools/golden.py compare            # everything; exit status 1 and a list if anything differs
-    python tests/tools/golden.py compare decks      # one part: decks, runs or commands
+    python tests/tools/golden.py compare decks      # one part: decks or runs
     python tests/tools/golden.py freeze [PART ...]  # write the golden numbers anew, after a change that is meant
 
 ``decks``: what determines the run of each point of each shipped case and sweep, and of up to 25 points a sweep the
 deck's text, its tables and its layout. ``runs``: each column of each table (bytes) and each number of the result of a
-dozen finished runs. ``commands``: what commands print as JSON about these runs, about sweeps, and the comparison with
-the paper. Runs are kept in ``runs/golden``; ``compare`` makes them anew.
+dozen finished runs, which are made anew in ``runs/golden``.
 
 Digests of tables are those of one machine's arithmetic: freeze on the machine that compares.
 """
@@ -17,7 +16,6 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
@@ -45,23 +43,6 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
     "groove": ("fig1b", {"boundary.shape": "groove", "boundary.opening": "120 deg", "dimers.replicates": 2}),
     "two-tones": ("fig4a", {"drive.waveform": "triangle", "run.cycles": 24, "run.settling_cycles": 8}),
 }
-COMMANDS = (
-    ("sweep", "fig4"),
-    ("sweep", "zoo-corner"),
-    ("list", "fig4", "--json"),
-    ("list", "zoo-corner", "--json"),
-    ("compare", "fig4a", "fig4b", "--json"),
-    ("compare", "pile-ci", "--set", "run.seed=2", "--json"),
-    ("climb", "pile-ci", "--json"),
-    ("show", "fig1b", "--theory", "--json"),
-    ("show", "fig4b", "--theory", "--json"),
-    ("show", "pile-ci", "--json"),
-    ("show", "climber", "--json"),
-    ("paper", "figures", "--only", "comparison", "--to", str(OUT / "figures")),
-)
-"""Commands without ``--json`` only make what the later ones print."""
-VOLATILE = {"seconds", "age", "size", "directory", "run", "forecast", "predicted_seconds", "path", "wall_time"}
-"""Keys of printed JSON that say where and how fast."""
 
 
 def digest(content: str | bytes) -> str:
@@ -112,7 +93,7 @@ def runs() -> dict[str, Any]:
             table = pd.read_parquet(path)
             digests |= {f"{name}/{path.stem}/{column}": _of_column(table[column]) for column in table}
         result = json.loads((place / "result.json").read_text("utf-8"))
-        digests |= {f"{name}/result/{key}": value for key, value in leaves(result["numbers"])}
+        digests |= {f"{name}/result/{key}": value for key, value in result["numbers"].items()}
     return digests
 
 
@@ -121,37 +102,7 @@ def _of_column(column: pd.Series) -> str:
     return digest("\n".join(map(repr, values.tolist())) if values.dtype == object else values.tobytes())
 
 
-def commands() -> dict[str, Any]:
-    """Part ``commands``."""
-    for case, changes in RUNS.values():
-        run(load_case(case, changes), OUT)
-    run(load_case("pile-ci", {"run.seed": 2}), OUT)
-    printed: dict[str, Any] = {}
-    for words in COMMANDS:
-        program = [str(Path(sys.executable).with_name("walkers")), *words, "--out", str(OUT)]
-        done = subprocess.run(program, capture_output=True, text=True, cwd=ROOT, check=False)
-        if done.returncode:
-            raise SystemExit(f"walkers {' '.join(words)}: status {done.returncode}\n{done.stderr}")
-        if words[-1] == "--json":
-            printed |= {f"{' '.join(words[:-1])}: {key}": value for key, value in leaves(json.loads(done.stdout))}
-    compared = json.loads((OUT / "figures" / "comparison.json").read_text("utf-8"))
-    return printed | {f"comparison: {key}": value for key, value in leaves(compared)}
-
-
-def leaves(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
-    """The values of nested JSON by dotted key, without those that say where and how fast."""
-    if isinstance(value, Mapping):
-        for name, part in value.items():
-            if name not in VOLATILE:
-                yield from leaves(part, f"{key}.{name}" if key else name)
-    elif isinstance(value, list):
-        for number, part in enumerate(value):
-            yield from leaves(part, f"{key}[{number}]")
-    else:
-        yield key, value
-
-
-PARTS = {"decks": decks, "runs": runs, "commands": commands}
+PARTS = {"decks": decks, "runs": runs}
 
 
 def differences(golden: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
@@ -166,7 +117,7 @@ def main(action: str, *names: str) -> int:
     """Freeze or compare."""
     golden = json.loads(GOLDEN.read_text("utf-8")) if GOLDEN.exists() else {}
     chosen = names or tuple(PARTS)
-    if {"runs", "commands"} & set(chosen):
+    if "runs" in chosen:
         shutil.rmtree(OUT, ignore_errors=True)
     status = 0
     for name in chosen:
