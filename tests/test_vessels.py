@@ -28,6 +28,7 @@ from walkers.postprocess.necks import ends_of
 from walkers.postprocess.scene import walls_of
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
+from walkers.show import describe, summarise
 from walkers.templates.deck import render_deck
 from walkers.templates.scene import Bead
 
@@ -339,6 +340,8 @@ def test_a_bowl_of_facets_becomes_round(tmp_path: Path) -> None:
             pi * (size / 2) ** 2 * (size - size / 6), rel=3 * off[-1]
         )
     assert off[1] / off[2] == pytest.approx(4.0, rel=0.1)
+    walls = f"{len(vessel.triangles)} triangles in {len({*vessel.faces})} faces"
+    assert f"vessel     {walls}, open at its top" in describe(summarise(case))
     with pytest.raises(
         InputError, match=r"faces, edges and corners; expected at most .* for 50000 beads: a coarser mesh"
     ):

@@ -132,9 +132,10 @@ def summarise(case: Case) -> dict[str, Any]:
     -------
     dict
         ``case`` (resolved), ``drive`` (its largest harmonic, the sum of all), ``beads`` (numbers, mass, liquid),
-        ``dimer`` (M, R̄, Γ0, sin δ, mass asymmetry; of dimers), ``contacts`` (forces, bridges, overlaps of each make of
-        walkers), ``time_step`` (limits, None if one does not apply; the chosen step; its shares of the limits and those
-        of ``"auto"``), ``run`` (steps, samples, predicted seconds).
+        ``dimer`` (M, R̄, Γ0, sin δ, mass asymmetry; of dimers), ``vessel`` (numbers of its walls; whether it is open),
+        ``contacts`` (forces, bridges, overlaps of each make of walkers), ``time_step`` (limits, None if one does not
+        apply; the chosen step; its shares of the limits and those of ``"auto"``), ``run`` (steps, samples, predicted
+        seconds).
     """
     run, drive, limits = case.run, case.excitation, vars(limits_of(case))
     volume = _volume(case)
@@ -168,6 +169,10 @@ def summarise(case: Case) -> dict[str, Any]:
             "predicted_seconds": PROGRAM_SECONDS + predicted_seconds(case) + predicted_overhead([case]),
         },
     }
+    if case.boundary.shape == "vessel":
+        vessel = case.boundary.vessel
+        summary["vessel"] = {"planes": len(case.boundary.planes), "triangles": len(vessel.triangles)}
+        summary["vessel"] |= {"faces": len({*vessel.faces.tolist()}), "open": bool(vessel.rims)}
     if case.walkers and len(case.walkers[0].radii) == 2:
         dimer = dimer_of(case)
         numbers = ("total_mass", "mean_radius", "sin_delta", "mass_asymmetry")
@@ -212,6 +217,10 @@ def describe(summary: dict[str, Any]) -> str:
         f"beads      {beads['small']} small and {beads['large']} large, {beads['mass'] * 1e6:.4g} mg, "
         f"{beads['volume'] * 1e9:.4g} µL with {beads['liquid'] * 1e9:.3g} µL of liquid{softened}",
     ]
+    if vessel := summary.get("vessel"):
+        of_mesh = f"{counted(vessel['triangles'], 'triangle')} in {counted(vessel['faces'], 'face')}"
+        walls = counted(vessel["planes"], "plane") if vessel["planes"] else of_mesh
+        lines.append(f"vessel     {walls}, {'open at its top' if vessel['open'] else 'closed'}")
     if dimer:
         lines.append(
             f"dimer      M = {dimer['total_mass'] * 1e6:.4g} mg, mean radius {dimer['mean_radius'] * 1e3:.4g} mm, "

@@ -23,11 +23,7 @@ _LONGEST_SHOWN = 300
 
 @dataclass(frozen=True)
 class Verification:
-    """State of the files of a run or an archive, or of the points of a sweep: a summary, and names by kind.
-
-    Kinds are ``changed``, ``missing``, ``not listed``, ``doubtful`` (with the reason in brackets), and two without
-    influence on results: ``made since`` from the run, and ``left out`` of the archive on purpose.
-    """
+    """Files of a run or an archive, or points of a sweep: a summary, and names by kind, such as ``changed``."""
 
     name: str
     summary: str
@@ -49,11 +45,7 @@ class Verification:
 def verify(path: Path) -> list[Verification]:
     """Compare a run, the runs of a sweep, or an unpacked archive with the checksums in manifests or in the archive.
 
-    All listed files must exist and be unchanged, and there must be no other files that a run is read from. Other files,
-    such as pictures, were made since; they are named and are no failure.
-
-    Runs and archives have one verification; sweeps have one of the points, and one of each finished run. `InputError`
-    if the path is none of these or cannot be read.
+    Sweeps have a verification of the points, and one of each finished run.
     """
     if (path / RECORD_NAME).is_file():
         record = read_record(path)

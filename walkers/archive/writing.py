@@ -144,10 +144,7 @@ def _write(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, file: File) -> None
 
 
 def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
-    """Contents of the archive of a finished run or a sweep; without the engine's dumps if ``dumps`` is false.
-
-    `InputError` if points of a sweep are not finished.
-    """
+    """Contents of the archive of a finished run or a sweep; without the engine's dumps if ``dumps`` is false."""
     from walkers.sweeps.table import encoded, load
 
     if not (directory / RECORD_NAME).is_file():

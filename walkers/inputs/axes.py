@@ -24,10 +24,7 @@ _DISTRIBUTIONS = ("uniform", "loguniform")
 
 
 class Range(NamedTuple):
-    """Range of a random number, in a unit (None: a plain number), uniform or log-uniform.
-
-    With a ``median``, half of the draws are below it and half above, each half spread over its side of the range.
-    """
+    """Range of a random number in a unit (None: a plain number); with a ``median``, half of the draws are below it."""
 
     low: float
     high: float
@@ -67,10 +64,7 @@ def is_axis(value: object) -> bool:
 
 
 def values_of(key: str, axis: object) -> list[Value]:
-    """The values of an axis: a list, ``{ linspace = [first, last, number] }`` or ``{ geomspace = [...] }``.
-
-    Raises `InputError` if it is something else.
-    """
+    """The values of an axis: a list, ``{ linspace = [first, last, number] }`` or ``{ geomspace = [...] }``."""
     if isinstance(axis, list):
         if not axis:
             raise unusable(key, "expected at least one value", axis)
@@ -122,10 +116,7 @@ def written(number: float, unit: str | None) -> Value:
 
 
 def unit_of(key: str, values: Sequence[Value]) -> str | None:
-    """The unit of the values of an axis; None if they are plain numbers, or no numbers at all (names, "auto").
-
-    Raises `InputError` if they are in several units.
-    """
+    """The one unit of the values of an axis; None if they are plain numbers, or no numbers at all (names, "auto")."""
     parts = [part for value in values for part in (value if isinstance(value, list) else [value])]
     units = {quantity[1] for quantity in map(as_quantity, parts) if quantity}
     if len(units) > 1:
@@ -194,10 +185,7 @@ def descending(key: str, ends: Mapping[str, Value]) -> Axis:
 
 
 def ranges_of(ranges: Mapping[str, Any]) -> dict[str, Range]:
-    """The ranges of several keys, as ``{ uniform = [low, high] }`` or ``{ loguniform = [low, high] }``.
-
-    A number between the two is the median: ``{ uniform = [low, median, high] }``. Raises `InputError` for others.
-    """
+    """The ranges of several keys, ``{ uniform = [low, high] }`` or ``{ loguniform = [low, median, high] }``."""
     spans = {}
     for key, given in flatten(ranges, is_axis).items():
         kind, ends = next(iter(given.items())) if isinstance(given, Mapping) and len(given) == 1 else ("", None)
@@ -221,10 +209,7 @@ def unit_cube(dimensions: int, points: int, seed: int) -> FloatArray:
 
 
 def combinations(axes: Sequence[Axis]) -> tuple[tuple[str, ...], list[tuple[Value, ...]]]:
-    """The keys of all axes, and one row of values for each combination of points; the last axis varies fastest.
-
-    Raises `InputError` if a key is on two axes, or there are too many combinations.
-    """
+    """The keys of all axes, and one row of values for each combination of points; the last axis varies fastest."""
     keys = tuple(key for axis in axes for key in axis.keys)
     for number, key in enumerate(keys):
         list_of = key.partition("[")[0]

@@ -215,10 +215,7 @@ class Boundary(Table):
     def room(
         self, half_x: float, half_y: float, *, height: float, margin: float, largest: float
     ) -> tuple[Vector, Vector]:
-        """Lower and upper corner of the simulation box; in a container, climbers may rise above the rim.
-
-        Half the extent of the beads' paths, their height, a margin, and the largest radius are in m.
-        """
+        """Corners of the simulation box, from half the extent of the paths of beads, height, margin and radius; m."""
         x, y = half_x + 2.0 * margin, half_y + 2.0 * margin
         top, below = height + 2.0 * margin, 4.0 * largest
         if self.shape == "plane":
@@ -236,10 +233,7 @@ class Boundary(Table):
         return (-down * _round(cos(self.uphill)), -down * _round(sin(self.uphill)), -press)
 
     def side_clearance(self, places: FloatArray) -> FloatArray:
-        """Distance of each place, shape (n, 3), from the nearest side wall, shape (n,), m.
-
-        In a vessel of facets it is the distance from the nearest wall, negative for a place outside.
-        """
+        """Distance of places, (n, 3), from the nearest side wall, (n,), m; in a vessel of facets, negative outside."""
         if self.triangles:
             return self.vessel.clearance(places)
         clearances = places[:, 0] + inf
@@ -269,10 +263,7 @@ class Boundary(Table):
         return self.vessel.volume(level) if self.shape == "vessel" else self.cross_section * level
 
     def layer(self, largest: float) -> Layer:
-        """Places from which beads up to a radius (m) are poured into a container.
-
-        A square lattice as wide as the container, where walls that cut it leave room; beads stray less then.
-        """
+        """Places from which beads up to a radius (m) are poured: a square lattice, without those that walls cut."""
         import numpy as np
 
         across = int(self.width / (2.0 * LOOSE * largest))

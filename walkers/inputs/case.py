@@ -179,10 +179,8 @@ _ABOUT = ("document", "sources", "recorded_law", "uncertain")
 class Case(Table):
     """A case file: bodies on a boundary under a drive, with a liquid and contacts.
 
-    ``uncertain`` has, for keys whose values are guesses, the range in which the truth may lie: ``[low, high]``, or
-    ``{ loguniform = [low, high] }`` for one of magnitudes. ``document`` has the tables that the case was read from,
-    ``sources`` the `Source` of each value that they do not give, and ``recorded_law`` is a user's law as a run has
-    recorded it.
+    ``document`` has the tables that the case was read from, ``sources`` the `Source` of each value that they do not
+    give, and ``recorded_law`` is a user's law as a run has recorded it.
     """
 
     title: Annotated[str, SAME_RUN] = key("Title of figures and reports. It does not change the results.", "")
@@ -285,8 +283,6 @@ class Case(Table):
     def changed(self, changes: Mapping[str, Any]) -> Case:
         """The case with other values of its file, by dotted keys and as a case file has them.
 
-        Raises `InputError` if a key or a value cannot be used.
-
         Examples
         --------
         >>> from walkers import load_case
@@ -297,10 +293,7 @@ class Case(Table):
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Case:
-        """A case from `as_dict` (a run directory's ``case.json``); raises `ValueError` if it is none.
-
-        Keys of earlier versions of the program are left out.
-        """
+        """A case from `as_dict`, without keys of earlier versions of the program; raises `ValueError` if it is none."""
         try:
             return cls.model_validate(values, extra="ignore")
         except ValidationError as error:

@@ -41,10 +41,7 @@ def value_at(document: Any, parts: Sequence[str | int]) -> Any:
 
 
 def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool] = lambda _: False) -> dict[str, Any]:
-    """Dotted keys of nested tables: ``{"drive": {"frequency": …}}`` and ``{"drive.frequency": …}`` are the same.
-
-    Raises `InputError` if a key is given both ways.
-    """
+    """Dotted keys of nested tables; ``{"drive": {"frequency": …}}`` and ``{"drive.frequency": …}`` are the same."""
     flat: dict[str, Any] = {}
     for name, value in table.items():
         below = {name: value}
@@ -58,8 +55,6 @@ def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool] = lambda _:
 
 def settings_of(words: Iterable[str]) -> dict[str, Value]:
     """Values from ``key=value``, the value as a case file has it; quotes about text may be left out.
-
-    Raises `InputError` if there is no ``=``, or a key is given twice.
 
     Examples
     --------

@@ -32,11 +32,7 @@ _OF_MIXTURES = {
 
 
 class LibraryNumber(NamedTuple):
-    """A number of the library, as a case would write it.
-
-    An unmeasured number may lie anywhere in its ``range``; the range of a calibrated number has 5 to 95 % of the
-    posterior. A ``logarithmic`` range is uniform in the logarithm.
-    """
+    """A number as a case would write it; the ``range`` of a calibrated one has 5 to 95 % of the posterior."""
 
     written: Any
     source: str = ""
@@ -55,11 +51,7 @@ class Collection(NamedTuple):
 
 
 class Library:
-    """The materials, liquids and surface pairs that a case can name.
-
-    They come from the user's own library, given by its validated tables, and from the program. No name has two
-    meanings: the user's library cannot redefine a name of the program.
-    """
+    """The materials, liquids and surface pairs that a case can name: of the user's own library, and of the program."""
 
     def __init__(self, users: Mapping[str, Any] | None = None) -> None:
         own_library = [Collection("own library", users.get("file", ""), users)] if users else []
@@ -82,11 +74,7 @@ class Library:
         return {}
 
     def surface_pair(self, first: str | None, second: str | None) -> Mapping[str, LibraryNumber]:
-        """Contact parameters of two wet surfaces; empty if there are none.
-
-        ``friction``, ``rolling_friction`` and, where known, ``contact_angle`` (rad), ``meniscus_radius`` (m) or
-        ``volume_fraction``, and ``restitution``.
-        """
+        """Contact parameters of two wet surfaces (``friction``, ``contact_angle``, …); empty if there are none."""
         for collection in self.collections:
             for pair in collection.tables.get("surface_pairs", ()):
                 if sorted(pair["materials"]) == sorted([first or "", second or ""]):
@@ -172,10 +160,7 @@ def _shipped() -> Library:
 
 
 def read_library(folder: Path) -> dict[str, Any]:
-    """The user's own library: the file of ``--library``, else that in a folder, else nothing.
-
-    Raises `InputError` if it is none.
-    """
+    """The user's own library: the file of ``--library``, else that in a folder, else nothing."""
     path = inputs.chosen_library or folder / FILE_NAME
     if not (inputs.chosen_library or path.is_file()):
         return {}

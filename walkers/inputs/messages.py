@@ -68,10 +68,7 @@ def blaming(source: str, document: Mapping[str, Any] | None = None) -> Iterator[
 def validated(
     model: type[File], document: Mapping[str, Any], source: str, whole: str = "a case", further: Sequence[Problem] = ()
 ) -> File:
-    """Nested tables as a kind of file; messages call it ``source``, and its kind ``whole``.
-
-    Raises `InputError` with all that pydantic finds wrong, and with ``further`` problems.
-    """
+    """Nested tables as a kind of file (``whole``); raises `InputError` with all problems, the ``further`` ones too."""
     problems = {problem.key: problem for problem in _quoting(further, document)}
     try:
         file = model.model_validate(document, context=WRITTEN)

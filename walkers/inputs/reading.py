@@ -100,10 +100,7 @@ def is_sweep_file(path: Path) -> bool:
 
 
 def find_input(name: str | Path, kind: str) -> Path:
-    """A file of a kind (case, sweep, calibration) by its path, which may lack ``.toml``, or a shipped one by its name.
-
-    Raises `InputError` if there is neither, or if it is known to be of another kind: with the command that takes it.
-    """
+    """A file of a kind (case, sweep, calibration) by its path, with or without ``.toml``, or by its shipped name."""
     check_utf8(name)
     text, path, of_kind = str(name), Path(name), shipped(kind)
     try:

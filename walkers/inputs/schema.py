@@ -36,10 +36,7 @@ class _Generator(GenerateJsonSchema):
 
 
 def case_schema() -> dict[str, Any]:
-    """The schema of a case file (JSON Schema 2020-12): keys, meanings, types, bounds and examples.
-
-    It has neither keys that exclude each other (`walkers.inputs.table.Choice`) nor values of the library.
-    """
+    """The schema of a case file (JSON Schema 2020-12), without exclusions of keys and values of the library."""
     schema = Case.model_json_schema(schema_generator=_Generator)
     schema = json.loads(_LINK.sub("", json.dumps(schema)))
     schema["properties"]["library"] = {"type": "object", "description": "Materials and liquids of the case itself."}

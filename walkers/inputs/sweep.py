@@ -150,8 +150,7 @@ class Sweep:
 def load_sweep(sweep: str | Path | Mapping[str, Any], changes: Mapping[str, Value] | None = None) -> Sweep:
     """Read a sweep file, a shipped sweep such as ``fig2``, or the tables of a sweep file, and expand it.
 
-    ``changes`` are put beside its ``[set]``, by dotted keys; its name tells of them. Raises `InputError` if there
-    is no such file or anything in it cannot be used; its points are checked by `Sweep.cases`.
+    ``changes`` are put beside its ``[set]``; its name tells of them. Its points are checked by `Sweep.cases`.
     """
     path = Path("sweep.toml") if isinstance(sweep, Mapping) else find_input(sweep, "sweep")
     document, name = dict(sweep) if isinstance(sweep, Mapping) else read_toml(path), path.stem
@@ -188,10 +187,9 @@ def expand(
     folder: Path = Path(),
     base: tuple[str, Mapping[str, Any]] | None = None,
 ) -> Sweep:
-    """Expand a sweep given as nested tables; raises `InputError` if anything in it cannot be used.
+    """Expand a sweep given as nested tables, with files that it names in a ``folder``.
 
-    Messages begin with ``source``; files that it names are looked up in ``folder``. With ``base``, the
-    name of the base case and its tables, no file is read.
+    With ``base``, the name of the base case and its tables, no file is read.
     """
     file = validated(SweepFile, document, source, "a sweep")
     path = None if base else _base(file.case, source, folder)

@@ -239,8 +239,7 @@ def alternatives(model: type[Table], name: str) -> set[str]:
 def changed(model: type[Table], document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """A document with other values at dotted keys (``dimers.radii[0]`` for one of a list).
 
-    Keys that a new one excludes (`Table.choices`) go, unless they change too. Raises `InputError` if a list has no such
-    place.
+    Keys that a new one excludes (`Table.choices`) go, unless they change too.
     """
     tables = copy.deepcopy(dict(document))
     for name, value in changes.items():

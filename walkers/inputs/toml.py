@@ -43,10 +43,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 def with_files(
     document: Mapping[str, Any], folder: Path = Path(), values: Iterable[tuple[str, object]] = ()
 ) -> dict[str, Any]:
-    """The tables of a case with the contents of the files that they, or other values of keys, name in a folder.
-
-    A case is whole without these files. Raises `InputError` if one cannot be read.
-    """
+    """Tables of a case with the contents of the files in a folder that they name, or further values of keys."""
     tables, values = dict(document), list(values)
     for key, (table, module, reader) in _FILES.items():
         contents = dict(below) if isinstance(below := tables.get(table), Mapping) else {}

@@ -50,11 +50,10 @@ _ZEROS: Mapping[str, float] = {"K": 0.0, "degC": 273.15, "°C": 273.15}
 
 @dataclass(frozen=True)
 class Kind:
-    """Kind of a quantity: name, SI unit, example for messages, and physical bounds of its magnitude.
+    """Kind of a quantity: name, SI unit, example for messages, and wide physical bounds of its magnitude.
 
-    The bounds are wide; they keep wrong exponents out of formulas that would overflow. ``sign`` is the accepted sign in
-    files: ``more than zero``, ``zero or more``, or anything. As an annotation of a float, a kind makes pydantic read
-    text with a unit.
+    ``sign`` is the accepted one in files: ``more than zero``, ``zero or more``, or anything. As an annotation of a
+    float, a kind makes pydantic read text with a unit.
     """
 
     name: str
@@ -89,10 +88,7 @@ class Kind:
 
 
 def parse_quantity(text: str, kind: Kind) -> float:
-    """Read a quantity of a kind, such as ``"0.3 mm"``, as a number in SI units; ``g`` of an acceleration is 9.8 m/s².
-
-    Raises `ValueError` if the text is no quantity, has no unit, or has the dimension of something else.
-    """
+    """Read a quantity of a kind, such as ``"0.3 mm"``, in SI units; raises `ValueError` if it is something else."""
     match = _NUMBER_AND_UNIT.fullmatch(text.strip())
     if match is None:
         raise ValueError(kind.expectation)

@@ -311,10 +311,7 @@ def named(normal: Vector, number: int) -> str:
 
 
 def vessel_of(mesh: Mapping[str, Any], scale: float) -> Vessel:
-    """A vessel of a mesh (`read_mesh`) in units of a length (m), its lowest point at z = 0, about the z axis.
-
-    Raises `InputError` if it is not the inner surface of one vessel.
-    """
+    """A vessel of a mesh (`read_mesh`) in units of a length (m), its lowest point at z = 0, about the z axis."""
     return _vessel_of(*(np.array(mesh[name]).tobytes() for name in ("points", "triangles")), scale)
 
 

@@ -123,10 +123,7 @@ class Curve:
     pull: Callable[[FloatArray], FloatArray] | None = None  # alone, N, if resistances are expensive to compute
 
     def __post_init__(self) -> None:
-        """Refuse gaps that are no numbers, or not in their order."""
-        for name, gap in (("breaks", self.rupture), ("forms", self.formation), ("changes", self.scale)):
-            if not isinstance(gap, (int, float, np.integer, np.floating)):
-                raise UnusableLawError(f"the bridge {name} at a gap of {gap!r}; expected a number")
+        """Refuse gaps that are not in their order."""
         if not 0.0 < self.rupture < inf:
             raise UnusableLawError(f"the bridge breaks at a gap of {self.rupture:g} m; expected a positive number")
         if not 0.0 <= self.formation <= self.rupture:

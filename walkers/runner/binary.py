@@ -58,10 +58,7 @@ class Engine:
 
 
 def find_engine(name_or_path: str | None = None) -> Engine:
-    """Find the engine: by a name or path, else by the environment variable ``WALKERS_ENGINE``, else ``liggghts``.
-
-    `EngineMissing` if there is no such executable.
-    """
+    """Find the engine by a name or path, else by the environment variable ``WALKERS_ENGINE``, else ``liggghts``."""
     name = name_or_path or os.environ.get(ENGINE_VARIABLE) or "liggghts"
     if (executable := shutil.which(name)) is None:
         text = "is not an executable file on this machine; install it with: sudo apt-get install liggghts"
@@ -96,11 +93,7 @@ def version_in(output: bytes) -> str | None:
 
 
 def plugin_of(engine: Engine) -> Path:
-    """The contact model for an engine, compiled on first use.
-
-    Raises `OtherEngine` if the model was written for another version of the engine, and `ContactModelMissing` if it
-    cannot be compiled.
-    """
+    """The contact model for an engine, compiled on first use; raises `OtherEngine` or `ContactModelMissing`."""
     place, fingerprint = _place()
     if set(str(place)) & set(": "):
         raise ContactModelMissing(f"{place} has a space or a colon, which the system's loader takes for a separator")
@@ -217,11 +210,7 @@ def compile_model() -> None:
 
 @dataclass(frozen=True)
 class AuditRecord:
-    """Outcome of an audit of a binary, identified by its hash (``engine``) and its banner (``version``).
-
-    ``contact_model`` is the SHA-256 of the library that it loaded, ``lines`` the number of checked lines, ``failures``
-    those that failed, ``skipped`` the number of those that lack a program.
-    """
+    """Outcome of an audit of a binary: SHA-256 of it and of its contact model, banner, checked lines, failed ones."""
 
     engine: str
     contact_model: str
@@ -242,10 +231,7 @@ class AuditRecord:
 
 
 def read_audit(engine: str, model: str | None) -> AuditRecord | None:
-    """The record of a binary, by its hash.
-
-    None if it has no readable record with this contact model (its hash; None: unknown, any).
-    """
+    """The record of a binary, by its hash; None if it has none with this contact model (its hash; None: any)."""
     with suppress(OSError, ValueError, KeyError, TypeError):
         values = read_json(cache_folder() / "audits" / f"{engine}.json")
         record = AuditRecord(**{**values, "failures": tuple(values["failures"])})

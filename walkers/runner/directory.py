@@ -173,11 +173,7 @@ def files_of_segments(directory: Path) -> list[str]:
 
 
 def leave_out_dumps(directory: Path) -> None:
-    """Remove what only pictures and further measurements read, of a finished, measured run that is locked.
-
-    Dumps, restart files and the forces of bridges, which the engine has read, go; the manifest says that they were left
-    out. Results, tables and decks stay.
-    """
+    """Remove dumps, restart files and tables of bridges of a finished run that is locked; its manifest says so."""
     contents = read_manifest(directory)
     dumps = {*layout_of(segment_directories(directory)[0]).dumps, RESTART_NAME, BRIDGES_NAME}
     names = [name for name in contents["files"] if "/" in name and Path(name).name in dumps]
@@ -197,10 +193,7 @@ def is_finished(directory: Path) -> bool:
 
 
 def drive_from(case: Case, done: Iterable[Mapping[str, Any]]) -> int | None:
-    """Step at which the drive begins, from the records of the complete segments; None if it is not known yet.
-
-    It is the end of the first segment that leaves the beads at rest, or of the last segment that may be used for that.
-    """
+    """Step at which the drive begins: the end of the first segment that leaves the beads at rest; None: unknown yet."""
     if not case.run.rests:
         return 0
     for segment in done:
@@ -216,11 +209,7 @@ def drive_from(case: Case, done: Iterable[Mapping[str, Any]]) -> int | None:
 
 
 def write_deck(deck: Deck, directory: Path, before: Path | None = None) -> None:
-    """Write a deck, its files and its layout into a directory.
-
-    Files that are the same in the segment ``before`` are linked: the bridge tables of a pile are larger than the output
-    of a segment.
-    """
+    """Write a deck, its files and its layout into a directory; files that are the same in ``before`` are linked."""
     for name, text in {DECK_NAME: deck.text, **deck.files}.items():
         contents = text.encode("utf-8", "surrogateescape")
         if before is not None and (before / name).is_file() and (before / name).read_bytes() == contents:
@@ -241,10 +230,7 @@ def write_segment_record(
 
 @contextmanager
 def room_on_disk(incomplete: Path, needed: int | None = None) -> Iterator[None]:
-    """Turn the system's error for a full disk into a `DiskFull` that names the bytes still ``needed``.
-
-    Turn the error for a removed directory into an `OutputGone`.
-    """
+    """Turn the system's errors for a full disk and a removed directory into `DiskFull` (bytes) and `OutputGone`."""
     try:
         yield
     except OSError as error:
@@ -285,10 +271,7 @@ def _lock_file(place: Path) -> Path:
 
 @contextmanager
 def locked(places: Iterable[Path]) -> Iterator[Mapping[Path, int]]:
-    """Lock the final places of runs, except those that other processes keep locked for more than two seconds.
-
-    Yields the locked places with the descriptors of their lock files; they stay locked until the end of the block.
-    """
+    """Lock places of runs; yield the descriptors of those that no other process keeps locked for two more seconds."""
     ours: dict[Path, int] = {}
     end = time.monotonic() + _PATIENCE_SECONDS
     try:
@@ -308,7 +291,6 @@ def recomputed(directory: Path, names: Collection[str]) -> Iterator[None]:
     """Record in the manifest of a finished run that the block recomputes files: program, time, checksums.
 
     During the block the run is locked, and the manifest does not list the files, so that a kill gives no false alarm.
-    An unfinished run has no manifest: nothing is recorded. `RunBusy` if another process recomputes or makes the run.
     """
     if not is_finished(directory):
         yield

@@ -90,10 +90,9 @@ def launch(
 ) -> EngineReport:
     """Run a deck in a directory until its end or its first failure, an `EngineFailure`; then the engine has ended.
 
-    The engine works in the directory, which has the deck's files. A few times per second and at the end ``on_step`` is
-    called with the current step; its exceptions end the engine. The run is stopped after ``time_limit`` (wall time, s).
-    The engine inherits the file descriptors ``keep_open`` (the lock of the run). If it ends before it prints its
-    version, it is started again, at most ``starts`` times in all.
+    A few times per second and at the end ``on_step`` is called with the current step; its exceptions end the engine.
+    The run is stopped after ``time_limit`` (wall time, s). The engine inherits the file descriptors ``keep_open`` (the
+    lock of the run). If it ends before it prints its version, it is started again, at most ``starts`` times in all.
     """
     ranks, temporary = deck.layout.ranks, Path(os.environ.get("TMPDIR", "/tmp"))
     check_room(directory, deck.layout.bead_dump_bytes)
@@ -170,11 +169,7 @@ def _off_the_network() -> tuple[str, ...]:
 
 @contextmanager
 def postponed_interrupts() -> Iterator[None]:
-    """Delay SIGINT, SIGTERM and SIGHUP to the end of the block.
-
-    An exception inside `subprocess.Popen` would leave an unknown engine behind. The engine does not inherit handlers,
-    but would inherit a mask of blocked signals.
-    """
+    """Delay signals to the end of the block: in `subprocess.Popen`, they would leave an unknown engine behind."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

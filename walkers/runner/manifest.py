@@ -28,11 +28,7 @@ _MOST_THREADS = 4
 def write_manifest(
     case: Case, name: str, engine: Engine | None, report: EngineReport, *, started: float, directory: Path, **more: Any
 ) -> None:
-    """Write the manifest of a run, after all of its other files.
-
-    ``report`` is the cost of the engine over all calls; ``started`` is in seconds after the epoch. The engine is None
-    for a deck that was run by hand: only the version is known.
-    """
+    """Write the manifest of a run, after its other files; ``started`` in s after the epoch; no engine: run by hand."""
     finished = time.time()
     plugin = plugin_of(engine) if engine else None
     model = {"path": str(plugin), "sha256": checksum(plugin)} if plugin else None
@@ -95,11 +91,7 @@ class FileChanged(WalkersError, ValueError):
 
 
 def check_unchanged(directory: Path, names: Collection[str]) -> bool:
-    """Compare files of a finished run with its manifest; return whether the manifest lists all of them.
-
-    Raises `FileChanged` if one differs, `OSError` or `ValueError` if the manifest or a file is unreadable. True for an
-    unfinished run, which has no manifest.
-    """
+    """Raise `FileChanged` if files of a finished run differ from its manifest; return whether it lists all of them."""
     try:
         sums = sums_of(read_manifest(directory), directory)
     except FileNotFoundError:

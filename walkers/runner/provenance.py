@@ -18,10 +18,9 @@ _PATIENCE_SECONDS = 20.0
 
 @cache
 def software() -> dict[str, Any]:
-    """Versions of the program, of Python and of the required packages, as manifests have them; looked up once (30 ms).
+    """Versions of the program, of Python and of the required packages, as manifests have them; looked up once.
 
-    ``commit`` belongs to the checkout from which the program runs (`commit_of`), else to the checkout from which it was
-    built (setuptools-scm adds it to the version); None if unknown.
+    ``commit`` is that of the checkout from which the program runs or was built; None if unknown.
     """
     try:
         version, required = metadata.version(PROJECT), metadata.requires(PROJECT) or []
@@ -38,10 +37,7 @@ def software() -> dict[str, Any]:
 
 
 def commit_of(checkout: Path) -> str | None:
-    """The commit of a checkout, with ``+changes`` if tracked files differ from it; None if it is no checkout.
-
-    Untracked files do not count, because runs are made in the folder.
-    """
+    """The commit of a checkout, with ``+changes`` if tracked files differ from it; None if it is no checkout."""
     if not (checkout / ".git").exists():
         return None
     # A git hook may set another repository. Nothing is written, because many processes may ask at once.

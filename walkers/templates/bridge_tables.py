@@ -75,10 +75,7 @@ class Table:
 
 @lru_cache(maxsize=4096)
 def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) -> Table:
-    """Tabulate a law as finely as the tolerance of the interpolated forces requires.
-
-    Raises `UnusableLawError` if the curve is unusable (`walkers.physics.bridge.columns_at`), or no table is fine.
-    """
+    """Tabulate a law as finely as the tolerance requires; raises `UnusableLawError` if that is not possible."""
     curve = law(surfaces)
     scale = curve.scale or surfaces.roughness
     octaves = max(int(log2(1.0 + 0.5 * curve.rupture / scale)), int(curve.rupture > scale))
@@ -115,7 +112,7 @@ def bridge_tables(
     """The bridge tables of a deck: one for every two surfaces that may meet (beads of different types never meet).
 
     The surfaces have the contact and the liquid of each atom type of beads, the sizes atom type and radius (m) of the
-    beads; without a law, each liquid has its own. Raises `UnusableLawError` as `tabulated`.
+    beads; without a law, each liquid has its own.
     """
     parts = ["# Gap (m), pull (N), resistances: normal, sliding (N s/m), coupling (N s), rolling (N m s).\n"]
     for kind, (contact, liquid) in enumerate(surfaces, 1):
@@ -134,10 +131,7 @@ def bridge_tables(
 
 @dataclass(frozen=True)
 class RecordedLaw:
-    """A user's law as a run has recorded it: its bridge tables, for the radii of the run alone, and its file.
-
-    It is interpolated as by the engine; nothing of the user's is executed.
-    """
+    """A user's law as a run has recorded it: tables for its radii, interpolated as by the engine, and its file."""
 
     tables: str
     source: bytes | None

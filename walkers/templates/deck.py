@@ -110,10 +110,7 @@ class Plan:
 
 
 def next_segment(case: Case, begin: int = 0, start: int | None = None) -> Segment:
-    """The segment of a run that begins at a step, after the start of the drive at another; empty after the last one.
-
-    Without a start of the drive, the beads come to rest if they have to.
-    """
+    """The segment of a run from a step on, after the start of the drive (None: not yet); empty after the last one."""
     run = case.run
     if start is None and run.rests:
         return Segment(begin, begin + settling_steps(case), None)
@@ -135,10 +132,7 @@ def settling_steps(case: Case) -> int:
 
 
 def render_deck(case: Case, segment: Segment | None = None) -> Deck:
-    """Render a segment of the run of a case; default: the first one.
-
-    Numbers are in full precision: the shortest text that reads back as the same double.
-    """
+    """Render a segment of the run of a case (default: the first one); numbers read back as the same doubles."""
     return compose(plan_of(case, segment=segment))
 
 

@@ -70,8 +70,7 @@ def loading_of(case: Case) -> Loading:
 def sharing_key(case: Case) -> Hashable:
     """All properties of a case that a deck has only once: cases with equal keys may share a deck.
 
-    The time step is one of them. Cases with different ``"auto"`` steps (beads of other sizes) do not share a deck, so
-    that the step of a case does not depend on the others.
+    The time step is one of them: the step of a case does not depend on the others.
     """
     if not case.independent:
         return case
@@ -96,10 +95,8 @@ def sharing_key(case: Case) -> Hashable:
 def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
     """Place the bodies of cases that share a deck, and size the box so that no walker can leave it unnoticed.
 
-    Walkers stand on a grid, other beads at the places in the case. Each walker draws its start from its own random
-    stream (seed, number of the walker in its case), so that walker k does not depend on the other cases.
-
-    Raises `ValueError` if the cases cannot share a deck (`sharing_key`).
+    Each walker draws its start from its own random stream (seed, number of the walker in its case), so that walker k
+    does not depend on the other cases.
     """
     if len({sharing_key(case) for case in cases}) != 1:
         raise ValueError("these cases cannot share a deck")
