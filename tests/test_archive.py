@@ -13,12 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-import requests
-from requests_cache import CachedSession
 from rocrate.rocrate import ROCrate
-from rocrate_validator.models import Severity
-from rocrate_validator.services import ValidationSettings, validate
-from urllib3 import HTTPResponse
 
 from tests.conftest import SHORT, call, document, make_case, to_toml
 from walkers import Run, load_case
@@ -56,6 +51,12 @@ def shared(once: Callable[[str, Callable[[Path], object]], Path], tmp_path: Path
 
 def _issues(archive: Path, folder: Path) -> list[str]:
     """What the validator of RO-Crates finds, without a network: its cache is given the context that rocrate ships."""
+    import requests
+    from requests_cache import CachedSession
+    from rocrate_validator.models import Severity
+    from rocrate_validator.services import ValidationSettings, validate
+    from urllib3 import HTTPResponse
+
     session = CachedSession(cache_name=str(folder / "http"), backend="sqlite", expire_after=-1)
     text = (importlib.resources.files("rocrate") / "data" / "ro-crate.jsonld").read_bytes()
     asked = requests.Request("GET", CONTEXT).prepare()

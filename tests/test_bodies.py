@@ -316,20 +316,6 @@ def test_rolling_friction_turns_a_walker_to_the_axis_and_a_symmetric_dimer_away(
     assert abs(sin(symmetric)) > 2.0 * sin(np.radians(5.0))
 
 
-def test_a_dimer_is_held_by_the_walls_that_it_touches(run_directory: Ran) -> None:
-    """In a narrow channel both side walls hold its large bead, and it is slower; in a groove both walls, each bead."""
-    channel, groove = {"shape": "channel", "width": "0.5998 mm"}, {"shape": "groove", "opening": "120 deg"}
-    for boundary, walls in ((channel, {0: [0, 1, 2], 1: [0]}), (groove, {0: [0, 1], 1: [0, 1]})):
-        directory = run_directory(fig1b(**{f"boundary.{key}": value for key, value in boundary.items()}))
-        bridges = read_table(directory, "bridges")
-        held = bridges[(bridges["wall"] >= 0) & (bridges["time"] == bridges["time"].max())]
-        assert held.groupby("bead_1")["wall"].apply(sorted).to_dict() == walls
-        if boundary is channel:
-            assert abs(read(directory)["velocity"]) < 1e-3
-    motion = read_motion(directory)
-    np.testing.assert_allclose(sin(pi / 3) * motion.position[-1, :, 2] / motion.radius, 1.0, atol=1e-3)
-
-
 def test_reporting_bridges_does_not_disturb_the_walkers(tmp_path: Path) -> None:
     """The engine evaluates contacts once more to report them; that must leave no trace in the motion."""
     deck = render_deck(load_case("fig1b", {"run.cycles": 10, "run.settling_cycles": 4}))

@@ -27,6 +27,8 @@ from walkers.errors import InputError
 from walkers.inputs.axes import unit_cube
 from walkers.inputs.reading import load_case, shipped
 from walkers.postprocess.gait import misalignment
+from walkers.postprocess.tables import read_columns, write_table
+from walkers.runner.directory import recomputed
 from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import load
 from walkers.text import rendered
@@ -291,22 +293,14 @@ def test_a_run_that_ended_early_slides_as_one_of_so_many_cycles(tmp_path: Path) 
     fixed = numbers_of(run(load_case("fig1b", given), tmp_path).directory)
     assert numbers_of(early.directory) == pytest.approx(fixed, rel=1e-6, nan_ok=True)
     assert fixed["slip_1"] > 0.0
+    # There is nothing to be observed of walkers that came apart.
+    with recomputed(early.directory, ["walkers.parquet"]):
+        columns = read_columns(early.directory, "walkers")
+        write_table(early.directory, "walkers", columns | {"separated_fraction": columns["separated_fraction"] + 0.5})
+    assert np.isnan([*numbers_of(early.directory).values()]).all()
 
 
 LONE = {"name": "v", "group": "v", "of": ["slow"], "value": "1 mm/s", "deviation": "1 mm/s"}
-
-
-def test_beads_that_came_apart_are_no_walker(tmp_path: Path) -> None:
-    """They roll fast, each for itself; there is nothing to be observed."""
-    few = {"dimers": {"replicates": 1}, "run": {"cycles": 28, "settling_cycles": 20, "samples_per_cycle": 10}}
-    wet = {"liquid": {"volume_fraction": 0.01, "law": "soulie"}, "contact": {"rolling_friction": 0.003}}
-    strong = {"slow": {"drive.peak_acceleration": "10 g"}}
-    found = small(tmp_path, case="fig4b", experiments=strong, observations=[LONE], design={}, set=few | wet)
-    whole, apart = (
-        numbers(found, values, tmp_path / "runs", Options(2))["slow"] for values in ([0.1, 0.5], [0.2, 9.9])
-    )
-    assert whole["velocity"] > 1e-3
-    assert np.isnan([apart[name] for name in ("velocity", "slip_1")]).all()
 
 
 def test_a_walker_that_still_turns_is_observed_by_its_angle_alone(run_directory: Callable[..., Path]) -> None:
