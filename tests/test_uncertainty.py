@@ -183,18 +183,18 @@ def test_the_error_is_the_distance_from_far_harder_beads_at_a_far_smaller_step(t
     own, limit = (run.result["velocity"] for run in (done, reference))
     assert "velocity_error" not in done.result
     found = done.accuracy()
-    error = found.errors["velocity"]
-    assert found.reached
-    assert abs(own + error["stiffer"] - limit) < found.share * limit
+    error = found["errors"]["velocity"]
+    assert found["reached"]
+    assert abs(own + error["stiffer"] - limit) < found["share"] * limit
     assert error["stiffer"] < -0.01 * own  # the limit is slower …
     half = walkers.run(changed(case, 0.5, 1.0), tmp_path)
     assert half.cached  # it is one of the runs
     assert error["half_step"] == pytest.approx(half.result["velocity"] - own)
     assert error["total"] == pytest.approx(hypot(error["half_step"], error["stiffer"]))
     # … because the large bead slides more.
-    assert found.errors["sliding_1"]["stiffer"] < 2.0 * error["stiffer"]
+    assert found["errors"]["sliding_1"]["stiffer"] < 2.0 * error["stiffer"]
     assert done.result["velocity_error"] == done.result["numerical_error"] == error["total"]
-    speeds = walkers.load(tmp_path / found.sweep).table()["velocity"]
+    speeds = walkers.load(tmp_path / found["sweep"]).table()["velocity"]
     cells = " | ".join(f"{1e3 * one:.3f}" for one in (own, *speeds[1:]))
     assert f"| `fig1b`, 10 g and 90 Hz | {cells} |" in (ROOT / "docs/explanation/physics.md").read_text("utf-8")
     assert declared("rotation_2_error").label == "rotation of bead 2, numerical error"  # also in the table of a sweep
@@ -230,7 +230,7 @@ def test_an_interrupted_accuracy_continues_and_an_edited_one_can_be_measured_aga
     assert (told.returncode, told.stderr.count("\n")) == (2, 1)
     assert told.stderr.endswith(f"damaged; measure it again with: walkers run {done.directory} --accuracy\n")
     again = call("run", str(done.directory), "--accuracy", "--json", check=True)
-    assert json.loads(again.stdout.splitlines()[-1])["velocity_error"] == kept.errors["velocity"]["total"]
+    assert json.loads(again.stdout.splitlines()[-1])["velocity_error"] == kept["errors"]["velocity"]["total"]
 
 
 def test_walkers_up_and_down_a_slope_both_converge(tmp_path: Path) -> None:
@@ -243,8 +243,8 @@ def test_walkers_up_and_down_a_slope_both_converge(tmp_path: Path) -> None:
     ]
     changes = [max(abs(after / before - 1.0) for before, after in zip(*pair, strict=True)) for pair in pairwise(speeds)]
     times, change = next((16.0 * 4.0**place, one) for place, one in enumerate(changes) if one < 0.01)
-    assert found.times == times
-    assert found.change == pytest.approx(change, rel=0.02)
+    assert found["times"] == times
+    assert found["change"] == pytest.approx(change, rel=0.02)
 
 
 def test_the_plan_of_a_sweep_has_the_runs_of_its_spread(in_folder: Path) -> None:

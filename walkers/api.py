@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from walkers.inputs.origins import Origin
     from walkers.postprocess.motion import Motion
     from walkers.postprocess.results import Results
-    from walkers.sweeps.accuracy import Accuracy
     from walkers.sweeps.comparison import Comparison
     from walkers.sweeps.scheduler import Failure
     from walkers.sweeps.spread import Spread
@@ -130,16 +129,13 @@ def case_and_run(reference: Named, out: str | Path = DEFAULT_OUT, changes: Chang
 def load(reference: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Run | Sweep:
     """Find a sweep, or a run, finished or not.
 
-    `InputError` if it does not exist or cannot be read; `EngineFailure` if a case is given and no engine is
-    installed.
+    `InputError` if it does not exist or cannot be read; `EngineFailure` if a case is given and no engine is installed.
 
     Parameters
     ----------
     reference
-        The directory of a run or a sweep, its name in ``out``, or a case (resolved, tables, file or shipped name). For
-        a case, the run with the installed engine.
-    out
-        Folder of the run directories.
+        The directory of a run or a sweep, its name in the folder ``out``, or a case (resolved, tables, file or shipped
+        name), which means its run with the installed engine.
     changes
         Other values of the case, by dotted keys.
 
@@ -196,8 +192,7 @@ class Run:
     cached
         Whether the run existed before.
     requested
-        The requested case; None: the case that made the run. A number may be given in the first and come from the
-        library in the second.
+        The requested case; None: the case that made the run, whose numbers may have other sources.
     """
 
     directory: Path
@@ -373,14 +368,12 @@ class Run:
         with progress_of(f"{case.name}, spread", progress) as advance:
             return run_spread(case, self.directory.parent, options, points=points, on_progress=advance, **how)
 
-    def accuracy(self, share: float = 0.01, *, progress: bool | None = None, **how: Any) -> Accuracy:
-        """Measure the numerical errors, which are part of the result from then on.
-
-        The last increase of Young's modulus changes velocities by less than a ``share``. Other arguments: see `run`.
+    def accuracy(self, *, progress: bool | None = None, **how: Any) -> dict[str, Any]:
+        """Measure the numerical errors, for the result; see `walkers.sweeps.accuracy.measure_accuracy`.
 
         Examples
         --------
-        >>> error = walkers.run("fig4a", tmp).accuracy().errors["velocity"]["total"]
+        >>> error = walkers.run("fig4a", tmp).accuracy()["errors"]["velocity"]["total"]
         >>> round(1e3 * error, 3)  # mm/s
         0.002
         """
@@ -388,7 +381,7 @@ class Run:
         from walkers.sweeps.scheduler import Options
 
         with progress_of(f"{self.case.name}, accuracy", progress) as advance:
-            return measure_accuracy(self.finished_directory, Options(), share=share, on_progress=advance, **how)
+            return measure_accuracy(self.finished_directory, Options(), on_progress=advance, **how)
 
     def export(self, form: Export, to: str | Path | None = None, **options: Any) -> Path:
         """Write the run for other programs; the functions of `EXPORTS` take the options, such as ``every``.
@@ -458,16 +451,14 @@ def run(
         deck that was run by hand.
     out
         Folder of the run directories.
-    engine
-        Name or path of the binary; see `walkers.runner.binary.find_engine`.
+    engine, allow_failed_audit
+        Name or path of the binary (`walkers.runner.binary.find_engine`), also if it failed ``walkers check engine``.
     force
         Run again. The old run is replaced when the new one is finished.
     progress
         Show the progress; None: only in notebooks.
     time_limit
         Limit of the wall time in s for each segment of the run.
-    allow_failed_audit
-        Use an engine that failed ``walkers check engine``.
 
     Examples
     --------
@@ -539,15 +530,7 @@ def _load_postprocess() -> None:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep: its points, their runs, and the table of results.
-
-    Attributes
-    ----------
-    directory
-        The sweep directory; the runs are in the same folder.
-    failures
-        Points that failed in this call of `sweep`.
-    """
+    """A sweep in its directory, beside its runs; ``failures`` are points that failed in this call of `sweep`."""
 
     directory: Path
     failures: tuple[Failure, ...] = field(default=(), repr=False, compare=False)
@@ -664,7 +647,7 @@ def sweep(
     spread: int = 0,
     **how: Any,
 ) -> Sweep:
-    """Run the missing points of a sweep on this machine or a cluster.
+    """Run the missing points of a sweep on this machine or a cluster; the ``status`` in its table marks failed points.
 
     `InputError` if the sweep or one of its points cannot be used.
 
@@ -672,14 +655,10 @@ def sweep(
     ----------
     sweep
         A sweep file, the name of a shipped sweep, or the tables of a sweep file.
-    out
-        Folder of the run directories.
     jobs
         Number of parallel decks; default: one per core.
     changes
         Values that replace those in ``[set]``, by dotted keys.
-    progress
-        Show the progress; None: only in notebooks.
     site
         The site file of a cluster, TOML or Python; see `walkers.sweeps.site.load_site`.
     executor
@@ -689,13 +668,8 @@ def sweep(
     spread
         Number of runs of each finished point with its uncertain values drawn from their ranges, for bands along the
         sweep (columns such as ``velocity_low``); 0: none.
-    how
-        ``engine`` and ``allow_failed_audit`` of `run`.
-
-    Returns
-    -------
-    Sweep
-        The column ``status`` of its table marks failed points.
+    out, progress, how
+        See `run`; ``how`` are ``engine`` and ``allow_failed_audit``.
 
     Examples
     --------
@@ -729,16 +703,9 @@ def compare(
     out: str | Path = DEFAULT_OUT,
     changes: Mapping[str, Any] | None = None,
 ) -> Comparison:
-    """Compare two runs or cases in parameters and results.
+    """Compare two runs or cases, named as for `load`, in parameters and results.
 
-    Parameters
-    ----------
-    first, second
-        Runs or cases, named as for `load`; ``second`` None: the first.
-    out
-        Folder of the run directories.
-    changes
-        Other values of the second case, by dotted keys.
+    The ``changes`` are of the second case, which by default is the first.
     """
     from walkers.errors import apply_all
     from walkers.sweeps.comparison import Side, compare_runs
@@ -770,9 +737,7 @@ def climb(
     Parameters
     ----------
     references
-        Sweeps, runs or cases of piles.
-    out, changes
-        See `load`.
+        Sweeps, runs or cases of piles; further arguments as of `load`.
     within
         Count climbs up to this time of the drive, s; None: the end of the shortest run without a climb.
     to

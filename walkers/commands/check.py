@@ -56,15 +56,15 @@ def engine(*, only: list[str] | None = None, as_json: Json = False, engine: str 
         if engine is None:
             raise
         raise refused("--engine", str(missing)) from missing
-    audit = run_audit(only or (), engine=binary, on_done=tell)
+    lines, version = run_audit(only or (), engine=binary, on_done=tell)
     if not only:
         try:
-            record(audit)
+            record(lines, binary, version)
         except OSError as error:
             warnings.warn(f"the outcome cannot be kept: {error}", stacklevel=1)
-    about = {"path": str(binary.path), "sha256": binary.sha256, "version": audit.version}
-    name = f"{audit.version}, binary and contact model {binary.sha256[:12]}: "
-    return _print_checked(audit.lines, as_json, name, engine=about)
+    about = {"path": str(binary.path), "sha256": binary.sha256, "version": version}
+    name = f"{version}, binary and contact model {binary.sha256[:12]}: "
+    return _print_checked(lines, as_json, name, engine=about)
 
 
 def _print_checked(lines: Sequence[Line], as_json: bool, of: str = "", **more: Any) -> int:

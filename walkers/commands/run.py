@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
-from cyclopts.validators import Number
 
 import walkers
 from walkers.commands.options import NOT_NEGATIVE, At, By, Case, Jobs, Json, print_as, print_lines, refuse, tell
@@ -68,7 +67,6 @@ def run(
     spread: bool = False,
     points: int | None = None,
     accuracy: bool = False,
-    share: Annotated[float | None, Parameter(validator=Number(gte=1e-6, lte=1.0))] = None,
     by: By = By(),
 ) -> int:
     """Run cases and print the results. A finished run is only printed, an interrupted run continues.
@@ -85,8 +83,6 @@ def run(
         Number of runs for --spread; default: 32.
     accuracy
         Also run with smaller time steps and harder beads, and print the numerical error of the result.
-    share
-        For --accuracy: largest relative change of the velocity by the last increase of Young's modulus; default: 0.01.
     """
     from walkers.api import case_at, finished_at
     from walkers.runner.failures import EngineFailure
@@ -95,12 +91,11 @@ def run(
     if not cases:
         raise refused("CASE", "expected a case, such as fig1b")
     refuse("--points", points is not None and not spread, "is for --spread")
-    refuse("--share", share is not None and not accuracy, "is for --accuracy")
     # Report a mistake in the last file before the first run starts.
     finished = apply_all(lambda case: None if at.changes or force else finished_at(case, at.out), cases)
     loaded = apply_all(lambda case: case_at(case, at.out, at.values), cases)
     if accuracy:
-        from walkers.sweeps.accuracy import SHARE, times_of
+        from walkers.sweeps.accuracy import times_of
 
         apply_all(times_of, [case for case, _ in loaded])
     if spread:
@@ -118,7 +113,7 @@ def run(
             failed = True
             continue
         if accuracy:
-            done.accuracy(share or SHARE, progress=True, **vars(by))
+            done.accuracy(progress=True, **vars(by))
         band = done.spread(POINTS if points is None else points, progress=True, **vars(by)) if spread else None
         failed |= bool(band and band.failures)
         if as_json:
@@ -161,12 +156,12 @@ def sweep(
     """
     from walkers.inputs.sweep import load_sweep
     from walkers.postprocess.uncertainty import lines_of_rest, rests_on
-    from walkers.show import predicted_overhead, predicted_seconds
     from walkers.sweeps.scheduler import Options, plan_sweep
     from walkers.sweeps.site import load_site
     from walkers.sweeps.spread import POINTS, spread_sweep
 
     refuse("--points", points is not None and not spread, "is for --spread")
+    draws = (POINTS if points is None else points) if spread else 0
     loaded = load_sweep(sweep, at.values)
     refuse("--jobs", jobs is not None and site is not None, "the site file sets how many decks run at once")
     if len(loaded.rows) > _MANY:
@@ -175,13 +170,12 @@ def sweep(
         options = Options(jobs, load_site(site) if site else None)
         print(plan_sweep(loaded, at.out, options, by.engine).as_text())
         if spread:
-            count = POINTS if points is None else points
-            draws = [draw for case in loaded.cases() for draw in spread_sweep(case, count, by.engine).cases()]
-            seconds = predicted_overhead(draws) + sum(predicted_seconds(draw) * draw.run.ranks for draw in draws)
-            print(f"  spread     {len(draws)} more runs, predicted {seconds:.0f} core-seconds if none is finished")
+            sweeps = (spread_sweep(case, draws, by.engine) for case in loaded.cases())
+            plans = [plan_sweep(drawn, at.out, options, by.engine) for drawn in sweeps]
+            seconds, more = (sum(plan.core_seconds for plan in plans), sum(len(plan.missing) for plan in plans))
+            print(f"  spread     {more} more runs, predicted {seconds:.0f} core-seconds")
         return 0
-    how = {"jobs": jobs, "site": site, "time_limit": limit, **vars(by)}
-    how["spread"] = (POINTS if points is None else points) if spread else 0
+    how = {"jobs": jobs, "site": site, "time_limit": limit, "spread": draws, **vars(by)}
     done = walkers.sweep(sweep, at.out, changes=at.values, progress=True, **how)
     tell(*(f"point {failure.point}, {failure.run}: {failure.message}" for failure in done.failures))
     print(f"{done.summary()}\n  table      walkers list {done.directory}")

@@ -8,12 +8,11 @@ follow no common power of the modulus (docs/explanation/physics.md), so nothing 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
 from math import hypot, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.errors import InputError, Problem, check_limits, refused
+from walkers.errors import InputError, Problem, refused
 from walkers.inputs.case import STIFFEST, Case
 from walkers.inputs.sweep import Sweep, expand
 from walkers.postprocess.results import recorded
@@ -32,38 +31,24 @@ SHARE = 0.01
 """Share of a velocity that the last increase of Young's modulus may change."""
 _TIMES = (1.0, 4.0, 16.0, 64.0, 256.0)
 """Young's moduli, divided by the modulus of the case. A run with the largest one takes 16 times as long."""
-_KEYS = ("run.time_step", "contact.youngs_modulus")
 _FAMILIES = ("velocity", "right_facing", "left_facing", "axial_", "lateral_", "rotation_", "sliding_")
 """Beginnings of the names of numbers that have a numerical error, all in m/s."""
 
 
-@dataclass(frozen=True)
-class Accuracy:
-    """Numerical errors of a run, as in its ``accuracy.json``.
-
-    ``sweep`` is the name of the sweep beside the run. ``share`` is the requested limit of ``change``, the relative
-    change of a velocity by the last increase of Young's modulus; ``reached``: the change is below the limit. ``times``
-    is the largest modulus, divided by the modulus of the case. ``errors`` has for each number, in m/s, the changes at
-    ``half_step`` and with the ``stiffer`` beads, and the root of the sum of their squares, ``total``.
-    """
-
-    sweep: str
-    share: float
-    reached: bool
-    change: float
-    times: float
-    errors: Mapping[str, Mapping[str, float]]
-
-
-def measure_accuracy(
-    directory: Path, options: Options, *, share: float = SHARE, engine: str | None = None, **how: Any
-) -> Accuracy:
+def measure_accuracy(directory: Path, options: Options, *, engine: str | None = None, **how: Any) -> dict[str, Any]:
     """Make the runs that measure the numerical errors of a finished run, and record the errors in the run.
 
     Finished runs are used again. Other arguments: see `walkers.sweeps.scheduler.run_sweep`. `InputError` if the run is
-    none of walkers or not of the installed engine, or the share is not 1e-6 to 1; `SweepStopped` if a run fails.
+    none of walkers or not of the installed engine; `SweepStopped` if a run fails.
+
+    Returns
+    -------
+    dict
+        Contents of ``accuracy.json``: ``sweep``, its name beside the run; ``times``, the largest modulus divided by the
+        modulus of the case; ``change``, the relative change of a velocity by the last increase, and whether it is below
+        the ``share`` (``reached``). ``errors`` has for each number, in m/s, the changes at ``half_step`` and with the
+        ``stiffer`` beads, and the root of the sum of their squares, ``total``.
     """
-    check_limits("share", share, 1e-6, 1.0)
     case = case_of(directory)
     possible = times_of(case)
     today = Case.read(case.document, source=directory.name, name=case.name)
@@ -76,13 +61,12 @@ def measure_accuracy(
         if failures:
             raise SweepStopped(f"{failures[0].run}: {failures[0].message}")
         table = load(record.directory)
-        if (change := _change(table, case)) < share:
+        if (change := _change(table, case)) < SHARE:
             break
-    accuracy = Accuracy(
-        record.sweep.name, share, change < share, change, possible[last], _errors(recorded(directory)["numbers"], table)
-    )
+    accuracy = {"sweep": record.sweep.name, "share": SHARE, "reached": change < SHARE, "change": change}
+    accuracy |= {"times": possible[last], "errors": _errors(recorded(directory)["numbers"], table)}
     with recomputed(directory, [ACCURACY_NAME]):
-        write_json(directory / ACCURACY_NAME, asdict(accuracy))
+        write_json(directory / ACCURACY_NAME, accuracy)
     return accuracy
 
 
@@ -102,8 +86,10 @@ def _sweep(case: Case, name: str, possible: Sequence[float]) -> Sweep:
     """The case at half its time step, and with harder beads at steps as much smaller as the Rayleigh limit."""
     step, modulus = 1e6 * case.run.time_step, 1e-6 * case.contact.youngs_modulus
     factors = [(0.5, 1.0), *((times**-0.5, times) for times in possible[1:])]
-    rows = [(f"{shorter * step!r} us", f"{harder * modulus!r} MPa") for shorter, harder in factors]
-    points = {key: list(values) for key, values in zip(_KEYS, zip(*rows, strict=True), strict=True)}
+    points = {
+        "run.time_step": [f"{shorter * step!r} us" for shorter, _ in factors],
+        "contact.youngs_modulus": [f"{harder * modulus!r} MPa" for _, harder in factors],
+    }
     title = f"{case.title or case.name}: smaller time steps and harder beads"
     file = {"title": title, "case": case.name, "zip": [points]}
     return expand(file, source=case.name, name=name, base=(case.name, case.document))

@@ -74,8 +74,7 @@ class Options:
     """Options of a sweep: cores of this machine (``workers``, None: all), or a cluster; MPI processes of a deck.
 
     An ``executor`` that is handed over runs as many decks at once as there are ``workers``. Failures with the names
-    ``final`` are never repeated by a later call, because the engine would fail again. ``time_limit`` is the wall time
-    in s that an engine may take. Without ``dumps`` the runs that are made keep only results and tables.
+    ``final`` are never repeated. An engine may take the ``time_limit``, s. Without ``dumps`` runs keep no dumps.
     """
 
     workers: int | None = None
@@ -198,13 +197,23 @@ class SweepPlan:
     options: Options
     final: list[Failure]
 
+    @property
+    def missing(self) -> list[Case]:
+        """The cases of the points that are made."""
+        return [self.cases[point] for deck in self.decks for point in deck.points]
+
+    @property
+    def core_seconds(self) -> float:
+        """Predicted CPU time of all processes for the missing points, s."""
+        decks = (deck.seconds * max(self.cases[point].run.ranks for point in deck.points) for deck in self.decks)
+        return sum(decks) + predicted_overhead(self.missing)
+
     def as_text(self) -> str:
-        """The plan in a few lines, with the predicted CPU time of all processes."""
-        record, at_once = self.record, self.options.decks_at_once
-        missing = {point for deck in self.decks for point in deck.points}
-        besides = PROGRAM_SECONDS + predicted_overhead(self.cases[point] for point in missing)
-        seconds = sum(deck.seconds * max(self.cases[point].run.ranks for point in deck.points) for deck in self.decks)
-        apart = sum(predicted_seconds(self.cases[point]) * self.cases[point].run.ranks for point in missing)
+        """The plan in a few lines."""
+        record, at_once, missing = self.record, self.options.decks_at_once, self.missing
+        besides = PROGRAM_SECONDS + predicted_overhead(missing)
+        whole = PROGRAM_SECONDS + self.core_seconds
+        apart = besides + sum(predicted_seconds(case) * case.run.ranks for case in missing)
         # Python works for one deck at a time, while other engines run.
         until = max(makespan((deck.seconds for deck in self.decks), at_once) + PROGRAM_SECONDS, besides)
         keys = ", ".join(table.with_unit(key, unit) for key, unit in record.sweep.units.items())
@@ -213,7 +222,7 @@ class SweepPlan:
             f"  varied     {keys or 'nothing'}",
             f"  points     {len(record.runs)}: {table.status_text(Counter(self.statuses))}",
             f"  to do      {counted(len(missing), 'point')} in {counted(len(self.decks), 'deck')}",
-            f"  predicted  {seconds + besides:.0f} core-seconds ({apart + besides:.0f} without shared decks), "
+            f"  predicted  {whole:.0f} core-seconds ({apart:.0f} without shared decks), "
             f"{duration_text(until)} with {counted(at_once, 'deck')} in parallel",
             f"  directory  {record.directory}",
         ]
@@ -260,26 +269,11 @@ def run_sweep(
     allow_failed_audit: bool = False,
     on_progress: Tell | None = None,
 ) -> tuple[table.SweepRecord, list[Failure]]:
-    """Make the missing runs of a sweep.
+    """Make the missing runs of a sweep, and return its record and the failed points.
 
     `InputError` if a point is invalid, or the path of the folder cannot be used in the shell scripts of a cluster;
-    `EngineFailure` if there is no engine, its audit failed, or the sweep's directory was removed during the
-    sweep; `SweepStopped` if a failure hits every point, or the jobs of the cluster end without doing
-    any work.
-
-    Parameters
-    ----------
-    sweep, out, options
-        The sweep (`walkers.inputs.sweep.load_sweep`); folder of the run directories; see `Options`.
-    engine, allow_failed_audit
-        See `walkers.run`.
-    on_progress
-        See `walkers.progress.Tell`.
-
-    Returns
-    -------
-    record, failures
-        The sweep (`walkers.sweeps.table.load` reads the table from ``record.directory``), and the failed points.
+    `EngineFailure` if there is no engine, its audit failed, or the sweep's directory was removed during the sweep;
+    `SweepStopped` if a failure hits every point, or the jobs of the cluster end without doing any work.
     """
     plan = plan_sweep(sweep, out, options, engine)
     record = plan.record
