@@ -64,26 +64,10 @@ def calibrate(
 ) -> Outcome:
     """Start or continue a calibration; finished runs are not repeated. Runs that are made keep no dumps.
 
-    Three sweeps: ``NAME-named``, the sets of the file; ``NAME-round``, a Sobol sequence of sets without the costly
-    experiments; and ``NAME-proposed``.
-
-    Parameters
-    ----------
-    calibration, options, how
-        From `walkers.calibration.file.load_calibration`; as for `walkers.sweeps.scheduler.run_sweep`.
-    out
-        Folder of the run directories.
-    progress
-        See `walkers.progress.progress_of`.
-
-    Raises
-    ------
-    InputError
-        If a key of the file cannot be used, or a range exceeds that of its key.
-    CalibrationStopped
-        If points are missing for reasons other than their parameters.
-    runner.EngineFailure
-        If there is no engine, or its audit failed.
+    Three sweeps in the folder ``out``: ``NAME-named``, the sets of the file; ``NAME-round``, a Sobol sequence of sets
+    without the costly experiments; and ``NAME-proposed``. ``options`` and ``how`` are as for
+    `walkers.sweeps.scheduler.run_sweep`. `InputError` if a key of the file cannot be used, or a range exceeds that of
+    its key; `CalibrationStopped` if points are missing for reasons other than their parameters.
     """
     require("calibrate")
     file, failures = calibration.file, dict[str, list[Failure]]()

@@ -82,11 +82,8 @@ class Benchmark:
         count, radius = len(self.before.normal), self.sphere.radius
         start = np.zeros((count, 9))
         start[:, 0], start[:, 2] = 4.0 * radius * np.arange(count), radius
-        start[:, 3], start[:, 5], start[:, 7] = (
-            self.before.tangential,
-            -self.before.normal,
-            self.before.rolling / radius,
-        )
+        normal, tangential, rolling = self.before
+        start[:, 3], start[:, 5], start[:, 7] = tangential, -normal, rolling / radius
         if self.like:  # far above the plane
             start[:, 2] += 6.0 * radius
             start = np.concatenate([start, start * [1, 1, 1, -1, 1, -1, 1, -1, 1] - [0, 0, 2 * radius, *[0] * 6]])
@@ -231,10 +228,8 @@ def benchmarks() -> Iterator[Line]:
                 yield Line(f"{name}, largest force (published)", PEAKS[name], peak, STEP, "N")
         if test.like:  # the surfaces do not slide on each other
             for which in ("tangential", "rolling"):
-                change = getattr(test.after, which) - getattr(test.before, which)
-                yield largest(
-                    f"{name}, change of the {which} speed over the normal", 0.0, change / test.before.normal, 1e-6
-                )
+                change = (getattr(test.after, which) - getattr(test.before, which)) / test.before.normal
+                yield largest(f"{name}, change of the {which} speed over the normal", 0.0, change, 1e-6)
     panels = published()
     for key, panel in PANELS.items():
         test, slides = TESTS[panel.test], (panel.slides[0] < panel.x) & (panel.x < panel.slides[1])

@@ -51,10 +51,9 @@ def courses(first: Motion, second: Motion) -> Iterator[Line]:
 
 
 def crosscheck(case: Case, out: Path, without: Collection[str] = (), *, seeds: int = 1, **how: Any) -> list[Line]:
-    """Compare the run of a case with the second engine; for a pile, runs with a number of ``seeds``.
+    """Compare the run of a case with the second engine ``without`` some terms; for a pile, runs with several seeds.
 
-    ``out`` is the folder of the run directories, ``without`` are terms that the second engine leaves out
-    (`walkers.check.engine.TERMS`), ``how`` are options of `walkers.run`. `EngineFailure` if the engine fails.
+    ``how`` are options of `walkers.run`.
 
     Examples
     --------

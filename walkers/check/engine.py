@@ -36,12 +36,8 @@ class SecondEngine:
     start : ndarray, shape (N, 9)
         Position (m), velocity (m/s) and spin (rad/s). Touching beads have a bridge; where liquid is conserved, bridges
         between beads form from the next step on, as in LIGGGHTS. Springs are unstretched, films full.
-    walls
-        Walls that replace the walls of the case.
-    clock
-        Number of the first step; the drive begins with step 0.
-    without
-        `TERMS` that are left out.
+    clock, without
+        Number of the first step; the drive begins with step 0. `TERMS` that are left out.
     """
 
     def __init__(

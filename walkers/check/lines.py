@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -45,11 +44,6 @@ class Line:
     decided: Verdict | None = None
     check: str = ""
 
-    @classmethod
-    def without_number(cls, quantity: str, verdict: Verdict) -> Line:
-        """A line without a measured value."""
-        return cls(quantity, nan, nan, decided=verdict)
-
     @property
     def error(self) -> float:
         """The error that is judged."""
@@ -80,11 +74,7 @@ def run_checks(
     on_done: Callable[[str], None] | None = None,
     mapped: Callable[[Callable[[str], list[Line]], Iterable[str]], Iterable[list[Line]]] = map,
 ) -> list[Line]:
-    """Lines of checks, which get an argument such as a folder of runs; a check that cannot be computed is a line.
-
-    ``only`` are names, default all; `InputError` for unknown ones. ``on_done`` gets each name. ``mapped`` is `map`, or
-    the method of a pool.
-    """
+    """Lines of checks, or ``only`` of some; a check that cannot be computed is a line. ``on_done`` gets each name."""
     for name in only:
         if name not in checks:
             raise refused("check", f"no check {name!r}; {expected_of(name, checks)}")
@@ -94,7 +84,7 @@ def run_checks(
             lines = list(checks[name](argument))
         except Exception as failure:  # another build of the engine may fail in any way
             reason = str(failure).split(" (see ", 1)[0] or type(failure).__name__
-            lines = [Line.without_number(f"could not be computed: {reason}", Verdict.ERROR)]
+            lines = [Line(f"could not be computed: {reason}", nan, nan, decided=Verdict.ERROR)]
         if on_done:
             on_done(name)
         return [replace(line, check=name) for line in lines]
@@ -109,7 +99,7 @@ def failures(lines: Iterable[Line]) -> list[Line]:
 
 def count(lines: Iterable[Line], verdict: Verdict) -> int:
     """Number of lines with a verdict."""
-    return Counter(line.verdict for line in lines)[verdict]
+    return sum(line.verdict is verdict for line in lines)
 
 
 def as_text(lines: Sequence[Line], of: str = "") -> str:

@@ -12,7 +12,7 @@ import shutil
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import cos, degrees, inf, pi, sin, sqrt
+from math import cos, degrees, inf, nan, pi, sin, sqrt
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
@@ -339,7 +339,7 @@ def _moved(bead: Bead, x: float, y: float, speed: float = 0.0) -> Bead:
 def rank_lines(bench: Bench) -> Iterator[Line]:
     """A deck on two MPI ranks against the same on one."""
     if shutil.which("mpirun") is None:
-        yield Line.without_number("two MPI ranks: no mpirun on this machine", Verdict.SKIPPED)
+        yield Line("two MPI ranks: no mpirun on this machine", nan, nan, decided=Verdict.SKIPPED)
         return
     # The engine exchanges the beads of a pair that has crossed from one rank to the other.
     first, last = pair(-DEEP, 0.01, STILL)
@@ -388,9 +388,8 @@ def liquid_lines(bench: Bench, ranks: int = 1) -> Iterator[Line]:
         engine.follow(frame)
         films.append(engine.state.film.copy())
     dump = BinaryDump(series.directory / "beads.bin", plan.bead_columns).stack()
-    yield Line(
-        "films of beads that meet and part, both engines", 0.0, float(np.abs(dump[:, :, -1] - films).max()), 1e-9
-    )
+    away = float(np.abs(dump[:, :, -1] - films).max())
+    yield Line("films of beads that meet and part, both engines", 0.0, away, 1e-9)
     yield Line("liquid at the end over liquid at the start", 1.0, engine.liquid() / everything, 1e-9)
     yield Line("smallest film", 0.0, float(np.min(films)))
     yield Line("largest film", 1.0, float(np.max(films)))

@@ -30,15 +30,11 @@ _PLACES = 6
 def compare(sources: Sources) -> dict[str, Any]:
     """The comparison, as in ``comparison.json``; None for numbers that do not exist.
 
-    Returns
-    -------
-    dict
-        ``sets``: for each parameter set the number of facts that ``agree``, their number (``of``), and its
-        ``parameters``. ``facts``: the sentence of the paper (``says``) and its ``source``, the ``expected`` value, our
-        ``values`` and whether they ``agree`` by set, the ``theory`` of the shipped set, and whether the fact is
-        ``derived`` from others and not counted.
-        ``thresholds``: Γc as from `thresholds_with_theory`. ``curve``: engine and theory beside the one-parameter curve
-        of Figs. 2 and 3, which is no measurement, mm/s.
+    ``sets``: for each parameter set the number of facts that ``agree``, their number (``of``), and its ``parameters``.
+    ``facts``: the sentence of the paper (``says``) and its ``source``, the ``expected`` value, our ``values`` and
+    whether they ``agree`` by set, the ``theory`` of the shipped set, and whether the fact is ``derived`` from others
+    and not counted. ``thresholds``: Γc as from `thresholds_with_theory`. ``curve``: engine and theory beside the
+    one-parameter curve of Figs. 2 and 3, which is no measurement, mm/s.
     """
     experiments = list(ruby().experiments)
     cases = {name: dict(zip(experiments, sweep_of(of_facts(name)).cases(), strict=True)) for name in sets()}

@@ -71,25 +71,10 @@ def make_figures(
     progress: bool | None = False,
     **how: Any,
 ) -> Made:
-    """Make the missing runs, draw the figures and write the comparison.
+    """Make the missing runs in the folder ``out``, draw the figures and write the comparison to the folder ``to``.
 
-    Parameters
-    ----------
-    out, to
-        Folders of the run directories and of the figures.
-    options, how
-        As for `walkers.sweeps.scheduler.run_sweep`.
-    only
-        Names of `FIGURES`, or ``comparison``; if empty, all.
-    formats
-        Formats of the figures, from `walkers.postprocess.drawing.FORMATS`.
-    progress
-        See `walkers.progress.progress_of`.
-
-    Raises
-    ------
-    InputError
-        If a figure or format does not exist, or a folder is a file.
+    ``only`` are names of `FIGURES`, or ``comparison``; if empty, all. ``options`` and ``how`` are as for
+    `walkers.sweeps.scheduler.run_sweep`. `InputError` if a figure or format does not exist, or a folder is a file.
     """
     require("theory")
     names = (*FIGURES, COMPARISON)

@@ -104,25 +104,15 @@ def summary(piles: pd.DataFrame, climbs: pd.DataFrame, within: float | None = No
 def statistics(piles: pd.DataFrame, climbs: pd.DataFrame, cut: float, at: float) -> dict[str, Any]:
     """Statistics of climbs over several piles that differ only in their seed.
 
-    Parameters
-    ----------
-    piles
-        A row per run: ``beads``, ``large`` (numbers of beads) and ``driven`` (s, length of the drive).
-    climbs
-        Rows of the tables ``clusters``, with the index of their ``pile``.
-    cut
-        Time of the drive in s up to which climbs count; later parts of runs do not.
-    at
-        Time in s by which a pile has climbed or not.
+    ``piles`` has a row per run: ``beads``, ``large`` (numbers of beads) and ``driven`` (s, length of the drive);
+    ``climbs`` are rows of the tables ``clusters``, with the index of their ``pile``. Climbs count up to the time
+    ``cut``; a pile has climbed or not by the time ``at``, s.
 
-    Returns
-    -------
-    dict
-        ``within`` (s, ``at``), ``runs`` and ``seconds`` (of drive, of all runs up to ``cut``); for first climbs the
-        items of `survival`, ``times`` and ``onsets`` (s, when they qualified and began). For all climbs: their number,
-        ``rate`` (1/s, of one start) with the exact Poisson ``rate_interval``, ``dispersion`` (variance over mean of the
-        number of climbs of a run; None if lengths of runs differ by more than a tenth), ``speeds`` (m/s), ``heights``
-        (m, of the leaders at the end), ``sizes``, and the items of `leaders`.
+    The items are ``within`` (s, ``at``), ``runs`` and ``seconds`` (of drive, of all runs up to ``cut``); for first
+    climbs those of `survival`, ``times`` and ``onsets`` (s, when they qualified and began). For all climbs: their
+    number, ``rate`` (1/s, of one start) with the exact Poisson ``rate_interval``, ``dispersion`` (variance over mean of
+    the number of climbs of a run; None if lengths of runs differ by more than a tenth), ``speeds`` (m/s), ``heights``
+    (m, of the leaders at the end), ``sizes``, and the items of `leaders`.
     """
     watched = piles["driven"].astype(float).clip(upper=cut)
     counted = climbs[climbs["qualified"] <= cut]
@@ -186,15 +176,12 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
     ``first`` are the times of the event in each record (infinite without one; times after its end are ignored),
     ``watched`` the lengths of the records, in s, shape (N,).
 
-    Returns
-    -------
-    dict
-        ``climbed`` (records with the event by then), ``ended`` (before, without it), ``censored`` (ended without it at
-        any time), ``median`` (s, time by which half have it; None if not reached); ``probability`` with its 95 %
-        ``interval``, None if no record is long enough. ``estimator`` of the interval: ``Clopper-Pearson`` (1934, exact,
-        binomial), or ``Kaplan-Meier`` (Greenwood's variance of log(-log) of the survival) if records ended before and
-        some, but not all, have climbed. ``curve``: ``probability`` and Greenwood's band, ``low`` and ``high``, at every
-        ``time`` (s) at which the share changes.
+    The items are ``climbed`` (records with the event by then), ``ended`` (before, without it), ``censored`` (ended
+    without it at any time), ``median`` (s, time by which half have it; None if not reached); ``probability`` with its
+    95 % ``interval``, None if no record is long enough. ``estimator`` of the interval: ``Clopper-Pearson`` (1934,
+    exact, binomial), or ``Kaplan-Meier`` (Greenwood's variance of log(-log) of the survival) if records ended before
+    and some, but not all, have climbed. ``curve``: ``probability`` and Greenwood's band, ``low`` and ``high``, at every
+    ``time`` (s) at which the share changes.
     """
     from scipy.stats import CensoredData, binomtest, ecdf
 

@@ -106,25 +106,12 @@ class LeftOutWarning(UserWarning):
 
 
 def figure_of(table: pd.DataFrame, options: FigureOptions = FigureOptions(), predict: Predict | None = None) -> Figure:
-    """Figure of the table of a sweep.
+    """Figure of the table of a sweep (`walkers.sweeps.table.load`), with the predictions of a theory if there is one.
 
-    `InputError` if no point is finished, or there is no such column.
-
-    Parameters
-    ----------
-    table
-        As `walkers.sweeps.table.load` reads it.
-    options
-        What is drawn. x, hue and panels are chosen automatically if None (`layout_of`). Without y, on slopes where the
-        walkers that face up and down differ, both are drawn.
-    predict
-        Theory that is drawn with the results.
-
-    Returns
-    -------
-    Figure
-        Means; bars are the scatter over copies where the table has it. The axis of a key has the unit of the sweep
-        file; other columns are in mm, mm/s, g (9.8 m/s²) and degrees. A `LeftOutWarning` reports what is left out.
+    Bars are the scatter over copies where the table has it. Without y, on slopes where the walkers that face up and
+    down differ, both are drawn. The axis of a key has the unit of the sweep file; other columns are in mm, mm/s, g
+    (9.8 m/s²) and degrees. A `LeftOutWarning` reports what is left out; `InputError` if no point is finished, or there
+    is no such column.
     """
     if options.log and options.log not in get_args(Log):
         raise refused("log", f"{options.log!r}: {expected_of(options.log, get_args(Log))}")
@@ -169,22 +156,17 @@ def _of_axis(table: pd.DataFrame, keys: Sequence[str]) -> list[Factor]:
     factors = []
     for key in keys:
         values, unit = key_values(table, key)
-        if is_number := {*map(type, values)} <= {int, float}:
-            values = [*map(float, values)]
-        else:
-            values = [value_text(value, unit) for value in values]
-        label = with_unit(readable_key(key), unit if is_number else "")
-        factor = Factor((key,), label, values, is_number, unit=(unit or "") if is_number else "")
-        factor = replace(factor, is_log=table.attrs.get("sampled", {}).get(key, False))
+        is_number, is_log = {*map(type, values)} <= {int, float}, table.attrs.get("sampled", {}).get(key, False)
+        values = [float(value) if is_number else value_text(value, unit) for value in values]
+        unit = (unit or "") if is_number else ""
+        factor = Factor((key,), with_unit(readable_key(key), unit), values, is_number, is_log=is_log, unit=unit)
         if len(factor.levels) > 1:
             factors.append(factor)
     if len(factors) < 2:
         return factors
     if not all(factor.is_number for factor in factors):
         # The texts of one key that distinguishes all levels, or of all keys.
-        texts = [
-            Factor(factor.keys, factor.name, [*map(factor.text, factor.values)], is_number=False) for factor in factors
-        ]
+        texts = [Factor(factor.keys, factor.name, [*map(factor.text, factor.values)], False) for factor in factors]
         whole = joined(texts)
         first = next((factor for factor in texts if len(factor.levels) == len(whole.levels)), whole)
         return [_with(first, factors)]
@@ -196,12 +178,8 @@ def _of_axis(table: pd.DataFrame, keys: Sequence[str]) -> list[Factor]:
 def _with(first: Factor, factors: Sequence[Factor]) -> Factor:
     """A factor that stands for others too, which its label names."""
     rest = [key for factor in factors for key in factor.keys if key not in first.keys]
-    words = (
-        f"and {len(rest)} further keys with it"
-        if len(rest) > 2
-        else f"and with it {', '.join(map(readable_key, rest))}"
-    )
-    label = f"{first.label}\n({words})" if rest else first.label
+    words = f"{len(rest)} further keys" if len(rest) > 2 else ", ".join(map(readable_key, rest))
+    label = f"{first.label}\n(and with it {words})" if rest else first.label
     return replace(first, keys=(*first.keys, *rest), label=label)
 
 
@@ -238,24 +216,11 @@ def _numbers(rows: pd.DataFrame, name: str, option: str) -> Factor:
 def layout_of(
     table: pd.DataFrame, rows: pd.DataFrame, options: FigureOptions = FigureOptions()
 ) -> tuple[list[Factor], Factor | None, Factor | None, list[str]]:
-    """Choose the factors on the x axis, in colours and in panels.
+    """Choose the factors on the x axis (of samples one for each panel), in colours and in panels for some rows.
 
     By default the x axis has the numbers with the most values, colours have the other factor with the most values, and
-    panels have all further factors. Samples have a panel for each key.
-
-    Parameters
-    ----------
-    table, rows
-        The sweep's table (`walkers.sweeps.table.load`), and the rows that are drawn.
-    options
-        x, hue, panels: varied keys or columns; ``none``: no colours or panels. `InputError` if there is no such key or
-        column.
-
-    Returns
-    -------
-    tuple
-        Factors on the x axis (of samples one for each panel), in colours, in panels; names of keys that the figure does
-        not distinguish.
+    panels have all further factors. Samples have a panel for each key. `InputError` if there is no key or column of an
+    option. The last value has the names of keys that the figure does not distinguish.
     """
     places = table.index.get_indexer(rows.index).tolist()
     left = factors = [
@@ -352,18 +317,12 @@ def _points(done: pd.DataFrame, column: str, down: str | None) -> tuple[str, pd.
     """Label and values of a column in its displayed unit, errors, and values of walkers that face down a slope."""
     import pandas as pd
 
-    values = _numbers(done, column, "y")
-    points, label = pd.DataFrame({"value": values.values, "error": np.nan}), values.label
-    if (scatter := scatter_of(column)) in done:
-        errors = done[scatter].to_numpy(dtype=float, na_value=np.nan)
-        points["error"] = unit_shown(done.attrs["units"][column])[1] * errors
-    if f"{column}_low" in done:  # the band of a spread at each point
-        for end in ("low", "high"):
-            points[end] = _numbers(done, f"{column}_{end}", "y").values
-    if down and done[down].notna().any():
-        points["down"] = _numbers(done, down, "y").values
-        label = label.replace(", facing right (up)", "")
-    return label, points
+    label, points = _numbers(done, column, "y").label, pd.DataFrame({"error": np.full(len(done), np.nan)})
+    sources = {"value": column, "error": scatter_of(column), "low": f"{column}_low", "high": f"{column}_high"}
+    for name, source in {**sources, "down": down}.items():
+        if source in done and done[source].notna().any():
+            points[name] = _numbers(done, source, "y").values
+    return label.replace(", facing right (up)", "") if "down" in points else label, points
 
 
 def _draws(done: pd.DataFrame, column: str) -> str:

@@ -71,26 +71,12 @@ def make_runs(
     on_progress: Tell | None = None,
     time_limit: float | None = None,
 ) -> dict[str, bool]:
-    """Make the missing runs in one deck, and measure them. A single run continues where it was interrupted.
+    """Make the missing runs of cases that may share a deck, and measure them; a single run continues.
 
-    `EngineFailure` if the engine fails. Nothing is left of a shared deck; its cases must be tried again in
-    smaller decks.
-
-    Parameters
-    ----------
-    cases
-        Cases that may share a deck (`walkers.templates.scene`).
-    force
-        Make all runs again; a run is replaced when the new one is finished.
-    dumps
-        Whether runs that are made keep their dumps (`walkers.runner.directory.leave_out_dumps`).
-    on_progress, time_limit
-        Called while the engine runs. Limit of the wall time in s for each segment.
-
-    Returns
-    -------
-    dict
-        The finished runs by name, and whether this call made them; without those that another process makes.
+    `EngineFailure` if the engine fails. Nothing is left of a shared deck; its cases must be tried again in smaller
+    decks. With ``force`` all runs are made again; without ``dumps`` those that are made keep none. The ``time_limit``
+    is the wall time in s of a segment. Returns the finished runs by name, and whether this call made them; without
+    those that another process makes.
     """
     out.mkdir(parents=True, exist_ok=True)
     places = {on_disk.run_place(case, engine, out): case for case in cases}

@@ -466,12 +466,7 @@ class _Loop:
         first = list(self.decks.values())[: 4 * self.plan.options.decks_at_once]  # later decks have not started
         decks = [deck for deck in first if is_locked(self.record.out / self.record.runs[deck.points[0]])]
         running, points, failed = sum(len(deck.points) for deck in decks), len(self.record.runs), len(self.failures)
-        in_decks = f" in {len(decks)} decks" if 1 < len(decks) < running else ""
-        words = [f"{self.done} of {points} points done, {running} running{in_decks}, {failed} failed"]
-        elapsed = time.perf_counter() - self.begin
-        if finished_now := self.done - self.finished_before:
-            pace = elapsed / finished_now
-            words.append(f"{60.0 / pace:.0f} points per minute" if pace < 10.0 else f"{duration_text(pace)} per point")
+        words = [f"{self.done} of {points} points done, {running} running, {failed} failed"]
         for deck in decks:  # between the segments of a run nothing is known
             share = share_at(self.record.out / self.record.runs[deck.points[0]], self.plan.cases[deck.points[0]])
             self.shares[deck] = max(self.shares.get(deck, 0.0), share)
@@ -479,5 +474,5 @@ class _Loop:
         share = max(0.0, 1.0 - sum(left) / self.seconds) if self.seconds else 1.0
         words.append("measuring" if running and share >= _MEASURING else f"{100.0 * share:.0f} % of the work")
         if 0.0 < share < 1.0:
-            words.append(f"{duration_text((1.0 / share - 1.0) * elapsed)} left")
+            words.append(f"{duration_text((1.0 / share - 1.0) * (time.perf_counter() - self.begin))} left")
         return Progress(share, ", ".join(words))
