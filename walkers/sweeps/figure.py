@@ -320,7 +320,7 @@ def _points(done: pd.DataFrame, column: str, down: str | None) -> tuple[str, pd.
     label, points = _numbers(done, column, "y").label, pd.DataFrame({"error": np.full(len(done), np.nan)})
     sources = {"value": column, "error": scatter_of(column), "low": f"{column}_low", "high": f"{column}_high"}
     for name, source in {**sources, "down": down}.items():
-        if source in done and done[source].notna().any():
+        if source and source in done and done[source].notna().any():
             points[name] = _numbers(done, source, "y").values
     return label.replace(", facing right (up)", "") if "down" in points else label, points
 
