@@ -3,12 +3,10 @@
 import hashlib
 import importlib.resources
 import io
-import json
 import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -76,12 +74,6 @@ def _verified(path: Path, status: int = 0) -> list[str]:
     return (done.stdout + done.stderr).splitlines()
 
 
-def _edit(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
-    contents = json.loads(path.read_text())
-    change(contents)
-    path.write_text(json.dumps(contents))
-
-
 def test_manifests_say_what_made_the_run(run: Path) -> None:
     manifest = read_manifest(run)
     files = {path.relative_to(run).as_posix(): path for path in run.rglob("*") if path.is_file()}
@@ -137,7 +129,7 @@ def test_an_archive_of_a_run(run: Path, tmp_path: Path) -> None:
     crate, manifest, place = ROCrate(unpacked), read_manifest(run), f"runs/{run.name}"
     root = crate.root_dataset
     assert (root["citation"].id, root["license"].id.rpartition("/")[2]) == (PAPER, "CC-BY-4.0")
-    assert root["datePublished"] == manifest["finished"].replace("Z", "+00:00")
+    assert root["datePublished"] == manifest["finished"]
     assert {name: crate.get(f"{place}/{name}")["sha256"] for name in manifest["sha256"]} == manifest["sha256"]
     engine, analysis = root["mentions"]
     assert engine["instrument"]["sha256"] == manifest["engine"]["sha256"]
@@ -160,7 +152,7 @@ def test_the_tables_of_an_archive_are_made_by_the_program_that_made_the_last(sha
     entities = {one["@id"]: one for one in describe_crate(contents, [], "CC0-1.0")["@graph"]}
     (tables,) = (one for one in entities.values() if one.get("name") == "Tables of angles")
     assert entities[tables["instrument"]["@id"]]["softwareVersion"] == "99.0"
-    assert tables["endTime"] == "2099-01-01T00:00:00+00:00"
+    assert tables["endTime"] == "2099-01-01T00:00:00Z"
 
 
 def test_an_archive_without_dumps(run: Path, tmp_path: Path) -> None:
@@ -224,9 +216,6 @@ def test_an_archive_that_cannot_be_made_leaves_the_older_one(run: Path, archive:
         write_archive(run, older, dumps=False)
     assert older.read_bytes() == archive.read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.zip", "runs"]
-    _edit(run / "manifest.json", lambda manifest: manifest.update(started="yesterday"))
-    done = call("export", str(run), "--to", "archive", "-o", str(older))
-    assert (done.returncode, "expected a time such as" in done.stderr) == (2, True)
 
 
 @pytest.mark.parametrize(

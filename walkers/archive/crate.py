@@ -6,13 +6,10 @@ Each run is an action of the engine, from case and deck to the dumps; one action
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import quote
 
-from walkers.errors import refused
-from walkers.runner.manifest import MANIFEST_NAME
 from walkers.runner.provenance import PROJECT
 
 if TYPE_CHECKING:
@@ -44,14 +41,6 @@ class Author(NamedTuple):
 Reference = dict[str, str]
 
 
-def moment(iso: Any) -> str:
-    """A time of a manifest, ISO 8601."""
-    try:
-        return datetime.fromisoformat(iso).isoformat()
-    except (TypeError, ValueError) as error:
-        raise refused(MANIFEST_NAME, f"expected a time such as 2026-01-31T12:00:00Z, not {iso}") from error
-
-
 class _Graph(dict[str, dict[str, Any]]):
     """Entities of a crate by identifier."""
 
@@ -62,7 +51,7 @@ class _Graph(dict[str, dict[str, Any]]):
 
     def action(self, name: str, text: str, instrument: Reference, ended: str, /, **more: Any) -> Reference:
         """What a program has done."""
-        more |= {"endTime": moment(ended), "actionStatus": "http://schema.org/CompletedActionStatus"}
+        more |= {"endTime": ended, "actionStatus": "http://schema.org/CompletedActionStatus"}
         return self.add(f"#{quote(name)}", "CreateAction", name=name, description=text, instrument=instrument, **more)
 
 
@@ -82,7 +71,7 @@ def describe_crate(contents: Contents, authors: Sequence[Author], licence: str) 
         "Dataset",
         name=f"{contents.name}: {contents.title}".rstrip(": "),
         description=f"Wet granular walkers, simulated by the discrete element method with LIGGGHTS through {PROJECT}.",
-        datePublished=moment(contents.finished),
+        datePublished=contents.finished,
         license=graph.add(f"https://spdx.org/licenses/{licence}", "CreativeWork", **spdx),
         conformsTo=graph.add(PROFILE, "CreativeWork", **profile),
         citation=graph.add(PAPER, "ScholarlyArticle", **_PAPER_PROPERTIES),
@@ -132,7 +121,7 @@ def _simulation(graph: _Graph, contents: Contents, place: str, **agents: Any) ->
         f"The engine runs the deck{f', together with {further_cases} other cases' if further_cases else ''}.",
         graph.add(binary, "SoftwareApplication", **more, sha256=engine["sha256"]),
         manifest["finished"],
-        startTime=moment(manifest["started"]),
+        startTime=manifest["started"],
         object=_with_role(contents, "case", "deck", folder=folder),
         result=_with_role(contents, "dump", "output", folder=folder),
         **agents,
