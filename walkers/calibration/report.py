@@ -17,7 +17,7 @@ from walkers.inputs.axes import is_axis
 from walkers.inputs.keys import flatten
 from walkers.inputs.toml import toml_bytes
 from walkers.postprocess.drawing import TWO_COLUMNS, new_figure, save_figure, styled
-from walkers.runner.files import write_bytes, write_json, write_text
+from walkers.runner.files import write_bytes, write_json
 from walkers.text import aligned, rendered
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def write_outcome(outcome: Outcome, to: Path) -> list[Path]:
     write_bytes(files[0], samples.to_parquet(index=False))
     write_json(files[1], record)
     write_bytes(files[3], toml_bytes(best_case(calibration, outcome.sets[PROPOSED[0]], samples)))
-    write_text(files[2], rendered("walkers.calibration", "report.md.j2", found=record))
+    write_bytes(files[2], rendered("walkers.calibration", "report.md.j2", found=record).encode())
     sources = [f"{calibration.name}-{part}" for part in ("named", "round", "proposed")]
     return files + save_figure(draw_facts(outcome), to / "predictions.png", sources, title=record["title"])
 

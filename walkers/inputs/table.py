@@ -217,10 +217,10 @@ def contradictions(model: type[Table], document: Any, place: str = "") -> Iterat
     if not isinstance(document, Mapping):
         return
     yield from model.problems({name: value for name, value in document.items() if value != []}, place)
-    for name, field in keys_in(model).items():
-        if (inner := table_in(field.annotation)) is None:
+    for name, below in document.items():
+        field, where = keys_in(model).get(name), within(place, name)
+        if field is None or (inner := table_in(field.annotation)) is None:
             continue
-        below, where = document.get(name), within(place, name)
         for number, entry in enumerate(below if isinstance(below, list) else [below]):
             yield from contradictions(inner, entry, f"{where}[{number}]" if isinstance(below, list) else where)
 

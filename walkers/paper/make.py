@@ -15,7 +15,7 @@ from walkers.paper.figures import fig1b, fig2_threshold, fig3, fig4, of_sweep
 from walkers.paper.sources import NothingFinishedError, Sources, of_facts, sets, sweep_of
 from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.progress import progress_of
-from walkers.runner.files import write_json, write_text
+from walkers.runner.files import write_bytes, write_json
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
 from walkers.text import rendered
 
@@ -106,7 +106,7 @@ def make_figures(
     comparison = compare(Sources(out))
     page, record = to / f"{COMPARISON}.md", to / f"{COMPARISON}.json"
     to.mkdir(parents=True, exist_ok=True)
-    write_text(page, rendered("walkers.paper", "comparison.md.j2", **comparison))
+    write_bytes(page, rendered("walkers.paper", "comparison.md.j2", **comparison).encode())
     write_json(record, comparison)
     return Made(
         [*files, page, record],

@@ -26,18 +26,13 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def write_json(path: Path, contents: Mapping[str, Any], *, at_once: bool = True) -> None:
-    """Write a JSON object; ``at_once`` is False if the whole directory is flushed to disk later (`settle`)."""
+    """Write a JSON object; ``at_once`` is False if the whole directory is flushed to disk later."""
     write_bytes(path, json_bytes(contents), at_once=at_once)
 
 
 def json_bytes(contents: Mapping[str, Any]) -> bytes:
     """A JSON object in the format of all JSON files of the program."""
     return (json.dumps(contents, indent=2, ensure_ascii=False) + "\n").encode("utf-8")
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file."""
-    write_bytes(path, text.encode("utf-8"))
 
 
 def write_bytes(path: Path, contents: bytes, *, at_once: bool = True) -> None:
@@ -77,11 +72,6 @@ def beside(path: Path) -> Iterator[Path]:
         with suppress(OSError):
             new.unlink(missing_ok=True)
         raise
-
-
-def settle() -> None:
-    """Flush all files to disk, so that the new name of a directory survives a loss of power."""
-    os.sync()  # a hundred times faster than file by file
 
 
 def fsync_path(path: Path) -> None:

@@ -11,7 +11,7 @@ from walkers.errors import InputError
 from walkers.postprocess.report.page import NAME, check_report, fill, page_of, svg_of
 from walkers.postprocess.results import read
 from walkers.postprocess.uncertainty import lines_of_rest
-from walkers.runner.files import write_text
+from walkers.runner.files import write_bytes
 from walkers.sweeps.figure import LeftOutWarning, figure_of, readable_key
 from walkers.sweeps.table import cells_of, load
 
@@ -46,7 +46,7 @@ def report_sweep(directory: Path, to: Path | None = None) -> Path:
         heads=list(cells),
         same=same,
     )
-    write_text(path, page_of(frame.attrs["title"], body))
+    write_bytes(path, page_of(frame.attrs["title"], body).encode())
     return path
 
 

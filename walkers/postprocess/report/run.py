@@ -18,7 +18,7 @@ from walkers.postprocess.report.page import LARGEST, NAME, check_report, fill, p
 from walkers.postprocess.report.player import MOST_PLACES, player_of
 from walkers.postprocess.results import Results, headlines, read
 from walkers.runner.directory import case_of
-from walkers.runner.files import write_text
+from walkers.runner.files import write_bytes
 from walkers.runner.manifest import read_manifest
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def report_run(
         player = player_of(motion, places=places)
         carried = {"player": base64.b64encode(player.plot.get_binary_snapshot(9)).decode()}
         page = page_of(title, fill("run.html.j2", run=run, player=player), carried)
-    write_text(path, page)
+    write_bytes(path, page.encode())
     return path
 
 
