@@ -80,8 +80,7 @@ def bulk_of(labels: IntArray, bridges: Bridges, *, heap: bool = True) -> BoolArr
     beads, walls = bridges.at_walls
     on_floor = labels[beads[walls == FLOOR]]
     most = [np.bincount(labels).argmax()] if heap else []
-    bulk: BoolArray = np.isin(labels, [*most, *on_floor])
-    return bulk
+    return np.isin(labels, [*most, *on_floor])
 
 
 def held_clusters(labels: IntArray, bridges: Bridges, bulk: BoolArray) -> Iterator[Cluster]:

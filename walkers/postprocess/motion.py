@@ -128,8 +128,7 @@ class Motion:
     @property
     def large(self) -> BoolArray:
         """Whether a bead is of the large class, shape (N,)."""
-        large: BoolArray = self.radius > self.case.border
-        return large
+        return self.radius > self.case.border
 
     @cached_property
     def walker_of(self) -> IntArray:
@@ -198,8 +197,7 @@ class Group:
     @property
     def across_axis(self) -> FloatArray:
         """Direction in the plane of the floor, a quarter turn to the left of `drive_axis`."""
-        across: FloatArray = np.cross([0.0, 0.0, 1.0], self.drive_axis)
-        return across
+        return np.cross([0.0, 0.0, 1.0], self.drive_axis)
 
     @cached_property
     def heading(self) -> FloatArray:
@@ -302,7 +300,7 @@ def _joined(case: Case, paths: Sequence[Path]) -> Motion:
     steps: list[int] = []
     stacks: list[FloatArray] = []
     frames: list[tuple[Path, int]] = []
-    start = None  # step
+    start = None  # step at which the drive begins
     for path in paths:
         record, layout, dump = _opened(path)
         if record["begin"] != (steps[-1] if steps else 0):
@@ -320,21 +318,9 @@ def _joined(case: Case, paths: Sequence[Path]) -> Motion:
         steps += dump.steps[first:].tolist()
         frames += [(path, number) for number in range(first, len(values))]
         start = record["drive_from"] if start is None else start
-    values = np.concatenate(stacks) if len(stacks) > 1 else stacks[0]
-    moved = _motion(case, values, np.array(steps, dtype=np.float64), start, layout)
-    cycles = record["end"] // case.run.steps_per_cycle if case.run.until_steady else case.run.cycles
-    return replace(
-        moved,
-        case=case.for_cycles(cycles) if case.run.until_steady else case,
-        frames=frames,
-        truncated=dump.truncated,
-        ended_early=cycles < case.run.cycles,
-    )
-
-
-def _motion(case: Case, values: FloatArray, steps: FloatArray, start: int | None, layout: Layout) -> Motion:
-    """The motion of frames at these steps; the drive begins at step ``start``, or in the frame after the last one."""
-    time = (steps - (steps[-1] + case.run.steps_per_sample if start is None else start)) * case.run.time_step
+    values, run = np.concatenate(stacks) if len(stacks) > 1 else stacks[0], case.run
+    # Without a drive yet, it begins in the frame after the last one.
+    time = (np.array(steps) - (steps[-1] + run.steps_per_sample if start is None else start)) * run.time_step
     shift, speed = prescribed_motion(case.excitation, time)
     if start:  # in the last frame at rest the walls do not move yet
         speed[time == 0.0] = 0.0
@@ -343,8 +329,9 @@ def _motion(case: Case, values: FloatArray, steps: FloatArray, start: int | None
         column = layout.bead_columns.index(name)
         return values[:, :, column : column + 3]
 
+    cycles = record["end"] // run.steps_per_cycle if run.until_steady else run.cycles
     return Motion(
-        case=case,
+        case=case.for_cycles(cycles) if run.until_steady else case,
         time=time,
         position=vectors("x") - shift[:, None],
         velocity=vectors("vx") - speed[:, None],
@@ -352,8 +339,9 @@ def _motion(case: Case, values: FloatArray, steps: FloatArray, start: int | None
         substrate=boundary_motion(case.excitation, time)[0],
         radius=values[0, :, layout.bead_columns.index("radius")],
         walkers=tuple(replace(walker, beads=tuple(bead - 1 for bead in walker.beads)) for walker in layout.walkers),
-        frames=[],
-        truncated=False,
+        frames=frames,
+        truncated=dump.truncated,
+        ended_early=cycles < run.cycles,
         mean_spin=vectors(MEAN_SPIN_COLUMNS[0]) if MEAN_SPIN_COLUMNS[0] in layout.bead_columns else None,
     )
 

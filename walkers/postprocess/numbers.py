@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 from math import isfinite, nan
 from typing import TYPE_CHECKING, Any
 
-from walkers.postprocess.quantities import GROUPS, Quantity, declared, is_error, ordered, unit_shown
+from walkers.postprocess.quantities import SHOWN, Quantity, declared, is_error, ordered, unit_shown
 from walkers.postprocess.sides import REST
 from walkers.rounding import counted, rounded, with_decimals
 
@@ -42,33 +42,10 @@ class Row:
 
 MAIN = ("velocity", "right_facing", "axial_velocity", "climbs", "highest", "speed")
 """Main numbers, of which a spread measures bands."""
-ASIDE = frozenset(
-    {
-        *("scatter", "smallest", "largest", "right_scatter", "left_scatter", "numerical_error"),
-        *("stops_within", "starts_within", "gamma0_stops_within", "gamma0_starts_within"),
-        *("orientation_smallest", "orientation_largest", "facing_right", "facing_left"),
-        *("gamma0", "sin_delta", "mass_asymmetry", "radius_1", "radius_2"),
-        *("meets", "came_apart", "facings_differ", "depends_on_start"),
-        *(quantity.name for quantity in GROUPS["drive"]),
-    }
-)
+ASIDE = frozenset(SHOWN["aside"])
 """Numbers that are not shown by themselves: errors of others, values of the case, conditions."""
-_HIDDEN = ASIDE | {
-    *("axial_velocity", "axial_left_facing", "walkers_met", "turned_first", "turned_last", "ended_early", "duration")
-}
-"""Numbers that rows leave out, because others count."""
 _OF_UP = "on a slope of those that started facing up"
 """Ends the meaning of a number that leaves out walkers that face down."""
-_OF_RAMP = (
-    *("velocity", "*_facing", "*_velocity", "velocity_make_*", "rotation_*", "sliding_*", "open_*"),
-    *("work", "cost_of_transport", "steady*", "orientation_end"),
-)
-"""Means over a run that rows leave out if a ramp changes the drive."""
-_IF_ANY = (
-    *("events_*", "open_*", "separated_fraction", "turned_round"),
-    *("leaning", "turned_over", "upright", "climbing", "descending"),
-)
-"""Numbers that rows leave out if they are zero."""
 
 
 def headline(numbers: Mapping[str, Any]) -> str:
@@ -128,25 +105,25 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
     Means that say nothing about any walker are left out: velocities of walkers that came apart, of two directions that
     differ or under a ramp; orientations of walkers of which some turned round.
     """
-    main, hidden = headline(numbers), set(_HIDDEN)
+    main, hidden = headline(numbers), ASIDE | SHOWN["hidden"]
     if main == "axial_velocity" or (main == "right_facing" and numbers["goes_uphill"]):
         hidden -= {"axial_velocity", "axial_left_facing"}
     if not (numbers.get("facing_right") and numbers.get("facing_left")):  # the velocity is that of the only direction
         hidden |= {"right_facing", "left_facing", "axial_left_facing"}
     if main != "velocity":
-        hidden.add("velocity")
+        hidden |= {"velocity"}
     if numbers.get("came_apart"):
         hidden |= {"velocity", "right_facing", "left_facing", "lateral_velocity", "axial_velocity", "axial_left_facing"}
     if 0 < numbers.get("turned_round", 0) < numbers.get("walkers", 0):
-        hidden.add("orientation_end")
+        hidden |= {"orientation_end"}
     if "stops_at" in numbers:
-        hidden |= {name for name in numbers if any(fnmatchcase(name, pattern) for pattern in _OF_RAMP)}
+        hidden |= {name for name in numbers if any(fnmatchcase(name, pattern) for pattern in SHOWN["not_of_a_ramp"])}
     listed = []
     for name in ordered(numbers.keys() - hidden):
         number = numbers[name]
         if isinstance(number, (bool, str)) or not isfinite(number) or is_error(name):
             continue
-        if number or not any(fnmatchcase(name, pattern) for pattern in _IF_ANY):
+        if number or not any(fnmatchcase(name, pattern) for pattern in SHOWN["if_any"]):
             quantity = declared(name)
             text, unit = shown(number, quantity.unit)
             listed.append(Row(name, _label(quantity, numbers), text, unit, _errors(numbers, quantity)))

@@ -73,6 +73,8 @@ TABLES: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(columns) for nam
 """The columns of the tables of runs, in their order."""
 GROUPS: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(group) for name, group in _FILE["numbers"].items()}
 """The numbers of results: of each module of `walkers.postprocess.results.modules_of`, and of all."""
+SHOWN: Mapping[str, frozenset[str]] = {name: frozenset(names) for name, names in _FILE["shown"].items()}
+"""Which numbers are shown (`walkers.postprocess.numbers.rows`)."""
 _NUMBERS = [
     quantity
     for number in (number for group in GROUPS.values() for number in group)

@@ -22,8 +22,7 @@ CONTACTS = ("bead 1 on the substrate", "bead 2 on the substrate", "bead on bead"
 def mass_asymmetry(sin_delta: npt.ArrayLike) -> FloatArray:
     """μ of two beads of equal density."""
     s = np.asarray(sin_delta, dtype=np.float64)
-    asymmetry: FloatArray = (3.0 * s + s**3) / (1.0 + 3.0 * s**2)
-    return asymmetry
+    return (3.0 * s + s**3) / (1.0 + 3.0 * s**2)
 
 
 def normal_force_matrix(sin_delta: npt.ArrayLike) -> FloatArray:
@@ -114,5 +113,4 @@ def mean_velocity(gamma0: npt.ArrayLike, sin_delta: npt.ArrayLike) -> FloatArray
         normal = forces_at_rest(s) + force * pressed
         sliding = force * parallel / (FRICTION_OF_THE_PAPER * np.where(normal > 0.0, normal, np.nan))
         sides.append(translation(np.moveaxis(sliding, -1, 0)))
-    mean: FloatArray = (sides[0] + sides[1]) / 2.0
-    return mean
+    return (sides[0] + sides[1]) / 2.0

@@ -18,7 +18,6 @@ FINER, LEVELS = 8, 3
 """A step in which a contact begins to stick or to slip is divided into 8 parts, and such a part into 8 again."""
 STAGE = 1.0 - np.sqrt(0.5)
 """Length of each stage of an L-stable step of second order (Alexander, SIAM J. Numer. Anal. 14 (1977) 1006)."""
-_TICKS = FINER ** (LEVELS - 1)
 _NEWTON_STEPS = 30
 _TOLERANCE = 1e-8
 """Tolerance of the friction forces, in units of 4πγR̄."""
@@ -82,10 +81,8 @@ def integrate(
             before = totals[0].copy()
             totals[0], totals[1] = 0.0, np.inf
             for step in range(steps):
-                begin, length = step / steps, 1.0 / steps
-                if not _advance(
-                    tables[walker], mu[walker], drive[walker], effect, terms[walker], begin, length, state, totals, work
-                ):
+                of_walker = (tables[walker], mu[walker], drive[walker], effect, terms[walker])
+                if not _advance(*of_walker, step / steps, 1.0 / steps, 0, state, totals, work):
                     solved[walker] = False
                     break
                 series[walker, step] = state[_SLIDING]
@@ -114,6 +111,7 @@ def _advance(  # noqa: PLR0913, PLR0917
     terms: FloatArray,
     begin: float,
     length: float,
+    level: int,
     state: FloatArray,
     totals: FloatArray,
     work: FloatArray,
@@ -122,31 +120,25 @@ def _advance(  # noqa: PLR0913, PLR0917
 
     Times are parts of a cycle. Returns whether friction forces were found at every stage.
     """
-    tick, level, after = 0, 0, work[:4]
-    while tick < _TICKS:
-        width = _TICKS // FINER**level
-        now, part = begin + tick / _TICKS * length, width / _TICKS * length
-        after[:] = state
-        start = (state[0, 0], state[0, 1], state[0, 2])
-        solved = _stage(tables[level], mu, drive, effect, terms, now + STAGE * part, STAGE * part, start, work)
-        # The second stage starts from where the slope of the first one leads.
-        more = (1.0 - STAGE) / STAGE
-        x, y, z = start
-        start = (x + more * (after[0, 0] - x), y + more * (after[0, 1] - y), z + more * (after[0, 2] - z))
-        solved &= _stage(tables[level], mu, drive, effect, terms, now + part, STAGE * part, start, work)
-        if level < LEVELS - 1 and (not solved or (after[_MODE] != state[_MODE]).any()):
-            level += 1
-            continue
-        if not solved:
-            return False
+    after, start = work[:4], (state[0, 0], state[0, 1], state[0, 2])
+    after[:] = state
+    solved = _stage(tables[level], mu, drive, effect, terms, begin + STAGE * length, STAGE * length, start, work)
+    # The second stage starts from where the slope of the first one leads.
+    start = _less(start, 1.0 - 1.0 / STAGE, _less((after[0, 0], after[0, 1], after[0, 2]), 1.0, start))
+    solved &= _stage(tables[level], mu, drive, effect, terms, begin + length, STAGE * length, start, work)
+    if level < LEVELS - 1 and (not solved or (after[_MODE] != state[_MODE]).any()):
+        part = length / FINER
+        for number in range(FINER):
+            now = begin + number * part
+            if not _advance(tables, mu, drive, effect, terms, now, part, level + 1, state, totals, work):
+                return False
+        return True
+    if solved:
         for contact in range(3):
-            totals[0, contact] += part / 2.0 * (state[_SLIDING, contact] + after[_SLIDING, contact])
+            totals[0, contact] += length / 2.0 * (state[_SLIDING, contact] + after[_SLIDING, contact])
             totals[1, contact] = min(totals[1, contact], after[_NORMAL, contact])
         state[:] = after
-        tick += width
-        if level and tick % (width * FINER) == 0:
-            level -= 1
-    return True
+    return solved
 
 
 @njit(cache=True)
