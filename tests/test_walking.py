@@ -60,14 +60,14 @@ def test_velocity_is_the_strobed_displacement_over_time(moved: Group) -> None:
     facing = np.array([walker.facing for walker in moved.walkers])
     crude = facing * (strobed[-1, :, 0] - strobed[0, :, 0]) / seconds
     walked = walk(moved)
-    np.testing.assert_allclose(facing * walked.axial_velocity, crude, rtol=1e-3)
-    np.testing.assert_allclose(walked.velocity, crude, rtol=0.01)
-    assert np.abs(walked.lateral_velocity).max() < 0.1 * np.abs(walked.axial_velocity).min()
-    assert np.all(walked.steady)
+    np.testing.assert_allclose(facing * walked["axial_velocity"], crude, rtol=1e-3)
+    np.testing.assert_allclose(walked["velocity"], crude, rtol=0.01)
+    assert np.abs(walked["lateral_velocity"]).max() < 0.1 * np.abs(walked["axial_velocity"]).min()
+    assert np.all(walked["steady"])
     # Twenty samples a cycle represent the gait: their mean velocity is the displacement a cycle.
     motion = gait(moved)
     settled = settled_samples(moved.case.run)
-    np.testing.assert_allclose(motion.velocity[settled].mean(axis=0), walked.velocity, rtol=0.03)
+    np.testing.assert_allclose(motion.velocity[settled].mean(axis=0), walked["velocity"], rtol=0.03)
     # Sliding is velocity less rotation: the mass centre moves as its beads do, weighted by their masses.
     weights = moved.radii**3 / np.sum(moved.radii**3)
     np.testing.assert_allclose((motion.sliding[..., :2] + motion.rotation) @ weights, motion.velocity, atol=1e-12)

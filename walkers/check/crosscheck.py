@@ -108,7 +108,7 @@ def measured(motion: Motion) -> dict[tuple[str, str], float]:
         label = f" ({number})" if len(motion.groups) > 1 else ""
         beads = [f"bead {bead + 1}" for bead in range(len(group.radii))]
         contacts = [*beads, *(f"beads {first + 1}-{second + 1}" for first, second in group.make.pairs)]
-        numbers[f"velocity{label}", "mm/s"] = 1e3 * float(walk(group).velocity.mean())
+        numbers[f"velocity{label}", "mm/s"] = 1e3 * float(walk(group)["velocity"].mean())
         gait, kinds = averages(group), (("rotation", beads), ("sliding", contacts), ("open", contacts))
         for quantity, places in kinds:
             factor, unit = (100.0, "%") if quantity == "open" else (1e3, "mm/s")

@@ -24,9 +24,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from walkers.inputs.run import CONSTANT, Run
-from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
+from walkers.postprocess.dump import DumpError, FloatArray
 from walkers.postprocess.motion import Group, between, read_motion
 from walkers.postprocess.sides import REST, SEPARATED, STEADY_SPEED, sides
+from walkers.postprocess.tables import Columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -141,22 +142,6 @@ def mass_of(group: Group) -> float:
     return float(4.0 / 3.0 * pi * np.sum(group.radii**3) * group.case.beads.density)
 
 
-class Walk(NamedTuple):
-    """Velocities of W walkers after the settling cycles, m/s, each of shape (W,), as in the table ``walkers``.
-
-    ``velocity`` is the slope of the distance along the heading, one sample per cycle (`fit_slopes`). Axial and lateral
-    velocities are those of the mass centre along and across the drive axis. ``steady`` is whether the first and the
-    second half agree.
-    """
-
-    velocity: FloatArray
-    first_half: FloatArray
-    second_half: FloatArray
-    axial_velocity: FloatArray
-    lateral_velocity: FloatArray
-    steady: BoolArray
-
-
 def distance_walked(group: Group) -> tuple[FloatArray, FloatArray]:
     """Time (s, shape (cycles + 1,)) and distance along the heading (m, shape (cycles + 1, W)) at the end of each cycle.
 
@@ -168,10 +153,11 @@ def distance_walked(group: Group) -> tuple[FloatArray, FloatArray]:
     return group.time[::strobe], np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
 
 
-def walk(group: Group) -> Walk:
-    """Fit the velocities of a run's walkers.
+def walk(group: Group) -> Columns:
+    """Velocities after the settling cycles as in the table ``walkers``, m/s, and whether both halves agree, shape (W,).
 
-    `DumpError` if the dump was cut short within the settling cycles.
+    They are slopes against time, one sample per cycle (`fit_slopes`): of the distance along the heading, and of the
+    mass centre along and across the drive axis. `DumpError` if the dump was cut short within the settling cycles.
     """
     settled = group.case.run.settled_strobes
     time, distance = distance_walked(group)
@@ -184,14 +170,14 @@ def walk(group: Group) -> Walk:
         first = fit_slopes(time[:middle], distance[:middle])
         second = fit_slopes(time[middle - 1 :], distance[middle - 1 :])
     centre = group.mass_centre[:: group.case.run.samples_per_cycle][settled:]
-    return Walk(
-        velocity=velocity,
-        first_half=first,
-        second_half=second,
-        axial_velocity=fit_slopes(time, centre @ group.drive_axis),
-        lateral_velocity=fit_slopes(time, centre @ group.across_axis),
-        steady=np.abs(first - second) <= np.maximum(STEADY_DIFFERENCE * np.abs(velocity), STEADY_SPEED),
-    )
+    return {
+        "velocity": velocity,
+        "first_half": first,
+        "second_half": second,
+        "axial_velocity": fit_slopes(time, centre @ group.drive_axis),
+        "lateral_velocity": fit_slopes(time, centre @ group.across_axis),
+        "steady": np.abs(first - second) <= np.maximum(STEADY_DIFFERENCE * np.abs(velocity), STEADY_SPEED),
+    }
 
 
 def fit_slopes(time: FloatArray, values: FloatArray) -> FloatArray:
@@ -257,12 +243,12 @@ def are_constant(directory: Path) -> bool:
 
 
 def _is_constant(group: Group) -> bool:
-    fit, run = walk(group), group.case.run
+    walked, run = walk(group), group.case.run
     turned = np.abs(np.diff(group.orientation[:: run.samples_per_cycle][run.settled_strobes :], axis=0))
     before, after = turned[: len(turned) // 2].max(axis=0), turned[len(turned) // 2 :].max(axis=0)
     little = (after < _LITTLE) & (after < before + _NO_FASTER)
-    allowed = max(CONSTANT * float(np.abs(fit.velocity).max()), REST)
-    agree = np.abs(fit.first_half - fit.second_half).max() <= allowed
+    allowed = max(CONSTANT * float(np.abs(walked["velocity"]).max()), REST)
+    agree = np.abs(walked["first_half"] - walked["second_half"]).max() <= allowed
     return bool(agree and np.all(little | (after < _FADING * before)))
 
 

@@ -421,7 +421,7 @@ class Window:
         self._plotter.camera.SetFocalPoint(self._middle + moved)
         self._plotter.render()  # a screenshot alone renders only the first time
         picture = Image.fromarray(np.array(self._plotter.screenshot(return_img=True), dtype=np.uint8))
-        return np.asarray(picture.resize(self._size, Image.Resampling.HAMMING))
+        return np.asarray(picture.resize(self._size, Image.Resampling.BOX))
 
     def close(self) -> None:
         """Close the window."""

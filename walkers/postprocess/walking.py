@@ -119,7 +119,7 @@ def tables_of(group: Group) -> dict[str, Columns]:
     starts = ("walker", "make", "facing", "start_angle")
     walkers = {
         **{name: np.array([getattr(walker, name) for walker in group.walkers]) for name in starts},
-        **gait.walk(group)._asdict(),
+        **gait.walk(group),
         "orientation_mean": group.orientation[samples].mean(axis=0),
         "orientation_end": group.orientation[-1],
         "turned_at": gait.turned_over_at(group),
