@@ -287,8 +287,8 @@ def test_a_pile_is_drawn_and_a_sweeps_points_open_reports_in_which_beads_play_pa
     stopped = wait_for(pause)
     paused = rested(page, begin)
 
-    def turn() -> bool:
-        """Whether the mouse has turned the scene; a busy page may lose what the mouse does before it listens."""
+    def turn() -> bytes | None:
+        """The scene that the mouse has turned; a busy page may lose what the mouse does before it listens."""
         scene = page.locator(".scene:visible").first
         scene.scroll_into_view_if_needed()
         box = scene.bounding_box()
@@ -298,10 +298,9 @@ def test_a_pile_is_drawn_and_a_sweeps_points_open_reports_in_which_beads_play_pa
         page.mouse.down()
         page.mouse.move(x + 90, y + 30, steps=4)
         page.mouse.up()
-        return rested(page) != paused
+        return after if (after := rested(page)) not in (begin, paused) else None
 
-    wait_for(turn)
-    turned = rested(page, begin, paused)
+    turned = wait_for(turn)
     assert time.text_content() == stopped  # turned, not played
     page.get_by_role("button", name="as at first").click()
     rested(page, turned)

@@ -342,7 +342,6 @@ def test_company_does_not_matter_whatever_forces_it_feels(tmp_path: Path) -> Non
         "one": ("title", ""),
         "across": ("drive.axis", "y"),
         "uphill": ("boundary.tilt", 0.3),
-        "light": ("environment.gravity", 5.0),
         "thin": ("liquid.viscosity_ratio", 0.4),
     }
     cases = [case.put(*change).but(name=name) for name, change in changes.items()]
