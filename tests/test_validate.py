@@ -136,11 +136,9 @@ def _pile(cycles: list[float]) -> Motion:
     still = np.zeros((frames, 3, 3))
     position = still + 1e-3 * np.arange(3.0)[:, None]
     time = np.array(cycles) / case.excitation.frequency
-    walls = np.zeros((frames, 3))
     radius = np.array([0.6e-3, 0.3e-3, 0.6e-3])
-    return Motion(
-        case, time, position, still, still, walls, walls, radius, (), [(Path("s"), 0)] * frames, truncated=False
-    )
+    parts = [(Path("s"), 0)] * frames
+    return Motion(case, time, position, still, still, still[:, 0], radius, (), parts, truncated=False)
 
 
 @pytest.mark.parametrize(("away", "cycle"), [(2, 0.5), (3, 1.5), (4, 1.5)])

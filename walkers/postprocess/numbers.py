@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a module measures: tables, numbers (SI units, names of `quantities.GROUPS`), reasons to doubt them.
+    """What a module measures: tables, numbers in SI units, reasons to doubt them.
 
-    A number that is not defined is None or NaN.
+    Names of numbers are those of `walkers.postprocess.quantities.GROUPS`. One that is not defined is None or NaN.
     """
 
     tables: Mapping[str, Columns]

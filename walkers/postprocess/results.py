@@ -1,6 +1,6 @@
 """Results of runs: measured and written once, read by all.
 
-A result is flat: a number of each name of `walkers.postprocess.quantities.NUMBERS`. Each module of `modules_of` has
+A result is flat: a number of each name of `walkers.postprocess.quantities.GROUPS`. Each module of `modules_of` has
 three functions: ``applies(case)``; ``derived(case)``, numbers that follow from the case alone; and ``measure(motion)``.
 """
 
@@ -70,7 +70,7 @@ class Results(dict[str, Any]):
         return read_table(self.directory, table)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain JSON types: the numbers, None for NaN, and `about`."""
+        """Plain JSON types: the numbers, None for NaN, and ``about``."""
         return {**self.about, **plain(self), "warnings": list(self.warnings)}
 
 
