@@ -40,15 +40,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.sweep import load_sweep
 from walkers.paper.make import COMPARED, FIGURES, make_figures
 from walkers.paper.sources import sweep_of
-from walkers.postprocess.drawing import (
-    ONE_COLUMN,
-    TWO_COLUMNS,
-    legend_below,
-    letter_panels,
-    new_figure,
-    save_figure,
-    styled,
-)
+from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, save_figure, styled
 from walkers.postprocess.results import VERSION
 from walkers.runner.files import read_json, write_json, write_text
 from walkers.sweeps.climbing import texts_of
@@ -142,8 +134,21 @@ def _make_others(_: Path, docs: Path) -> None:
 
 @styled
 def _experiments(bench: Bench) -> Figure:
-    """Restitution on a wet plate against 1/St."""
-    figure, impacts = new_figure(ONE_COLUMN, 3.2)
+    """Drift by two tones against phase and strength, and restitution on a wet plate against 1/St."""
+    figure, (phases, strengths, impacts) = new_figure(TWO_COLUMNS, 3.2, ncols=3)
+    at, fine = experiments.PHASES, np.arange(0.0, 181.0, 10.0)
+    drifts = np.array([experiments.slider(bench, phase) for phase in at])
+    curves = np.array([experiments.modelled(phase) for phase in fine])
+    for number, strength in enumerate(experiments.STRENGTHS):
+        phases.plot(at, drifts[:, number], "o", mfc="none", ms=4.0, color=f"C{number}")
+        phases.plot(fine, curves[:, number], lw=1.0, color=f"C{number}", label=f"a = {strength:g} · 7/2 μg")
+    phases.plot(fine, [experiments.weak(phase) for phase in fine], "k--", lw=1.0, label="weak friction")
+    for number, phase in enumerate((0.0, 90.0)):
+        of, curve = (
+            -rows[list(places).index(phase)] * experiments.STRENGTHS for rows, places in ((drifts, at), (curves, fine))
+        )
+        strengths.plot(experiments.STRENGTHS, of, "o", mfc="none", ms=4.0, color=f"C{number}", label=f"{phase:g}°")
+        strengths.plot(experiments.STRENGTHS, curve, lw=1.0, color=f"C{number}")
     for label, how in (
         ("70 GPa", {}),
         ("70 GPa, bridge from the film on", {"law": f"{experiments.__name__}:filmed"}),
@@ -154,8 +159,12 @@ def _experiments(bench: Bench) -> Figure:
     inverse = np.array([0.0, 1.0 / stokes[:, 2].min()])
     loss = np.log(experiments.FILM / experiments.ROUGH) * inverse
     impacts.plot(inverse, experiments.RESTITUTION * (1.0 - loss), "k--", lw=1.0, label="lubrication, approach")
+    phases.set(xlabel="phase of the second tone (°)", ylabel="drift / speed of the first tone")
+    strengths.set(xlabel="a/(7/2 μg)", ylabel="drift / (7/2 μg/ω)")
     impacts.set(xlabel="1/St", ylabel="restitution", ylim=(0.0, 1.0), xticks=(0.0, 0.005, 0.01))
-    legend_below(impacts)
+    for axes in (phases, strengths, impacts):
+        legend_below(axes)
+    letter_panels((phases, strengths, impacts))
     return figure
 
 

@@ -79,9 +79,10 @@ def test_benchmarks_pass_and_a_check_that_cannot_be_computed_leaves_the_others(
 
 
 def test_experiments_of_others_pass_where_they_are_judged(in_folder: Path) -> None:
-    """A bead that is thrown, one on a wet incline."""
+    """A bead that is thrown, one on a wet incline; and the drift of a dry bead at one phase."""
     with experiments.workbench() as bench:
         lines = [*experiments.thrown(bench), *experiments.incline(bench)]
+        assert experiments.slider(bench, 60.0) == pytest.approx(experiments.modelled(60.0), abs=5e-3)
     assert {line.verdict for line in lines} == {Verdict.PASS}
     assert len(lines) == 7
 
@@ -108,6 +109,7 @@ def test_experiments_fail_with_twice_the_friction(in_folder: Path, monkeypatch: 
     monkeypatch.setitem(experiments._DRY, "contact.friction.bead_wall", 2.0 * experiments.FRICTION)
     with experiments.workbench() as bench:
         assert [line.verdict for line in experiments.thrown(bench)] == [Verdict.PASS, Verdict.FAIL]
+        assert np.abs(experiments.slider(bench, 90.0) - experiments.modelled(90.0)).max() > 0.05
 
 
 GOOD, BAD = Line("good", 1.0, 1.05, 0.1), Line("bad", 1.0, 1.2, 0.1, check="second")

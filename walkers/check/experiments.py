@@ -1,4 +1,4 @@
-"""Experiments of others in the engine: a symmetric dimer, a thrown bead, impacts on a wet plate, a wet incline.
+"""Experiments of others in the engine: a thrown bead, two tones, impacts on a wet plate, a wet incline.
 
 Lines are judged if the reference is exact or has the assumptions of the model; the other lines show missing physics.
 The documentation has the sources and their measurements (``explanation/others``).
@@ -10,7 +10,8 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from math import inf, log, pi
+from functools import partial
+from math import inf, log, pi, radians
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from walkers.check.lines import Line
 from walkers.check.scenes import DRY, FLOOR, STILL, Bench, R, bench_case, over, recording
 from walkers.inputs.boundary import Flat, Wall
 from walkers.inputs.case import Case
+from walkers.inputs.drive import Harmonic
 from walkers.inputs.loads import bridge_at_rest, contact_loads, resistances_at_rest
 from walkers.inputs.reading import load_case
 from walkers.physics.bridge import Curve, Surfaces
@@ -33,6 +35,10 @@ from walkers.templates.deck import Plan
 from walkers.templates.scene import Bead, Scene, loading_of, surface_of
 
 FRICTION, G = 0.2, 9.81
+SLOWS = 3.5 * FRICTION * G  # m/s²; friction slows the surface of a solid sphere 7/2 times as much as its centre
+BASE, CYCLES, FIRST = 80.0, 12, 4  # Hz; number of cycles, and number of first cycles that are not measured
+PHASES = np.arange(0.0, 180.0, 30.0)  # of the second tone, degrees
+STRENGTHS = np.array([2.0, 4.0, 8.0, 16.0])  # peak acceleration of both tones over the deceleration `SLOWS`
 GLASS, FILM, ROUGH, RESTITUTION = 2.75e-3, 0.45e-3, 1e-7, 0.97  # radius of a bead, film, roughness, m; of a dry bead
 OILS = np.array([0.25, 0.5, 1.0, 2.0, 4.0]) * 4.6e-3  # viscosities, Pa s
 SPEEDS = np.array([0.25, 0.5, 1.0, 2.0])  # of impacts, m/s
@@ -50,7 +56,7 @@ def experiments(out: Path) -> Iterator[Line]:
     """All lines; ``out`` is the folder of the runs of walkers."""
     yield from symmetry(out)
     with workbench() as bench:
-        for lines in (thrown, impacts, incline):
+        for lines in (thrown, two_tones, impacts, incline):
             yield from lines(bench)
 
 
@@ -68,8 +74,12 @@ def symmetry(out: Path) -> Iterator[Line]:
     odd, even, opposite = speeds
     yield Line("symmetric dimer, tones 2:3: velocity (not zero)", 0.0, even, unit="mm/s")
     yield Line("symmetric dimer: velocity at 1:3 over velocity at 2:3", 0.0, odd / even, 1e-3)
-    title = "symmetric dimer, 2:3: velocity by the opposite waveform over velocity by the waveform"
-    yield Line(title, -1, opposite / even, 0.01)
+    yield Line(
+        "symmetric dimer, 2:3: velocity by the opposite waveform over velocity by the waveform",
+        -1,
+        opposite / even,
+        0.01,
+    )
 
 
 def followed(
@@ -90,13 +100,67 @@ def followed(
 
 def thrown(bench: Bench, speed: float = 0.05) -> Iterator[Line]:
     """A dry bead that is thrown sliding rolls at 5/7 of its speed after 2v/7μg."""
-    case, ends = bench_case(_DRY), 2.0 * speed / (7.0 * FRICTION * G)
+    case, ends = bench_case(_DRY), speed / SLOWS
     bead = over(FLOOR, -contact_loads(case)[0].overlap, R, (speed, 0.0, 0.0), STILL)
     frames = followed(bench, [case], [bead], 10 * round(0.15 * ends / case.run.time_step), 10)[:, 0]
     slip, time = frames[:, 3] - R * frames[:, 7], 10.0 * case.run.time_step * np.arange(len(frames))
     slope, start = np.polyfit(time[slip > 0.05 * speed], slip[slip > 0.05 * speed], 1)
     yield Line("thrown bead: speed of rolling over speed of the throw", 5.0 / 7.0, frames[-1, 3] / speed, 1e-3)
-    yield Line("thrown bead: time until it rolls", ends, -start / slope, 1e-3, "s")
+    yield Line("thrown bead: time until it rolls", 2.0 * speed / (7.0 * FRICTION * G), -start / slope, 1e-3, "s")
+
+
+def glide(phase: float, angle: FloatArray | float) -> FloatArray:
+    """Velocity by two tones, at a phase of the cycle (rad), without friction; over the speed of the first tone.
+
+    Tones have the frequencies 1:2 and equal accelerations; ``phase`` is the phase of the second tone, degrees.
+    """
+    return np.asarray(-np.cos(angle) - 0.5 * np.cos(2.0 * np.asarray(angle) + radians(phase)))
+
+
+def weak(phase: float) -> float:
+    """Drift in the limit of weak friction, in which a slider slides forward as long as backward."""
+    return -float(np.median(glide(phase, np.linspace(0.0, 2.0 * pi, 20_000, endpoint=False))))
+
+
+def modelled(phase: float, steps: int = 2500) -> FloatArray:
+    """Drift of a mass with Coulomb friction, which can stop it at the end of a step; shape and unit as in `slider`."""
+    step, displacement = 2.0 * pi / steps, np.zeros_like(STRENGTHS)
+    slip = glide(phase, 0.0) + weak(phase) + displacement
+    for number in range(CYCLES * steps):
+        slip = slip + glide(phase, (number + 1) * step) - glide(phase, number * step)
+        slip = np.sign(slip) * np.maximum(np.abs(slip) - step / STRENGTHS, 0.0)
+        displacement += slip * (number >= FIRST * steps)
+    return displacement / ((CYCLES - FIRST) * steps)
+
+
+def slider(bench: Bench, phase: float) -> FloatArray:
+    """Mean sliding velocity of a dry bead on the plate by `STRENGTHS`, over the speed of the first tone.
+
+    Its surface moves as a slider with 7/2 times the friction. It starts at the velocity of the limit of weak friction.
+    """
+    plain, start, drift = bench_case(_DRY), float(glide(phase, 0.0)), weak(phase)
+    speeds = SLOWS * STRENGTHS / (2.0 * pi * BASE)
+    gap, steps, cases = -contact_loads(plain)[0].overlap, round(1.0 / BASE / plain.run.time_step), []
+    for peak in SLOWS * STRENGTHS:
+        tones = (BASE, 0.0), (2.0 * BASE, radians(phase))
+        sines = (Harmonic(axis="x", frequency=tone, peak_acceleration=peak, phase=angle) for tone, angle in tones)
+        cases.append(plain.put("drive.harmonics", tuple(sines)))
+    moves, turns = start + 2.0 / 7.0 * drift, -5.0 / 7.0 * drift / R  # so that the centre stays here
+    beads = [over(FLOOR, gap, R, (moves * speed, 0.0, 0.0), (0.0, turns * speed, 0.0)) for speed in speeds.tolist()]
+    frames = followed(bench, cases, beads, CYCLES * steps, 50)[1 + FIRST * steps // 50 :]
+    return np.asarray((frames[..., 3] - R * frames[..., 7]).mean(axis=0) / speeds)
+
+
+def two_tones(bench: Bench) -> Iterator[Line]:
+    """Drift of a dry bead by two tones, beside the friction model and limits."""
+    drifts, expected = (np.array([drift(phase) for phase in PHASES]) for drift in (partial(slider, bench), modelled))
+    title = "dry bead, two tones"
+    away = float(np.abs(drifts - expected).max())
+    yield Line(f"{title}, {drifts.size} drives: largest distance of the drift from the friction model", 0.0, away, 5e-3)
+    yield Line(f"{title} in phase, weak friction: drift", weak(0.0), drifts[0, -1], 0.03)
+    for phase, growth in ((0, 2.0), (90, 1.0)):
+        last = drifts[list(PHASES).index(phase), -2:] * STRENGTHS[-2:]
+        yield Line(f"{title}, {phase}°: growth of the drift at twice the drive", growth, last[1] / last[0])
 
 
 def filmed(surfaces: Surfaces) -> Curve:
