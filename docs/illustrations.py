@@ -42,7 +42,7 @@ from walkers.paper.make import COMPARED, FIGURES, make_figures
 from walkers.paper.sources import sweep_of
 from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, save_figure, styled
 from walkers.postprocess.results import VERSION
-from walkers.runner.files import read_json, write_json, write_text
+from walkers.runner.files import read_json, write_bytes, write_json
 from walkers.sweeps.climbing import texts_of
 from walkers.sweeps.scheduler import Options
 from walkers.templates.deck import CONTENT_VERSION
@@ -100,7 +100,7 @@ def _make_climbs(out: Path, docs: Path) -> None:
     """Figure and table of the climbs in all sweeps of piles."""
     climbs = climb([sweep(name, out).directory for name in _PILES], to=docs / "figures" / "pile-climbs.png")
     rows = [{name: texts[name] for name in _OF_CLIMBS} for texts in map(texts_of, climbs)]
-    write_text(docs / "figures" / "pile-climbs.md", tables.page(f"walkers climb {' '.join(_PILES)}", rows))
+    write_bytes(docs / "figures" / "pile-climbs.md", tables.page(f"walkers climb {' '.join(_PILES)}", rows).encode())
 
 
 def _make_validation(out: Path, docs: Path) -> None:
@@ -204,7 +204,7 @@ def _of_sweep(name: str, options: Mapping[str, Any]) -> Illustration:
         done = sweep(name, out)
         save_figure(done.figure(**options), docs / files[0], [point.directory.name for point in done.runs])
         for file in files[1:]:
-            write_text(docs / file, tables.page(f"walkers list {name}", _TABLES[name](done.table())))
+            write_bytes(docs / file, tables.page(f"walkers list {name}", _TABLES[name](done.table())).encode())
 
     return Illustration(tuple(files), lambda: load_sweep(name).cases(), make)
 
@@ -233,7 +233,7 @@ ILLUSTRATIONS: Mapping[str, Illustration] = {
     "unexplained": Illustration(
         ("figures/unexplained.md",),
         _shipped("fig1b", "fig4a", "fig4b"),
-        lambda _, docs: write_text(docs / "figures" / "unexplained.md", effects.table()),
+        lambda _, docs: write_bytes(docs / "figures" / "unexplained.md", effects.table().encode()),
     ),
     "validation": Illustration(
         (CHECKED.as_posix(), "figures/benchmarks.png"),
@@ -338,7 +338,7 @@ def refresh_pages(pages: Iterable[Path], numbers: Mapping[str, str], out: Path) 
         new = _FACT.sub(lambda fact: f"<!--fact {fact['name']}-->{numbers[fact['name']]}<!--/fact-->", old)
         new = _BLOCK.sub(lambda block: block["head"] + output_of(block["command"], out), new)
         if without_hashes(new) != without_hashes(old):
-            write_text(page, new)
+            write_bytes(page, new.encode())
             changed.append(page)
     return changed
 
