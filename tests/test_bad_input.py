@@ -336,7 +336,7 @@ COMMANDS: list[tuple[str, str]] = [
     ("check fig1b --without magic", "--without magic: expected one of"),
     ("paper figures --only fig9", "fig9"),
     # Mistyped names
-    ("--library", "Parameter --library requires an argument. See: walkers --help"),
+    ("--libary", 'Unknown command "--libary"'),
     ("new {case}", "exists already"),
     *((f"new '{name}'", f"{name or '.'}: expected a name") for name in ("", "..")),
     ("show fig1b --set 'run.seed=3\nfoo=4'", 'fig1b: run.seed = "3\\nfoo=4": expected a whole number'),
@@ -359,7 +359,7 @@ COMMANDS: list[tuple[str, str]] = [
         ("--walker 2", "walker: 2: expected 0 to 1"),
         ("--begin '0.2 s'", "expected times within the drive, 0 to 0.1 s"),
     )),
-    ("--library own.toml render --film {run} --size wide", "--size: 'wide': expected 360p, 480p, 720p, 1080p"),
+    ("render --film {run} --size wide", "--size: 'wide': expected 360p, 480p, 720p, 1080p"),
 ]  # fmt: skip
 
 

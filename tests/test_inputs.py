@@ -284,8 +284,6 @@ def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(own: Pat
     assert {point.beads.density for points in (sweep, spread) for point in points.cases()} == {2450.0}
     with pytest.raises(InputError, match=r'beads\.material = "my beads": not in the library'):
         load_case("mine.toml")
-    # A library elsewhere is named, for one call.
-    assert "weighed" in call("--library", "other.toml", "show", "mine.toml", check=True).stdout
     assert "my beads  " not in call("library", check=True).stdout
 
 

@@ -11,12 +11,10 @@ import warnings
 from collections.abc import Mapping
 from contextlib import suppress
 from itertools import groupby
-from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import FrameType
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
-import walkers.inputs
 from walkers.commands import commands
 from walkers.errors import InputError, WalkersError, shortened
 from walkers.text import printable
@@ -27,7 +25,6 @@ if TYPE_CHECKING:
 
 _SUMMARY = "Wet granular walkers, simulated with LIGGGHTS."
 _OPTIONS = {
-    "--library PATH": "Your own library file; default: library.toml beside the case.",
     "--help, -h": "Display this message and exit.",
     "--version": "Show the versions of the package (with its commit, if known) and of the engine, and exit.",
     "--install-completion": "Install the completion of commands, options, cases, runs and sweeps for your shell.",
@@ -67,12 +64,10 @@ def _status(tokens: list[str]) -> int:
         print_help()
         return 0
     try:
-        outcome = program().meta(tokens)
+        outcome = program()(tokens)
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt, SystemExit, _Terminated) as stop:
         return _report_stop(stop, tokens)
-    finally:
-        walkers.inputs.chosen_library = None  # whoever calls `main` goes on in the same process
     return outcome if isinstance(outcome, int) else 0
 
 
@@ -122,7 +117,7 @@ def _plain(text: Any) -> str:
 
 
 def program() -> App:
-    """The program. A command is imported when it is called; ``meta`` takes the options before a command too."""
+    """The program. A command is imported when it is called."""
     from cyclopts import App, Parameter
 
     quiet: dict[str, Any] = {"print_error": False, "exit_on_error": False, "suppress_keyboard_interrupt": False}
@@ -133,16 +128,6 @@ def program() -> App:
         app.command(command.place, name=command.name, help=command.summary)
     app.command(print_version, name="--version")
     app.register_install_completion_command(help=_OPTIONS["--install-completion"])
-
-    def with_library(*tokens: str, library: Path | None = None) -> Any:
-        walkers.inputs.chosen_library = library
-        return app(tokens)
-
-    tokens, help_of_library = Parameter(show=False, allow_leading_hyphen=True), _OPTIONS["--library PATH"]
-    with_library.__annotations__["tokens"] = Annotated[str, tokens]
-    with_library.__annotations__["library"] = Annotated[Path | None, Parameter(help=help_of_library)]
-    app.meta.default(with_library)
-    app.meta.suppress_keyboard_interrupt = False
     return app
 
 

@@ -227,7 +227,7 @@ def _commands() -> str:
     for words in [whole for name in names for whole in ([name] if not name else [name, *_parts(app, *name)])]:
         head, page = " ".join(["walkers", *words]), io.StringIO()
         with redirect_stdout(page):
-            app.meta([*words, "--help"]) if words else print_help()
+            app([*words, "--help"]) if words else print_help()
         text += f"\n## {head}\n" * bool(words) + f"\n```text\n$ {head} --help\n{page.getvalue()}```\n"
     return text
 

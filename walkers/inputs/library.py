@@ -13,7 +13,6 @@ from math import sqrt
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from walkers import inputs
 from walkers.errors import InputError, Problem, expected_of, refused, shown
 from walkers.inputs import units
 from walkers.inputs.messages import validated
@@ -160,9 +159,8 @@ def _shipped() -> Library:
 
 
 def read_library(folder: Path) -> dict[str, Any]:
-    """The user's own library: the file of ``--library``, else that in a folder, else nothing."""
-    path = inputs.chosen_library or folder / FILE_NAME
-    if not (inputs.chosen_library or path.is_file()):
+    """The user's own library in a folder; empty if there is none."""
+    if not (path := folder / FILE_NAME).is_file():
         return {}
     tables = read_toml(path)
     check_library(tables, str(path))
