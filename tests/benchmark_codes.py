@@ -6,10 +6,8 @@ density, walls, drive and time step, on one core. Codes run in turn, several tim
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
-import subprocess
 import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
@@ -92,56 +90,6 @@ if STEPS: O.run(STEPS, True)
 numpy.savetxt("{end}", [bead.state.pos for bead in beads])
 """
 
-_LAMMPS_WALL = """
-units si
-atom_style sphere
-atom_modify map array
-boundary f f f
-newton off
-comm_modify vel yes
-region box block -0.002 0.002 -0.002 0.002 -0.001 0.004
-create_box 1 box
-create_atoms 1 single 0 0 0.0004999999999
-set group all diameter 1e-3
-set group all density 2500
-pair_style granular
-pair_coeff * * dmt 5e7 0.3 0.3 0.02 tangential mindlin NULL 1.0 0.5 damping tsuji
-fix floor all wall/gran granular dmt 5e7 0.3 0.3 0.02 tangential mindlin NULL 1.0 0.5 damping tsuji zplane 0 NULL
-fix motion all nve/sphere
-timestep 1e-9
-run 0
-variable pull equal -fz[1]/(4*PI*5e-4*0.02)
-print "lammps, DMT, plane: ${pull} of 4 pi R gamma"
-"""
-_YADE_WALL = """
-from yade import *
-from numpy import pi
-for floor in "wall", "facet", "box", "sphere":
-    O.reset()
-    liquid = dict(Capillar=True, CapillarType="Willett_analytic", Vb=1.25e-13, gamma=0.02, theta=0.0)
-    material = ViscElCapMat(density=2500.0, frictionAngle=0.1, tc=1e-4, en=0.5, et=0.5, **liquid)
-    O.materials.append(material)
-    how = dict(material=material)
-    bead = O.bodies.append(sphere((0, 0, 5e-4 * (1 - 1e-7)), 5e-4, **how))
-    O.bodies.append({
-        "wall": lambda: wall((0, 0, 0), 2, **how),
-        "facet": lambda: facet([(-0.01, -0.01, 0), (0.01, -0.01, 0), (0, 0.02, 0)], **how),
-        "box": lambda: box((0, 0, -0.001), (0.01, 0.01, 0.001), fixed=True, **how),
-        "sphere": lambda: sphere((0, 0, -5e-4), 5e-4, fixed=True, **how),
-    }[floor]())
-    shapes = Bo1_Sphere_Aabb(aabbEnlargeFactor=1.2), Bo1_Facet_Aabb(), Bo1_Wall_Aabb(), Bo1_Box_Aabb()
-    meetings = [Ig2_Sphere_Sphere_ScGeom(interactionDetectionFactor=1.2), Ig2_Facet_Sphere_ScGeom()]
-    meetings += [Ig2_Wall_Sphere_ScGeom(), Ig2_Box_Sphere_ScGeom()]
-    laws = [Ip2_ViscElCapMat_ViscElCapMat_ViscElCapPhys()], [Law2_ScGeom_ViscElCapPhys_Basic()]
-    loop = InteractionLoop(meetings, *laws)
-    O.engines = [ForceResetter(), InsertionSortCollider(list(shapes)), loop, NewtonIntegrator(damping=0.0)]
-    O.dt = 1e-12
-    O.step()  # the bridge forms in contact; then it is open
-    O.bodies[bead].state.pos, O.bodies[bead].state.vel = (0, 0, 5e-4 * (1 + 1e-7)), (0, 0, 0)
-    O.step()
-    print(f"yade, Willett_analytic, {floor}: {-O.forces.f(bead)[2] / (4 * pi * 5e-4 * 0.02):.5f} of 4 pi R gamma")
-"""
-
 
 class Script(NamedTuple):
     """How to run a code: its command, its input with STEPS for the number of steps, its environment."""
@@ -152,9 +100,7 @@ class Script(NamedTuple):
 
 
 def main() -> None:
-    """Print pulls at walls; bead-steps per second and touching neighbours at the end, shaken and at rest."""
-    with tempfile.TemporaryDirectory() as folder:
-        print(_pulls(Path(folder)), flush=True)
+    """Print bead-steps per second and touching neighbours at the end, shaken and at rest."""
     print("| code | beads | shaken: M bead-steps/s | neighbours | at rest: M bead-steps/s | neighbours |")
     print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
@@ -172,18 +118,6 @@ def main() -> None:
                         row[2 * column + 1].append(_neighbours(place, beads))
             for code, row in rows.items():
                 print(f"| {code} | {len(beads)} |", *(f"{median(values):.1f} |" for values in row), flush=True)
-
-
-def _pulls(folder: Path) -> str:
-    """What the codes that are installed pull with at walls, over the pull of a plane on a sphere."""
-    said = ""
-    for command, text in ((_LAMMPS, _LAMMPS_WALL), (_YADE, _YADE_WALL)):
-        if shutil.which(command[0]):
-            (folder / "wall.py").write_text(text, "utf-8")
-            how = {"cwd": folder, "env": {**os.environ, **environment(stock=True)}, "text": True}
-            done = subprocess.run([*command, "wall.py"], check=True, capture_output=True, **how)
-            said += "".join(f"{line}\n" for line in done.stdout.splitlines() if line.endswith(" of 4 pi R gamma"))
-    return said
 
 
 def scripts(case: str, beads: list[Bead], steps: int, place: Path, peak: float | None) -> dict[str, Script]:

@@ -118,6 +118,7 @@ def test_the_wheel_of_the_sdist_holds_all_files_of_the_package(wheel: Path) -> N
     assert held == {path.relative_to(ROOT).as_posix(): path.read_bytes() for path in files if path.name[0] != "."}
 
 
+@pytest.mark.slow
 def test_mandatory_packages_run_tabulate_and_draw(bare: Path, in_folder: Path) -> None:
     """Several commands in one process: each start takes two seconds."""
     (in_folder / "mine.toml").write_text(to_toml(document(run=SHORT)))

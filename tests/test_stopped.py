@@ -105,7 +105,7 @@ def stopping(undisturbed: Path, in_folder: Path, monkeypatch: pytest.MonkeyPatch
     return in_folder
 
 
-@pytest.mark.parametrize("name", STOPS)
+@pytest.mark.parametrize("name", [pytest.param(one, marks=[pytest.mark.slow] * ("pilots" in one)) for one in STOPS])
 def test_stopped_and_gone_on(name: str, stopping: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first engine has ended well by then: its segment or run is kept, and nobody makes it again."""
     (command, number, signals, whom, status, last), out = STOPS[name], stopping / "runs"
