@@ -19,7 +19,7 @@ from walkers.postprocess.drawing import check_place, new_figure, plain_text, sav
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import Motion, read_motion
 from walkers.postprocess.necks import EXPLAINED, bridges_at
-from walkers.postprocess.scene import Scene, Window, from_the_side, named_direction, plan_axes, shown_of
+from walkers.postprocess.scene import Scene, Window, from_the_side, gathered, named_direction, plan_axes, shown_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,13 +32,12 @@ _PIXELS = 40.0
 """Smallest resolution of a view in pixels per mm, unless it becomes too large."""
 _TALL, _TALLEST, _WIDEST = 1000, 1600, 1900
 """Pixels of a view: usual height, largest height (views that are much higher than wide), largest width."""
-_PAGE, _VIEW = (8.0, 9.0), (1.4, 5.0)
+_PAGE, _VIEW = (8.0, 10.0), (1.4, 5.0)
 """Largest width and height of all views; width or height of a view, which gives the larger one; inches."""
 _BESIDE, _BENEATH, _LINE = 0.25, 0.75, 0.2
 """Space beside and beneath a view; height of a line of text; inches."""
-_AROUND, _ASPECT = 1.1, 2.0
-"""Extent of a view from above over that of the beads; width over height of a view that follows a walker."""
-_LEFT_OUT = 0.02  # largest share of a run after the last of several evenly spaced times
+_AROUND, _ASPECT = 1.1, 6.0
+"""Extent of a view from above over that of the beads; largest width over height of a view that does not follow."""
 
 
 @styled
@@ -65,7 +64,8 @@ def render_series(
         check_place(destination, ".png")
     motion, single = shown_of(read_motion(directory), walker)
     path = destination or directory / (PICTURE_NAME if single else SERIES_NAME)
-    return save_figure(_figure(motion, even_frames(motion, images), follow=single), path, [directory.name])
+    figure = _figure(gathered(motion) if single else motion, even_frames(motion, images), follow=single)
+    return save_figure(figure, path, [directory.name])
 
 
 def even_frames(motion: Motion, count: int) -> list[int]:
@@ -76,14 +76,10 @@ def even_frames(motion: Motion, count: int) -> list[int]:
     start, cycle = motion.first_driven, motion.case.run.samples_per_cycle
     last = len(motion.time) - 1 - start
     every, steps = (cycle, last // cycle) if last // cycle >= count - 1 else (1, last)
-    most = min(count - 1, steps)
-    parts = range(most, most // 2, -1)
-    if not parts:
+    if not (most := min(count - 1, steps)):
         return [start]
-    exact = [number for number in parts[:2] if steps % number == 0]
-    nearly = [number for number in parts if steps % number <= _LEFT_OUT * steps]
-    number = [*exact, *nearly, min(parts, key=lambda number: steps % number)][0]
-    return [start + every * (steps // number) * part for part in range(number + 1)]
+    step = min(steps // most, -(-steps // most), key=lambda step: steps - step * min(most, steps // step))
+    return [start + every * step * number for number in range(min(most, steps // step) + 1)]
 
 
 def even_labels(time: FloatArray) -> list[str]:
@@ -94,7 +90,7 @@ def even_labels(time: FloatArray) -> list[str]:
 
 
 def _figure(motion: Motion, frames: Sequence[int], *, follow: bool) -> Figure:
-    """Pictures of frames with axes in mm, in the number of columns that makes them largest."""
+    """Pictures of frames with axes in mm; those of one walker in a column, or in a row if it goes up."""
     case, sideways, driven = motion.case, from_the_side(motion.case), slice(motion.first_driven, None)
     axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     axes = axes if sideways else plan_axes(motion, np.array([1.0, 0.0, 0.0]))
@@ -109,12 +105,19 @@ def _figure(motion: Motion, frames: Sequence[int], *, follow: bool) -> Figure:
         names = ("", "")
         titles = [f"{time}\n{scene.moved(frame) @ toward:z.1f} mm" for time, frame in zip(titles, frames, strict=True)]
         heading.insert(-1, f"the view follows the beads: time and displacement {direction}")
-    return _drawn(scene, frames, titles, [f"{name} (mm)".lstrip() for name in names], heading)
+    columns = (1 if np.ptp([scene.low, scene.high], axis=0)[:2].argmax() == 0 else len(frames)) if follow else 0
+    return _drawn(scene, frames, titles, [f"{name} (mm)".lstrip() for name in names], heading, columns)
 
 
 def _drawn(
-    scene: Scene, frames: Sequence[int], titles: Sequence[str], labels: Sequence[str], heading: Sequence[str]
+    scene: Scene,
+    frames: Sequence[int],
+    titles: Sequence[str],
+    labels: Sequence[str],
+    heading: Sequence[str],
+    columns: int,
 ) -> Figure:
+    """Pictures of frames in a number of columns; 0: that which makes them largest."""
     count, (wide, tall) = len(frames), (scene.high - scene.low)[:2].tolist()
 
     def scale(columns: int) -> float:
@@ -122,7 +125,7 @@ def _drawn(
         across, up = _PAGE[0] / columns - _BESIDE, _PAGE[1] / ceil(count / columns) - _BENEATH
         return float(min(max(_VIEW[0] / wide, _VIEW[1] / tall), across / wide, up / tall))
 
-    columns = max(range(1, count + 1), key=lambda number: (scale(number), number))
+    columns = columns or max(range(1, count + 1), key=lambda number: (scale(number), number))
     rows, inches = ceil(count / columns), scale(columns)
     width = columns * (inches * wide + _BESIDE) + 0.8
     lines = [line for text in heading for line in wrap(plain_text(text), round(13.0 * width))]
