@@ -280,6 +280,18 @@ def test_help_names_every_command() -> None:
     assert all(f"make {target}" in targets for target in ("walker", "test", "help", "clean"))
 
 
+LOADED: dict[str, set[str]] = {"--help": set(), "list": {"cyclopts", "pydantic"}}
+
+
+@pytest.mark.parametrize("command", LOADED)
+def test_commands_load_what_they_need(command: str, in_folder: Path) -> None:
+    """Of the packages that take long to import."""
+    slow = "'cyclopts', 'rich', 'pydantic', 'numpy', 'scipy', 'pandas', 'matplotlib', 'pyarrow', 'pyvista', 'pint'"
+    script = f"import sys, walkers.main as m; m._status({command.split()}); print(*{{{slow}}} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert {*done.stdout.splitlines()[-1].split()} == LOADED[command]
+
+
 def test_a_function_gives_what_its_command_prints(looked_through: Path) -> None:
     out = ["--out", str(looked_through)]
     printed = json.loads(call("show", "fig1b", "--theory", "--json", *out, check=True).stdout)

@@ -218,7 +218,9 @@ def test_bands_along_a_sweep_are_those_of_each_points_spread(tmp_path: Path) -> 
         assert row.velocity_low < row.velocity_high
     assert table["velocity_high"].is_monotonic_increasing
     assert "velocity_low (mm/s)  velocity_high (mm/s)" in sweep.describe()
-    assert sweep.figure().get_suptitle().endswith("bands: 5 to 95 % of 4 draws of the uncertain values")
+    figure = sweep.figure()
+    assert figure.get_suptitle().endswith("bands: 5 to 95 % of 4 draws of the uncertain values")
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["5 to 95 % of 4 draws"]
 
 
 def test_points_that_differ_in_their_seed_alone_are_a_group() -> None:

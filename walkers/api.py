@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
 from inspect import signature
-from math import isclose
 from mimetypes import guess_type
 from pathlib import Path
 from pkgutil import resolve_name
@@ -469,7 +468,6 @@ def run(
     >>> one.walkers[["facing", "steady"]].drop_duplicates("facing").to_dict("list")
     {'facing': [1, -1], 'steady': [True, True]}
     """
-    from walkers.inputs.run import limits_of
     from walkers.sweeps.making import check_audit, make_runs
 
     if not force and (finished := finished_at(case, out)):
@@ -477,12 +475,6 @@ def run(
     case, out = case_at(case, out)
     for text in (out.absolute(), case.name):
         check_utf8(text)
-    if exceeded := [] if case.run.allow_unstable else limits_of(case).exceeded_by(case.run.time_step):
-        message = f"beyond the {' and the '.join(exceeded)} limit of the case as changed: use case.changed(changes)"
-        raise InputError(case.name, [Problem("run.time_step", f"{case.run.time_step:.3g} s", message)])
-    if not isclose(case.run.period * case.excitation.frequency, 1.0, rel_tol=1e-9):
-        message = f"time step and sampling are of {1.0 / case.run.period:g} Hz: use case.changed(changes)"
-        raise InputError(case.name, [Problem("drive.frequency", f"{case.excitation.frequency:g} Hz", message)])
     binary = find_engine(engine)
     place = on_disk.run_place(case, binary, out)
     if on_disk.is_finished(place) and not force:

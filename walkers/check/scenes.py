@@ -308,12 +308,6 @@ for _name in LAWS:
     SCENES[f"two beads separate ({_name})"] = Setting(_PARTING, changes=_liquid)
 
 
-def scene_lines(bench: Bench) -> Iterator[Line]:
-    """Forces on beads with prescribed motion, and motions of free beads, in both engines."""
-    for name, setting in SCENES.items():
-        yield from setting.lines(name, bench)
-
-
 def restart_lines(bench: Bench) -> Iterator[Line]:
     """Springs and open bridges of pairs and walls continue from a restart file as in an uninterrupted run."""
     beads = [over(FLOOR, -DEEP, R, (0.002, 0.001, 0.0), STILL), *pair(-DEEP, 0.001, (0.001, -0.002, 0.001))]
@@ -414,11 +408,11 @@ def company_lines(bench: Bench) -> Iterator[Line]:
 
 
 CHECKS: Mapping[str, Callable[[Bench], Iterable[Line]]] = {
-    "scenes": scene_lines,
+    "scenes": lambda bench: (line for name, setting in SCENES.items() for line in setting.lines(name, bench)),
     "restart": restart_lines,
     "ranks": rank_lines,
     "stock": stock_lines,
     "liquid": liquid_lines,
     "company": company_lines,
 }
-"""Checks by name; each runs decks on a bench and returns lines; its docstring is its title."""
+"""Checks by name; each runs decks on a bench and returns lines."""

@@ -51,7 +51,9 @@ def catalogue(*, of_others: bool = True) -> list[Entry]:
     """
     entries = list(_of_library(Library(read_library(Path()) if of_others else None)))
     entries += [Entry("not measured", key, numbers={"default": number}) for key, number in unmeasured().items()]
-    entries += [Entry("bridge laws", name, text=_summary(name)) for name in LAWS]
+    for name in LAWS:
+        text = resources.files("walkers.physics.laws").joinpath(f"{name.replace('-', '_')}.py").read_text("utf-8")
+        entries.append(Entry("bridge laws", name, text=text.split('"""')[1].splitlines()[0]))
     for kind in COMMANDS:
         files = shipped(kind[:-1]).items()
         entries += [Entry(kind, name, "", {}, str(read_toml(file).get("title", "")), str(file)) for name, file in files]
@@ -68,11 +70,6 @@ def _of_library(library: Library) -> Iterator[Entry]:
         for pair in collection.tables.get("surface_pairs", ()):
             first, second = pair["materials"]
             yield Entry("surface pairs", f"{first} on {second}", collection.place, library.surface_pair(first, second))
-
-
-def _summary(law: str) -> str:
-    text = resources.files("walkers.physics.laws").joinpath(f"{law.replace('-', '_')}.py").read_text("utf-8")
-    return text.split('"""')[1].splitlines()[0]
 
 
 def describe(entries: Sequence[Entry]) -> str:

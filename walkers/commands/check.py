@@ -48,14 +48,8 @@ def engine(*, only: list[str] | None = None, as_json: Json = False, engine: str 
     """
     from walkers.check.audit import record, run_audit
     from walkers.runner.binary import find_engine
-    from walkers.runner.failures import EngineMissing
 
-    try:
-        binary = find_engine(engine)
-    except EngineMissing as missing:
-        if engine is None:
-            raise
-        raise refused("--engine", str(missing)) from missing
+    binary = find_engine(engine)
     lines, version = run_audit(only or (), engine=binary, on_done=tell)
     if not only:
         try:
@@ -190,7 +184,6 @@ def calibrate(
     /,
     *,
     out: Out = DEFAULT_OUT,
-    to: Path | None = None,
     jobs: Jobs = None,
     by: By = By(),
 ) -> int:
@@ -200,18 +193,13 @@ def calibrate(
     ----------
     calibration
         A calibration file, or the name of a shipped calibration such as ruby.
-    to
-        Folder to write tables and figures to; default: OUT/NAME.
     """
-    from walkers.calibration.file import load_calibration
     from walkers.calibration.report import RECORD_NAME, summary, write_outcome
     from walkers.runner.files import read_json
 
-    folder = to or out / load_calibration(calibration).name
-    refuse("--to", folder.is_file(), f"expected a folder, {folder} is a file")
     outcome = walkers.calibrate(calibration, out, jobs=jobs, progress=True, **vars(by))
     tell(*(f"{name}: {len(failures)} points failed" for name, failures in outcome.failures.items()))
-    files = write_outcome(outcome, folder)
-    print(summary(read_json(folder / RECORD_NAME)))
+    files = write_outcome(outcome, out / outcome.calibration.name)
+    print(summary(read_json(out / outcome.calibration.name / RECORD_NAME)))
     print_lines(files)
     return 0  # a set whose run fails is an outcome: it counts as far off

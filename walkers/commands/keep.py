@@ -72,23 +72,19 @@ def export(
         given["authors"] = [Author(*author) for author in zip_longest(given["authors"], orcids)]
     if "dumps" in given:
         given["dumps"] = False
-    if form == "deck":
-        writer_of(form, given)
-        _export_deck(name, at, to)
+    if form != "deck":
+        print(at.load(name).export(form, to, **given))
         return
-    print(at.load(name).export(form, to, **given))
-
-
-def _export_deck(name: str, at: At, output: Path | None) -> None:
     from walkers.api import case_and_run
     from walkers.sweeps.by_hand import as_run, write_folder
     from walkers.templates.deck import RUN_NAME, render_deck, whole
 
+    writer_of(form, given)
     case = as_run(*case_and_run(name, at.out, at.values))
-    if output is None:
+    if to is None:
         print(render_deck(case, whole(case)).text, end="")
     else:
-        print(f"{write_folder(case, output)}    run it there with: sh {RUN_NAME}    then: walkers run {output}")
+        print(f"{write_folder(case, to)}    run it there with: sh {RUN_NAME}    then: walkers run {to}")
     if case.run.continuation:
         tell(f"{case.run.attempts[0]} cycles; {case.run.continuation}")
 

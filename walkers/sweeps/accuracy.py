@@ -61,7 +61,10 @@ def measure_accuracy(directory: Path, options: Options, *, engine: str | None = 
         if failures:
             raise SweepStopped(f"{failures[0].run}: {failures[0].message}")
         table = load(record.directory)
-        if (change := _change(table, case)) < SHARE:
+        # The largest share of a headline velocity that the last increase of the modulus changes.
+        names = {main_columns(table)[0], *(SIDES if case.goes_uphill or sides_differ(table) else ())}
+        before, after = table[[*names]].iloc[-2:].dropna(axis="columns").to_numpy(float)
+        if (change := float(max(abs(after - before) / abs(after).clip(STEADY_SPEED)))) < SHARE:
             break
     accuracy = {"sweep": record.sweep.name, "share": SHARE, "reached": change < SHARE, "change": change}
     accuracy |= {"times": possible[last], "errors": _errors(recorded(directory)["numbers"], table)}
@@ -93,13 +96,6 @@ def _sweep(case: Case, name: str, possible: Sequence[float]) -> Sweep:
     title = f"{case.title or case.name}: smaller time steps and harder beads"
     file = {"title": title, "case": case.name, "zip": [points]}
     return expand(file, source=case.name, name=name, base=(case.name, case.document))
-
-
-def _change(table: pd.DataFrame, case: Case) -> float:
-    """The largest share of a headline velocity that the last increase of Young's modulus changes."""
-    names = {main_columns(table)[0], *(SIDES if case.goes_uphill or sides_differ(table) else ())}
-    before, after = table[[*names]].iloc[-2:].dropna(axis="columns").to_numpy(float)
-    return float(max(abs(after - before) / abs(after).clip(STEADY_SPEED)))
 
 
 def _errors(row: Mapping[str, Any], table: pd.DataFrame) -> dict[str, dict[str, float]]:

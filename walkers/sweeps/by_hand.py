@@ -146,8 +146,8 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
     doubtful = case.run.cycles < planned.cycles if planned.until_steady else case.apart and case != before
     if doubtful and not are_constant(folder):
         reached = f"the velocities are not constant within {percent(CONSTANT)} after {case.run.cycles} cycles"
-        further = f"walkers run continues to {planned.cycles}: set cycles to {planned.cycles} and run the deck again"
-        notes.append(f"{reached}; {further if planned.until_steady else 'set cycles to more and run the deck again'}")
+        more = f"{planned.cycles}, as walkers run does," if planned.until_steady else "more"
+        notes.append(f"{reached}; set cycles to {more} and run the deck again")
         on_disk.write_segment_record(folder, segment, report, by_hand=notes)
     measure(folder)
     about: dict[str, Any] = {"drive_from": rest, "segments": 1, "by_hand": notes}

@@ -316,17 +316,12 @@ def _draw_rates(panel: Axes, table: pd.DataFrame) -> None:
         at, rates = np.arange(len(rows)) + 0.2 * (number - 1), rows["rate"].astype(float)  # NaN without a drive
         errors = [rates - rows["rate_low"], rows["rate_high"] - rates]
         panel.errorbar(rates, at, xerr=errors, fmt=look, label=where, linestyle="none", markersize=3.0)
-    labels = [
-        fill(f"{_in_short(row['condition']) or 'usual'}: {row['climbed']}/{row['runs']} climbed", _LETTERS)
-        for row in first.to_dict("records")
-    ]
+    labels = []
+    for row in first.to_dict("records"):  # with the last word of each key, such as ``frequency 100 Hz``
+        condition = re.sub(r"[\w.\[\]]*?(\w+) = ", r"\1 ", row["condition"])
+        labels.append(fill(f"{condition or 'usual'}: {row['climbed']}/{row['runs']} climbed", _LETTERS))
     panel.set_yticks(range(len(labels)), list(map(plain_text, labels)))
     panel.set(xlabel="climbs per run and second", xlim=(0.0, None), ylim=(len(labels) - 0.5, -0.5))
-
-
-def _in_short(condition: str) -> str:
-    """The label of a condition with the last word of each key, such as ``frequency 100 Hz``."""
-    return re.sub(r"[\w.\[\]]*?(\w+) = ", r"\1 ", condition)
 
 
 def write_climbs(climbs: Sequence[Mapping[str, Any]], runs: Sequence[str], to: Path) -> None:

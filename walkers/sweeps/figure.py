@@ -381,12 +381,11 @@ def _draw(
     _scale_y(grid[0, 0], points, list(theory.values.values())[:1] if theory else [], log)
     for axes in grid.flat[len(parts) :]:
         axes.set_axis_off()
-    _legend(figure, grid, hue, looks, list(theory.values) if theory else [], down="down" in points)
-    texts = [done.attrs["title"]]
-    if "low" in points:
-        texts.append(f"bands: 5 to 95 % of {_draws(done, column)} draws of the uncertain values")
+    band = f"5 to 95 % of {_draws(done, column)} draws" if "low" in points else ""
+    _legend(figure, grid, hue, looks, list(theory.values) if theory else [], down="down" in points, band=band)
+    texts = [done.attrs["title"], *([f"bands: {band} of the uncertain values"] if band else [])]
     if points["error"].notna().any():
-        banded = "low" in points or {*unmeasured()} & {*done.attrs["varied"]}
+        banded = band or {*unmeasured()} & {*done.attrs["varied"]}
         bars = SCATTER.partition(" (")[0] if banded else SCATTER
         texts.append(bars + ("" if errors_seen(points["error"], points["value"]) else ", smaller than the symbols"))
     figure.suptitle(plain_text("\n".join(line for text in texts for line in wrap(text, round(14.0 * width)))))
@@ -520,8 +519,9 @@ def _legend(
     models: Sequence[str],
     *,
     down: bool,
+    band: str,
 ) -> None:
-    """A legend of colours and lines below all panels."""
+    """A legend of colours, lines and bands below all panels."""
     from matplotlib.lines import Line2D
 
     given: list[dict[str, Any]] = []
@@ -532,6 +532,8 @@ def _legend(
     lines = {line.get_linestyle() for axes in grid.flat for line in axes.lines}
     for number, model in enumerate(models):
         given.append({"label": model, **_model_look(number, _MODELS[number][0] in lines, "0.3")})
+    if band:
+        given.append({"lw": 5.0, "alpha": 0.25, "color": "0.3", "label": band})
     if given:
         longest = max(len(look["label"]) for look in given)
         columns = max(1, min(len(given), int(13.0 * figure.get_figwidth() / (longest + 6))))

@@ -278,7 +278,8 @@ def plan_cleaning(out: Path, given: Sequence[Path] = ()) -> Cleaning:
         theirs = _with_theirs({*named.values()}, runs_of) - {*named.values()}
         doomed = [row for row in contents if row["directory"] in named or row["name"] in theirs]
     running = [row for row in doomed if row["kind"] == "run" and row["status"] == "running"]
-    waiting = [row for row in doomed if row not in running and _waits(row["directory"])]
+    waiting = [row for row in doomed if row not in running and row["directory"].name.endswith(on_disk.REPLACED)]
+    waiting = [row for row in waiting if not _place(row["directory"]).exists()]  # the run that replaces it
     remove = [row for row in doomed if row not in (*running, *waiting)]
     going = {row["name"] for row in remove}
     needed = {name: len(going & {*runs}) for name, runs in runs_of.items() if name not in going}
@@ -306,11 +307,6 @@ def _with_theirs(names: set[str], runs_of: Mapping[str, Collection[str]]) -> set
     further = {run for sweep in names & runs_of.keys() for run in runs_of[sweep]} - needed
     further |= {sweep for sweep in runs_of if _beside(sweep) in names}
     return names if further <= names else _with_theirs(names | further, runs_of)
-
-
-def _waits(directory: Path) -> bool:
-    """Whether a run was moved aside, and the one that replaces it does not exist."""
-    return directory.name.endswith(on_disk.REPLACED) and not _place(directory).exists()
 
 
 def clean(cleaning: Cleaning) -> dict[Path, str]:

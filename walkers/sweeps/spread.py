@@ -152,23 +152,20 @@ def spread_in(table: pd.DataFrame, case: Case, directory: Path, failures: Sequen
         counts = {"forward": int((speeds > REST).sum()), "backward": int((speeds < -REST).sum())}
         counts |= {"at_rest": int((speeds.abs() <= REST).sum()), "separated": len(table) - len(together)}
     shown = [main_columns(together)[0]] if "velocity" in table else [name for name in MAIN if name in table]
-    varied = tuple(value for value in case.origins if value.range is not None)
+    varied, bands = tuple(value for value in case.origins if value.range is not None), {}
+    for name in (name for name in shown if together[name].notna().any()):
+        ends = together[name].astype(float).quantile([0.05, 0.5, 0.95, 0.0, 1.0])
+        bands[name] = dict(zip(("low", "median", "high", "smallest", "largest"), ends.tolist(), strict=True))
+        bands[name]["points"] = int(together[name].count())
     return Spread(
         directory=directory,
         varied=varied,
         held=tuple(value for value in case.origins if value.key in unmeasured() and value.range is None),
-        bands={name: _band(together[name].dropna()) for name in shown if together[name].notna().any()},
-        depends={
-            name: _ranks(together[together[name].notna()], name, [value.key for value in varied]) for name in shown
-        },
+        bands=bands,
+        depends={name: _ranks(together.dropna(subset=name), name, [value.key for value in varied]) for name in shown},
         counts=counts,
         failures=tuple(failures),
     )
-
-
-def _band(values: pd.Series[float]) -> dict[str, float]:
-    ends = values.astype(float).quantile([0.05, 0.5, 0.95, 0.0, 1.0]).tolist()
-    return dict(zip(("low", "median", "high", "smallest", "largest"), ends, strict=True)) | {"points": len(values)}
 
 
 def _ranks(table: pd.DataFrame, name: str, keys: Sequence[str]) -> dict[str, float]:

@@ -191,7 +191,9 @@ def load(directory: str | Path) -> pd.DataFrame:
     numbers = {name for point in points for name in point.result or _declared(sweep)}
     described = {"point": ("", "number of the point"), **varied, **columns_of(numbers), **STATE}
     rows = [_row(number, sweep, state) for number, state in enumerate(points)]
-    frame = _described(pd.DataFrame(rows, columns=list(described)), described)
+    frame = pd.DataFrame(rows, columns=list(described))
+    frame.attrs["units"] = {name: unit for name, (unit, _) in described.items()}
+    frame.attrs["meanings"] = {name: meaning for name, (_, meaning) in described.items()}
     frame.attrs |= {"sweep": sweep.name, "title": sweep.title or sweep.name, "until_below": sweep.until_below}
     frame.attrs |= {"varied": list(varied), "axes": [axis.keys for axis in sweep.axes]}
     samples = [ranges_of(sample["ranges"]) for sample in sweep.file.get("sample", [])]
@@ -210,12 +212,6 @@ def _declared(sweep: Sweep) -> list[str]:
         groups = [module.NAME for module in modules_of(next(sweep.cases()))]
         return [number.name for group in [*groups, "drive"] for number in GROUPS[group] if number.name[-1] != "*"]
     return []
-
-
-def _described(frame: pd.DataFrame, described: Mapping[str, tuple[str, str]]) -> pd.DataFrame:
-    frame.attrs["units"] = {name: unit for name, (unit, _) in described.items()}
-    frame.attrs["meanings"] = {name: meaning for name, (_, meaning) in described.items()}
-    return frame
 
 
 def _row(number: int, sweep: Sweep, state: PointState) -> dict[str, Any]:
@@ -372,7 +368,11 @@ def short_text(frame: pd.DataFrame) -> str:
 
 
 def thresholds(frame: pd.DataFrame) -> pd.DataFrame:
-    """The ends of the descents in a sweep's table, a row each, NaN where there is none; `InputError` if it has none."""
+    """The ends of the descents in a sweep's table, a row each; `InputError` if it has none.
+
+    Values of the lowered key: the last one at which the walkers move, and the first one at which they rest, with the
+    dimensionless peak forces Γ0 there; NaN where there is none.
+    """
     import pandas as pd
 
     if (until_below := frame.attrs["until_below"]) is None:
@@ -387,15 +387,9 @@ def thresholds(frame: pd.DataFrame) -> pd.DataFrame:
             row[name] = part.iloc[0][lowered] if len(part) else nan
             row[f"gamma0_{name}"] = part.iloc[0]["gamma0"] if len(part) else nan
         rows.append(row)
-    units = frame.attrs["units"]
-    described = {name: (units[name], "varied") for name in kept} | {
-        "moving": (units[lowered], f"last {lowered} at which the walkers move"),
-        "gamma0_moving": ("", "dimensionless peak force Γ0 of moving"),
-        "at_rest": (units[lowered], f"first {lowered} at which the walkers rest"),
-        "gamma0_at_rest": ("", "dimensionless peak force Γ0 of at_rest"),
-    }
-    table = _described(pd.DataFrame(rows), described)
-    table.attrs["varied"] = kept
+    table, units = pd.DataFrame(rows), frame.attrs["units"]
+    ends = {"moving": units[lowered], "gamma0_moving": "", "at_rest": units[lowered], "gamma0_at_rest": ""}
+    table.attrs |= {"units": {name: units[name] for name in kept} | ends, "varied": kept}
     return table
 
 
