@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from walkers.archive.crate import METADATA_NAME
-from walkers.errors import refused, shortened
+from walkers.errors import refused
 from walkers.runner.directory import CASE_NAME, SEGMENTS
 from walkers.runner.manifest import MANIFEST_NAME, checksums, read_manifest
 from walkers.sweeps.table import RECORD_NAME, read_record, states
@@ -18,7 +18,6 @@ SUMS_NAME = "sha256sums.txt"
 _READ = (".json", ".parquet", ".txt", ".lig", ".bin")
 """Suffixes of the files of a run that are read again."""
 _HARMLESS = ("made since", "left out")
-_LONGEST_SHOWN = 300
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,7 @@ class Verification:
         """The outcome, and one line for each file that has changed or is not listed."""
         lines = [f"{self.name}: {self.summary}"]
         for kind, names in self.findings.items():  # names in archives may contain escape sequences
-            lines += [f"  {kind:<10} {printable(shortened(name, _LONGEST_SHOWN))}" for name in names]
+            lines += [f"  {kind:<10} {printable(name)}" for name in names]
         return "\n".join(lines)
 
 

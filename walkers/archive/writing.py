@@ -81,19 +81,10 @@ def write_archive(
     authors: Sequence[Author] = (),
     licence: str = "CC-BY-4.0",
 ) -> Path:
-    """Pack a finished run, or a sweep whose runs are all finished, into an RO-Crate.
+    """Pack a finished run, or a sweep whose runs are all finished, into an RO-Crate; an older file is replaced.
 
-    `InputError` if the directory is no run or sweep, is not finished, or an option is invalid; `FileChanged` if a file
-    differs from its manifest.
-
-    Parameters
-    ----------
-    to
-        Default: ``NAME.zip`` in the current directory. An older file is replaced.
-    dumps
-        Include the dumps of the engine; tables and results are always included.
-    licence
-        An SPDX identifier.
+    The ``licence`` is an SPDX identifier. Without ``dumps``, tables and results are included all the same. `InputError`
+    if something is unusable or unfinished; `FileChanged` if a file differs from its manifest.
     """
     require("archive")
     _check(authors, licence)

@@ -134,10 +134,8 @@ ARRANGEMENTS: Mapping[str, Arrangement] = {
 class Walkers(Table):
     """What ``[dimers]`` and ``[[clusters]]`` share: walkers of one make, their number and initial state.
 
-    ``meet = true`` says that they may stand and come as near as they like; without it they are replicates. They face
-    along the drive axis (right, up a slope), against it (left, down), or every other one (both), but for an ``angle``.
-    At the start, forces balance at all contacts. The first of the ``radii`` belongs to the leading bead (the large one,
-    as in the paper).
+    They face along the drive axis (right, up a slope), against it (left, down), or every other one (both), but for an
+    ``angle``. At the start, forces balance at all contacts. The first of the ``radii`` belongs to the leading bead.
     """
 
     if TYPE_CHECKING:

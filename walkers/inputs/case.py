@@ -125,9 +125,8 @@ class Roughness(Table):
 class Contact(Table):
     """``[contact]``: the model of the contacts, with the Young's modulus of softened beads and walls.
 
-    The engine requires a restitution above 0.05. The modulus of ``"auto"`` is 50 MPa for loose beads; for walkers it is
-    the lowest of 50, 200, 800, ... MPa at which bridges hardly delay the contacts (`walkers.inputs.loads.delay`).
-    ``walkers run CASE --accuracy`` measures by how much a larger one changes velocities, up to 100 GPa.
+    The modulus of ``"auto"`` is 50 MPa for loose beads; for walkers it is the lowest of 50, 200, 800, ... MPa at which
+    bridges hardly delay the contacts (`walkers.inputs.loads.delay`).
     """
 
     friction: Friction = key("")
@@ -234,9 +233,8 @@ class Case(Table):
     ) -> Case:
         """A case given as the tables of a case file, quantities as strings with units.
 
-        Messages begin with the ``source``, run directories with the ``name``; ``changes`` are other values by
-        dotted keys; ``around``: uncertain ranges must hold the values of the case, which points of sweeps may leave.
-        Raises `InputError` with all problems of the tables, or with the first contradiction between them.
+        Messages begin with the ``source``, run directories with the ``name``; ``changes`` are other values by dotted
+        keys; ``around``: uncertain ranges must hold the values of the case, which points of sweeps may leave.
         """
         if changes:
             with blaming(source):

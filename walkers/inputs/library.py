@@ -139,18 +139,13 @@ def library_of(document: Mapping[str, Any], source: str = "") -> Library:
     users = document.get("library")
     if users is None:
         return _shipped()
+    # `read_library` puts the name of its file beside its tables.
+    tables = {name: table for name, table in users.items() if name != "file"} if isinstance(users, Mapping) else users
     try:
-        check_library(_tables_in(users), source)
+        check_library(tables, source)
     except InputError as error:
         raise error.below("library", source) from error
     return Library(users)
-
-
-def _tables_in(library: object) -> object:
-    """The library of a case without the name of its file, which `read_library` puts beside its tables."""
-    if not isinstance(library, Mapping):
-        return library
-    return {name: tables for name, tables in library.items() if name != "file" or not isinstance(tables, str)}
 
 
 @cache

@@ -74,10 +74,10 @@ def load_case(case: str | Path | Mapping[str, Any], changes: Mapping[str, Any] |
 
 
 def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
-    """The tables of a case file, the user's own library among them under ``library``.
+    """The tables of a case file, with the mesh and the record that it names, and the user's own library.
 
     That is the library beside the file; beside a case that comes with the program it is that in ``folder``, the working
-    directory if None. A case that has a ``[library]`` itself takes no other. Its mesh and its record are read, too.
+    directory if None. A case that has a ``[library]`` itself takes no other.
     """
     document = read_toml(path)
     with blaming(str(path), document):

@@ -49,10 +49,8 @@ def settling_of(cycles: int) -> int:
 class Run(Table):
     """``[run]``: the time step, the length and the samples of the run.
 
-    Left out, or ``cycles = "auto"``, walkers run until their velocities are constant; loose beads rest before the drive
-    (``longest_settling``; None of walkers, which stand from the first). Beads are recorded ``samples_per_cycle`` times
-    a cycle, or once in ``cycles_per_sample`` (one of the two is 1), bridges with one of ``samples_per_bridge_sample``
-    samples. If there are several segments, each has a restart file at its end.
+    Beads are recorded ``samples_per_cycle`` times a cycle, or once in ``cycles_per_sample`` (one of the two is 1),
+    bridges with one of ``samples_per_bridge_sample`` samples. Several segments have a restart file at the end of each.
     """
 
     choices: ClassVar = (

@@ -5,10 +5,8 @@ A run is made in ``<name>-<hash>.incomplete``. Its manifest is written last, the
 when it has finished. Input and output of the engine are in ``segments/0000``, ``segments/0001``, …; walkers have one
 segment unless their case asks for more.
 
-During the run, the file ``<name>-<hash>.lock`` is locked with ``flock``. The kernel releases the lock when the last
-process that has the file open ends, for any reason. Engines inherit the lock: an engine that outlives its launcher
-keeps other processes away from its directory. The kernel ends such an engine within moments; a process that finds a
-lock waits that long.
+During the run, the file ``<name>-<hash>.lock`` is locked with ``flock``. Engines inherit the lock: an engine that
+outlives its launcher keeps other processes away from its directory until the kernel ends it, within moments.
 """
 
 from __future__ import annotations

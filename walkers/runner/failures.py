@@ -15,11 +15,10 @@ AUDITED_VERSION = "LIGGGHTS-PUBLIC 3.8.0"
 
 
 class EngineFailure(WalkersError):
-    """Base class of the failures of a run; ``failure.json`` contains the name of the class.
+    """Base class of the failures of a run, in a ``directory``; ``lost`` is the number of lost beads.
 
-    ``directory`` contains the files of the failed run; ``lost`` is the number of lost beads. ``hits`` says which points
-    of a sweep such a failure hits: every point; all at first, until a point is finished; one point, by its parameters
-    or another process; or empty if this is not certain.
+    ``hits`` says which points of a sweep such a failure hits: every point; all at first, until a point is finished; one
+    point; or empty if this is not certain.
     """
 
     hits = ""

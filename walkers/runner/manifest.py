@@ -5,7 +5,6 @@ from __future__ import annotations
 import platform
 import time
 from collections.abc import Collection, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +12,13 @@ from walkers.errors import WalkersError
 from walkers.inputs.case import Case
 from walkers.runner.binary import Engine, plugin_of, read_audit
 from walkers.runner.files import checksum, read_json, write_json
-from walkers.runner.launch import EngineReport, cores_here
+from walkers.runner.launch import EngineReport
 from walkers.runner.provenance import software
 from walkers.templates.deck import CONTENT_VERSION
 
 MANIFEST_NAME = "manifest.json"
 RESULT_NAME = "result.json"
 FORMAT = 3
-_SMALL_BYTES = 8 << 20
-"""Smaller amounts are hashed faster without threads."""
-_MOST_THREADS = 4
 
 
 def write_manifest(
@@ -78,12 +74,8 @@ def iso_time(seconds: float) -> str:
 
 
 def checksums(directory: Path, names: Iterable[str]) -> dict[str, str]:
-    """SHA-256 of files of a directory, in threads if there is much to read; raises `OSError` if one is unreadable."""
-    paths = {name: directory / name for name in names}
-    if sum(path.stat().st_size for path in paths.values()) < _SMALL_BYTES:
-        return {name: checksum(path) for name, path in paths.items()}
-    with ThreadPoolExecutor(min(_MOST_THREADS, cores_here())) as pool:
-        return dict(zip(paths, pool.map(checksum, paths.values()), strict=True))
+    """SHA-256 of files of a directory; raises `OSError` if one is unreadable."""
+    return {name: checksum(directory / name) for name in names}
 
 
 class FileChanged(WalkersError, ValueError):

@@ -27,9 +27,8 @@ _COARSEST, _FINEST = 8, 256
 
 @dataclass(frozen=True)
 class Table:
-    """The table of a law for two surfaces, as the engine reads it.
+    """The table of a law for two surfaces, as the engine reads it: a curve, the grid (``scale`` in m), and forces.
 
-    ``curve`` says where the bridge forms and breaks, ``scale`` (m), ``octaves`` and ``cells`` the grid.
     ``rows`` are the forces at its gaps, shape (3 cells (octaves + 2) + 1, 5), as `walkers.physics.bridge.Forces`.
     """
 

@@ -77,7 +77,7 @@ class Deck:
 
 
 class Segment(NamedTuple):
-    """A segment of a run, between two steps; it begins with the restart file of the segment before, if there is one.
+    """A segment of a run between two steps, from the restart file of the segment before, if there is one.
 
     ``drive_from`` is the step at which the drive begins; None while the beads come to rest.
     """

@@ -30,8 +30,8 @@ WALL_BRIDGE_COLUMNS = ("wall", "id", "fx", "fy", "fz", "overlap")
 class PlacedWalker:
     """One walker of a deck: number of its make in the case, ids of its beads, and its start.
 
-    ``facing`` is the direction in which the first bead points, +1 along the drive axis (right) or −1 (left);
-    ``start_angle`` in rad is measured from that direction; ``origin`` in m.
+    ``facing`` is +1 along the drive axis (right) or −1 (left); ``start_angle`` (rad) is measured from there; ``origin``
+    in m.
     """
 
     walker: int
