@@ -46,6 +46,7 @@ from walkers.postprocess.results import measure, read
 from walkers.runner.directory import CASE_NAME, FIRST_SEGMENT, case_of, locked, recomputed
 from walkers.runner.failures import DiskFull, RunBusy
 from walkers.runner.files import write_json
+from walkers.sweeps.making import DamagedSegment
 from walkers.sweeps.table import load as load_table
 from walkers.templates.deck import render_deck
 from walkers.templates.layout import BEAD_COLUMNS, MEAN_SPIN_COLUMNS
@@ -288,7 +289,7 @@ def test_a_run_goes_on_when_a_full_disk_has_room_again(tmp_path: Path) -> None:
 
         with ThreadPoolExecutor(1) as pool:
             filled = pool.submit(fill_soon)
-            with pytest.raises(DiskFull, match="disk full"):
+            with pytest.raises((DiskFull, DamagedSegment), match="disk full"):  # the engine may end before it notices
                 run_case(case, place)
             filled.result()
         assert not list(place.glob("*/manifest.json"))

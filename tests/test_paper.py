@@ -161,7 +161,7 @@ def test_the_table_is_of_all_of_it(compared: dict[str, Any]) -> None:
         assert row["gamma0_at_rest"] - row["within"] < row["ramp"] < row["gamma0_moving"] + row["within"]
 
 
-PANELS = {"fig1b": 3, "fig2": 0, "fig2-threshold": 0, "fig3": 0, "fig4": 2, "alignment": 3}
+PANELS = {"fig1b": 3, "fig2": 0, "fig2-threshold": 0, "fig3": 0, "fig4": 2}
 
 
 @pytest.mark.parametrize("name", PANELS)

@@ -60,11 +60,12 @@ def main(arguments: list[str] | None = None) -> NoReturn:
 
 def _status(tokens: list[str]) -> int:
     """Run the program and return its exit status. Unexpected errors are raised."""
-    if tokens in ([], ["--help"], ["-h"]):
-        print_help()
-        return 0
     try:
-        outcome = program()(tokens)
+        outcome = None
+        if tokens in ([], ["--help"], ["-h"]):
+            print_help()
+        else:
+            outcome = program()(tokens)
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt, SystemExit, _Terminated) as stop:
         return _report_stop(stop, tokens)
