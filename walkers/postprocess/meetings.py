@@ -22,8 +22,6 @@ from walkers.postprocess.motion import Bridges, Motion
 from walkers.postprocess.numbers import Measured
 from walkers.postprocess.tables import columns_of
 
-NAME = "meetings"
-"""Group of its numbers, see `walkers.postprocess.quantities.GROUPS`."""
 _SLOW = 0.1
 """Walkers below this fraction of the speed of free walkers are slow."""
 _END = 0.1

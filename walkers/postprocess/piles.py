@@ -17,8 +17,6 @@ from walkers.postprocess.motion import FLOOR, Bridges, Motion, read_bridges
 from walkers.postprocess.numbers import Measured
 from walkers.postprocess.tables import Columns, read_columns
 
-NAME = "piles"
-"""Group of its numbers, see `walkers.postprocess.quantities.GROUPS`."""
 _WHOLE = 1.0 - 1e-6
 """Fraction of the duration below which a run ended early."""
 State = dict[str, float]

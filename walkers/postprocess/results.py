@@ -74,17 +74,18 @@ class Results(dict[str, Any]):
         return {**self.about, **plain(self), "warnings": list(self.warnings)}
 
 
-def modules_of(case: Case) -> list[Any]:
-    """The modules that measure a case, in the order of results."""
+def modules_of(case: Case) -> dict[str, Any]:
+    """The modules that measure a case, in the order of results, by the groups of their numbers."""
     from walkers.postprocess import meetings, piles, threshold, walking
 
-    return [module for module in (walking, threshold, meetings, piles) if module.applies(case)]
+    modules = {"walking": walking, "threshold": threshold, "meetings": meetings, "piles": piles}
+    return {name: module for name, module in modules.items() if module.applies(case)}
 
 
 def derived(case: Case) -> dict[str, Any]:
     """Numbers of a result that follow from the case alone."""
     numbers = {name: getattr(case.excitation, name) for name in _DRIVE}
-    for module in modules_of(case):
+    for module in modules_of(case).values():
         numbers |= module.derived(case)
     return numbers
 
@@ -101,7 +102,7 @@ def measure(directory: Path) -> None:
     check_unchanged(directory, files_of_segments(directory))
     motion = read_motion(directory)
     case = motion.case
-    parts = [module.measure(motion) for module in modules_of(case)]
+    parts = [module.measure(motion) for module in modules_of(case).values()]
     tables = {name: columns for part in parts for name, columns in part.tables.items()}
     numbers = derived(case) | {"goes_uphill": case.goes_uphill, "truncated": motion.truncated}
     for part in parts:

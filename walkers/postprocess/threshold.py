@@ -19,8 +19,6 @@ from walkers.postprocess.motion import Motion
 from walkers.postprocess.numbers import Measured
 from walkers.postprocess.sides import REST
 
-NAME = "threshold"
-"""Group of its numbers, see `walkers.postprocess.quantities.GROUPS`."""
 WINDOW = 8
 """Cycles of a window."""
 

@@ -28,8 +28,6 @@ from walkers.rounding import counted, percent
 _LONGER = 1.5
 """Cycles of a run in which walkers turn over, over those until they have turned by 90°."""
 _OF_BEADS = ("rotation_", "sliding_", "open_")
-NAME = "walking"
-"""Group of its numbers, see `walkers.postprocess.quantities.GROUPS`."""
 
 
 def applies(case: Case) -> bool:

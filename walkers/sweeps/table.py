@@ -209,7 +209,7 @@ def columns_of(names: Iterable[str]) -> dict[str, tuple[str, str]]:
 def _declared(sweep: Sweep) -> list[str]:
     """The numbers of results of a sweep's cases, without numbers of single beads; empty if a case cannot be read."""
     with suppress(InputError):
-        groups = [module.NAME for module in modules_of(next(sweep.cases()))]
+        groups = modules_of(next(sweep.cases()))
         return [number.name for group in [*groups, "drive"] for number in GROUPS[group] if number.name[-1] != "*"]
     return []
 
