@@ -280,7 +280,7 @@ def test_mpirun_needs_room_for_temporary_files(tmp_path: Path, monkeypatch: pyte
 
 def test_a_run_goes_on_when_a_full_disk_has_room_again(tmp_path: Path) -> None:
     """The disk is filled during the second segment: nothing is lost, and the numbers are those of another disk."""
-    case = brief_pile(duration="0.06 s")
+    case = brief_pile(duration="0.06 s", segment="0.03 s")
     with mounted(tmp_path / "disk", "16m") as place:
 
         def fill_soon() -> None:

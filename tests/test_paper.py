@@ -181,7 +181,7 @@ def test_figures_and_comparison_do_without_what_failed(sources: Sources, tmp_pat
         else:
             (tmp_path / path.name).symlink_to(path)
     left = Sources(tmp_path)
-    for name in PANELS.keys() - {"fig1b"}:  # is of a sweep of another one
+    for name in PANELS.keys() - {"fig1b"}:  # a picture, which takes seconds
         if lost:
             FIGURES[name].draw(left)
         else:
