@@ -289,10 +289,7 @@ class Excitation:
 
 
 def common_frequency(frequencies: list[float]) -> float:
-    """Frequency of the common period of several, Hz.
-
-    Raises `ValueError` if one has no ratio of whole numbers up to `LARGEST_RATIO` to the first, or a cycle is too long.
-    """
+    """Frequency of the common period of several, Hz; raises `ValueError` if there is none, or it is too long."""
     first = frequencies[0]
     if len(frequencies) == 1:  # asked for at every turn of a sweep's plan
         return first

@@ -61,10 +61,7 @@ class Library:
         return tuple(dict.fromkeys(name for collection in self.collections for name in collection.tables.get(kind, ())))
 
     def numbers(self, kind: str, name: str, mixture: tuple[float, float] | None = None) -> Mapping[str, LibraryNumber]:
-        """Numbers of one of the ``materials`` or ``liquids``, in SI units; empty if there is none of this name.
-
-        ``mixture`` is the mass fraction and the temperature (K) of a liquid whose numbers depend on them.
-        """
+        """Numbers of a material or liquid; ``mixture``: mass fraction and temperature (K), if they depend on them."""
         for collection in self.collections:
             if numbers := collection.tables.get(kind, {}).get(name):
                 computed = MIXTURES[name](*mixture or HALF) if name in MIXTURES else {}

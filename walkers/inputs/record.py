@@ -81,10 +81,7 @@ class Record(Table):
 
     @cached_property
     def frequencies(self) -> tuple[float, float]:
-        """Frequency of a cycle, and the highest one in the spectrum, Hz.
-
-        A record that repeats has as many cycles as divide all of its lines; else its strongest line gives the cycle.
-        """
+        """Frequency of a cycle (of all lines, if the record repeats; else the strongest), and the highest one, Hz."""
         import numpy as np
 
         count = len(self.rows)

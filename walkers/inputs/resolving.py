@@ -65,10 +65,7 @@ SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_ROUGHNESS, *_OF_SUR
 def supplied(
     model: type[Case], document: Mapping[str, Any], library: Library
 ) -> tuple[dict[str, Any], dict[str, Source], list[Problem]]:
-    """The tables of a case with missing values from the library, of the materials and the liquid that they name.
-
-    Also the sources of these values, and names that the library does not know.
-    """
+    """The tables of a case with missing values from the library, their sources, and names that it does not know."""
     given = {key for key in SUPPLIED if value_at(document, parts_of(key)) is not MISSING}
     named = (value_at(document, parts_of(key)) for key in NAMES)
     bead, wall, liquid = (name if isinstance(name, str) else None for name in named)

@@ -110,8 +110,7 @@ def parse_quantity(text: str, kind: Kind) -> float:
 def _registry() -> UnitRegistry[float]:
     """Pint's registry with the ``gee`` (9.8 m/s²) added.
 
-    Pint's cache of parsed definitions would save a tenth of a second, but two programs that fill it at once break it
-    permanently.
+    Not cached in files: two programs that fill pint's cache at once break it permanently.
     """
     import pint
 

@@ -222,10 +222,9 @@ class Vessel:
         return angles
 
     def planes(self) -> list[tuple[Vector, Vector]]:
-        """Points and normals of the planes that are the same vessel, the floor first.
+        """Points and normals of the planes that are the same vessel, the floor first; empty if there are none.
 
-        Empty if some faces turn at an edge by less than `SHARP`, or if some are not upright at the rim: planes go on
-        above it, where a funnel would be wider.
+        There are none if faces turn at an edge by less than `SHARP`, or flare at the rim: planes go on above it.
         """
         at_rim = np.isin(self.triangles, [point for rim in self.rims for point in rim]).any(axis=1)
         flared = (np.abs(self.normals[at_rim, 2]) > _UPRIGHT).any()

@@ -68,8 +68,7 @@ _PATIENCE_SECONDS = 2.0
 def run_place(case: Case, engine: Engine, out: Path) -> Path:
     """The final directory of a run: name of the case, and 12 hex digits of a hash of case, engine and version of decks.
 
-    The text of the deck is not hashed, so that a changed comment in a template keeps existing runs. The file of a
-    user's own bridge law is hashed.
+    The text of the deck is not hashed (a comment in a template renames no runs); the file of a user's law is.
     """
     determinants = {"case": case.determinants(), "deck": CONTENT_VERSION, "engine": engine.sha256, "format": FORMAT}
     if law_sha256 := case.recorded_law.sha256 if case.recorded_law else source_sha256(case.liquid.law):
