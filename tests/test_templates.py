@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from hashlib import sha256
 from math import inf
 from pathlib import Path
@@ -60,15 +61,15 @@ CONTENT = {9: "b5bc9e772130d902"}
 
 def _reads(deck: Deck) -> str:
     """The commands and files of a deck; numbers to fewer digits than what other machines' arithmetic leaves alone."""
-    commands = [line.partition("#")[0] for line in deck.text.splitlines()]
-    files = [f"{name} {text}" for name, text in deck.files.items()]  # a million numbers: one may be close to a half
-    return f"{_rounded(commands, 9)} {_rounded(files, 6)}"
+    commands = _rounded("\n".join(line.partition("#")[0] for line in deck.text.splitlines()), 9)
+    files = (f"{name} {_rounded(text, 6)}" for name, text in deck.files.items())  # many: one may be close to a half
+    return " ".join([commands, *files])
 
 
-def _rounded(texts: list[str], digits: int) -> str:
+@cache
+def _rounded(text: str, digits: int) -> str:
     number = re.compile(r"[-+.\de]*\d[-+.\de]*")
-    words = " ".join(texts).split()
-    return " ".join(f"{float(word):.{digits}g}" if number.fullmatch(word) else word for word in words)
+    return " ".join(f"{float(word):.{digits}g}" if number.fullmatch(word) else word for word in text.split())
 
 
 def test_a_change_of_what_decks_compute_asks_for_another_version() -> None:
