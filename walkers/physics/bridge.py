@@ -56,11 +56,11 @@ class Roughness(Protocol):
 class Surfaces:
     """Two surfaces with a bridge between them."""
 
-    radius: float  # of the bead, or of the smaller one of two beads, m
-    other_radius: float  # of the other bead, infinite for a plane, m
-    volume: float  # of the bridge, m³
+    radius: float  #: of the bead, or of the smaller one of two beads, m
+    other_radius: float  #: of the other bead, infinite for a plane, m
+    volume: float  #: of the bridge, m³
     liquid: BridgeLiquid
-    roughness: float  # gap that remains for the liquid between surfaces that touch at their asperities, m
+    roughness: float  #: gap that remains for the liquid between surfaces that touch at their asperities, m
 
     @classmethod
     def of(cls, radius: float, other_radius: float, liquid: BridgeLiquid, roughness: Roughness) -> Surfaces:
@@ -101,11 +101,11 @@ class Surfaces:
 class Forces:
     """Pull and resistances of the module at given gaps, each of shape (n,)."""
 
-    pull: FloatArray  # P, N
-    normal: FloatArray  # N, N s/m
-    sliding: FloatArray  # S, N s/m
-    coupling: FloatArray  # C, N s
-    rolling: FloatArray  # Q, N m s
+    pull: FloatArray  #: P, N
+    normal: FloatArray  #: N, N s/m
+    sliding: FloatArray  #: S, N s/m
+    coupling: FloatArray  #: C, N s
+    rolling: FloatArray  #: Q, N m s
 
     def columns(self) -> FloatArray:
         """Shape (N, 5), in the order of the attributes."""
@@ -116,11 +116,11 @@ class Forces:
 class Curve:
     """The law for two given surfaces; raises `UnusableLawError` if its gaps are none."""
 
-    forces: Callable[[FloatArray], Forces]  # at gaps from 0 to ``rupture``, m
-    rupture: float  # gap at which the bridge breaks, m
-    formation: float = 0.0  # gap below which it forms, m; 0: the surfaces must touch
-    scale: float = 0.0  # gap over which forces vary near contact, where a kink may be, m; 0: `Surfaces.roughness`
-    pull: Callable[[FloatArray], FloatArray] | None = None  # alone, N, if resistances are expensive to compute
+    forces: Callable[[FloatArray], Forces]  #: at gaps from 0 to ``rupture``, m
+    rupture: float  #: gap at which the bridge breaks, m
+    formation: float = 0.0  #: gap below which it forms, m; 0: the surfaces must touch
+    scale: float = 0.0  #: gap over which forces vary near contact, where a kink may be, m; 0: `Surfaces.roughness`
+    pull: Callable[[FloatArray], FloatArray] | None = None  #: alone, N, if resistances are expensive to compute
 
     def __post_init__(self) -> None:
         """Refuse gaps that are not in their order."""
