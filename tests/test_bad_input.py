@@ -72,6 +72,8 @@ CASES: list[tuple[dict[str, Any], str]] = [
     ({"liquid": {"volume_fracton": 0.01}}, 'liquid.volume_fracton = 0.01: unknown key; [liquid] takes name, '),
     ({"dimers": {"seed": 2}}, 'did you mean "run.seed"'),
     ({"run": {"until_steady": True}}, "run.until_steady = true: unknown key; [run] takes time_step, "),
+    *(({name: {"own": {}}}, f'{name} = {{"own": {{}}}}: unknown key: the program reads this table from a file')
+      for name in ("meshes", "records")),
     # What contradicts something else
     ({"drive": {"gamma0": 0.5}}, "drive.gamma0 = 0.5: expected either peak_acceleration or gamma0, not both"),
     ({"drive": {**HARMONICS, "peak_acceleration": None}}, "beside drive.harmonics: write drive.harmonics[0].frequency"),
