@@ -1,7 +1,6 @@
 """Figures of sweeps: what goes where, what is drawn, what is left out and said."""
 
 import shutil
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +15,7 @@ import walkers
 from tests.conftest import document, to_toml
 from walkers.errors import InputError
 from walkers.runner.directory import case_of
-from walkers.sweeps.figure import SCATTER, LeftOutWarning, factors_of, figure_of, layout_of
-from walkers.sweeps.figure_options import FigureOptions
+from walkers.sweeps.figure import SCATTER, LeftOutWarning, factors_of, figure_of
 from walkers.theory.prediction import MODEL, PAPER, predict
 
 
@@ -171,17 +169,6 @@ def test_keys_that_go_together_are_one_factor() -> None:
     for keys, rows, factors in expected:
         table = _table({key: "g" if key.endswith("acceleration") else "" for key in keys}, rows, [keys])
         assert [(one.keys, one.levels, one.is_sample) for one in factors_of(table)] == factors
-
-
-def test_what_would_take_too_many_panels_is_not_told_apart() -> None:
-    """Of five keys of three values one is along x, one has colours, and two have nine panels: the last is named."""
-    keys = ["drive.frequency", *(f"contact.friction.{name}" for name in ("a", "b", "c", "d"))]
-    rows = [list(row) for row in product((1.0, 2.0, 3.0), repeat=5)]
-    table = _table(dict.fromkeys(keys, ""), rows, [(key,) for key in keys])
-    _, _, panels, undistinguished = layout_of(table, table)
-    assert panels is not None
-    assert (len(panels.levels), len(undistinguished)) == (9, 1)
-    assert layout_of(table, table, FigureOptions(panels="none"))[2] is None
 
 
 def test_theory_is_what_the_theory_says_of_each_point(looked_through: Path) -> None:
