@@ -91,7 +91,7 @@ def predict(case: Case) -> dict[str, Any]:
 
     Errors as for `check_applies`.
     """
-    dimer = dimer_of(case)
+    dimer, motion = dimer_of(case), motion_of(case)
     gamma0 = dimer.gamma0(case.excitation.peak_acceleration)
     end = detachment(dimer.sin_delta)
     linear, reason = nan, why_not_the_paper(case)
@@ -102,7 +102,15 @@ def predict(case: Case) -> dict[str, Any]:
         "gamma0": gamma0,
         "sin_delta": dimer.sin_delta,
         "paper": plain({"friction": FRICTION_OF_THE_PAPER, "velocity": linear, "reason": reason}),
-        "viscous": _predicted(case),
+        "viscous": plain(
+            {
+                "velocity": float(motion.velocity[0]) if motion.periodic[0] else nan,
+                "rotation": motion.rotation[:, 0].tolist(),
+                "sliding": motion.sliding[:, 0].tolist(),
+                "reason": _why_unknown(motion, 0),
+                "threshold": threshold(case),
+            }
+        ),
         "detachment": {"gamma": float(end.gamma), "contact": CONTACTS[int(end.contact)]},
         "alignment": alignment_of(case),
     }
@@ -128,18 +136,6 @@ def outside_of_the_paper(case: Case) -> str | None:
         *([] if slow <= drive.frequency <= fast else [f"{drive.frequency:g} Hz ({slow:g} to {fast:g} Hz)"]),
     ]
     return f"outside the paper's range: {', '.join(beyond)}; the models are not tested there" if beyond else None
-
-
-def _predicted(case: Case) -> dict[str, Any]:
-    motion = motion_of(case)
-    numbers = {
-        "velocity": float(motion.velocity[0]) if motion.periodic[0] else nan,
-        "rotation": motion.rotation[:, 0].tolist(),
-        "sliding": motion.sliding[:, 0].tolist(),
-        "reason": _why_unknown(motion, 0),
-        "threshold": threshold(case),
-    }
-    return plain(numbers)
 
 
 def _why_unknown(motion: Motion, of: int) -> str | None:
