@@ -349,7 +349,7 @@ def test_the_documented_laws(tmp_path: Path) -> None:
     found = curve.forces(np.array([0.0, curve.rupture]))
     assert found.pull == pytest.approx(6.5e-20 / (6.0 * 0.165e-9**2) * np.array([1.0, 1e-3]))
     assert not np.any(found.columns()[:, 1:])
-    assert by_name("walkers.physics.laws.willett:law")(given).rupture == willett.law(given).rupture
+    assert by_name(f"{willett.__file__}:law")(given).rupture == willett.law(given).rupture
 
 
 def test_a_law_is_executed_when_it_is_new_and_the_program_says_so_once(in_folder: Path) -> None:

@@ -196,7 +196,7 @@ def restitutions(bench: Bench, modulus: float = 7e10, law: str = "young-laplace"
 def impacts(bench: Bench) -> Iterator[Line]:
     """Restitution of a glass bead on a wet plate at 1 m/s by viscosity; effects of other changes at a Stokes number."""
     (stokes, hard), (_, soft) = restitutions(bench), restitutions(bench, 5e7)
-    filled = restitutions(bench, law=f"{__name__}:filmed")[1]
+    filled = restitutions(bench, law=f"{__file__}:filmed")[1]
     drag, e = 1.0 / stokes[:, 2], hard[:, 2]
     slope, start = np.polyfit(drag, e, 1)
     title = "glass bead on a wet plate"

@@ -43,7 +43,7 @@ from walkers.text import rendered
 
 EQUAL = 1e-6
 """Tolerance between the engines, relative to the largest force, torque or displacement (interpolation errors)."""
-DRY = {"liquid.law": f"{__name__}:dry"}
+DRY = {"liquid.law": f"{__file__}:dry"}
 """Changes of a case without bridges."""
 FLOOR = BOTTOM
 R, S = 3e-4, 2e-4
@@ -93,7 +93,7 @@ _BARE = {
 _FULL = {
     **{"contact.friction.bead_bead": 0.23, "contact.friction.bead_wall": 0.31},
     **{"contact.rolling_friction": 0.04, "contact.restitution": 0.4},
-    **{"liquid.dynamic_viscosity": "4.6 mPa*s", "liquid.law": f"{__name__}:law"},
+    **{"liquid.dynamic_viscosity": "4.6 mPa*s", "liquid.law": f"{__file__}:law"},
 }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import runpy
 from collections.abc import Callable
-from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from walkers.physics.bridge import BridgeLaw, Curve, FloatArray, Forces, Surfaces, UnusableLawError, columns_at
@@ -13,16 +13,16 @@ _FARTHEST = 10.0
 """Largest rupture distance, in radii of the smaller bead."""
 
 
-def loaded(name: str, place: str) -> BridgeLaw:
-    """The function of a module, or of a file; its curves are checked (`_curve`).
+def loaded(name: str, file: Path) -> BridgeLaw:
+    """The function of a file; its curves are checked (`_curve`).
 
     Raises `ValueError` if there is none, or if its file raises an error or exits.
     """
-    function, is_file = name.rpartition(":")[2], place.endswith(".py")
+    function = name.rpartition(":")[2]
     # Not as Python imports a file, which takes an edited one of the same length and second for the former one.
-    law = _called(runpy.run_path if is_file else lambda module: vars(import_module(module)), place).get(function)
+    law = _called(runpy.run_path, str(file)).get(function)
     if not callable(law):
-        raise ValueError(f"bridge law {name!r}: {place} has no function {function}")
+        raise ValueError(f"bridge law {name!r}: {file} has no function {function}")
     return lambda surfaces: _curve(law, surfaces)
 
 

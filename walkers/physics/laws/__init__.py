@@ -2,8 +2,7 @@
 
 A law is a function `Surfaces → Curve` (`walkers.physics.bridge`). A built-in law is the function ``law`` of a file in
 this folder, with its equation and source, and has the name of the file. A user's law is named
-``path/to/file.py:function`` or ``package.module:function``. It is checked whenever it is evaluated
-(`walkers.physics.user_law`).
+``path/to/file.py:function``. It is checked whenever it is evaluated (`walkers.physics.user_law`).
 """
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ import hashlib
 import warnings
 from functools import lru_cache
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING
@@ -29,39 +27,29 @@ class ExecutedLawWarning(UserWarning):
 
 
 def by_name(name: str) -> BridgeLaw:
-    """Find a law by name: one of `LAWS`, ``file.py:function`` or ``package.module:function``.
+    """Find a law by name: one of `LAWS`, or ``file.py:function``, a path from the working directory.
 
-    Paths of files are relative to the working directory. A file is executed again only after it has changed. Raises
-    `ValueError` if there is no law with this name, or its file or module cannot be executed.
+    A file is executed again only after it has changed. Raises `ValueError` if there is no law with this name, or its
+    file cannot be executed.
     """
-    if name in LAWS:
+    if (file := source_of(name)) is None:
         law: BridgeLaw = import_module(f"{__name__}.{name.replace('-', '_')}").law
         return law
-    file = source_of(name)
-    place = name.rpartition(":")[0]
-    return _of_user(name, str(file) if file and place.endswith(".py") else place, file, source_sha256(name))
+    return _of_user(name, file, source_sha256(name))
 
 
 def source_of(name: str) -> Path | None:
-    """The file of a user's law; None for a built-in law, and for a module without a file; errors as of `by_name`."""
+    """The file of a user's law; None for a built-in law; errors as of `by_name`."""
     if name in LAWS:
         return None
     place, _, function = name.rpartition(":")
-    if not place or not function or not name.isprintable():
-        message = f"expected one of {', '.join(LAWS)}, file.py:function or package.module:function"
-        raise ValueError(f"bridge law {name!r}: {message}")
-    if place.endswith(".py"):
-        return Path(place).resolve()
-    try:
-        if (module := find_spec(place)) is None:
-            raise ImportError("no such module")
-    except (ImportError, ValueError, AttributeError) as error:
-        raise ValueError(f"bridge law {name!r}: {place} cannot be imported: {error}") from error
-    return Path(module.origin) if module.has_location and module.origin else None
+    if not place.endswith(".py") or not function or not name.isprintable():
+        raise ValueError(f"bridge law {name!r}: expected one of {', '.join(LAWS)}, or file.py:function")
+    return Path(place).resolve()
 
 
 def source_sha256(name: str) -> str | None:
-    """SHA-256 of the file of a user's law, None if it has none; errors as of `by_name`. Nothing is executed."""
+    """SHA-256 of the file of a user's law; None for a built-in law; errors as of `by_name`. Nothing is executed."""
     if (file := source_of(name)) is None:
         return None
     try:
@@ -71,11 +59,11 @@ def source_sha256(name: str) -> str | None:
 
 
 @lru_cache(maxsize=64)
-def _of_user(name: str, place: str, file: Path | None, sha256: str | None) -> BridgeLaw:
+def _of_user(name: str, file: Path, sha256: str | None) -> BridgeLaw:
     """A user's law with this content (``sha256``) of its file."""
     from walkers.physics.user_law import loaded
 
     del sha256
-    if not place.startswith("walkers."):
-        warnings.warn(f"executes {file or place}, the bridge law of the case", ExecutedLawWarning, stacklevel=3)
-    return loaded(name, place)
+    if not file.is_relative_to(Path(__file__).parents[2]):
+        warnings.warn(f"executes {file}, the bridge law of the case", ExecutedLawWarning, stacklevel=3)
+    return loaded(name, file)
