@@ -49,9 +49,13 @@ class Outcome:
     held_out: Posterior
     failures: Mapping[str, list[Failure]]
 
+    def emulator_of(self, observation: Observation) -> Emulator | None:
+        """The emulator of an observation; None if it is costly."""
+        return next((emulator for emulator in self.emulators if emulator.observation is observation), None)
+
     def predicted(self, observation: Observation) -> FloatArray | None:
         """5 %, median and 95 % of what was held out, from the other observations; None for others."""
-        emulator = next((emulator for emulator in self.emulators if emulator.observation is observation), None)
+        emulator = self.emulator_of(observation)
         if emulator is None or observation.group not in self.calibration.file.design.held_out:
             return None
         samples = self.held_out.samples

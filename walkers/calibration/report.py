@@ -108,9 +108,8 @@ def summary(record: Mapping[str, Any]) -> str:
     ]
     note = "posterior: median, in brackets 5 to 95 %"
     if 2 * max(record["agree"].values()) < record["of"]:
-        note += (
-            "; no set agrees with half of the facts: the model, or a fact, is in question, and the intervals say little"
-        )
+        doubt = "the model, or a fact, is in question, and the intervals say little"
+        note += f"; no set agrees with half of the facts: {doubt}"
     return "\n\n".join([aligned(agree), aligned(intervals), note])
 
 
@@ -118,16 +117,14 @@ def _row(outcome: Outcome, place: int) -> dict[str, Any]:
     """A fact, its number at the sets, and its prediction if it was held out."""
     observation = outcome.calibration.file.observations[place]
     (unit, scale), numbers = observation.unit, {name: float(row[place]) for name, row in outcome.numbers.items()}
-    ends = outcome.predicted(observation)
+    ends, emulator = outcome.predicted(observation), outcome.emulator_of(observation)
     return {
         **{name: getattr(observation, name) for name in ("name", "group", "title", "derived")},
         "expected": observation.text,
         "unit": unit,
         "numbers": {name: number * scale if isfinite(number) else None for name, number in numbers.items()},
         "agrees": {name: observation.agrees(number) for name, number in numbers.items()},
-        "emulator_error": next(
-            (emulator.error for emulator in outcome.emulators if emulator.observation is observation), None
-        ),
+        "emulator_error": emulator and emulator.error,
         "predicted": None if ends is None else (ends * scale).tolist(),
     }
 

@@ -74,12 +74,8 @@ def symmetry(out: Path) -> Iterator[Line]:
     odd, even, opposite = speeds
     yield Line("symmetric dimer, tones 2:3: velocity (not zero)", 0.0, even, unit="mm/s")
     yield Line("symmetric dimer: velocity at 1:3 over velocity at 2:3", 0.0, odd / even, 1e-3)
-    yield Line(
-        "symmetric dimer, 2:3: velocity by the opposite waveform over velocity by the waveform",
-        -1,
-        opposite / even,
-        0.01,
-    )
+    title = "symmetric dimer, 2:3: velocity by the opposite waveform over velocity by the waveform"
+    yield Line(title, -1, opposite / even, 0.01)
 
 
 def followed(
@@ -87,12 +83,10 @@ def followed(
 ) -> FloatArray:
     """Frames of beads, each with its own case, 8 mm apart along y; shape (steps // every + 1, beads, 9)."""
     kinds = list(dict.fromkeys(map(surface_of, cases)))
-    placed = [
-        replace(
-            bead, id=n + 1, centre=(0.0, 8e-3 * n, bead.centre[2]), surface=1 + kinds.index(surface_of(case)), loading=n
-        )
-        for n, (case, bead) in enumerate(zip(cases, beads, strict=True))
-    ]
+    placed = []
+    for n, (case, bead) in enumerate(zip(cases, beads, strict=True)):
+        centre, surface = (0.0, 8e-3 * n, bead.centre[2]), 1 + kinds.index(surface_of(case))
+        placed.append(replace(bead, id=n + 1, centre=centre, surface=surface, loading=n))
     room = (-0.05, -0.01, -0.01), (0.05, 8e-3 * len(placed), 0.1)
     scene = Scene(tuple(placed), tuple(walls), *room, tuple(kinds), tuple(map(loading_of, cases)))
     return bench.run(Plan(cases[0], scene, **recording(steps, every))).frames

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.errors import refused
@@ -50,15 +49,12 @@ COMPARED = (*map(of_facts, sets()), "fig2-threshold", "fig2-ramp", "fig2", "fig3
 
 
 class Made(NamedTuple):
-    """Written files, failed points by sweep, figures that could not be drawn with the reasons, and facts that agree.
-
-    Facts are counted for each parameter set: those that agree, and all; there are none without a comparison.
-    """
+    """Written files, failed points by sweep, figures that could not be drawn, and facts that agree and all by set."""
 
     files: list[Path]
     failures: dict[str, list[Failure]]
     left_out: dict[str, str]
-    counts: Mapping[str, tuple[int, int]] = MappingProxyType({})
+    counts: dict[str, tuple[int, int]]
 
 
 def make_figures(
@@ -101,16 +97,12 @@ def make_figures(
             files += save_figure(drawing.draw(sources), to / name, runs, formats, drawing.title)
         except NothingFinishedError as missing:
             left_out[name] = str(missing)
-    if COMPARISON not in chosen:
-        return Made(files, failed, left_out)
-    comparison = compare(Sources(out))
-    page, record = to / f"{COMPARISON}.md", to / f"{COMPARISON}.json"
-    to.mkdir(parents=True, exist_ok=True)
-    write_bytes(page, rendered("walkers.paper", "comparison.md.j2", **comparison).encode())
-    write_json(record, comparison)
-    return Made(
-        [*files, page, record],
-        failed,
-        left_out,
-        {name: (facts["agree"], facts["of"]) for name, facts in comparison["sets"].items()},
-    )
+    counts: dict[str, tuple[int, int]] = {}
+    if COMPARISON in chosen:
+        comparison = compare(Sources(out))
+        files += [page := to / f"{COMPARISON}.md", record := to / f"{COMPARISON}.json"]
+        to.mkdir(parents=True, exist_ok=True)
+        write_bytes(page, rendered("walkers.paper", "comparison.md.j2", **comparison).encode())
+        write_json(record, comparison)
+        counts = {name: (facts["agree"], facts["of"]) for name, facts in comparison["sets"].items()}
+    return Made(files, failed, left_out, counts)
