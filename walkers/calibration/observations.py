@@ -47,15 +47,8 @@ class Observation(Table):
     ``deviation`` within which a number agrees: one standard deviation of the value, the tolerance of a limit. They are
     in SI units, angles in degrees; a file gives speeds and angles with their unit, other numbers plainly.
 
-    Attributes
-    ----------
-    name, group, title
-        Own name; that of what is held out together; short text for tables and figures, the name by default.
-    says, source
-        The fact as it was said, and where.
-    derived, costly
-        Whether it follows from other observations, or needs runs too long for many parameter sets. Either has no weight
-        in a calibration.
+    Observations of a ``group`` are held out together; ``says`` is the fact as it was said. One that is ``derived`` from
+    others, or ``costly`` (its runs are too long for many parameter sets), has no weight in a calibration.
     """
 
     name: str

@@ -50,8 +50,6 @@ class SecondEngine:
         clock: int = 0,
         without: Collection[str] = (),
     ) -> None:
-        if unknown := set(without) - set(TERMS):
-            raise ValueError(f"without {unknown}: expected any of {', '.join(TERMS)}")
         if case.boundary.triangles and not walls:
             raise refused(case.name, "boundary.mesh: expected a vessel of planes; the second engine knows no facets")
         self.clock = clock
