@@ -165,6 +165,15 @@ _STEEL = {
 }
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_two_frames_of_a_walker_on_a_slope_say_nothing_of_its_turning_over(runs_folder: Path) -> None:
+    """Three are necessary to see that an angle grows faster and faster."""
+    few = {"run.cycles": 8, "run.settling_cycles": 4, "run.frames_per_second": 20, "dimers.replicates": 1}
+    done = walkers.run(load_case("fig1b", {"boundary.tilt": "4 deg", **few}), runs_folder)
+    assert len(done.table("cycles")["time"]) == 3
+    assert not done.result.warnings
+
+
 def test_a_run_that_ends_before_its_walker_turns_over_says_how_long_it_must_be(runs_folder: Path) -> None:
     """Of steel on PTFE; ruby stands on a gentle slope."""
     shorts = [

@@ -208,6 +208,8 @@ def turns_over_after(group: Group) -> FloatArray:
     """
     run = group.case.run
     angle = np.abs(group.orientation[:: run.samples_per_cycle][run.settled_strobes :])
+    if len(angle) < 3:  # too few frames a second, or a dump that was cut short
+        return np.full(len(group.walkers), np.nan)
     first, second, last = (part.mean(axis=0) for part in np.array_split(angle, 3))
     up = sides([walker.facing for walker in group.walkers], [walker.start_angle for walker in group.walkers]) > 0
     grows = (last > (1.0 + STEADY_DIFFERENCE) * second) & (last - second > np.maximum(second - first, _NOTHING))
