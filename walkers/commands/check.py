@@ -31,8 +31,9 @@ from walkers.errors import refused
 if TYPE_CHECKING:
     from walkers.check.lines import Line
 
-check = App(name="check", version_flags=())
-paper = App(name="paper", version_flags=())
+# A section does not inherit the heading of its options.
+check = App(name="check", version_flags=(), group_parameters="Options")
+paper = App(name="paper", version_flags=(), group_parameters="Options")
 
 
 @check.command
