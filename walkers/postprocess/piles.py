@@ -44,7 +44,7 @@ def measure(motion: Motion) -> Measured:
         driven = motion.time[bridges.frame] >= 0.0
         held.append(list(clusters.held_clusters(labels, bridges, bulks[-1])) if driven else [])
         joined.append(_joined(bridges, len(motion.radius)))
-        rows.append(_state_of(motion, bridges, bulks[-1], held[-1]))
+        rows.append(_state_of(motion, bridges, joined[-1][1], bulks[-1], held[-1]))
     bed, walls = {name: np.array([row[name] for row in rows]) for name in rows[0]}, case.boundary.walls
     beads = Beads(
         time=motion.time,
@@ -120,14 +120,16 @@ def _joined(bridges: Bridges, count: int) -> Joined:
     return bridges.beads.astype(np.int32), at_wall
 
 
-def _state_of(motion: Motion, bridges: Bridges, bulk: BoolArray, held: Sequence[Cluster]) -> dict[str, Any]:
-    """State of a pile in a frame from its bulk and the held clusters."""
+def _state_of(
+    motion: Motion, bridges: Bridges, at_wall: BoolArray, bulk: BoolArray, held: Sequence[Cluster]
+) -> dict[str, Any]:
+    """State of a pile in a frame from its beads at walls and in the bulk, and the held clusters."""
     frame = bridges.frame
     position, radius, large = motion.position[frame], motion.radius, motion.large
     # Cells of the cross-section are about four large radii wide. Without a bulk the floor is the surface.
     tops = _surface_cells(position[bulk], radius[bulk], motion.case.boundary, 4.0 * float(radius.max()))
     low, middle, high = (float(value) for value in np.percentile(tops if len(tops) else [0.0], (10.0, 50.0, 90.0)))
-    pairs, (_, at_wall) = len(bridges.beads), _joined(bridges, len(radius))
+    pairs = len(bridges.beads)
     touching = int((bridges.gap[:pairs] <= 0.0).sum())
     return {
         "time": float(motion.time[frame]),
