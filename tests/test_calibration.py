@@ -22,7 +22,7 @@ from walkers.calibration.calibrate import PROPOSED, Outcome, calibrate, nearest
 from walkers.calibration.emulator import LARGEST, Emulator, Posterior, middle
 from walkers.calibration.file import Calibration, Parameter, load_calibration, read_calibration
 from walkers.calibration.observations import NO_NUMBERS, FloatArray, Observation, numbers_of
-from walkers.calibration.report import draw_facts, record_of
+from walkers.calibration.report import draw_facts, record_of, summary
 from walkers.errors import InputError
 from walkers.inputs.axes import unit_cube
 from walkers.inputs.reading import load_case, shipped
@@ -346,6 +346,9 @@ def test_the_record_has_quantiles_and_agreement_of_a_known_outcome(
     assert found["observations"][1]["numbers"][PROPOSED[0]] is None
     predicted = [row["predicted"] for row in found["observations"]]
     assert predicted == [None, pytest.approx([1e3 * known(without.points)[0, 1]] * 3, rel=0.02)]
+    for agree, doubted in (([0, 1], False), ([0, 0], True)):  # of two facts
+        said = summary({**found, "agree": dict(zip(names, agree, strict=False))})
+        assert ("no set agrees with half" in said) == doubted
     assert "| drag/friction |" in rendered("walkers.calibration", "report.md.j2", found=found)
 
 

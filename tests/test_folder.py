@@ -19,6 +19,7 @@ from walkers.runner.directory import case_of, locked
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.sweeps.comparison import Side, compare_runs
+from walkers.sweeps.folder import bytes_text, weigh
 from walkers.sweeps.readable import readable
 
 
@@ -157,7 +158,8 @@ def test_clean_keeps_runs_that_other_sweeps_have(out: Path) -> None:
     names = ("grid", "rough", "three", "beads")
     runs = {name: {Path(run).name for run in walkers.load(out / name).table()["run"]} for name in names}
     before = finished_places(out)
-    call("clean", "grid", "rough", "--yes", check=True)
+    size = bytes_text(sum(weigh(out / name)[0] for name in ("grid", "rough")))
+    assert f"2 sweeps to remove, {size}" in call("clean", "grid", "rough", "--yes", check=True).stdout
     assert before.keys() == finished_places(out).keys()
     assert not any((out / name).exists() for name in ("grid", "rough"))
     one = sorted(runs["three"] - runs["beads"])[0]

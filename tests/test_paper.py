@@ -91,6 +91,7 @@ def test_peak_forces_are_the_papers(case: str, g: int, gamma0: float) -> None:
 @pytest.mark.parametrize(
     ("changes", "told"),
     [({}, None),
+     *(({"drive.frequency": end}, None) for end in ("60 Hz", "90 Hz")),
      ({"drive.peak_acceleration": "40 g"}, "Γ0 = 3.81 (measured up to 3.5), 40 g (up to 10 g)"),
      ({"drive.frequency": "170 Hz"}, "170 Hz (60 to 90 Hz)")],
 )  # fmt: skip

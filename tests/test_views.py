@@ -31,6 +31,7 @@ from walkers.postprocess.necks import NO_BRIDGES, bridges_at, ends_of, necks_of
 from walkers.postprocess.paraview import _walls, write_vtk
 from walkers.postprocess.results import read
 from walkers.postprocess.scene import Scene, Window, axes_toward, camera_axes, gathered, mesh_of, walls_of
+from walkers.postprocess.series import _figure
 from walkers.postprocess.tables import read_table
 
 
@@ -210,6 +211,15 @@ def test_rendering_shows_ruby_beads_on_a_grey_floor_and_cuts_nothing(
     assert 0.02 < np.mean(_ruby(pixels, 1.8, 60)) < 0.5
     assert np.mean(np.ptp(pixels, axis=-1) < 25) > 0.4
     assert all((edge == 255).all() for edge in (pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]))
+
+
+@pytest.mark.parametrize(
+    ("tilt", "labels"), [(0.0, ["x (mm)", "y (mm)"]), (0.1, ["across the slope (mm)", "uphill (mm)"])]
+)
+def test_axes_of_a_picture_say_which_way_is_uphill(tilt: float, labels: list[str], motion: Motion) -> None:
+    on_slope = replace(motion, case=motion.case.put("boundary.tilt", tilt))
+    (axes,) = _figure(on_slope, [0], follow=False).axes
+    assert [axes.get_xlabel(), axes.get_ylabel()] == labels
 
 
 def test_a_neck_is_where_a_bridge_is_and_gone_when_it_ruptured(pile_run: Path) -> None:
