@@ -120,8 +120,8 @@ CASES: list[tuple[dict[str, Any], str]] = [
     ({"boundary": {"tilt": "-5 deg"}}, 'must be zero or more; boundary.uphill = "180 deg" turns the slope'),
     ({**cluster("fan", "0.3 mm", "0.2 mm", "0.2 mm"), "boundary": {"shape": "channel", "width": "0.7 mm"}},
      "do not fit between the walls of the channel; expected fewer, a smaller spacing or a wider boundary"),
-    ({"boundary": {"shape": "box", "width": "9 mm", "height": "0.55 mm"}},
-     'boundary.height = "0.55 mm": too low for the walkers of dimers; expected at least 0.5998 mm'),
+    ({"dimers": {"radii": ["0.37 mm", "0.2 mm"]}, "boundary": {"shape": "box", "width": "9 mm", "height": "0.7397 mm"}},
+     'boundary.height = "0.7397 mm": too low for the walkers of dimers; expected at least 0.74 mm'),
     ({"placed": [bead("1 mm", "9 mm"), bead("0.1 mm", "30 mm"), bead("0.5 mm", "10.4 mm")]},
      "overlaps with placed[0] by 0.1 mm; expected their centres 1.5 mm apart, where they touch"),
     # What is missing

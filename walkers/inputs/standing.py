@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
-from math import atan2, cos, dist, inf, pi, sin
+from math import atan2, ceil, cos, dist, inf, pi, sin
 from typing import TYPE_CHECKING, NamedTuple
 
 from walkers.errors import unusable
@@ -200,7 +200,7 @@ def _check_walls(case: Case, beads: list[_Held]) -> None:
             message = f"the walkers do not fit between the walls of the {boundary.shape}; expected fewer"
             raise unusable(f"{bead.key}.replicates", f"{message}, a smaller spacing or a wider boundary")
         if bead.walker >= 0 and too_high:
-            least = f"{1e3 * (bead.place[2] + bead.radius):.4g} mm"
+            least = f"{ceil(1e6 * (bead.place[2] + bead.radius)) / 1e3:g} mm"  # a number that will do
             raise unusable("boundary.height", f"too low for the walkers of {bead.key}; expected at least {least}")
         if bead.walker < 0 and (out or too_high or bead.place[2] < (1.0 - OVERLAP) * bead.radius):
             raise unusable(f"{bead.key}.at", "expected a bead within the boundary")
