@@ -27,7 +27,7 @@ from walkers.postprocess.films import speed_text
 from walkers.postprocess.gait import averages, fit_slopes, settled_samples, turned_over_at
 from walkers.postprocess.motion import Bridges, Motion
 from walkers.postprocess.numbers import in_short
-from walkers.postprocess.piles import _of_climbs, _state_of
+from walkers.postprocess.piles import _joined, _of_climbs, _state_of
 from walkers.postprocess.report.player import _points
 from walkers.postprocess.scene import Scene, rotations_at, turned_in
 from walkers.postprocess.uncertainty import SPREAD_NAME, bands_of, spread_of
@@ -309,8 +309,9 @@ def test_the_state_of_a_bed() -> None:
     contacts = np.array([(0, 1, -1), (1, 2, -1), (0, -1, FLOOR), (2, -1, SIDE)])
     bridges = Bridges(1, contacts, np.array([1e-6, 3e-6, 1e-6, 1e-6]), np.array([-1e-9, 2e-6, -1e-9, -1e-9]))
     bulk = np.array([True, True, False, False])
+    _, at_wall = _joined(bridges, 4)
     moved = replace(motion, position=position, velocity=velocity)
-    state = _state_of(moved, bridges, bulk, [(frozenset({2, 3}), frozenset({SIDE}))])
+    state = _state_of(moved, bridges, at_wall, bulk, [(frozenset({2, 3}), frozenset({SIDE}))])
     bed = SimpleNamespace(**state)
     assert (bed.touching, bed.opened, bed.contacts, bed.bridges) == (1, 1, 0.5, 1.0)
     assert (bed.at_wall, bed.large_at_wall, bed.bulk, bed.clusters) == (1, 0, 2, 1)
