@@ -11,7 +11,6 @@ import struct
 import subprocess
 import zipfile
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -31,7 +30,6 @@ from tests.conftest import (
     make_case,
     mounted,
     to_toml,
-    wait_for,
 )
 from walkers import run as run_case
 from walkers.archive.writing import write_archive
@@ -46,9 +44,9 @@ from walkers.postprocess.results import measure, read
 from walkers.runner.directory import CASE_NAME, FIRST_SEGMENT, case_of, locked, recomputed
 from walkers.runner.failures import DiskFull, RunBusy
 from walkers.runner.files import write_json
-from walkers.sweeps.making import DamagedSegment
+from walkers.runner.launch import launch
 from walkers.sweeps.table import load as load_table
-from walkers.templates.deck import render_deck
+from walkers.templates.deck import Deck, render_deck
 from walkers.templates.layout import BEAD_COLUMNS, MEAN_SPIN_COLUMNS
 from walkers.text import environment
 
@@ -278,20 +276,20 @@ def test_mpirun_needs_room_for_temporary_files(tmp_path: Path, monkeypatch: pyte
             run_case(brief_pile(ranks=2), tmp_path / "runs", time_limit=PATIENCE)
 
 
-def test_a_run_goes_on_when_a_full_disk_has_room_again(tmp_path: Path) -> None:
-    """The disk is filled during the second segment: nothing is lost, and the numbers are those of another disk."""
+def test_a_run_goes_on_when_a_full_disk_has_room_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The disk is filled when the second segment begins: nothing is lost, and the numbers are those of another disk."""
     case = brief_pile(duration="0.06 s", segment="0.03 s")
     with mounted(tmp_path / "disk", "16m") as place:
 
-        def fill_soon() -> None:
-            wait_for(lambda: list(place.glob("*.incomplete/segments/0001.new/beads.bin")))
-            fill(place)
+        def on_a_full_disk(deck: Deck, folder: Path, *given: Any, **how: Any) -> Any:
+            if folder.name == "0001.new":
+                fill(place)
+            return launch(deck, folder, *given, **how)
 
-        with ThreadPoolExecutor(1) as pool:
-            filled = pool.submit(fill_soon)
-            with pytest.raises((DiskFull, DamagedSegment), match="disk full"):  # the engine may end before it notices
+        with monkeypatch.context() as patch:
+            patch.setattr("walkers.sweeps.making.launch", on_a_full_disk)
+            with pytest.raises(DiskFull, match="disk full"):
                 run_case(case, place)
-            filled.result()
         assert not list(place.glob("*/manifest.json"))
         (first,) = place.glob("*.incomplete/segments/0000/beads.bin")
         node = first.stat().st_ino

@@ -26,7 +26,7 @@ import numpy as np
 from walkers.inputs.run import CONSTANT, Run
 from walkers.postprocess.dump import DumpError, FloatArray
 from walkers.postprocess.motion import Group, between, read_motion
-from walkers.postprocess.sides import REST, SEPARATED, STEADY_SPEED, sides
+from walkers.postprocess.sides import REST, SEPARATED, STEADY_SPEED
 from walkers.postprocess.tables import Columns
 
 if TYPE_CHECKING:
@@ -201,22 +201,22 @@ def turned_over_at(group: Group) -> FloatArray:
 
 
 def turns_over_after(group: Group) -> FloatArray:
-    """Time after the end of the run at which walkers turn over that face up and still stand, s; NaN for others.
+    """Time after the end of the run at which walkers on a slope turn over, s; NaN if their angle does not grow so.
 
-    Small angles grow exponentially, and dψ/dt = rate · sin ψ. A walker will turn over if its mean angle in the last
-    third of the measured cycles exceeds that in the second third by more than 5 %, and grows faster than before.
+    Small angles grow exponentially, and dψ/dt = rate · sin ψ. A walker that faces up and stands will turn over if its
+    mean angle in the last third of the measured cycles exceeds that in the second third by more than 5 %, and grows
+    faster than before.
     """
     run = group.case.run
     angle = np.abs(group.orientation[:: run.samples_per_cycle][run.settled_strobes :])
     if len(angle) < 3:  # too few frames a second, or a dump that was cut short
         return np.full(len(group.walkers), np.nan)
     first, second, last = (part.mean(axis=0) for part in np.array_split(angle, 3))
-    up = sides([walker.facing for walker in group.walkers], [walker.start_angle for walker in group.walkers]) > 0
     grows = (last > (1.0 + STEADY_DIFFERENCE) * second) & (last - second > np.maximum(second - first, _NOTHING))
     third = len(angle) / 3.0 * run.cycles_per_sample / group.case.excitation.frequency
     with np.errstate(divide="ignore", invalid="ignore"):
         left = third * np.log(1.0 / np.tan(angle[-1] / 2.0)) / np.log(last / second)
-    return np.where(up & grows & np.isnan(turned_over_at(group)), np.maximum(left, 0.0), np.nan)
+    return np.where(grows, np.maximum(left, 0.0), np.nan)
 
 
 def postures(group: Group) -> list[str]:

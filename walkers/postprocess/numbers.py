@@ -42,7 +42,7 @@ class Row:
 
 MAIN = ("velocity", "right_facing", "axial_velocity", "climbs", "highest", "speed")
 """Main numbers, of which a spread measures bands."""
-ASIDE = frozenset(SHOWN["aside"])
+ASIDE = SHOWN["aside"]
 """Numbers that are not shown by themselves: errors of others, values of the case, conditions."""
 _OF_UP = "on a slope of those that started facing up"
 """Ends the meaning of a number that leaves out walkers that face down."""

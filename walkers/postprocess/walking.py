@@ -71,7 +71,7 @@ def measure(motion: Motion) -> Measured:
         numbers[f"velocity_make_{number}"] = float(velocity.mean())
         numbers[f"walkers_make_{number}"] = len(of_make["velocity"])
         numbers[f"steady_make_{number}"] = int(np.sum(of_make["steady"]))
-    doubts = (*_doubts(numbers, ramp=bool(case.drive.ramp)), *(_falls(groups) if case.goes_uphill else ()))
+    doubts = (*_doubts(numbers, ramp=bool(case.drive.ramp)), *(_falls(groups, walkers) if case.goes_uphill else ()))
     return Measured({**tables, "bridges": _bridges(motion)}, numbers, doubts)
 
 
@@ -89,9 +89,10 @@ def _doubts(numbers: Mapping[str, Any], *, ramp: bool) -> Iterable[str]:
         yield "walkers came close to each other and are not independent: increase the spacing"
 
 
-def _falls(groups: Sequence[Group]) -> Iterable[str]:
+def _falls(groups: Sequence[Group], walkers: Columns) -> Iterable[str]:
     """A warning if walkers that face up a slope have not turned over yet, but will."""
-    left = np.concatenate([gait.turns_over_after(group) for group in groups])
+    stand = (sides(walkers["facing"], walkers["start_angle"]) > 0) & np.isnan(walkers["turned_at"])
+    left = np.concatenate([gait.turns_over_after(group) for group in groups])[stand]
     if count := int(np.isfinite(left).sum()):
         run, frequency = groups[0].case.run, groups[0].case.excitation.frequency
         cycles = float(f"{_LONGER * (run.cycles + frequency * np.nanmax(left)):.2g}")

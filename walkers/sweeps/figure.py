@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import ceil, prod
@@ -271,46 +271,61 @@ def rank_correlation(first: Any, second: Any) -> float:
 
 @dataclass(frozen=True)
 class _Theory:
-    """Predictions of models for the points (``values``, in the displayed unit), and between them."""
+    """Predictions of models for the cases of the points (``values``, in the displayed unit), and between them."""
 
     predict: Predict
     done: pd.DataFrame
     column: str
     log: str
+    cases: Sequence[Case]
     values: Mapping[str, FloatArray]
+    remarks: Collection[str]
 
     @classmethod
     def at_points(cls, done: pd.DataFrame, column: str, log: str, predict: Predict) -> _Theory | None:
         """The theory of the points; None if it has no such number, which a warning says."""
-        predicted, remarks = predict([case_of(Path(run)) for run in done["run"]], column)
+        cases, factor = [case_of(Path(run)) for run in done["run"]], _factor(done, column)
+        predicted, remarks = predict(cases, column)
         for remark, number in remarks.items():
             _tell(f"{number} of {len(done)} points: {remark}")
-        factor = unit_shown(done.attrs["units"].get(column) or "")[1]
         values = {model: factor * values for model, values in predicted.items()}
-        return cls(predict, done, column, log, values) if values else None
+        return cls(predict, done, column, log, cases, values, remarks.keys()) if values else None
 
-    def curves(self, rows: npt.NDArray[np.int64], x: Factor) -> tuple[FloatArray, Mapping[str, FloatArray]]:
-        """Values of x and the predictions there: a fine curve if the points differ in one number, else the points.
+    def curves(
+        self, rows: npt.NDArray[np.int64], at: FloatArray, x: Factor | None
+    ) -> tuple[FloatArray, Mapping[str, FloatArray]]:
+        """Places on the x axis and predictions there: those of the points, which are ``at`` these places.
 
-        If x is no key, such as Γ0, the key that varies is changed.
+        A fine curve instead for an axis ``x`` along which the points differ in one number. If x is no key, such as Γ0,
+        the key that varies is changed.
         """
-        units, points = self.done.attrs["units"], self.done.iloc[rows]
-        places = np.array(x.values, float)[rows], {model: values[rows] for model, values in self.values.items()}
+        points, case = self.done.iloc[rows], self.cases[rows[0]]
+        of_points = at, {model: values[rows] for model, values in self.values.items()}
         moving = [key for key in self.done.attrs["varied"] if points[key].nunique() > 1]
-        if len(moving) != 1 or points[moving[0]].dtype.kind not in "if" or moving[0].endswith(_OF_SHAPE):
-            return places
-        (key,), case = moving, case_of(Path(points["run"].iloc[0]))
-        space = np.geomspace if "x" in self.log and points[key].min() > 0.0 else np.linspace
+        if x is None or len(moving) != 1 or not (x.keys[0] in moving or x.keys[0] in derived(case)):
+            return of_points
+        key, name = moving[0], x.keys[0]
+        if key.endswith(_OF_SHAPE) or points[key].dtype.kind not in "if":
+            return of_points
+        low, high, unit = points[key].min(), points[key].max(), self.done.attrs["units"][key] or ""
         cases: list[tuple[float, Case]] = []
-        for value in space(points[key].min(), points[key].max(), _CURVE).tolist():
+        for value in (np.geomspace if "x" in self.log and low > 0.0 else np.linspace)(low, high, _CURVE).tolist():
             with suppress(InputError, ValueError):  # a value that no case may have
-                cases.append((value, case.changed({key: f"{value!r} {units[key] or ''}".strip()})))
-        if not cases or not (x.keys[0] == key or x.keys[0] in derived(case)):
-            return places
-        predicted, _ = self.predict([moved for _, moved in cases], self.column)
-        factors = [unit_shown(units.get(name) or "")[1] for name in (x.keys[0], self.column)]
-        along = [value if x.keys[0] == key else factors[0] * derived(moved)[x.keys[0]] for value, moved in cases]
-        return np.array(along), {model: factors[1] * values for model, values in predicted.items()}
+                cases.append((value, case.changed({key: f"{value!r} {unit}".strip()})))
+        predicted, remarks = self.predict([moved for _, moved in cases], self.column)
+        if predicted.keys() != self.values.keys():
+            return of_points
+        if not all(np.isfinite(values).all() for values in predicted.values()):
+            for remark in remarks.keys() - self.remarks:
+                _tell(f"the theory's curve has gaps: {remark}")
+        along = [value if name == key else _factor(self.done, name) * derived(moved)[name] for value, moved in cases]
+        factor = _factor(self.done, self.column)
+        return np.array(along), {model: factor * values for model, values in predicted.items()}
+
+
+def _factor(done: pd.DataFrame, column: str) -> float:
+    """How many displayed units an SI unit of a column is."""
+    return unit_shown(done.attrs["units"].get(column) or "")[1]
 
 
 def _points(done: pd.DataFrame, column: str, down: str | None) -> tuple[str, pd.DataFrame]:
@@ -452,7 +467,7 @@ def _series(
         axes.plot(at, shown["down"], lw=0.9, **{**look, **shape})
     if theory is None:
         return
-    along, models = theory.curves(rows, x) if is_line else (at, {m: v[rows] for m, v in theory.values.items()})
+    along, models = theory.curves(rows, at, x if is_line else None)
     for number, values in enumerate(models.values()):
         axes.plot(along, values, zorder=1, **_model_look(number, is_line, look["color"]))
 

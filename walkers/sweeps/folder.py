@@ -180,8 +180,11 @@ def _beside(name: str) -> str:
 
 def _by_case(contents: Sequence[Row]) -> Iterator[tuple[str, list[Row], list[str]]]:
     """The runs of each case, and the keys by which they differ."""
-    for case in dict.fromkeys(row["case"] for row in contents if row["kind"] == "run"):
-        runs = [row for row in contents if row["kind"] == "run" and row["case"] == case]
+    by_case: dict[str, list[Row]] = {}
+    for row in contents:
+        if row["kind"] == "run":
+            by_case.setdefault(row["case"], []).append(row)
+    for case, runs in by_case.items():
         yield case, runs, differing([row["parameters"] for row in runs if row["parameters"]])
 
 
@@ -277,16 +280,20 @@ def plan_cleaning(out: Path, given: Sequence[Path] = ()) -> Cleaning:
         named = {row["directory"]: row["name"] for place in given for row in _rows_at(place, contents)}
         theirs = _with_theirs({*named.values()}, runs_of) - {*named.values()}
         doomed = [row for row in contents if row["directory"] in named or row["name"] in theirs]
-    running = [row for row in doomed if row["kind"] == "run" and row["status"] == "running"]
-    waiting = [row for row in doomed if row not in running and row["directory"].name.endswith(on_disk.REPLACED)]
-    waiting = [row for row in waiting if not _place(row["directory"]).exists()]  # the run that replaces it
-    remove = [row for row in doomed if row not in (*running, *waiting)]
+    stays: dict[str, list[Row]] = {"running": [], "about to be restored": []}
+    remove = []
+    for row in doomed:
+        if row["kind"] == "run" and row["status"] == "running":
+            stays["running"].append(row)
+        elif row["directory"].name.endswith(on_disk.REPLACED) and not _place(row["directory"]).exists():
+            stays["about to be restored"].append(row)  # there is no run yet that replaces it
+        else:
+            remove.append(row)
     going = {row["name"] for row in remove}
     needed = {name: len(going & {*runs}) for name, runs in runs_of.items() if name not in going}
     remarks = [
         f"needed by the sweep {name}, which would run them again: {count}" for name, count in needed.items() if count
     ]
-    stays = {"running": running, "about to be restored": waiting}
     remarks += [f"stays: {len(rows)} {why}" for why, rows in stays.items() if rows]
     locks = [] if given else sorted(out.glob("*.lock"))
     stale = [lock for lock in locks if on_disk.is_run_name(lock.stem) and not on_disk.is_locked(lock.with_suffix(""))]
