@@ -119,9 +119,9 @@ CASES: list[tuple[dict[str, Any], str]] = [
      "the radii differ too much: the beads do not touch"),
     ({"boundary": {"tilt": "-5 deg"}}, 'must be zero or more; boundary.uphill = "180 deg" turns the slope'),
     ({**cluster("fan", "0.3 mm", "0.2 mm", "0.2 mm"), "boundary": {"shape": "channel", "width": "0.7 mm"}},
-     "do not fit between the walls of the channel; expected fewer, a smaller spacing or a wider boundary"),
-    ({"dimers": {"radii": ["0.37 mm", "0.2 mm"]}, "boundary": {"shape": "box", "width": "9 mm", "height": "0.7397 mm"}},
-     'boundary.height = "0.7397 mm": too low for the walkers of dimers; expected at least 0.74 mm'),
+     "do not fit between the walls of the channel; expected a wider boundary"),
+    ({"dimers": {"radii": ["0.2 mm", "0.37 mm"]}, "boundary": {"shape": "box", "width": "9 mm", "height": "0.3 mm"}},
+     'boundary.height = "0.3 mm": too low for the walkers of dimers; expected at least 0.74 mm'),
     ({"placed": [bead("1 mm", "9 mm"), bead("0.1 mm", "30 mm"), bead("0.5 mm", "10.4 mm")]},
      "overlaps with placed[0] by 0.1 mm; expected their centres 1.5 mm apart, where they touch"),
     # What is missing
@@ -137,8 +137,10 @@ CASES: list[tuple[dict[str, Any], str]] = [
          "mixture.count", "beads.density", "boundary.material", "boundary.width", "boundary.height", "drive.frequency",
          "drive.peak_acceleration", "run.duration", "liquid.surface_tension", "liquid.dynamic_viscosity",
      ))),
-    ({"drive": {"frequency": "80 mm", "axis": "w"}, "beads": {"material": "rubi"}, "liquid": {"name": "oil"}, "no": 1},
-     'drive.frequency = "80 mm": \ndrive.axis = "w": \nbeads.material = "rubi": \nliquid.name = "oil": \nno = 1: '),
+    ({"drive": {"frequency": "80 mm", "axis": "w"}, "beads": {"material": "rubi"}, "liquid": {"name": "oil"}, "no": 1,
+      "dimers": {"radii": None}},
+     'drive.frequency = "80 mm": \ndrive.axis = "w": \nbeads.material = "rubi": \nliquid.name = "oil": \nno = 1: \n'
+     "dimers.radii: missing; "),
     # Ranges, and a library within the case
     *(({"uncertain": {key: ends}}, f"uncertain.{key} = {told}") for key, ends, told in (
         ("contact.frictio", [0.1, 0.2], "[0.1, 0.2]: unknown key"),

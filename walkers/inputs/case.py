@@ -26,7 +26,7 @@ from walkers.inputs.keys import MISSING, flatten, parts_of, value_at
 from walkers.inputs.library import library_of
 from walkers.inputs.messages import blaming, check_key, validated
 from walkers.inputs.origins import Origin, Source, Whence, text_of
-from walkers.inputs.resolving import NAMES, resolve, supplied
+from walkers.inputs.resolving import NAMES, SUPPLIED, resolve, supplied
 from walkers.inputs.run import Run, settling_of
 from walkers.inputs.table import (
     SAME_RUN,
@@ -248,10 +248,10 @@ class Case(Table):
             tables, sources, unknown = supplied(cls, document, library_of(document, source))
             try:
                 case = validated(cls, tables, source, further=[*unknown, *contradictions(cls, tables)])
-            except InputError as error:  # what a wrong name would have given is not missing too
-                wrong = {problem.key for problem in error.problems if problem.key in NAMES and problem.value}
-                wrong |= {problem.key for problem in unknown}
-                kept = [problem for problem in error.problems if not wrong or problem.value or problem.key in wrong]
+            except InputError as error:  # what the library would have given under another name is not missing too
+                misnamed = unknown or any(problem.key in NAMES and problem.value for problem in error.problems)
+                hidden = SUPPLIED if misnamed else ()
+                kept = [problem for problem in error.problems if problem.value or problem.key not in hidden]
                 raise InputError(source, kept) from error
             try:
                 case = resolve(case.but(name=name, document=document, sources=sources))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterator
 from functools import lru_cache
 from math import atan2, ceil, cos, dist, inf, pi, sin
@@ -123,7 +124,10 @@ def check_bodies(case: Case) -> Case:
     if mixture is not None:
         _check_pour(mixture, boundary, _top_of_others(case))
     if case.placed or case.meets or (case.walkers and not boundary.bare):
-        _check_places(case)
+        beads = _held(case)
+        _check_walls(case, beads)
+        if case.placed or case.meets:
+            _check_overlaps(beads)
     return case
 
 
@@ -169,41 +173,55 @@ class _Held(NamedTuple):
     walker: int = -1
 
 
-def _check_places(case: Case) -> None:
-    """Walkers and beads that are placed: between the walls, and not within each other."""
+def _held(case: Case) -> list[_Held]:
+    """The beads of walkers, then those that are placed."""
     keys = [key for key, walkers in case.walkers_by_key.items() for _ in range(walkers.replicates)]
     grid = case.boundary.grid(len(keys), max(walkers.spacing for walkers in case.walkers)) if keys else []
     beads: list[_Held] = []
-    for number, (key, (x, y), walkers) in enumerate(zip(keys, grid, standing(case), strict=False)):
-        held = walkers[1].beads
-        beads += [_Held(key, (x + bead.x, y + bead.y, bead.z), bead.radius, number) for bead in held]
-    beads += [_Held(f"placed[{number}]", bead.at, bead.radius) for number, bead in enumerate(case.placed)]
-    _check_walls(case, beads)
-    if case.placed or case.meets:
-        _check_overlaps(beads)
+    for number, (key, (x, y), (_, walker)) in enumerate(zip(keys, grid, standing(case), strict=False)):
+        beads += [_Held(key, (x + bead.x, y + bead.y, bead.z), bead.radius, number) for bead in walker.beads]
+    return beads + [_Held(f"placed[{number}]", bead.at, bead.radius) for number, bead in enumerate(case.placed)]
+
+
+def _cut_by_walls(case: Case, beads: list[_Held]) -> list[_Held]:
+    """The beads that side walls cut, and those of walkers that stand beside the floor of a vessel."""
+    import numpy as np
+
+    places = np.array([bead.place for bead in beads])
+    clearances = case.boundary.side_clearance(places)
+    if case.boundary.triangles and case.walkers:
+        clearances = np.where(np.isfinite(case.boundary.walls[0].distances(places)), clearances, -1.0)
+    return [bead for bead, clear in zip(beads, clearances, strict=True) if clear < (1.0 - OVERLAP) * bead.radius]
 
 
 def _check_walls(case: Case, beads: list[_Held]) -> None:
-    import numpy as np
-
     boundary, top = case.boundary, case.boundary.height or inf
     largest = max((max(walkers.radii) for walkers in case.walkers), default=0.0)
     if boundary.width is not None and boundary.width < 2.0 * (1.0 - OVERLAP) * largest:
         raise unusable("boundary.width", f"expected more than a bead's diameter, {2e3 * largest:.4g} mm")
-    places = np.array([bead.place for bead in beads])
-    clearances = boundary.side_clearance(places)
-    if boundary.triangles and case.walkers:  # they stand on its floor
-        clearances = np.where(np.isfinite(boundary.walls[0].distances(places)), clearances, -1.0)
-    for bead, clear in zip(beads, clearances, strict=True):
-        out, too_high = clear < (1.0 - OVERLAP) * bead.radius, bead.place[2] + bead.radius > top
-        if bead.walker >= 0 and out:
-            message = f"the walkers do not fit between the walls of the {boundary.shape}; expected fewer"
-            raise unusable(f"{bead.key}.replicates", f"{message}, a smaller spacing or a wider boundary")
-        if bead.walker >= 0 and too_high:
-            least = f"{ceil(1e6 * (bead.place[2] + bead.radius)) / 1e3:g} mm"  # a number that will do
-            raise unusable("boundary.height", f"too low for the walkers of {bead.key}; expected at least {least}")
-        if bead.walker < 0 and (out or too_high or bead.place[2] < (1.0 - OVERLAP) * bead.radius):
-            raise unusable(f"{bead.key}.at", "expected a bead within the boundary")
+    cut = _cut_by_walls(case, beads)
+    if cut and cut[0].walker >= 0:
+        raise unusable(f"{cut[0].key}.replicates", _expected_number(case, cut[0].key))
+    high = [bead for bead in beads if bead.place[2] + bead.radius > top]
+    if walking := [bead for bead in high if bead.walker >= 0]:
+        highest = max(walking, key=lambda bead: bead.place[2] + bead.radius)
+        least = f"{ceil(1e6 * (highest.place[2] + highest.radius)) / 1e3:g} mm"  # a number that will do
+        raise unusable("boundary.height", f"too low for the walkers of {highest.key}; expected at least {least}")
+    low = [bead for bead in beads if bead.walker < 0 and bead.place[2] < (1.0 - OVERLAP) * bead.radius]
+    if out := [*cut, *high, *low]:
+        raise unusable(f"{out[0].key}.at", "expected a bead within the boundary")
+
+
+def _expected_number(case: Case, key: str) -> str:
+    """How many walkers of a make fit between the walls beside the others."""
+
+    def too_many(number: int) -> bool:
+        fewer = case.put(f"{key}.replicates", number)
+        return any(bead.walker >= 0 for bead in _cut_by_walls(fewer, _held(fewer)))
+
+    most = bisect_left(range(1, case.walkers_by_key[key].replicates), True, key=too_many)
+    expected = f"at most {most}, a smaller spacing or a wider boundary" if most else "a wider boundary"
+    return f"the walkers do not fit between the walls of the {case.boundary.shape}; expected {expected}"
 
 
 def _check_overlaps(beads: list[_Held]) -> None:
