@@ -231,7 +231,8 @@ def test_from_a_case_file_to_a_deck_and_a_run(in_folder: Path, monkeypatch: pyte
     assert "velocity along the heading" in done.stdout
     lines = [line for line in done.stderr.splitlines() if not line.startswith("walkers: warning:")]
     assert lines
-    assert all(re.match(r"mine: (.* %, .*s simulated.*steps/s.*(left|starting)|measuring)", line) for line in lines), lines
+    progress = re.compile(r"mine: (.* %, .*s simulated.*steps/s.*(left|starting)|measuring)")
+    assert all(map(progress.match, lines)), lines
     assert "(already run)" in call("run", "mine.toml", check=True).stdout
     written = Path(call("export", "--to", "vtk", "mine.toml", check=True).stdout.strip())
     assert (written.name, written.exists()) == ("walkers.pvd", True)
