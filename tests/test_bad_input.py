@@ -61,7 +61,7 @@ CASES: list[tuple[dict[str, Any], str]] = [
     ({"liquid": {"meniscus_radius": "70 um"}}, "expected either volume_fraction or meniscus_radius, not both"),
     ({"liquid": {"volume_fraction": None, "meniscus_radius": "70 um"},
       "uncertain": {"liquid.volume_fraction": [0.1, 0.2]}},
-     "uncertain.liquid.volume_fraction: expected liquid.meniscus_radius, which the case has instead"),
+     "uncertain.liquid.volume_fraction = [0.1, 0.2]: expected liquid.meniscus_radius, which the case has instead"),
     ({"liquid": {"volume_fraction": None, "meniscus_radius": "1 mm"}},
      'liquid.meniscus_radius = "1 mm": expected menisci that fit between the surfaces: no bridge between'),
     ({"contact": {"roughness": {"bead_bead": "2.1 um"}}},

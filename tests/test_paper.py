@@ -12,7 +12,6 @@ from scipy.integrate import solve_ivp
 from tests.conftest import call
 from tests.printed import letters, spoilt
 from walkers.calibration.observations import numbers_of
-from walkers.inputs.axes import is_axis
 from walkers.inputs.keys import flatten
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case, shipped
@@ -53,7 +52,7 @@ def sources(once: Callable[[str, Callable[[Path], object]], Path]) -> Sources:
             given = read_toml(shipped("sweep")[name])
             given["set"] = flatten(given.get("set", {}), lambda _: False) | (ramp if name == "fig2-ramp" else SHORT)
             if "axes" in given:
-                given["axes"] = {**flatten(given["axes"], is_axis), **axes}
+                given["axes"] = {**flatten(given["axes"]), **axes}
             if name == "alignment":
                 given["set"] |= {"run.cycles": 50}  # three images 0.3 s apart
             if "descend" in given:

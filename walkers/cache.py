@@ -7,13 +7,10 @@ from collections.abc import Callable
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import numpy as np
+import numpy.typing as npt
 from platformdirs import user_cache_path
-
-if TYPE_CHECKING:
-    import numpy as np
-    import numpy.typing as npt
 
 _NOWHERE = Path("/proc/no-home")
 """A folder that nobody can make."""
@@ -43,8 +40,6 @@ def place_of_numbers(kind: str, key: bytes) -> Path:
 
 def kept_numbers(place: Path, compute: Callable[[], npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:
     """The numbers at a place of the cache, shape (n,); they are computed if there are none, or others than written."""
-    import numpy as np
-
     with suppress(OSError):
         contents = place.read_bytes()
         if contents[:32] == _checksum(place, contents[32:]):

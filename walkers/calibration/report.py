@@ -13,7 +13,6 @@ import numpy as np
 from walkers.calibration.calibrate import PROPOSED, Outcome
 from walkers.calibration.file import Calibration
 from walkers.calibration.observations import FloatArray
-from walkers.inputs.axes import is_axis
 from walkers.inputs.keys import flatten
 from walkers.inputs.toml import toml_bytes
 from walkers.postprocess.drawing import TWO_COLUMNS, new_figure, save_figure, styled
@@ -55,7 +54,7 @@ def best_case(calibration: Calibration, best: FloatArray, samples: pd.DataFrame)
     parameters, first = calibration.file.parameters, next(iter(calibration.experiments))
     values = dict(zip(parameters, map(_short, calibration.values(best[None])[0]), strict=True))
     tables = calibration.case(np.array([*values.values()]))
-    ranges = flatten(tables.get("uncertain", {}), is_axis)
+    ranges = flatten(tables.get("uncertain", {}))
     for name, parameter in parameters.items():
         low, high = map(_short, samples[name].quantile(_ENDS[::2]))
         ends = [min(low, values[name]), max(high, values[name])]

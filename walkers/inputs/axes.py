@@ -9,18 +9,16 @@ import warnings
 from collections.abc import Mapping, Sequence
 from itertools import product
 from math import prod
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from walkers.errors import unusable
-from walkers.inputs.keys import Value, flatten
+from walkers.inputs.keys import DISTRIBUTIONS, SPACINGS, Value, flatten
 from walkers.inputs.units import as_quantity
-
-if TYPE_CHECKING:
-    from walkers.physics.bridge import FloatArray
+from walkers.physics.bridge import FloatArray
 
 MOST_POINTS = 1_000_000
-_SPACINGS = ("linspace", "geomspace")
-_DISTRIBUTIONS = ("uniform", "loguniform")
 
 
 class Range(NamedTuple):
@@ -34,8 +32,6 @@ class Range(NamedTuple):
 
     def at(self, shares: FloatArray) -> FloatArray:
         """Quantiles of the range."""
-        import numpy as np
-
         ends = np.array([self.low, self.high] if self.median is None else [self.low, self.median, self.high])
         numbers = np.interp(shares, np.linspace(0.0, 1.0, len(ends)), np.log(ends) if self.logarithmic else ends)
         return np.asarray(np.exp(numbers) if self.logarithmic else numbers)
@@ -58,11 +54,6 @@ class Axis(NamedTuple):
         return tuple(map(unit_of, self.keys, zip(*self.rows, strict=True)))
 
 
-def is_axis(value: object) -> bool:
-    """Whether a table is an axis rather than a table of axes."""
-    return isinstance(value, Mapping) and any(name in value for name in (*_SPACINGS, *_DISTRIBUTIONS))
-
-
 def values_of(key: str, axis: object) -> list[Value]:
     """The values of an axis: a list, ``{ linspace = [first, last, number] }`` or ``{ geomspace = [...] }``."""
     if isinstance(axis, list):
@@ -71,11 +62,9 @@ def values_of(key: str, axis: object) -> list[Value]:
         unit_of(key, axis)
         return axis
     kind, given = next(iter(axis.items())) if isinstance(axis, Mapping) and len(axis) == 1 else ("", None)
-    if kind not in _SPACINGS:
+    if kind not in SPACINGS:
         message = "expected a list of values, { linspace = [first, last, number] } or { geomspace = [...] }"
         raise unusable(key, message, axis)
-    import numpy as np
-
     if not (isinstance(given, list) and len(given) == 3 and type(given[2]) is int and 1 <= given[2] <= MOST_POINTS):
         message = f'expected first value, last value and number, such as {{ {kind} = ["0.5 g", "10 g", 20] }}'
         raise unusable(key, message, axis)
@@ -138,12 +127,12 @@ def listed(key: str, given: object) -> Axis:
 
 def crossed(table: Mapping[str, Any]) -> list[Axis]:
     """An axis of each key."""
-    return [listed(key, given) for key, given in flatten(table, is_axis).items()]
+    return [listed(key, given) for key, given in flatten(table).items()]
 
 
 def zipped(table: Mapping[str, Any]) -> Axis:
     """An axis of keys that vary together, first value with first value."""
-    columns = {key: values_of(key, axis) for key, axis in flatten(table, is_axis).items()}
+    columns = {key: values_of(key, axis) for key, axis in flatten(table).items()}
     if not columns:
         raise unusable("zip", "expected keys and their values", dict(table))
     lengths = {key: len(values) for key, values in columns.items()}
@@ -187,9 +176,9 @@ def descending(key: str, ends: Mapping[str, Value]) -> Axis:
 def ranges_of(ranges: Mapping[str, Any]) -> dict[str, Range]:
     """The ranges of several keys, ``{ uniform = [low, high] }`` or ``{ loguniform = [low, median, high] }``."""
     spans = {}
-    for key, given in flatten(ranges, is_axis).items():
+    for key, given in flatten(ranges).items():
         kind, ends = next(iter(given.items())) if isinstance(given, Mapping) and len(given) == 1 else ("", None)
-        if kind not in _DISTRIBUTIONS or not (isinstance(ends, list) and len(ends) in (2, 3)):
+        if kind not in DISTRIBUTIONS or not (isinstance(ends, list) and len(ends) in (2, 3)):
             raise unusable(key, "expected { uniform = [low, high] } or { loguniform = [low, high] }", given)
         (low, *median, high), unit = _numbers(key, ends, positive=kind == "loguniform")
         if low >= high or not all(low <= middle <= high for middle in median):
@@ -200,7 +189,6 @@ def ranges_of(ranges: Mapping[str, Any]) -> dict[str, Range]:
 
 def unit_cube(dimensions: int, points: int, seed: int) -> FloatArray:
     """Points of Sobol's sequence in the unit cube, shape (points, dimensions), scrambled with a seed."""
-    import numpy as np
     from scipy.stats import qmc
 
     with warnings.catch_warnings():

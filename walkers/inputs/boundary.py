@@ -10,16 +10,16 @@ from dataclasses import replace
 from functools import lru_cache
 from itertools import count
 from math import ceil, cos, degrees, inf, pi, sin, sqrt
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeAlias
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
+
+import numpy as np
 
 from walkers.errors import Problem
 from walkers.inputs import units
 from walkers.inputs.drive import Vector
 from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, key, within
-
-if TYPE_CHECKING:
-    from walkers.inputs.vessel import Facet, Vessel
-    from walkers.physics.bridge import FloatArray
+from walkers.inputs.vessel import Facet, Vessel, named, vessel_between
+from walkers.physics.bridge import FloatArray
 
 FLOOR = "floor"
 LOOSE = 1.03
@@ -64,7 +64,7 @@ class Round(NamedTuple):
         return normals
 
 
-Wall: TypeAlias = "Flat | Round | Facet"
+Wall: TypeAlias = Flat | Round | Facet
 BOTTOM = Flat((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 """The floor of all boundaries with a floor."""
 
@@ -186,8 +186,6 @@ class Boundary(Table):
         if self.triangles:
             return self.vessel.facets
         if self.shape == "vessel":
-            from walkers.inputs.vessel import named
-
             return tuple(Flat(plane.point, plane.normal, named(plane.normal, k)) for k, plane in enumerate(self.planes))
         if self.shape == "groove":
             across, up = cos(self.opening / 2.0), sin(self.opening / 2.0)
@@ -264,8 +262,6 @@ class Boundary(Table):
 
     def layer(self, largest: float) -> Layer:
         """Places from which beads up to a radius (m) are poured: a square lattice, without those that walls cut."""
-        import numpy as np
-
         across = int(self.width / (2.0 * LOOSE * largest))
         pitch = self.width / max(across, 1)
         line = [(index + 0.5) * pitch - self.width / 2.0 for index in range(across)]
@@ -287,10 +283,6 @@ class Boundary(Table):
 
 @lru_cache(maxsize=16)
 def _vessel_of(boundary: Boundary) -> Vessel:
-    import numpy as np
-
-    from walkers.inputs.vessel import Vessel, vessel_between
-
     if boundary.triangles:
         return Vessel(np.array(boundary.points), np.array(boundary.triangles))
     return vessel_between([(plane.point, plane.normal) for plane in boundary.planes], boundary.height)
@@ -299,8 +291,6 @@ def _vessel_of(boundary: Boundary) -> Vessel:
 @lru_cache(maxsize=16)
 def _layers_in(boundary: Boundary, largest: float, floor: float) -> tuple[Layer, ...]:
     """Layers of a vessel of the user's own, see `Boundary.layers`."""
-    import numpy as np
-
     deep, layers = 2.0 * LOOSE * largest, []
     line = deep * (np.arange(ceil(boundary.width / deep)) - (ceil(boundary.width / deep) - 1) / 2.0)
     for level in (np.arange(max(int((2.0 * boundary.height - floor) / deep), 0)) + 0.5) * deep:

@@ -7,22 +7,22 @@ Values are numbers in SI units. What the file leaves out comes from the library,
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
 from html import escape
 from math import cos, hypot, inf, isclose, pi, sin
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import BeforeValidator, Field, ValidationError
 
-from walkers.errors import InputError, Problem, apply_all, refused, shown, unusable
+from walkers.errors import InputError, Problem, apply_all, refused, unusable
 from walkers.inputs import units
-from walkers.inputs.axes import is_axis, ranges_of
+from walkers.inputs.axes import ranges_of
 from walkers.inputs.bodies import MOST_BEADS, Cluster, Dimers, Mixture, PlacedBead, Walkers
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.drive import AXES, Drive, Excitation, Vector
-from walkers.inputs.keys import MISSING, flatten, parts_of, value_at
+from walkers.inputs.keys import MISSING, flatten, is_axis, parts_of, value_at
 from walkers.inputs.library import library_of
 from walkers.inputs.messages import blaming, check_key, validated
 from walkers.inputs.origins import Origin, Source, Whence, text_of
@@ -42,19 +42,12 @@ from walkers.inputs.table import (
 )
 from walkers.inputs.toml import with_files
 from walkers.inputs.units import Coefficient, Number, kind_in
+from walkers.physics.bridge import BridgeLaw
 from walkers.physics.capillary import DEFAULT_LAW, BridgeLiquid
 from walkers.physics.laws import by_name
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from walkers.physics.bridge import BridgeLaw
-
-
 STIFFEST = 1e11
 """Largest Young's modulus of the contacts of a case, Pa: as hard as glass or steel; runs take a day."""
-
-
 _SOFTENED = Annotated[float, replace(units.MODULUS, smallest=5e6, largest=STIFFEST)]
 
 
@@ -142,28 +135,14 @@ class Contact(Table):
 class Environment(Table):
     """``[environment]``."""
 
-    gravity: units.Acceleration = key("Acceleration of gravity.", 9.81)
+    gravity: Annotated[float, replace(units.ACCELERATION, example="9.81 m/s^2")] = key("Acceleration of gravity.", 9.81)
 
 
 def _ranges(value: object) -> object:
-    """Ranges by dotted keys (`_problems_of_ranges` has checked them)."""
+    """Ranges by dotted keys."""
     if not isinstance(value, dict):
         return value
-    return {name: ends if is_axis(ends) else {"uniform": ends} for name, ends in flatten(value, is_axis).items()}
-
-
-def _problems_of_ranges(model: type[Table], ranges: object) -> Iterator[Problem]:
-    """Keys that no case has, and ranges that are not two values of one unit, the smaller first."""
-    if not isinstance(ranges, Mapping):
-        return
-    for name, ends in flatten(ranges, is_axis).items():
-        try:
-            check_key(model, name)
-            if ranges_of({name: ends if isinstance(ends, Mapping) else {"uniform": ends}})[name].median is not None:
-                raise unusable(name, "expected [low, high]: the case's own value is the median", ends)
-        except InputError as error:
-            message = error.problems[0].expected.replace("{ uniform = [low, high] }", "[low, high]")
-            yield Problem(f"uncertain.{name}", shown(ends), message)
+    return {name: ends if is_axis(ends) else {"uniform": ends} for name, ends in flatten(value).items()}
 
 
 Ranges = Annotated[dict[str, Any], BeforeValidator(_ranges)]
@@ -212,7 +191,6 @@ class Case(Table):
         run, loose = given.get("run", {}), given.keys() & {"mixture", "placed"}
         if loose and isinstance(run, Mapping) and not run.keys() & {"duration", "cycles"}:
             yield Run.missing("duration", "run")
-        yield from _problems_of_ranges(cls, given.get("uncertain"))
         yield from super().problems(given, place)
 
     @cached_property
@@ -262,21 +240,26 @@ class Case(Table):
 
     def _check_uncertain(self, tables: Mapping[str, Any], source: str, *, around: bool) -> None:
         """Uncertain values are keys of the case, which could say both ends of the range."""
+        written = flatten(tables.get("uncertain", {}))
         for name, given in self.uncertain.items():
-            ends = next(iter(given.values()))
             try:
+                check_key(Case, name)
+                if ranges_of({name: given})[name].median is not None:
+                    raise unusable(name, "expected [low, high]: the case's own value is the median")
+                (ends,) = given.values()
                 low, high = (validated(Case, changed(Case, tables, {name: end}), source).value_of(name) for end in ends)
             except InputError as error:
-                raise error.below("uncertain", source) from error
-            value = self.value_of(name)
+                raise unusable(f"uncertain.{name}", error.problems[0].expected, written[name]) from error
+            value, slack = self.value_of(name), 1e-9 * (high - low)
             if value is None and (instead := sorted(key for key in alternatives(Case, name) if self.value_of(key))):
-                message = f"expected {' or '.join(instead)}, which the case has instead"
-                raise InputError(source, [Problem(f"uncertain.{name}", None, message)])
-            slack = 1e-9 * (high - low)
+                raise unusable(
+                    f"uncertain.{name}", f"expected {' or '.join(instead)}, which the case has instead", written[name]
+                )
             if around and isinstance(value, (int, float)) and not low - slack <= value <= high + slack:
                 text = next((origin.text for origin in self.origins if origin.key == name), str(value))
-                message = f"expected a range that holds the case's own value, {text}"
-                raise InputError(source, [Problem(f"uncertain.{name}", None, message)])
+                raise unusable(
+                    f"uncertain.{name}", f"expected a range that holds the case's own value, {text}", written[name]
+                )
 
     def changed(self, changes: Mapping[str, Any]) -> Case:
         """The case with other values of its file, by dotted keys and as a case file has them.

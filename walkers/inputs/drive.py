@@ -13,6 +13,7 @@ from itertools import pairwise
 from math import degrees, gcd, hypot, inf, isclose, isfinite, lcm, pi
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from walkers.errors import Problem
@@ -20,11 +21,10 @@ from walkers.inputs import units
 from walkers.inputs.record import Record, course_text, record_of
 from walkers.inputs.table import Choice, Filled, Indirect, Table, key
 from walkers.inputs.units import Angle, Coefficient
+from walkers.physics.bridge import FloatArray
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
-
-    from walkers.physics.bridge import FloatArray
 
 Vector = tuple[float, float, float]
 Frame = Literal["lab", "container"]
@@ -229,7 +229,6 @@ class Excitation:
     @cached_property
     def factor(self) -> PPoly:
         """Factor of the ramp against time (s): its mean over a cycle, so that velocities do not jump at its kinks."""
-        import numpy as np
         from scipy.interpolate import PPoly, make_interp_spline
 
         times, factors = np.array(self.ramp or ((0.0, 1.0),)).T
@@ -242,8 +241,6 @@ class Excitation:
 
     def motions(self, time: FloatArray) -> Iterator[tuple[Vector, tuple[FloatArray, ...]]]:
         """Direction of each harmonic or axis of a record, and displacement, velocity and acceleration at times (s)."""
-        import numpy as np
-
         for harmonic in self.harmonics:
             turn = harmonic.angular_frequency * time + harmonic.phase
             sine = np.sin(turn)

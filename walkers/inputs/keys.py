@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from typing import Any
@@ -17,6 +17,8 @@ from walkers.errors import InputError, Problem, unusable
 Value = Any
 """A TOML value: text with a unit, a number, or a list of such."""
 MISSING = object()
+SPACINGS = ("linspace", "geomspace")
+DISTRIBUTIONS = ("uniform", "loguniform")
 
 
 @lru_cache(maxsize=4096)
@@ -40,13 +42,18 @@ def value_at(document: Any, parts: Sequence[str | int]) -> Any:
     return document
 
 
-def flatten(table: Mapping[str, Any], is_leaf: Callable[[Any], bool] = lambda _: False) -> dict[str, Any]:
-    """Dotted keys of nested tables; ``{"drive": {"frequency": …}}`` and ``{"drive.frequency": …}`` are the same."""
+def is_axis(value: object) -> bool:
+    """Whether a table is an axis rather than a table of axes."""
+    return isinstance(value, Mapping) and any(name in value for name in (*SPACINGS, *DISTRIBUTIONS))
+
+
+def flatten(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Dotted keys of nested tables and axes; ``{"drive": {"frequency": …}}`` is ``{"drive.frequency": …}``."""
     flat: dict[str, Any] = {}
     for name, value in table.items():
         below = {name: value}
-        if isinstance(value, Mapping) and value and not is_leaf(value):
-            below = {f"{name}.{key}": leaf for key, leaf in flatten(value, is_leaf).items()}
+        if isinstance(value, Mapping) and value and not is_axis(value):
+            below = {f"{name}.{key}": leaf for key, leaf in flatten(value).items()}
         if twice := flat.keys() & below.keys():
             raise unusable(twice.pop(), "is given twice; expected one value")
         flat |= below

@@ -6,6 +6,9 @@ from functools import lru_cache
 from math import inf, pi
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
+from walkers.physics.bridge import BridgeLaw, Surfaces
 from walkers.physics.capillary import bead_volume, largest_normal
 from walkers.physics.contact import hertz_overlap, hertz_stiffness, reduced_modulus
 from walkers.physics.dimer import Dimer
@@ -13,7 +16,6 @@ from walkers.physics.dimer import Dimer
 if TYPE_CHECKING:
     from walkers.inputs.bodies import Walkers
     from walkers.inputs.case import Case
-    from walkers.physics.bridge import BridgeLaw, Surfaces
 
 
 def dimer_of(case: Case) -> Dimer:
@@ -40,15 +42,11 @@ def bridge_at_rest(case: Case, radius: float, other_radius: float) -> Load:
 
 def surfaces_of(case: Case, radius: float, other_radius: float) -> Surfaces:
     """A bead of a case and another bead or a plane (a radius of infinity), with a bridge between them; radii in m."""
-    from walkers.physics.bridge import Surfaces
-
     return Surfaces.of(radius, other_radius, case.liquid.of_bridges, case.contact.roughness)
 
 
 @lru_cache(maxsize=1024)  # points of a sweep have the same few bridges
 def _at_rest(law: BridgeLaw, surfaces: Surfaces) -> Load:
-    import numpy as np
-
     curve = law(surfaces)
     touching = np.zeros(1)
     pull = curve.pull(touching) if curve.pull else curve.forces(touching).pull
@@ -57,8 +55,6 @@ def _at_rest(law: BridgeLaw, surfaces: Surfaces) -> Load:
 
 def resistances_at_rest(case: Case, radius: float, other_radius: float) -> tuple[float, float, float]:
     """S (N s/m), C (N s) and Q (N m s) of that bridge, the smaller bead as body 1 (`walkers.physics.bridge`)."""
-    import numpy as np
-
     touching = case.law(surfaces_of(case, radius, other_radius)).forces(np.zeros(1))
     _, _, sliding, coupling, rolling = map(float, touching.columns()[0])
     return sliding, coupling, rolling

@@ -13,13 +13,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
+
 from walkers.inputs.table import SAME_RUN, Table
 from walkers.inputs.units import ACCELERATION, TIME, parse_quantity
+from walkers.physics.bridge import FloatArray
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
-
-    from walkers.physics.bridge import FloatArray
 
 FEWEST, MOST = 16, 100_000
 """Numbers of rows."""
@@ -45,8 +46,6 @@ class Record(Table):
     @cached_property
     def course(self) -> PPoly:
         """Displacement along x, y and z, m, against the time since the first row, s."""
-        import numpy as np
-
         course = _spline(np.array(self.rows), self.repeats).antiderivative(2)
         drift = course(course.x[-1]) / course.x[-1]
         course.c[-2] -= drift
@@ -65,15 +64,11 @@ class Record(Table):
 
     def largest(self, order: int) -> float:
         """Largest displacement (order 0, m), velocity (1) or acceleration (2) at the rows."""
-        import numpy as np
-
         return float(np.linalg.norm(self.course(self.course.x, order), axis=1).max())
 
     @cached_property
     def direction(self) -> tuple[float, float, float]:
         """Direction in which the acceleration has its largest root mean square, a unit vector."""
-        import numpy as np
-
         acceleration = self.course(self.course.x, 2)
         axis = np.linalg.eigh(acceleration.T @ acceleration)[1][:, -1]
         x, y, z = (axis * np.sign(axis[np.argmax(np.abs(axis))])).tolist()
@@ -82,8 +77,6 @@ class Record(Table):
     @cached_property
     def frequencies(self) -> tuple[float, float]:
         """Frequency of a cycle (of all lines, if the record repeats; else the strongest), and the highest one, Hz."""
-        import numpy as np
-
         count = len(self.rows)
         window = 1.0 if self.repeats else np.hanning(count + 1)[:-1, None]
         even = self.course(np.arange(count) * self.length / count, 2)
@@ -97,8 +90,6 @@ class Record(Table):
 
     def motion(self, time: FloatArray) -> FloatArray:
         """Displacement, velocity and acceleration along x, y and z at times (s), shape (3, N, 3)."""
-        import numpy as np
-
         beyond = "periodic" if self.repeats else None
         return np.stack([self.course(time, order, extrapolate=beyond) for order in range(3)])
 
@@ -133,7 +124,6 @@ def record_of(value: object) -> object:
 
 def read_record(path: Path) -> list[list[float]]:
     """Rows of a file: time, s, and acceleration along x, y and z, m/s²; raises `ValueError` if it has none."""
-    import numpy as np
     import pandas as pd
 
     try:
@@ -158,8 +148,6 @@ def read_record(path: Path) -> list[list[float]]:
 
 def _check(rows: Sequence[Sequence[float]]) -> None:
     """Raise `ValueError` for rows that give no motion."""
-    import numpy as np
-
     if not FEWEST <= len(rows) <= MOST:
         raise ValueError(f"has {len(rows)} rows; expected {FEWEST} to {MOST}")
     array, largest = np.array(rows), ACCELERATION.largest

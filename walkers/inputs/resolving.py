@@ -20,16 +20,17 @@ from walkers.inputs.keys import MISSING, parts_of, value_at
 from walkers.inputs.library import Library, LibraryNumber, unmeasured
 from walkers.inputs.loads import bridge_at_rest, contact_loads, delay, dimer_of, reach
 from walkers.inputs.origins import Source
+from walkers.inputs.record import Record
 from walkers.inputs.run import with_run
 from walkers.inputs.standing import OVERLAP, check_bodies, overlaps
 from walkers.inputs.table import alternatives, changed
 from walkers.inputs.units import ACCELERATION, LENGTH, TEMPERATURE, parse_quantity, quantity_text
+from walkers.inputs.vessel import SHARP, vessel_of
 from walkers.physics.capillary import DEFAULT_LAW, bridge_volume
 from walkers.physics.mixtures import MIXTURES
 
 if TYPE_CHECKING:
     from walkers.inputs.case import Case
-    from walkers.inputs.record import Record
 
 _PACKING = 0.55
 """Packing fraction of a settled wet pile, for the count that fills a height."""
@@ -188,8 +189,6 @@ def _vessel(case: Case) -> Case:
     boundary = case.boundary
     if boundary.mesh is None and not boundary.planes:
         return case
-    from walkers.inputs.vessel import vessel_of
-
     why = "of the mesh"
     if boundary.mesh is not None:
         try:
@@ -221,8 +220,6 @@ def _vessel(case: Case) -> Case:
 
 def _planes(planes: Sequence[Plane]) -> tuple[Plane, ...]:
     """The planes with normals of length one, a level one through the origin first."""
-    from walkers.inputs.vessel import SHARP
-
     units = []
     for number, plane in enumerate(planes):
         try:
@@ -444,12 +441,7 @@ def _check_held(case: Case, walkers: Walkers) -> None:
             raise unusable(f"liquid.{key}", f"expected {remedy}: {pushed}")
 
 
-def _gravity(case: Case) -> Case:
-    # Not in g: the paper's, 9.8 m/s², is not the case's gravity.
-    return case.noted("environment.gravity", "", "default", f"{case.environment.gravity:g} m/s^2")
-
-
 STEPS: Sequence[Callable[[Case], Case]] = (
     *(_radii, _vessel, _viscosity, _count, _walkers, _drive, _surfaces, _law, _modulus, with_run),
-    *(_uphill, _spacing, check_bodies, _gravity),
+    *(_uphill, _spacing, check_bodies),
 )

@@ -8,6 +8,9 @@ from functools import lru_cache
 from math import atan2, ceil, cos, dist, inf, pi, sin
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+from numpy.random import default_rng
+
 from walkers.errors import unusable
 from walkers.inputs.bodies import Mixture, Walkers
 from walkers.inputs.boundary import FLOOR, LOOSE, Boundary
@@ -83,16 +86,12 @@ def _walkers(case: Case, walkers: Walkers, first: int) -> Iterator[Standing]:
 
 @lru_cache(maxsize=4096)
 def _draws(seed: int, number: int) -> tuple[float, float]:
-    from numpy.random import default_rng
-
     turn, press = default_rng([seed, number]).uniform(-1.0, 1.0, size=2)
     return float(turn), float(press)
 
 
 def _poured(case: Case, mixture: Mixture) -> Standing:
     """Beads on a loose lattice with random order and displacements (seed of the case); they fall and settle."""
-    from numpy.random import default_rng
-
     largest, draw = max(mixture.radii), default_rng(case.run.seed)
     floor, beads = _top_of_others(case), []
     places = ((layer, x, y) for layer in case.boundary.layers(largest, floor) for x, y in layer.places)
@@ -185,8 +184,6 @@ def _held(case: Case) -> list[_Held]:
 
 def _cut_by_walls(case: Case, beads: list[_Held]) -> list[_Held]:
     """The beads that side walls cut, and those of walkers that stand beside the floor of a vessel."""
-    import numpy as np
-
     places = np.array([bead.place for bead in beads])
     clearances = case.boundary.side_clearance(places)
     if case.boundary.triangles and case.walkers:

@@ -139,26 +139,25 @@ class Vessel:
         return int(corners[side]), int(corners[(side + 1) % 3])
 
     @cached_property
+    def _neighbours(self) -> IntArray:
+        """Pairs of triangles with an edge in common, shape (E, 2)."""
+        pairs = [[triangle for triangle, _ in pair] for pair in self.sharing.values() if len(pair) == 2]
+        return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+    @cached_property
     def parts(self) -> IntArray:
         """Number of the connected part of each triangle, shape (T,)."""
-        pairs = [[triangle for triangle, _ in pair] for pair in self.sharing.values() if len(pair) == 2]
-        return _joined(np.array(pairs, dtype=np.int64).reshape(-1, 2), len(self.triangles))
+        return _joined(self._neighbours, len(self.triangles))
 
     @cached_property
     def faces(self) -> IntArray:
         """Number of the first triangle of the face of each: connected ones in a plane."""
-        beside: dict[int, list[int]] = defaultdict(list)
-        for pair in self.sharing.values():
-            for triangle, _ in pair:
-                beside[triangle] += [neighbour for neighbour, _ in pair if neighbour != triangle]
-        faces = np.full(len(self.triangles), -1)
-        for seed in range(len(faces)):
-            todo = [seed] if faces[seed] < 0 else []
-            while todo:
-                faces[triangle := todo.pop()] = seed
-                new = [neighbour for neighbour in beside[triangle] if faces[neighbour] < 0]
-                todo += [neighbour for neighbour in new if self.normals[seed] @ self.normals[neighbour] > _COPLANAR]
-        return faces
+        first, second = self.normals[self._neighbours.T]
+        level = np.einsum("ex,ex->e", first, second) > _COPLANAR
+        _, firsts, faces = np.unique(
+            _joined(self._neighbours[level], len(self.triangles)), return_index=True, return_inverse=True
+        )
+        return np.asarray(firsts[faces])
 
     @cached_property
     def rims(self) -> list[list[int]]:
@@ -211,16 +210,6 @@ class Vessel:
         surface: pv.PolyData = pv.PolyData.from_regular_faces(self.points, self.triangles.tolist())
         return surface
 
-    @property
-    def turns(self) -> list[float]:
-        """Angle by which the surface turns at each edge between faces, rad; negative where it stands out."""
-        angles = []
-        for (first, _), second in (pair for pair in self.sharing.values() if len(pair) == 2):
-            if self.faces[first] != self.faces[second[0]]:
-                turn = float(np.arccos(np.clip(self.normals[first] @ self.normals[second[0]], -1.0, 1.0)))
-                angles.append(turn if self._inward(*second) @ self.normals[first] > 0.0 else -turn)
-        return angles
-
     def planes(self) -> list[tuple[Vector, Vector]]:
         """Points and normals of the planes that are the same vessel, the floor first; empty if there are none.
 
@@ -228,11 +217,17 @@ class Vessel:
         """
         at_rim = np.isin(self.triangles, [point for rim in self.rims for point in rim]).any(axis=1)
         flared = (np.abs(self.normals[at_rim, 2]) > _UPRIGHT).any()
-        if flared or min(self.turns) < SHARP:
+        edges = [pair for pair in self.sharing.values() if len({self.faces[triangle] for triangle, _ in pair}) == 2]
+        obtuse = any(
+            self.normals[before] @ self.normals[after[0]] > cos(SHARP)
+            or self._inward(*after) @ self.normals[before] <= 0.0
+            for (before, _), after in edges
+        )
+        if flared or obtuse:
             return []
-        normals = [self.normals[face] for face in self._in_order()]
-        points = [self.points[self.triangles[face, 0]] for face in self._in_order()]
-        return [(_vector((n @ x) * n), _vector(n)) for x, n in zip(points, normals, strict=True)]
+        faces = self._in_order()
+        through = zip(self.normals[faces], self.points[self.triangles[faces, 0]], strict=True)
+        return [(_vector((normal @ point) * normal), _vector(normal)) for normal, point in through]
 
     def _in_order(self) -> list[int]:
         """The faces, first a level one at the bottom, if there is any."""
