@@ -340,6 +340,8 @@ COMMANDS: list[tuple[str, str]] = [
     # Options
     ("run", "CASE"),
     ("check fig1b --without magic", "--without magic: expected one of"),
+    *((f"{command} --engine /nowhere", "--engine /nowhere: expected the name or path of a liggghts binary")
+      for command in ("run fig1b", "check engine", "sweep fig2")),
     ("paper figures --only fig9", "fig9"),
     # Mistyped names
     ("--libary", 'Unknown command "--libary"'),

@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import subprocess
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from math import cos, inf, pi
@@ -20,7 +21,7 @@ from walkers.check import experiments, literature
 from walkers.check.benchmarks import TESTS, farthest_point, largest, published
 from walkers.check.bridges import LAWS, pulls
 from walkers.check.crosscheck import courses
-from walkers.check.lines import Line, Verdict, as_dict, as_text, count, failures
+from walkers.check.lines import Line, Verdict, as_dict, as_text, failures
 from walkers.inputs.reading import load_case
 from walkers.physics.capillary import derjaguin_radius
 from walkers.postprocess.motion import Motion
@@ -57,7 +58,7 @@ def test_laws_have_derjaguins_limit(law: str, radius_2: float) -> None:
 def test_published_laws_beside_young_laplace() -> None:
     """The fit of Willett et al. is within its published error; the law of Soulié et al. is too strong at walls."""
     lines = {line.quantity: line for line in pulls()}
-    assert [count(lines.values(), verdict) for verdict in (Verdict.PASS, Verdict.NOT_JUDGED)] == [4, 44]
+    assert Counter(line.verdict for line in lines.values()) == {Verdict.PASS: 4, Verdict.NOT_JUDGED: 44}
     assert lines["Soulié 2006, fig1b, wall: work over Young–Laplace"].measured == pytest.approx(1.39, abs=0.01)
     assert lines["Soulié 2006, fig1b, beads: work over Young–Laplace"].measured == pytest.approx(0.99, abs=0.01)
 

@@ -8,9 +8,10 @@ from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from walkers.check.lines import Line, Verdict, count, failures, run_checks
+from walkers.check.lines import Line, Verdict, failures, run_checks
 from walkers.check.scenes import CHECKS, Bench
-from walkers.runner.binary import AuditRecord, Engine, find_engine, model_sha256, write_audit
+from walkers.runner.binary import Engine, find_engine, model_sha256, write_audit
+from walkers.runner.manifest import iso_time
 
 
 def run_audit(
@@ -30,21 +31,12 @@ def run_audit(
             pool.shutdown(cancel_futures=True)
 
 
-def record(lines: Sequence[Line], engine: Engine, version: str) -> AuditRecord | None:
+def record(lines: Sequence[Line], engine: Engine, version: str) -> None:
     """Keep an audit for the user: runs with this binary name it, and are refused if it failed.
 
     An audit with lines that could not be measured is not kept, because the reason is the machine, not the binary.
     """
-    if count(lines, Verdict.ERROR):
-        return None
-    kept = AuditRecord(
-        engine=engine.sha256,
-        contact_model=model_sha256(engine) or "",
-        version=version,
-        lines=len(lines),
-        failures=tuple(line.quantity for line in failures(lines)),
-        skipped=count(lines, Verdict.SKIPPED),
-        date=time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
-    )
-    write_audit(kept)
-    return kept
+    if not any(line.verdict is Verdict.ERROR for line in lines):
+        failed = [line.quantity for line in failures(lines)]
+        outcome = {"passed": not failed, "lines": len(lines), "failures": failed, "date": iso_time(time.time())}
+        write_audit(engine.sha256, {"contact_model": model_sha256(engine), "version": version, **outcome})

@@ -22,7 +22,6 @@ class Verdict(StrEnum):
     PASS = "pass"
     FAIL = "FAIL"
     ERROR = "ERROR"
-    SKIPPED = "skipped"
     NOT_JUDGED = "-"
 
 
@@ -97,18 +96,14 @@ def failures(lines: Iterable[Line]) -> list[Line]:
     return [line for line in lines if line.failed]
 
 
-def count(lines: Iterable[Line], verdict: Verdict) -> int:
-    """Number of lines with a verdict."""
-    return sum(line.verdict is verdict for line in lines)
-
-
 def as_text(lines: Sequence[Line], of: str = "") -> str:
     """A table below the name of each check, and the number of lines that pass, after the words ``of``."""
     tables = [f"{check}\n{_table(rows)}\n" for check, rows in groupby(lines, lambda line: line.check)]
-    passed, failed = count(lines, Verdict.PASS), count(lines, Verdict.FAIL)
+    passed, failed, unknown = (
+        sum(line.verdict is verdict for line in lines) for verdict in (Verdict.PASS, Verdict.FAIL, Verdict.ERROR)
+    )
     outcome = f"{failed} of {passed + failed} lines fail" if failed else f"all {passed} lines pass"
-    for verdict, words in ((Verdict.ERROR, "could not be measured"), (Verdict.SKIPPED, "skipped")):
-        outcome += f", {number} {words}" if (number := count(lines, verdict)) else ""
+    outcome += f", {unknown} could not be measured" if unknown else ""
     return "\n".join([*tables, of + outcome])
 
 

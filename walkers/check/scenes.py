@@ -12,7 +12,7 @@ import shutil
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import cos, degrees, inf, nan, pi, sin, sqrt
+from math import cos, degrees, inf, pi, sin, sqrt
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
@@ -21,7 +21,7 @@ import numpy as np
 
 from walkers.check.engine import SecondEngine
 from walkers.check.kernels import FloatArray
-from walkers.check.lines import Line, Verdict
+from walkers.check.lines import Line
 from walkers.errors import Stopped
 from walkers.inputs.boundary import BOTTOM, Flat, Round, Wall
 from walkers.inputs.case import Case
@@ -130,6 +130,16 @@ def pair(
     return [
         Bead(0, (first[0], first[1], first[2]), R, spin=spins[0]),
         Bead(0, (place[0], place[1], place[2]), S, (second[0], second[1], second[2]), spins[1]),
+    ]
+
+
+def moved(beads: Sequence[Bead], x: float, y: float, speed: float = 0.0) -> list[Bead]:
+    """Beads shifted by x and y (m), with an additional velocity along x (m/s)."""
+    places = [np.add(bead.centre, (x, y, 0.0)).tolist() for bead in beads]
+    speeds = [np.add(bead.velocity, (speed, 0.0, 0.0)).tolist() for bead in beads]
+    return [
+        replace(bead, centre=tuple(place), velocity=tuple(velocity))
+        for bead, place, velocity in zip(beads, places, speeds, strict=True)
     ]
 
 
@@ -252,21 +262,21 @@ CLIMBING = [
     Bead(0, (R + S - DEEP, 0.0, S + 1e-4), S, (0.01, 0.03, -0.04), SPIN),
     Bead(0, (0.0, R + R - DEEP, R - DEEP), R, (0.0113, 0.0447, 0.0511), (3.0, -80.0, 5.0)),
 ]
-_THROWN = [
-    over(FLOOR, 2e-5, R, (0.04, -0.03, -0.2), x=1e-3),
-    over(FLOOR, -1e-7, S, (0.05, 0.0, 0.0), STILL, x=-1e-3),
-    over(FLOOR, -1e-7, R, (0.03, 0.0, 0.0), _ROLL, x=3e-3),
-    *pair(1e-5, -0.1, (0.01, -0.02, 0.0)),
-]
 _WEIGHT = {"environment.gravity": "9.81 m/s^2"}
 _FAST = {"drive.frequency": "300 Hz", "drive.peak_acceleration": "8 g", "drive.frame": "lab"}
 
 SCENES: dict[str, Setting] = {
-    "a bead leaves the floor": Setting([_LEAVING, over(FLOOR, 2e-5, S, WAY, x=2e-3)]),
-    "a bead approaches the floor": Setting([over(FLOOR, 9e-5, R, (0.031, 0.023, -0.053))]),
-    "a bead slides": Setting([over(FLOOR, -DEEP, R, (0.02, 0.013, 0.0), STILL)]),
-    "a bead rolls": Setting([over(FLOOR, -DEEP, R, (0.03, 0.0, 0.0), _ROLL)]),
-    "a bead spins in place": Setting([over(FLOOR, -DEEP, R), over(FLOOR, 2e-6, S, x=2e-3)]),
+    "beads on the floor leave, approach, slide, roll, and spin in place": Setting(
+        [
+            _LEAVING,
+            over(FLOOR, 2e-5, S, WAY, x=2e-3),
+            over(FLOOR, 9e-5, R, (0.031, 0.023, -0.053), x=4e-3),
+            over(FLOOR, -DEEP, R, (0.02, 0.013, 0.0), STILL, x=6e-3),
+            over(FLOOR, -DEEP, R, (0.03, 0.0, 0.0), _ROLL, x=8e-3),
+            over(FLOOR, -DEEP, R, x=-2e-3),
+            over(FLOOR, 2e-6, S, x=-4e-3),
+        ]
+    ),
     "a bead leaves a tilted wall": Setting([over(_LEANING, -DEEP, R, WAY)], [_LEANING]),
     "beads leave a cylindrical wall": Setting(
         [within(_ROUND, -DEEP, size, turn, (-0.05, 0.03, 0.02)) for size, turn in ((R, 0.7), (S, 3.0))], [_ROUND]
@@ -278,10 +288,14 @@ SCENES: dict[str, Setting] = {
     "a bead in a corner": Setting(
         [Bead(0, (1e-4, 6.0e-4 - R + DEEP, R - DEEP), R, (0.031, -0.043, 0.037), SPIN)], [FLOOR, _SIDE]
     ),
-    "two beads separate": Setting(_PARTING),
-    "two beads separate, the smaller first": Setting(_PARTING[::-1]),
-    "two beads approach": Setting(pair(4.1e-5, -0.023, (0.004, -0.003, 0.002))),
-    "two beads roll on each other": Setting(pair(-DEEP, 0.0, STILL)),
+    "pairs separate, of either order, approach, and roll on each other": Setting(
+        [
+            *_PARTING,
+            *moved(_PARTING[::-1], 3e-3, 0.0),
+            *moved(pair(4.1e-5, -0.023, (0.004, -0.003, 0.002)), 6e-3, 0.0),
+            *moved(pair(-DEEP, 0.0, STILL), 9e-3, 0.0),
+        ]
+    ),
     "three beads on the floor": Setting(CLIMBING),
     "the floor oscillates horizontally": Setting(
         [over(FLOOR, -DEEP, R), over(FLOOR, -5e-7, S, spin=STILL, x=2e-3)], changes=_FAST
@@ -294,25 +308,32 @@ SCENES: dict[str, Setting] = {
         [over(FLOOR, -DEEP, R), Bead(0, (2e-3, 0.0, 5e-3), S)],
         changes={**_FAST, "drive.frame": "container", "drive.axis": "z", **_WEIGHT},
     ),
-    "thrown beads": Setting(_THROWN, changes={**_WEIGHT, "drive.peak_acceleration": "4 g"}, freely=6000),
-    "a bead in free flight": Setting(
-        [Bead(0, (0.0, 0.0, 5e-3), R, (0.1, 0.2, 0.0), (1.0, 2.0, 3.0))],
+    "thrown beads": Setting(
+        [
+            over(FLOOR, 2e-5, R, (0.04, -0.03, -0.2), x=1e-3),
+            over(FLOOR, -1e-7, S, (0.05, 0.0, 0.0), STILL, x=-1e-3),
+            over(FLOOR, -1e-7, R, (0.03, 0.0, 0.0), _ROLL, x=3e-3),
+            *pair(1e-5, -0.1, (0.01, -0.02, 0.0)),
+            Bead(0, (0.0, 0.0, 5e-3), R, (0.1, 0.2, 0.0), (1.0, 2.0, 3.0)),
+        ],
         changes={**_WEIGHT, "drive.peak_acceleration": "4 g"},
-        freely=10_000,
+        freely=6000,
     ),
+    **{
+        f"beads leave the floor and each other ({name})": Setting(
+            [_LEAVING, *_PARTING], changes={"liquid.law": name, "liquid.contact_angle": "10 deg"}
+        )
+        for name in LAWS
+    },
 }
 """Scenes by name: with prescribed motion, and of beads that move freely."""
-for _name in LAWS:
-    _liquid = {"liquid.law": _name, "liquid.contact_angle": "10 deg"}
-    SCENES[f"a bead leaves the floor ({_name})"] = Setting([_LEAVING], changes=_liquid)
-    SCENES[f"two beads separate ({_name})"] = Setting(_PARTING, changes=_liquid)
 
 
 def restart_lines(bench: Bench) -> Iterator[Line]:
     """Springs and open bridges of pairs and walls continue from a restart file as in an uninterrupted run."""
     beads = [over(FLOOR, -DEEP, R, (0.002, 0.001, 0.0), STILL), *pair(-DEEP, 0.001, (0.001, -0.002, 0.001))]
     leaving = replace(over(FLOOR, -DEEP, S, WAY), centre=(3e-3, 0.0, S - DEEP))
-    scene = standing([*beads, leaving, *(_moved(bead, 0.0, 3e-3) for bead in pair(-DEEP, 0.04, STILL))])
+    scene = standing([*beads, leaving, *moved(pair(-DEEP, 0.04, STILL), 0.0, 3e-3)])
     whole = bench.run(prescribed(full_case({}), scene, 1000))
     first = prescribed(full_case({}), scene, 500, restart_to="half.restart")
     carry = bench.run(first).directory / "half.restart"
@@ -324,21 +345,12 @@ def restart_lines(bench: Bench) -> Iterator[Line]:
         yield Line(f"{quantity}: with and without a restart", 0.0, error, EQUAL)
 
 
-def _moved(bead: Bead, x: float, y: float, speed: float = 0.0) -> Bead:
-    """A bead shifted by x and y (m), with an additional velocity along x (m/s)."""
-    centre, velocity = np.add(bead.centre, (x, y, 0.0)).tolist(), np.add(bead.velocity, (speed, 0.0, 0.0)).tolist()
-    return replace(bead, centre=tuple(centre), velocity=tuple(velocity))
-
-
 def rank_lines(bench: Bench) -> Iterator[Line]:
     """A deck on two MPI ranks against the same on one."""
-    if shutil.which("mpirun") is None:
-        yield Line("two MPI ranks: no mpirun on this machine", nan, nan, decided=Verdict.SKIPPED)
-        return
     # The engine exchanges the beads of a pair that has crossed from one rank to the other.
     first, last = pair(-DEEP, 0.01, STILL)
-    rows = (0.0, (first, last)), (2e-3, (last, first))
-    scene = standing([*CLIMBING, *(_moved(bead, 2.6e-3, y, 0.9) for y, beads in rows for bead in beads)])
+    crossing = [*moved([first, last], 2.6e-3, 0.0, 0.9), *moved([last, first], 2.6e-3, 2e-3, 0.9)]
+    scene = standing([*CLIMBING, *crossing])
     single, double = (bench.run(prescribed(full_case({}), scene, 1000, ranks=ranks)).forces for ranks in (1, 2))
     yield Line("forces: two MPI ranks and one", 0.0, farthest(double[..., :3], single[..., :3]), 1e-9)
     yield Line("torques: two MPI ranks and one", 0.0, farthest(double[..., 3:], single[..., 3:]), 1e-9)

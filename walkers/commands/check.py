@@ -16,6 +16,7 @@ from walkers.commands.options import (
     At,
     By,
     Case,
+    Engine,
     Formats,
     Jobs,
     Json,
@@ -37,15 +38,13 @@ paper = App(name="paper", version_flags=(), group_parameters="Options")
 
 
 @check.command
-def engine(*, only: list[str] | None = None, as_json: Json = False, engine: str | None = None) -> int:
+def engine(*, only: list[str] | None = None, as_json: Json = False, engine: Engine = None) -> int:
     """Compare the forces of the engine and its contact model with a second engine and exact formulas.
 
     Parameters
     ----------
     only
         Run only the check with this name. Repeatable.
-    engine
-        Name or path of the liggghts binary.
     """
     from walkers.check.audit import record, run_audit
     from walkers.runner.binary import find_engine

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -86,6 +87,15 @@ class At:
         return loaded
 
 
+def _check_engine(_: object, name: str | None) -> None:
+    """Refuse a binary that is not on this machine before anything is done."""
+    if name and shutil.which(name) is None:
+        raise refused(f"--engine {name}", "expected the name or path of a liggghts binary")
+
+
+Engine = Annotated[str | None, Parameter(validator=_check_engine, help="Name or path of the liggghts binary.")]
+
+
 @Parameter(name="*")
 @dataclass(frozen=True)
 class By:
@@ -93,13 +103,11 @@ class By:
 
     Parameters
     ----------
-    engine
-        Name or path of the liggghts binary.
     allow_failed_audit
         Use an engine that failed walkers check engine.
     """
 
-    engine: str | None = None
+    engine: Engine = None
     allow_failed_audit: bool = False
 
 

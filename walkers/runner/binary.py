@@ -19,7 +19,7 @@ import subprocess
 import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -208,34 +208,12 @@ def compile_model() -> None:
 # --- audits -----------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class AuditRecord:
-    """Outcome of an audit of a binary: SHA-256 of it and of its contact model, banner, checked lines, failed ones."""
-
-    engine: str
-    contact_model: str
-    version: str
-    lines: int
-    failures: tuple[str, ...]
-    skipped: int
-    date: str
-
-    @property
-    def passed(self) -> bool:
-        """Whether all lines pass."""
-        return not self.failures
-
-    def summary(self) -> Mapping[str, Any]:
-        """Summary for the manifest of a run."""
-        return {name: getattr(self, name) for name in ("passed", "lines", "skipped", "date")}
-
-
-def read_audit(engine: str, model: str | None) -> AuditRecord | None:
-    """The record of a binary, by its hash; None if it has none with this contact model (its hash; None: any)."""
-    with suppress(OSError, ValueError, KeyError, TypeError):
-        values = read_json(cache_folder() / "audits" / f"{engine}.json")
-        record = AuditRecord(**{**values, "failures": tuple(values["failures"])})
-        return record if model in (None, record.contact_model) else None
+def read_audit(engine: str, model: str | None) -> dict[str, Any] | None:
+    """Outcome of the audit of a binary, by its hash; None without one with this contact model (its hash; None: any)."""
+    with suppress(OSError, ValueError, KeyError):
+        record = read_json(cache_folder() / "audits" / f"{engine}.json")
+        if model in (None, record["contact_model"]):
+            return {name: record[name] for name in ("passed", "lines", "failures", "date")}
     return None
 
 
@@ -248,6 +226,6 @@ def is_new(engine: str, model: str | None) -> bool:
     return True
 
 
-def write_audit(record: AuditRecord) -> None:
-    """Save a record in place of the one before. Raises `OSError` if the cache cannot be written."""
-    write_json(make_cache_folder("audits") / f"{record.engine}.json", asdict(record))
+def write_audit(engine: str, record: Mapping[str, Any]) -> None:
+    """Save the record of a binary in place of the one before. Raises `OSError` if the cache cannot be written."""
+    write_json(make_cache_folder("audits") / f"{engine}.json", record)

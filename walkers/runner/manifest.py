@@ -40,7 +40,7 @@ def write_manifest(
             "path": str(engine.path) if engine else "",
             "version": report.version,
             "sha256": engine.sha256 if engine else "",
-            "audit": audit.summary() if audit else None,
+            "audit": audit,
         },
         "deck_version": CONTENT_VERSION,
         "contact_model": model,

@@ -55,9 +55,9 @@ def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
     if audit is None and is_new(engine.sha256, model):
         message = "this engine was never audited with its contact model: walkers check engine (shown once)"
         warnings.warn(message, UnauditedEngineWarning, stacklevel=3)
-    elif audit is not None and not audit.passed and not allow_failed_audit:
+    elif audit is not None and not audit["passed"] and not allow_failed_audit:
         raise AuditFailed(
-            f"this engine failed its audit in {len(audit.failures)} line(s), first: {audit.failures[0]}; "
+            f"this engine failed its audit in {len(audit['failures'])} line(s), first: {audit['failures'][0]}; "
             "for details: walkers check engine (--allow-failed-audit, in Python allow_failed_audit=True, runs anyway)"
         )
 
