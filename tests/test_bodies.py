@@ -21,7 +21,7 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.standing import standing
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.figures import figures_of
-from walkers.postprocess.gait import postures, turned_over_at
+from walkers.postprocess.gait import postures
 from walkers.postprocess.meetings import collective
 from walkers.postprocess.motion import Group, read_motion
 from walkers.postprocess.results import read
@@ -441,4 +441,4 @@ def test_the_shipped_climber_comes_upright_and_climbs_and_its_posture_is_that_of
         turned = replace(group)
         turned.__dict__["orientation"] = np.broadcast_to(turn, group.orientation.shape)
         assert postures(turned) == [expected] * 6
-    assert turned_over_at(turned) == pytest.approx(group.time[9])
+    assert turned.turned_at == pytest.approx(group.time[9])

@@ -24,10 +24,10 @@ from walkers.inputs.table import changed
 from walkers.inputs.units import quantity_text
 from walkers.postprocess import meetings
 from walkers.postprocess.films import speed_text
-from walkers.postprocess.gait import averages, fit_slopes, settled_samples, turned_over_at
+from walkers.postprocess.gait import averages, fit_slopes, settled_samples
 from walkers.postprocess.motion import Bridges, Motion
 from walkers.postprocess.numbers import in_short
-from walkers.postprocess.piles import _joined, _of_climbs, _state_of
+from walkers.postprocess.piles import _of_climbs, _state_of
 from walkers.postprocess.report.player import _points
 from walkers.postprocess.scene import Scene, rotations_at, turned_in
 from walkers.postprocess.uncertainty import SPREAD_NAME, bands_of, spread_of
@@ -256,7 +256,7 @@ def test_a_walker_has_turned_over_90_degrees_from_its_start() -> None:
     for end, over in ((180.0, np.nan), (100.0, np.nan), (-60.0, 4.0 / 80.0)):  # 26.7° a cycle: 106.7° after four
         turned = replace(group)
         turned.__dict__["orientation"] = np.radians(np.linspace(100.0, end, len(group.time)))[:, None]
-        assert turned_over_at(turned) == pytest.approx(over, nan_ok=True)
+        assert turned.turned_at == pytest.approx(over, nan_ok=True)
 
 
 def test_the_work_of_two_harmonics_with_phases() -> None:
@@ -309,9 +309,8 @@ def test_the_state_of_a_bed() -> None:
     contacts = np.array([(0, 1, -1), (1, 2, -1), (0, -1, FLOOR), (2, -1, SIDE)])
     bridges = Bridges(1, contacts, np.array([1e-6, 3e-6, 1e-6, 1e-6]), np.array([-1e-9, 2e-6, -1e-9, -1e-9]))
     bulk = np.array([True, True, False, False])
-    _, at_wall = _joined(bridges, 4)
     moved = replace(motion, position=position, velocity=velocity)
-    state = _state_of(moved, bridges, at_wall, bulk, [(frozenset({2, 3}), frozenset({SIDE}))])
+    state = _state_of(moved, bridges, bulk, [(frozenset({2, 3}), frozenset({SIDE}))])
     bed = SimpleNamespace(**state)
     assert (bed.touching, bed.opened, bed.contacts, bed.bridges) == (1, 1, 0.5, 1.0)
     assert (bed.at_wall, bed.large_at_wall, bed.bulk, bed.clusters) == (1, 0, 2, 1)

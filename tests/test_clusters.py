@@ -183,8 +183,8 @@ def test_where_the_beads_of_a_climb_came_from() -> None:
     """Two on a wall; a third leaves the pile and joins them at 1 s; they climb from 2 s on."""
     pairs = [[(20, 21), (21, 22) if now >= 1.0 else (22, 19), (23, 19)] for now in TIME]
     scene = seen(3e-3 * np.clip(TIME[:, None] - 2.0, 0.0, None) * [1.0, 1.0, 1.0, 0.0], joined=pairs.__getitem__)
-    joined = [(np.array([*pairwise(BULK), *some], dtype=np.int32), np.arange(24) == 20) for some in pairs]
-    rows = rows_of(assembly_of(scene.tracks, scene.table, scene.beads, joined))
+    bridges = [replace(bridges_of([*pairwise(BULK), *some], {20: SIDE}), frame=n) for n, some in enumerate(pairs)]
+    rows = rows_of(assembly_of(scene.tracks, scene.table, scene.beads, bridges))
     assert max(row.time for row in rows) == scene.climbs[0].qualified > 2.0
     of_third = [row for row in rows if row.bead == 22]
     assert [row.in_bulk for row in of_third] == [row.time < 1.0 for row in of_third]

@@ -18,7 +18,7 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import chain, pairwise, takewhile
 from typing import Any
 
 import numpy as np
@@ -29,9 +29,6 @@ from walkers.postprocess.tables import Columns, columns_of
 
 Cluster = tuple[frozenset[int], frozenset[int]]
 """Beads of a cluster in a frame, and side walls that hold it."""
-
-Joined = tuple[IntArray, BoolArray]
-"""Pairs of joined beads of a frame, shape (K, 2), and whether each bead is joined to a side wall, shape (N,)."""
 
 MIN_RISE = 2e-3
 """Smallest rise of a climb, m: about two diameters of the paper's large beads."""
@@ -49,10 +46,7 @@ _MOST_BLOCKS, _FEWEST_BLOCKS = 10, 4
 
 @dataclass
 class Track:
-    """A cluster through time: frames in which it is free and held, its beads and side walls.
-
-    ``merged_into`` and ``merged_at`` are the track into which it merged and the frame in which it did, or -1.
-    """
+    """A cluster through time: frames in which it is free and held, its beads and side walls; where it merged, or -1."""
 
     frames: list[int] = field(default_factory=list)
     members: list[frozenset[int]] = field(default_factory=list)
@@ -74,13 +68,18 @@ def connected(count: int, pairs: IntArray) -> IntArray:
 def bulk_of(labels: IntArray, bridges: Bridges, *, heap: bool = True) -> BoolArray:
     """Whether beads are part of the bulk, shape (N,).
 
-    Without a ``heap`` (beads placed one by one) the largest component may be a cluster on a wall; then the bulk is what
-    is bridged to the floor.
+    Without a ``heap`` (placed beads) the largest component may be a cluster on a wall, and does not count.
     """
     beads, walls = bridges.at_walls
     on_floor = labels[beads[walls == FLOOR]]
     most = [np.bincount(labels).argmax()] if heap else []
     return np.isin(labels, [*most, *on_floor])
+
+
+def at_sides(bridges: Bridges, count: int) -> BoolArray:
+    """Whether a bridge joins a bead to a side wall, shape (count,)."""
+    beads, walls = bridges.at_walls
+    return np.isin(np.arange(count), beads[walls != FLOOR])
 
 
 def held_clusters(labels: IntArray, bridges: Bridges, bulk: BoolArray) -> Iterator[Cluster]:
@@ -132,10 +131,9 @@ def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]]) -> list[Trac
 
 @dataclass(frozen=True)
 class Beads:
-    """Beads of a pile: time (s, shape (F,)), height (m, shape (F, N)), and which are large.
+    """Beads of a pile: time (s, shape (F,)), height (m, shape (F, N)), which are large; first frame of the drive.
 
-    ``surface`` and ``bulk`` are the height of the surface and the beads of the bulk in each frame, ``first`` is the
-    first frame of the drive.
+    ``surface`` and ``bulk`` are the height of the surface and the beads of the bulk in each frame.
     """
 
     time: FloatArray
@@ -158,10 +156,9 @@ def _left_bulk(track: Track, beads: Beads) -> bool:
 def climbs_of(tracks: Sequence[Track], beads: Beads) -> Columns:
     """Table ``clusters``: the largest rise of each track of `follow`, and whether the track is a climb.
 
-    Begin and end of a rise maximise the gain, so the speed of a short and unsteady climb is too large. Its standard
-    error is that of the mean over up to ten equal parts; it is too small if the speed changes more slowly than over a
-    tenth of the climb. ``onset`` and ``qualified`` do not depend on later frames: up to a given time, records of any
-    length contain the same climbs.
+    A rise maximises the gain: the speed of a short and unsteady climb is too large. Its standard error, of the mean
+    over up to ten equal parts, is too small if the speed changes more slowly. ``onset`` and ``qualified`` do not depend
+    on later frames: up to a given time, records of any length contain the same climbs.
     """
     rows = [_climb_of(number, track, beads) for number, track in enumerate(tracks)]
     return {name: np.array([row[name] for row in rows], dtype=kind) for name, kind in _KINDS.items()}
@@ -225,8 +222,7 @@ def _climb_of(number: int, track: Track, beads: Beads) -> dict[str, Any]:
 def _qualified(gained: FloatArray) -> list[int] | None:
     """Begin of the rise that makes a track a climb, and the frame at which it qualifies; None without a climb.
 
-    It qualifies where its height above its lowest is a maximum so far, at least `MIN_RISE`, and the rise has enough
-    frames: a hop between two frames is not a climb.
+    Its height above its lowest is then a maximum so far, and at least `MIN_RISE`; a hop between two frames is no climb.
     """
     places, least = np.arange(len(gained)), np.minimum.accumulate(gained)
     risen = gained - least
@@ -291,21 +287,27 @@ def _of_beads(columns: Columns, beads: Beads) -> Columns:
     return columns | {"time": beads.time[frame], "large": beads.large[bead], "height": beads.height[frame, bead]}
 
 
-def assembly_of(tracks: Sequence[Track], climbs: Columns, beads: Beads, bridges: Sequence[Joined]) -> Columns:
-    """Table ``assembly``: state of the beads of each climb in each frame, from rest until it qualifies."""
-    rows: list[tuple[Any, ...]] = []
-    for number in np.flatnonzero(climbs["climbed"]).tolist():
-        until = int(np.searchsorted(beads.time, climbs["qualified"][number]))
-        members = np.array(sorted(tracks[number].members[tracks[number].frames.index(until)]))
-        for frame in range(max(beads.first - 1, 0), until + 1):
-            pairs, walled = bridges[frame]
-            within = np.searchsorted(members, pairs[np.isin(pairs, members).all(axis=1)])
+def assembly_of(tracks: Sequence[Track], climbs: Columns, beads: Beads, bridges: Iterable[Bridges]) -> Columns:
+    """Table ``assembly``: state of the beads of each climb in each frame, from rest until it qualifies.
+
+    Of the ``bridges`` of all frames those after the last of these are not asked for.
+    """
+    climbing = np.flatnonzero(climbs["climbed"]).tolist()
+    ends = np.searchsorted(beads.time, climbs["qualified"][climbing]).tolist()
+    rows: list[list[tuple[Any, ...]]] = [[] for _ in climbing]
+    for now in takewhile(lambda now: now.frame <= max(ends), bridges if ends else ()):
+        walled = at_sides(now, len(beads.large))
+        for number, until, of_climb in zip(climbing, ends, rows, strict=True):
+            if not max(beads.first - 1, 0) <= now.frame <= until:
+                continue
+            members = np.array(sorted(tracks[number].members[tracks[number].frames.index(until)]))
+            within = np.searchsorted(members, now.beads[np.isin(now.beads, members).all(axis=1)])
             labels, neighbours = connected(len(members), within), np.bincount(within.ravel(), minlength=len(members))
             joined = (labels == np.bincount(labels).argmax()) & (neighbours > 0)
-            states = (members, beads.bulk[frame][members], walled[members], neighbours, joined)
-            rows += [(frame, number, *state) for state in zip(*states, strict=True)]
+            states = (members, beads.bulk[now.frame][members], walled[members], neighbours, joined)
+            of_climb += [(now.frame, number, *state) for state in zip(*states, strict=True)]
     kinds = {"frame": int, "track": int, "bead": int, "in_bulk": bool, "at_wall": bool, "neighbours": int}
-    return _of_beads(columns_of(rows, **kinds, joined=bool), beads)
+    return _of_beads(columns_of(chain.from_iterable(rows), **kinds, joined=bool), beads)
 
 
 def events_of(tracks: Sequence[Track], climbs: Columns, beads: Beads) -> Columns:

@@ -102,14 +102,9 @@ def check_place(path: Path, *suffixes: str) -> None:
 def save_figure(
     figure: Figure, path: Path, sources: Sequence[str], formats: str | Sequence[str] = ("png",), title: str = ""
 ) -> list[Path]:
-    """Write a figure, in one or several formats, beside its final place and rename it.
+    """Write a figure beside its final place and rename it; each of the formats (`FORMATS`) replaces the suffix.
 
-    Parameters
-    ----------
-    figure, path, formats
-        The figure; the file, whose suffix each format replaces; formats of `FORMATS`, else InputError.
-    sources, title
-        Metadata of the file: names of the run directories, which end in the hash of case and engine; title.
+    Its metadata name the ``sources``, run directories, which end in the hash of case and engine, and a title.
     """
     formats = check_formats(formats)
     path.parent.mkdir(parents=True, exist_ok=True)

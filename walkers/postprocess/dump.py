@@ -44,16 +44,9 @@ class _Frame(NamedTuple):
 
 
 class BinaryDump:
-    """Frames of a binary dump with named columns.
+    """Complete frames of a binary dump with named columns, and the engine's step of each.
 
-    `DumpError` if the file is not such a dump.
-
-    Attributes
-    ----------
-    steps : ndarray of int64, shape (frames,)
-        The engine's step of each complete frame.
-    truncated : bool
-        Whether the file ends within a frame; the incomplete frame is left out.
+    It is ``truncated`` if it ends within a frame. `DumpError` if the file is not such a dump.
     """
 
     def __init__(self, path: Path, columns: tuple[str, ...]) -> None:
@@ -87,10 +80,7 @@ class BinaryDump:
         return _Frame(start, end, step, parts)
 
     def stack(self) -> FloatArray:
-        """All frames, shape (frames, rows, columns).
-
-        `DumpError` if the number of rows changes; `NoNumberError` if there is a NaN or an infinity.
-        """
+        """All frames, shape (frames, rows, columns); `DumpError` if the number of rows changes or is not a number."""
         sizes = {sum(count for _, count in frame.parts) for frame in self._frames}
         if len(sizes) > 1:
             raise DumpError(f"{self.path}: the number of beads changes")

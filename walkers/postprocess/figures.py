@@ -38,10 +38,7 @@ if TYPE_CHECKING:
 
 
 class Panel(NamedTuple):
-    """A plot: its table, x, y, the column with the number of the line, title, inches high.
-
-    ``y`` may be several columns, separated by blanks; ``rotation_*`` are those of all beads.
-    """
+    """A plot: table, x, y (several columns; ``rotation_*``: of all beads), column of the lines, title, inches high."""
 
     table: str
     x: str
@@ -96,10 +93,9 @@ def figures_of(results: Results) -> dict[str, Figure]:
 
 
 def plot_run(directory: Path, destination: Path | None = None, formats: str | Sequence[str] = ("png",)) -> list[Path]:
-    """Draw the figures of a run: ``walk`` and ``gait`` of walkers, ``paths`` of trays, ``climb`` of piles.
+    """Draw the figures of a run, ``walk``, ``gait``, ``paths`` or ``climb``, into a folder, by default that of the run.
 
-    The files are written into ``destination``, by default the run directory. A format that is not in
-    `walkers.postprocess.drawing.FORMATS` raises ``InputError``, as does the name of a picture for the folder.
+    `InputError` for formats that are not in `walkers.postprocess.drawing.FORMATS`, and for a picture's name as folder.
     """
     from walkers.postprocess.results import read
 

@@ -36,17 +36,10 @@ _COLOURS, _SAMPLES = 40, 6  # colours of a GIF; pictures from which they are cho
 def render_film(
     directory: Path, to: Path | None = None, options: FilmOptions = FilmOptions(), *, on_progress: Tell | None = None
 ) -> Path:
-    """Render a film of one walker if walkers are independent or one is chosen, otherwise of all beads.
+    """Render a film (MP4 or GIF, by default ``film.mp4`` in the run directory); see `FilmOptions` for what it shows.
 
     `InputError` if the format cannot hold the film, the walker does not exist, or no frame is between begin and end;
-    `WalkersError` if ffmpeg fails.
-
-    Parameters
-    ----------
-    directory, to
-        A run directory, and the MP4 or GIF file to write; None: ``film.mp4`` in the run directory.
-    options, on_progress
-        Options; a function that is called after each frame.
+    `WalkersError` if ffmpeg fails. ``on_progress`` is called after each frame.
     """
     path, (wide, tall) = to or directory / "film.mp4", options.size
     check_place(path, ".mp4", ".gif")
@@ -84,10 +77,9 @@ def render_film(
 
 
 class FilmTimes(NamedTuple):
-    """Times of the K pictures of a film.
+    """Times of the K pictures of a film (s), and their frames of the motion, with fractions between two.
 
-    ``time`` is the physical time (s). ``frame`` is the index of the frame of the motion, a fraction between two frames.
-    ``slowdown`` is the slow motion factor; in a ``stroboscopic`` film all pictures are at one phase of the drive.
+    In a ``stroboscopic`` film all pictures are at one phase of the drive.
     """
 
     time: FloatArray

@@ -54,10 +54,9 @@ _PARTS = 10
 
 
 class Gait(NamedTuple):
-    """Time series of F frames and W walkers of n beads; SI units.
+    """Velocity along the heading, shape (F, W), and rotation velocities of the beads, shape (F, W, n), m/s.
 
-    Velocity of the mass centre along the heading, shape (F, W); rotation velocity of the beads, shape (F, W, n);
-    sliding velocity at the contacts of the beads with walls, then of their pairs, shape (F, W, n + pairs).
+    Sliding velocity, m/s, at the contacts of beads with walls, then of their pairs, shape (F, W, n + pairs).
     """
 
     velocity: FloatArray
@@ -95,10 +94,9 @@ def _normals(group: Group) -> FloatArray:
 
 
 class Averages(NamedTuple):
-    """Means over the cycles after the settling ones, and work of the drive; contacts as in `Gait`.
+    """Means over the measured cycles: rotation, sliding (m/s), share of the time with open contacts, as in `Gait`.
 
-    Rotation, m/s, shape (W, n); sliding, m/s, and share of the time with open contacts, shape (W, n + pairs); work on
-    each walker in each cycle, J, shape (cycles, W), NaN if the frames do not resolve a cycle.
+    Work on each walker in each cycle, J, shape (cycles, W), NaN if the frames do not resolve a cycle.
     """
 
     rotation: FloatArray
@@ -112,8 +110,7 @@ def averages(group: Group) -> Averages:
 
     Means over 20 samples per cycle have errors up to 10 % if contacts open, because spins change within few steps when
     beads touch. Therefore spins are averages of the engine over all steps, velocities are displacements, and gaps and
-    work are evaluated ten times per interval between samples by cubic interpolation (with less than eight samples per
-    cycle, gaps at the samples).
+    work are evaluated ten times per interval by cubic interpolation (gaps at the samples, if they are few).
     """
     run, samples = group.case.run, settled_samples(group.case.run)
     parts = _PARTS if group.motion.follows_cycles else 1
@@ -193,13 +190,6 @@ def settled_samples(run: Run) -> slice:
     return slice(run.settled_strobes * samples, run.cycles // run.cycles_per_sample * samples)
 
 
-def turned_over_at(group: Group) -> FloatArray:
-    """End of the first cycle with a heading more than 90° from that at the start, s; NaN if none; shape (W,)."""
-    strobe = group.case.run.samples_per_cycle
-    over = np.abs(group.orientation[::strobe] - group.orientation[0]) > np.pi / 2.0
-    return np.where(over.any(axis=0), group.time[::strobe][over.argmax(axis=0)], np.nan)
-
-
 def turns_over_after(group: Group) -> FloatArray:
     """Time after the end of the run at which walkers on a slope turn over, s; NaN if their angle does not grow so.
 
@@ -229,7 +219,7 @@ def postures(group: Group) -> list[str]:
     """
     off = np.abs(group.orientation[:: group.case.run.samples_per_cycle])
     stands = (off[-1] <= UPRIGHT) & (off[-1] <= off[len(off) // 2] + _NO_MORE)
-    turned = np.isfinite(turned_over_at(group))
+    turned = np.isfinite(group.turned_at)
     labels: list[str] = np.select([turned, stands], ["turned_over", "upright"], "leaning").tolist()
     return labels
 

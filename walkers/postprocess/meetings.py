@@ -96,11 +96,10 @@ def collective(
     merged: int,
     axis: FloatArray,
 ) -> dict[str, Any]:
-    """Collective numbers of a result (`walkers.postprocess.quantities`); NaN for undefined ones.
+    """Collective numbers of a result of W walkers in K frames, two or more, at least one per cycle; NaN if undefined.
 
-    Of W walkers in K frames, two or more and at least one per cycle: ``time`` (s) has the shape (K,), ``centre`` (of
-    mass, m) and ``heading`` have the shape (K, W, 2); ``size`` (number of walkers in the cluster) and ``held`` have the
-    shape (K, W). ``merged`` is the number of meetings, ``axis`` the unit vector of the drive.
+    ``centre`` (of mass, m) and ``heading`` have the shape (K, W, 2), ``size`` (number of walkers in the cluster) and
+    ``held`` (K, W); ``merged`` is the number of meetings, ``axis`` the unit vector of the drive.
     """
     begin = min(int(np.searchsorted(time, time[-1] - _END * (time[-1] - time[0]))), len(time) - 2)
     speed = np.linalg.norm(np.diff(centre, axis=0), axis=-1) / np.diff(time)[:, None]

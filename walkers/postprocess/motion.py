@@ -160,8 +160,8 @@ class Motion:
 class Group:
     """The W walkers of one make, of n beads each, in F frames of a motion of all beads; SI units.
 
-    ``rows`` are the indices of their beads in the motion, shape (W, n). ``position`` and ``velocity`` of the centres
-    and ``spin`` (angular velocity, rad/s) have the shape (F, W, n, 3), ``time`` has the shape (F,).
+    ``rows`` are the indices of their beads in the motion, shape (W, n); positions, velocities and spins have the shape
+    (F, W, n, 3).
     """
 
     motion: Motion
@@ -234,6 +234,13 @@ class Group:
         turned = np.arctan2(facing * (arm @ self.across_axis), facing * (arm @ self.drive_axis))
         angle: FloatArray = np.unwrap(turned - np.arctan2(aside, ahead), axis=0)
         return angle
+
+    @cached_property
+    def turned_at(self) -> FloatArray:
+        """End of the first cycle with a heading more than 90° from that at the start, s; NaN if none; shape (W,)."""
+        strobe = self.case.run.samples_per_cycle
+        over = np.abs(self.orientation[::strobe] - self.orientation[0]) > np.pi / 2.0
+        return np.where(over.any(axis=0), self.time[::strobe][over.argmax(axis=0)], np.nan)
 
 
 def between(moved: Motion | Group, share: float) -> FloatArray:
@@ -366,14 +373,9 @@ def boundary_motion(drive: Excitation, time: FloatArray) -> tuple[FloatArray, Fl
 class Bridges:
     """The bridges of one frame of a motion (index ``frame``): K between beads, then M to walls.
 
-    Tangential forces are left out: the engine reports wrong ones for sliding contacts.
-
-    Attributes
-    ----------
-    contacts : ndarray of int, shape (K + M, 3)
-        Both beads, from 0, in ascending order, and -1; of a bridge to a wall the bead, -1 and the wall (0: floor).
-    force, gap : ndarray, shape (K + M,)
-        Net normal force (capillary, viscous and elastic), positive for attraction, N; gap, negative for overlap, m.
+    ``contacts``, shape (K + M, 3), are both beads, from 0, in ascending order, and -1; of a bridge to a wall the bead,
+    -1 and the wall (0: floor). ``force`` is the net normal force (capillary, viscous and elastic, N, positive for
+    attraction), ``gap`` (m) is negative for overlap. The engine reports wrong tangential forces of sliding contacts.
     """
 
     frame: int

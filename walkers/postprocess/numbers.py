@@ -67,10 +67,7 @@ def fell(numbers: Mapping[str, Any]) -> bool:
 
 
 def state(numbers: Mapping[str, Any]) -> str:
-    """State of walkers whose mean velocity is not informative, such as ``at rest``; empty otherwise.
-
-    For a drive with a ramp it is the threshold of motion: ``stops at 0.8 g``.
-    """
+    """State of walkers whose mean velocity is not informative: ``at rest``, of a ramp ``stops at 0.8 g``, or empty."""
     if numbers.get("came_apart"):
         return "came apart"
     thresholds = {verb: numbers.get(f"{verb}_at", nan) for verb in ("stops", "starts")}

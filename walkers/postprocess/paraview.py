@@ -36,23 +36,18 @@ _NECK = 0.45  # drawn radius of a bridge over the radius of the smallest bead
 
 
 def write_vtk(directory: Path, destination: Path | None = None, *, every: int | None = None) -> Path:
-    """Write a run for ParaView, with a script that shows it; independent walkers are side by side.
+    """Write a run for ParaView, with a script that shows it, and return the ``.pvd`` file with times in s.
+
+    Each frame has the blocks ``beads``, ``boundary`` and, if they were recorded in it, ``bridges``; independent walkers
+    are side by side.
 
     Parameters
     ----------
     directory, destination
-        A run directory; the folder to write, ``vtk`` in the run directory if None. A folder is replaced if it is
-        empty, or if it has no files but those of an earlier export, which its ``walkers.pvd`` lists. A folder with any
-        other file, a file, or a symbolic link raises an InputError.
+        A run directory; the folder to write, ``vtk`` in the run directory if None. An `InputError` is raised unless it
+        is new, empty, or has no files but those that its ``walkers.pvd`` lists, and is no symbolic link.
     every
         Write every ``every``-th sample of the drive; None: one per cycle, or all samples if they are further apart.
-        Bridges are in the frames that recorded them.
-
-    Returns
-    -------
-    Path
-        The ``.pvd`` file with times in s; each frame has the blocks ``beads`` (vertices, `_beads`), ``boundary``
-        (triangles) and, if there are any, ``bridges`` (lines, `_bridges`).
     """
     check_limits("every", every, 1)
     destination = destination or directory / "vtk"

@@ -11,16 +11,14 @@ import numpy as np
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
 from walkers.postprocess import clusters
-from walkers.postprocess.clusters import Beads, Cluster, Joined
+from walkers.postprocess.clusters import Beads, Cluster
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
-from walkers.postprocess.motion import FLOOR, Bridges, Motion, read_bridges
+from walkers.postprocess.motion import Bridges, Motion, read_bridges
 from walkers.postprocess.numbers import Measured
 from walkers.postprocess.tables import Columns, read_columns
 
 _WHOLE = 1.0 - 1e-6
 """Fraction of the duration below which a run ended early."""
-State = dict[str, float]
-"""The columns of ``bed`` in a frame."""
 
 
 def applies(case: Case) -> bool:
@@ -36,15 +34,14 @@ def derived(case: Case) -> dict[str, float]:
 def measure(motion: Motion) -> Measured:
     """Tables and numbers of the bed and of the clusters."""
     case = motion.case
-    rows, bulks, held, joined = [], [], [], []
+    rows, bulks, held = [], [], []
     for bridges in read_bridges(motion):
         labels = clusters.connected(len(motion.radius), bridges.beads)
         bulks.append(clusters.bulk_of(labels, bridges, heap=case.mixture is not None))
         # While the pile settles, most beads are free of the bulk.
         driven = motion.time[bridges.frame] >= 0.0
         held.append(list(clusters.held_clusters(labels, bridges, bulks[-1])) if driven else [])
-        joined.append(_joined(bridges, len(motion.radius)))
-        rows.append(_state_of(motion, bridges, joined[-1][1], bulks[-1], held[-1]))
+        rows.append(_state_of(motion, bridges, bulks[-1], held[-1]))
     bed, walls = {name: np.array([row[name] for row in rows]) for name in rows[0]}, case.boundary.walls
     beads = Beads(
         time=motion.time,
@@ -63,7 +60,7 @@ def measure(motion: Motion) -> Measured:
         "clusters": climbs,
         "events": events,
         "members": clusters.members_of(tracks, beads),
-        "assembly": clusters.assembly_of(tracks, climbs, beads, joined),
+        "assembly": clusters.assembly_of(tracks, climbs, beads, read_bridges(motion)),
     }
     counts = {f"events_{event}": int(np.sum(events["event"] == event)) for event in clusters.EVENTS}
     numbers = {"clusters": len(tracks), **counts, **_of_climbs(climbs), **_of_bed(motion, bed)}
@@ -112,19 +109,9 @@ def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
     return track, np.append(climbed, False)[track]
 
 
-def _joined(bridges: Bridges, count: int) -> Joined:
-    """The joined beads of a frame."""
-    at_wall = np.zeros(count, dtype=np.bool_)
-    beads, walls = bridges.at_walls
-    at_wall[beads[walls != FLOOR]] = True
-    return bridges.beads.astype(np.int32), at_wall
-
-
-def _state_of(
-    motion: Motion, bridges: Bridges, at_wall: BoolArray, bulk: BoolArray, held: Sequence[Cluster]
-) -> dict[str, Any]:
-    """State of a pile in a frame from its beads at walls and in the bulk, and the held clusters."""
-    frame = bridges.frame
+def _state_of(motion: Motion, bridges: Bridges, bulk: BoolArray, held: Sequence[Cluster]) -> dict[str, Any]:
+    """The columns of ``bed`` in a frame."""
+    frame, at_wall = bridges.frame, clusters.at_sides(bridges, len(motion.radius))
     position, radius, large = motion.position[frame], motion.radius, motion.large
     # Cells of the cross-section are about four large radii wide. Without a bulk the floor is the surface.
     tops = _surface_cells(position[bulk], radius[bulk], motion.case.boundary, 4.0 * float(radius.max()))

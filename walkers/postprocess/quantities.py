@@ -28,20 +28,10 @@ ENDS = {
 
 @dataclass(frozen=True)
 class Quantity:
-    """A column or a number.
+    """A column or a number: name, SI unit, label of axes and rows, definition, name of its error or scatter if any.
 
-    Attributes
-    ----------
-    name
-        Its name; with a ``*`` there is one per bead or contact: ``rotation_1``, ``rotation_2``, …
-    unit
-        SI unit; ``share`` for a number that is shown in per cent.
-    label
-        Label of axes and rows, without the unit; ``*`` is the number of the bead or contact.
-    meaning
-        Definition, for the reference and the files.
-    error
-        Name of the number that is its error or scatter, if there is one.
+    With a ``*`` in its name there is one per bead or contact: ``rotation_1``, ``rotation_2``, …. The unit ``share`` is
+    that of numbers that are shown in per cent.
     """
 
     name: str

@@ -93,8 +93,7 @@ def derived(case: Case) -> dict[str, Any]:
 def measure(directory: Path) -> None:
     """Measure a run, finished or not; write its tables and, last, ``result.json``.
 
-    `walkers.postprocess.dump.DumpError` if a dump cannot be read; `walkers.runner.manifest.FileChanged` if a dump of a
-    finished run is not what it was.
+    `walkers.postprocess.dump.DumpError` if a dump cannot be read, `walkers.runner.manifest.FileChanged` if it changed.
     """
     from walkers.postprocess.motion import read_motion
     from walkers.postprocess.tables import write_table
@@ -171,10 +170,7 @@ def recorded(directory: Path) -> dict[str, Any]:
 
 
 def ensure_measured(directory: Path) -> None:
-    """Measure a finished run again if a file of its result is missing, damaged, edited or of another version.
-
-    Its errors are those of `measure`.
-    """
+    """Measure (`measure`) a finished run again if a file of its result is missing, damaged, edited or outdated."""
     try:
         names = [RESULT_NAME, *(f"{name}.parquet" for name in recorded(directory)["tables"])]
         if check_unchanged(directory, names):
@@ -191,10 +187,7 @@ def plain(numbers: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def text(results: Results, *, cached: bool = False) -> str:
-    """A result in lines: state or drive, numbers with errors, warnings, origins of values, directory.
-
-    ``cached`` results are marked as already run.
-    """
+    """A result in lines: state or drive, numbers with errors, warnings, origins of values, directory."""
     first, *rest = headlines(results)
     if cached and not results.about["by_hand"]:  # it was never made by a command
         first += " (already run)"

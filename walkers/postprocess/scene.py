@@ -132,8 +132,8 @@ class Scene:
     ) -> Scene:
         """A view of the beads in some frames, and of the width and the floor of a container.
 
-        ``share`` is the extent of the picture over that of the beads. Options are ``shaken``, ``rolling`` and ``path``;
-        with a path the view does not include the container.
+        ``share`` is the extent of the picture over that of the beads. Options are ``shaken``, ``rolling`` and ``path``,
+        with which the view does not include the container.
         """
         seen = motion.position[frames]
         if options.get("shaken", True):
@@ -149,10 +149,7 @@ class Scene:
         return cls(motion, axes, low - wider, high + wider, **options)
 
     def following(self, aspect: float, share: float = 1.0, frames: slice = slice(None)) -> Scene:
-        """The same view, or, if the path of the beads is long, a closer view that follows the beads.
-
-        ``aspect`` is the width of the picture over its height; ``share`` and ``frames`` are those of `around`.
-        """
+        """The same view (`around`), or, if the path of the beads is long, a closer one that follows the beads."""
         options = {"shaken": self.shaken, "rolling": self.rolling, "path": path_of(self.motion, frames.start or 0)}
         near = Scene.around(self.motion, self.axes, _ABOUT * share, frames, **options)
         return near if self.height(aspect) > _LONG * near.height(aspect) else self

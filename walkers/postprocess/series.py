@@ -50,10 +50,8 @@ def render_series(
 
     Parameters
     ----------
-    directory
-        A run directory.
-    destination
-        The PNG to write; ``series.png``, of one walker ``walker.png``, in the run directory if None.
+    directory, destination
+        A run directory; the PNG, if None ``series.png``, of one walker ``walker.png``, in it.
     images
         Largest number of pictures, evenly spaced through the drive; fewer if the last is then closer to its end.
     walker

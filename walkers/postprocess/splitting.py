@@ -20,15 +20,8 @@ from walkers.templates.layout import Layout
 def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) -> None:
     """Write the dumps and the layout of each case into its directory, and remove those of the shared deck.
 
-    Beads and walkers are renumbered; their positions are those in the shared deck. `WalkersMet` if two
-    walkers came so close that they are not independent; `walkers.postprocess.dump.DumpError` if a dump cannot be read.
-
-    Parameters
-    ----------
-    directory, layout
-        Directory and layout of the deck.
-    cases
-        Cases by directory, in the order of the deck.
+    ``cases`` are in the order of the deck. Beads and walkers are renumbered; their positions are those in the shared
+    deck. `WalkersMet` if two walkers came so close that they are not independent.
     """
     dump = BinaryDump(directory / layout.bead_dump, layout.bead_columns)
     frames, x = dump.stack(), dump.column("x")

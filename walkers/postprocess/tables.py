@@ -34,10 +34,7 @@ def columns_of(rows: Iterable[Sequence[Any]], **kinds: type) -> Columns:
 
 
 def write_table(directory: Path, name: str, columns: Columns) -> None:
-    """Write a table into a run directory, beside its final place, and rename it.
-
-    KeyError if a column is missing or is not declared in `walkers.postprocess.quantities.TABLES`.
-    """
+    """Write a table of a run; KeyError if columns are missing or not in `walkers.postprocess.quantities.TABLES`."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -78,21 +75,10 @@ def _arrow(values: npt.NDArray[Any]) -> Any:
 
 
 def read_table(directory: str | Path, name: str) -> pd.DataFrame:
-    """Read a table of a run directory into pandas, SI units.
+    """Read a table of a run directory, such as ``trajectory``, ``walkers`` or ``bed``, into pandas, SI units.
 
-    `InputError` if the directory has no such table, or it is damaged.
-
-    Parameters
-    ----------
-    directory
-        The run directory.
-    name
-        A table, such as ``trajectory``, ``walkers`` or ``bridges``; of a pile ``bed`` or ``clusters``.
-
-    Returns
-    -------
-    DataFrame
-        ``attrs["units"]`` and ``attrs["long_name"]`` map columns to units and labels.
+    ``attrs["units"]`` and ``attrs["long_name"]`` map its columns to units and labels. `InputError` if the directory has
+    no such table, or it is damaged.
     """
     table = _read(Path(directory), name)
     frame: pd.DataFrame = table.to_pandas()

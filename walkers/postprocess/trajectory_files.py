@@ -22,11 +22,9 @@ SUFFIX = ".lammpstrj"
 
 
 def write_trajectory(directory: Path, destination: Path | None = None, *, every: int | None = None) -> Path:
-    """Write the motion of the beads during the drive, every ``every``-th sample (None: all).
+    """Write every ``every``-th sample of the drive to a file, if None ``trajectory.lammpstrj`` in the run directory.
 
-    The box of all frames contains the beads and the inner width of a container. ``destination`` is the file to write,
-    ``trajectory.lammpstrj`` in the run directory if None. `InputError` if the file has another suffix, or ``every`` is
-    less than 1.
+    The box of all frames contains the beads and the inner width of a container. `InputError` for another suffix.
     """
     path = destination or directory / f"trajectory{SUFFIX}"
     check_place(path, SUFFIX)

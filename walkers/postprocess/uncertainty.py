@@ -88,10 +88,7 @@ def bands_of(directory: Path, rests: Sequence[Mapping[str, Any]], numbers: Mappi
 
 
 def accuracy_of(directory: Path) -> dict[str, Any]:
-    """The numerical errors of a run as `walkers.sweeps.accuracy` has recorded them; empty if they were not measured.
-
-    `InputError` if their file was edited or is damaged.
-    """
+    """The recorded numerical errors of a run (`walkers.sweeps.accuracy`), if any; `InputError` for edited files."""
     if not (directory / ACCURACY_NAME).is_file():
         return {}
     try:

@@ -121,7 +121,7 @@ def tables_of(group: Group) -> dict[str, Columns]:
         **gait.walk(group),
         "orientation_mean": group.orientation[samples].mean(axis=0),
         "orientation_end": group.orientation[-1],
-        "turned_at": gait.turned_over_at(group),
+        "turned_at": group.turned_at,
         "separated_fraction": (group.gap[samples, :, beads:] > reach).any(axis=-1).mean(axis=0),
         **numbered("rotation", mean.rotation),
         **_by_kind(beads, sliding=mean.sliding, open=mean.open),

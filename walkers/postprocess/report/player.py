@@ -48,7 +48,7 @@ class Player:
 def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: int = 480) -> Player:
     """The player of a run directory or of its motion, with a height in pixels.
 
-    ``places`` is the largest number of beads times frames; frames are left out evenly, and replicates of walkers.
+    ``places`` is the largest number of beads times frames; frames are left out evenly.
     """
     require("report")
     import k3d

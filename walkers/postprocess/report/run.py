@@ -36,21 +36,11 @@ def report_run(
     figures: Mapping[str, Figure] = {},
     largest: int = LARGEST,
 ) -> Path:
-    """Write the report of a run as a self-contained HTML file.
+    """Write the report of a run as a self-contained HTML file, by default ``report.html`` in the run directory.
 
-    `InputError` if the file is no HTML file in an existing folder, `walkers.postprocess.dump.DumpError` if the dumps
-    cannot be read.
-
-    Parameters
-    ----------
-    directory, origins
-        The run directory; the sources of the values of its case.
-    to
-        The file; None: ``report.html`` in the run directory.
-    figures
-        Figures to show beside those of the run, such as that of its spread.
-    largest
-        Size in bytes that the file must not reach: the player shows fewer frames of runs of many beads.
+    ``origins`` are the sources of the values of its case, ``figures`` further ones, such as that of its spread. The
+    player shows fewer frames of runs of many beads, so that the file has fewer bytes than ``largest``. `InputError` if
+    the file is no HTML file in an existing folder, `walkers.postprocess.dump.DumpError` if a dump cannot be read.
     """
     require("report")
     path = to or directory / NAME
