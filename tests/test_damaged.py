@@ -208,7 +208,7 @@ def test_a_dump_of_beads_is_read_but_for_a_last_frame_that_was_cut(
     dump, contents = BinaryDump(beads, columns), beads.read_bytes()
     frames = dump.stack()
     assert frames.shape == (61, 4, len(columns))
-    np.testing.assert_allclose(frames[0, :, dump.column("radius")], [3e-4, 2e-4, 3e-4, 2e-4], rtol=1e-15)
+    np.testing.assert_allclose(frames[0, :, dump.columns.index("radius")], [3e-4, 2e-4, 3e-4, 2e-4], rtol=1e-15)
     for less in (1, 200, 550):  # of a frame of 704 bytes, 104 of them its head
         short.write_bytes(contents[:-less])
         assert BinaryDump(short, columns).truncated

@@ -617,7 +617,6 @@ class Sweep:
 
 
 def _figure(table: pd.DataFrame, options: Mapping[str, Any]) -> Figure:
-    """The figure of the table of a sweep."""
     from walkers.sweeps.figure import figure_of
     from walkers.sweeps.figure_options import FigureOptions
     from walkers.theory.prediction import predicted_column

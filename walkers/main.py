@@ -96,7 +96,6 @@ class _PlainHelp:
     """Help of a command in plain text."""
 
     def __call__(self, _console: object, _options: object, panel: HelpPanel) -> None:
-        """Print the commands, arguments or options below a heading."""
         meanings = {}
         for entry in panel.entries:
             default = f" [default: {entry.default}]" * (entry.default not in (None, "False"))
@@ -104,16 +103,13 @@ class _PlainHelp:
         _print_panel(str(panel.title), meanings)
 
     def render_usage(self, _console: object, _options: object, usage: Any) -> None:
-        """Print the arguments of a command."""
         print(f"Usage: {_plain(usage)}")
 
     def render_description(self, _console: object, _options: object, description: Any) -> None:
-        """Print the purpose of a command."""
         print(f"\n{textwrap.fill(_plain(description), _WIDE)}")
 
 
 def _plain(text: Any) -> str:
-    """The words of a formatted text."""
     return str(getattr(text, "primary_renderable", text)).strip()
 
 
@@ -154,7 +150,6 @@ def print_version() -> None:
 
 
 def _report_stop(stop: BaseException, tokens: list[str]) -> int:
-    """Print why the program stopped, and return its exit status."""
     from cyclopts import CycloptsError, UnusedCliTokensError
 
     if isinstance(stop, SystemExit):

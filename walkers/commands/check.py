@@ -62,7 +62,6 @@ def engine(*, only: list[str] | None = None, as_json: Json = False, engine: Engi
 
 
 def _print_checked(lines: Sequence[Line], as_json: bool, of: str = "", **more: Any) -> int:
-    """Print lines; returns the exit status."""
     from walkers.check.lines import as_dict, as_text, failures
 
     print_as(as_json, lambda: as_dict(lines, **more), lambda: as_text(lines, of))

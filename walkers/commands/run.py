@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 import walkers
 from walkers.commands.options import NOT_NEGATIVE, At, By, Case, Jobs, Json, print_as, print_lines, refuse, tell
-from walkers.errors import apply_all, refused
+from walkers.errors import apply_all
 
 _MANY = 10_000
 """Number of points that take seconds to resolve."""
@@ -58,6 +58,14 @@ def show(case: Case, /, *, at: At = At(), theory: bool = False, as_json: Json = 
     print_as(as_json, lambda: summary, lambda: describe(summary))
 
 
+def _draws(spread: bool, points: int | None) -> int:
+    """Number of runs of a spread; 0 for none."""
+    from walkers.sweeps.spread import POINTS
+
+    refuse("--points", points is not None and not spread, "is for --spread")
+    return (POINTS if points is None else points) if spread else 0
+
+
 def run(
     *cases: Case,
     at: At = At(),
@@ -87,22 +95,17 @@ def run(
     from walkers.api import case_at, finished_at
     from walkers.runner.failures import EngineFailure
     from walkers.show import notes
+    from walkers.sweeps.accuracy import times_of
+    from walkers.sweeps.spread import describe, spread_sweep
 
-    if not cases:
-        raise refused("CASE", "expected a case, such as fig1b")
-    refuse("--points", points is not None and not spread, "is for --spread")
+    refuse("CASE", not cases, "expected a case, such as fig1b")
+    draws = _draws(spread, points)
     # Report a mistake in the last file before the first run starts.
     finished = apply_all(lambda case: None if at.changes or force else finished_at(case, at.out), cases)
     loaded = apply_all(lambda case: case_at(case, at.out, at.values), cases)
-    if accuracy:
-        from walkers.sweeps.accuracy import times_of
-
-        apply_all(times_of, [case for case, _ in loaded])
-    if spread:
-        from walkers.sweeps.spread import POINTS, describe, spread_sweep
-
-        for case, _ in loaded:  # also an unusable range
-            list(spread_sweep(case, POINTS if points is None else points, by.engine).cases())
+    apply_all(times_of, [case for case, _ in loaded if accuracy])
+    for case, _ in loaded if spread else ():  # also an unusable range
+        list(spread_sweep(case, draws, by.engine).cases())
     failed = False
     for (case, folder), earlier in zip(loaded, finished, strict=True):
         tell(*(f"{case.name}: {note}" for note in notes(case) if earlier is None))
@@ -114,7 +117,7 @@ def run(
             continue
         if accuracy:
             done.accuracy(progress=True, **vars(by))
-        band = done.spread(POINTS if points is None else points, progress=True, **vars(by)) if spread else None
+        band = done.spread(draws, progress=True, **vars(by)) if spread else None
         failed |= bool(band and band.failures)
         if as_json:
             ranges = {"spread": band.as_dict()} if band else {}
@@ -158,10 +161,9 @@ def sweep(
     from walkers.postprocess.uncertainty import lines_of_rest, rests_on
     from walkers.sweeps.scheduler import Options, plan_sweep
     from walkers.sweeps.site import load_site
-    from walkers.sweeps.spread import POINTS, spread_sweep
+    from walkers.sweeps.spread import spread_sweep
 
-    refuse("--points", points is not None and not spread, "is for --spread")
-    draws = (POINTS if points is None else points) if spread else 0
+    draws = _draws(spread, points)
     loaded = load_sweep(sweep, at.values)
     refuse("--jobs", jobs is not None and site is not None, "the site file sets how many decks run at once")
     if len(loaded.rows) > _MANY:

@@ -180,7 +180,6 @@ _KINDS = {
 
 
 def _climb_of(number: int, track: Track, beads: Beads) -> dict[str, Any]:
-    """Row of a track in the table ``clusters``."""
     frames, height = np.array(track.frames), beads.height
     gained, seconds = _gained(track, beads.time, height)
     risen = gained - np.minimum.accumulate(gained)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
-from itertools import product
 from pathlib import Path
 from string import ascii_lowercase
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
@@ -59,9 +58,8 @@ def new_figure(width: float, height: float, *, mosaic: Any = None, **options: An
 
 
 def letter_panels(panels: Iterable[Axes]) -> None:
-    """Put (a), (b), … before the titles of panels, aligned to the left; z is followed by aa, ab, …."""
-    letters = [*ascii_lowercase, *map("".join, product(ascii_lowercase, repeat=2))]
-    for panel, letter in zip(panels, letters, strict=False):
+    """Put (a), (b), … before the titles of panels, aligned to the left."""
+    for panel, letter in zip(panels, ascii_lowercase, strict=False):
         title, size = panel.get_title(), panel.title.get_fontsize()
         panel.set_title("")
         panel.set_title(f"({letter}) {title}".rstrip(), loc="left", fontsize=size)

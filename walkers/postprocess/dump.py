@@ -100,10 +100,6 @@ class BinaryDump:
                 head = _HEADER.pack(step, len(values), *box, columns, 1) + _COUNT.pack(values.size)
                 file.write(head + values.tobytes())
 
-    def column(self, name: str) -> int:
-        """Index of a column."""
-        return self.columns.index(name)
-
 
 def local_frames(path: Path, columns: tuple[str, ...]) -> Iterator[tuple[int, FloatArray]]:
     """Step and rows, shape (rows, columns), of each frame of a text dump of bridges (``dump local``), one by one.

@@ -174,9 +174,6 @@ class Group:
     velocity: FloatArray
     spin: FloatArray
 
-    def __repr__(self) -> str:
-        return f"<Group of {self.case.name}: {len(self.walkers)} walkers of {len(self.make.radii)} beads>"
-
     @property
     def radii(self) -> FloatArray:
         """Radii of the beads of each walker, m, shape (n,)."""
@@ -303,7 +300,6 @@ def _opened(path: Path) -> tuple[dict[str, Any], Layout, BinaryDump]:
 
 
 def _joined(case: Case, paths: Sequence[Path]) -> Motion:
-    """The motion over all segments."""
     steps: list[int] = []
     stacks: list[FloatArray] = []
     frames: list[tuple[Path, int]] = []
@@ -425,7 +421,6 @@ def read_bridges(motion: Motion, frames: Collection[int] | None = None) -> Itera
 
 
 def _bridges(motion: Motion, frame: int, between: FloatArray, against: FloatArray, layout: Layout) -> Bridges:
-    """The bridges of a frame from the rows of its dumps."""
     place, pair, wall = motion.position[frame], layout.pair_bridge_columns.index, layout.wall_bridge_columns.index
     index = np.full(layout.atoms, -1)  # in the motion, which may hold some of the beads
     index[slice(None) if motion.numbers is None else motion.numbers] = np.arange(len(place))

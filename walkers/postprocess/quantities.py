@@ -48,15 +48,12 @@ class Quantity:
 
 def _quantities(entries: Mapping[str, str | list[str]]) -> tuple[Quantity, ...]:
     """Quantities from their entries: lists, or what a table adds to the meaning of a shared column."""
-
-    def quantity_of(name: str, entry: str | list[str]) -> Quantity:
-        if isinstance(entry, str):
-            unit, label, meaning = _FILE["shared"][name]
-            return Quantity(name, unit, label, meaning + entry)
-        unit, label, *more = entry
-        return Quantity(name, unit, label, *(more or [label]))
-
-    return tuple(quantity_of(name, entry) for name, entry in entries.items())
+    quantities = []
+    for name, entry in entries.items():
+        unit, label, *more = _FILE["shared"][name] if isinstance(entry, str) else entry
+        more = [more[0] + entry] if isinstance(entry, str) else more or [label]
+        quantities.append(Quantity(name, unit, label, *more))
+    return tuple(quantities)
 
 
 TABLES: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(columns) for name, columns in _FILE["tables"].items()}

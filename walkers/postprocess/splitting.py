@@ -24,7 +24,7 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) ->
     deck. `WalkersMet` if two walkers came so close that they are not independent.
     """
     dump = BinaryDump(directory / layout.bead_dump, layout.bead_columns)
-    frames, x = dump.stack(), dump.column("x")
+    frames, x = dump.stack(), dump.columns.index("x")
     sampled = frames[:: next(iter(cases.values())).run.samples_per_cycle, :, x : x + 2]
     centre = np.stack([sampled[:, np.array(walker.beads) - 1].mean(axis=1) for walker in layout.walkers], axis=1)
     if came_near(centre, NEAR * max(make.length for case in cases.values() for make in case.walkers)):
@@ -37,8 +37,8 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) ->
         new = np.arange(1, len(old) + 1)
         owner[old], renumbered[old] = number, new
         frames_of_case = frames[:, old - 1]
-        frames_of_case[..., dump.column("id")] = new
-        frames_of_case[..., dump.column("type")] = 1
+        frames_of_case[..., dump.columns.index("id")] = new
+        frames_of_case[..., dump.columns.index("type")] = 1
         dump.write_like(frames_of_case, place / layout.bead_dump)
         placed = tuple(
             replace(walker, walker=index, beads=tuple(renumbered[list(walker.beads)].tolist()))

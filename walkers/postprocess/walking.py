@@ -205,7 +205,6 @@ def _scatter(values: FloatArray) -> float:
 
 
 def _velocities(walkers: Columns, case: Case) -> dict[str, Any]:
-    """Numbers of all rows of the table of walkers."""
     velocity, axial, end = walkers["velocity"], walkers["axial_velocity"], walkers["orientation_end"]
     facing = sides(walkers["facing"], walkers["start_angle"])
     right, left = facing > 0, facing < 0
@@ -258,7 +257,6 @@ def _work(groups: Sequence[Group], cycles: Columns, walkers: Columns) -> dict[st
 
 
 def _is_symmetric(case: Case) -> bool:
-    """Whether boundary and drive are the same for both headings."""
     drive = case.excitation
     return not case.boundary.tilt and len(drive.harmonics) == 1 and abs(drive.direction[2]) in (0.0, 1.0)
 

@@ -173,7 +173,6 @@ def _necks(motion: Motion, place: FloatArray, bridges: list[IntArray], path: Flo
 
 
 def _points(motion: Motion, colours: FloatArray) -> Any:
-    """All beads as points of their size."""
     import k3d
 
     sizes, look = (2e3 * motion.radius).astype(np.float32), {"shader": "3d", "roughness": 0.5, "name": "beads"}
@@ -185,7 +184,6 @@ def _points(motion: Motion, colours: FloatArray) -> Any:
 
 
 def _series(motion: Motion, values: FloatArray) -> dict[str, Any]:
-    """A time series for K3D."""
     return {f"{time:.6f}": value for time, value in zip(motion.time, values.astype(np.float32), strict=True)}
 
 
