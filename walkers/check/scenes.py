@@ -198,7 +198,7 @@ class Bench:
         self.version = launch(deck, directory, self.engine, on_step=self._look).version
         dump = BinaryDump(directory / deck.layout.bead_dump, deck.layout.bead_columns)
         beads = dump.stack()
-        vectors = [beads[:, :, dump.column(name) :][:, :, :3] for name in ("x", "vx", "omegax", "fx", "tqx")]
+        vectors = [beads[:, :, dump.columns.index(name) :][:, :, :3] for name in ("x", "vx", "omegax", "fx", "tqx")]
         time = dump.steps.astype(np.float64) * deck.layout.time_step
         return Measured(time, np.concatenate(vectors[:3], -1), np.concatenate(vectors[3:], -1), directory)
 
