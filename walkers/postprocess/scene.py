@@ -201,13 +201,11 @@ class Scene:
 
 def path_of(motion: Motion, begin: int = 0) -> FloatArray:
     """Displacement of the centre of the beads since a frame, smoothed over a cycle, mm, shape (F, 3)."""
-    from scipy.signal import savgol_filter
-
     middle = 1e3 * motion.position.mean(axis=1)
     half = min(motion.case.run.samples_per_cycle, len(middle) - 1) // 2
-    smooth: FloatArray = savgol_filter(middle, 2 * half + 1, min(half, 1), axis=0)
-    displacement: FloatArray = smooth - smooth[begin]
-    return displacement
+    beyond = np.pad(middle, ((half, half), (0, 0)), "reflect", reflect_type="odd")  # a straight path goes on
+    smooth: FloatArray = np.lib.stride_tricks.sliding_window_view(beyond, 2 * half + 1, axis=0).mean(axis=-1)
+    return smooth - smooth[begin]
 
 
 def against_gravity(motion: Motion) -> FloatArray:
