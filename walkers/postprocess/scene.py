@@ -204,8 +204,8 @@ def path_of(motion: Motion, begin: int = 0) -> FloatArray:
     middle = 1e3 * motion.position.mean(axis=1)
     half = min(motion.case.run.samples_per_cycle, len(middle) - 1) // 2
     beyond = np.pad(middle, ((half, half), (0, 0)), "reflect", reflect_type="odd")  # a straight path goes on
-    smooth: FloatArray = np.lib.stride_tricks.sliding_window_view(beyond, 2 * half + 1, axis=0).mean(axis=-1)
-    return smooth - smooth[begin]
+    smooth = np.lib.stride_tricks.sliding_window_view(beyond, 2 * half + 1, axis=0).mean(axis=-1)
+    return np.asarray(smooth - smooth[begin])
 
 
 def against_gravity(motion: Motion) -> FloatArray:

@@ -393,7 +393,7 @@ def _draw(
             axes.set_ylabel(plain_text("\n".join(wrap(label, _LETTERS))))
         _scale_x(axes, x, log)
     letter_panels(grid.flat[: len(parts)] if len(parts) > 1 else ())
-    _scale_y(grid[0, 0], points, list(theory.values.values())[:1] if theory else [], log)
+    _scale_y(grid[0, 0], points, list(theory.values.values()) if theory else [], log)
     for axes in grid.flat[len(parts) :]:
         axes.set_axis_off()
     band = f"5 to 95 % of {_draws(done, column)} draws" if "low" in points else ""
@@ -506,7 +506,7 @@ def _scale_x(axes: Axes, x: Factor, log: str) -> None:
 
 
 def _scale_y(axes: Axes, points: pd.DataFrame, theory: Sequence[FloatArray], log: str) -> None:
-    """Scale and range of the y axis: runs and first model with margins; other models may leave the axes."""
+    """Scale and range of the y axis: runs and models with margins."""
     from matplotlib.ticker import MaxNLocator
 
     if "y" in log:

@@ -18,7 +18,7 @@ from pathlib import Path
 from stat import S_ISDIR
 from typing import Any, TypeAlias
 
-from walkers.errors import InputError, refused
+from walkers.errors import InputError, refused, suggestion
 from walkers.inputs.case import Case
 from walkers.postprocess.numbers import headline, in_short
 from walkers.postprocess.results import plain, read
@@ -168,7 +168,9 @@ def select(contents: Sequence[Row], where: Iterable[str]) -> list[Row]:
     for condition in where:
         answers = [has_value(row["parameters"], condition) for row in runs]
         if runs and all(answer is None for answer in answers):
-            raise refused("where", f'"{condition}": no run has such a key')
+            keys = short_keys(sorted({key for row in runs for key in row["parameters"]}))
+            near = suggestion(condition.partition("=")[0].strip(), keys)
+            raise refused("where", f'"{condition}": no run has such a key{near}; runs have {", ".join(keys)}')
         runs = [row for row, answer in zip(runs, answers, strict=True) if answer]
     return runs
 
