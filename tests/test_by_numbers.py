@@ -14,14 +14,11 @@ import pytest
 
 import walkers
 from tests.conftest import document, make_case
-from walkers.inputs import units
 from walkers.inputs.axes import Range
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Harmonic, waveform
 from walkers.inputs.loads import bridge_at_rest, contact_loads
 from walkers.inputs.reading import load_case
-from walkers.inputs.table import changed
-from walkers.inputs.units import quantity_text
 from walkers.postprocess import meetings
 from walkers.postprocess.films import speed_text
 from walkers.postprocess.gait import averages, fit_slopes, settled_samples
@@ -81,12 +78,6 @@ def resting(case: Case, frames: int | None = None) -> Motion:
     )
 
 
-def test_quantities_are_written_in_the_unit_of_their_example() -> None:
-    for value, kind, text in ((293.15, units.TEMPERATURE, "20 degC"), (39.2, units.ACCELERATION, "4 g")):
-        assert quantity_text(value, kind) == text
-        assert units.parse_quantity(text, kind) == pytest.approx(value, rel=1e-12)
-
-
 def test_quarters_of_a_range() -> None:
     for scale, median, quarters in (
         (True, None, [0.01, 0.1**1.5, 0.1, 0.1**0.5, 1.0]),
@@ -94,16 +85,6 @@ def test_quarters_of_a_range() -> None:
         (False, 0.21, [0.01, 0.11, 0.21, 0.605, 1.0]),
     ):
         np.testing.assert_allclose(Range(0.01, 1.0, None, scale, median).at(np.linspace(0, 1, 5)), quarters, rtol=1e-12)
-
-
-def test_a_key_within_a_list_puts_what_says_the_same_out_of_force() -> None:
-    tables = {"drive": {"harmonics": [{"gamma0": 0.4, "axis": "x"}, {"gamma0": 0.2}]}}
-    both = {"drive.harmonics[0].peak_acceleration": "2 g", "drive.harmonics[0].gamma0": 0.3}
-    for changes, number, expected in (
-        ({"drive.harmonics[1].peak_acceleration": "2 g"}, 1, {"peak_acceleration": "2 g"}),
-        (both, 0, {"gamma0": 0.3, "axis": "x", "peak_acceleration": "2 g"}),
-    ):
-        assert changed(Case, tables, changes)["drive"]["harmonics"][number] == expected
 
 
 def test_a_phase_of_a_waveform_is_an_earlier_begin_of_the_whole() -> None:

@@ -19,7 +19,7 @@ from walkers.inputs.origins import Origin
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.sweep import expand
 from walkers.inputs.table import changed
-from walkers.inputs.units import parse_quantity
+from walkers.inputs.units import parse_quantity, quantity_text
 from walkers.physics.mixtures import water_glycerol
 from walkers.postprocess.uncertainty import lines_of_rest, rests_on
 from walkers.show import describe, summarise
@@ -55,6 +55,8 @@ def test_quantities_are_read_in_si_and_nothing_else_is() -> None:
         for text in wrong:
             with pytest.raises(ValueError, match=f"expected an? {kind.name} with its unit"):
                 parse_quantity(text, kind)
+    assert quantity_text(293.15, units.TEMPERATURE) == "20 degC"
+    assert quantity_text(39.2, units.ACCELERATION) == "4 g"
 
 
 # Glass beads on polystyrene in glycol, materials that the paper names: nobody has measured how they touch.
@@ -141,9 +143,11 @@ def test_a_case_is_changed_as_its_file_would_be() -> None:
     assert "<tr><td>drive.frequency</td><td>80 Hz</td><td>given</td><td></td></tr>" in case._repr_html_()
     # What says the same in other words goes, in one of several harmonics as well.
     assert case.changed({"drive.gamma0": 0.5}).drive.peak_acceleration > 50.0
-    harmonic = {"drive.harmonics[0].peak_acceleration": "4 g"}
-    tables = changed(Case, {"drive": {"harmonics": [{"gamma0": 1.0}]}}, harmonic)
-    assert tables["drive"]["harmonics"] == [{"peak_acceleration": "4 g"}]
+    first, last = ({f"drive.harmonics[{number}].peak_acceleration": "2 g"} for number in (0, 1))
+    tables = {"drive": {"harmonics": [{"gamma0": 0.4, "axis": "x"}, {"gamma0": 0.2}]}}
+    assert changed(Case, tables, last)["drive"]["harmonics"][1] == {"peak_acceleration": "2 g"}
+    both = {"gamma0": 0.3, "axis": "x", "peak_acceleration": "2 g"}  # each as it is said
+    assert changed(Case, tables, {**first, "drive.harmonics[0].gamma0": 0.3})["drive"]["harmonics"][0] == both
 
 
 HARMONICS = [{"frequency": "80 Hz", "gamma0": 0.2}, {"frequency": "120 Hz", "peak_acceleration": "1 g", "axis": "y"}]

@@ -16,7 +16,6 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from html import escape
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -41,10 +40,8 @@ from walkers.inputs.reading import find_input, read_case, shipped
 from walkers.inputs.table import Table, alternatives, changed
 from walkers.inputs.toml import read_toml, with_files
 from walkers.inputs.units import Speed, Whole
-from walkers.rounding import counted
 
 _LONGEST_NAME = 120
-_SHOWN = 20
 
 
 class SampleTable(Table):
@@ -90,7 +87,7 @@ class SweepFile(Table):
         return axes + ([self.descend.axis()] if self.descend else [])
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Sweep:
     """A base case and its variations."""
 
@@ -123,16 +120,6 @@ class Sweep:
     def keys(self) -> tuple[str, ...]:
         """The varied keys."""
         return tuple(self.units)
-
-    def __repr__(self) -> str:
-        varied = ", ".join(self.keys) or "nothing"
-        return f"<Sweep {self.name} of {self.case_name}: {counted(len(self.rows), 'point')}, varies {varied}>"
-
-    def _repr_html_(self) -> str:
-        """The points, for notebooks: at most the first `_SHOWN`."""
-        rows = [self.keys, *([str(value) for value in row] for row in self.rows[:_SHOWN])]
-        cells = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
-        return f"<table><caption>{escape(repr(self))}</caption>{cells}</table>"
 
     def cases(self) -> Iterator[Case]:
         """The case of each point, resolved; raises `InputError` if a point cannot be used; it says which."""
