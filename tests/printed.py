@@ -33,7 +33,6 @@ class _Recorder(RendererAgg):
 
 
 def _drawn(figure: Figure) -> list[Text]:
-    """The texts that are seen."""
     figure.draw_without_rendering()
     texts = figure.findobj(Text)
     for number, text in enumerate(texts):
@@ -43,7 +42,6 @@ def _drawn(figure: Figure) -> list[Text]:
 
 
 def _marked(axes: Axes) -> list[Bbox]:
-    """The marks of ticks that are seen."""
     found = []
     for axis in (axes.xaxis, axes.yaxis) if axes.axison else ():
         low, high = sorted(axis.get_view_interval())

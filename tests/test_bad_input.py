@@ -19,32 +19,22 @@ NO_SINE = {"frequency": None, "peak_acceleration": None, "record": "record.csv"}
 
 
 def cluster(arrangement: str, *radii: str) -> dict[str, Any]:
-    """Tables with one cluster, and no dimers."""
     return {"clusters": [{"arrangement": arrangement, "radii": list(radii)}], "dimers": None}
 
 
 def at(*places: list[str], radii: tuple[str, str] = ("0.3 mm", "0.2 mm")) -> dict[str, Any]:
-    """Tables with a cluster whose beads are given places, and no dimers."""
     return {"clusters": [{"radii": list(radii), "at": list(places)}], "dimers": None}
 
 
 def bead(radius: str, x: str, z: str = "1 mm") -> dict[str, Any]:
-    """A bead that is placed."""
     return {"radius": radius, "at": [x, "0 mm", z]}
 
 
-def box(width: str, height: str, **bodies: Any) -> dict[str, Any]:
-    """Tables with bodies in a box."""
-    return {**bodies, "boundary": {"shape": "box", "width": width, "height": height}}
-
-
 def material(name: str, **density: Any) -> str:
-    """A library with a density."""
     return to_toml({"materials": {name: {"density": {"value": "2 g/cm^3", "source": "x", **density}}}})
 
 
 def pairs(*materials: list[str]) -> str:
-    """A library with pairs of surfaces."""
     return to_toml({"surface_pairs": [{"materials": pair} for pair in materials]})
 
 
@@ -100,7 +90,8 @@ CASES: list[tuple[dict[str, Any], str]] = [
          'run.cycles = "auto": expected a number of cycles: with drive.ramp no velocity is constant'),
     )),
     # Bodies and boundaries
-    (box("1.5 mm", "9 mm", mixture=MIXTURE, dimers=None, run={"seed": 1}), "boundary.width = "),
+    ({"mixture": MIXTURE, "dimers": None, "boundary": {"shape": "box", "width": "1.5 mm", "height": "9 mm"}},
+     "boundary.width = "),
     ({"liquid": {"conserved": True}}, "liquid.conserved = true: "),
     ({"mixture": {**MIXTURE, "small": None, "small_diameters": ["0.63 mm", "0.6 mm"]}},
      'mixture.small_diameters = ["0.63 mm", "0.6 mm"]: expected the smaller one first'),
@@ -160,20 +151,15 @@ LIBRARIES: list[tuple[str, str]] = [
     (pairs(["chromium-coated glass", "ruby"]), "[0] = chromium-coated glass on ruby: is in the library of"),
 ]
 SQUARE = [(x, y, z) for z in (0, 4) for x, y in ((-2, -2), (2, -2), (2, 2), (-2, 2))]
+FLIPPED = [(x, -y, -z) for x, y, z in SQUARE]
 FLOOR, SIDES = [(1, 2, 3, 4)], [(1, 2, 6, 5), (2, 3, 7, 6), (3, 4, 8, 7), (4, 1, 5, 8)]
 OPEN_BOX = [*FLOOR, *SIDES]
 
 
 def obj(points: list[tuple[float, ...]], faces: list[tuple[int, ...]]) -> str:
-    """A mesh as text."""
     lines = [f"v {' '.join(map(str, point))}" for point in points]
     corners = [(one[0], *pair) for one in faces for pair in pairwise(one[1:])]
     return "\n".join([*lines, *(f"f {' '.join(map(str, face))}" for face in corners), ""])
-
-
-def turned(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
-    """Points upside down."""
-    return [(x, -y, -z) for x, y, z in points]
 
 
 OF_MESH = {"mesh": "own.obj", "scale": "1 mm"}
@@ -189,7 +175,6 @@ def beside(points: list[tuple[float, ...]]) -> str:
 
 
 def plane(*normal: float, at: tuple[str, str, str] = ("0 mm", "0 mm", "0 mm")) -> dict[str, Any]:
-    """A plane around the beads."""
     return {"point": list(at), "normal": list(normal)}
 
 
@@ -204,7 +189,7 @@ VESSELS: list[tuple[str | None, dict[str, Any], dict[str, Any], str]] = [
     (obj(SQUARE, OPEN_BOX), {**OF_MESH, "shape": "box"}, {}, "expected none beside boundary.mesh"),
     (obj(SQUARE, OPEN_BOX), {**OF_MESH, "height": "3 mm"}, {}, 'boundary.height = "3 mm": expected none of a vessel'),
     (obj(SQUARE, SIDES), OF_MESH, {}, "has 2 openings, the lowest at (-2, -2, 0) mm; expected one, at its top"),
-    (obj(turned(SQUARE), OPEN_BOX), OF_MESH, {}, "is open at its lowest point, at (-2, 2, -4) mm; expected a closed"),
+    (obj(FLIPPED, OPEN_BOX), OF_MESH, {}, "is open at its lowest point, at (-2, 2, -4) mm; expected a closed"),
     (obj(SQUARE, [*OPEN_BOX, (1, 3, 7, 5)]), OF_MESH, {}, "has 3 triangles at an edge, at (0, 0, 0) mm; expected two"),
     (beside([(x + 1.5, y, z) for x, y, z in INNER]), OF_MESH, {}, "has triangles that intersect, at (1.917, 0.5"),
     (beside([(x, y, z - 1.0) for x, y, z in INNER]), OF_MESH, {}, "has triangles that overlap in a plane, at ("),
@@ -355,7 +340,6 @@ COMMANDS: list[tuple[str, str]] = [
 
 
 def _said(tables: dict[str, Any]) -> dict[str, Any]:
-    """Tables without what is None in them."""
     said = {key: _said(value) if isinstance(value, dict) else value for key, value in tables.items()}
     return {key: value for key, value in said.items() if value is not None}
 

@@ -66,7 +66,6 @@ def cluster(arrangement: str, sizes: str, **start: Any) -> dict[str, Any]:
 
 
 def dimers(replicates: int, **start: Any) -> dict[str, Any]:
-    """The table of ``[dimers]``."""
     return {"radii": ["0.3 mm", "0.2 mm"], "replicates": replicates, **start}
 
 

@@ -44,7 +44,6 @@ def sine(rows: int = 1000, **more: float) -> str:
 
 
 def recorded(folder: Path, text: str, run: Any = None, dimers: Any = None, **drive: Any) -> Case:
-    """The reference case with a record."""
     tables = document(run=run or BRIEF, dimers=dimers or {})
     tables["drive"] = {"record": "record.csv", **drive}
     (folder / "record.csv").write_text(text)

@@ -167,7 +167,6 @@ POURED: dict[str, Any] = {
 
 
 def poured(**boundary: Any) -> dict[str, Any]:
-    """The tables of a small pile in a vessel."""
     return {**POURED, "boundary": {"material": "glass", **boundary}}
 
 
@@ -187,7 +186,6 @@ def prism(sides: int, inner: float, height: float) -> Vessel:
 
 
 def write(folder: Path, vessel: Vessel, name: str = "own.obj") -> str:
-    """Write a vessel in mm; returns its path."""
     meshio.Mesh(1e3 * vessel.points, [("triangle", vessel.triangles)]).write(folder / name)
     return str(folder / name)
 

@@ -276,11 +276,6 @@ class Cluster(Walkers):
     )
 
 
-def beside(radius: float, neighbour: float) -> list[tuple[float, list[float]]]:
-    """`Walkers.bridged` of two beads, radii in m."""
-    return [(radius, [neighbour]), (neighbour, [radius])]
-
-
 class Mixture(Table):
     """``[mixture]``: poured beads of two classes, each of ``sizes`` radii within a range, which occur equally often."""
 
@@ -337,7 +332,8 @@ class Mixture(Table):
         Beads of a pile have more neighbours, and its viscous limit is lower; ``auto``'s share of the limit allows for
         it: a glycerol pile at 0.4 of it is agitated as at a quarter of that step, within 0.1 %, and at 0.8 it heats up.
         """
-        return beside(max(self.large_radii), min(self.small_radii))
+        large, small = max(self.large_radii), min(self.small_radii)
+        return [(large, [small]), (small, [large])]
 
     @property
     def all_radii(self) -> list[float]:

@@ -1,7 +1,4 @@
-"""Dotted keys, such as ``drive.harmonics[1].phase``, and values given by them.
-
-They come from the command line (``drive.frequency=70Hz``), a mapping in Python, or a sweep's points.
-"""
+"""Dotted keys, such as ``drive.harmonics[1].phase``, and values given by them."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Origin of each value of a case: the case, the library, a calibration, a default, or other values.
-
-Unmeasured values (friction, drag of the bridges, volume of liquid) are distinguished from known values, with the range
-in which they may lie: a speed that rests on such values is as uncertain as they are.
-"""
+"""Origin of each value of a case: the case, the library, a calibration, a default, or other values."""
 
 from __future__ import annotations
 

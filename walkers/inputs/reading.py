@@ -1,7 +1,4 @@
-"""Case files: found, read as TOML, validated and resolved.
-
-Every problem ends as an `InputError` with the file, the key, the value and the expectation.
-"""
+"""Case files: found, read as TOML, validated and resolved."""
 
 from __future__ import annotations
 

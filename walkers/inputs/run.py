@@ -9,7 +9,6 @@ from pydantic import Field
 
 from walkers.errors import unusable
 from walkers.inputs import units
-from walkers.inputs.bodies import beside
 from walkers.inputs.origins import Source
 from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, key
 from walkers.inputs.units import AUTO, Duration, Number, Whole
@@ -143,9 +142,9 @@ class Run(Table):
 
 def limits_of(case: Case) -> TimeStepLimits:
     """Limits of the time step for the bodies of a case."""
-    contact, placed = case.contact, [bead.radius for bead in case.placed]
+    contact, placed = case.contact, sorted(bead.radius for bead in case.placed)
     bridged = [entry for body in case.bodies for entry in body.bridged]
-    bridged += beside(max(placed), min(placed)) if placed else []
+    bridged += [(placed[-1], placed[:1]), (placed[0], placed[-1:])] if placed else []
     return time_step_limits(
         [(*entry, case.boundary.damping(entry[0])) for entry in bridged],
         density=case.beads.density,

@@ -1,13 +1,4 @@
-"""Sweep files: a base case and the values to vary, read from TOML and expanded into points.
-
-case = "fig1b"
-
-[set]
-drive.frequency = "80 Hz"
-
-[axes]
-drive.peak_acceleration = { linspace = ["0.5 g", "10 g", 20] }
-"""
+"""Sweep files: a base case and the values to vary, read from TOML and expanded into points."""
 
 from __future__ import annotations
 

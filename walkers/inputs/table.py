@@ -1,8 +1,4 @@
-"""Tables of files as frozen models: a file's keys are the fields, values are in SI units.
-
-A table declares keys that exclude each other (`Table.choices`), gives its values by dotted keys (`Table.leaves`), and
-makes copies with other values (`Table.but`, `Table.put`).
-"""
+"""Tables of files as frozen models: a file's keys are the fields, values are in SI units."""
 
 from __future__ import annotations
 

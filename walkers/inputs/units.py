@@ -30,18 +30,14 @@ _PATTERN = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[^\d\s%,;]"
 """The begin of a quantity, for editors."""
 _GRAM_SYMBOL = re.compile(r"(?<![A-Za-z_])g(?![A-Za-z_0-9])")
 _ANGLE_UNITS = frozenset({"degree", "radian", "milliradian", "arcminute", "arcsecond"})
+_PREFIXES = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
+_PREFIXED = ("m", "Hz", "m/s", "s", "rad", "N/m", "Pa*s", "Pa")
 _USUAL: Mapping[str, tuple[str, float]] = {
-    **{"m": ("m", 1.0), "cm": ("m", 1e-2), "mm": ("m", 1e-3), "um": ("m", 1e-6), "µm": ("m", 1e-6), "nm": ("m", 1e-9)},
-    **{"mHz": ("Hz", 1e-3), "Hz": ("Hz", 1.0), "kHz": ("Hz", 1e3)},
+    **{f"{prefix}{unit}": (unit, factor) for unit in _PREFIXED for prefix, factor in _PREFIXES.items()},
+    **{"cm": ("m", 1e-2), "deg": ("rad", pi / 180.0)},
     **{"g": ("m/s^2", ACCELERATION_OF_ONE_G), "m/s^2": ("m/s^2", 1.0), "m/s²": ("m/s^2", 1.0)},
-    **{"m/s": ("m/s", 1.0), "mm/s": ("m/s", 1e-3), "um/s": ("m/s", 1e-6), "µm/s": ("m/s", 1e-6), "nm/s": ("m/s", 1e-9)},
-    **{"s": ("s", 1.0), "ms": ("s", 1e-3), "us": ("s", 1e-6), "µs": ("s", 1e-6), "ns": ("s", 1e-9)},
-    **{"rad": ("rad", 1.0), "mrad": ("rad", 1e-3), "deg": ("rad", pi / 180.0)},
     **{"kg/m^3": ("kg/m^3", 1.0), "kg/m³": ("kg/m^3", 1.0), "g/cm^3": ("kg/m^3", 1e3), "g/cm³": ("kg/m^3", 1e3)},
-    **{"N/m": ("N/m", 1.0), "mN/m": ("N/m", 1e-3)},
     **{"m^2/s": ("m^2/s", 1.0), "m²/s": ("m^2/s", 1.0), "mm^2/s": ("m^2/s", 1e-6), "mm²/s": ("m^2/s", 1e-6)},
-    **{"Pa*s": ("Pa*s", 1.0), "mPa*s": ("Pa*s", 1e-3)},
-    **{"Pa": ("Pa", 1.0), "kPa": ("Pa", 1e3), "MPa": ("Pa", 1e6), "GPa": ("Pa", 1e9)},
 }
 """Usual units in SI units, as in pint; cases with only these units do not import pint."""
 _ZEROS: Mapping[str, float] = {"K": 0.0, "degC": 273.15, "°C": 273.15}
