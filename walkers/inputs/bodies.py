@@ -18,7 +18,7 @@ from pydantic import AfterValidator, Field
 
 from walkers.inputs import units
 from walkers.inputs.table import Choice, Filled, Indirect, Table, key
-from walkers.inputs.units import Diameter, Length, Number, Radius, SignedLength, Whole
+from walkers.inputs.units import Diameter, Length, Number, Position, Radius, SignedLength, Whole
 from walkers.physics.capillary import bead_volume
 
 Apart = Callable[[int, int], float]
@@ -248,7 +248,7 @@ class Walkers(Table):
 class Dimers(Walkers):
     """``[dimers]``: walkers of two beads."""
 
-    choices: ClassVar = (Choice((("radii",), ("diameters",), ("mean_radius", "sin_delta"))),)
+    choices: ClassVar = (Choice("radii or diameters or mean_radius and sin_delta"),)
     arrangement: ClassVar[str] = "chain"
     at: ClassVar[tuple[_Place, ...]] = ()
     radii: Filled[tuple[Radius, Radius]] = key("Radii of the beads. The first bead leads.", None, ["0.3 mm", "0.2 mm"])
@@ -263,10 +263,8 @@ _THREE = ["0.3 mm", "0.2 mm", "0.2 mm"], ["0.6 mm", "0.4 mm", "0.4 mm"]
 class Cluster(Walkers):
     """One of ``[[clusters]]``: walkers of several beads, in an ``arrangement``, or ``at`` a place for each."""
 
-    choices: ClassVar = (Choice((("radii",), ("diameters",))), Choice((("arrangement",), ("at",))))
-    radii: Filled[Annotated[tuple[Radius, ...], _FEW]] = key(
-        "Radii of the beads. The first bead leads.", None, _THREE[0]
-    )
+    choices: ClassVar = (Choice("radii or diameters"), Choice("arrangement or at"))
+    radii: Filled[Annotated[tuple[Radius, ...], _FEW]] = key("Radii. The first bead leads.", None, _THREE[0])
     diameters: Indirect[Annotated[tuple[Diameter, ...], _FEW]] = key("Diameters, instead of `radii`.", None, _THREE[1])
     arrangement: str = key("`chain`, `fan`, `diamond` or `ring`. See [](../cases.md#bodies).", "", "fan")
     at: Annotated[tuple[_Place, ...], Field(max_length=100)] = key(
@@ -280,9 +278,9 @@ class Mixture(Table):
     """``[mixture]``: poured beads of two classes, each of ``sizes`` radii within a range, which occur equally often."""
 
     choices: ClassVar = (
-        Choice((("small",), ("small_diameters",))),
-        Choice((("large",), ("large_diameters",))),
-        Choice((("count",), ("fill_height",))),
+        Choice("small or small_diameters"),
+        Choice("large or large_diameters"),
+        Choice("count or fill_height"),
     )
     small: Filled[_Range] = key("Range of radii of the small beads.", None, ["0.3 mm", "0.315 mm"])
     large: Filled[_Range] = key("Range of radii of the large beads.", None, ["0.5 mm", "0.59 mm"])
@@ -351,9 +349,7 @@ def _middles(ends: tuple[float, float], number: int) -> tuple[float, ...]:
 class PlacedBead(Table):
     """One of ``[[placed]]``: a bead and where it begins, from the middle of the floor."""
 
-    choices: ClassVar = (Choice((("radius",), ("diameter",))),)
+    choices: ClassVar = (Choice("radius or diameter"),)
     radius: Filled[Radius] = key("Radius of the bead.", None, "0.3 mm")
     diameter: Indirect[Diameter] = key("Diameter of the bead, instead of `radius`.", None, "0.6 mm")
-    at: tuple[SignedLength, SignedLength, SignedLength] = key(
-        "Centre of the bead at the start: x, y, z from the middle of the floor.", example=["5 mm", "-3 mm", "0.3 mm"]
-    )
+    at: Position = key("Centre at the start, from the middle of the floor.", example=["5 mm", "-3 mm", "0.3 mm"])

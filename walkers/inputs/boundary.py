@@ -91,7 +91,7 @@ SIZES: Mapping[str, Collection[str]] = {
     "vessel": (),
 }
 """Size keys of each shape."""
-_VESSEL = Choice((("mesh", "scale"), ("planes", "height")))
+_VESSEL = Choice("mesh and scale or planes and height")
 _AREAS = {"box": 1.0, "cylinder": pi / 4.0, "octagon": 2.0 * (sqrt(2.0) - 1.0)}
 """Of the cross-sections of containers, in squares of their width."""
 _ACROSS = {"-y": (0.0, 1.0), "+y": (0.0, -1.0)}
@@ -105,12 +105,8 @@ _SIDES_OF = {"channel": _ACROSS, "box": _BOX, "octagon": {**_BOX, **_CORNERS}}
 class Plane(Table):
     """One of ``[[boundary.planes]]``: a point and the normal, toward the beads."""
 
-    point: tuple[units.SignedLength, units.SignedLength, units.SignedLength] = key(
-        "A point of the plane.", example=["0 mm", "0 mm", "0 mm"]
-    )
-    normal: tuple[units.Number, units.Number, units.Number] = key(
-        "Direction of its normal, toward the beads.", example=[0, 0, 1]
-    )
+    point: units.Position = key("A point of the plane.", example=["0 mm", "0 mm", "0 mm"])
+    normal: tuple[units.Number, units.Number, units.Number] = key("Normal, toward the beads.", example=[0, 0, 1])
 
 
 class Boundary(Table):
@@ -121,19 +117,13 @@ class Boundary(Table):
     """
 
     shape: Shape = key("Shape of the boundary. See [](../cases.md#boundaries).", "plane")
-    material: Annotated[str, SAME_RUN] = key(
-        "Material, from the library, or any other name beside all friction coefficients.", ..., "glass"
-    )
+    material: Annotated[str, SAME_RUN] = key("Material, of the library unless all frictions are given.", ..., "glass")
     opening: Filled[Annotated[float, replace(units.ANGLE, smallest=0.5, largest=3.1, sign=units.POSITIVE)]] = key(
         "Angle between the two walls of a groove.", None, "120 deg"
     )
     width: Filled[units.Length] = key("Width of a channel; inner side or diameter of a container.", None, "5.3 mm")
     height: Filled[units.Length] = key("Height of a container. Beads are lost above twice this height.", None, "5.3 mm")
-    mesh: Indirect[str] = key(
-        "File of a vessel of your own: its inner surface as triangles or polygons, in any format of meshio.",
-        None,
-        "funnel.stl",
-    )
+    mesh: Indirect[str] = key("File of a vessel: its inner surface, in any format of meshio.", None, "funnel.stl")
     scale: Indirect[units.Length] = key("Length of the unit of the mesh file.", None, "1 mm")
     planes: tuple[Plane, ...] = key("Planes around the beads, up to the `height`, instead of a mesh.", ())
     points: Derived[tuple[Vector, ...]] = ()

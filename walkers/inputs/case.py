@@ -62,8 +62,8 @@ class Liquid(Table):
     """``[liquid]``: a name from the library, numbers, or both (numbers take precedence)."""
 
     choices: ClassVar = (
-        Choice((("dynamic_viscosity",), ("kinematic_viscosity",)), instead="a liquid of the library"),
-        Choice((("volume_fraction",), ("meniscus_radius",))),
+        Choice("dynamic_viscosity or kinematic_viscosity", instead="a liquid of the library"),
+        Choice("volume_fraction or meniscus_radius"),
     )
     name: Indirect[str] = key("Liquid from the library. The other keys override its values.", None, "Si AK5")
     mass_fraction: Indirect[Number] = key("Mass fraction of glycerol in `water-glycerol`.", None, 0.87, ge=0, le=1)
@@ -72,19 +72,13 @@ class Liquid(Table):
     density: Indirect[units.Density] = key("Density of the liquid.", None)
     kinematic_viscosity: Indirect[units.KinematicViscosity] = key("Kinematic viscosity.", None)
     dynamic_viscosity: Filled[units.DynamicViscosity] = key("Dynamic viscosity, instead of the kinematic one.", None)
-    volume_fraction: Filled[Number] = key(
-        "Ratio of the volumes of liquid and bead. The bridges share the liquid.", None, 0.01, ge=1e-9, le=0.5
-    )
+    volume_fraction: Filled[Number] = key("Volume of liquid over that of the beads.", None, 0.01, ge=1e-9, le=0.5)
     meniscus_radius: units.Length | None = key(
-        "Radius of the menisci of all bridges, which exchange liquid through the film on a wetted plate.", None, "70 um"
+        "Radius of the menisci of all bridges, on a wetted plate.", None, "70 um"
     )
     viscosity_ratio: Number = key("Factor of the viscosity of the bridges. It scales their drag.", 1.0, ge=0, le=1e4)
-    contact_angle: units.UpToRightAngle = key(
-        "Contact angle at every bridge. A case whose bridges push the beads of a walker apart at rest is refused."
-    )
-    conserved: units.Flag = key(
-        "Whether bridges take their liquid from the films of their beads, and give it back. For piles.", False
-    )
+    contact_angle: units.UpToRightAngle = key("Contact angle at all bridges, which must not push beads apart.")
+    conserved: units.Flag = key("Whether bridges take their liquid from films of the beads. For piles.", False)
     law: str = key("Law of the bridges. See [](../../how-to/bridge-law.md).", DEFAULT_LAW)
 
     @cached_property
@@ -174,9 +168,7 @@ class Case(Table):
     run: Run = key("", Run())
     environment: Environment = key("", Environment())
     uncertain: Annotated[Ranges, SAME_RUN] = key(
-        "Ranges of values that are guesses, by dotted key: `[low, high]`, or `{ loguniform = [low, high] }`. "
-        "See [](../../how-to/own-beads.md).",
-        {},
+        "Ranges by dotted key, `[low, high]` or `{ loguniform = [low, high] }`. See [](../../how-to/own-beads.md).", {}
     )
     name: Annotated[Derived[str], SAME_RUN] = "case"
     document: Annotated[Derived[dict[str, Any]], SAME_RUN] = Field({})

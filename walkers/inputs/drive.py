@@ -53,9 +53,9 @@ def _axis(value: object) -> object:
     raise ValueError("expected 'x', 'y' or 'z', or a direction such as [1, 0, 1]")
 
 
-_AXIS = {"anyOf": [{"enum": list(AXES)}, {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}]}
-
-
+_VECTOR = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
+_Direction = Annotated[Any, BeforeValidator(_axis), WithJsonSchema({"anyOf": [{"enum": list(AXES)}, _VECTOR]})]
+_Recorded = Annotated[Any, BeforeValidator(record_of), WithJsonSchema({"type": "string"})]
 Ramp = tuple[tuple[float, float], ...]
 
 
@@ -66,21 +66,21 @@ def _increasing(ramp: Ramp) -> Ramp:
     return ramp
 
 
-_RAMP = {"type": "array", "items": {"type": "array", "minItems": 2, "maxItems": 2}}
+_Factors = Annotated[
+    tuple[tuple[units.NonNegativeDuration, Coefficient], ...],
+    AfterValidator(_increasing),
+    WithJsonSchema({"type": "array", "items": {"type": "array", "minItems": 2, "maxItems": 2}}),
+]
 
 
 class Harmonic(Table):
     """One of ``[[drive.harmonics]]``: A sin(2π f t + φ) along a direction, frequency f, peak acceleration A (2πf)²."""
 
-    choices: ClassVar[tuple[Choice, ...]] = (Choice((("peak_acceleration",), ("gamma0",))),)
-    axis: Filled[Annotated[Any, BeforeValidator(_axis), WithJsonSchema(_AXIS)]] = key(
-        "Direction of the shaking. Default: `x`; in containers `z`.", None
-    )
+    choices: ClassVar[tuple[Choice, ...]] = (Choice("peak_acceleration or gamma0"),)
+    axis: Filled[_Direction] = key("Direction of the shaking. Default: `x`; in containers `z`.", None)
     frequency: units.Frequency = key("Frequency in cycles per second.")
     peak_acceleration: Filled[units.Acceleration] = key("Peak acceleration of the boundary; `g` is 9.8 m/s².", None)
-    gamma0: Indirect[Coefficient] = key(
-        "Γ0 = a0 M/(4πγR̄) of the dimer of mass M and mean radius R̄, instead of a0.", None, 0.5
-    )
+    gamma0: Indirect[Coefficient] = key("Γ0 = a0 M/(4πγR̄) of the dimer, instead of a0.", None, 0.5)
     phase: Angle = key("Phase of the sine.", 0.0)
 
     @property
@@ -112,32 +112,21 @@ class Drive(Harmonic):
     """
 
     choices: ClassVar[tuple[Choice, ...]] = (
-        Choice((("peak_acceleration",), ("gamma0",), ("harmonics",), ("record",))),
-        Choice((("frequency",), ("harmonics",), ("record",))),
-        *(Choice(((name,), ("record",)), required=False) for name in ("axis", "phase", "waveform")),
+        Choice("peak_acceleration or gamma0 or harmonics or record"),
+        Choice("frequency or harmonics or record"),
+        *(Choice(f"{name} or record", required=False) for name in ("axis", "phase", "waveform")),
     )
     frequency: Filled[units.Frequency] = key("Frequency in cycles per second.", None)
     waveform: Literal["sine", "triangle", "sawtooth"] = key(
-        "Waveform of the acceleration. `triangle` and `sawtooth` contain harmonics up to the 9th.", "sine"
+        "Waveform of the acceleration, to the 9th harmonic.", "sine"
     )
-    frame: Frame = key(
-        "`container`: the beads feel the inertial force. `lab`: the boundary moves. Velocities agree within 10⁻⁶.",
-        "container",
-    )
+    frame: Frame = key("`container`: the beads feel the inertial force. `lab`: the boundary moves.", "container")
     harmonics: Annotated[tuple[Harmonic, ...], Field(max_length=24)] = key("Several harmonics.", ())
-    record: Filled[Annotated[Any, BeforeValidator(record_of), WithJsonSchema({"type": "string"})]] = key(
-        "File with the acceleration of the boundary against time. See [](../cases.md#recorded-shaking).",
-        None,
-        "trace.csv",
+    record: Filled[_Recorded] = key(
+        "File of recorded accelerations. See [](../cases.md#recorded-shaking).", None, "trace.csv"
     )
     repeats: Filled[units.Flag] = key("Whether the record is a period, which repeats. Default: false.", None)
-    ramp: Annotated[
-        tuple[tuple[units.NonNegativeDuration, Coefficient], ...], AfterValidator(_increasing), WithJsonSchema(_RAMP)
-    ] = key(
-        "Times after the start of the drive and factors of the displacement, which is linear in between.",
-        (),
-        [["0 s", 1], ["2 s", 0.2]],
-    )
+    ramp: _Factors = key("Times and factors of the displacement, linear in between.", (), [["0 s", 1], ["2 s", 0.2]])
 
     @classmethod
     def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:

@@ -49,14 +49,14 @@ def key(meaning: str, default: Any = PydanticUndefined, example: Any = None, **b
 class Choice(NamedTuple):
     """Keys that exclude each other: a table has one of the expressions, at most one, or something ``instead``."""
 
-    expressions: tuple[tuple[str, ...], ...]
+    text: str  # such as ``radii or mean_radius and sin_delta``
     required: bool = True
     instead: str = ""
 
     @property
-    def text(self) -> str:
-        """The expressions, such as ``radii or mean_radius and sin_delta``."""
-        return " or ".join(" and ".join(names) for names in self.expressions)
+    def expressions(self) -> list[list[str]]:
+        """The keys of each expression."""
+        return [expression.split(" and ") for expression in self.text.split(" or ")]
 
     def excluded_by(self, name: str) -> set[str]:
         """Keys that a key excludes."""
@@ -153,11 +153,11 @@ class Table(BaseModel):
         begun = [names for names in choice.expressions if any(not is_auto(given.get(name, "auto")) for name in names)]
         if len(begun) > 1:
             name = next(name for name in begun[1] if name in given)
-            two = Choice(tuple(begun[:2])).text
+            two = " or ".join(map(" and ".join, begun[:2]))
             yield Problem(within(place, name), None, f"expected either {two}, not both")
         elif begun or choice.required:
             expected = begun[0] if begun else choice.expressions[0]
-            instead = [" and ".join(names) for names in choice.expressions if not begun and names is not expected]
+            instead = [" and ".join(names) for names in choice.expressions if not begun and names != expected]
             instead += [choice.instead] if choice.instead else []
             for name in (name for name in expected if name not in given):
                 yield cls.missing(name, place, "".join(f", or {words}" for words in instead))
