@@ -151,11 +151,11 @@ def test_a_reports_figures_are_those_that_are_plotted_and_fewer_frames_make_it_s
 
 def test_the_player_shows_the_motion(walked_run: Path) -> None:
     """Each bead of the first walker is where the motion has it, turned as its spins turned it, to 0.1 µm."""
-    motion, player = gathered(read_motion(walked_run)).driven, player_of(walked_run)
+    motion, (plot, times, _) = gathered(read_motion(walked_run)).driven, player_of(read_motion(walked_run))
     motion = motion.of_walkers(motion.walkers[:1])
-    beads = [one for one in player.plot.objects if one.name.startswith("bead")]
+    beads = [one for one in plot.objects if one.name.startswith("bead")]
     assert len(beads) == len(motion.radius) == 2
-    assert (player.begin, player.end) == (motion.time[0], motion.time[-1])
+    assert times == [motion.time[0], motion.time[-1]]
     across = np.cross([0.0, 0.0, 1.0], motion.case.drive_axis)
     settled = motion.case.run.settling_cycles * motion.case.run.samples_per_cycle
     rotation = read_table(walked_run, "walkers").iloc[0]
@@ -173,16 +173,16 @@ def test_the_player_shows_the_motion(walked_run: Path) -> None:
 
 def test_necks_of_the_player_are_as_wide_as_bridges_at_their_times(pile_run: Path) -> None:
     """Those of a pile rupture, and have no width then."""
-    motion, player = read_motion(pile_run).driven, player_of(pile_run)
-    (necks,) = (one for one in player.plot.objects if one.name == "bridges")
+    motion, (plot, _, captions) = read_motion(pile_run).driven, player_of(read_motion(pile_run))
+    (necks,) = (one for one in plot.objects if one.name == "bridges")
     held = {bridges.frame: len(bridges.contacts) for bridges in read_bridges(motion)}
     points = [necks.vertices[f"{motion.time[frame]:.6f}"].reshape(-1, 80, 3) for frame in held]
     wide = [np.ptp(one[:, :16], axis=1).max(axis=1) > 0.01 for one in points]
     assert [int(each.sum()) for each in wide] == [*held.values()]
     assert any((one & ~other).any() for one, other in pairwise(wide))
-    beads = next(one for one in player.plot.objects if one.name == "beads")
+    beads = next(one for one in plot.objects if one.name == "beads")
     np.testing.assert_allclose(beads.positions[f"{motion.time[-1]:.6f}"], 1e3 * motion.position[-1], atol=1e-3)
-    assert any("rolling of the beads is not shown" in caption for caption in player.captions)
+    assert any("rolling of the beads is not shown" in caption for caption in captions)
 
 
 def test_words_and_numbers() -> None:

@@ -39,7 +39,7 @@ from walkers.theory.prediction import describe, predict
 def test_what_is_usual_lies_within_its_range() -> None:
     """Strictly, but for a contact angle of 0°, the end of what is possible."""
     numbers = {key: (one, one.range) for key, one in library.unmeasured().items()}
-    for entry in catalogue(of_others=False):
+    for entry in catalogue():
         if entry.kind == "surface pairs":
             known = {key: one for key, one in entry.numbers.items() if one.range}
             numbers |= {f"contact.{key} of {entry.name}": (one, one.range) for key, one in known.items()}

@@ -338,9 +338,10 @@ class Run:
         >>> len(walkers.run("fig1b", tmp).view().objects)  # two beads, their necks, the floor, the lines on it
         5
         """
+        from walkers.postprocess.motion import read_motion
         from walkers.postprocess.report.player import player_of
 
-        return player_of(self.finished_directory, height=height).plot
+        return player_of(read_motion(self.finished_directory), height=height)[0]
 
     def report(self, to: str | Path | None = None) -> Path:
         """Write a self-contained HTML report, with the figure of the run's spread if it has one.

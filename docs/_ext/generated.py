@@ -172,7 +172,7 @@ Sources of liquids give the temperature. Densities and moduli of a grade differ 
 
 def _library() -> str:
     """The library of materials and liquids with its sources, as ``walkers library`` has it."""
-    text, entries = _LIBRARY, catalogue(of_others=False)
+    text, entries = _LIBRARY, catalogue()
     for kind in ("materials", "liquids", "surface pairs"):
         text += f"\n## {kind.capitalize()}\n"
         for entry in (entry for entry in entries if entry.kind == kind):
@@ -197,7 +197,7 @@ def _shipped() -> str:
     """Shipped cases and sweeps with their titles."""
     text = "# Shipped cases, sweeps and calibrations\n\nEvery command accepts these names instead of a file.\n"
     for kind, command in COMMANDS.items():
-        entries = (entry for entry in catalogue(of_others=False) if entry.kind == kind)
+        entries = (entry for entry in catalogue() if entry.kind == kind)
         rows = ((f"`walkers {command} {entry.name}`", entry.text) for entry in entries)
         text += f"\n## {kind.capitalize()}\n\n{markdown(['', 'title'], rows)}"
     return text

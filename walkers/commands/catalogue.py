@@ -44,12 +44,9 @@ class Entry:
     file: str = ""
 
 
-def catalogue(*, of_others: bool = True) -> list[Entry]:
-    """All names: of the program, and of the library in the working directory.
-
-    Raises `InputError` if that library cannot be used.
-    """
-    entries = list(_of_library(Library(read_library(Path()) if of_others else None)))
+def catalogue() -> list[Entry]:
+    """All names: of the program, and of the library in the working directory; `InputError` if that cannot be used."""
+    entries = list(_of_library(Library(read_library(Path()))))
     entries += [Entry("not measured", key, numbers={"default": number}) for key, number in unmeasured().items()]
     for name in LAWS:
         text = resources.files("walkers.physics.laws").joinpath(f"{name.replace('-', '_')}.py").read_text("utf-8")
@@ -57,7 +54,7 @@ def catalogue(*, of_others: bool = True) -> list[Entry]:
     for kind in COMMANDS:
         files = shipped(kind[:-1]).items()
         entries += [Entry(kind, name, "", {}, str(read_toml(file).get("title", "")), str(file)) for name, file in files]
-    return entries if of_others else [entry for entry in entries if not entry.place]
+    return entries
 
 
 def _of_library(library: Library) -> Iterator[Entry]:

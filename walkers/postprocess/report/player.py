@@ -6,9 +6,8 @@ beads roll, unless the frames are too far apart (`walkers.postprocess.scene.turn
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil, radians, tan
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +15,7 @@ import numpy as np
 from walkers.extras import require
 from walkers.postprocess import scene as view
 from walkers.postprocess.dump import FloatArray, IntArray
-from walkers.postprocess.motion import Motion, read_motion
+from walkers.postprocess.motion import Motion
 from walkers.postprocess.necks import BLUE, OPACITY, bridges_at, bridges_text, ends_of, necks_of, triangles_of
 
 if TYPE_CHECKING:
@@ -35,26 +34,17 @@ _GRID = 2.0**-13
 """Positions are rounded to this (mm, about 0.1 µm); multiples of a power of two can be packed."""
 
 
-@dataclass(frozen=True)
-class Player:
-    """A K3D plot (a widget in notebooks), its first and last time (s), and captions."""
-
-    plot: k3d.Plot
-    begin: float
-    end: float
-    captions: list[str]
-
-
-def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: int = 480) -> Player:
-    """The player of a run directory or of its motion, with a height in pixels.
+def player_of(
+    motion: Motion, *, places: int = MOST_PLACES, height: int = 480
+) -> tuple[k3d.Plot, list[float], list[str]]:
+    """The plot of a motion (a widget in notebooks), its first and last time (s), and captions; ``height`` is in pixels.
 
     ``places`` is the largest number of beads times frames; frames are left out evenly.
     """
     require("report")
     import k3d
 
-    read = run if isinstance(run, Motion) else read_motion(run)
-    motion, stride, captions = _thinned(read.driven, places)
+    motion, stride, captions = _thinned(motion.driven, places)
     motion = view.gathered(motion, lane=_LANE)
     scene = view.Scene.around(motion, view.camera_axes(motion), _AROUND, shaken=False, rolling=True).following(
         _ASPECT, _AROUND
@@ -86,10 +76,9 @@ def player_of(run: str | Path | Motion, *, places: int = MOST_PLACES, height: in
         plot += part
     plot.fps_meter, plot.camera = False, camera_of(motion, scene.path)
     # K3D's own player plays the run in 12 s.
-    plot.time = begin = float(shown.time[0])
-    end = float(shown.time[-1])
-    plot.time_speed = (end - begin) / 12.0 or 1.0
-    return Player(plot, begin, end, captions)
+    plot.time, end = ends = shown.time[[0, -1]].tolist()
+    plot.time_speed = (end - plot.time) / 12.0 or 1.0
+    return plot, ends, captions
 
 
 def camera_of(motion: Motion, path: FloatArray | None = None) -> list[float]:

@@ -58,9 +58,10 @@ def report_run(
     places, page = 2 * MOST_PLACES, ""
     while not page or (len(page.encode()) >= largest and places > len(motion.radius)):
         places //= 2
-        player = player_of(motion, places=places)
-        carried = {"player": base64.b64encode(player.plot.get_binary_snapshot(9)).decode()}
-        page = page_of(title, fill("run.html.j2", run=run, player=player), carried)
+        plot, times, captions = player_of(motion, places=places)
+        carried = {"player": base64.b64encode(plot.get_binary_snapshot(9)).decode()}
+        body = fill("run.html.j2", run=run, camera=plot.camera, begin=times[0], end=times[1], captions=captions)
+        page = page_of(title, body, carried)
     write_bytes(path, page.encode())
     return path
 
