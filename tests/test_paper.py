@@ -50,7 +50,7 @@ def sources(once: Callable[[str, Callable[[Path], object]], Path]) -> Sources:
         for name, axes in FEWER.items():
             ramp = {"drive.ramp": [["0 s", 0.8], ["0.6 s", 0.4]]}
             given = read_toml(shipped("sweep")[name])
-            given["set"] = flatten(given.get("set", {}), lambda _: False) | (ramp if name == "fig2-ramp" else SHORT)
+            given["set"] = flatten(given.get("set", {})) | (ramp if name == "fig2-ramp" else SHORT)
             if "axes" in given:
                 given["axes"] = {**flatten(given["axes"]), **axes}
             if name == "alignment":

@@ -87,14 +87,19 @@ class Sources:
         return [Path(run).name for sweep in sweeps for run in self.finished(sweep)["run"]]
 
 
+@cache
+def _by_theory(frequency: float) -> float:
+    """Γc of the walker of Fig. 2, driven at a frequency in Hz; a second each, for the figure and the comparison."""
+    return threshold(load_case("fig1b", {"drive.frequency": f"{frequency} Hz"}))
+
+
 def thresholds_with_theory(sources: Sources) -> pd.DataFrame:
     """Γc of the sweep ``fig2-threshold``: the Γ0 at which walkers rest and move, and Γc of the ``theory``.
 
     Also Γc of the sweep ``fig2-ramp``, ``ramp``, and its resolution, ``within``.
     """
     ends = thresholds(sources.table("fig2-threshold"))
-    cases = [load_case("fig1b", {"drive.frequency": f"{frequency} Hz"}) for frequency in ends["drive.frequency"]]
     shown = ends[["drive.frequency", "gamma0_at_rest", "gamma0_moving"]]
     ramp = sources.table("fig2-ramp").groupby("drive.frequency")[["gamma0_stops_at", "gamma0_stops_within"]].first()
     ramps = ramp.reindex(shown["drive.frequency"]).to_numpy(dtype=float).T
-    return shown.assign(theory=[threshold(case) for case in cases], ramp=ramps[0], within=ramps[1])
+    return shown.assign(theory=[*map(_by_theory, ends["drive.frequency"])], ramp=ramps[0], within=ramps[1])
