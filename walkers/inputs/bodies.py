@@ -224,9 +224,8 @@ class Walkers(Table):
             return self.front
         many = (sum(large), len(large) - sum(large))
         weights = tuple(1.0 / many[0] if is_large else -1.0 / many[1] for is_large in large)
-        lever = [
-            sum(weight * x for weight, x in zip(weights, axis, strict=True)) for axis in zip(*self.design, strict=True)
-        ]
+        axes = zip(*self.design, strict=True)
+        lever = [sum(weight * x for weight, x in zip(weights, axis, strict=True)) for axis in axes]
         return weights if hypot(*lever) > _LEAST_LEVER * self.length else self.front
 
     def places(self, heights: Sequence[float], overlaps: Sequence[float]) -> Places:

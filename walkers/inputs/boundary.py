@@ -184,9 +184,8 @@ class Boundary(Table):
         if self.shape == "cylinder":
             return BOTTOM, Round(half)
         sides = _SIDES_OF.get(self.shape, {})
-        return BOTTOM, *(
-            Flat((-half * x + 0.0, -half * y + 0.0, 0.0), (x, y, 0.0), name) for name, (x, y) in sides.items()
-        )
+        normals = ((name, x, y) for name, (x, y) in sides.items())
+        return BOTTOM, *(Flat((-half * x + 0.0, -half * y + 0.0, 0.0), (x, y, 0.0), name) for name, x, y in normals)
 
     def damping(self, radius: float) -> float:
         """Damping of a bead of a radius (m) by the walls that it touches at once, over that by one of them.

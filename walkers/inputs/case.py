@@ -73,9 +73,7 @@ class Liquid(Table):
     kinematic_viscosity: Indirect[units.KinematicViscosity] = key("Kinematic viscosity.", None)
     dynamic_viscosity: Filled[units.DynamicViscosity] = key("Dynamic viscosity, instead of the kinematic one.", None)
     volume_fraction: Filled[Number] = key("Volume of liquid over that of the beads.", None, 0.01, ge=1e-9, le=0.5)
-    meniscus_radius: units.Length | None = key(
-        "Radius of the menisci of all bridges, on a wetted plate.", None, "70 um"
-    )
+    meniscus_radius: units.Length | None = key("Radius of the menisci of all bridges on a wetted plate.", None, "70 um")
     viscosity_ratio: Number = key("Factor of the viscosity of the bridges. It scales their drag.", 1.0, ge=0, le=1e4)
     contact_angle: units.UpToRightAngle = key("Contact angle at all bridges, which must not push beads apart.")
     conserved: units.Flag = key("Whether bridges take their liquid from films of the beads. For piles.", False)
@@ -244,14 +242,12 @@ class Case(Table):
                 raise unusable(f"uncertain.{name}", error.problems[0].expected, written[name]) from error
             value, slack = self.value_of(name), 1e-9 * (high - low)
             if value is None and (instead := sorted(key for key in alternatives(Case, name) if self.value_of(key))):
-                raise unusable(
-                    f"uncertain.{name}", f"expected {' or '.join(instead)}, which the case has instead", written[name]
-                )
+                message = f"expected {' or '.join(instead)}, which the case has instead"
+                raise unusable(f"uncertain.{name}", message, written[name])
             if around and isinstance(value, (int, float)) and not low - slack <= value <= high + slack:
                 text = next((origin.text for origin in self.origins if origin.key == name), str(value))
-                raise unusable(
-                    f"uncertain.{name}", f"expected a range that holds the case's own value, {text}", written[name]
-                )
+                message = f"expected a range that holds the case's own value, {text}"
+                raise unusable(f"uncertain.{name}", message, written[name])
 
     def changed(self, changes: Mapping[str, Any]) -> Case:
         """The case with other values of its file, by dotted keys and as a case file has them.

@@ -117,13 +117,11 @@ class Drive(Harmonic):
         *(Choice(f"{name} or record", required=False) for name in ("axis", "phase", "waveform")),
     )
     frequency: Filled[units.Frequency] = key("Frequency in cycles per second.", None)
-    waveform: Literal["sine", "triangle", "sawtooth"] = key(
-        "Waveform of the acceleration, to the 9th harmonic.", "sine"
-    )
+    waveform: Literal["sine", "triangle", "sawtooth"] = key("Waveform of acceleration, to the 9th harmonic.", "sine")
     frame: Frame = key("`container`: the beads feel the inertial force. `lab`: the boundary moves.", "container")
     harmonics: Annotated[tuple[Harmonic, ...], Field(max_length=24)] = key("Several harmonics.", ())
     record: Filled[_Recorded] = key(
-        "File of recorded accelerations. See [](../cases.md#recorded-shaking).", None, "trace.csv"
+        "File of the acceleration. See [](../cases.md#recorded-shaking).", None, "trace.csv"
     )
     repeats: Filled[units.Flag] = key("Whether the record is a period, which repeats. Default: false.", None)
     ramp: _Factors = key("Times and factors of the displacement, linear in between.", (), [["0 s", 1], ["2 s", 0.2]])
@@ -193,16 +191,14 @@ class Excitation:
     @property
     def amplitude(self) -> float:
         """Largest displacement that the harmonics could add up to, m."""
-        return self.largest_factor * (
-            self.record.largest(0) if self.record else sum(sine.amplitude for sine in self.harmonics)
-        )
+        largest = self.record.largest(0) if self.record else sum(sine.amplitude for sine in self.harmonics)
+        return self.largest_factor * largest
 
     @property
     def peak_velocity(self) -> float:
         """Largest speed that the harmonics could add up to, m/s."""
-        return self.largest_factor * (
-            self.record.largest(1) if self.record else sum(sine.peak_velocity for sine in self.harmonics)
-        )
+        largest = self.record.largest(1) if self.record else sum(sine.peak_velocity for sine in self.harmonics)
+        return self.largest_factor * largest
 
     @property
     def largest_factor(self) -> float:

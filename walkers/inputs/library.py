@@ -14,20 +14,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from walkers.errors import InputError, Problem, expected_of, refused, shown
-from walkers.inputs import units
 from walkers.inputs.messages import validated
 from walkers.inputs.origins import Whence
 from walkers.inputs.toml import read_toml
-from walkers.inputs.units import LENGTH, parse_quantity, quantity_text
+from walkers.inputs.units import DENSITY, DYNAMIC_VISCOSITY, LENGTH, SURFACE_TENSION, parse_quantity, quantity_text
 from walkers.physics.mixtures import MIXTURES
 
 FILE_NAME = "library.toml"
 HALF = (0.5, 293.15)
-_OF_MIXTURES = {
-    "density": units.DENSITY,
-    "surface_tension": units.SURFACE_TENSION,
-    "dynamic_viscosity": units.DYNAMIC_VISCOSITY,
-}
+_OF_MIXTURES = {"density": DENSITY, "surface_tension": SURFACE_TENSION, "dynamic_viscosity": DYNAMIC_VISCOSITY}
 
 
 class LibraryNumber(NamedTuple):

@@ -152,9 +152,8 @@ def _check(rows: Sequence[Sequence[float]]) -> None:
         raise ValueError(f"has {len(rows)} rows; expected {FEWEST} to {MOST}")
     array, largest = np.array(rows), ACCELERATION.largest
     if (odd := ~np.isfinite(array).all(axis=1) | (np.abs(array[:, 1:]) > largest).any(axis=1)).any():
-        raise ValueError(
-            f"row {np.argmax(odd) + 1}: expected a number in each column, accelerations up to {largest:g} m/s²"
-        )
+        expected = f"expected a number in each column, accelerations up to {largest:g} m/s²"
+        raise ValueError(f"row {np.argmax(odd) + 1}: {expected}")
     steps = np.diff(array[:, 0])
     usual = np.median(steps)
     if (odd := (steps <= 0.0) | (steps > _GAP * usual)).any():

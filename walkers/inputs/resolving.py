@@ -70,7 +70,7 @@ def supplied(
     given = {key for key in SUPPLIED if value_at(document, parts_of(key)) is not MISSING}
     named = (value_at(document, parts_of(key)) for key in NAMES)
     bead, wall, liquid = (name if isinstance(name, str) else None for name in named)
-    problems = list(_unknown(library, given, bead, wall, liquid))
+    problems = _unknown(library, given, (bead, wall, liquid))
     mixture, sources, problem = _mixture(document, liquid)
     problems += problem
     values = _values(library, bead, wall, None if problem else liquid, mixture)
@@ -86,21 +86,15 @@ def supplied(
     return changed(model, tables, written), sources, problems
 
 
-def _unknown(
-    library: Library, given: set[str], bead: str | None, wall: str | None, liquid: str | None
-) -> list[Problem]:
+def _unknown(library: Library, given: set[str], names: Sequence[str | None]) -> list[Problem]:
     """Names that are not in the library and that the case does not describe completely itself."""
-    described = given.issuperset(_FRICTION)
-    problems = []
-    for key, name, kind, says_all in (
-        ("beads.material", bead, "materials", described and "beads.density" in given),
-        ("liquid.name", liquid, "liquids", any(given.issuperset(keys) for keys in _LIQUIDS)),
-        ("boundary.material", wall, "materials", described),
-    ):
+    described, problems = given.issuperset(_FRICTION), []
+    complete = (described and "beads.density" in given, described, any(given.issuperset(keys) for keys in _LIQUIDS))
+    for key, name, says_all in zip(NAMES, names, complete, strict=True):
+        kind = "liquids" if key == "liquid.name" else "materials"
         if name is not None and not says_all and name not in library.names(kind):
-            message = "not in the library, nor in a library.toml beside the case"
-            expected = f"{message}; {expected_of(name, library.names(kind))}"
-            problems.append(Problem(key, shown(name), expected))
+            expected = f"nor in a library.toml beside the case; {expected_of(name, library.names(kind))}"
+            problems.append(Problem(key, shown(name), f"not in the library, {expected}"))
     return problems
 
 
@@ -207,9 +201,7 @@ def _vessel(case: Case) -> Case:
         if abs(lowest := float(vessel.points[:, 2].min())) > 1e-9:
             raise unusable("boundary.planes", f"have their lowest point at z = {1e3 * lowest:.4g} mm; expected 0 mm")
         if (top := vessel.height) < (1.0 - 1e-9) * boundary.height:
-            raise unusable(
-                "boundary.height", f"the planes close the vessel at {1e3 * top:.4g} mm; expected that at most"
-            )
+            raise unusable("boundary.height", f"the planes close the vessel; expected at most {1e3 * top:.4g} mm")
     width, size = float(f"{2.0 * abs(vessel.points[:, :2]).max():.12g}"), 2.0 * max(case.radii)
     if not 1.0 < width / size < _WIDEST:
         wide, across = (f"{length:.4g} m" if length >= 1.0 else f"{1e3 * length:.4g} mm" for length in (width, size))
@@ -341,10 +333,9 @@ def _record(case: Case, record: Record) -> Case:
     if record.repeats and dist(first, last) > _MEET * record.largest(2):
         raise unusable("drive.repeats", "expected a record that ends with the first row of the next period")
     why = "all lines are multiples" if record.repeats else "the strongest line"
-    case = case.noted(
-        "drive.frequency", f"of the spectrum of the record: {why}", text=f"{case.excitation.frequency:.6g} Hz"
-    )
+    frequency = f"{case.excitation.frequency:.6g} Hz"
     peak = quantity_text(case.excitation.peak_acceleration, ACCELERATION)
+    case = case.noted("drive.frequency", f"of the spectrum of the record: {why}", text=frequency)
     return case.noted("drive.peak_acceleration", "of the record, without its mean", text=peak)
 
 

@@ -265,9 +265,8 @@ def _until_steady(case: Case, cycles_per_sample: int) -> bool:
     until += ["most_cycles"] if table.most_cycles is not None else []
     given = [name for name in ("cycles", "duration", "settling_cycles", "segment") if getattr(table, name) is not None]
     if given and until:
-        raise unusable(
-            f"run.{given[0]}", f"expected none: with run.{until[0]}, walkers run until their velocity is constant"
-        )
+        message = f"expected none: with run.{until[0]}, walkers run until their velocity is constant"
+        raise unusable(f"run.{given[0]}", message)
     if until and not case.apart:
         raise unusable(f"run.{until[0]}", "expected run.duration: a run until steady needs independent walkers")
     if until and case.drive.ramp:

@@ -138,9 +138,7 @@ def _check_vessel(case: Case) -> None:
         most = f"at most {_MOST_PARTS // case.count} for {case.count} beads: a coarser mesh"
         raise unusable(blamed, f"has {walls} faces, edges and corners; expected {most}")
     if case.walkers and boundary.walls[0].name != FLOOR:
-        raise unusable(
-            blamed, "has no level floor at its bottom, on which walkers stand; expected [[placed]] beads in it"
-        )
+        raise unusable(blamed, "has no level floor at its bottom, on which walkers stand; expected [[placed]] beads")
 
 
 def _check_pour(mixture: Mixture, boundary: Boundary, floor: float) -> None:

@@ -154,9 +154,8 @@ class Vessel:
         """Number of the first triangle of the face of each: connected ones in a plane."""
         first, second = self.normals[self._neighbours.T]
         level = np.einsum("ex,ex->e", first, second) > _COPLANAR
-        _, firsts, faces = np.unique(
-            _joined(self._neighbours[level], len(self.triangles)), return_index=True, return_inverse=True
-        )
+        groups = _joined(self._neighbours[level], len(self.triangles))
+        _, firsts, faces = np.unique(groups, return_index=True, return_inverse=True)
         return np.asarray(firsts[faces])
 
     @cached_property
@@ -180,9 +179,8 @@ class Vessel:
         """The vessel with a lid on each opening."""
         points, triangles = [*self.points], [*self.triangles]
         for rim in self.rims:
-            triangles += [
-                np.array([end, begin, len(points)]) for begin, end in zip(rim, [*rim[1:], rim[0]], strict=True)
-            ]
+            sides = zip(rim, [*rim[1:], rim[0]], strict=True)
+            triangles += [np.array([end, begin, len(points)]) for begin, end in sides]
             points.append(self.points[rim].mean(axis=0))
         return Vessel(np.array(points), np.array(triangles))
 
@@ -283,10 +281,8 @@ class Vessel:
                     inward = _vector(self._inward(triangle, side))
                     halves.append((_vector(self.points[begin]), inward, _ACROSS if within else _CLOSED))
                 cells.append(tuple(halves))
-            normal = _vector(self.normals[face])
-            yield Facet(
-                "face", _vector(self.points[self.triangles[face, 0]]), normal, tuple(cells), named(normal, number)
-            )
+            point, normal = _vector(self.points[self.triangles[face, 0]]), _vector(self.normals[face])
+            yield Facet("face", point, normal, tuple(cells), named(normal, number))
 
 
 def _vector(array: FloatArray) -> Vector:
