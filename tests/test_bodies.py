@@ -302,12 +302,10 @@ def test_walkers_are_as_fast_as_measured(run_directory: Ran, name: str) -> None:
 
 def test_rolling_friction_turns_a_walker_to_the_axis_and_a_symmetric_dimer_away(trajectory: Moved) -> None:
     friction = {"bead_bead": 0.2, "bead_wall": 0.2}
-    common: dict[str, Any] = {
-        "contact": {"friction": friction, "rolling_friction": 0.01},
-        "run": {"cycles": 40, "settling_cycles": 20},
-    }
-    asymmetric = trajectory(dimers={"angle": "5 deg"}, **common).orientation[-1, 0]
-    symmetric = trajectory(dimers={"radii": ["0.25 mm", "0.25 mm"], "angle": "5 deg"}, **common).orientation[-1, 0]
+    contact, run = {"friction": friction, "rolling_friction": 0.01}, {"cycles": 40, "settling_cycles": 20}
+    alike = {"radii": ["0.25 mm", "0.25 mm"], "angle": "5 deg"}
+    asymmetric = trajectory(dimers={"angle": "5 deg"}, contact=contact, run=run).orientation[-1, 0]
+    symmetric = trajectory(dimers=alike, contact=contact, run=run).orientation[-1, 0]
     assert abs(sin(asymmetric)) < 0.5 * sin(np.radians(5.0))
     assert abs(sin(symmetric)) > 2.0 * sin(np.radians(5.0))
 
@@ -419,9 +417,7 @@ def test_a_dimer_on_the_axis_climbs_if_friction_suffices(run_directory: Ran, fri
     assert read(run_directory(on_a_wall(friction, radii=["0.42625 mm", "0.42625 mm"])))["axial_velocity"] < -1e-3
 
 
-def test_the_shipped_climber_comes_upright_and_climbs_and_its_posture_is_that_of_the_whole_run(
-    run_directory: Ran,
-) -> None:
+def test_the_shipped_climber_comes_upright_and_its_posture_is_that_of_the_whole_run(run_directory: Ran) -> None:
     """With its spread of starts, for a fifth of its time; then the same motion, turned."""
     run = {"cycles": 36, "settling_cycles": 24, "samples_per_cycle": 1}
     upright = run_directory(Case.read({**read_toml(shipped("case")["climber"]), "run": run}, name="climber"))

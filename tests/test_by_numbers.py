@@ -52,9 +52,8 @@ PILE: dict[str, Any] = {
 def case_of(**changes: Any) -> Case:
     """The reference's liquid, contacts and drive with other bodies, boundary or run."""
     tables = {name: table for name, table in document().items() if name not in {"dimers", "boundary", "run"}}
-    return Case.read(
-        {**tables, "boundary": {"material": "chromium-coated glass"}, "run": FEW, **changes}, name="made up"
-    )
+    plate = {"material": "chromium-coated glass"}
+    return Case.read({**tables, "boundary": plate, "run": FEW, **changes}, name="made up")
 
 
 def resting(case: Case, frames: int | None = None) -> Motion:
@@ -113,9 +112,7 @@ def test_a_bead_on_a_slope_presses_with_a_part_of_its_weight() -> None:
 
 
 @pytest.mark.parametrize(("angle", "facing", "ways"), [("30 deg", "both", (30, 210)), ("-20 deg", "left", (160, 160))])
-def test_walkers_start_at_their_angle_to_the_left_of_where_they_face(
-    angle: str, facing: str, ways: tuple[int, int]
-) -> None:
+def test_walkers_start_at_their_angle_to_the_left(angle: str, facing: str, ways: tuple[int, int]) -> None:
     start = {"replicates": 2, "facing": facing, "angle": angle, "angle_spread": "0 deg"}
     group = resting(make_case(dimers=start)).groups[0]
     arm = group.position[0, :, 0] - group.position[0, :, 1]

@@ -148,10 +148,8 @@ def test_cycles_of_records(tmp_path: Path) -> None:
     assert once.excitation.frequency == pytest.approx(74.4, rel=1e-3)  # a third of the way between two lines
     assert once.excitation.cycles == (0.0, pytest.approx(0.2998 * 74.4, rel=1e-3))
     # Left out, a run has all whole cycles of its record, or those of its ramp.
-    lengths = [
-        load_case({**one.document, "run": {}}).run.cycles for one in (once, repeats.changed({"drive.ramp": RAMP}))
-    ]
-    assert lengths == [22, 5]
+    ramped = repeats.changed({"drive.ramp": RAMP})
+    assert [load_case({**one.document, "run": {}}).run.cycles for one in (once, ramped)] == [22, 5]
     direction = recorded(tmp_path, csv(time, x=tones[0] + np.sin(500.0 * time), y=-np.sin(500.0 * time))).excitation
     assert direction.direction == pytest.approx((0.5**0.5, -(0.5**0.5), 0.0))
 
@@ -196,6 +194,5 @@ def test_a_ramp_finds_the_threshold(ramp: list[float], name: str, tmp_path: Path
 def test_the_last_window_in_which_a_walker_moves(moves: list[list[int]], expected: tuple[float, float]) -> None:
     """Mean over walkers; one that never moves, or never rests, has none."""
     peaks = np.array([4.0, 3.0, 2.0])[: len(moves)]
-    assert _crossed(np.array(moves, dtype=np.bool_), peaks, np.full(len(moves), 0.5)) == pytest.approx(
-        expected, nan_ok=True
-    )
+    crossed = _crossed(np.array(moves, dtype=np.bool_), peaks, np.full(len(moves), 0.5))
+    assert crossed == pytest.approx(expected, nan_ok=True)

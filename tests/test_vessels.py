@@ -146,9 +146,8 @@ def test_bridge_and_spring_go_with_a_bead_over_an_edge(bench: Bench, gap: float)
     moves = {"velocity": (speed, 0.0, 0.0), "steps": steps, "case": full_case}
     if gap > 0.0:  # lifted as it crosses
         moves["velocity"] = (speed, 0.0, gap / (steps * 1e-6))
-    over, plane = (
-        forces_on(bench, extruded(profile), start, rough, **moves)[:, 0] for profile in (roof(0.01), roof(0.0))
-    )
+    surfaces = (extruded(roof(turn)) for turn in (0.01, 0.0))
+    over, plane = (forces_on(bench, surface, start, rough, **moves)[:, 0] for surface in surfaces)
     assert np.abs(plane[-1]).min(where=np.array([True, False, True]), initial=1.0) > 1e-6
     np.testing.assert_allclose(over, plane, rtol=0, atol=0.05 * np.abs(plane).max())
 
@@ -176,13 +175,9 @@ def prism(sides: int, inner: float, height: float) -> Vessel:
     ring = inner / cos(pi / sides) * np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=1)
     points = np.round(np.concatenate([ring, ring + np.array([0.0, 0.0, height])]), 9)
     floor = [[0, k, k + 1] for k in range(1, sides - 1)]
-    walls = [(k, (k + 1) % sides, sides) for k in range(sides)]
     order = (0, 2, 1, 3) if sides == 4 else range(sides)  # those of a box: -x, +x, -y, +y
-    sides_of = [walls[k] for k in order]
-    return Vessel(
-        points,
-        np.array([*floor, *((b, a, n + a) for a, b, n in sides_of), *((b, n + a, n + b) for a, b, n in sides_of)]),
-    )
+    low = [((k + 1) % sides, k, sides + k) for k in order]
+    return Vessel(points, np.array([*floor, *low, *((b, top, sides + b) for b, _, top in low)]))
 
 
 def write(folder: Path, vessel: Vessel, name: str = "own.obj") -> str:
@@ -312,9 +307,8 @@ def bowl(radius: float, rings: int) -> Vessel:
     ring = np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=1)
     points = np.concatenate([radius * sin(at) * ring + [0.0, 0.0, radius * (1.0 - cos(at))] for at in bends])
     number = np.arange(len(points)).reshape(rings + 1, -1)
-    a, b, c, d = (
-        each.ravel() for each in (number[:-1], np.roll(number[:-1], -1, 1), np.roll(number[1:], -1, 1), number[1:])
-    )
+    after = np.roll(number, -1, 1)
+    a, b, c, d = (each.ravel() for each in (number[:-1], after[:-1], after[1:], number[1:]))
     return Vessel(points, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
 
 
@@ -334,9 +328,8 @@ def test_a_bowl_of_facets_becomes_round(tmp_path: Path) -> None:
         vessel = case.boundary.vessel
         assert vessel.height == pytest.approx(size)
         off.append(1.0 - vessel.volume() / (2.0 / 3.0 * pi * size**3))
-        assert case.boundary.volume(size / 2) == pytest.approx(
-            pi * (size / 2) ** 2 * (size - size / 6), rel=3 * off[-1]
-        )
+        half = pi * (size / 2) ** 2 * (size - size / 6)
+        assert case.boundary.volume(size / 2) == pytest.approx(half, rel=3 * off[-1])
     assert off[1] / off[2] == pytest.approx(4.0, rel=0.1)
     walls = f"{len(vessel.triangles)} triangles in {len({*vessel.faces})} faces"
     assert f"vessel     {walls}, open at its top" in describe(summarise(case))
@@ -369,10 +362,8 @@ def test_beads_are_poured_into_a_vessel_and_stay_there(tmp_path: Path, boundary:
     bridges = list(read_bridges(motion))[-1]
     beads, numbers = bridges.at_walls
     assert len(beads) > 3
-    gaps = [
-        float(walls[wall].distances(motion.position[-1, bead])) - motion.radius[bead]
-        for bead, wall in zip(beads, numbers, strict=True)
-    ]
+    places = zip(numbers, motion.position[-1, beads], strict=True)
+    gaps = [float(walls[wall].distances(place)) for wall, place in places] - motion.radius[beads]
     np.testing.assert_allclose(gaps, bridges.gap[len(bridges.beads) :], atol=1e-9)
     _, ends = ends_of(motion, motion.position[-1], bridges.contacts[len(bridges.beads) :])
     np.testing.assert_allclose(done.case.boundary.vessel.clearance(ends), 0.0, atol=1e-9)

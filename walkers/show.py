@@ -108,7 +108,8 @@ def notes(case: Case) -> list[str]:
         return lines
     numbers = {"large": case.large, "small": case.count - case.large}
     lines += [f"no {name} beads; in the paper, large beads lead small ones" for name in numbers if not numbers[name]]
-    room = 2.0 * case.boundary.height - _volume(case) / (_LOOSE_PACKING * case.boundary.cross_section)
+    filled = sum(map(bead_volume, case.all_radii)) / (_LOOSE_PACKING * case.boundary.cross_section)
+    room = 2.0 * case.boundary.height - filled
     if (fastest := room / case.duration) < _FASTEST_CLIMB:
         end = "rise above twice boundary.height, and end the run early"
         lines.append(f"climbers faster than {fastest * 1e3:.1f} mm/s {end}")
@@ -117,11 +118,6 @@ def notes(case: Case) -> list[str]:
 
 def _two_digits(number: float) -> str:
     return f"{float(f'{number:.2g}'):,.0f}"
-
-
-def _volume(case: Case) -> float:
-    """Volume of all beads, m³."""
-    return sum(map(bead_volume, case.all_radii))
 
 
 def summarise(case: Case) -> dict[str, Any]:
@@ -137,7 +133,7 @@ def summarise(case: Case) -> dict[str, Any]:
         seconds).
     """
     run, drive, limits = case.run, case.excitation, vars(limits_of(case))
-    volume = _volume(case)
+    volume = sum(map(bead_volume, case.all_radii))
     modulus = library_of(case.document).numbers("materials", case.beads.material or "").get("youngs_modulus")
     summary: dict[str, Any] = {
         "case": {**case.as_dict(), "origins": [asdict(origin) for origin in case.origins]},
@@ -190,19 +186,21 @@ def _liquid(case: Case, volume: float) -> float:
 
 def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
     """Loads of the contacts of a walker at rest."""
-    loads, tension = contact_loads(case, walkers), case.liquid.surface_tension
     contacts = [f"bead {bead} on substrate" for bead, _ in enumerate(walkers.radii, 1)]
     contacts += [f"bead {second + 1} on bead {first + 1}" for first, second in walkers.pairs]
-    planes = [capillary_force_limit_at_wall(tension, radius) for radius in walkers.radii]
-    columns = {
-        "contact": contacts,
-        "bridge_volume": [load.surfaces.volume for load in loads],
-        "capillary_force": [load.pull for load in loads],
-        "capillary_force_limit": [*planes, *(None for _ in walkers.pairs)],
-        "rupture_distance": [load.rupture for load in loads],
-        "overlap_at_rest": [load.overlap for load in loads],
-    }
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    planes = [capillary_force_limit_at_wall(case.liquid.surface_tension, radius) for radius in walkers.radii]
+    limits = [*planes, *(None for _ in walkers.pairs)]
+    return [
+        {
+            "contact": contact,
+            "bridge_volume": load.surfaces.volume,
+            "capillary_force": load.pull,
+            "capillary_force_limit": limit,
+            "rupture_distance": load.rupture,
+            "overlap_at_rest": load.overlap,
+        }
+        for contact, load, limit in zip(contacts, contact_loads(case, walkers), limits, strict=True)
+    ]
 
 
 def describe(summary: dict[str, Any]) -> str:
