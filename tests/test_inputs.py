@@ -239,10 +239,7 @@ def test_water_and_glycerol_are_as_tabulated_and_follow_fraction_and_temperature
     assert of(temperature="25 degC").liquid.dynamic_viscosity < 0.8 * case.liquid.dynamic_viscosity
 
 
-@pytest.fixture
-def own(in_folder: Path) -> Path:
-    """A folder with a case and the library that it takes its beads from."""
-    (in_folder / "library.toml").write_text("""
+OWN = """
 [materials."my beads"]
 density = { value = "2.45 g/cm^3", source = "weighed" }
 youngs_modulus = { value = "2.5 GPa", source = "its data sheet" }
@@ -254,14 +251,14 @@ roughness = { value = "40 nm", source = "by a profiler" }
 [[surface_pairs]]
 materials = ["my beads", "glass"]
 friction  = { value = 0.21, source = "tilting table", range = [0.18, 0.24] }
-""")
+"""
+
+
+def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(in_folder: Path) -> None:
+    (in_folder / "library.toml").write_text(OWN)
     tables = document(beads={"material": "my beads"}, boundary={"material": "glass"})
     del tables["contact"]["friction"]
     (in_folder / "mine.toml").write_text(to_toml(tables))
-    return in_folder
-
-
-def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(own: Path) -> None:
     case = load_case("mine.toml")
     friction, density = (origins(case)[key] for key in ("contact.friction.bead_wall", "beads.density"))
     assert (case.beads.density, case.contact.friction.bead_wall) == (2450.0, 0.21)
@@ -276,8 +273,8 @@ def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(own: Pat
     # What it took goes along: into case.json, sweeps, spreads and their archives.
     varied = spread_sweep(case, 2)
     assert "contact.friction.bead_wall" in varied.keys
-    sweep = expand({"case": "mine.toml", "axes": {"dimers.replicates": [1, 2]}}, source="s", name="s", folder=own)
-    (own / "library.toml").rename(own / "other.toml")
+    sweep = expand({"case": "mine.toml", "axes": {"dimers.replicates": [1, 2]}}, source="s", name="s", folder=in_folder)
+    (in_folder / "library.toml").rename("other.toml")
     again = Case.read(Case.from_dict(case.as_dict()).document, name="mine")
     assert (again, again.determinants()) == (case, case.determinants())
     spread = expand(varied.file, source="s", name="s", base=(varied.case_name, varied.base))

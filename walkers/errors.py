@@ -10,7 +10,7 @@ import difflib
 import json
 import os
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from typing import TypeVar
@@ -58,10 +58,6 @@ class InputError(WalkersError):
         self.problems = tuple(problems)
         named = shortened(printable(source), _LONGEST_TEXT)
         super().__init__("\n".join(f"{named}: {problem}" for problem in self.problems))
-
-    def below(self, table: str, source: str = "") -> InputError:
-        """The same error, of keys of a table."""
-        return InputError(source, [replace(problem, key=f"{table}.{problem.key}") for problem in self.problems])
 
 
 def refused(source: object, expected: str) -> InputError:

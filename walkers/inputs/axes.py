@@ -157,9 +157,8 @@ def sampled(points: int, seed: int, ranges: Mapping[str, Any]) -> Axis:
     if not ends:
         raise unusable("sample.ranges", "expected keys and their ranges", dict(ranges))
     shares = zip(unit_cube(len(ends), points, seed).T, ends.items(), strict=True)
-    return Axis.of(
-        {key: [written(float(number), span.unit) for number in span.at(share)] for share, (key, span) in shares}
-    )
+    drawn = ((key, span.unit, span.at(share).tolist()) for share, (key, span) in shares)
+    return Axis.of({key: [written(number, unit) for number in numbers] for key, unit, numbers in drawn})
 
 
 def descending(key: str, ends: Mapping[str, Value]) -> Axis:

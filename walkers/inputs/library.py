@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from importlib import resources
 from math import sqrt
@@ -136,7 +137,8 @@ def library_of(document: Mapping[str, Any], source: str = "") -> Library:
     try:
         check_library(tables, source)
     except InputError as error:
-        raise error.below("library", source) from error
+        problems = [replace(problem, key=f"library.{problem.key}") for problem in error.problems]
+        raise InputError(source, problems) from error
     return Library(users)
 
 

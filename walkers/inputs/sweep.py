@@ -53,10 +53,6 @@ class DescendTable(Table):
     step: Any = Field(examples=["0.1 g"])
     until_below: Speed = Field(examples=["0.02 mm/s"])
 
-    def axis(self) -> Axis:
-        """From the start down."""
-        return descending(self.key, {"descend.from": self.start, "descend.to": self.to, "descend.step": self.step})
-
 
 class SweepFile(Table):
     """A sweep file."""
@@ -75,7 +71,10 @@ class SweepFile(Table):
         axes = [*crossed(self.axes), *(zipped(table) for table in self.zip)]
         axes += [one_at_a_time(self.one_at_a_time)] if self.one_at_a_time else []
         axes += [sampled(table.points, table.seed, table.ranges) for table in self.sample]
-        return axes + ([self.descend.axis()] if self.descend else [])
+        if table := self.descend:
+            ends = {"descend.from": table.start, "descend.to": table.to, "descend.step": table.step}
+            axes.append(descending(table.key, ends))
+        return axes
 
 
 @dataclass(frozen=True)
