@@ -11,7 +11,7 @@ import shutil
 import time
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from math import isclose, pi
+from math import inf, isclose, pi
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ from walkers.runner.failures import EngineFailure, MissingFrames
 from walkers.runner.files import read_json, write_json
 from walkers.runner.launch import judge
 from walkers.runner.manifest import MANIFEST_NAME, read_manifest, write_manifest
-from walkers.sweeps.readable import flattened, kind_of
+from walkers.sweeps.readable import kind_of
 from walkers.templates import deck as decks
 from walkers.templates.deck import Segment
 from walkers.templates.parameters import PRINTED, suffixes
@@ -37,7 +37,7 @@ from walkers.templates.parameters import PRINTED, suffixes
 _LOGS = (decks.OUTPUT_NAME, "log.liggghts")
 """Output of the engine by `write_run_script`, and the default log of LIGGGHTS."""
 _PRINTED = re.compile(rf"^{PRINTED} (.+)$", re.MULTILINE)
-_LINE = re.compile(r"^variable +(\w+) string ")
+_LINE = re.compile(r"^variable +(\w+) string +(\S+)", re.MULTILINE)
 _SAME = 1e-9
 _OF_SINES = ("frequency", "peak_acceleration", "phase")
 _KEYS: Mapping[str, str] = {
@@ -127,7 +127,12 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
     before = on_disk.with_recorded_law(Case.from_dict(record["case"]), folder)
     words = (_PRINTED.findall(log.read_text(encoding="utf-8", errors="replace")) or [""])[-1].split()
     values = {name: float(value) for name, value in zip(words[::2], words[1::2], strict=True)}
-    case, edits = _ran(before.for_cycles(before.run.attempts[0]), values, f"{folder}: the edited deck")
+    was = _parameters(record["deck"], values)
+    edited = {name: now for name, now in values.items() if name in was and not isclose(now, was[name], rel_tol=_SAME)}
+    case = before.for_cycles(before.run.attempts[0])
+    if edited:
+        case = _edited(case, values, edited, f"{folder}: the edited deck")
+    edits = [f"{name} {value:g}, was {was[name]:g}" for name, value in edited.items()]
     edits += _other_edits(record["deck"], deck.read_text(encoding="utf-8", errors="surrogateescape"), values)
     rest = int(values.get("rest_steps", 0))
     segment = Segment(0, rest + case.run.steps, rest)
@@ -141,47 +146,37 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
     write_json(folder / on_disk.CASE_NAME, case.as_dict(), at_once=False)
     write_json(folder / decks.LAYOUT_NAME, rendered.layout.as_dict(), at_once=False)
     on_disk.write_segment_record(folder, segment, report, by_hand=notes)
-    planned = before.run
     # Cycles that were enough for the finished run of a case may be too few for an edited deck.
-    doubtful = case.run.cycles < planned.cycles if planned.until_steady else case.apart and case != before
-    if doubtful and not are_constant(folder):
+    most = before.run.cycles if before.run.until_steady else inf
+    if case.run.cycles < most and (most < inf or (case.apart and case != before)) and not are_constant(folder):
         reached = f"the velocities are not constant within {percent(CONSTANT)} after {case.run.cycles} cycles"
-        more = f"{planned.cycles}, as walkers run does," if planned.until_steady else "more"
-        notes.append(f"{reached}; set cycles to {more} and run the deck again")
+        notes.append(
+            f"{reached}; set cycles to {f'{most}, as walkers run does,' if most < inf else 'more'} and run again"
+        )
         on_disk.write_segment_record(folder, segment, report, by_hand=notes)
     measure(folder)
     about: dict[str, Any] = {"drive_from": rest, "segments": 1, "by_hand": notes}
     write_manifest(case, folder.name, None, report, started=time.time(), directory=folder, **about)
 
 
-def _parameters(case: Case, values: Mapping[str, float]) -> tuple[dict[str, str], dict[str, float]]:
-    """Keys of a case by the parameters of its deck, and the numbers that these have unless they are edited."""
-    flat, sines, run = flattened(case), case.excitation.harmonics, case.run
-    keys, was = dict(_KEYS), {name: float(flat.get(key, 0.0)) for name, key in _KEYS.items()}
-    was |= {"viscosity": case.liquid.of_bridges.viscosity, "rest_steps": decks.whole(case).drive_from or 0}
-    was |= {"steps_per_cycle": run.steps_per_cycle, "cycles": run.cycles, "cycle_frequency": case.excitation.frequency}
-    for place, (end, sine) in enumerate(zip(suffixes(len(sines)), sines, strict=True)):
-        table = "drive" if len(sines) == 1 else f"drive.harmonics[{place}]"
-        keys |= {f"{name}{end}": f"{table}.{name}" for name in _OF_SINES}
-        was |= {f"{name}{end}": getattr(sine, name) for name in _OF_SINES}
-        # What follows from parameters follows from their new values.
-        frequency, peak = (values.get(f"{name}{end}", getattr(sine, name)) for name in _OF_SINES[:2])
-        turning = 2.0 * pi * frequency
+def _parameters(deck: str, values: Mapping[str, float]) -> dict[str, float]:
+    """The parameters of a deck as it was written; those that follow from others, from the new values of these."""
+    was = {name: float(text) for name, text in _LINE.findall(deck) if name in values and text[0] != "$"}
+    now = was | values
+    for end in (name.removeprefix("amplitude") for name in values if name.startswith("amplitude")):
+        peak, turning = now[f"peak_acceleration{end}"], 2.0 * pi * now[f"frequency{end}"]
         was |= {f"amplitude{end}": peak / turning**2, f"peak_velocity{end}": peak / turning}
-    now = {**was, **values}
-    was["time_step"] = 1.0 / (now["frequency" if len(sines) == 1 else "cycle_frequency"] * now["steps_per_cycle"])
-    return keys, was
+    cycle = now["cycle_frequency" if "cycle_frequency" in now else "frequency"]
+    return was | {"time_step": 1.0 / (cycle * now["steps_per_cycle"])}
 
 
-def _ran(case: Case, values: Mapping[str, float], source: str) -> tuple[Case, list[str]]:
-    """The case that the engine ran, from the parameters that it printed, and the parameters that were edited."""
-    keys, was = _parameters(case, values)
-    edited = [name for name in values if name in was and not isclose(values[name], was[name], rel_tol=_SAME)]
-    edits = [f"{name} {values[name]:g}, was {was[name]:g}" for name in edited]
-    if not edited:
-        return case, edits
-    step, steps, cycles = values["time_step"], int(values["steps_per_cycle"]), int(values["cycles"])
-    numbers = {key: values[name] for name, key in keys.items() if name in edited}
+def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float], source: str) -> Case:
+    """The case that the engine ran, from the parameters that it printed."""
+    keys, number_of_sines = dict(_KEYS), len(case.excitation.harmonics)
+    for place, end in enumerate(suffixes(number_of_sines)):
+        table = "drive" if number_of_sines == 1 else f"drive.harmonics[{place}]"
+        keys |= {f"{name}{end}": f"{table}.{name}" for name in _OF_SINES}
+    numbers = {keys[name]: value for name, value in edited.items() if name in keys}
     for name, key in keys.items():  # a deck has no Γ0: the acceleration is that for the density for which it was made
         if key.endswith("peak_acceleration") and case.document["drive"].get("waveform", "sine") == "sine":
             end = name.removeprefix("peak_acceleration")
@@ -190,14 +185,13 @@ def _ran(case: Case, values: Mapping[str, float], source: str) -> tuple[Case, li
     changes: dict[str, Any] = {
         key: f"{number!r} {kind.unit}" if (kind := kind_of(key)) else number for key, number in numbers.items()
     }
+    step, steps, cycles = values["time_step"], int(values["steps_per_cycle"]), int(values["cycles"])
     if "viscosity" in edited:
         changes["liquid.viscosity_ratio"] = 1.0
     if "steps_per_cycle" in edited:
         changes |= {"run.time_step": f"{step!r} s", "run.allow_unstable": True}
     if "cycles" in edited:
-        changes["run.cycles"] = cycles
-        if case.apart:
-            changes["run.settling_cycles"] = settling_of(cycles)
+        changes |= {"run.cycles": cycles} | ({"run.settling_cycles": settling_of(cycles)} if case.apart else {})
     ran = Case.read(changed(Case, case.document, changes), source=source, name=case.name).for_cycles(cycles)
     frequency, parts = ran.excitation.frequency, case.run.samples_per_cycle
     if not isclose(step * steps * frequency, 1.0, rel_tol=_SAME) or steps % parts:
@@ -207,21 +201,21 @@ def _ran(case: Case, values: Mapping[str, float], source: str) -> tuple[Case, li
         )
     for key, walkers in case.walkers_by_key.items():
         ran = ran.put(f"{key}.spacing", walkers.spacing)
-    sampling = {name: getattr(case.run, name) for name in ("cycles_per_sample", "samples_per_bridge_sample")}
-    lasts = {"time_step": step, "steps_per_cycle": steps, "cycles": cycles, "samples_per_cycle": parts}
-    return ran.but(run=ran.run.but(**lasts, **sampling)), edits
+    lasts = {"time_step": step, "steps_per_cycle": steps, "cycles": cycles}
+    kept = ("samples_per_cycle", "cycles_per_sample", "samples_per_bridge_sample")
+    return ran.but(run=ran.run.but(**lasts, **{name: getattr(case.run, name) for name in kept}))
 
 
 def _other_edits(written: str, edited_text: str, parameters: Collection[str]) -> list[str]:
     """A line about edited commands that set no parameter, if there are any."""
+
+    def sets_parameter(line: str) -> bool:
+        named = _LINE.match(line)
+        return bool(named) and named[1] in parameters
+
     before, after = (
-        [
-            command
-            for line in text.splitlines()
-            if (command := " ".join(line.partition("#")[0].split()))
-            and not ((parameter := _LINE.match(line)) and parameter[1] in parameters)
-        ]
+        [" ".join(line.partition("#")[0].split()) for line in text.splitlines() if not sets_parameter(line)]
         for text in (written, edited_text)
     )
-    lines = [line for line in after if line not in before] or [line for line in before if line not in after]
+    lines = [line for line in after if line not in [*before, ""]] or [line for line in before if line not in after]
     return [f"{len(lines)} other line(s), which are not part of the case, first: {lines[0]}"] if lines else []
