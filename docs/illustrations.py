@@ -17,10 +17,9 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -37,7 +36,7 @@ from walkers.check.lines import as_dict, failures, run_checks
 from walkers.check.literature import LITERATURE
 from walkers.errors import InputError, Problem
 from walkers.inputs.case import Case
-from walkers.inputs.sweep import load_sweep
+from walkers.inputs.sweep import Sweep, load_sweep
 from walkers.paper.make import COMPARED, FIGURES, make_figures
 from walkers.paper.sources import sweep_of
 from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, save_figure, styled
@@ -53,8 +52,8 @@ if TYPE_CHECKING:
 RECORD = Path("figures") / "made-from.json"
 CHECKED = Path("figures") / "validation.json"
 """Lines of ``walkers check literature``, of which pages quote numbers."""
-_BLOCK = re.compile(r"(?ms)(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n)(?P<text>.*?)(?=^```)")
-_FACT = re.compile(r"<!--fact (?P<name>\S+)-->(?P<text>[^<]*)<!--/fact-->")
+_BLOCK = re.compile(r"(?ms)(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n).*?(?=^```)")
+_FACT = re.compile(r"<!--fact (?P<name>\S+)-->[^<]*<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
 _CLIMBS = {f"contact.roughness.bead_{surface}": "0.2 um" for surface in ("bead", "wall")}
 """The small pile of which clusters climb within its four seconds."""
@@ -63,46 +62,114 @@ _OF_CLIMBS = (
     *("pile", "climbed", "climbs", "rate", "on plain walls", "in corners"),
     *("led by large", "p by chance", "speed (mm/s)"),
 )
-_OF_CALIBRATION = ("calibration.md", "calibration.json", "predictions.png")
 
 
-@dataclass(frozen=True)
-class Illustration:
-    """Files of docs/, the cases that they show, and the function that makes them from the folders of runs and docs."""
+Make: TypeAlias = Callable[[Path, Path], object]
+"""Makes the files of an illustration from the folders of runs and docs."""
+
+
+class Illustration(NamedTuple):
+    """Files of docs/, the cases that they show, and the function that makes them."""
 
     files: tuple[str, ...]
     cases: Callable[[], Iterable[Case]]
-    make: Callable[[Path, Path], None]
+    make: Make
 
 
-def _of_figure(name: str, *files: str, sweeps: Iterable[str]) -> Illustration:
+ILLUSTRATIONS: dict[str, Illustration] = {}
+
+
+def _illustration(name: str, *files: str, cases: Callable[[], Iterable[Case]]) -> Callable[[Make], Make]:
+    def enter(make: Make) -> Make:
+        ILLUSTRATIONS[name] = Illustration(files, cases, make)
+        return make
+
+    return enter
+
+
+def _cases(*names: str, of: Callable[[str], Sweep] = load_sweep) -> Callable[[], Iterable[Case]]:
+    """The cases of sweeps."""
+    return lambda: [case for name in names for case in of(name).cases()]
+
+
+def _shipped(*names: str, changes: Changes = None) -> Callable[[], Iterable[Case]]:
+    return lambda: [load_case(name, changes) for name in names]
+
+
+def _picture(name: str, case: str, changes: Changes = None, film: Changes = None) -> None:
+    """A picture of one run as `walkers render` makes it, or a film."""
+    file = f"pictures/{name}"
+
+    @_illustration(Path(name).stem if not film else "film", file, cases=_shipped(case, changes=changes))
+    def make(out: Path, docs: Path) -> None:
+        done = run(load_case(case, changes), out)
+        done.film(docs / file, **film) if film else done.render(docs / file)
+
+
+_picture("walker.png", "fig1b", {"run.cycles": 60})
+_FILM = {"size": (512, 216), "fps": 20, "slowdown": 20.0, "walker": 0, "end": 0.4}
+_picture("walker.gif", "fig1b", {"run.cycles": 60}, film=_FILM)
+_picture("tray.png", "tray")
+_picture("climber.png", "climber")
+_picture("pile.png", "pile-small", _CLIMBS)
+
+
+def _of_paper(name: str, *files: str, sweeps: Iterable[str]) -> None:
+    @_illustration(name, *files, cases=_cases(*sweeps, of=sweep_of))
     def make(out: Path, docs: Path) -> None:
         make_figures(out, docs / "figures", Options(), only=[name], formats=("png",))
 
-    return Illustration(files, lambda: [case for sweep in sweeps for case in sweep_of(sweep).cases()], make)
+
+for _name, _figure in FIGURES.items():
+    _of_paper(_name, f"figures/{_name}.png", sweeps=_figure.sweeps)
+_of_paper("comparison", "figures/comparison.md", "figures/comparison.json", sweeps=COMPARED)
+
+_BY_FRICTION = {"x": "contact.friction.bead_wall", "y": "axial_velocity", "hue": "liquid.name"}
+_SWEEPS: Mapping[str, tuple[Mapping[str, str], Callable[[Any], list[dict[str, str]]] | None]] = {
+    "climb-liquids": ({**_BY_FRICTION, "panels": "contact.roughness.bead_wall"}, tables.least_frictions),
+    "climb-corner": (_BY_FRICTION, tables.least_frictions),
+    "zoo": ({"y": "axial_velocity", "hue": "none"}, None),
+    "zoo-corner": ({"y": "axial_velocity"}, None),
+    "tray-phases": (
+        {"x": "drive.peak_acceleration", "y": "clustered_share", "hue": "walkers", "panels": "coverage"},
+        tables.means_of_trays,
+    ),
+}
+"""Sweeps, how their figures show them, and the rows of their tables if they have one."""
 
 
-def _of_run(name: str, case: str, changes: Changes = None, film: Changes = None) -> Illustration:
-    """A picture of one run as `walkers render` makes it, or a film."""
-    file = f"pictures/{name}.gif" if film else f"pictures/{name}.png"
+def _of_sweep(name: str) -> None:
+    options, rows = _SWEEPS[name]
+    files = [f"figures/{name}.png", *([f"figures/{name}.md"] if rows else [])]
 
+    @_illustration(name, *files, cases=_cases(name))
     def make(out: Path, docs: Path) -> None:
-        done = run(load_case(case, changes), out)
-        if film:
-            done.film(docs / file, **film)
-        else:
-            done.render(docs / file)
-
-    return Illustration((file,), lambda: [load_case(case, changes)], make)
+        done = sweep(name, out)
+        save_figure(done.figure(**options), docs / files[0], [point.directory.name for point in done.runs])
+        if rows:
+            write_bytes(docs / files[1], tables.page(f"walkers list {name}", rows(done.table())).encode())
 
 
+for _name in _SWEEPS:
+    _of_sweep(_name)
+
+
+@_illustration("pile-climbs", "figures/pile-climbs.png", "figures/pile-climbs.md", cases=_cases(*_PILES))
 def _make_climbs(out: Path, docs: Path) -> None:
-    """Figure and table of the climbs in all sweeps of piles."""
     climbs = climb([sweep(name, out).directory for name in _PILES], to=docs / "figures" / "pile-climbs.png")
     rows = [{name: texts[name] for name in _OF_CLIMBS} for texts in map(texts_of, climbs)]
     write_bytes(docs / "figures" / "pile-climbs.md", tables.page(f"walkers climb {' '.join(_PILES)}", rows).encode())
 
 
+@_illustration("unexplained", "figures/unexplained.md", cases=_shipped("fig1b", "fig4a", "fig4b"))
+def _make_effects(_: Path, docs: Path) -> None:
+    write_bytes(docs / "figures" / "unexplained.md", effects.table().encode())
+
+
+_CHECKED_CASES = _shipped("fig1b", "fig4a", "fig4b", "climber", "climber-dimer", "pile-ci")
+
+
+@_illustration("validation", CHECKED.as_posix(), "figures/benchmarks.png", cases=_CHECKED_CASES)
 def _make_validation(out: Path, docs: Path) -> None:
     lines = run_checks(LITERATURE, out)
     write_json(docs / CHECKED, as_dict(lines))
@@ -127,6 +194,7 @@ def _benchmarks() -> Figure:
     return figure
 
 
+@_illustration("others", "figures/others.png", cases=_shipped("symmetric"))
 def _make_others(_: Path, docs: Path) -> None:
     with experiments.workbench() as bench:
         save_figure(_experiments(bench), docs / "figures" / "others.png", (), title="Experiments of others")
@@ -168,92 +236,22 @@ def _experiments(bench: Bench) -> Figure:
     return figure
 
 
+_CALIBRATED = {
+    f"figures/{name.replace('predictions', 'calibration')}": name
+    for name in ("calibration.md", "calibration.json", "predictions.png")
+}
+
+
+@_illustration("calibration", *_CALIBRATED, cases=lambda: load_calibration("ruby").sweep("ruby").cases())
 def _make_calibration(out: Path, docs: Path) -> None:
     write_outcome(calibrate(load_calibration("ruby"), out, Options()), out / "ruby")
-    for name in _OF_CALIBRATION:
-        shutil.copy(out / "ruby" / name, docs / "figures" / name.replace("predictions", "calibration"))
-
-
-def _calibrated() -> list[Case]:
-    """The experiments of the calibration with the shipped values of its parameters."""
-    return list(load_calibration("ruby").sweep("ruby").cases())
-
-
-_BY_FRICTION = {"x": "contact.friction.bead_wall", "y": "axial_velocity", "hue": "liquid.name"}
-_SWEEPS: Mapping[str, Mapping[str, str]] = {
-    "climb-liquids": {**_BY_FRICTION, "panels": "contact.roughness.bead_wall"},
-    "climb-corner": _BY_FRICTION,
-    "zoo": {"y": "axial_velocity", "hue": "none"},
-    "zoo-corner": {"y": "axial_velocity"},
-    "tray-phases": {"x": "drive.peak_acceleration", "y": "clustered_share", "hue": "walkers", "panels": "coverage"},
-}
-"""Sweeps and how their figures show them."""
-_TABLES = {
-    "climb-liquids": tables.least_frictions,
-    "climb-corner": tables.least_frictions,
-    "tray-phases": tables.means_of_trays,
-}
-"""Those of which there is a table too."""
-
-
-def _of_sweep(name: str, options: Mapping[str, Any]) -> Illustration:
-    """The figure of a sweep, and its table."""
-    files = [f"figures/{name}.png", *([f"figures/{name}.md"] if name in _TABLES else [])]
-
-    def make(out: Path, docs: Path) -> None:
-        done = sweep(name, out)
-        save_figure(done.figure(**options), docs / files[0], [point.directory.name for point in done.runs])
-        for file in files[1:]:
-            write_bytes(docs / file, tables.page(f"walkers list {name}", _TABLES[name](done.table())).encode())
-
-    return Illustration(tuple(files), lambda: load_sweep(name).cases(), make)
-
-
-def _shipped(*names: str) -> Callable[[], list[Case]]:
-    return lambda: [load_case(name) for name in names]
-
-
-ILLUSTRATIONS: Mapping[str, Illustration] = {
-    "walker": _of_run("walker", "fig1b", {"run.cycles": 60}),
-    "film": _of_run(
-        *("walker", "fig1b", {"run.cycles": 60}),
-        film={"size": (512, 216), "fps": 20, "slowdown": 20.0, "walker": 0, "end": 0.4},
-    ),
-    "tray": _of_run("tray", "tray"),
-    "climber": _of_run("climber", "climber"),
-    "pile-climbs": Illustration(
-        ("figures/pile-climbs.png", "figures/pile-climbs.md"),
-        lambda: [case for name in _PILES for case in load_sweep(name).cases()],
-        _make_climbs,
-    ),
-    "pile": _of_run("pile", "pile-small", _CLIMBS),
-    **{name: _of_figure(name, f"figures/{name}.png", sweeps=figure.sweeps) for name, figure in FIGURES.items()},
-    **{name: _of_sweep(name, options) for name, options in _SWEEPS.items()},
-    "comparison": _of_figure("comparison", "figures/comparison.md", "figures/comparison.json", sweeps=COMPARED),
-    "unexplained": Illustration(
-        ("figures/unexplained.md",),
-        _shipped("fig1b", "fig4a", "fig4b"),
-        lambda _, docs: write_bytes(docs / "figures" / "unexplained.md", effects.table().encode()),
-    ),
-    "validation": Illustration(
-        (CHECKED.as_posix(), "figures/benchmarks.png"),
-        _shipped("fig1b", "fig4a", "fig4b", "climber", "climber-dimer", "pile-ci"),
-        _make_validation,
-    ),
-    "others": Illustration(("figures/others.png",), lambda: [load_case("symmetric")], _make_others),
-    "calibration": Illustration(
-        tuple(f"figures/calibration.{ending}" for ending in ("md", "json", "png")), _calibrated, _make_calibration
-    ),
-}
+    for file, name in _CALIBRATED.items():
+        shutil.copy(out / "ruby" / name, docs / file)
 
 
 def digest(cases: Iterable[Case]) -> str:
     """Twelve hex digits over cases, deck version and version of the results; the engine binary does not count."""
-    contents = {
-        "cases": [case.determinants() for case in cases],
-        "decks": CONTENT_VERSION,
-        "results": VERSION,
-    }
+    contents = {"cases": [case.determinants() for case in cases], "decks": CONTENT_VERSION, "results": VERSION}
     return hashlib.sha256(json.dumps(contents, sort_keys=True).encode()).hexdigest()[:12]
 
 
@@ -282,7 +280,13 @@ def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[
         record = read_json(docs / RECORD) | dict.fromkeys(illustration.files, digest(illustration.cases()))
         write_json(docs / RECORD, dict(sorted(record.items())))
         written += [docs / file for file in illustration.files]
-    return written + refresh_pages(pages_of(docs), facts(docs), out)
+    for page in pages_of(docs):
+        old = page.read_text("utf-8")
+        new = refreshed(old, facts(docs), lambda command: output_of(command, out))
+        if without_hashes(new) != without_hashes(old):
+            write_bytes(page, new.encode())
+            written.append(page)
+    return written
 
 
 def pages_of(docs: Path) -> list[Path]:
@@ -330,27 +334,10 @@ def _of_checks(lines: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     }
 
 
-def refresh_pages(pages: Iterable[Path], numbers: Mapping[str, str], out: Path) -> list[Path]:
-    """Write the current outputs and numbers into pages; return the pages that changed."""
-    changed = []
-    for page in pages:
-        old = page.read_text("utf-8")
-        new = _FACT.sub(lambda fact: f"<!--fact {fact['name']}-->{numbers[fact['name']]}<!--/fact-->", old)
-        new = _BLOCK.sub(lambda block: block["head"] + output_of(block["command"], out), new)
-        if without_hashes(new) != without_hashes(old):
-            write_bytes(page, new.encode())
-            changed.append(page)
-    return changed
-
-
-def outputs_in(page: Path) -> dict[str, str]:
-    """The commands of a page with their outputs, without the hashes of run names."""
-    return {block["command"]: without_hashes(block["text"]) for block in _BLOCK.finditer(page.read_text("utf-8"))}
-
-
-def facts_in(page: Path) -> list[tuple[str, str]]:
-    """The names and texts of the facts that a page quotes."""
-    return [(fact["name"], fact["text"]) for fact in _FACT.finditer(page.read_text("utf-8"))]
+def refreshed(page: str, numbers: Mapping[str, str], printed: Callable[[str], str]) -> str:
+    """The text of a page with the current numbers, and with what its commands print."""
+    page = _FACT.sub(lambda fact: f"<!--fact {fact['name']}-->{numbers[fact['name']]}<!--/fact-->", page)
+    return _BLOCK.sub(lambda block: block["head"] + printed(block["command"]), page)
 
 
 without_hashes = partial(_RUN_HASH.sub, "")
