@@ -32,7 +32,7 @@ from walkers.runner.binary import find_engine
 from walkers.runner.directory import case_of, unfinished
 from walkers.runner.failures import WalkersMet
 from walkers.runner.files import write_json
-from walkers.sweeps.making import DECK_FOLDER, make_runs, share_at
+from walkers.sweeps.making import DECK_FOLDER, make_runs, progress_at
 from walkers.sweeps.scheduler import (
     LONGEST_SECONDS,
     MOST_WALKERS,
@@ -335,12 +335,12 @@ def test_the_share_of_a_shared_deck_is_that_of_its_steps(tmp_path: Path) -> None
     """As its engine says beside the first of its runs; before that none is known."""
     cases = [make_case(drive={"peak_acceleration": peak}) for peak in ("2 g", "4 g")]
     deck, place = compose(plan_of(*cases)), tmp_path / "first"
-    assert share_at(place) == 0.0
+    assert progress_at(place) is None
     folder = unfinished(place) / DECK_FOLDER
     folder.mkdir(parents=True)
     write_json(folder / LAYOUT_NAME, deck.layout.as_dict())
     (folder / OUTPUT_NAME).write_text(f" {deck.layout.steps // 4} 4 0.05 {'0.001 ' * 6}\n")
-    assert share_at(place) == pytest.approx(0.25, rel=1e-3)
+    assert progress_at(place)[0] == pytest.approx(0.25, rel=1e-3)
 
 
 def test_what_parsl_is_told(tmp_path: Path) -> None:

@@ -41,11 +41,6 @@ _ALIKE = 1e-6  # relative difference below which lengths of runs are equal
 _LETTERS = 44  # of a line in labels of conditions
 _KINDS = {"all": ("", "ko"), "plain walls": ("on_plain_walls", "C1s"), "corners": ("in_corners", "C2^")}
 """All climbs and their parts: key of `summarise_climbs`, colour and marker."""
-_COLUMNS = (
-    *("condition", "where", "runs", "seconds", "within", "climbed", "probability", "probability_low"),
-    *("probability_high", "estimator", "median", "climbs", "rate", "rate_low", "rate_high", "dispersion"),
-    *("led_by_large", "share_of_large", "p_among_beads"),
-)
 
 
 def conditions_in(frame: pd.DataFrame) -> Iterator[tuple[str, list[Path]]]:
@@ -263,11 +258,15 @@ def table_of(climbs: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     rows = []
     for condition in climbs:
         for where, (key, _) in _KINDS.items():
-            row = {**(condition[key] if key else condition), "condition": condition["condition"], "where": where}
-            for name, ends in (("probability", row["interval"]), ("rate", row["rate_interval"])):
-                row |= dict(zip((f"{name}_low", f"{name}_high"), ends or (np.nan, np.nan), strict=True))
+            row = {"condition": condition["condition"], "where": where}
+            for name, value in (condition[key] if key else condition).items():
+                if name.endswith("interval"):
+                    quantity = name.removesuffix("interval").strip("_") or "probability"
+                    row |= dict(zip((f"{quantity}_low", f"{quantity}_high"), value or (np.nan, np.nan), strict=True))
+                elif not isinstance(value, (dict, list)):
+                    row[name] = value
             rows.append(row)
-    return pd.DataFrame(rows, columns=_COLUMNS)
+    return pd.DataFrame(rows)
 
 
 @styled

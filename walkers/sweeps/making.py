@@ -110,12 +110,16 @@ def make_runs(
 
 
 def progress_at(place: Path, case: Case | None = None) -> Progress | None:
-    """Progress of a run from its files, with the wall time of its segment; None for shared decks and at the start.
+    """Progress of a run from its files, or of the shared deck whose first run has this place; None at the start.
 
     The case is read as well, unless it is given.
     """
     directory = on_disk.unfinished(place)
+    shared = on_disk.unfinished(place) / DECK_FOLDER
     try:
+        if shared.is_dir():
+            share = last_step(shared / decks.OUTPUT_NAME) / on_disk.layout_of(shared).steps
+            return Progress(share, f"{100 * share:.0f} %")
         case = case or on_disk.case_of(directory)
         done = [_read_segment(path) for path in on_disk.segment_directories(directory)]
         (folder,) = (directory / on_disk.SEGMENTS).glob("*.new")
@@ -128,15 +132,6 @@ def progress_at(place: Path, case: Case | None = None) -> Progress | None:
     except (OSError, ValueError, KeyError, TypeError, WalkersError):
         return None
     return progress_in(run, cycles, Segment(begin, begin, start), step, seconds)
-
-
-def share_at(place: Path, case: Case | None = None) -> float:
-    """Share of the steps that are done of a run, or of the shared deck whose first run has this place; 0 if unknown."""
-    shared = on_disk.unfinished(place) / DECK_FOLDER
-    with suppress(OSError, ValueError, KeyError, TypeError):
-        return last_step(shared / decks.OUTPUT_NAME) / on_disk.layout_of(shared).steps
-    progress = progress_at(place, case)
-    return progress.share if progress else 0.0
 
 
 def progress_in(run: Run, cycles: int, segment: Segment, step: int, seconds: float) -> Progress:

@@ -42,7 +42,7 @@ from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, Outp
 from walkers.runner.launch import cores_here
 from walkers.show import PROGRAM_SECONDS, pairs_of_beads, predicted_overhead, predicted_seconds
 from walkers.sweeps import table
-from walkers.sweeps.making import check_audit, make_runs, share_at
+from walkers.sweeps.making import check_audit, make_runs, progress_at
 from walkers.sweeps.site import check_path, decks_at, prepare
 from walkers.templates.scene import sharing_key
 
@@ -203,36 +203,32 @@ class SweepPlan:
         """The cases of the points that are made."""
         return [self.cases[point] for deck in self.decks for point in deck.points]
 
-    @cached_property
-    def overhead(self) -> float:
-        """Predicted CPU time of Python for the missing points, s."""
-        return predicted_overhead(self.missing)
-
     @property
     def core_seconds(self) -> float:
         """Predicted CPU time of all processes for the missing points, s."""
         decks = (deck.seconds * max(self.cases[point].run.ranks for point in deck.points) for deck in self.decks)
-        return sum(decks) + self.overhead
+        return sum(decks) + predicted_overhead(self.missing)
 
     def as_text(self) -> str:
         """The plan in a few lines."""
         record, at_once, missing = self.record, self.options.decks_at_once, self.missing
-        besides = PROGRAM_SECONDS + self.overhead
+        besides = PROGRAM_SECONDS + predicted_overhead(missing)
         whole = PROGRAM_SECONDS + self.core_seconds
         apart = besides + sum(predicted_seconds(case) * case.run.ranks for case in missing)
         # Python works for one deck at a time, while other engines run.
         until = max(makespan((deck.seconds for deck in self.decks), at_once) + PROGRAM_SECONDS, besides)
         keys = ", ".join(table.with_unit(key, unit) for key, unit in record.sweep.units.items())
-        lines = [
-            f"{record.sweep.name}: {record.sweep.title}".rstrip(": "),
-            f"  varied     {keys or 'nothing'}",
-            f"  points     {len(record.runs)}: {table.status_text(Counter(self.statuses))}",
-            f"  to do      {counted(len(missing), 'point')} in {counted(len(self.decks), 'deck')}",
-            f"  predicted  {whole:.0f} core-seconds ({apart:.0f} without shared decks), "
-            f"{duration_text(until)} with {counted(at_once, 'deck')} in parallel",
-            f"  directory  {record.directory}",
-        ]
-        return "\n".join(lines)
+        return "\n".join(
+            [
+                f"{record.sweep.name}: {record.sweep.title}".rstrip(": "),
+                f"  varied     {keys or 'nothing'}",
+                f"  points     {len(record.runs)}: {table.status_text(Counter(self.statuses))}",
+                f"  to do      {counted(len(missing), 'point')} in {counted(len(self.decks), 'deck')}",
+                f"  predicted  {whole:.0f} core-seconds ({apart:.0f} without shared decks), "
+                f"{duration_text(until)} with {counted(at_once, 'deck')} in parallel",
+                f"  directory  {record.directory}",
+            ]
+        )
 
 
 def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = None) -> SweepPlan:
@@ -258,10 +254,10 @@ def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = N
 
 
 def _failures(record: table.SweepRecord, states: Sequence[table.PointState], reasons: Collection[str]) -> list[Failure]:
-    """The points with such failures."""
+    points = enumerate(zip(record.runs, states, strict=True))
     return [
         Failure(point, run, state.reason or "", state.message or "", str(state.directory))
-        for point, (run, state) in enumerate(zip(record.runs, states, strict=True))
+        for point, (run, state) in points
         if state.reason in reasons
     ]
 
@@ -400,19 +396,13 @@ def _report_of(future: Future[Report]) -> Report:
 
 
 class _Loop:
-    """Submits decks to an executor, and evaluates their reports."""
-
     def __init__(self, plan: SweepPlan, executor: Executor, stop: threading.Event | None) -> None:
         self.plan, self.record, self.executor, self.stop = plan, plan.record, executor, stop
         self.failures = list(plan.final)
-        self.decks: dict[Future[Report], PlannedDeck] = {}
-        """Submitted decks."""
-        self.halves: list[PlannedDeck] = []
-        """Second halves of failed decks, while no point is finished."""
-        self.shares: dict[PlannedDeck, float] = {}
-        """Shares of running decks that are done."""
-        self.alone: Counter[tuple[str, str]] = Counter()
-        """Failures of points alone, by name and message."""
+        self.decks: dict[Future[Report], PlannedDeck] = {}  # submitted
+        self.halves: list[PlannedDeck] = []  # second halves of failed decks, while no point is finished
+        self.shares: dict[PlannedDeck, float] = {}  # of running decks, that are done
+        self.alone: Counter[tuple[str, str]] = Counter()  # failures of points alone, by name and message
         self.begin, self.seconds = time.perf_counter(), sum(deck.seconds for deck in plan.decks)
         self.finished_before = self.done = plan.statuses.count("finished")
 
@@ -474,8 +464,9 @@ class _Loop:
         running, points, failed = sum(len(deck.points) for deck in decks), len(self.record.runs), len(self.failures)
         words = [f"{self.done} of {points} points done, {running} running, {failed} failed"]
         for deck in decks:  # between the segments of a run nothing is known
-            share = share_at(self.record.out / self.record.runs[deck.points[0]], self.plan.cases[deck.points[0]])
-            self.shares[deck] = max(self.shares.get(deck, 0.0), share)
+            first_point = deck.points[0]
+            at = progress_at(self.record.out / self.record.runs[first_point], self.plan.cases[first_point])
+            self.shares[deck] = max(self.shares.get(deck, 0.0), at.share if at else 0.0)
         left = [deck.seconds * (1.0 - self.shares.get(deck, 0.0)) for deck in (*self.decks.values(), *self.halves)]
         share = max(0.0, 1.0 - sum(left) / self.seconds) if self.seconds else 1.0
         words.append("measuring" if running and share >= _MEASURING else f"{100.0 * share:.0f} % of the work")
