@@ -200,7 +200,8 @@ strong = { drive.peak_acceleration = "6 g" }
 friction = 0.2
 drag     = 1.0
 [design]
-points   = 16
+points   = 12
+posterior = 16384
 seed     = 2
 held_out = ["r"]
 """)
@@ -247,8 +248,8 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     ]
     assert "| fact | measured |" in (to / "calibration.md").read_text()
     said = json.loads((to / "calibration.json").read_text())
-    assert (said["number"], said["of"], len(said["observations"])) == (17, 5, 6)
-    assert said["effective_samples"][0] > 400.0
+    assert (said["number"], said["of"], len(said["observations"])) == (13, 5, 6)
+    assert said["effective_samples"][0] > 100.0
     for name, true in TRUE.items():
         low, middle, high = said["posterior"][name]
         assert low < true < high, name
