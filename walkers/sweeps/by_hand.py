@@ -162,7 +162,7 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
 def _parameters(deck: str, values: Mapping[str, float]) -> dict[str, float]:
     """The parameters of a deck as it was written; those that follow from others, from the new values of these."""
     was = {name: float(text) for name, text in _LINE.findall(deck) if name in values and text[0] != "$"}
-    now = was | values
+    now = {**was, **values}
     for end in (name.removeprefix("amplitude") for name in values if name.startswith("amplitude")):
         peak, turning = now[f"peak_acceleration{end}"], 2.0 * pi * now[f"frequency{end}"]
         was |= {f"amplitude{end}": peak / turning**2, f"peak_velocity{end}": peak / turning}
@@ -210,8 +210,7 @@ def _other_edits(written: str, edited_text: str, parameters: Collection[str]) ->
     """A line about edited commands that set no parameter, if there are any."""
 
     def sets_parameter(line: str) -> bool:
-        named = _LINE.match(line)
-        return bool(named) and named[1] in parameters
+        return (named := _LINE.match(line)) is not None and named[1] in parameters
 
     before, after = (
         [" ".join(line.partition("#")[0].split()) for line in text.splitlines() if not sets_parameter(line)]
