@@ -45,11 +45,8 @@ def drawn(begins: Any, lengths: Any, takes: float, within: float | None = None, 
     """`summary` of runs whose first climbs began so and take so long to gain enough, where the run shows that, s."""
     rows = pd.DataFrame([CLIMB | {"size": 2, "leader": 0, "wall_names": "+x"}] * len(begins)).assign(**columns)
     rows = rows.assign(pile=range(len(begins)), onset=begins, qualified=np.add(begins, takes))
-    return summary(
-        PILES.iloc[:0].assign(driven=lengths).fillna({"beads": BEADS, "large": LARGE}),
-        rows[rows["qualified"] <= lengths],
-        within,
-    )
+    piles = pd.DataFrame({"beads": BEADS, "large": LARGE, "driven": lengths})
+    return summary(piles, rows[rows["qualified"] <= lengths], within)
 
 
 def test_a_rate_has_the_exact_interval_of_a_poisson_distribution() -> None:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import ast
 import doctest
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -57,59 +56,38 @@ _NAME = re.compile(r"(?<!`)`([A-Za-z_][\w.]*)`(?!`)")
 _OF_PACKAGE = re.compile(r"(?<![\w./-])walkers(?:\.[A-Za-z_]\w*)+")
 _FILES = ("pvd", "parquet", "sif", "def", "css")
 """Suffixes of files that are named ``walkers``."""
-_ERRORS = tuple(import_module(one) for one in ("builtins", "walkers.errors", "walkers.runner.failures"))
+_ERRORS = ("walkers.errors.", "walkers.runner.failures.")
 
 
-def _has(holder: object, parts: list[str]) -> bool:
-    """Whether attributes of attributes are there; fields of a dataclass without a default are annotations alone."""
-    for part in parts:
-        if not hasattr(holder, part):
-            return part in getattr(holder, "__annotations__", {})
-        holder = getattr(holder, part)
-    return True
-
-
-def is_there(name: str, *homes: object) -> bool:
-    """Whether a dotted name is that of a module or in it, or an attribute of a module or class at hand."""
+def is_there(name: str) -> bool:
+    """Whether a dotted name is that of a module, or of an attribute of one; fields of a dataclass are annotations."""
     parts = name.split(".")
-    if any(_has(home, parts) for home in homes):
-        return True
     for count in range(len(parts), 0, -1):
         with suppress(ImportError):
-            return _has(import_module(".".join(parts[:count])), parts[count:])
+            holder: object = import_module(".".join(parts[:count]))
+            for part in parts[count:]:
+                if not hasattr(holder, part):
+                    return part in getattr(holder, "__annotations__", {})
+                holder = getattr(holder, part)
+            return True
     return False
 
 
-def _docstrings(
-    node: ast.AST, homes: list[Any], arguments: frozenset[str]
-) -> Iterator[tuple[str, list[Any], set[str]]]:
-    """Texts of a module, its classes, functions and constants: each with what is at hand there."""
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.Expr) and isinstance(child.value, ast.Constant) and isinstance(child.value.value, str):
-            yield child.value.value, homes, arguments
-        inside, known = homes, arguments
-        if isinstance(child, ast.ClassDef) and hasattr(homes[0], child.name):
-            inside = [getattr(homes[0], child.name), *homes]
-        if isinstance(child, ast.FunctionDef):
-            known = arguments | {one.arg for one in (*child.args.args, *child.args.kwonlyargs)}
-        yield from _docstrings(child, inside, known)
-
-
 def test_names_in_docstrings_are_there() -> None:
-    """Those in backquotes: of the module or the class, of a module beside it, of an error, or a full path."""
+    """Those in backquotes: names in the code of the file, of a module beside it, of an error, or a full path."""
     wrong, count = [], 0
     for file in sorted((ROOT / "walkers").rglob("*.py")):
-        if file.stem == "__main__":
-            continue
         module = ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-        package = module if file.stem == "__init__" else module.rpartition(".")[0]
-        tree = ast.parse(file.read_text("utf-8"))
-        for text, homes, arguments in _docstrings(tree, [import_module(module), *_ERRORS], frozenset()):
-            for name in _NAME.findall(text):
-                count += 1
-                beside = is_there(f"{package}.{name}") and "." not in name
-                if not (name in arguments or beside or is_there(name, *homes)):
-                    wrong.append(f"{file.relative_to(ROOT)}: {name}")
+        homes = ("", f"{module}.", f"{module.rpartition('.')[0]}.", "builtins.", *_ERRORS)
+        nodes = [*ast.walk(ast.parse(file.read_text("utf-8")))]
+        code = {getattr(node, field, None) for node in nodes for field in ("id", "attr", "arg", "name")}
+        texts = [
+            node.value.value for node in nodes if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+        ]
+        for name in (name for text in texts for name in _NAME.findall(str(text))):
+            count += 1
+            if not ({*name.split(".")} <= code or any(is_there(f"{home}{name}") for home in homes)):
+                wrong.append(f"{file.relative_to(ROOT)}: {name}")
     assert count > 300
     assert not wrong
 
