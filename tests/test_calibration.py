@@ -21,7 +21,7 @@ from walkers import run
 from walkers.calibration.calibrate import PROPOSED, Outcome, calibrate, nearest
 from walkers.calibration.emulator import LARGEST, Emulator, Posterior, middle
 from walkers.calibration.file import Calibration, Parameter, load_calibration, read_calibration
-from walkers.calibration.observations import NO_NUMBERS, FloatArray, Observation, numbers_of
+from walkers.calibration.observations import NO_NUMBERS, FloatArray, Observation, numbers_in, numbers_of
 from walkers.calibration.report import draw_facts, record_of, summary
 from walkers.errors import InputError
 from walkers.inputs.axes import unit_cube
@@ -228,9 +228,7 @@ def small(folder: Path, **changes: Any) -> Calibration:
 def numbers(found: Calibration, values: list[float], out: Path, options: Options) -> dict[str, dict[str, float]]:
     """Quantities of the experiments at a parameter set."""
     record, _ = run_sweep(found.sweep("one", np.array([values])), out, options)
-    table = load(record.directory)
-    states = zip(found.experiments, table["run"], table["status"], strict=True)
-    return {name: numbers_of(run) if status == "finished" else NO_NUMBERS for name, run, status in states}
+    return dict(zip(found.experiments, numbers_in(load(record.directory)), strict=True))
 
 
 def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: Path) -> None:
@@ -335,7 +333,9 @@ def test_the_record_has_quantiles_and_agreement_of_a_known_outcome(
     names = ("guess", *PROPOSED[::2])
     sets, seen = zip(names, [[0.5, 0.5], [0.1, 0.1], [0.9, 0.9]], strict=True), zip(names, rows, strict=True)
     unit = {name: np.array(row) for name, row in sets}
-    found = record_of(Outcome(calibration, unit, dict(seen), 10, emulators, even, without, {}))
+    found = record_of(
+        Outcome(calibration, unit, dict(seen), 10, dict(zip("ab", emulators, strict=True)), even, without, {})
+    )
     assert found["sets"]["guess"] == {"friction": pytest.approx(0.1), "drag": pytest.approx(2.0)}
     assert list(found["agree"].values()) == [1, 1, 2]
     assert found["posterior"]["friction"] == pytest.approx([0.04 * 6.25**at for at in (0.41, 0.5, 0.59)], rel=1e-3)

@@ -11,7 +11,7 @@ import io
 import json
 import re
 import types
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
@@ -32,7 +32,6 @@ from walkers.postprocess.quantities import GROUPS, TABLES, Quantity
 from walkers.sweeps.table import STATE
 
 if TYPE_CHECKING:
-    from cyclopts import App
     from sphinx.application import Sphinx
     from sphinx.config import Config
 
@@ -132,12 +131,7 @@ def tables_of_keys(model: type[Table] = Case, place: str = "") -> Iterator[tuple
             yield from tables_of_keys(inner, f"[[{path}{name}]]" if several else f"[{path}{name}]")
 
 
-def _keys() -> str:
-    """Keys of case files and columns of tables, read off the declarations that the program itself uses."""
-    text = "# Keys and columns\n\n## Keys of a case file\n\n`walkers show CASE` prints every value.\n"
-    return text + "".join(f"\n### {place}\n\n{table}" for place, table in tables_of_keys()) + _columns()
-
-
+_KEYS = "# Keys and columns\n\n## Keys of a case file\n\n`walkers show CASE` prints every value.\n"
 _COLUMNS = """
 ## Columns of the tables of a run
 
@@ -154,12 +148,13 @@ The first columns are the keys that vary.
 _GROUPS = {"walking": "Walkers", "meetings": "Walkers that may meet", "piles": "Piles", "drive": "All sweeps"}
 
 
-def _columns() -> str:
-    """Columns of the tables of a run and of a sweep, from where they are declared."""
-    runs = [_described(name, quantities) for name, quantities in TABLES.items()]
-    sweeps = [_described(title, GROUPS[group]) for group, title in _GROUPS.items()]
+def _keys() -> str:
+    """Keys of case files and columns of tables, read off the declarations that the program itself uses."""
+    keys = "".join(f"\n### {place}\n\n{table}" for place, table in tables_of_keys())
+    runs = "\n".join(_described(name, quantities) for name, quantities in TABLES.items())
+    sweeps = "\n".join(_described(title, GROUPS[group]) for group, title in _GROUPS.items())
     status = "".join(f"| `{name}` | {unit} | {meaning} |\n" for name, (unit, meaning) in STATE.items())
-    return _COLUMNS + "\n".join(runs) + _SWEEPS + "\n".join(sweeps) + status
+    return f"{_KEYS}{keys}{_COLUMNS}{runs}{_SWEEPS}{sweeps}{status}"
 
 
 _LIBRARY = """# Library
@@ -176,16 +171,13 @@ def _library() -> str:
     for kind in ("materials", "liquids", "surface pairs"):
         text += f"\n## {kind.capitalize()}\n"
         for entry in (entry for entry in entries if entry.kind == kind):
-            text += f"\n### {entry.name}\n\n{entry.text}\n\n{_sourced(entry.numbers)}"
+            linked = {key: _PAGE.sub(r"[docs/\1](../../\1)", number.source) for key, number in entry.numbers.items()}
+            rows = ((*_numbers(key, number), linked[key]) for key, number in entry.numbers.items())
+            table = markdown(["", "value", "range", "source"], rows)
+            text += f"\n### {entry.name}\n\n{entry.text}\n\n{table}"
     defaults = {entry.name: entry.numbers["default"] for entry in entries if entry.kind == "not measured"}
-    rows = (_numbers(*default) for default in defaults.items())
-    return f"{text}\n## Not measured\n\n{NOT_KNOWN}\n\n{markdown(['', 'default', 'range'], rows)}"
-
-
-def _sourced(numbers: Mapping[str, LibraryNumber]) -> str:
-    linked = {key: _PAGE.sub(r"[docs/\1](../../\1)", number.source) for key, number in numbers.items()}
-    rows = ((*_numbers(key, number), linked[key]) for key, number in numbers.items())
-    return markdown(["", "value", "range", "source"], rows)
+    guesses = (_numbers(*default) for default in defaults.items())
+    return f"{text}\n## Not measured\n\n{NOT_KNOWN}\n\n{markdown(['', 'default', 'range'], guesses)}"
 
 
 def _numbers(key: str, number: LibraryNumber) -> tuple[str, str, str]:
@@ -223,18 +215,15 @@ of commands, options, cases, sweeps and runs for bash, zsh and fish; call it aga
 def _commands() -> str:
     """Help texts of the program, its commands, and theirs."""
     text, app = _COMMANDS, program()
-    names: list[list[str]] = [[], *([command.name] for command in commands())]
-    for words in [whole for name in names for whole in ([name] if not name else [name, *_parts(app, *name)])]:
+    names: list[list[str]] = [[]]
+    for name in (command.name for command in commands()):
+        names += [[name], *([name, part] for part in app[name] if part[0] != "-")]
+    for words in names:
         head, page = " ".join(["walkers", *words]), io.StringIO()
         with redirect_stdout(page):
             app([*words, "--help"]) if words else print_help()
         text += f"\n## {head}\n" * bool(words) + f"\n```text\n$ {head} --help\n{page.getvalue()}```\n"
     return text
-
-
-def _parts(app: App, name: str) -> list[list[str]]:
-    """The commands of a command."""
-    return [[name, part] for part in app[name] if part[0] != "-"]
 
 
 PAGES = {"commands": _commands, "tables": _keys, "library": _library, "shipped": _shipped}

@@ -11,7 +11,7 @@ import numpy as np
 
 from walkers.calibration.emulator import Emulator, Posterior
 from walkers.calibration.file import Calibration
-from walkers.calibration.observations import NO_NUMBERS, FloatArray, Observation, numbers_of
+from walkers.calibration.observations import NO_NUMBERS, FloatArray, Observation, numbers_in
 from walkers.errors import WalkersError
 from walkers.extras import require
 from walkers.inputs.axes import unit_cube
@@ -36,26 +36,23 @@ class Outcome:
     """Outcome of a calibration of D parameters to K observations.
 
     ``sets`` are points of the unit cube of the prior, shape (D,): those of the file, then `PROPOSED`; ``numbers`` the
-    engine's observations there, shape (K,), NaN where there is none. The emulators, of all but costly observations, are
-    from a ``number`` of sets. ``held_out`` is the posterior without what is held out. ``failures`` are by sweep.
+    engine's observations there, shape (K,), NaN where there is none. The emulators, by the names of all but costly
+    observations, are from a ``number`` of sets. ``held_out`` is the posterior without what is held out. ``failures``
+    are by sweep.
     """
 
     calibration: Calibration
     sets: Mapping[str, FloatArray]
     numbers: Mapping[str, FloatArray]
     number: int
-    emulators: Sequence[Emulator]
+    emulators: Mapping[str, Emulator]
     posterior: Posterior
     held_out: Posterior
     failures: Mapping[str, list[Failure]]
 
-    def emulator_of(self, observation: Observation) -> Emulator | None:
-        """The emulator of an observation; None if it is costly."""
-        return next((emulator for emulator in self.emulators if emulator.observation is observation), None)
-
     def predicted(self, observation: Observation) -> FloatArray | None:
         """5 %, median and 95 % of what was held out, from the other observations; None for others."""
-        emulator = self.emulator_of(observation)
+        emulator = self.emulators.get(observation.name)
         if emulator is None or observation.group not in self.calibration.file.design.held_out:
             return None
         samples = self.held_out.samples
@@ -94,11 +91,13 @@ def calibrate(
     unit = np.concatenate([calibration.sets, sobol])
     numbers = np.concatenate([named, run("round", sobol, cheap)])
     columns = zip(observations, numbers.T, strict=True)
-    emulators = [
-        Emulator.of(observation, unit, column, design.seed) for observation, column in columns if not observation.costly
-    ]
+    emulators = {
+        observation.name: Emulator.of(observation, unit, column, design.seed)
+        for observation, column in columns
+        if not observation.costly
+    }
     posterior, held_out = (
-        Posterior.of(emulators, design.posterior, design.seed, without) for without in ((), design.held_out)
+        Posterior.of([*emulators.values()], design.posterior, design.seed, without) for without in ((), design.held_out)
     )
     proposed = np.stack([posterior.best, held_out.best, unit[nearest(observations, numbers)]])
     rows, names = np.concatenate([named, run("proposed", proposed)]), (*file.sets, *PROPOSED)
@@ -113,9 +112,7 @@ def _numbers(calibration: Calibration, labels: Sequence[str], sweep: Path, faile
     if undone or not table["status"].isin(("finished", "failed")).all():
         message = undone[0].message if undone else "another process is running them"
         raise CalibrationStopped(f"{sweep.name}: points are missing ({message}); call again to continue")
-    states = zip(table["run"], table["status"], strict=True)
-    seen = [numbers_of(run) if status == "finished" else NO_NUMBERS for run, status in states]
-    lacking = dict.fromkeys(calibration.experiments, NO_NUMBERS)
+    seen, lacking = numbers_in(table), dict.fromkeys(calibration.experiments, NO_NUMBERS)
     sets = [lacking | dict(zip(labels, seen[at:], strict=False)) for at in range(0, len(seen), len(labels))]
     return np.array(
         [[observation.of_numbers(numbers) for observation in calibration.file.observations] for numbers in sets]

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import degrees, inf, nan
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,9 @@ from walkers.inputs.units import ANGLE, SPEED, WRITTEN, Kind, Number, parse_quan
 from walkers.postprocess.gait import misalignment, settled_samples, steady_walkers, together
 from walkers.postprocess.results import read
 from walkers.runner.directory import case_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FloatArray = npt.NDArray[np.float64]
 Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_pair_1"]
@@ -147,3 +150,9 @@ def numbers_of(run: str | Path) -> dict[str, float]:
     if len(angles := misalignment(walkers[together(walkers)])):
         numbers |= {"largest_angle": float(angles.max()), "smallest_angle": float(angles.min())}
     return numbers
+
+
+def numbers_in(table: pd.DataFrame) -> list[dict[str, float]]:
+    """`numbers_of` the runs of a sweep's table; NaN for those that are not finished."""
+    points = zip(table["run"], table["status"], strict=True)
+    return [numbers_of(run) if status == "finished" else NO_NUMBERS for run, status in points]

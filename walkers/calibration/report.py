@@ -116,7 +116,7 @@ def _row(outcome: Outcome, place: int) -> dict[str, Any]:
     """A fact, its number at the sets, and its prediction if it was held out."""
     observation = outcome.calibration.file.observations[place]
     (unit, scale), numbers = observation.unit, {name: float(row[place]) for name, row in outcome.numbers.items()}
-    ends, emulator = outcome.predicted(observation), outcome.emulator_of(observation)
+    ends, emulator = outcome.predicted(observation), outcome.emulators.get(observation.name)
     return {
         **{name: getattr(observation, name) for name in ("name", "group", "title", "derived")},
         "expected": observation.text,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkers.calibration.observations import LEAST_SPEED, Observation, numbers_of
+from walkers.calibration.observations import LEAST_SPEED, Observation, numbers_in
 from walkers.inputs.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.paper.sources import Sources, of_facts, ruby, sets, sweep_of, thresholds_with_theory
@@ -19,7 +19,7 @@ from walkers.runner.directory import case_of
 from walkers.theory.prediction import MODEL, PAPER, predicted_column
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 Numbers = Mapping[str, Mapping[str, float]]
 """Quantities of walkers by experiment of the calibration."""
@@ -38,7 +38,10 @@ def compare(sources: Sources) -> dict[str, Any]:
     """
     experiments = list(ruby().experiments)
     cases = {name: dict(zip(experiments, sweep_of(of_facts(name)).cases(), strict=True)) for name in sets()}
-    numbers, theory = {name: _by_engine(sources.table(of_facts(name))) for name in sets()}, _by_theory(cases["shipped"])
+    numbers, theory = (
+        {name: dict(zip(experiments, numbers_in(sources.table(of_facts(name))), strict=True)) for name in sets()},
+        _by_theory(cases["shipped"]),
+    )
     facts = [_fact(observation, numbers, theory) for observation in ruby().file.observations]
     counted = [fact["agree"] for fact in facts if not fact["derived"]]
     thresholds: Any = thresholds_with_theory(sources).to_dict("records")
@@ -64,13 +67,6 @@ def _parameters(cases: Mapping[str, Case]) -> dict[str, str]:
         texts = {origin.key: origin.text for origin in case.origins}
         shown[parameter.symbol or name] = " and ".join(dict.fromkeys(texts[key] for key in parameter.keys))
     return shown
-
-
-def _by_engine(table: pd.DataFrame) -> Numbers:
-    """Numbers of the runs of a sweep of all experiments; NaN for those that are not finished."""
-    nothing: Mapping[str, float] = defaultdict(lambda: nan)
-    runs = zip(ruby().experiments, table["run"], table["status"] == "finished", strict=True)
-    return {label: numbers_of(run) if finished else nothing for label, run, finished in runs}
 
 
 def _by_theory(cases: Mapping[str, Case]) -> Numbers:
