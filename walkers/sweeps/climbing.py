@@ -136,11 +136,10 @@ def _rate(events: int, seconds: float) -> dict[str, Any]:
     """Rate of events, 1/s, with the exact 95 % interval (Garwood 1936); None if the time is zero."""
     from scipy.stats import chi2
 
-    if seconds <= 0.0:
-        return {"rate": None, "rate_interval": None}
     tail = (1.0 - _CONFIDENCE) / 2.0
     ends = chi2.ppf((tail, 1.0 - tail), (2 * events, 2 * events + 2)) / 2.0  # NaN: no lower end without events
-    return {"rate": events / seconds, "rate_interval": (np.nan_to_num(ends) / seconds).tolist()}
+    rates = [events / seconds, *(np.nan_to_num(ends) / seconds).tolist()] if seconds > 0.0 else [None]
+    return {"rate": rates[0], "rate_interval": rates[1:] or None}
 
 
 def leaders(piles: pd.DataFrame, climbs: pd.DataFrame) -> dict[str, Any]:
@@ -280,31 +279,23 @@ def climbs_figure(climbs: Sequence[Mapping[str, Any]]) -> Figure:
     heights = [1.0, 0.3 + len(climbs) / 6.0]
     mosaic = [["survival", "climbs"], ["rates", "rates"]]
     figure, axes = new_figure(TWO_COLUMNS, _ROW * sum(heights), mosaic=mosaic, height_ratios=heights)
-    _draw_survival(axes["survival"], climbs[0]["curve"])
-    _draw_climbs(axes["climbs"], climbs[0]["each"])
+    curve = climbs[0]["curve"]
+    time, share, low, high = (np.array(curve[name], dtype=float) for name in ("time", "probability", "low", "high"))
+    axes["survival"].step(time, share, "k", where="post")
+    axes["survival"].fill_between(time, low, high, step="post", color="0.85")
+    axes["survival"].set(
+        xlabel="time of drive (s)", ylabel="share that has climbed", ylim=(0.0, 1.02), xlim=(0.0, None)
+    )
+    risen = [climb for climb in climbs[0]["each"] if climb["speed"] is not None]
+    for where, (key, look) in list(_KINDS.items())[1:]:
+        of_kind = [climb for climb in risen if (" " in climb["wall_names"]) == (key == "in_corners")]
+        sizes, speeds = [climb["size"] for climb in of_kind], [climb["speed"] * 1e3 for climb in of_kind]
+        axes["climbs"].plot(sizes, speeds, look, markerfacecolor="none", label=where, clip_on=False)
+    axes["climbs"].set(xlabel="beads", ylabel="speed (mm/s)", xlim=(0.0, None), ylim=(0.0, None))
     _draw_rates(axes["rates"], table_of(climbs))
     letter_panels(axes.values())
     figure.legend(*axes["rates"].get_legend_handles_labels(), loc="outside lower center", ncols=len(_KINDS))
     return figure
-
-
-def _draw_survival(panel: Axes, curve: Mapping[str, Sequence[float | None]]) -> None:
-    time, share, low, high = (np.array(curve[name], dtype=float) for name in ("time", "probability", "low", "high"))
-    panel.step(time, share, "k", where="post")
-    panel.fill_between(time, low, high, step="post", color="0.85")
-    panel.set(xlabel="time of drive (s)", ylabel="share that has climbed", ylim=(0.0, 1.02), xlim=(0.0, None))
-
-
-def _draw_climbs(panel: Axes, climbs: Sequence[Mapping[str, Any]]) -> None:
-    for where, (key, look) in list(_KINDS.items())[1:]:
-        climbs_of_kind = [
-            climb
-            for climb in climbs
-            if climb["speed"] is not None and (" " in climb["wall_names"]) == (key == "in_corners")
-        ]
-        sizes, speeds = [climb["size"] for climb in climbs_of_kind], [climb["speed"] * 1e3 for climb in climbs_of_kind]
-        panel.plot(sizes, speeds, look, markerfacecolor="none", label=where, clip_on=False)
-    panel.set(xlabel="beads", ylabel="speed (mm/s)", xlim=(0.0, None), ylim=(0.0, None))
 
 
 def _draw_rates(panel: Axes, table: pd.DataFrame) -> None:
@@ -315,10 +306,10 @@ def _draw_rates(panel: Axes, table: pd.DataFrame) -> None:
         at, rates = np.arange(len(rows)) + 0.2 * (number - 1), rows["rate"].astype(float)  # NaN without a drive
         errors = [rates - rows["rate_low"], rows["rate_high"] - rates]
         panel.errorbar(rates, at, xerr=errors, fmt=look, label=where, linestyle="none", markersize=3.0)
-    labels = []
-    for row in first.to_dict("records"):  # with the last word of each key, such as ``frequency 100 Hz``
-        condition = re.sub(r"[\w.\[\]]*?(\w+) = ", r"\1 ", row["condition"])
-        labels.append(fill(f"{condition or 'usual'}: {row['climbed']}/{row['runs']} climbed", _LETTERS))
+    # With the last word of each key, such as ``frequency 100 Hz``.
+    named = [re.sub(r"[\w.\[\]]*?(\w+) = ", r"\1 ", condition) or "usual" for condition in first["condition"]]
+    climbed = zip(named, first["climbed"], first["runs"], strict=True)
+    labels = [fill("{}: {}/{} climbed".format(*row), _LETTERS) for row in climbed]
     panel.set_yticks(range(len(labels)), list(map(plain_text, labels)))
     panel.set(xlabel="climbs per run and second", xlim=(0.0, None), ylim=(len(labels) - 0.5, -0.5))
 
