@@ -106,10 +106,7 @@ def check_limits(name: str, value: float | None, low: float, high: float = inf) 
 
 
 def check_utf8(word: str | Path) -> None:
-    """Refuse a path or a word that is no UTF-8, which neither tables nor decks could name, its odd bytes written out.
-
-    Raises `InputError` if it is one.
-    """
+    """Refuse a path or a word that is no UTF-8, which no table or deck could name, its odd bytes written out."""
     try:
         str(word).encode("utf-8")
     except UnicodeEncodeError as error:

@@ -1,7 +1,6 @@
-"""Packages that only some commands need: the extras of ``pyproject.toml``.
+"""Packages that only some commands need: the extras of ``pyproject.toml``, imported where they are used.
 
-They are imported where they are used. A function that needs an extra calls `require` before it computes or writes
-anything.
+A function that needs an extra calls `require` before it computes or writes anything.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Axes of a sweep: lists, spaced values, zipped values, and samplers.
-
-An axis is a set of keys with, for each of its points, one value a key, which a case file could say.
-"""
+"""Axes of a sweep: lists, spaced values, zipped values, and samplers."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Boundaries: planes, channels, grooves, containers, vessels of the user's own (`walkers.inputs.vessel`).
-
-Most have a floor, the plane z = 0 in their own frame, and may have side walls.
-"""
+"""Boundaries: planes, channels, grooves, containers, vessels of the user's own (`walkers.inputs.vessel`)."""
 
 from __future__ import annotations
 
@@ -66,7 +63,7 @@ class Round(NamedTuple):
 
 Wall: TypeAlias = Flat | Round | Facet
 BOTTOM = Flat((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-"""The floor of all boundaries with a floor."""
+"""The floor of all boundaries with a floor, in their own frame."""
 
 
 class Layer(NamedTuple):

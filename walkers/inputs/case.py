@@ -1,8 +1,6 @@
-"""A case: bodies on a boundary under a drive, with a liquid and contacts; a file's keys are its fields.
+"""A case in SI units, whose fields are the keys of a file, with what the file leaves out (`walkers.inputs.resolving`).
 
-Values are numbers in SI units. What the file leaves out comes from the library, from defaults or from other values
-(`walkers.inputs.resolving`), and ``sources`` says from where. A deck is rendered from it, a run directory stores it as
-``case.json``, and the hash in a run's name is made of it.
+A deck is rendered from it, a run directory stores it as ``case.json``, and the hash in a run's name is made of it.
 """
 
 from __future__ import annotations

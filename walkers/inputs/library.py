@@ -1,7 +1,4 @@
-"""The library of materials, liquids and surface pairs (``library.toml``), each number with its source.
-
-Users add to it by a file of their own.
-"""
+"""The library of materials, liquids and surface pairs (``library.toml``), each number with its source."""
 
 from __future__ import annotations
 
