@@ -12,8 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from platformdirs import user_cache_path
 
-_NOWHERE = Path("/proc/no-home")
-"""A folder that nobody can make."""
+_NOWHERE = Path("/proc/no-home")  # a folder that nobody can make
 
 
 def cache_folder() -> Path:

@@ -20,8 +20,7 @@ from walkers.text import printable
 T = TypeVar("T")
 R = TypeVar("R")
 _LONGEST_VALUE = 80
-_LONGEST_TEXT = 1000
-"""Longest quotation of a value, and of a file's name or an expectation, in a message, in letters."""
+_LONGEST_TEXT = 1000  # longest quotation of a value, and of a file's name or an expectation, in a message, in letters
 
 
 class WalkersError(Exception):

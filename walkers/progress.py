@@ -9,8 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
-_BAR = 24
-"""Letters of the bar."""
+_BAR = 24  # letters of the bar
 _FIRST_LINE_SECONDS = 1.0
 _LONGEST_SILENCE_SECONDS = 60.0
 

@@ -31,15 +31,13 @@ _WALKER_MICROSECONDS = 0.22
 _BEAD_STEPS_PER_SECOND, _PILE_MICROSECONDS = 10.7e6, 1.5
 """For loose beads, and per step in addition; measured from settled piles on, bead-steps per second: 11.0 million with
 200 beads and 10.2 with 1,630 on a quiet core, 5.7 million with 60 on a busy one."""
-_SOLVING_SECONDS = 0.25
-"""For each shape of bridge without a cached solution: measured 0.2 to 0.3."""
+_SOLVING_SECONDS = 0.25  # for each shape of bridge without a cached solution: measured 0.2 to 0.3
 _MEASURING_SECONDS, _FRAME_MICROSECONDS = 0.037, 30.0
 """For the tables and the result of a run, and in addition for each bead of walkers in each frame."""
 PROGRAM_SECONDS = 1.5
 """For the imports of a program that runs cases."""
 _LOOSE_PACKING = 0.55
-_FASTEST_CLIMB = 12e-3
-"""m/s; none of about a hundred climbs in glycerol at the drive of the paper was faster."""
+_FASTEST_CLIMB = 12e-3  # m/s; none of about a hundred climbs in glycerol at the drive of the paper was faster
 _GAIN_PER_RANK = 0.9
 _TRIED_AGAIN = (1.0, 0.1, 0.1)
 """Of the runs that may end when their velocities are constant: shares with a first, second and third attempt."""

@@ -30,8 +30,7 @@ _FEW = Field(min_length=2, max_length=100)
 MOST_BEADS = 200_000
 _LEAST_LEVER = 0.1
 """Smallest distance of the centroids of large and small beads that gives a heading, over the extent of a cluster."""
-_TOUCHING = 0.02
-"""Radii by which beads that are given places may be apart and still touch."""
+_TOUCHING = 0.02  # radii by which beads that are given places may be apart and still touch
 _TOO_SMALL = "a bead is too small to touch two beads that touch each other; expected a larger one"
 
 

@@ -23,8 +23,7 @@ LOOSE = 1.03
 """Pitch of the places from which beads are poured, in diameters of the largest bead."""
 _SLOPE = f'{units.NOT_NEGATIVE}; boundary.uphill = "180 deg" turns the slope'
 _LEAST = 1e-13
-_RIM = 2e-4
-"""m; the simulation box of a container reaches this far beyond its walls."""
+_RIM = 2e-4  # m; the simulation box of a container reaches this far beyond its walls
 
 
 class Flat(NamedTuple):

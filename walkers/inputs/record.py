@@ -24,12 +24,9 @@ if TYPE_CHECKING:
 
 FEWEST, MOST = 16, 100_000
 """Numbers of rows."""
-_GAP = 1.5
-"""Longest time between two rows, in medians of all."""
-_COARSE = 0.1
-"""Largest change by leaving out every second row, root mean square; a sine does with six rows a period."""
-_FAINT = 0.05
-"""Share of the strongest amplitude in the spectrum below which others do not count."""
+_GAP = 1.5  # longest time between two rows, in medians of all
+_COARSE = 0.1  # largest change by leaving out every second row, root mean square; a sine does with six rows a period
+_FAINT = 0.05  # share of the strongest amplitude in the spectrum below which others do not count
 _HEADER = (
     "expected a header of a time and accelerations along x, y or z, with commas between them, such as "
     '"time (ms), x (g), z (m/s^2)"'

@@ -32,18 +32,14 @@ from walkers.physics.mixtures import MIXTURES
 if TYPE_CHECKING:
     from walkers.inputs.case import Case
 
-_PACKING = 0.55
-"""Packing fraction of a settled wet pile, for the count that fills a height."""
+_PACKING = 0.55  # packing fraction of a settled wet pile, for the count that fills a height
 _SOFTEST, _LATEST = 5e7, 0.025
 """Lowest Young's modulus of ``"auto"``, Pa, and the largest `delay`, rad: velocities are then within 2 %."""
 _ROUGHEST = 0.01
 """Largest roughness over the radius of a bead: the wedge of liquid between smooth spheres is then no model."""
-_MEET = 0.01
-"""Largest difference of the ends of a record that repeats, over its peak acceleration."""
-_WIDEST = 1000.0
-"""Largest width of a vessel in diameters of the largest bead."""
-_FACING = {"up": "right", "down": "left"}
-"""The words for climbers."""
+_MEET = 0.01  # largest difference of the ends of a record that repeats, over its peak acceleration
+_WIDEST = 1000.0  # largest width of a vessel in diameters of the largest bead
+_FACING = {"up": "right", "down": "left"}  # the words for climbers
 NAMES = ("beads.material", "boundary.material", "liquid.name")
 """Keys whose values are names of the library."""
 _FRICTION = ("contact.friction.bead_bead", "contact.friction.bead_wall", "contact.rolling_friction")

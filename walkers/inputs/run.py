@@ -29,10 +29,8 @@ CONSTANT = 0.002
 _SEGMENT_SECONDS = 0.5
 _MOST_CYCLES = 60
 _SAMPLES = 20
-_NEARLY_SYMMETRIC = 0.08
-"""sin δ of dimers below which speeds of steady walkers still creep …"""
-_ASLANT = 0.1
-"""… and start angle (rad) from which walkers turn for longer than a few cycles: both run in full."""
+_NEARLY_SYMMETRIC = 0.08  # sin δ of dimers below which speeds of steady walkers still creep …
+_ASLANT = 0.1  # … and start angle (rad) from which walkers turn for longer than a few cycles: both run in full
 _LONGEST_SETTLING = 0.5
 _SETTLED_BELOW = 5e-3
 _FRAMES_PER_SECOND = 60.0

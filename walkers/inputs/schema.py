@@ -11,8 +11,7 @@ from pydantic_core.core_schema import NullableSchema, TupleSchema, WithDefaultSc
 
 from walkers.inputs.case import Case
 
-_LINK = re.compile(r" See \[\]\(\S+\)\.")
-"""To a page, from the page of keys."""
+_LINK = re.compile(r" See \[\]\(\S+\)\.")  # to a page, from the page of keys
 
 
 class _Generator(GenerateJsonSchema):

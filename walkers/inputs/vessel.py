@@ -35,8 +35,7 @@ SHARP = radians(44.9)
 """Faces of a convex vessel that turn by less at an edge cannot be planes without end: a bead near one of them would
 have a bridge to the other behind the edge. Its gap there is R/cos - R, at 45° 0.41 R, beyond the reach of bridges."""
 MOST_TRIANGLES = 20_000
-_SAME = 1e-6
-"""Of the extent of a surface: points that are nearer are one."""
+_SAME = 1e-6  # of the extent of a surface: points that are nearer are one
 _COPLANAR = cos(1e-3)
 _UPRIGHT = 1e-3  # largest vertical part of a normal
 _CLOSED, _ACROSS = -3e-308, -1e-12  # bounds of halves: the border is in it; triangles of one face overlap (m)
