@@ -246,13 +246,16 @@ def test_two_sweeps_over_the_same_points_share_them(
         "first": [(60, 2), (70, 2), (80, 1), (80, 2), (80, 3)],
         "second": [(70, 2), (80, 2), (80, 3), (80, 4), (90, 2)],
     }
-    programs = []
     for name, each in points.items():
         values = {"drive.frequency": [f"{hertz} Hz" for hertz, _ in each]}
         values |= {"drive.peak_acceleration": [f"{g} g" for _, g in each]}
-        command = [PROGRAM, "sweep", sweep_file(to_toml({"zip": [values]}), name), "-j", "2", "--engine", engine]
-        programs.append(subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL))
-    assert [program.wait(timeout=PATIENCE) for program in programs] == [0, 0]
+        sweep_file(to_toml({"zip": [values]}), name)
+    command = [PROGRAM, "sweep", "first.toml", "-j", "2", "--engine", engine]
+    program = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    # The second begins while engines of the first run.
+    wait_for(lambda: program.poll() is not None or log.exists())
+    assert _sweep("second.toml", "-j", "2", "--engine", engine).returncode == 0
+    assert program.wait(timeout=PATIENCE) == 0
     runs = {run for name in points for run in zip(points[name], load(f"runs/{name}")["run"], strict=True)}
     made = {str(path.parent.relative_to(in_folder)) for path in in_folder.glob("runs/base-*/manifest.json")}
     assert {run for _, run in runs} == made
@@ -426,11 +429,11 @@ def test_a_sweep_through_slurm(
     wait_for(lambda: not jobs())
     go.touch()
     second = start()
+    assert call(*command, "local").returncode == 1  # meanwhile
     _, errors = second.communicate(timeout=PATIENCE)
     assert (second.returncode, "point 2, base-" in errors, "blow-up" in errors) == (1, True, True), errors
     wait_for(lambda: not jobs())
     assert list(load("cluster/test")["status"]) == ["finished"] * 2 + ["failed"] + ["finished"] * 5
-    assert call(*command, "local").returncode == 1
     assert bits(in_folder / "cluster") == bits(in_folder / "local") != {}
 
 

@@ -61,13 +61,12 @@ FILES: dict[str, dict[str, Any]] = {
     },
 }
 FILES["pile"]["liquid"] |= {"conserved": True, "law": "willett"}
-FILES["pile"]["mixture"] |= {"count": 20}
+FILES["pile"]["mixture"] |= {"count": 14}
 SWEEP, SITE = "sweep sweep.toml -j 2", "sweep sweep.toml --site site.py"
 STOPS: dict[str, tuple[str, int, str, str, int, str]] = {
     # Command, engines at that time, signals, to whom, exit status, last line.
     "a run, Ctrl-C": ("run walker.toml", 1, "INT", "program", 130, "interrupted"),
     "a run, closed terminal under nohup": ("run walker.toml", 1, "HUP TERM", "nohup", 143, "terminated"),
-    "a run, killed": ("run walker.toml", 1, "KILL", "program", -9, ""),
     "a run, engine killed": ("run walker.toml", 1, "KILL", "engine", 1, "the engine was killed by SIGKILL"),
     "a check, Ctrl-C": ("check engine --only restart", 1, "INT", "program", 130, "interrupted"),
     "a pile, killed": ("run pile.toml", 1, "KILL", "program", -9, ""),
