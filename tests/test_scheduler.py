@@ -254,7 +254,7 @@ def test_two_sweeps_over_the_same_points_share_them(
     program = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     # The second begins while engines of the first run.
     wait_for(lambda: program.poll() is not None or log.exists())
-    assert _sweep("second.toml", "-j", "2", "--engine", engine).returncode == 0
+    assert call("sweep", "second.toml", "-j", "2", "--engine", engine).returncode == 0
     assert program.wait(timeout=PATIENCE) == 0
     runs = {run for name in points for run in zip(points[name], load(f"runs/{name}")["run"], strict=True)}
     made = {str(path.parent.relative_to(in_folder)) for path in in_folder.glob("runs/base-*/manifest.json")}
