@@ -73,19 +73,11 @@ class NoBridgeError(ValueError):
 
 
 class ForceCurve(NamedTuple):
-    """Stable bridges of one volume at n gaps.
+    """Stable bridges of one volume at n gaps, in the unit of length that was given."""
 
-    Attributes
-    ----------
-    forces : ndarray, shape (n,)
-        F/γ, in the unit of length that was given.
-    bridges : ndarray, shape (n, 4)
-        Arcs from the apex of either solid to its wetting line (at a sphere the filling angle times its radius), excess
-        pressure over the surface tension (1/length), and length of the profile.
-    """
-
-    forces: FloatArray
-    bridges: FloatArray
+    forces: FloatArray  # F/γ, shape (n,)
+    bridges: FloatArray  # shape (n, 4): arcs from the apex of either solid to its wetting line (at a sphere the filling
+    # angle times its radius), excess pressure over the surface tension (1/length), length of the profile
 
 
 def _sinc(x: Array) -> Array:
@@ -205,13 +197,7 @@ def _family_of(radii: tuple[float, float], volume: float, contact_angle: float |
 
 
 def _touching(family: _Family) -> FloatArray:
-    """The bridge at contact, continued from flatter solids, for which `_toroid` is a good approximation.
-
-    Raises
-    ------
-    NoBridgeError
-        If Newton's method does not find it.
-    """
+    """The bridge at contact, continued from flatter solids, for which `_toroid` is a good approximation."""
 
     def flatter(share: float) -> _Family:
         first, second = family.curvatures
@@ -226,24 +212,9 @@ def _touching(family: _Family) -> FloatArray:
     raise NoBridgeError("no bridge was found at contact")
 
 
-@dataclass(frozen=True)
-class _Branch:
-    """Stable bridges from contact to the largest gap: x and dx/ds against the arc length s of the family."""
-
-    arcs: FloatArray
-    bridges: FloatArray
-    tangents: FloatArray
-
-
 @lru_cache(maxsize=256)
-def _branch(family: _Family) -> _Branch:
-    """Follow a family along its arc length until its gap decreases.
-
-    Raises
-    ------
-    NoBridgeError
-        If there is none at contact, or the end is not reached.
-    """
+def _branch(family: _Family) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Stable bridges from contact to the largest gap: the arc length s of the family, x and dx/ds."""
     x = _touching(family)
     scale = np.array([1.0, 1.0, max(1.0, abs(float(x[2]))), 1.0, 1.0])
     tangent, step = family.tangent(x, _GAP, scale), _ARC_STEP
@@ -260,7 +231,7 @@ def _branch(family: _Family) -> _Branch:
         bridges.append(x)
         tangents.append(tangent)
         if abs(tangent[4]) < _TURNING:
-            return _Branch(np.array(arcs), np.array(bridges), np.array(tangents))
+            return np.array(arcs), np.array(bridges), np.array(tangents)
         step = min(_ARC_STEP, 1.5 * step)
     raise NoBridgeError("the largest gap was not reached")
 
@@ -298,42 +269,28 @@ def force_curve(
     contact_angle: float | tuple[float, float],
     gaps: npt.ArrayLike,
 ) -> ForceCurve:
-    """Pull of a bridge of constant volume at gaps.
+    """Pull of a bridge of constant volume at gaps, shape (n,), from 0 to the rupture distance.
 
-    Parameters
-    ----------
-    radius_1, radius_2
-        Radii of the spheres; infinity for a plane.
-    volume
-        Volume of the liquid, in the cube of the unit of the radii.
-    contact_angle
-        rad; one for both solids, or one for each.
-    gaps
-        From 0 to the rupture distance, shape (n,).
-
-    Raises
-    ------
-    ValueError
-        If a gap is negative or beyond rupture, or radii or volume are not positive.
-    NoBridgeError
-        If no bridge was found (a contact angle so large that the liquid is not held between them).
+    A plane has an infinite radius; the contact angle (rad) is one for both solids, or one for each. `ValueError` for
+    other gaps, and for radii and volumes that are not positive; `NoBridgeError` if no bridge was found (a contact angle
+    so large that the liquid is not held between them).
     """
     family = _family_of((radius_1, radius_2), volume, contact_angle)
-    unit, branch = cbrt(volume), _branch(family)
-    largest = float(branch.bridges[-1, 4])
+    unit, largest = cbrt(volume), float(_branch(family)[1][-1, 4])
     scaled = np.asarray(gaps, np.float64) / unit
     if scaled.min() < 0.0 or scaled.max() > largest * (1.0 + 1e-12):
         raise ValueError(f"gaps: expected 0 to {largest * unit:.6g}, where the bridge ruptures")
-    bridges = _stable(family, branch, np.minimum(scaled, largest))
+    bridges = _stable(family, np.minimum(scaled, largest))
     return ForceCurve(unit * family.forces(bridges), bridges[:, :4] * [unit, unit, 1.0 / unit, unit])
 
 
-def _stable(family: _Family, branch: _Branch, gaps: FloatArray) -> FloatArray:
+def _stable(family: _Family, gaps: FloatArray) -> FloatArray:
     """The stable bridges at n gaps, shape (n, 5)."""
-    knots = branch.bridges[:, 4]
+    along, branch, tangents = _branch(family)
+    knots = branch[:, 4]
     pieces = np.clip(np.searchsorted(knots, gaps, side="right") - 1, 0, len(knots) - 2)
-    cubics = CubicHermiteSpline(branch.arcs, branch.bridges, branch.tangents).c[:, pieces]
-    lows, highs = branch.arcs[pieces], branch.arcs[pieces + 1]
+    cubics = CubicHermiteSpline(along, branch, tangents).c[:, pieces]
+    lows, highs = along[pieces], along[pieces + 1]
 
     def ahead(arc: float, number: int) -> float:
         return float(_cubic(of_gaps[number], arc - lows[number]) - gaps[number])
@@ -343,10 +300,10 @@ def _stable(family: _Family, branch: _Branch, gaps: FloatArray) -> FloatArray:
     arcs = [brentq(ahead, lows[i], highs[i], (i,)) if inside[i] else lows[i] for i in range(len(gaps))]
     near = _cubic(cubics, (np.array(arcs) - lows)[:, None])
     bridges = family.solve(near, _GAP, gaps)
-    bridges[gaps >= knots[-1]] = branch.bridges[-1]
+    bridges[gaps >= knots[-1]] = branch[-1]
     far = ~(np.max(np.abs(bridges - near)[:, _POSITIVE], axis=1) <= _NEAR) & (gaps < knots[-1])
     for number in np.flatnonzero(far):
-        chord = branch.bridges[pieces[number] + 1] - branch.bridges[pieces[number]]
+        chord = branch[pieces[number] + 1] - branch[pieces[number]]
         bridges[number] = _across(family, cubics[:, number], chord, (lows[number], highs[number]), gaps[number])
     lost = ~(np.maximum(np.abs(bridges[:, 4] - gaps), np.max(np.abs(family.misfit(bridges)), axis=1)) <= _SAME_GAP)
     if lost.any():
@@ -376,26 +333,14 @@ def rupture_distance(
     radius_1: float, radius_2: float, volume: float, contact_angle: float | tuple[float, float]
 ) -> float:
     """Largest gap at which a bridge of this volume exists; parameters and errors as for `force_curve`."""
-    family = _family_of((radius_1, radius_2), volume, contact_angle)
-    return cbrt(volume) * float(_branch(family).bridges[-1, 4])
+    return cbrt(volume) * float(_branch(_family_of((radius_1, radius_2), volume, contact_angle))[1][-1, 4])
 
 
 def volume_at_contact(radius_1: float, radius_2: float, contact_angle: float, meniscus_radius: float) -> float:
     """Volume of a bridge between touching solids whose pressure is that of the air minus γ/``meniscus_radius``.
 
-    Parameters
-    ----------
-    radius_1, radius_2
-        Radii of the spheres; infinity for a plane.
-    contact_angle
-        rad.
-    meniscus_radius
-        Inverse of the suction over the surface tension, in the unit of the radii.
-
-    Raises
-    ------
-    NoBridgeError
-        If bridges up to half of the smaller sphere have more suction, or bridges as small as 1e-9 of it have less.
+    Parameters as for `force_curve`. `NoBridgeError` if bridges up to half of the smaller sphere have more suction, or
+    bridges as small as 1e-9 of it have less.
     """
     ends = [log(share * 4.0 / 3.0 * pi * min(radius_1, radius_2) ** 3) for share in (1e-9, 0.5)]
 
@@ -407,7 +352,6 @@ def volume_at_contact(radius_1: float, radius_2: float, contact_angle: float, me
         return float(1.0 + pressure * meniscus_radius)
 
     if not missing(ends[0]) < 0.0 < missing(ends[1]):
-        raise NoBridgeError(
-            f"no bridge between touching surfaces has a meniscus radius of {1e6 * meniscus_radius:g} um"
-        )
+        wanted = f"a meniscus radius of {1e6 * meniscus_radius:g} um"
+        raise NoBridgeError(f"no bridge between touching surfaces has {wanted}")
     return exp(brentq(missing, *ends, xtol=1e-12))

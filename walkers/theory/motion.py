@@ -16,7 +16,7 @@ vanishes while the gap is constant.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import inf
 from typing import TYPE_CHECKING
 
@@ -76,9 +76,8 @@ class Walker:
     @classmethod
     def joined(cls, walkers: Sequence[Walker]) -> Walker:
         """Concatenate several sets of walkers."""
-        return cls(
-            *(np.concatenate([getattr(walker, field.name) for walker in walkers], axis=-1) for field in fields(cls))
-        )
+        values = zip(*(vars(walker).values() for walker in walkers), strict=True)
+        return cls(*(np.concatenate(value, axis=-1) for value in values))
 
 
 @dataclass(frozen=True)
@@ -115,34 +114,24 @@ def walk(
 ) -> Motion:
     """Integrate from rest under the substrate's acceleration a0 cos 2πft and average over the last cycle.
 
-    Parameters
-    ----------
-    walker
-        N walkers, or one for all drives.
-    frequency, peak_acceleration
-        f in Hz and a0 in m/s², each a number or of shape (N,).
-    steady_acceleration
-        A pull along the axis toward the small bead, m/s²: the weight of a walker that climbs with its large bead above.
-    cycles, steps_per_cycle
-        Largest number of cycles of the drive (a periodic motion ends earlier), and time steps per cycle.
-    effect
-        A further effect: a function compiled by numba, and its K parameters of each walker, shape (N, K). It takes the
-        sliding velocities (m/s), the normal forces (unit 4πγR̄) and μ of the three contacts at the beginning of each
-        stage of a step, and a walker's parameters. It returns μ, f and Hᵀm in that unit; f and Hᵀm add to the forces of
-        the bridges, and all are constant through the stage; take as many steps as they need.
+    There are N walkers, or one for all drives; f (Hz), a0 and a steady pull along the axis toward the small bead (m/s²:
+    the weight of a walker that climbs with its large bead above) are numbers or of shape (N,). ``cycles`` is their
+    largest number: a periodic motion ends earlier.
+
+    A further ``effect`` is a function compiled by numba, and its K parameters of each walker, shape (N, K). It takes
+    the sliding velocities (m/s), the normal forces (unit 4πγR̄) and μ of the three contacts at the beginning of each
+    stage of a step, and a walker's parameters. It returns μ, f and Hᵀm in that unit; f and Hᵀm add to the forces of the
+    bridges, and all are constant through the stage; take as many steps as they need.
     """
     require("theory")
     from walkers.theory.stepping import integrate
 
-    quantities = (frequency, peak_acceleration, steady_acceleration, walker.scale)
-    drive = np.stack(
-        np.broadcast_arrays(*(np.asarray(value, np.float64).reshape(-1) for value in quantities))[:3], axis=-1
-    )
+    quantities = map(np.atleast_1d, (frequency, peak_acceleration, steady_acceleration, walker.scale))
+    drive = np.stack(np.broadcast_arrays(*quantities)[:3], axis=-1).astype(np.float64)
     friction = np.broadcast_to(walker.friction, (3, len(drive))).T.copy()
     tables = _tables(walker, drive[:, 0] * steps_per_cycle)
-    acts, terms = effect or (None, np.zeros((len(drive), 0)))
-    of_last_cycle = integrate(tables, friction, drive, acts, terms, cycles, steps_per_cycle)
-    mean, least, repeated, solved, series = of_last_cycle
+    further = effect or (None, np.zeros((len(drive), 0)))
+    mean, least, repeated, solved, series = integrate(tables, friction, drive, *further, cycles, steps_per_cycle)
     velocity = translation(mean)
     if not np.any(drive[:, 2]):  # by symmetry; the rest is the error of the steps
         velocity = np.where(walker.sin_delta == 0.0, 0.0, velocity)
@@ -166,11 +155,8 @@ def _tables(walker: Walker, steps_per_second: FloatArray) -> FloatArray:
     """
     from walkers.theory.stepping import FINER, LEVELS, STAGE
 
-    gains, presses = (
-        inertia_matrix(walker.sin_delta) * walker.scale[:, None, None],
-        normal_force_matrix(walker.sin_delta),
-    )
-    roll = rolling_matrix(*walker.radii)
+    gains = inertia_matrix(walker.sin_delta) * walker.scale[:, None, None]
+    presses, roll = normal_force_matrix(walker.sin_delta), rolling_matrix(*walker.radii)
     slide, couple, turn = np.moveaxis(walker.resistances / walker.force_unit, -1, 1)[..., None] * np.eye(3)
     forces, couples = slide + couple @ roll, couple + turn @ roll
     slowed = gains @ (forces + np.swapaxes(roll, 1, 2) @ couples)

@@ -152,21 +152,17 @@ def _why_unknown(motion: Motion, of: int) -> str | None:
 def alignment_of(case: Case) -> dict[str, Any]:
     """Whether the dimer of a case stays aligned with the axis, and otherwise the time until it turns over.
 
-    Returns
-    -------
-    dict
-        ``u``, ``v`` and ``damping`` (β, by the bridges) of the Mathieu equation; whether small angles are ``stable`` in
-        it; the ``largest_stable_v`` on a level substrate; ``rolling_rate``, the growth rate in it, 1/s; ``rate``, the
-        growth rate with sliding contacts and spinning beads, 1/s (negative: decay; at 1° if there is rolling friction),
-        None if the axial motion is not periodic; whether the dimer ``stands``; ``turns_over_after``, s from 1° to 90°.
+    The table has ``u``, ``v`` and ``damping`` (β, by the bridges) of the Mathieu equation; whether small angles are
+    ``stable`` in it; the ``largest_stable_v`` on a level substrate; ``rolling_rate``, the growth rate in it, 1/s;
+    ``rate``, the growth rate with sliding contacts and spinning beads, 1/s (negative: decay; at 1° if there is rolling
+    friction), None if the axial motion is not periodic; whether the dimer ``stands``; ``turns_over_after``, s from 1°
+    to 90°.
     """
     drive = case.excitation
     mathieu = alignment(case)
     rate = turning_rate(case) if drive.peak_acceleration > 0.0 else None
     return {
-        "u": mathieu.u,
-        "v": mathieu.v,
-        "damping": mathieu.damping,
+        **vars(mathieu),
         "stable": mathieu.stable,
         "largest_stable_v": LARGEST_STABLE_V,
         "rolling_rate": mathieu.growth * pi * drive.frequency,
@@ -216,21 +212,11 @@ def describe(prediction: dict[str, Any], result: Mapping[str, Any] | None) -> st
 
 
 def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, FloatArray], dict[str, int]]:
-    """Predictions of the models for a column of the table of a sweep of N cases.
+    """Predictions of the models for a column of the table of a sweep of N cases, such as ``velocity`` or ``sliding_1``.
 
-    Parameters
-    ----------
-    cases, column
-        N cases; ``velocity``, ``right_facing``, ``left_facing``, ``rotation_1``, ``sliding_1``, …
-
-    Returns
-    -------
-    predictions
-        Values of each model by its name, m/s, shape (N,); NaN where it does not apply. Empty if no model has the column
-        or applies to any point.
-    reasons
-        Reasons why points lack a value of `MODEL`, or velocities one of `PAPER`, and how points are outside of the
-        paper's measurements, where no model is tested, with the number of points.
+    Returns values of each model by its name, m/s, shape (N,), NaN where it does not apply (none if no model has the
+    column or applies to any point); and reasons why points lack a value of `MODEL`, or velocities one of `PAPER`, and
+    how points are outside of the paper's measurements, where no model is tested, with the number of points.
     """
     family, _, number = column.replace("_pair_1", "_3").rpartition("_")  # contact 3 of the theory
     is_velocity = column in ("velocity", "right_facing", "left_facing")

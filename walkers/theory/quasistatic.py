@@ -96,15 +96,10 @@ def detachment(sin_delta: npt.ArrayLike) -> Detachment:
 
 
 def mean_velocity(gamma0: npt.ArrayLike, sin_delta: npt.ArrayLike) -> FloatArray:
-    """Mean velocity for a quasi-static drive of ±Γ0/√2 under the paper's friction, from the matrices.
+    """Mean velocity for a quasi-static drive of ±Γ0/√2 under the paper's friction, m/s, positive toward the large bead.
 
-    Γ0 and sin δ of beads of equal density may be of any shapes that broadcast.
-
-    Returns
-    -------
-    ndarray
-        m/s, positive toward the large bead; NaN where a contact would open (`detachment`), for there the model does not
-        hold.
+    Γ0 and sin δ of beads of equal density may be of any shapes that broadcast. NaN where a contact would open
+    (`detachment`), for there the model does not hold.
     """
     gamma, s = np.broadcast_arrays(np.asarray(gamma0, np.float64), np.asarray(sin_delta, np.float64))
     parallel, pressed = _under_a_steady_force(s)

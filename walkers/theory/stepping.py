@@ -44,31 +44,17 @@ def integrate(
     cycles: int,
     steps: int,
 ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, FloatArray]:
-    """Walk N walkers from rest.
+    """Walk N walkers from rest; see `walkers.theory.motion.walk`.
 
-    Parameters
-    ----------
-    tables : ndarray, shape (N, 3, 13, 3)
-        For each walker, and for stages (of h seconds) of a step, of an 8th and of a 64th of it: velocities v0 become
-        P v0 - h G F∥, normal forces are F0 + B P v0 + D F∥. Three rows of P, G (m/s²), D and B (s/m), and F0.
-    mu : ndarray, shape (N, 3)
-        Coulomb's coefficient of each walker and contact.
-    drive : ndarray, shape (N, 3)
-        Frequency (Hz), peak acceleration and steady acceleration (m/s²).
-    effect, terms
-        A further effect (`walkers.theory.motion.walk`) and its parameters of each walker, shape (N, K).
-    cycles, steps
-        Largest number of cycles, and time steps per cycle.
+    ``tables`` (N, 3, 13, 3) have for stages (of h seconds) of a step, of an 8th and of a 64th of it: velocities v0
+    become P v0 - h G F∥, normal forces are F0 + B P v0 + D F∥; three rows of P, G (m/s²), D and B (s/m), and F0.
+    ``mu`` (N, 3) is Coulomb's coefficient of each contact; ``drive`` (N, 3) has frequency (Hz), peak acceleration and
+    steady acceleration (m/s²).
 
-    Returns
-    -------
-    mean, least : ndarray, shape (3, N)
-        Mean sliding velocities (m/s) and smallest normal forces over the last cycle.
-    repeated, solved : ndarray of bool, shape (N,)
-        Whether the last two cycles agree, or all cycles of the second half within the error of the steps (then means
-        are over that half); and whether friction forces that obey the law were found at every step.
-    series : ndarray, shape (N, steps, 3)
-        Sliding velocities through the last cycle.
+    Returns mean sliding velocities (m/s) and smallest normal forces over the last cycle, of shape (3, N); whether the
+    last two cycles agree, or all cycles of the second half within the error of the steps (then means are over that
+    half); whether friction forces that obey the law were found at every step; and the sliding velocities through the
+    last cycle, shape (N, steps, 3).
     """
     count = len(drive)
     means, leasts = np.zeros((3, count)), np.zeros((3, count))
