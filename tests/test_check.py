@@ -81,7 +81,7 @@ def pile(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     monkeypatch.setattr("walkers.templates.deck.SETTLING_SECONDS", 0.02)
     tables: dict[str, Any] = read_toml(shipped("case")["pile-ci"])
     tables["mixture"] |= {"count": 12}
-    tables["run"] |= {"longest_settling": "0.02 s", "frames_per_second": 170}
+    tables["run"] |= {"longest_settling": "0.02 s", "frames_per_second": 170, "time_step": "3 us"}
     return tables
 
 

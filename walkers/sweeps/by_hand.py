@@ -31,8 +31,7 @@ from walkers.runner.launch import judge
 from walkers.runner.manifest import MANIFEST_NAME, read_manifest, write_manifest
 from walkers.sweeps.readable import kind_of
 from walkers.templates import deck as decks
-from walkers.templates.deck import Segment
-from walkers.templates.parameters import PRINTED, suffixes
+from walkers.templates.deck import PRINTED, Segment, suffixes
 
 _LOGS = (decks.OUTPUT_NAME, "log.liggghts")
 """Output of the engine by `write_run_script`, and the default log of LIGGGHTS."""

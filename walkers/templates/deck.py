@@ -16,7 +16,6 @@ from walkers.inputs.run import limits_of
 from walkers.physics.capillary import bead_volume
 from walkers.physics.laws import LAWS
 from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, MEAN_SPIN_COLUMNS, Layout, PlacedWalker
-from walkers.templates.parameters import PRINTED, STATUS_LINES_PER_CYCLE, along, in_cycles, suffixes
 from walkers.templates.scene import Scene, Surface, place, surface_of
 from walkers.text import rendered
 
@@ -36,6 +35,9 @@ _NAMES = {
     **{"layout": LAYOUT_NAME, "bridges": BRIDGES_NAME, "scaled": "bridges.scaled.txt"},
     **{"loads": LOADS_NAME, "facets": FACETS_NAME, "run": RUN_NAME, "scale": SCALE_NAME},
 }
+STATUS_LINES_PER_CYCLE = 4
+PRINTED = "parameters:"
+"""Start of the line in which the engine prints the parameters."""
 CONTENT_VERSION = 9
 """Version of the numbers of decks, part of the names of runs: increase it if a case gives other numbers.
 
@@ -206,6 +208,33 @@ def compose(plan: Plan) -> Deck:
     slowest = min(case.run.steps_per_sample, case.run.steps_per_cycle) * len(scene.beads) * _SLOWEST_STEP
     bounds = (max(_SILENCE, slowest), max(_LOG_BYTES, case.run.cycles * _LOG_BYTES_PER_CYCLE))
     return Deck(text, files, layout, (scene.lower, scene.upper), fastest, *bounds, beyond)
+
+
+# Texts of the named parameters of a deck (``blocks/parameters.lig.j2``), lines that a user may edit. LIGGGHTS replaces
+# ``${name}`` by the text of a ``string`` variable, and computes ``$(formula)`` in double precision to 20 digits. A deck
+# with names therefore gives the same results bit for bit as one with numbers. An ``equal`` variable has 15 digits.
+
+
+def suffixes(count: int) -> list[str]:
+    """Suffixes for the names of several parameters of a kind; empty for a single one."""
+    return [""] if count == 1 else [f"_{place}" for place in range(1, count + 1)]
+
+
+def in_cycles(steps: int, steps_per_cycle: int) -> str:
+    """Steps as a multiple or a part of a cycle, if possible."""
+    whole, rest = divmod(steps, steps_per_cycle)
+    if whole and not rest:
+        return "${steps_per_cycle}" if whole == 1 else f"$({whole}*v_steps_per_cycle)"
+    for parts in (steps_per_cycle // steps, STATUS_LINES_PER_CYCLE):
+        if parts and ceil(steps_per_cycle / parts) == steps:
+            return f"$(ceil(v_steps_per_cycle/{parts}))" if steps_per_cycle % parts else f"$(v_steps_per_cycle/{parts})"
+    return str(steps)
+
+
+def along(name: str, direction: Vector) -> str:
+    """A parameter times a unit vector."""
+    parts = {1.0: f"${{{name}}}", 0.0: "0.0"}
+    return " ".join(parts.get(part, f"$(v_{name}*({float(part)!r}))") for part in direction)
 
 
 def _start(drive: Excitation) -> list[float]:
