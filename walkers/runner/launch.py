@@ -86,13 +86,12 @@ def launch(
     on_step: Callable[[int], None] | None = None,
     time_limit: float | None = None,
     keep_open: Sequence[int] = (),
-    starts: int = 3,
 ) -> EngineReport:
     """Run a deck in a directory until its end or its first failure, an `EngineFailure`; then the engine has ended.
 
     A few times per second and at the end ``on_step`` is called with the current step; its exceptions end the engine.
     The run is stopped after ``time_limit`` (wall time, s). The engine inherits the file descriptors ``keep_open`` (the
-    lock of the run). If it ends before it prints its version, it is started again, at most ``starts`` times in all.
+    lock of the run). If it ends before it prints its version, it is started again, three times in all.
     """
     ranks, temporary = deck.layout.ranks, Path(os.environ.get("TMPDIR", "/tmp"))
     check_room(directory, deck.layout.bead_dump_bytes)
@@ -103,14 +102,12 @@ def launch(
     plugin = plugin_of(engine)
     write_run_script(directory, engine, plugin, ranks)
     command = [*_before(ranks), "env", f"LD_PRELOAD={plugin}", str(engine.path), "-log", "none", "-in", DECK_NAME]
-    while True:
-        starts -= 1
-        try:
-            return _Watch(deck, directory, engine.path, time_limit).run(command, on_step or (lambda _: None), keep_open)
-        except failures.EngineNeverStarted:
-            if not starts:
-                raise
-            time.sleep(_PAUSE_SECONDS)
+    tell = on_step or (lambda _: None)
+    for _ in range(2):
+        with suppress(failures.EngineNeverStarted):
+            return _Watch(deck, directory, engine.path, time_limit).run(command, tell, keep_open)
+        time.sleep(_PAUSE_SECONDS)
+    return _Watch(deck, directory, engine.path, time_limit).run(command, tell, keep_open)
 
 
 def last_step(log: Path) -> int:
@@ -216,10 +213,6 @@ class _Watch:
         self.loop_seconds = math.nan
         self.read = self.grown = 0
         self.silent = 0.0
-
-    @property
-    def elapsed(self) -> float:
-        return time.perf_counter() - self.begin
 
     @property
     def written(self) -> int:
@@ -337,7 +330,7 @@ class _Watch:
         if self.silent > deck.silence:
             message = f"the engine wrote nothing for {deck.silence:g} s after {at}; it was stopped"
             raise failures.EngineSilent(message, self.directory)
-        if self.elapsed > self.time_limit:
+        if time.perf_counter() - self.begin > self.time_limit:
             raise failures.TimeLimitExceeded(f"time limit of {self.time_limit:g} s reached at {at}", self.directory)
         missing = self.layout.bead_dump_bytes - self.written
         free = shutil.disk_usage(self.directory).free
@@ -346,7 +339,7 @@ class _Watch:
 
     def verdict(self, status: int) -> EngineReport:
         """Judge a run that has ended: raise its failure, or return its cost."""
-        wall_seconds, layout, self.time_limit = self.elapsed, self.layout, math.inf
+        wall_seconds, layout, self.time_limit = time.perf_counter() - self.begin, self.layout, math.inf
         self.look()
         self._take_in(self.rest)  # the last line may lack its end
         self.check()
