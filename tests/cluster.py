@@ -45,7 +45,7 @@ from parsl.providers import LocalProvider
 
 hearts = {"heartbeat_period": 1, "heartbeat_threshold": 3}
 pilots = HighThroughputExecutor(provider=LocalProvider(), address="127.0.0.1", max_workers_per_node=2, **hearts)
-config = Config([pilots], strategy_period=2)
+config = Config([pilots], strategy_period=0.5)
 """
 """A site file: pilots on this machine without a scheduler."""
 
