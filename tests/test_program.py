@@ -281,16 +281,23 @@ def test_help_names_every_command() -> None:
     assert all(f"make {target}" in targets for target in ("walker", "test", "help", "clean"))
 
 
-LOADED: dict[str, set[str]] = {"--help": set(), "list": {"cyclopts", "numpy", "pydantic"}}
+SLOW = "cyclopts rich pydantic numpy scipy pandas matplotlib pyarrow pyvista pint"
+PUBLIC = "import walkers.inputs, walkers.api, walkers.postprocess.report.run, walkers.sweeps.report"
+LOADED: dict[str, tuple[str, str, set[str]]] = {
+    "help": ("import walkers.main as m; m._status(['--help'])", SLOW, set()),
+    "list": ("import walkers.main as m; m._status(['list'])", SLOW, {"cyclopts", "numpy", "pydantic"}),
+    "package": (PUBLIC, "inputs runner sweeps IPython", set()),
+}
+"""What is done, modules that take long to import, or are others', and those of them that are loaded then."""
 
 
-@pytest.mark.parametrize("command", LOADED)
-def test_commands_load_what_they_need(command: str, in_folder: Path) -> None:
-    """Of the packages that take long to import."""
-    slow = "'cyclopts', 'rich', 'pydantic', 'numpy', 'scipy', 'pandas', 'matplotlib', 'pyarrow', 'pyvista', 'pint'"
-    script = f"import sys, walkers.main as m; m._status({command.split()}); print(*{{{slow}}} & set(sys.modules))"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert {*done.stdout.splitlines()[-1].split()} == LOADED[command]
+@pytest.mark.parametrize("name", LOADED)
+def test_no_more_is_loaded_than_is_needed(name: str, in_folder: Path) -> None:
+    """Others may have a module called inputs or runner, and theirs is theirs. Nothing public needs a notebook."""
+    script, modules, expected = LOADED[name]
+    assert {*python("-c", f"{script}; import sys; print(*sys.modules)", folder=in_folder).splitlines()[-1].split()} & {
+        *modules.split()
+    } == expected
 
 
 def test_a_function_gives_what_its_command_prints(looked_through: Path) -> None:
@@ -306,12 +313,6 @@ def test_a_function_gives_what_its_command_prints(looked_through: Path) -> None:
     assert refused == "walkers: --all: is for folders, not for a sweep\n"
 
 
-def test_the_package_claims_one_name_and_exports_few_that_are_documented() -> None:
-    """Others may have a module called inputs or runner, and theirs is theirs. Nothing public needs a notebook."""
-    modules = "walkers.inputs, walkers.api, walkers.postprocess.report.run, walkers.sweeps.report"
-    wanted = "{'inputs', 'runner', 'sweeps', 'IPython'}"
-    script = f"import sys, {modules}; print(sorted({wanted} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", script], cwd="/", capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n"
+def test_the_package_exports_few_names_that_are_documented() -> None:
     assert dir(walkers) == walkers.__all__ == sorted(walkers.__all__, key=lambda name: (name.islower(), name))
     assert all(getattr(walkers, name).__doc__ for name in walkers.__all__)

@@ -39,7 +39,7 @@ from walkers.postprocess.tables import read_table
 def directory(run_directory: Callable[..., Path]) -> Path:
     return run_directory(
         dimers={"replicates": 2, "angle_spread": "1 deg"},
-        run={"cycles": 8, "settling_cycles": 2, "samples_per_cycle": 10, "bridge_samples_per_cycle": 2},
+        run={"cycles": 8, "settling_cycles": 2, "samples_per_cycle": 20, "bridge_samples_per_cycle": 2},
     )
 
 
@@ -55,7 +55,7 @@ def moved(directory: Path) -> Group:
 
 def test_beads_and_floor_are_where_the_engine_put_them(moved: Group, collection: Path) -> None:
     sets = ElementTree.parse(collection).getroot().findall("Collection/DataSet")
-    for kind, every in {"beads": 1, "boundary": 1, "bridges": 5}.items():
+    for kind, every in {"beads": 1, "boundary": 1, "bridges": 10}.items():
         seconds = [float(entry.attrib["timestep"]) for entry in sets if entry.get("name") == kind]
         np.testing.assert_allclose(seconds, moved.time[::every], atol=1e-15)
     frame = 13
@@ -102,9 +102,9 @@ def test_walkers_are_exported_side_by_side_once_a_cycle_with_the_script_that_sho
     script = files("walkers.postprocess").joinpath("show.py.txt").read_bytes()
     assert collection.with_name("show.py").read_bytes() == script
     np.testing.assert_allclose(pv.get_reader(collection).time_values, np.arange(9) / 80.0)
-    points = [pv.read(collection.parent / f"beads_{frame:06d}.vtu").points for frame in (0, 80)]
+    points = [pv.read(collection.parent / f"beads_{frame:06d}.vtu").points for frame in (0, 160)]
     walked = (points[1] - points[0]).reshape(2, 2, 3)
-    np.testing.assert_allclose(walked, moved.position[80] - moved.position[0], atol=1e-12)
+    np.testing.assert_allclose(walked, moved.position[160] - moved.position[0], atol=1e-12)
     assert np.ptp(points[0][:, 1]) < 4e-3 < np.ptp(read_motion(directory).position[0, ..., 1])
     assert np.ptp(points[0][:, 0]) < 1e-3  # in a row, wherever they stood
     view = json.loads(ElementTree.parse(collection).getroot().attrib["view"])
@@ -131,17 +131,17 @@ def test_an_export_replaces_its_own_files_alone(directory: Path, tmp_path: Path)
             write_vtk(directory, place)
         assert {path.name: path.read_text() for path in place.iterdir()} == foreign
         shutil.rmtree(place)
-    for every in (40, 80):  # an earlier export is replaced
+    for every in (80, 160):  # an earlier export is replaced
         write_vtk(directory, place, every=every)
-        assert len(list(place.glob("beads_*.vtu"))) == 80 // every + 1
+        assert len(list(place.glob("beads_*.vtu"))) == 160 // every + 1
     (tmp_path / "link").symlink_to(place)
     for wrong, told in ((place / "walkers.pvd", "it is a file"), (tmp_path / "link", "it is a symbolic link")):
         with pytest.raises(InputError, match=told):
             write_vtk(directory, wrong)
 
 
-def test_a_lammps_dump_holds_the_motion(filmed: Path, motion: Motion, tmp_path: Path) -> None:
-    path = walkers.load(filmed).export("lammps", tmp_path / "here" / "walk.lammpstrj", every=4)
+def test_a_lammps_dump_holds_the_motion(directory: Path, motion: Motion, tmp_path: Path) -> None:
+    path = walkers.load(directory).export("lammps", tmp_path / "here" / "walk.lammpstrj", every=4)
     written = motion.select(slice(None, None, 4))
     frames = [text.split("ITEM: ") for text in path.read_text().split("ITEM: TIMESTEP\n")[1:]]
     steps, counts, _, tables = zip(*frames, strict=True)
@@ -183,13 +183,8 @@ def test_gaits_are_smooth_and_go_through_the_samples(directory: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def filmed(run_directory: Callable[..., Path]) -> Path:
-    return run_directory(dimers={"replicates": 2}, run={"cycles": 8, "settling_cycles": 2, "samples_per_cycle": 20})
-
-
-@pytest.fixture(scope="module")
-def motion(filmed: Path) -> Motion:
-    return read_motion(filmed).driven
+def motion(directory: Path) -> Motion:
+    return read_motion(directory).driven
 
 
 @pytest.fixture(scope="module")
@@ -310,9 +305,11 @@ def test_the_camera_follows_a_walker_that_walks_far(lengths: float, follows: boo
     assert all(ruby.mean() > 0.07 and not ruby[:, [0, -1]].any() for ruby in pictures)
 
 
-def test_an_mp4_shows_a_walker_that_walks_and_a_gif_lasts_as_long_as_it_says(filmed: Path, tmp_path: Path) -> None:
+def test_an_mp4_shows_a_walker_that_walks_and_a_gif_lasts_as_long_as_it_says(directory: Path, tmp_path: Path) -> None:
     path = tmp_path / "here" / "walk.mp4"
-    done = call("render", "--film", str(filmed), "--to", str(path), "--size", "360p", "--fps", "10", "--slowdown", "10")
+    done = call(
+        "render", "--film", str(directory), "--to", str(path), "--size", "360p", "--fps", "10", "--slowdown", "10"
+    )
     assert (done.returncode, done.stdout.strip()) == (0, str(path))
     about, *frames = imageio_ffmpeg.read_frames(str(path))
     assert (about["size"], about["fps"], len(frames)) == ((640, 360), 10.0, 11)
@@ -320,7 +317,7 @@ def test_an_mp4_shows_a_walker_that_walks_and_a_gif_lasts_as_long_as_it_says(fil
     assert all(0.02 < one.mean() < 0.4 for one in ruby)
     assert (ruby[0] != ruby[-1]).mean() > 0.01
     options = ["--size", "160x90", "--fps", "20", "--slowdown", "1e1", "--end", "50 ms", "--walker", "1"]
-    call("render", "--film", str(filmed), "--to", str(tmp_path / "walk.gif"), *options, check=True)
+    call("render", "--film", str(directory), "--to", str(tmp_path / "walk.gif"), *options, check=True)
     film = Image.open(tmp_path / "walk.gif")
     assert (film.size, film.n_frames, film.info["duration"], film.info["loop"]) == ((160, 90), 11, 50, 0)
 
@@ -348,9 +345,9 @@ def test_walls_are_whole_wherever_the_beads_are(motion: Motion, boundary: Bounda
 
 
 @pytest.mark.slow
-def test_pvpython_shows_spheres_bridges_and_floor(filmed: Path, tmp_path: Path) -> None:
+def test_pvpython_shows_spheres_bridges_and_floor(directory: Path, tmp_path: Path) -> None:
     """With ParaView and Xvfb, 1.4 GB, which ``make test-slow`` installs."""
-    collection = walkers.load(filmed).export("vtk", tmp_path / "vtk")
+    collection = walkers.load(directory).export("vtk", tmp_path / "vtk")
     script = collection.parent.rename(tmp_path / "moved") / "show.py"  # the files are found beside it
     picture = tmp_path / "walkers.png"
     command = ["xvfb-run", "-a", "pvpython", str(script), str(picture), "0.05"]
