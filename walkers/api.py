@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import threading
 import warnings
 from base64 import b64encode
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -18,14 +17,39 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from walkers import DEFAULT_OUT, RECORDS
-from walkers.errors import InputError, Problem, WalkersError, check_utf8, expected_of, refused
+from walkers.errors import InputError, Problem, WalkersError, apply_all, check_utf8, expected_of, refused
 from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped
+from walkers.inputs.sweep import load_sweep
+from walkers.postprocess import results
+from walkers.postprocess.drawing import FORMATS, check_place, save_figure
+from walkers.postprocess.figures import plot_run
+from walkers.postprocess.film_options import FilmOptions
+from walkers.postprocess.films import render_film
+from walkers.postprocess.motion import Motion, read_motion
+from walkers.postprocess.report.player import player_of
+from walkers.postprocess.report.run import report_run, result_html
+from walkers.postprocess.results import Results
+from walkers.postprocess.series import render_series
+from walkers.postprocess.tables import read_table
 from walkers.progress import Progress, in_notebook, progress_of
 from walkers.runner import directory as on_disk
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import EngineMissing, RunBusy
 from walkers.runner.files import read_json
 from walkers.runner.manifest import read_manifest
+from walkers.sweeps import table as of_points
+from walkers.sweeps.accuracy import measure_accuracy
+from walkers.sweeps.by_hand import as_run, take_in
+from walkers.sweeps.climbing import conditions_in, summarise_climbs, write_climbs
+from walkers.sweeps.comparison import Comparison, Side, compare_runs
+from walkers.sweeps.figure import column_of, figure_of
+from walkers.sweeps.figure_options import FigureOptions
+from walkers.sweeps.folder import run_text
+from walkers.sweeps.making import check_audit, make_runs, progress_at
+from walkers.sweeps.report import report_sweep
+from walkers.sweeps.scheduler import Failure, Options, run_sweep
+from walkers.sweeps.site import load_site
+from walkers.sweeps.spread import Spread, figures_of_spread, run_spread
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -37,11 +61,6 @@ if TYPE_CHECKING:
     from walkers.calibration.calibrate import Outcome
     from walkers.inputs.case import Case
     from walkers.inputs.origins import Origin
-    from walkers.postprocess.motion import Motion
-    from walkers.postprocess.results import Results
-    from walkers.sweeps.comparison import Comparison
-    from walkers.sweeps.scheduler import Failure
-    from walkers.sweeps.spread import Spread
 
 Named: TypeAlias = "Case | str | Path | Mapping[str, Any]"
 Changes: TypeAlias = "Mapping[str, Any] | None"
@@ -204,8 +223,6 @@ class Run:
 
     def __repr__(self) -> str:
         """Directory, status and result in a line."""
-        from walkers.sweeps.folder import run_text
-
         return f"Run({self.directory}: {run_text(self._files)})"
 
     def check(self) -> Run:
@@ -222,15 +239,11 @@ class Run:
     @property
     def status(self) -> str:
         """``finished``, ``running``, ``interrupted`` or ``failed``."""
-        from walkers.sweeps.table import state_at, worst_status
-
-        return worst_status([state_at(self.directory).status])
+        return of_points.worst_status([of_points.state_at(self.directory).status])
 
     @property
     def progress(self) -> Progress | None:
         """Progress of a running run, in any process; None between segments, and if it is not running."""
-        from walkers.sweeps.making import progress_at
-
         return progress_at(self.directory) if on_disk.is_locked(self.directory) else None
 
     @property
@@ -267,15 +280,11 @@ class Run:
     @property
     def result(self) -> Results:
         """The result: numbers in SI units by name, with bands and numerical errors where these are measured."""
-        from walkers.postprocess.results import read
-
-        return read(self.finished_directory, self.origins)
+        return results.read(self.finished_directory, self.origins)
 
     @property
     def motion(self) -> Motion:
         """Positions, velocities and spins of all beads as arrays; also of an unfinished run."""
-        from walkers.postprocess.motion import read_motion
-
         return read_motion(self._files)
 
     @property
@@ -290,43 +299,30 @@ class Run:
 
     def table(self, name: str) -> pd.DataFrame:
         """A table of the run, see `walkers.postprocess.tables.read_table`."""
-        from walkers.postprocess.tables import read_table
-
         return read_table(self.finished_directory, name)
 
     def describe(self) -> str:
         """The result as text in mm, mm/s and degrees; of an unfinished run, its progress."""
-        from walkers.postprocess.results import text
-
         if not on_disk.is_finished(self.directory):
             return f"{self.directory.name}: {self._state}"
-        return text(self.result, cached=self.cached)
+        return results.text(self.result, cached=self.cached)
 
     def _repr_html_(self) -> str:
         """The result in a notebook: a table with errors, units and warnings, and the parameters."""
-        from walkers.postprocess.report.run import result_html
-
         if not on_disk.is_finished(self.directory):
             return f"<p>{escape(self.describe())}</p>"
         return result_html(self.result, self.origins)
 
     def plot(self, to: str | Path | None = None, formats: str | Sequence[str] = ("png",)) -> Pictures:
         """Draw the figures and return their files; see `walkers.postprocess.figures.plot_run`."""
-        from walkers.postprocess.figures import plot_run
-
         return Pictures(plot_run(self.finished_directory, _path(to), formats))
 
     def render(self, to: str | Path | None = None, *, images: int = 6, walker: int | None = None) -> Pictures:
         """Render pictures at several times; see `walkers.postprocess.series.render_series`."""
-        from walkers.postprocess.series import render_series
-
         return Pictures(render_series(self.finished_directory, _path(to), images=images, walker=walker))
 
     def film(self, to: str | Path | None = None, *, progress: bool | None = None, **options: Any) -> Path:
         """Render a film with `walkers.postprocess.film_options.FilmOptions`, such as ``slowdown``."""
-        from walkers.postprocess.film_options import FilmOptions
-        from walkers.postprocess.films import render_film
-
         with progress_of(self.case.name, progress) as advance:
             return render_film(self.finished_directory, _path(to), FilmOptions(**options), on_progress=advance)
 
@@ -338,9 +334,6 @@ class Run:
         >>> len(walkers.run("fig1b", tmp).view().objects)  # two beads, their necks, the floor, the lines on it
         5
         """
-        from walkers.postprocess.motion import read_motion
-        from walkers.postprocess.report.player import player_of
-
         return player_of(read_motion(self.finished_directory), height=height)[0]
 
     def report(self, to: str | Path | None = None) -> Path:
@@ -353,17 +346,11 @@ class Run:
         >>> walkers.run("fig1b", tmp).report(tmp / "fig1b.html").name
         'fig1b.html'
         """
-        from walkers.postprocess.report.run import report_run
-        from walkers.sweeps.spread import figures_of_spread
-
         figures = figures_of_spread(self.finished_directory)
         return report_run(self.finished_directory, _path(to), self.origins, figures=figures)
 
     def spread(self, points: int = 32, *, progress: bool | None = None, **how: Any) -> Spread:
         """Run the case with uncertain values drawn from their ranges; see `walkers.sweeps.spread.run_spread`."""
-        from walkers.sweeps.scheduler import Options
-        from walkers.sweeps.spread import run_spread
-
         case, options = self.requested or self.case, Options()
         with progress_of(f"{case.name}, spread", progress) as advance:
             return run_spread(case, self.directory.parent, options, points=points, on_progress=advance, **how)
@@ -377,9 +364,6 @@ class Run:
         >>> round(1e3 * error, 3)  # mm/s
         0.002
         """
-        from walkers.sweeps.accuracy import measure_accuracy
-        from walkers.sweeps.scheduler import Options
-
         with progress_of(f"{self.case.name}, accuracy", progress) as advance:
             return measure_accuracy(self.finished_directory, Options(), on_progress=advance, **how)
 
@@ -396,8 +380,6 @@ class Run:
         """
         write, place = writer_of(form, options), _path(to)
         if form == "deck":
-            from walkers.sweeps.by_hand import as_run
-
             return write(as_run(self.case, self.directory), place or Path(f"{self.directory.name}-deck"))
         return write(self.finished_directory, place, **options)
 
@@ -469,8 +451,6 @@ def run(
     >>> one.walkers[["facing", "steady"]].drop_duplicates("facing").to_dict("list")
     {'facing': [1, -1], 'steady': [True, True]}
     """
-    from walkers.sweeps.making import check_audit, make_runs
-
     if not force and (finished := finished_at(case, out)):
         return finished
     case, out = case_at(case, out)
@@ -481,8 +461,6 @@ def run(
     if on_disk.is_finished(place) and not force:
         return _measured(Run(place, requested=case))
     check_audit(binary, allow_failed_audit)
-    # Numpy and pyarrow are loaded while the engine works and the interpreter is idle.
-    threading.Thread(target=_load_postprocess, daemon=True).start()
     with progress_of(case.name, progress) as advance:
         runs = make_runs([case], out, binary, force=force, on_progress=advance, time_limit=time_limit)
     if not runs:
@@ -496,26 +474,16 @@ def finished_at(reference: Named, out: str | Path) -> Run | None:
     if kind not in ("run", "deck"):
         return None
     if on_disk.is_deck_folder(path):
-        from walkers.sweeps.by_hand import take_in
-
         take_in(path)
     return _measured(Run(path)) if on_disk.is_finished(path) else None
 
 
 def _measured(run: Run) -> Run:
     """The run; a finished run is measured again if its result or a table cannot be read."""
-    from walkers.postprocess.results import ensure_measured
-
     if on_disk.is_finished(run.check().directory):
         with _refusing(run.directory, "the run"):
-            ensure_measured(run.directory)
+            results.ensure_measured(run.directory)
     return run
-
-
-def _load_postprocess() -> None:
-    import pyarrow.parquet  # noqa: F401
-
-    import walkers.postprocess.walking  # noqa: F401
 
 
 # --- sweeps -----------------------------------------------------------------------------------------------------------
@@ -539,36 +507,26 @@ class Sweep:
 
     def summary(self) -> str:
         """The status of the points and their failures."""
-        from walkers.sweeps.table import describe_status
-
-        return describe_status(self.table())
+        return of_points.describe_status(self.table())
 
     @property
     def status(self) -> str:
         """``finished``, ``running``, ``failed`` (some points) or ``interrupted`` (points are missing)."""
-        from walkers.sweeps.table import worst_status
-
-        return worst_status(self.table()["status"])
+        return of_points.worst_status(self.table()["status"])
 
     @cached_property
     def runs(self) -> list[Run]:
         """The runs of all points, finished or not."""
-        from walkers.sweeps.table import read_record
-
-        record = read_record(self.directory)
+        record = of_points.read_record(self.directory)
         return [Run(record.out / name) for name in record.runs]
 
     def table(self) -> pd.DataFrame:
         """One row per point; see `walkers.sweeps.table.load`."""
-        from walkers.sweeps.table import load
-
-        return load(self.directory)
+        return of_points.load(self.directory)
 
     def describe(self) -> str:
         """The status of the points, their failures, and the table in mm, mm/s, nJ and degrees."""
-        from walkers.sweeps.table import short_text
-
-        return f"{self.summary()}\n\n{short_text(self.table().drop(columns='run'))}"
+        return f"{self.summary()}\n\n{of_points.short_text(self.table().drop(columns='run'))}"
 
     def _repr_html_(self) -> str:
         """The table in a notebook."""
@@ -592,9 +550,6 @@ class Sweep:
 
     def plot(self, to: str | Path | None = None, **options: Any) -> Pictures:
         """Plot the table to a file as in `figure`; by default in the sweep's directory, named after the column."""
-        from walkers.postprocess.drawing import FORMATS, check_place, save_figure
-        from walkers.sweeps.figure import column_of
-
         table = self.table()
         place = _path(to) or self.directory / f"{column_of(table, options.get('y'))}.png"
         check_place(place, *(f".{form}" for form in FORMATS))
@@ -604,8 +559,6 @@ class Sweep:
 
     def report(self, to: str | Path | None = None) -> Path:
         """Write a self-contained HTML report; see `walkers.sweeps.report.report_sweep`."""
-        from walkers.sweeps.report import report_sweep
-
         return report_sweep(self.directory, _path(to))
 
     def export(self, form: Export = "archive", to: str | Path | None = None, **options: Any) -> Path:
@@ -618,8 +571,6 @@ class Sweep:
 
 
 def _figure(table: pd.DataFrame, options: Mapping[str, Any]) -> Figure:
-    from walkers.sweeps.figure import figure_of
-    from walkers.sweeps.figure_options import FigureOptions
     from walkers.theory.prediction import predicted_column
 
     chosen = FigureOptions(**options)
@@ -668,11 +619,6 @@ def sweep(
     >>> walkers.sweep("fig4", tmp).table()[["liquid.name", "status"]].to_dict("list")
     {'liquid.name': ['Si AK5', 'Si AK10'], 'status': ['finished', 'finished']}
     """
-    from walkers.inputs.sweep import load_sweep
-    from walkers.sweeps.scheduler import Options, run_sweep
-    from walkers.sweeps.site import load_site
-    from walkers.sweeps.spread import run_spread
-
     points = load_sweep(sweep, changes)
     options = Options(jobs, load_site(Path(site)) if site else None, executor, time_limit)
     folder = Path(out).resolve() if site else Path(out)
@@ -699,9 +645,6 @@ def compare(
 
     The ``changes`` are of the second case, which by default is the first.
     """
-    from walkers.errors import apply_all
-    from walkers.sweeps.comparison import Side, compare_runs
-
     if second is None and not changes:
         raise refused(first, "expected a second run, or changed values (--set KEY=VALUE)")
 
@@ -735,10 +678,6 @@ def climb(
     to
         Also write the figure (.png, .svg, .pdf) or the table (.csv) to this file.
     """
-    from walkers.errors import apply_all
-    from walkers.postprocess.drawing import FORMATS, check_place
-    from walkers.sweeps.climbing import conditions_in, summarise_climbs, write_climbs
-
     if to is not None:
         check_place(Path(to), *(f".{form}" for form in FORMATS), ".csv")
     climbs, runs = [], []
@@ -774,7 +713,6 @@ def calibrate(
     """
     from walkers.calibration import calibrate
     from walkers.calibration.file import load_calibration
-    from walkers.sweeps.scheduler import Options
 
     return calibrate.calibrate(load_calibration(calibration), Path(out), Options(jobs), progress=progress, **how)
 

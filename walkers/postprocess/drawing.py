@@ -8,6 +8,8 @@ from pathlib import Path
 from string import ascii_lowercase
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
+import numpy as np
+
 from walkers.errors import refused
 from walkers.runner.files import beside
 from walkers.text import printable
@@ -67,8 +69,6 @@ def letter_panels(panels: Iterable[Axes]) -> None:
 
 def errors_seen(errors: Any, values: Any) -> bool:
     """Whether error bars exceed the symbols, if the values fill the axes."""
-    import numpy as np
-
     finite, shown = np.asarray(errors)[np.isfinite(errors)], np.asarray(values)[np.isfinite(values)]
     return bool(len(finite) and finite.max() > _LEAST_ERROR * np.ptp(shown))
 

@@ -25,6 +25,7 @@ from walkers.postprocess.drawing import (
 )
 from walkers.postprocess.motion import LEAST_SAMPLES
 from walkers.postprocess.quantities import axis, declared, matches
+from walkers.postprocess.results import Results, read
 from walkers.postprocess.sides import directions, sides
 from walkers.postprocess.tables import Columns
 from walkers.rounding import rounded
@@ -33,8 +34,6 @@ from walkers.runner.directory import case_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from walkers.postprocess.results import Results
 
 
 class Panel(NamedTuple):
@@ -97,8 +96,6 @@ def plot_run(directory: Path, destination: Path | None = None, formats: str | Se
 
     `InputError` for formats that are not in `walkers.postprocess.drawing.FORMATS`, and for a picture's name as folder.
     """
-    from walkers.postprocess.results import read
-
     formats = check_formats(formats)
     destination = destination or directory
     if destination.suffix.lower()[1:] in FORMATS and not destination.is_dir():

@@ -7,14 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from math import isfinite, nan
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from walkers.postprocess.quantities import SHOWN, Quantity, declared, is_error, ordered, unit_shown
 from walkers.postprocess.sides import REST
+from walkers.postprocess.tables import Columns
 from walkers.rounding import counted, rounded, with_decimals
-
-if TYPE_CHECKING:
-    from walkers.postprocess.tables import Columns
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, refused
 from walkers.inputs.run import limits_of
+from walkers.postprocess import meetings, piles, threshold, walking
 from walkers.postprocess.caption import conditions
+from walkers.postprocess.motion import read_motion
 from walkers.postprocess.numbers import headline, rows, state
+from walkers.postprocess.tables import Columns, read_columns, read_table, write_table
 from walkers.postprocess.uncertainty import accuracy_of, bands_of, lines_of_rest, rests_on
 from walkers.rounding import percent
 from walkers.runner.directory import SEGMENT_NAME, files_of_segments, recomputed, segment_directories
@@ -26,7 +29,6 @@ if TYPE_CHECKING:
 
     from walkers.inputs.case import Case
     from walkers.inputs.origins import Origin
-    from walkers.postprocess.tables import Columns
 
 VERSION = 1
 """Of all methods together: a result of another version is measured again."""
@@ -59,14 +61,10 @@ class Results(dict[str, Any]):
 
     def columns(self, table: str) -> Columns:
         """A table as arrays."""
-        from walkers.postprocess.tables import read_columns
-
         return read_columns(self.directory, table)
 
     def table(self, table: str) -> pd.DataFrame:
         """A table as a data frame."""
-        from walkers.postprocess.tables import read_table
-
         return read_table(self.directory, table)
 
     def as_dict(self) -> dict[str, Any]:
@@ -76,8 +74,6 @@ class Results(dict[str, Any]):
 
 def modules_of(case: Case) -> dict[str, Any]:
     """The modules that measure a case, in the order of results, by the groups of their numbers."""
-    from walkers.postprocess import meetings, piles, threshold, walking
-
     modules = {"walking": walking, "threshold": threshold, "meetings": meetings, "piles": piles}
     return {name: module for name, module in modules.items() if module.applies(case)}
 
@@ -95,9 +91,6 @@ def measure(directory: Path) -> None:
 
     `walkers.postprocess.dump.DumpError` if a dump cannot be read, `walkers.runner.manifest.FileChanged` if it changed.
     """
-    from walkers.postprocess.motion import read_motion
-    from walkers.postprocess.tables import write_table
-
     check_unchanged(directory, files_of_segments(directory))
     motion = read_motion(directory)
     case = motion.case

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+import numpy.typing as npt
+
+from walkers.postprocess.dump import BoolArray, IntArray
+
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import numpy.typing as npt
     import pandas as pd
-
-    from walkers.postprocess.dump import BoolArray, IntArray
 
 SAME = 0.05
 """Mean velocities of the two directions are printed separately if their difference exceeds this share of the larger
@@ -37,8 +38,6 @@ def differ(first: float, second: float) -> bool:
 
 def sides(facing: npt.ArrayLike, start_angle: npt.ArrayLike) -> IntArray:
     """Direction in which walkers face at their start: 1 along the drive axis, −1 opposite; the angle counts."""
-    import numpy as np
-
     return np.where(np.cos(start_angle) < -_ACROSS, np.negative(facing), facing)
 
 
