@@ -195,9 +195,7 @@ class Boundary(Table):
             return 2.0
         return 2.0 if (self.width or inf) < 2.02 * radius else 1.0
 
-    def room(
-        self, half_x: float, half_y: float, *, height: float, margin: float, largest: float
-    ) -> tuple[Vector, Vector]:
+    def room(self, half_x: float, half_y: float, height: float, margin: float, largest: float) -> tuple[Vector, Vector]:
         """Corners of the simulation box, from half the extent of the paths of beads, height, margin and radius; m."""
         x, y = half_x + 2.0 * margin, half_y + 2.0 * margin
         top, below = height + 2.0 * margin, 4.0 * largest
