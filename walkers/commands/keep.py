@@ -11,8 +11,13 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from walkers import DEFAULT_OUT
-from walkers.api import Export, writer_of
+from walkers.api import Export, case_and_run, directory_of, writer_of
 from walkers.commands.options import At, Out, RunOrSweep, refuse, tell
+from walkers.errors import apply_all
+from walkers.runner.directory import UNFINISHED
+from walkers.sweeps import folder
+from walkers.sweeps.by_hand import as_run, write_folder
+from walkers.templates.deck import RUN_NAME, render_deck, whole
 
 _REMOVED = "Runs, with their spreads and accuracies, and sweeps, with the runs that no other sweep has."
 
@@ -75,10 +80,6 @@ def export(
     if form != "deck":
         print(at.load(name).export(form, to, **given))
         return
-    from walkers.api import case_and_run
-    from walkers.sweeps.by_hand import as_run, write_folder
-    from walkers.templates.deck import RUN_NAME, render_deck, whole
-
     writer_of(form, given)
     case = as_run(*case_and_run(name, at.out, at.values))
     if to is None:
@@ -101,17 +102,13 @@ def clean(
     yes
         Do not ask for confirmation.
     """
-    from walkers.api import directory_of
-    from walkers.errors import apply_all
-    from walkers.runner.directory import UNFINISHED
-    from walkers.sweeps.folder import clean, plan_cleaning
 
     def place_of(name: str) -> Path:
         if Path(name).suffix != UNFINISHED:
             return directory_of(name, out)
         return Path(name) if Path(name).is_dir() else out / name
 
-    plan = plan_cleaning(out, apply_all(place_of, runs))
+    plan = folder.plan_cleaning(out, apply_all(place_of, runs))
     print(plan.as_text())
     if not (plan.remove or plan.locks):
         return 0
@@ -120,6 +117,6 @@ def clean(
         if input("remove them? [y/N] ").strip().lower() not in ("y", "yes"):
             print("nothing removed")
             return 0
-    left = clean(plan)
+    left = folder.clean(plan)
     tell(*(f"{directory}: {why}" for directory, why in left.items()))
     return 1 if left else 0
