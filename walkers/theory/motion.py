@@ -130,8 +130,9 @@ def walk(
     drive = np.stack(np.broadcast_arrays(*quantities)[:3], axis=-1).astype(np.float64)
     friction = np.broadcast_to(walker.friction, (3, len(drive))).T.copy()
     tables = _tables(walker, drive[:, 0] * steps_per_cycle)
-    further = effect or (None, np.zeros((len(drive), 0)))
-    mean, least, repeated, solved, series = integrate(tables, friction, drive, *further, cycles, steps_per_cycle)
+    acts, terms = effect or (None, np.zeros((len(drive), 0)))
+    ended = integrate(tables, friction, drive, acts, terms, cycles, steps_per_cycle)
+    mean, least, repeated, solved, series = ended
     velocity = translation(mean)
     if not np.any(drive[:, 2]):  # by symmetry; the rest is the error of the steps
         velocity = np.where(walker.sin_delta == 0.0, 0.0, velocity)
