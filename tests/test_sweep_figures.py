@@ -37,19 +37,18 @@ def _legend(figure: Figure) -> list[str]:
     return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
 
 
-def _table(units: dict[str, str], rows: list[list[Any]], axes: list[tuple[str, ...]]) -> pd.DataFrame:
-    """That of a sweep as far as what varies goes."""
-    table = pd.DataFrame(rows, columns=list(units)).assign(point=range(len(rows)), status="finished")
-    table.attrs |= {"units": units, "varied": list(units), "axes": axes, "title": ""}
+def _table(units: dict[str, str], rows: list[list[Any]], **speeds: Any) -> pd.DataFrame:
+    """That of a sweep with a single axis as far as what varies goes, and columns of velocities, m/s."""
+    table = pd.DataFrame(rows, columns=list(units)).assign(point=range(len(rows)), status="finished", **speeds)
+    table.attrs |= {"units": units | dict.fromkeys(speeds, "m/s"), "varied": list(units), "axes": [tuple(units)]}
+    table.attrs["title"] = ""
     return table
 
 
 @pytest.mark.parametrize(("error", "bars"), [(2e-4, 3), (2e-6, 0)])
 def test_error_bars_that_symbols_would_hide_are_left_out_and_the_figure_says_so(error: float, bars: int) -> None:
-    table = _table({"drive.frequency": "Hz"}, [[60.0], [70.0], [80.0]], [("drive.frequency",)])
-    table = table.assign(velocity=[1e-3, 2e-3, 3e-3], scatter=error)
-    table.attrs["units"] |= {"velocity": "m/s", "scatter": "m/s"}
-    figure = figure_of(table)
+    speeds = {"velocity": [1e-3, 2e-3, 3e-3], "scatter": error}
+    figure = figure_of(_table({"drive.frequency": "Hz"}, [[60.0], [70.0], [80.0]], **speeds))
     (panel,) = _panels(figure)
     assert sum(len(one.get_segments()) for one in panel.collections if isinstance(one, LineCollection)) == bars
     said = " ".join(figure.get_suptitle().split())
@@ -57,11 +56,9 @@ def test_error_bars_that_symbols_would_hide_are_left_out_and_the_figure_says_so(
 
 
 def test_axes_do_not_magnify_rounding() -> None:
-    table = _table({"dimers.angle": "deg"}, [[-30.0], [-3.2e-15], [30.0]], [("dimers.angle",)])
     for values in ([1e-3, 1e-3 * (1.0 + 1e-9), 1e-3], [3.2e-18, -3.2e-18, 0.0]):
-        shown = table.assign(velocity=values, scatter=0.0)
-        shown.attrs["units"] = {**table.attrs["units"], "velocity": "m/s"}
-        (panel,) = _panels(figure_of(shown))
+        table = _table({"dimers.angle": "deg"}, [[-30.0], [-3.2e-15], [30.0]], velocity=values, scatter=0.0)
+        (panel,) = _panels(figure_of(table))
         assert np.ptp(panel.get_ylim()) > 0.1
         assert [label.get_text() for label in panel.get_xticklabels()] == ["-30", "0", "30"]
 
@@ -127,10 +124,8 @@ def test_panels_of_a_sample_begin_with_the_strongest_key_and_log_uniform_ranges_
     """Titles have rank correlations, here by hand: the sums of d² of six ranks are 68 and 48."""
     keys = ("contact.restitution", "contact.friction.bead_wall")
     rows = [[0.3, 0.1], [0.8, 0.2], [0.4, 0.3], [0.6, 0.4], [0.5, 0.6], [0.7, 0.5]]
-    table = _table(dict.fromkeys(keys, ""), rows, [keys])
+    table = _table(dict.fromkeys(keys, ""), rows, velocity=[6e-3, 5e-3, 4e-3, 3e-3, 2e-3, 1e-3])
     table.attrs["sampled"] = dict(zip(keys, (False, True), strict=True))
-    table = table.assign(velocity=[6e-3, 5e-3, 4e-3, 3e-3, 2e-3, 1e-3])
-    table.attrs["units"] |= {"velocity": "m/s"}
     panels = _panels(figure_of(table))
     assert [axes.get_xlabel() for axes in panels] == ["friction bead wall", "restitution"]
     assert [axes.get_xscale() for axes in panels] == ["log", "linear"]
@@ -142,9 +137,8 @@ def test_keys_that_vary_one_at_a_time_are_each_shown_with_the_usual_others() -> 
     keys = ("contact.friction.bead_wall", "contact.restitution")
     rows = [[0.2, 0.5], [0.1, 0.5], [0.3, 0.5], [0.2, 0.9]]
     for more, shown in (([], [(0.1, 0.2, 0.3), (0.5, 0.9)]), ([[0.1, 0.9]], [(0.1, 0.1, 0.2, 0.2, 0.3)] * 2)):
-        table = _table(dict.fromkeys(keys, ""), rows + more, [keys])
-        table = table.assign(velocity=np.arange(len(table)) * 1e-3, scatter=1e-4)
-        table.attrs["units"] |= {"velocity": "m/s", "scatter": "m/s"}
+        speeds = np.arange(len(rows + more)) * 1e-3
+        table = _table(dict.fromkeys(keys, ""), rows + more, velocity=speeds, scatter=1e-4)
         along = [_drawn(axes)[0][0] for axes in _panels(figure_of(table))]
         assert [*map(len, along)] == [*map(len, shown)]
         assert tuple(along[0]) == shown[0]
@@ -167,7 +161,7 @@ def test_keys_that_go_together_are_one_factor() -> None:
         (named, [["a", 2.0]], []),
     ]
     for keys, rows, factors in expected:
-        table = _table({key: "g" if key.endswith("acceleration") else "" for key in keys}, rows, [keys])
+        table = _table({key: "g" if key.endswith("acceleration") else "" for key in keys}, rows)
         assert [(one.keys, one.levels, one.is_sample) for one in factors_of(table)] == factors
 
 
