@@ -347,10 +347,6 @@ def _draws(done: pd.DataFrame, column: str) -> str:
     return " to ".join(map(str, sorted({min(numbers), max(numbers)})))
 
 
-_ALSO = ("down", "low", "high")
-"""Columns of `_points` that are drawn beside the values and their errors."""
-
-
 @styled
 def _draw(
     done: pd.DataFrame,
@@ -513,9 +509,8 @@ def _scale_y(axes: Axes, points: pd.DataFrame, theory: Sequence[FloatArray], log
         axes.set_yscale("log", nonpositive="mask")
         return
     values, errors = points["value"], points["error"].fillna(0.0)
-    shown = np.concatenate(
-        [values - errors, values + errors, *theory, *(points[name] for name in _ALSO if name in points)]
-    )
+    others = points.filter(["down", "low", "high"]).to_numpy().ravel()
+    shown = np.concatenate([values - errors, values + errors, *theory, others])
     low, high = float(np.nanmin(shown)), float(np.nanmax(shown))
     if (values.dropna() % 1.0 == 0.0).all():  # counts
         axes.yaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))

@@ -69,17 +69,11 @@ def _is(key: str, value: Any, text: str) -> bool:
         raise refused("where", f'"{key}={text}": {error if kind else "expected a number without a unit"}') from error
 
 
+@cache
 def kind_of(key: str) -> Kind | None:
     """Kind of quantity of a key of a case, such as ``dimers.radii[0]``; None for pure numbers."""
-    return _kinds().get(_ending(key))
-
-
-@cache
-def _kinds() -> Mapping[str, Kind]:
-    """Kinds of quantities by the ends of keys of a case; other keys have pure numbers."""
-    fields = [(_ending(key), field) for key, field in keys_of(Case).items()]
-    kinds = {name: units.kind_in([*field.metadata, field.annotation]) for name, field in fields}
-    return {name: kind for name, kind in kinds.items() if kind is not None}
+    fields = (field for name, field in keys_of(Case).items() if _ending(name) == _ending(key))
+    return next(filter(None, (units.kind_in([*field.metadata, field.annotation]) for field in fields)), None)
 
 
 def _ending(key: str) -> str:
