@@ -181,12 +181,10 @@ def _library() -> str:
 
 
 def _numbers(key: str, number: LibraryNumber) -> tuple[str, str, str]:
-    """Key, value and range."""
     return f"`{key}`", str(number.written), f"{number.range[0]} to {number.range[1]}" if number.range else ""
 
 
 def _shipped() -> str:
-    """Shipped cases and sweeps with their titles."""
     text = "# Shipped cases, sweeps and calibrations\n\nEvery command accepts these names instead of a file.\n"
     for kind, command in COMMANDS.items():
         entries = (entry for entry in catalogue() if entry.kind == kind)
@@ -213,7 +211,6 @@ of commands, options, cases, sweeps and runs for bash, zsh and fish; call it aga
 
 
 def _commands() -> str:
-    """Help texts of the program, its commands, and theirs."""
     text, app = _COMMANDS, program()
     names: list[list[str]] = [[]]
     for name in (command.name for command in commands()):

@@ -24,7 +24,6 @@ from walkers.runner.manifest import MANIFEST_NAME, FileChanged, read_manifest
 from walkers.sweeps.table import RECORD_NAME, read_record, states
 from walkers.text import printable, rendered
 
-README_NAME = "README.md"
 RUNS = "runs"
 """Folder of the run directories in an archive: the default folder of the program."""
 _ROLES: Mapping[str, Sequence[str]] = {
@@ -97,7 +96,7 @@ def write_archive(
     about["left_out"] = any("left_out" in manifest for manifest in contents.manifests.values())
     described = {
         METADATA_NAME: json_bytes(describe_crate(contents, authors, licence)),
-        README_NAME: rendered("walkers.archive", "README.md.j2", **about).encode(),
+        "README.md": rendered("walkers.archive", "README.md.j2", **about).encode(),
     }
     files = {**{place: File.of(place, text) for place, text in described.items()}, **contents.files}
     sums = "".join(f"{file.sha256}  {place}\n" for place, file in files.items()).encode()

@@ -24,10 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 RECORD_NAME = "calibration.json"
-BEST_NAME = "best.toml"
 _ENDS = (0.05, 0.5, 0.95)
-_DIGITS = 4
-"""Of numbers in the best case: more than the facts determine."""
 
 
 def write_outcome(outcome: Outcome, to: Path) -> list[Path]:
@@ -40,7 +37,7 @@ def write_outcome(outcome: Outcome, to: Path) -> list[Path]:
     to.mkdir(parents=True, exist_ok=True)
     record, calibration = record_of(outcome), outcome.calibration
     samples = pd.DataFrame(calibration.values(outcome.posterior.samples), columns=[*calibration.file.parameters])
-    files = [to / file for file in ("posterior.parquet", RECORD_NAME, "calibration.md", BEST_NAME)]
+    files = [to / file for file in ("posterior.parquet", RECORD_NAME, "calibration.md", "best.toml")]
     write_bytes(files[0], samples.to_parquet(index=False))
     write_json(files[1], record)
     write_bytes(files[3], toml_bytes(best_case(calibration, outcome.sets[PROPOSED[0]], samples)))
@@ -65,7 +62,7 @@ def best_case(calibration: Calibration, best: FloatArray, samples: pd.DataFrame)
 
 
 def _short(value: float) -> float:
-    return float(f"{value:.{_DIGITS}g}")
+    return float(f"{value:.4g}")  # more digits than the facts determine
 
 
 def record_of(outcome: Outcome) -> dict[str, Any]:

@@ -80,7 +80,6 @@ def _by_theory(cases: Mapping[str, Case]) -> Numbers:
 
 
 def _fact(observation: Observation, numbers: Mapping[str, Numbers], theory: Numbers) -> dict[str, Any]:
-    """A row of the comparison."""
     values, scale = {name: observation.of_numbers(of_set) for name, of_set in numbers.items()}, observation.unit[1]
     return {
         **{name: getattr(observation, name) for name in ("name", "title", "says", "source", "derived")},

@@ -8,14 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.paper.sources import Sources, described, ruby, thresholds_with_theory
-from walkers.postprocess.drawing import (
-    ONE_COLUMN,
-    TWO_COLUMNS,
-    legend_below,
-    letter_panels,
-    new_figure,
-    styled,
-)
+from walkers.postprocess.drawing import ONE_COLUMN, TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
 from walkers.postprocess.gait import gait
 from walkers.postprocess.necks import bridges_at
 from walkers.postprocess.scene import Scene, Window, axes_toward

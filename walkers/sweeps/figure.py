@@ -46,8 +46,6 @@ Predict = Callable[[Sequence[Case], str], tuple[Mapping[str, FloatArray], Mappin
 """Function of N cases and a column: predictions of models, SI units, shape (N,); remarks, with the number of cases."""
 SCATTER = "bars: standard deviation of the copies (uncertain parameters not varied)"
 """What the error bars of a sweep are."""
-_NONE = "none"
-"""Instead of a column: no colours or no panels."""
 _UP: dict[str, Any] = {"marker": "o", "color": "0.3", "label": "started facing right (up)"}
 _DOWN: dict[str, Any] = {"marker": "v", "color": "0.3", "label": "started facing left (down)"}
 _MOST_PANELS = 12
@@ -139,7 +137,6 @@ def column_of(table: pd.DataFrame, name: str | None) -> str:
 
 
 def _tell(message: str) -> None:
-    """Warn that something is left out of a figure."""
     warnings.warn(message, LeftOutWarning, stacklevel=3)
 
 
@@ -228,7 +225,7 @@ def layout_of(
     ]
     chosen = {}
     for option, name in (("x", options.x), ("hue", options.hue), ("panels", options.panels)):
-        if name is not None and not (name == _NONE and option != "x"):
+        if name is not None and not (name == "none" and option != "x"):
             column = find_name(option, name, [*(key for factor in factors for key in factor.keys), *table.columns])
             given = next((factor for factor in factors if column in factor.keys), None)
             if given is None and rows[column].map(lambda value: isinstance(value, str)).all():
@@ -412,7 +409,6 @@ def _with_usual_others(x: Factor, along: Sequence[Factor]) -> npt.NDArray[np.boo
 
 
 def _where(factor: Factor | None, level: Any) -> npt.NDArray[np.bool_]:
-    """Which points have a level."""
     return np.array([value == level for value in factor.values] if factor else True)
 
 

@@ -100,7 +100,6 @@ def _run(path: Path, now: float) -> Row | None:
 
 
 def _result(path: Path) -> dict[str, Any]:
-    """Columns of a finished run."""
     try:
         results = read(path)
     except InputError as error:

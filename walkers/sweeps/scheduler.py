@@ -89,9 +89,9 @@ class Options:
     @property
     def decks_at_once(self) -> int:
         """Number of decks that run at the same time."""
-        workers = self.workers or cores_here()
         if self.executor is None and self.site is not None:
             return decks_at(self.site, self.ranks)
+        workers = self.workers or cores_here()
         return workers if self.executor is not None else max(1, workers // self.ranks)
 
     def for_ranks(self, ranks: int) -> Options:
@@ -363,7 +363,7 @@ def _workers(options: Options, record: table.SweepRecord) -> Iterator[tuple[Exec
     from parsl import DataFlowKernel
     from parsl.concurrent import ParslPoolExecutor
 
-    folder = record.directory / table.PARSL
+    folder = record.directory / "parsl"  # its scripts and logs
     try:
         kernel = DataFlowKernel(prepare(options.site, folder, options.ranks))
     except Exception as error:  # any class: an address that this machine does not have, ports in use

@@ -202,10 +202,11 @@ def describe(spread: Spread) -> str:
         texts = {end: rounded(float(f"{number * factor:.3g}"), unit) for end, number in band.items()}
         ends = "{low} to {high} {unit} (5 to 95 %), median {median}; smallest {smallest}, largest {largest}"
         lines.append(f"    {declared(name).label:8} {ends.format(unit=unit, **texts)}")
-        ranks = ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items())
-        text = f"strongest dependence: {ranks} (rank correlation)" if ranks else "no clear dependence on any of them"
+        text = "no clear dependence on any of them"
         if band["points"] < LEAST_PER_VALUE * len(spread.varied):
             text = "too few draws for rank correlations; the band is approximate"
+        elif ranks := ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items()):
+            text = f"strongest dependence: {ranks} (rank correlation)"
         lines.append(f"{'':13}{text}")
     words = _WORDS | (_ON_A_SLOPE if {"right_facing", "axial_velocity"} & spread.bands.keys() else {})
     draws = [f"{count} {words[name]}" for name, count in spread.counts.items() if count]

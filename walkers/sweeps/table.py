@@ -40,8 +40,6 @@ if TYPE_CHECKING:
     from walkers.inputs.sweep import Sweep
 
 RECORD_NAME = "sweep.json"
-PARSL = "parsl"
-"""Folder in a sweep's directory for Parsl's scripts and logs."""
 _FORMAT = 4
 STATE = {
     "status": ("", "finished, failed, running or missing"),
