@@ -352,6 +352,6 @@ def volume_at_contact(radius_1: float, radius_2: float, contact_angle: float, me
         return float(1.0 + pressure * meniscus_radius)
 
     if not missing(ends[0]) < 0.0 < missing(ends[1]):
-        wanted = f"a meniscus radius of {1e6 * meniscus_radius:g} um"
-        raise NoBridgeError(f"no bridge between touching surfaces has {wanted}")
+        radius = f"a meniscus radius of {1e6 * meniscus_radius:g} um"
+        raise NoBridgeError(f"no bridge between touching surfaces has {radius}")
     return exp(brentq(missing, *ends, xtol=1e-12))
