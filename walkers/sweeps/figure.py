@@ -505,13 +505,8 @@ def _scale_y(axes: Axes, points: pd.DataFrame, theory: Sequence[FloatArray], log
         axes.set_yscale("log", nonpositive="mask")
         return
     values, errors = points["value"], points["error"].fillna(0.0)
-<<<<<<< HEAD
     ends = points.filter(["down", "low", "high"]).to_numpy().ravel()
     shown = np.concatenate([values - errors, values + errors, *theory, ends])
-=======
-    beside = points.filter(["down", "low", "high"]).to_numpy().ravel()
-    shown = np.concatenate([values - errors, values + errors, *theory, beside])
->>>>>>> 8ecd78aa (A variable of a sweep's figure has a name of its own)
     low, high = float(np.nanmin(shown)), float(np.nanmax(shown))
     if (values.dropna() % 1.0 == 0.0).all():  # counts
         axes.yaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
