@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping
 from math import nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +17,6 @@ from walkers.paper.sources import Sources, of_facts, ruby, sets, sweep_of, thres
 from walkers.postprocess.results import plain
 from walkers.runner.directory import case_of
 from walkers.theory.prediction import MODEL, PAPER, predicted_column
-
-if TYPE_CHECKING:
-    pass
 
 Numbers = Mapping[str, Mapping[str, float]]
 """Quantities of walkers by experiment of the calibration."""
