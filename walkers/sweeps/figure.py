@@ -498,7 +498,7 @@ def _scale_x(axes: Axes, x: Factor, log: str) -> None:
 
 
 def _scale_y(axes: Axes, points: pd.DataFrame, theory: Sequence[FloatArray], log: str) -> None:
-    """Scale and range of the y axis: runs and models with margins."""
+    """Scale and range of the y axis: runs and first model with margins; of other models a point at least is within."""
     from matplotlib.ticker import MaxNLocator
 
     if "y" in log:
@@ -506,8 +506,10 @@ def _scale_y(axes: Axes, points: pd.DataFrame, theory: Sequence[FloatArray], log
         return
     values, errors = points["value"], points["error"].fillna(0.0)
     ends = points.filter(["down", "low", "high"]).to_numpy().ravel()
-    shown = np.concatenate([values - errors, values + errors, *theory, ends])
+    shown = np.concatenate([values - errors, values + errors, *theory[:1], ends])
     low, high = float(np.nanmin(shown)), float(np.nanmax(shown))
+    for model in (model[np.isfinite(model)].tolist() for model in theory[1:]):
+        low, high = min(low, max(model, default=low)), max(high, min(model, default=high))
     if (values.dropna() % 1.0 == 0.0).all():  # counts
         axes.yaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
         low, high = low - 0.5, high + 0.5
