@@ -156,7 +156,7 @@ def test_a_damaged_run_is_told_in_a_line_by_all_that_read_what_is_damaged(name: 
         assert all(path.read_bytes() == contents for path, contents in files.items()), "nothing on disk is lost"
     if what in ("result", "tables"):
         call("run", str(run), check=True)
-        call("plot", str(run), check=True)
+        call("export", "--to", "archive", str(run), "-o", "out.zip", check=True)
 
 
 @pytest.mark.parametrize("name", ["a manifest that was cut", "a dump to be measured"])
@@ -246,7 +246,7 @@ FULL = {
     "plot runs/sweep --to {}/d.png": 2,
     "export --to vtk {run} -o {}/e": 2,
     "export --to deck {run} -o {}/deck": 2,
-    "render {run} --to {}/f.png": 2,
+    "render {run} --images 1 --to {}/f.png": 2,
     "list runs/sweep --to {}/g.csv": 2,
 }
 """Commands that write to a disk, and their exit status if it is full."""

@@ -391,7 +391,8 @@ def test_what_a_user_has_set_in_the_environment_does_not_matter(
         monkeypatch.setenv(variable, value)
     assert not run_case(make_case(run=SHORT), tmp_path).cached
     if "MPI" in name:
-        assert not run_case(brief_pile(ranks=2), tmp_path, time_limit=PATIENCE).cached
+        pile = brief_pile(ranks=2, duration="0.01 s", longest_settling="0.01 s")
+        assert not run_case(pile, tmp_path, time_limit=PATIENCE).cached
 
 
 def test_lines_of_a_log_are_judged(tmp_path: Path) -> None:
