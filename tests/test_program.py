@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import importlib
 import json
 import os
@@ -174,12 +173,7 @@ def test_every_package_that_is_imported_is_declared() -> None:
     declared = names_of([*PROJECT["dependencies"], *(one for given in FOR_USERS.values() for one in given)])
     modules = {name: {file.parts[0].removesuffix(".py") for file in metadata.files(name) or ()} for name in declared}
     of_others = {"IPython", "paraview", "pydantic_core", "vtkmodules", "setuptools"}  # of a notebook, of pydantic, …
-    used = set[str]()
-    for path in (ROOT / "walkers").rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            named = [one.name for one in node.names] if isinstance(node, ast.Import) else []
-            named += [node.module] if isinstance(node, ast.ImportFrom) and node.module and not node.level else []
-            used |= {name.partition(".")[0] for name in named}
+    used = {name.partition(".")[0] for name in grimp.build_graph("walkers", include_external_packages=True).modules}
     used -= {*sys.stdlib_module_names, "walkers", *of_others}
     assert used - set().union(*modules.values()) == set()
     assert [name for name in declared if not modules[name] & used] == [], "declared and not used"
