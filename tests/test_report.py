@@ -4,6 +4,8 @@ Debian's Chromium, which ``make test`` installs, driven by Playwright. WebGL is 
 (SwiftShader), which is slow: windows are small and patience is long.
 """
 
+from __future__ import annotations
+
 import base64
 import html
 import re
@@ -15,11 +17,11 @@ from io import BytesIO
 from itertools import pairwise
 from math import nan, pi
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser, Page, expect, sync_playwright
 from scipy.spatial.transform import Rotation
 
 import walkers
@@ -38,6 +40,9 @@ from walkers.postprocess.tables import read_table
 from walkers.rounding import rounded
 from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import load
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
 
 Once = Callable[[str, Callable[[Path], object]], Path]
 HOSTILE = "<script>window.hostile = true</script> \" ' </title> & {{ 7 * 7 }}"
@@ -204,6 +209,8 @@ MILLISECONDS = 1e3 * PATIENCE
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
+    from playwright.sync_api import expect, sync_playwright
+
     flags = ["--no-sandbox", "--no-first-run", "--disable-background-networking", "--disable-component-update"]
     flags += ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
     with sync_playwright() as playwright:
@@ -259,6 +266,8 @@ def rested(page: Page, *others: bytes) -> bytes:
 def test_a_pile_is_drawn_and_a_sweeps_points_open_reports_in_which_beads_play_pause_and_turn(
     pile_report: Path, swept_report: Path, visit: Callable[..., Page]
 ) -> None:
+    from playwright.sync_api import expect
+
     page = visit(pile_report)
     page.wait_for_selector(".scene[data-ready]")
     wait_for(lambda: len(np.unique(Image.open(BytesIO(picture(page))))) > 9)
