@@ -286,7 +286,8 @@ COMMANDS: list[tuple[str, str]] = [
     *((f"{command} fig1b", "no finished run in runs; first do: walkers run fig1b") for command in READING),
     ("plot .", "not a finished run"),
     ("plot folder.html", "manifest.json cannot be read"),
-    *((f"sweep {what}", "") for what in ("bad_sweep.toml", "nosuch", "fig2 --site nosite.toml", "fig2 --out {case}")),
+    *((f"sweep {what}", "")
+      for what in ("bad_sweep.toml", "nosuch", "mine.toml --site nosite.toml", "mine.toml --out {case}")),
     *((f"{command} fig1b --set 'drive.frequency=70 mm'", 'fig1b: drive.frequency = "70 mm": expected a frequency')
       for command in ("show", "run", "plot", "check")),
     *((f"{command} fig1b --set liquid.volume_fraction=0.02 --set 'liquid.contact_angle=88 deg'",
@@ -306,7 +307,7 @@ COMMANDS: list[tuple[str, str]] = [
     ("run", "CASE"),
     ("check fig1b --without magic", "--without magic: expected one of"),
     *((f"{command} --engine /nowhere", "--engine /nowhere: expected the name or path of a liggghts binary")
-      for command in ("run fig1b", "check engine", "sweep fig2")),
+      for command in ("run fig1b", "check engine", "sweep mine.toml")),
     ("paper figures --only fig9", "fig9"),
     # Mistyped names
     ("--libary", 'Unknown command "--libary"'),

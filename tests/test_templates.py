@@ -47,7 +47,8 @@ def test_a_mixture_is_placed_by_its_seed() -> None:
 
 
 def test_bridges_may_push_loose_beads_and_have_no_viscosity() -> None:
-    pile, less = (load_case("pile-ci", {"liquid.contact_angle": f"{angle} deg"}) for angle in (90, 84))
+    few = {"mixture.small": ["0.3 mm"] * 2, "mixture.large": ["0.545 mm"] * 2}  # radii, and so tables
+    pile, less = (load_case("pile-ci", {"liquid.contact_angle": f"{angle} deg", **few}) for angle in (90, 84))
     assert render_deck(pile).fastest > render_deck(less).fastest
     tables = render_deck(make_case(liquid={"viscosity_ratio": 0})).files["bridges.txt"].splitlines()
     resistances = [[float(number) for number in line.split()[2:]] for line in tables if line[0] in "0123456789"]
