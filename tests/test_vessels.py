@@ -320,6 +320,18 @@ def test_planes_are_where_no_edge_is_obtuse_and_no_rim_flares() -> None:
     assert [len(planes) for planes in found] == [7, 0, 0]
 
 
+def test_a_shallow_dish_is_not_a_plane() -> None:
+    """Its triangles turn by less than 1 mrad from one to the next, and by 70 mrad from rim to rim."""
+    across = np.linspace(-0.025, 0.025, 60)
+    x, y = (axis.ravel() for axis in np.meshgrid(across, across))
+    number = np.arange(len(x)).reshape(60, 60)
+    a, b, c, d = (each.ravel() for each in (number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]))
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    dish = Vessel(np.stack([x, y, (x**2 + y**2) / 2.0], axis=1), triangles)
+    turned = np.einsum("tx,tx->t", dish.normals, dish.normals[dish.faces])
+    assert np.arccos(np.minimum(turned, 1.0)).max() < 1.001e-3
+
+
 def test_a_bowl_of_facets_becomes_round(tmp_path: Path) -> None:
     """Its volume, how far beads are from it, and how many of its faces are nearest around the foot of a bead."""
     size, off = 5e-3, []

@@ -150,12 +150,22 @@ class Vessel:
 
     @cached_property
     def faces(self) -> IntArray:
-        """Number of the first triangle of the face of each: connected ones in a plane."""
-        first, second = self.normals[self._neighbours.T]
-        level = np.einsum("ex,ex->e", first, second) > _COPLANAR
-        groups = _joined(self._neighbours[level], len(self.triangles))
-        _, firsts, faces = np.unique(groups, return_index=True, return_inverse=True)
-        return np.asarray(firsts[faces])
+        """Number of the first triangle of the face of each: connected ones in the plane of the first.
+
+        Not of neighbours: triangles of a shallow dish turn by little from one to the next, and are no plane.
+        """
+        beside: dict[int, list[int]] = defaultdict(list)
+        for first, second in self._neighbours.tolist():
+            beside[first].append(second)
+            beside[second].append(first)
+        faces = np.full(len(self.triangles), -1)
+        for seed in range(len(faces)):
+            todo = [seed] if faces[seed] < 0 else []
+            while todo:
+                faces[triangle := todo.pop()] = seed
+                new = [neighbour for neighbour in beside[triangle] if faces[neighbour] < 0]
+                todo += [neighbour for neighbour in new if self.normals[seed] @ self.normals[neighbour] > _COPLANAR]
+        return faces
 
     @cached_property
     def rims(self) -> list[list[int]]:
