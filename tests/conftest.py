@@ -63,8 +63,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 os.environ["OMPI_MCA_mpi_yield_when_idle"] = "1"  # noqa: SIM112
 _LONGEST = (
     *("test_a_sweep_through_slurm", "test_figures_and_comparison", "test_a_pile_is_drawn"),
-    *("test_known_parameters_are_found", "[a pile, killed]"),
-    *("test_workers_of_another_process", "test_the_installed_engine_passes", "test_a_dimer_on_the_axis_climbs"),
+    *("[a pile, killed]", "test_the_installed_engine_passes", "test_a_dimer_on_the_axis_climbs"),
 )
 """Parts of the names of tests that take more than a few seconds, the longest first."""
 T = TypeVar("T")

@@ -135,6 +135,9 @@ CASES: list[tuple[dict[str, Any], str]] = [
         ("contact.frictio", [0.1, 0.2], "[0.1, 0.2]: unknown key"),
         ("contact.restitution", [0.2, 0.3, 0.8], "[0.2, 0.3, 0.8]: expected [low, high]: the case's own value is th"),
     )),
+    ({"uncertain": {"contact.restitution": 0.1, "contact.rolling_friction": [0.2, 0.1]}},
+     "uncertain.contact.restitution = 0.1: expected [low, high] or { loguniform = [low, high] }\n"
+     "uncertain.contact.rolling_friction = [0.2, 0.1]: "),
     ({"library": {"surface_pairs": [{"materials": ["rubby", "glass"]}]}},
      'library.surface_pairs[0].materials = "rubby": not in the library; expected one of ruby, '),
 ]  # fmt: skip
@@ -188,6 +191,8 @@ VESSELS: list[tuple[str | None, dict[str, Any], dict[str, Any], str]] = [
     (obj(SQUARE, OPEN_BOX), {**OF_MESH, "height": "3 mm"}, {}, 'boundary.height = "3 mm": expected none of a vessel'),
     (obj(SQUARE, SIDES), OF_MESH, {}, "has 2 openings, the lowest at (-2, -2, 0) mm; expected one, at its top"),
     (obj(FLIPPED, OPEN_BOX), OF_MESH, {}, "is open at its lowest point, at (-2, 2, -4) mm; expected a closed"),
+    (obj(SQUARE[:2] + SQUARE[4:6] + [(0.0, 3.0, 1.0), (0.0, 3.0, 3.0)],
+         [(1, 2, 4, 3), (2, 6, 5, 4), (6, 3, 1, 5)]), OF_MESH, {}, "has a surface of one side alone, at ("),
     (obj(SQUARE, [*OPEN_BOX, (1, 3, 7, 5)]), OF_MESH, {}, "has 3 triangles at an edge, at (0, 0, 0) mm; expected two"),
     (beside([(x + 1.5, y, z) for x, y, z in INNER]), OF_MESH, {}, "has triangles that intersect, at (1.917, 0.5"),
     (beside([(x, y, z - 1.0) for x, y, z in INNER]), OF_MESH, {}, "has triangles that overlap in a plane, at ("),

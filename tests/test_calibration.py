@@ -231,6 +231,7 @@ def numbers(found: Calibration, values: list[float], out: Path, options: Options
     return dict(zip(found.experiments, numbers_in(load(record.directory)), strict=True))
 
 
+@pytest.mark.slow
 def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: Path) -> None:
     """Within a quarter; the second time nothing is run."""
     out, to = tmp_path / "runs", tmp_path / "runs" / "reduced"

@@ -361,6 +361,7 @@ def test_what_parsl_is_told(tmp_path: Path) -> None:
     assert executor.launch_cmd.startswith("apptainer exec w.sif process_worker_pool.py ")
 
 
+@pytest.mark.slow
 def test_workers_of_another_process_give_the_same(
     sweep_file: Callable[..., str], in_folder: Path, front: Callable[[str], str]
 ) -> None:

@@ -262,7 +262,9 @@ class Cluster(Walkers):
     """One of ``[[clusters]]``: walkers of several beads, in an ``arrangement``, or ``at`` a place for each."""
 
     choices: ClassVar = (Choice("radii or diameters"), Choice("arrangement or at"))
-    radii: Filled[Annotated[tuple[Radius, ...], _FEW]] = key("Radii. The first bead leads.", None, _THREE[0])
+    radii: Filled[Annotated[tuple[Radius, ...], _FEW]] = key(
+        "Radii of the beads. The first bead leads.", None, _THREE[0]
+    )
     diameters: Indirect[Annotated[tuple[Diameter, ...], _FEW]] = key("Diameters, instead of `radii`.", None, _THREE[1])
     arrangement: str = key("`chain`, `fan`, `diamond` or `ring`. See [](../cases.md#bodies).", "", "fan")
     at: Annotated[tuple[_Place, ...], Field(max_length=100)] = key(
@@ -350,4 +352,6 @@ class PlacedBead(Table):
     choices: ClassVar = (Choice("radius or diameter"),)
     radius: Filled[Radius] = key("Radius of the bead.", None, "0.3 mm")
     diameter: Indirect[Diameter] = key("Diameter of the bead, instead of `radius`.", None, "0.6 mm")
-    at: Position = key("Centre at the start, from the middle of the floor.", example=["5 mm", "-3 mm", "0.3 mm"])
+    at: Position = key(
+        "Centre of the bead at the start: x, y, z from the middle of the floor.", example=["5 mm", "-3 mm", "0.3 mm"]
+    )

@@ -102,7 +102,9 @@ class Plane(Table):
     """One of ``[[boundary.planes]]``: a point and the normal, toward the beads."""
 
     point: units.Position = key("A point of the plane.", example=["0 mm", "0 mm", "0 mm"])
-    normal: tuple[units.Number, units.Number, units.Number] = key("Normal, toward the beads.", example=[0, 0, 1])
+    normal: tuple[units.Number, units.Number, units.Number] = key(
+        "Direction of its normal, toward the beads.", example=[0, 0, 1]
+    )
 
 
 class Boundary(Table):
@@ -113,13 +115,19 @@ class Boundary(Table):
     """
 
     shape: Shape = key("Shape of the boundary. See [](../cases.md#boundaries).", "plane")
-    material: Annotated[str, SAME_RUN] = key("Material, of the library unless all frictions are given.", ..., "glass")
+    material: Annotated[str, SAME_RUN] = key(
+        "Material, from the library, or any other name beside all friction coefficients.", ..., "glass"
+    )
     opening: Filled[Annotated[float, replace(units.ANGLE, smallest=0.5, largest=3.1, sign=units.POSITIVE)]] = key(
         "Angle between the two walls of a groove.", None, "120 deg"
     )
     width: Filled[units.Length] = key("Width of a channel; inner side or diameter of a container.", None, "5.3 mm")
     height: Filled[units.Length] = key("Height of a container. Beads are lost above twice this height.", None, "5.3 mm")
-    mesh: Indirect[str] = key("File of a vessel: its inner surface, in any format of meshio.", None, "funnel.stl")
+    mesh: Indirect[str] = key(
+        "File of a vessel of your own: its inner surface as triangles or polygons, in any format of meshio.",
+        None,
+        "funnel.stl",
+    )
     scale: Indirect[units.Length] = key("Length of the unit of the mesh file.", None, "1 mm")
     planes: tuple[Plane, ...] = key("Planes around the beads, up to the `height`, instead of a mesh.", ())
     points: Derived[tuple[Vector, ...]] = ()

@@ -70,11 +70,19 @@ class Liquid(Table):
     density: Indirect[units.Density] = key("Density of the liquid.", None)
     kinematic_viscosity: Indirect[units.KinematicViscosity] = key("Kinematic viscosity.", None)
     dynamic_viscosity: Filled[units.DynamicViscosity] = key("Dynamic viscosity, instead of the kinematic one.", None)
-    volume_fraction: Filled[Number] = key("Volume of liquid over that of the beads.", None, 0.01, ge=1e-9, le=0.5)
-    meniscus_radius: units.Length | None = key("Radius of the menisci of all bridges on a wetted plate.", None, "70 um")
+    volume_fraction: Filled[Number] = key(
+        "Ratio of the volumes of liquid and bead. The bridges share the liquid.", None, 0.01, ge=1e-9, le=0.5
+    )
+    meniscus_radius: units.Length | None = key(
+        "Radius of the menisci of all bridges, which exchange liquid through the film on a wetted plate.", None, "70 um"
+    )
     viscosity_ratio: Number = key("Factor of the viscosity of the bridges. It scales their drag.", 1.0, ge=0, le=1e4)
-    contact_angle: units.UpToRightAngle = key("Contact angle at all bridges, which must not push beads apart.")
-    conserved: units.Flag = key("Whether bridges take their liquid from films of the beads. For piles.", False)
+    contact_angle: units.UpToRightAngle = key(
+        "Contact angle at every bridge. A case whose bridges push the beads of a walker apart at rest is refused."
+    )
+    conserved: units.Flag = key(
+        "Whether bridges take their liquid from the films of their beads, and give it back. For piles.", False
+    )
     law: str = key("Law of the bridges. See [](../../how-to/bridge-law.md).", DEFAULT_LAW)
 
     @cached_property
@@ -164,7 +172,9 @@ class Case(Table):
     run: Run = key("", Run())
     environment: Environment = key("", Environment())
     uncertain: Annotated[Ranges, SAME_RUN] = key(
-        "Ranges by dotted key, `[low, high]` or `{ loguniform = [low, high] }`. See [](../../how-to/own-beads.md).", {}
+        "Ranges of values that are guesses, by dotted key: `[low, high]`, or `{ loguniform = [low, high] }`. "
+        "See [](../../how-to/own-beads.md).",
+        {},
     )
     name: Annotated[Derived[str], SAME_RUN] = "case"
     document: Annotated[Derived[dict[str, Any]], SAME_RUN] = Field({})
@@ -229,15 +239,17 @@ class Case(Table):
     def _check_uncertain(self, tables: Mapping[str, Any], source: str, *, around: bool) -> None:
         """Uncertain values are keys of the case, which could say both ends of the range."""
         written = flatten(tables.get("uncertain", {}))
-        for name, given in self.uncertain.items():
+
+        def check(name: str) -> None:
             try:
                 check_key(Case, name)
-                if ranges_of({name: given})[name].median is not None:
+                if ranges_of({name: self.uncertain[name]})[name].median is not None:
                     raise unusable(name, "expected [low, high]: the case's own value is the median")
-                (ends,) = given.values()
+                (ends,) = self.uncertain[name].values()
                 low, high = (validated(Case, changed(Case, tables, {name: end}), source).value_of(name) for end in ends)
             except InputError as error:
-                raise unusable(f"uncertain.{name}", error.problems[0].expected, written[name]) from error
+                message = error.problems[0].expected.replace("{ uniform = [low, high] }", "[low, high]")
+                raise unusable(f"uncertain.{name}", message, written[name]) from error
             value, slack = self.value_of(name), 1e-9 * (high - low)
             if value is None and (instead := sorted(key for key in alternatives(Case, name) if self.value_of(key))):
                 message = f"expected {' or '.join(instead)}, which the case has instead"
@@ -246,6 +258,8 @@ class Case(Table):
                 text = next((origin.text for origin in self.origins if origin.key == name), str(value))
                 message = f"expected a range that holds the case's own value, {text}"
                 raise unusable(f"uncertain.{name}", message, written[name])
+
+        apply_all(check, self.uncertain)
 
     def changed(self, changes: Mapping[str, Any]) -> Case:
         """The case with other values of its file, by dotted keys and as a case file has them.

@@ -80,7 +80,9 @@ class Harmonic(Table):
     axis: Filled[_Direction] = key("Direction of the shaking. Default: `x`; in containers `z`.", None)
     frequency: units.Frequency = key("Frequency in cycles per second.")
     peak_acceleration: Filled[units.Acceleration] = key("Peak acceleration of the boundary; `g` is 9.8 m/s².", None)
-    gamma0: Indirect[Coefficient] = key("Γ0 = a0 M/(4πγR̄) of the dimer, instead of a0.", None, 0.5)
+    gamma0: Indirect[Coefficient] = key(
+        "Γ0 = a0 M/(4πγR̄) of the dimer of mass M and mean radius R̄, instead of a0.", None, 0.5
+    )
     phase: Angle = key("Phase of the sine.", 0.0)
 
     @property
@@ -117,14 +119,25 @@ class Drive(Harmonic):
         *(Choice(f"{name} or record", required=False) for name in ("axis", "phase", "waveform")),
     )
     frequency: Filled[units.Frequency] = key("Frequency in cycles per second.", None)
-    waveform: Literal["sine", "triangle", "sawtooth"] = key("Waveform of acceleration, to the 9th harmonic.", "sine")
-    frame: Frame = key("`container`: the beads feel the inertial force. `lab`: the boundary moves.", "container")
+    waveform: Literal["sine", "triangle", "sawtooth"] = key(
+        "Waveform of the acceleration. `triangle` and `sawtooth` contain harmonics up to the 9th.", "sine"
+    )
+    frame: Frame = key(
+        "`container`: the beads feel the inertial force. `lab`: the boundary moves. Velocities agree within 10⁻⁶.",
+        "container",
+    )
     harmonics: Annotated[tuple[Harmonic, ...], Field(max_length=24)] = key("Several harmonics.", ())
     record: Filled[_Recorded] = key(
-        "File of the acceleration. See [](../cases.md#recorded-shaking).", None, "trace.csv"
+        "File with the acceleration of the boundary against time. See [](../cases.md#recorded-shaking).",
+        None,
+        "trace.csv",
     )
     repeats: Filled[units.Flag] = key("Whether the record is a period, which repeats. Default: false.", None)
-    ramp: _Factors = key("Times and factors of the displacement, linear in between.", (), [["0 s", 1], ["2 s", 0.2]])
+    ramp: _Factors = key(
+        "Times after the start of the drive and factors of the displacement, which is linear in between.",
+        (),
+        [["0 s", 1], ["2 s", 0.2]],
+    )
 
     @classmethod
     def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:

@@ -54,9 +54,13 @@ class Run(Table):
         Choice("cycles or duration or most_cycles", required=False),
         Choice("samples_per_cycle or frames_per_second", required=False),
     )
-    time_step: Annotated[Filled[units.Time], AUTO] = key("Largest time step: whole steps fit into a sample.", None)
+    time_step: Annotated[Filled[units.Time], AUTO] = key(
+        "Time step, or its upper limit: the program fits a whole number of samples into a cycle.", None
+    )
     allow_unstable: Annotated[units.Flag, SAME_RUN] = key("Accept a time step beyond a stability limit.", False)
-    cycles: Annotated[Filled[_Cycles], AUTO] = key("Drive cycles. See [](../cases.md#length-of-a-run).", None, 60)
+    cycles: Annotated[Filled[_Cycles], AUTO] = key(
+        "Number of drive cycles. `auto`: until velocities are constant. See [](../cases.md#length-of-a-run).", None, 60
+    )
     most_cycles: Indirect[_Cycles] = key('Upper limit for `cycles = "auto"`. Default: 60.', None, 60)
     duration: Indirect[Duration] = key("Duration of the drive, instead of `cycles`. Loose beads need it.", None)
     settling_cycles: Filled[Whole] = key(
@@ -72,7 +76,9 @@ class Run(Table):
     segment: Indirect[Duration] = key(
         "Length of a segment; a run can continue after a complete segment. Default for loose beads: 0.5 s.", None
     )
-    settled_below: Filled[units.Speed] = key("Root mean square velocity of a settled pile. Default: 5 mm/s.", None)
+    settled_below: Filled[units.Speed] = key(
+        "Root mean square velocity of a settled pile. Default for loose beads: 5 mm/s.", None
+    )
     longest_settling: Filled[units.NonNegativeDuration] = key(
         "Longest time for settling before the drive starts. Default for loose beads: 0.5 s.", None
     )

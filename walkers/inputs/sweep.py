@@ -77,7 +77,7 @@ class SweepFile(Table):
         return axes
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Sweep:
     """A base case and its variations."""
 

@@ -365,6 +365,10 @@ def _oriented(vessel: Vessel) -> Vessel:
             raise _broken(f"has {len(pair)} triangles at an edge,", middle, "two: give sheets a thickness")
     consistent = vessel.surface.compute_normals(point_normals=False, split_vertices=False, auto_orient_normals=False)
     turned = Vessel(vessel.points, consistent.regular_faces)
+    for pair in turned.sharing.values():
+        if len(pair) == 2 and turned._ends(*pair[0]) == turned._ends(*pair[1]):
+            where = turned.points[turned.triangles[pair[1][0], 0]]
+            raise _broken("has a surface of one side alone,", where, "one with an inside and an outside")
     rims, parts = turned.rims, turned.parts
     if len(rims) > 1:
         lowest = min((turned.points[rim][turned.points[rim, 2].argmin()] for rim in rims), key=lambda point: point[2])
