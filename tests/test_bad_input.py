@@ -325,6 +325,7 @@ COMMANDS: list[tuple[str, str]] = [
     ("plot {sweep} --to figure.jpg", "figure.jpg: expected the name of a .png or .svg or .pdf file"),
     ("report {run} --to a.txt", "expected the name of a .html or .htm file"),
     ("plot {run} --to out.png", "out.png: expected a folder"),
+    ("export {run} --to vtk --licence MIT", "--licence: is for --to archive"),
     *((f"export {{run}} --to archive {words}", told) for words, told in (
         ("-o run.tar", "-o: expected the name of a .zip file"),
         ("--licence 'the public'", "licence: expected an SPDX identifier such as CC-BY-4.0"),
