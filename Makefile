@@ -53,9 +53,9 @@ test: setup cluster chromium .venv/with-dev ## Lint, check types, run the tests 
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/lint-imports
-	.venv/bin/pytest -q -m smoke tests/test_program.py
-	@# Compiles both integrators once; each worker would by itself.
-	@$(WALKERS) show fig1b --theory > /dev/null & .venv/bin/pytest -q tests/test_check.py -k momentum > /dev/null; wait
+	@# Both integrators are compiled once, beside the smoke test; each worker would by itself.
+	@{ $(WALKERS) show fig1b --theory; .venv/bin/pytest -q tests/test_check.py -k momentum; } > /dev/null & \
+	  .venv/bin/pytest -q -m smoke tests/test_program.py; smoke=$$?; wait; exit $$smoke
 	@# Types are checked beside the tests, which leave a part of two cores idle.
 	@mkdir -p build; .venv/bin/mypy > build/types.txt & types=$$!; \
 	  .venv/bin/pytest -q -n 3 --dist worksteal -m "not smoke and not slow"; tests=$$?; \
