@@ -280,9 +280,10 @@ def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[
         record = read_json(docs / RECORD) | dict.fromkeys(illustration.files, digest(illustration.cases()))
         write_json(docs / RECORD, dict(sorted(record.items())))
         written += [docs / file for file in illustration.files]
+    numbers = facts(docs)
     for page in pages_of(docs):
         old = page.read_text("utf-8")
-        new = refreshed(old, facts(docs), lambda command: output_of(command, out))
+        new = refreshed(old, numbers, lambda command: output_of(command, out))
         if without_hashes(new) != without_hashes(old):
             write_bytes(page, new.encode())
             written.append(page)

@@ -106,7 +106,7 @@ def notes(case: Case) -> list[str]:
         return lines
     numbers = {"large": case.large, "small": case.count - case.large}
     lines += [f"no {name} beads; in the paper, large beads lead small ones" for name in numbers if not numbers[name]]
-    filled = sum(map(bead_volume, case.all_radii)) / (_LOOSE_PACKING * case.boundary.cross_section)
+    filled = _volume(case) / (_LOOSE_PACKING * case.boundary.cross_section)
     room = 2.0 * case.boundary.height - filled
     if (fastest := room / case.duration) < _FASTEST_CLIMB:
         end = "rise above twice boundary.height, and end the run early"
@@ -116,6 +116,11 @@ def notes(case: Case) -> list[str]:
 
 def _two_digits(number: float) -> str:
     return f"{float(f'{number:.2g}'):,.0f}"
+
+
+def _volume(case: Case) -> float:
+    """Volume of all beads, m³."""
+    return sum(map(bead_volume, case.all_radii))
 
 
 def summarise(case: Case) -> dict[str, Any]:
@@ -131,7 +136,7 @@ def summarise(case: Case) -> dict[str, Any]:
         seconds).
     """
     run, drive, limits = case.run, case.excitation, vars(limits_of(case))
-    volume = sum(map(bead_volume, case.all_radii))
+    volume = _volume(case)
     modulus = library_of(case.document).numbers("materials", case.beads.material or "").get("youngs_modulus")
     summary: dict[str, Any] = {
         "case": {**case.as_dict(), "origins": [asdict(origin) for origin in case.origins]},

@@ -35,10 +35,9 @@ def compare(sources: Sources) -> dict[str, Any]:
     """
     experiments = list(ruby().experiments)
     cases = {name: dict(zip(experiments, sweep_of(of_facts(name)).cases(), strict=True)) for name in sets()}
-    numbers, theory = (
-        {name: dict(zip(experiments, numbers_in(sources.table(of_facts(name))), strict=True)) for name in sets()},
-        _by_theory(cases["shipped"]),
-    )
+    tables = {name: sources.table(of_facts(name)) for name in sets()}
+    numbers = {name: dict(zip(experiments, numbers_in(table), strict=True)) for name, table in tables.items()}
+    theory = _by_theory(cases["shipped"])
     facts = [_fact(observation, numbers, theory) for observation in ruby().file.observations]
     counted = [fact["agree"] for fact in facts if not fact["derived"]]
     thresholds: Any = thresholds_with_theory(sources).to_dict("records")

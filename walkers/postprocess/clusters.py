@@ -293,13 +293,16 @@ def assembly_of(tracks: Sequence[Track], climbs: Columns, beads: Beads, bridges:
     """
     climbing = np.flatnonzero(climbs["climbed"]).tolist()
     ends = np.searchsorted(beads.time, climbs["qualified"][climbing]).tolist()
+    members_of_climbs = [
+        np.array(sorted(tracks[number].members[tracks[number].frames.index(until)]))
+        for number, until in zip(climbing, ends, strict=True)
+    ]
     rows: list[list[tuple[Any, ...]]] = [[] for _ in climbing]
     for now in takewhile(lambda now: now.frame <= max(ends), bridges if ends else ()):
         walled = at_sides(now, len(beads.large))
-        for number, until, of_climb in zip(climbing, ends, rows, strict=True):
+        for number, until, members, of_climb in zip(climbing, ends, members_of_climbs, rows, strict=True):
             if not max(beads.first - 1, 0) <= now.frame <= until:
                 continue
-            members = np.array(sorted(tracks[number].members[tracks[number].frames.index(until)]))
             within = np.searchsorted(members, now.beads[np.isin(now.beads, members).all(axis=1)])
             labels, neighbours = connected(len(members), within), np.bincount(within.ravel(), minlength=len(members))
             joined = (labels == np.bincount(labels).argmax()) & (neighbours > 0)

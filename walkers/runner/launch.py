@@ -103,11 +103,15 @@ def launch(
     write_run_script(directory, engine, plugin, ranks)
     command = [*_before(ranks), "env", f"LD_PRELOAD={plugin}", str(engine.path), "-log", "none", "-in", DECK_NAME]
     tell = on_step or (lambda _: None)
-    for _ in range(2):
-        with suppress(failures.EngineNeverStarted):
+    starts_left = 3
+    while True:
+        starts_left -= 1
+        try:
             return _Watch(deck, directory, engine.path, time_limit).run(command, tell, keep_open)
-        time.sleep(_PAUSE_SECONDS)
-    return _Watch(deck, directory, engine.path, time_limit).run(command, tell, keep_open)
+        except failures.EngineNeverStarted:
+            if not starts_left:
+                raise
+            time.sleep(_PAUSE_SECONDS)
 
 
 def last_step(log: Path) -> int:

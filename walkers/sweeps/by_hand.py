@@ -11,7 +11,7 @@ import shutil
 import time
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from math import inf, isclose, pi
+from math import isclose, pi
 from pathlib import Path
 from typing import Any
 
@@ -146,12 +146,12 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
     write_json(folder / decks.LAYOUT_NAME, rendered.layout.as_dict(), at_once=False)
     on_disk.write_segment_record(folder, segment, report, by_hand=notes)
     # Cycles that were enough for the finished run of a case may be too few for an edited deck.
-    most = before.run.cycles if before.run.until_steady else inf
-    if case.run.cycles < most and (most < inf or (case.apart and case != before)) and not are_constant(folder):
+    planned = before.run
+    doubtful = case.run.cycles < planned.cycles if planned.until_steady else case.apart and case != before
+    if doubtful and not are_constant(folder):
         reached = f"the velocities are not constant within {percent(CONSTANT)} after {case.run.cycles} cycles"
-        notes.append(
-            f"{reached}; set cycles to {f'{most}, as walkers run does,' if most < inf else 'more'} and run again"
-        )
+        more = f"{planned.cycles}, as walkers run does," if planned.until_steady else "more"
+        notes.append(f"{reached}; set cycles to {more} and run again")
         on_disk.write_segment_record(folder, segment, report, by_hand=notes)
     measure(folder)
     about: dict[str, Any] = {"drive_from": rest, "segments": 1, "by_hand": notes}

@@ -136,10 +136,11 @@ def _rate(events: int, seconds: float) -> dict[str, Any]:
     """Rate of events, 1/s, with the exact 95 % interval (Garwood 1936); None if the time is zero."""
     from scipy.stats import chi2
 
+    if seconds <= 0.0:
+        return {"rate": None, "rate_interval": None}
     tail = (1.0 - _CONFIDENCE) / 2.0
     ends = chi2.ppf((tail, 1.0 - tail), (2 * events, 2 * events + 2)) / 2.0  # NaN: no lower end without events
-    rates = [events / seconds, *(np.nan_to_num(ends) / seconds).tolist()] if seconds > 0.0 else [None]
-    return {"rate": rates[0], "rate_interval": rates[1:] or None}
+    return {"rate": events / seconds, "rate_interval": (np.nan_to_num(ends) / seconds).tolist()}
 
 
 def leaders(piles: pd.DataFrame, climbs: pd.DataFrame) -> dict[str, Any]:

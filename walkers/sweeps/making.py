@@ -115,7 +115,7 @@ def progress_at(place: Path, case: Case | None = None) -> Progress | None:
     The case is read as well, unless it is given.
     """
     directory = on_disk.unfinished(place)
-    shared = on_disk.unfinished(place) / DECK_FOLDER
+    shared = directory / DECK_FOLDER
     try:
         if shared.is_dir():
             share = last_step(shared / decks.OUTPUT_NAME) / on_disk.layout_of(shared).steps

@@ -203,16 +203,21 @@ class SweepPlan:
         """The cases of the points that are made."""
         return [self.cases[point] for deck in self.decks for point in deck.points]
 
+    @cached_property
+    def overhead(self) -> float:
+        """Predicted CPU time of Python for the missing points, s."""
+        return predicted_overhead(self.missing)
+
     @property
     def core_seconds(self) -> float:
         """Predicted CPU time of all processes for the missing points, s."""
         decks = (deck.seconds * max(self.cases[point].run.ranks for point in deck.points) for deck in self.decks)
-        return sum(decks) + predicted_overhead(self.missing)
+        return sum(decks) + self.overhead
 
     def as_text(self) -> str:
         """The plan in a few lines."""
         record, at_once, missing = self.record, self.options.decks_at_once, self.missing
-        besides = PROGRAM_SECONDS + predicted_overhead(missing)
+        besides = PROGRAM_SECONDS + self.overhead
         whole = PROGRAM_SECONDS + self.core_seconds
         apart = besides + sum(predicted_seconds(case) * case.run.ranks for case in missing)
         # Python works for one deck at a time, while other engines run.
