@@ -259,13 +259,22 @@ def test_the_work_of_two_harmonics_with_phases() -> None:
 
 
 def test_a_band_holds_the_result(tmp_path: Path) -> None:
-    run, band = tmp_path / "run", {"velocity": {"low": 1.0, "high": 2.0}}
+    """Three draws of each varied value, and six in all, are enough for it."""
+    run, band = tmp_path / "run", {"velocity": {"low": 1.0, "high": 2.0, "points": 8}}
     assert bands_of(run, [], {"velocity": 1.5}) == {}
     spread_of(run).mkdir()
     write_json(spread_of(run) / SPREAD_NAME, {"varied": [], "bands": band})
     for own, low, high in ((1.5, 1.0, 2.0), (2.5, 1.0, 2.5), (0.5, 0.5, 2.0), (None, 1.0, 2.0), (inf, 1.0, 2.0)):
-        assert bands_of(run, [], {"velocity": own}) == {"velocity_low": low, "velocity_high": high}
+        ends = {"velocity_low": low, "velocity_high": high, "velocity_draws": 8, "velocity_approximate": False}
+        assert bands_of(run, [], {"velocity": own}) == ends
     assert bands_of(run, [{"key": "liquid.volume_fraction", "range": [0.0, 1.0]}], {"velocity": 1.5}) == {}
+    for draws, values, few in ((5, 1, True), (6, 1, False), (6, 2, False), (8, 3, True), (9, 3, False)):
+        varied = [{"key": str(number), "range": [0.0, 1.0]} for number in range(values)]
+        write_json(
+            spread_of(run) / SPREAD_NAME,
+            {"varied": varied, "bands": {"velocity": {**band["velocity"], "points": draws}}},
+        )
+        assert bands_of(run, varied, {"velocity": 1.5})["velocity_approximate"] == few
 
 
 def test_a_tray_that_has_hardly_been_driven_has_meetings_alone() -> None:

@@ -22,7 +22,7 @@ from walkers.inputs.sweep import Sweep, expand, load_sweep
 from walkers.postprocess import meetings
 from walkers.postprocess.dump import DumpError
 from walkers.postprocess.numbers import band_text
-from walkers.postprocess.uncertainty import SPREAD_NAME, spread_of
+from walkers.postprocess.uncertainty import SPREAD_NAME, held_text, spread_of
 from walkers.runner.files import read_json
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.spread import describe, run_spread, spread_in, spread_sweep
@@ -212,8 +212,9 @@ def test_bands_along_a_sweep_are_those_of_each_points_spread(tmp_path: Path) -> 
     assert table["velocity_high"].is_monotonic_increasing
     assert "velocity_low (mm/s)  velocity_high (mm/s)" in sweep.describe()
     figure = sweep.figure()
-    assert figure.get_suptitle().endswith("bands: 5 to 95 % of 4 draws of the uncertain values")
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["5 to 95 % of 4 draws"]
+    band = "5 to 95 % of 4 draws, approximate"
+    assert figure.get_suptitle().endswith(f"bands over uncertain values: {band}")
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [band]
 
 
 def test_points_that_differ_in_their_seed_alone_are_a_group() -> None:
@@ -259,8 +260,13 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     spread = run_spread(case, runs_folder, Options(2), points=4)
     rough = {"contact.roughness.bead_bead", "contact.roughness.bead_wall"}  # of the library, for these materials
     assert {one.key for one in spread.varied} == {one.key for one in case.origins if one.guessed} | rough
-    assert {one.key for one in spread.held} == {"contact.friction.bead_bead", "contact.rolling_friction"}
-    assert "contact_angle 0 deg (0 deg to 60 deg)" in describe(spread)
+    given = {"contact.friction.bead_bead", "contact.rolling_friction"}
+    liquid = {f"liquid.{name}" for name in ("name", "surface_tension", "density", "kinematic_viscosity")}
+    assert {one.key for one in spread.held} == given | liquid
+    text = describe(spread)
+    assert "contact_angle 0 deg (0 deg to 60 deg)" in text
+    assert "liquid.kinematic_viscosity 14.5 mm^2/s (ethylene glycol), contact." in " ".join(text.split())
+    assert text.count("median") == 1  # of the result
     table = walkers.load(spread.directory).table()
     assert table["contact.friction.bead_wall"].between(0.1, 0.6).all()
     assert (table["liquid.volume_fraction"] > 0.01).sum() == 2  # half of the draws: the case's own is the median
@@ -269,7 +275,11 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     # The headline has the band from now on, which holds it.
     done, band = walkers.run(case, runs_folder), spread.bands["velocity"]
     # The report shows the figure; no draw keeps what only pictures read, and a picture says how to get it.
-    assert 'aria-label="spread"' in done.report().read_text("utf-8")
+    page = done.report().read_text("utf-8")
+    assert 'aria-label="spread"' in page
+    for text in ("4 draws: too few for rank correlations", "4 draws, approximate", held_text(spread.held)):
+        assert text in page
+    assert "rank correlation " not in page
     assert list(done.directory.rglob("beads.bin"))
     drawn = [Path(place) for place in table["run"]]
     assert not [path for place in drawn for path in place.rglob("beads.bin")]
@@ -279,7 +289,7 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     assert band["high"] - band["low"] > 1e-4  # m/s
     own, ends = done.result["velocity"], (done.result["velocity_low"], done.result["velocity_high"])
     assert ends == (min(band["low"], own), max(band["high"], own))
-    assert f"band {band_text(*ends, 'm/s')}" in done.describe()
+    assert f"band {band_text(*ends, 'm/s')} (4 draws, approximate)" in done.describe()
     told = {one["key"]: one["origin"] for one in done.result.about["rests_on"]}
     assert told["contact.friction.bead_wall"] == "given"
     assert told.keys() == unmeasured().keys() - {"liquid.meniscus_radius"}  # in place of which there is a fraction

@@ -86,7 +86,7 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
         write_json(spread / SPREAD_NAME, {"varied": result.about["rests_on"], "bands": bands})
         assert (done.result[f"{name}_low"], done.result[f"{name}_high"]) == (low, own)  # with the result of the case
         errors = {row.name: row.error for row in rows(done.result)}
-        assert ("band" in errors["right_facing"]) == (name == "right_facing")
+        assert errors["right_facing"].endswith("(64 draws)") == (name == "right_facing")
     assert "plane tilted by 20°" in done.report(tmp_path / "report.html").read_text("utf-8")
     gentle = Case.read({**tables, "boundary": {"material": "glass", "tilt": "10 deg"}}, name="gentle")
     walkers.run(gentle, tmp_path)
@@ -101,6 +101,9 @@ def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> N
     assert not fell({"goes_uphill": True, "climbs": 0})  # a pile
     # Nor has any walker the mean angle of those that turned over and those that did not.
     assert ["orientation_end" in {row.name for row in rows(one)} for one in ({**result}, turned)] == [True, False]
+    ends = [rounded(np.degrees(end), "°") for end in sorted(done.walkers["orientation_end"])]
+    for walkers_, error in ((2, f"walkers {ends[0]} to {ends[1]}"), (1, "")):
+        assert [row.error for row in rows({**result, "walkers": walkers_}) if row.name == "orientation_end"] == [error]
 
 
 def test_clusters_on_a_slope_are_averaged_by_the_way_they_face_and_lean_by_how_far_they_turned(tmp_path: Path) -> None:

@@ -49,10 +49,10 @@ _OF_SURFACES = (
 )
 _ROUGHNESS = ("contact.roughness.bead_bead", "contact.roughness.bead_wall")
 _VISCOSITIES = ("liquid.kinematic_viscosity", "liquid.dynamic_viscosity")
-_OF_LIQUIDS = ("liquid.surface_tension", "liquid.density", *_VISCOSITIES)
-_LIQUIDS = ((_OF_LIQUIDS[0], _VISCOSITIES[1]), _OF_LIQUIDS[:3])
+OF_LIQUIDS = ("liquid.surface_tension", "liquid.density", *_VISCOSITIES)
+_LIQUIDS = ((OF_LIQUIDS[0], _VISCOSITIES[1]), OF_LIQUIDS[:3])
 """Keys that describe a liquid completely: surface tension, and dynamic viscosity or density and kinematic viscosity."""
-SUPPLIED = ("beads.density", *_OF_LIQUIDS, *_FRICTION[:2], *_ROUGHNESS, *_OF_SURFACES)
+SUPPLIED = ("beads.density", *OF_LIQUIDS, *_FRICTION[:2], *_ROUGHNESS, *_OF_SURFACES)
 """Keys that a case may leave out because the library has values or defaults."""
 
 

@@ -143,19 +143,28 @@ def shown(number: float, unit: str) -> tuple[str, str]:
 
 
 def _errors(numbers: Mapping[str, Any], quantity: Quantity) -> str:
-    """Scatter or resolution, band and numerical error of a number in its displayed unit."""
+    """Scatter or resolution, band and numerical error of a number in its displayed unit; of an angle, its range."""
     parts = []
+    if quantity.name == "orientation_end" and numbers["walkers"] > 1:
+        ends = (shown(numbers[f"orientation_{end}"], quantity.unit)[0] for end in ("smallest", "largest"))
+        parts.append(f"walkers {' to '.join(ends)}")
     if isfinite(scatter := numbers.get(quantity.error, nan)):
         text = shown(scatter, quantity.unit)[0]
         word = "resolution" if quantity.error.endswith("_within") else "scatter"
         parts.append(f"{word} {'below 0.001' if text == '0' and quantity.unit == 'm/s' else text}")
     low, high = (numbers.get(f"{quantity.name}_{end}") for end in ("low", "high"))
     if low is not None and high is not None:
-        parts.append(f"band {band_text(low, high, quantity.unit)}")
+        draws = draws_text(numbers[f"{quantity.name}_draws"], approximate=numbers[f"{quantity.name}_approximate"])
+        parts.append(f"band {band_text(low, high, quantity.unit)} ({draws})")
     if isfinite(error := numbers.get(f"{quantity.name}_error", nan)):
         text = shown(float(f"{error:.2g}"), quantity.unit)[0]
         parts.append(f"numerical error {'below 0.001' if text == '0' else text}")
     return ", ".join(parts)
+
+
+def draws_text(draws: object, *, approximate: bool) -> str:
+    """How many draws a band is of, and whether it is approximate because they are few."""
+    return f"{draws} draws, approximate" if approximate else f"{draws} draws"
 
 
 def band_text(low: float, high: float, unit: str) -> str:

@@ -21,9 +21,13 @@ _BAND = "of the draws over the ranges of uncertain values"
 ENDS = {
     "low": ("5 %", f"5 % {_BAND}"),
     "high": ("95 %", f"95 % {_BAND}"),
+    "draws": ("draws of the band", f"number {_BAND}"),
+    "approximate": ("band approximate", "whether these draws are too few for more than an approximate band"),
     "error": ("numerical error", "numerical error, of time step and stiffness"),
 }
 """Ends of names of bands and of numerical errors, as in ``velocity_low``: words of their labels, meaning."""
+_PLAIN = ("draws", "approximate")
+"""Ends of names of numbers without a unit."""
 
 
 @dataclass(frozen=True)
@@ -68,12 +72,17 @@ _NUMBERS = [
     for quantity in (
         number,
         *(
-            Quantity(f"{number.name}_{end}", number.unit, f"{number.label}, {words}", f"{meaning}: {number.meaning}")
+            Quantity(
+                f"{number.name}_{end}",
+                "" if end in _PLAIN else number.unit,
+                f"{number.label}, {words}",
+                f"{meaning}: {number.meaning}",
+            )
             for end, (words, meaning) in ENDS.items()
         ),
     )
 ]
-"""The numbers of results, each with both ends of its band and its numerical error."""
+"""The numbers of results, each with its band and its numerical error."""
 
 
 def matches(pattern: str, name: str) -> bool:
@@ -105,7 +114,7 @@ def is_declared(name: str) -> bool:
 
 
 def is_error(name: str) -> bool:
-    """Whether a number is an end of the band of another, or its numerical error."""
+    """Whether a number belongs to the band of another, or is its numerical error."""
     return name.rpartition("_")[2] in ENDS
 
 

@@ -12,6 +12,7 @@ from typing import Any
 from walkers.errors import refused
 from walkers.inputs.library import unmeasured
 from walkers.inputs.origins import Origin
+from walkers.inputs.resolving import OF_LIQUIDS
 from walkers.runner.files import read_json
 from walkers.runner.manifest import check_unchanged
 
@@ -22,7 +23,9 @@ ACCURACY = "-accuracy"
 ACCURACY_NAME = "accuracy.json"
 """End of the name of the sweep that measures numerical errors, and name of the file with them in the run."""
 LEAST_PER_VALUE = 3
-"""Draws per varied value below which the band is approximate and rank correlations are not significant."""
+"""Least number of draws per varied value (`few_draws`)."""
+_LEAST = 6
+"""Least number of draws: of five, no rank correlation is larger than two standard errors, 2/√4."""
 _WIDTH = 110
 
 
@@ -59,8 +62,35 @@ def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
     if "guessed" in listed:
         listed["guessed"][-1] += " (not of these materials and this liquid)"
     texts = [f"  {head:10} {', '.join(listed[head])}" for head in _HEADS if head in listed]
-    wrapper = textwrap.TextWrapper(_WIDTH, subsequent_indent=" " * 13, break_on_hyphens=False)
-    return [line for text in texts for line in wrapper.wrap(text)]
+    return [line for text in texts for line in in_lines(text)]
+
+
+def in_lines(text: str) -> list[str]:
+    """A text beside a head of 13 letters, in lines for a terminal."""
+    return textwrap.wrap(text, _WIDTH, subsequent_indent=" " * 13, break_on_hyphens=False)
+
+
+def held_of(origins: Sequence[Origin]) -> tuple[Origin, ...]:
+    """Values of a case without a range, which a spread holds fixed: those of the liquid, and other unmeasured ones."""
+    keys = {"liquid.name", *OF_LIQUIDS, *unmeasured()}
+    held = (value for value in origins if value.key in keys and value.origin != "derived")
+    return tuple(value for value in held if value.range is None)
+
+
+def held_text(held: Sequence[Origin]) -> str:
+    """Values that a spread holds fixed (`held_of`), those of the liquid first and with its name."""
+    name = "".join(f" ({value.text})" for value in held if value.key == "liquid.name")
+    of_liquid, unknown = (
+        ", ".join(f"{value.key} {value.text}" for value in held if value.key in keys)
+        for keys in (OF_LIQUIDS, unmeasured())
+    )
+    listed = ", ".join(filter(None, [f"{of_liquid}{name}" if of_liquid else "", unknown]))
+    return f"{listed}{' and ' if listed else ''}all other values; to vary one, add its range in [uncertain]"
+
+
+def few_draws(draws: int, values: int) -> bool:
+    """Whether draws of some values are too few: the band is approximate, and rank correlations are not significant."""
+    return draws < max(_LEAST, LEAST_PER_VALUE * values)
 
 
 def spread_of(directory: Path) -> Path:
@@ -69,7 +99,7 @@ def spread_of(directory: Path) -> Path:
 
 
 def bands_of(directory: Path, rests: Sequence[Mapping[str, Any]], numbers: Mapping[str, Any]) -> dict[str, float]:
-    """Both ends of the bands of numbers (SI), ``velocity_low`` and ``velocity_high``, by the spread beside a run.
+    """Bands of numbers (SI) by the spread beside a run: ``velocity_low``, ``velocity_high``, ``velocity_draws``, ….
 
     The spread must be over the ranges of the uncertain values ``rests``. A band is extended to the number of the case,
     which is usually in it, because a spread draws half of the values below and half above those of the case.
@@ -83,7 +113,8 @@ def bands_of(directory: Path, rests: Sequence[Mapping[str, Any]], numbers: Mappi
         for name, band in spread["bands"].items() if drawn == ranges else ():
             number = numbers.get(name)
             ends = [band["low"], band["high"], *([number] if number is not None and isfinite(number) else [])]
-            bands |= {f"{name}_low": min(ends), f"{name}_high": max(ends)}
+            bands |= {f"{name}_low": min(ends), f"{name}_high": max(ends), f"{name}_draws": band["points"]}
+            bands[f"{name}_approximate"] = few_draws(band["points"], len(drawn))
     return bands
 
 

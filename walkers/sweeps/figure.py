@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from math import ceil, prod
+from math import ceil, prod, sqrt
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, get_args
@@ -19,11 +19,11 @@ from walkers.errors import InputError, expected_of, refused
 from walkers.inputs.case import Case
 from walkers.inputs.library import unmeasured
 from walkers.postprocess.drawing import TWO_COLUMNS, errors_seen, letter_panels, new_figure, plain_text, styled
+from walkers.postprocess.numbers import draws_text
 from walkers.postprocess.quantities import declared, is_declared, scatter_of, unit_shown
 from walkers.postprocess.results import derived
-from walkers.postprocess.uncertainty import SPREAD_NAME, spread_of
+from walkers.postprocess.uncertainty import few_draws
 from walkers.runner.directory import case_of
-from walkers.runner.files import read_json
 from walkers.sweeps.figure_options import FigureOptions, Log
 from walkers.sweeps.table import (
     FACING_DOWN,
@@ -32,6 +32,7 @@ from walkers.sweeps.table import (
     find_name,
     key_values,
     status_text,
+    together,
     value_text,
     with_unit,
 )
@@ -258,7 +259,20 @@ def _same(first: Factor, second: Factor) -> bool:
     return first.keys == second.keys or pairs == len(first.levels) == len(second.levels)
 
 
-def rank_correlation(first: Any, second: Any) -> float:
+def rank_correlations(done: pd.DataFrame, column: str, keys: Sequence[str]) -> dict[str, float] | None:
+    """Rank correlations of a column with drawn keys, the strongest first, if larger than two standard errors.
+
+    Points without a number and walkers that came apart do not count. None if the draws are too few (`few_draws`).
+    """
+    points = together(done).dropna(subset=column)
+    if few_draws(len(points), len(keys)):
+        return None
+    ranks = {key: _rank_correlation(points[key], points[column]) for key in keys}
+    certain = {key: rank for key, rank in ranks.items() if abs(rank) > 2.0 / sqrt(len(points) - 1)}
+    return dict(sorted(certain.items(), key=lambda item: -abs(item[1])))
+
+
+def _rank_correlation(first: Any, second: Any) -> float:
     """Spearman's correlation of two columns, the correlation of their ranks; 0 if one is constant."""
     import pandas as pd
 
@@ -339,9 +353,9 @@ def _points(done: pd.DataFrame, column: str, down: str | None) -> tuple[str, pd.
 
 def _draws(done: pd.DataFrame, column: str) -> str:
     """Numbers of draws of the spreads at the points: ``32``, or ``30 to 32`` if some failed or came apart."""
-    places = [spread_of(Path(run)) / SPREAD_NAME for run in done.loc[done[f"{column}_low"].notna(), "run"]]
-    numbers = [read_json(place)["bands"][column]["points"] for place in places]
-    return " to ".join(map(str, sorted({min(numbers), max(numbers)})))
+    numbers = done[f"{column}_draws"].dropna()
+    draws = " to ".join(f"{number:.0f}" for number in sorted({numbers.min(), numbers.max()}))
+    return draws_text(draws, approximate=bool(done[f"{column}_approximate"].eq(True).any()))
 
 
 @styled
@@ -359,11 +373,16 @@ def _draw(
     if "x" in log and not all(factor.is_number for factor in along):
         raise refused("log", f"{along[0].label} has no numbers")
     label, points = _points(done, column, down)
-    parts = [(x, _with_usual_others(x, along), "") for x in along]
-    if len(along) > 1 and all(x.keys[0] in done.attrs.get("sampled", {}) for x in along):
-        influence = {x.keys: rank_correlation(x.values, points["value"]) for x in along}
-        parts = [(x, shown, f"rank correlation {influence[x.keys]:+.2f}") for x, shown, _ in parts]
-        parts.sort(key=lambda part: -abs(influence[part[0].keys]))
+    parts, texts = [(x, _with_usual_others(x, along), "") for x in along], [done.attrs["title"]]
+    sampled = done.attrs.get("sampled", {})
+    if len(along) > 1 and all(x.keys[0] in sampled for x in along):
+        ranks = rank_correlations(done, column, [*sampled])
+        if ranks is None:
+            texts.append(f"{len(done)} draws: too few for rank correlations")
+        else:
+            titles = {key: f"rank correlation {rank:+.2f}" for key, rank in ranks.items()}
+            parts = [(x, shown, titles.get(x.keys[0], "no clear dependence")) for x, shown, _ in parts]
+            parts.sort(key=lambda part: -abs(ranks.get(part[0].keys[0], 0.0)))
     if panels is not None:
         parts = [(along[0], _where(panels, level), panels.text(level, by_name=True)) for level in panels.levels]
     looks = _looks(hue, hollow=bool(theory))
@@ -389,9 +408,9 @@ def _draw(
     _scale_y(grid[0, 0], points, list(theory.values.values()) if theory else [], log)
     for axes in grid.flat[len(parts) :]:
         axes.set_axis_off()
-    band = f"5 to 95 % of {_draws(done, column)} draws" if "low" in points else ""
+    band = f"5 to 95 % of {_draws(done, column)}" if "low" in points else ""
     _legend(figure, grid, hue, looks, list(theory.values) if theory else [], down="down" in points, band=band)
-    texts = [done.attrs["title"], *([f"bands: {band} of the uncertain values"] if band else [])]
+    texts += [f"bands over uncertain values: {band}"] if band else []
     if points["error"].notna().any():
         banded = band or {*unmeasured()} & {*done.attrs["varied"]}
         bars = SCATTER.partition(" (")[0] if banded else SCATTER

@@ -6,30 +6,28 @@ import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
-from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, check_limits, refused, unusable
 from walkers.inputs.axes import Range, ranges_of, unit_cube, written
 from walkers.inputs.case import Case
-from walkers.inputs.library import unmeasured
 from walkers.inputs.messages import blaming
 from walkers.inputs.origins import Origin
 from walkers.inputs.sweep import Sweep, expand
 from walkers.inputs.units import parse_quantity
 from walkers.postprocess.numbers import MAIN
 from walkers.postprocess.quantities import declared, unit_shown
-from walkers.postprocess.sides import REST, SEPARATED
-from walkers.postprocess.uncertainty import LEAST_PER_VALUE, SPREAD_NAME, spread_of
+from walkers.postprocess.sides import REST
+from walkers.postprocess.uncertainty import SPREAD_NAME, few_draws, held_of, held_text, in_lines, spread_of
 from walkers.rounding import rounded
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.runner.files import write_json
-from walkers.sweeps.figure import LeftOutWarning, figure_of, rank_correlation
+from walkers.sweeps.figure import LeftOutWarning, figure_of, rank_correlations
 from walkers.sweeps.readable import kind_of
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
-from walkers.sweeps.table import load, main_columns
+from walkers.sweeps.table import load, main_columns, together
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,7 +51,8 @@ _ON_A_SLOPE = {"forward": "go up the slope", "backward": "go down"}
 class Spread:
     """Results of a spread, in the directory of its sweep.
 
-    ``varied`` are the values that were drawn from their ranges, ``held`` are unmeasured values that the case gives.
+    ``varied`` are the values that were drawn from their ranges, ``held`` those of the liquid and unmeasured ones that
+    have no range (`walkers.postprocess.uncertainty.held_of`).
     ``bands`` has percentiles of the main results by the columns of the sweep's table (``low``, ``median`` and ``high``
     for 5, 50 and 95 %), their ``smallest`` and ``largest`` values (SI units), and numbers of ``points``, without
     walkers that came apart; ``depends`` has their rank correlations (Spearman) with the drawn values, the strongest
@@ -77,7 +76,7 @@ class Spread:
 
 
 def _range_of(value: Origin) -> dict[str, list[Any]]:
-    """The range of a value for the sampler of a sweep; the value of the case is the median."""
+    """The range of a value for the sampler of a sweep; half of the draws are at or below the value of the case."""
     name, (low, high) = "loguniform" if value.logarithmic else "uniform", value.range or (None, None)
     ends: Range = ranges_of({value.key: {name: [low, high]}})[value.key]
     kind = kind_of(value.key)
@@ -95,8 +94,8 @@ def _range_of(value: Origin) -> dict[str, list[Any]]:
 def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> Sweep:
     """A sweep over the uncertain values of a case by Sobol's sequence, scrambled for the least correlated columns.
 
-    The medians are the values of the case. `InputError` if no value is uncertain, a range does not contain the value
-    of the case, or there are not 2 to 4096 points.
+    Half of the draws are at or below the value of the case. `InputError` if no value is uncertain, a range does not
+    contain the value of the case, or there are not 2 to 4096 points.
     """
     import numpy as np
 
@@ -145,36 +144,26 @@ def run_spread(
 def spread_in(table: pd.DataFrame, case: Case, directory: Path, failures: Sequence[Failure] = ()) -> Spread:
     """The spread of a case by the table of its sweep in a directory."""
     table = table[table["status"] == "finished"]
-    together, counts = table, {}
+    whole, counts = together(table), {}
     if "velocity" in table:
-        together = table[~(table["separated_fraction"] > SEPARATED)]
-        speeds = together[main_columns(together)[0]]
+        speeds = whole[main_columns(whole)[0]]
         counts = {"forward": int((speeds > REST).sum()), "backward": int((speeds < -REST).sum())}
-        counts |= {"at_rest": int((speeds.abs() <= REST).sum()), "separated": len(table) - len(together)}
-    shown = [main_columns(together)[0]] if "velocity" in table else [name for name in MAIN if name in table]
+        counts |= {"at_rest": int((speeds.abs() <= REST).sum()), "separated": len(table) - len(whole)}
+    shown = [main_columns(whole)[0]] if "velocity" in table else [name for name in MAIN if name in table]
     varied, bands = tuple(value for value in case.origins if value.range is not None), {}
-    for name in (name for name in shown if together[name].notna().any()):
-        ends = together[name].astype(float).quantile([0.05, 0.5, 0.95, 0.0, 1.0])
+    for name in (name for name in shown if whole[name].notna().any()):
+        ends = whole[name].astype(float).quantile([0.05, 0.5, 0.95, 0.0, 1.0])
         bands[name] = dict(zip(("low", "median", "high", "smallest", "largest"), ends.tolist(), strict=True))
-        bands[name]["points"] = int(together[name].count())
+        bands[name]["points"] = int(whole[name].count())
     return Spread(
         directory=directory,
         varied=varied,
-        held=tuple(value for value in case.origins if value.key in unmeasured() and value.range is None),
+        held=held_of(case.origins),
         bands=bands,
-        depends={name: _ranks(together.dropna(subset=name), name, [value.key for value in varied]) for name in shown},
+        depends={name: rank_correlations(whole, name, [value.key for value in varied]) or {} for name in shown},
         counts=counts,
         failures=tuple(failures),
     )
-
-
-def _ranks(table: pd.DataFrame, name: str, keys: Sequence[str]) -> dict[str, float]:
-    """Rank correlations of a column with each key, the strongest first, without insignificant ones."""
-    if len(table) < LEAST_PER_VALUE * len(keys) or table[name].nunique() < 2:
-        return {}
-    ranks = {key: rank_correlation(table[key], table[name]) for key in keys}
-    certain = {key: rank for key, rank in ranks.items() if abs(rank) > 2.0 / sqrt(len(table) - 1)}
-    return dict(sorted(certain.items(), key=lambda item: -abs(item[1])))
 
 
 def figures_of_spread(run: Path) -> dict[str, Figure]:
@@ -190,20 +179,19 @@ def figures_of_spread(run: Path) -> dict[str, Figure]:
 def describe(spread: Spread) -> str:
     """A spread in a few lines: mm, mm/s."""
     points = max((band["points"] for band in spread.bands.values()), default=0)
-    lines = [f"  spread     {points} draws; values drawn independently from their ranges, median: value of the case"]
+    half = "half of them at or below the value of the case"
+    lines = [f"  spread     {points} draws; values drawn independently from their ranges, {half}"]
     lines += [
         f"{'':13}{value.key} {value.text} ({' to '.join(map(str, value.range or ()))})" for value in spread.varied
     ]
-    if spread.held:
-        text = ", ".join(f"{value.key} {value.text}" for value in spread.held)
-        lines.append(f"    fixed    {text}; to vary these values, add ranges in [uncertain]")
+    lines += in_lines(f"    fixed    {held_text(spread.held)}")
     for name, band in spread.bands.items():
         unit, factor = unit_shown(declared(name).unit)
         texts = {end: rounded(float(f"{number * factor:.3g}"), unit) for end, number in band.items()}
         ends = "{low} to {high} {unit} (5 to 95 %), median {median}; smallest {smallest}, largest {largest}"
         lines.append(f"    {declared(name).label:8} {ends.format(unit=unit, **texts)}")
         text = "no clear dependence on any of them"
-        if band["points"] < LEAST_PER_VALUE * len(spread.varied):
+        if few_draws(int(band["points"]), len(spread.varied)):
             text = "too few draws for rank correlations; the band is approximate"
         elif ranks := ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items()):
             text = f"strongest dependence: {ranks} (rank correlation)"

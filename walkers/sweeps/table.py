@@ -26,8 +26,9 @@ from walkers.errors import InputError, refused, suggestion
 from walkers.inputs.axes import ranges_of
 from walkers.inputs.origins import text_of
 from walkers.postprocess.numbers import headline
-from walkers.postprocess.quantities import GROUPS, declared, is_declared, ordered, unit_shown
+from walkers.postprocess.quantities import ENDS, GROUPS, declared, is_declared, ordered, unit_shown
 from walkers.postprocess.results import Results, modules_of, read
+from walkers.postprocess.sides import SEPARATED
 from walkers.rounding import counted, rounded
 from walkers.runner.directory import FAILURE_NAME, is_finished, is_locked, unfinished
 from walkers.runner.files import json_bytes, read_json, write_bytes, write_json
@@ -233,6 +234,11 @@ def groups(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]
         yield dict(zip(keys, values, strict=True)), frame.loc[rows.index]
 
 
+def together(frame: pd.DataFrame) -> pd.DataFrame:
+    """The points of a sweep's table without those whose walkers came apart, which have no velocity."""
+    return frame[~(frame["separated_fraction"] > SEPARATED)] if "separated_fraction" in frame else frame
+
+
 def sides_differ(frame: pd.DataFrame) -> bool:
     """Whether walkers facing right (up) and left (down) differ at a point: then their mean velocity means nothing."""
     return "facings_differ" in frame and bool(frame["facings_differ"].eq(True).any())
@@ -334,7 +340,7 @@ def cells_of(frame: pd.DataFrame, named: Callable[[str], str] | None = None) -> 
 
     main = main_columns(frame)
     shown = _SHOWN | (set(SIDES) if sides_differ(frame) else {"velocity", default_column(frame)})
-    shown |= {f"{name}_{end}" for name in main for end in ("low", "high")}
+    shown |= {f"{name}_{end}" for name in main for end in ENDS.keys() - {"error"}}
     names = [name for name in map(str, frame) if name in shown or not (is_declared(name) or name in _ASIDE)]
     varied, cells, same = frame.attrs["varied"], {}, []
     kept = {"point", *varied, *main} if "status" in names else {*names}
