@@ -18,6 +18,7 @@ import walkers
 from docs._ext import generated
 from docs.illustrations import facts, output_of, pages_of, refreshed, stale, without_hashes
 from walkers.runner.files import read_json
+from walkers.text import rendered
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -139,6 +140,13 @@ def test_examples_give_what_they_say(module: str, runs_folder: Path, monkeypatch
 def test_generated_pages_of_the_reference_are_todays(name: str) -> None:
     """If this fails, run ``python -m docs._ext.generated``."""
     assert (generated.FOLDER / f"{name}.md").read_text("utf-8") == generated.PAGES[name]()
+
+
+def test_the_page_of_the_comparison_is_of_todays_template() -> None:
+    """Its sentences say when a fact agrees: `walkers.calibration.observations.Observation.agrees`."""
+    page = DOCS / "figures" / "comparison.md"
+    compared = read_json(page.with_suffix(".json"))
+    assert page.read_text("utf-8") == rendered("walkers.paper", "comparison.md.j2", **compared)
 
 
 def test_the_table_of_performance_is_the_benchmarks() -> None:

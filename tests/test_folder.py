@@ -14,6 +14,7 @@ import pytest
 
 import walkers
 from tests.conftest import TINY, call, document, finished_places, to_toml
+from walkers import load_case
 from walkers.postprocess.uncertainty import ACCURACY_NAME
 from walkers.runner.directory import case_of, locked
 from walkers.runner.files import read_json, write_json
@@ -176,7 +177,14 @@ def test_compare_tells_parameters_and_results_of_two_runs(out: Path) -> None:
     table = walkers.load(out / "beads").table().set_index(["liquid.name", "dimers.radii[0]"])
     rows = [table.loc[("Si AK5", 0.3)], table.loc[("Si AK10", 0.3)]]
     found = json.loads(call("compare", *(Path(row["run"]).name for row in rows), "--json", check=True).stdout)
-    assert found["parameters"] == {"liquid.name": ["Si AK5", "Si AK10"]}
+    # What is given, then what follows from it.
+    assert [*found["sources"].items()] == [
+        ("liquid.name", ["given"] * 2),
+        *((f"liquid.{name}", ["library"] * 2) for name in ("surface_tension", "density", "kinematic_viscosity")),
+        ("liquid.dynamic_viscosity", ["derived"] * 2),
+    ]
+    assert found["parameters"]["liquid.name"] == ["Si AK5", "Si AK10"]
+    assert found["parameters"]["liquid.density"] == [920.0, 930.0]
     results = {one["quantity"]: one for one in found["results"]}
     for name, number in {"": "velocity", "_scatter": "scatter"}.items():
         sides = [results["velocity"][f"{side}{name}"] for side in ("first", "second")]
@@ -188,19 +196,37 @@ def test_compare_tells_parameters_and_results_of_two_runs(out: Path) -> None:
     assert "all results are the same" in call("compare", "base.toml", "base.toml", check=True).stdout
     for sides in (["base.toml"], ["base.toml", "base.toml"]):
         found = json.loads(call("compare", *sides, "--set", "drive.frequency=90Hz", "--json", check=True).stdout)
-        assert {key: values[1] for key, values in found["parameters"].items()} == {"drive.frequency": 90.0}
+        assert next(iter(found["parameters"].items())) == ("drive.frequency", [80.0, 90.0])
         assert found["second"] == "base.toml drive.frequency=90Hz" == found["not_run"][0]
 
 
-def _changed(run: Path, to: Path, name: str, speed: float, error: float) -> Side:
-    """A copy of a run whose result has another velocity and numerical error (m/s), as if measured so."""
+def test_compared_cases_show_what_follows_from_their_materials() -> None:
+    """Friction, roughness, and liquid that only one case has; no defaults of a table that only one has."""
+    ruby, cluster = load_case("fig1b"), load_case("cluster")
+    glass = ruby.changed({"beads.material": "glass"})
+    text = compare_runs(Side("a", ruby, None), Side("b", glass, None)).text
+    cells = {tuple(re.split("  +", line)) for line in text.splitlines()}
+    assert cells >= {
+        ("beads.material", "ruby", "glass", "given"),
+        ("contact.friction.bead_bead", "0.11", "0.1", "calibrated / guessed"),
+        ("contact.roughness.bead_bead", "28.3 nm", "990 nm", "library"),
+        ("liquid.volume_fraction", "-", "0.01", "guessed"),
+    }
+    keys = compare_runs(Side("a", ruby, None), Side("c", cluster, None)).contents["parameters"]
+    assert "dimers.radii" in keys and "dimers.replicates" not in keys
+
+
+def _changed(run: Path, to: Path, name: str, error: float = 0.0, **numbers: float) -> Side:
+    """A copy of a run whose result has other numbers and a numerical error of the velocity (SI), as if measured so."""
     shutil.copytree(run, to / name)
     result = read_json(to / name / "result.json")
-    result["numbers"]["velocity"] = speed
+    result["numbers"] |= numbers
     write_json(to / name / "result.json", result)
-    write_json(to / name / ACCURACY_NAME, {"errors": {"velocity": {"total": error}}})
+    if error:
+        errors = {name: {"total": error} for name in ("velocity", "right_facing")}
+        write_json(to / name / ACCURACY_NAME, {"errors": errors})
     manifest = read_json(to / name / MANIFEST_NAME)
-    manifest["sha256"] |= checksums(to / name, ["result.json", ACCURACY_NAME])
+    manifest["sha256"] |= checksums(to / name, ["result.json", *([ACCURACY_NAME] if error else [])])
     write_json(to / name / MANIFEST_NAME, manifest)
     return Side(name, case_of(run), to / name)
 
@@ -209,14 +235,33 @@ def test_compared_runs_differ_by_so_many_times_both_their_numerical_errors(
     run_directory: Callable[..., Path], tmp_path: Path
 ) -> None:
     """Errors of 3 and 4 µm/s make 5 µm/s of a difference of -50 µm/s."""
+    heads = {"velocity": 10, "right_facing": 20}
     run = run_directory(run=TINY)
-    fast, slow = _changed(run, tmp_path, "fast", 1.05e-3, 3e-6), _changed(run, tmp_path, "slow", 1e-3, 4e-6)
+    fast = _changed(run, tmp_path, "fast", 3e-6, velocity=1.05e-3, right_facing=1.1e-3)
+    slow = _changed(run, tmp_path, "slow", 4e-6, velocity=1e-3, right_facing=1e-3)
     found = compare_runs(fast, slow)
     (velocity,) = (one for one in found.contents["results"] if one["quantity"] == "velocity")
     assert velocity["difference"] == pytest.approx(-5e-5)
     assert velocity["numerical_error"] == pytest.approx(hypot(3e-6, 4e-6))
-    assert "velocity: differs by 10 times its numerical error" in found.text
+    lines = [f"{name}: differs by {times} times its numerical error" for name, times in heads.items()]
+    assert "\n".join(["\n", *lines, ""]) in found.text and "--accuracy" not in found.text
     assert re.search(r"\nvelocity \(mm/s\) +1\.05 +1 +-0\.05 ", found.text)
+    # Without them the table has no column for them, and a line says how to have them.
+    rough = _changed(run, tmp_path, "rough", velocity=1.2e-3)
+    found = compare_runs(fast, rough)
+    assert f"\n\nto measure numerical errors: walkers run {rough.directory} --accuracy\n" in found.text
+    assert re.search(r"\nresult +fast +rough +difference\n", found.text)
+
+
+@pytest.mark.parametrize(("uphill", "shown"), [(True, True), (False, False)])
+def test_a_main_number_is_compared_unless_it_is_a_mean_over_two_directions(
+    uphill: bool, shown: bool, run_directory: Callable[..., Path], tmp_path: Path
+) -> None:
+    """The main velocity of a level run, and of a slope that of walkers that face up."""
+    run = run_directory(run=TINY)
+    other = _changed(run, tmp_path, "other", velocity=1e-3, facings_differ=True, goes_uphill=uphill)
+    rows = compare_runs(Side("level", case_of(run), run), other).contents["results"]
+    assert ("velocity" in {row["quantity"] for row in rows}) == shown
 
 
 def test_values_are_shown_as_a_case_file_has_them() -> None:

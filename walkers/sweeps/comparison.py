@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from math import hypot, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -42,32 +43,57 @@ class Comparison:
 def compare_runs(first: Side, second: Side) -> Comparison:
     """Compare two runs, or cases not yet run."""
     names, flat = [first.name, second.name], [flattened(side.case) for side in (first, second)]
-    parameters = {key: [values.get(key) for values in flat] for key in differing(flat)}
-    changed = [[key, *(readable(key, value) for value in values)] for key, values in parameters.items()]
-    text = [aligned([["parameter", *names], *changed]) if changed else "the cases are the same"]
+    parameters = {key: [values.get(key) for values in flat] for key in chain(*differing(flat))}
+    sources = {key: [case.words.get(key) for case in flat] for key in parameters}
+    changed = [
+        [key, *(readable(key, value) for value in values), " / ".join(dict.fromkeys(filter(None, sources[key])))]
+        for key, values in parameters.items()
+    ]
+    text = [aligned([["parameter", *names, "source"], *changed]) if changed else "the cases are the same"]
     not_run, rows = [side.name for side in (first, second) if side.directory is None], []
     if first.directory and second.directory:
-        rows = _rows(read(first.directory), read(second.directory))
+        results = [read(first.directory), read(second.directory)]
+        rows = _rows(*results)
         apart = {row["quantity"]: row for row in rows if row["first"] != row["second"]}
         if "cycles" in apart and not changed:
             text = [f"{text[0]}, but ran {' and '.join(_cells(apart['cycles'])[1:3])} cycles"]
         if apart:
             heads = ["result", *names, "difference", "scatter of copies", "numerical error"]
-            text.append(aligned([heads, *map(_cells, apart.values())]))
-        for row in [apart[name] for name in _VELOCITIES if name in apart and apart[name]["numerical_error"]]:
-            times = _two_digits(abs(row["difference"]) / row["numerical_error"], "")
-            text.append(f"{row['quantity']}: differs by {times} times its numerical error")
+            columns = zip(heads, *map(_cells, apart.values()), strict=True)
+            text.append(aligned([*zip(*(column for column in columns if {*column[1:]} != {"-"}), strict=True)]))
+        text += _of_errors(apart, results)
         if same := [row["quantity"] for row in rows if row["quantity"] not in apart]:
             text.append(f"the same in both: {', '.join(same)}" if apart else "all results are the same")
     text += [f"{name}: no finished run; only the parameters are compared" for name in not_run]
-    contents = {"first": first.name, "second": second.name, "parameters": parameters, "not_run": not_run}
-    return Comparison(contents | {"results": rows}, "\n\n".join(text))
+    contents = {"first": first.name, "second": second.name, "parameters": parameters, "sources": sources}
+    return Comparison(contents | {"not_run": not_run, "results": rows}, "\n\n".join(text))
+
+
+def _of_errors(apart: Mapping[str, Mapping[str, Any]], results: Sequence[Results]) -> list[str]:
+    """How many times its numerical error a velocity differs, and which runs' errors are still to be measured."""
+    rows = [apart[name] for name in _VELOCITIES if name in apart]
+    lines = [
+        f"{row['quantity']}: differs by {_two_digits(abs(row['difference']) / row['numerical_error'], '')} times "
+        "its numerical error"
+        for row in rows
+        if row["numerical_error"]
+    ]
+    unmeasured = [str(result.directory) for result in results if not {"numerical_error", "stops_at"} & result.keys()]
+    if rows and unmeasured:
+        lines.append(f"to measure numerical errors: walkers run {' '.join(unmeasured)} --accuracy")
+    return ["\n".join(lines)] if lines else []
 
 
 def _rows(first: Results, second: Results) -> list[dict[str, Any]]:
-    """The numbers of two results, without errors, values of the case and conditions, and means over both facings."""
+    """The numbers of two results, without errors, values of the case and conditions, and means over both facings.
+
+    The main number of each result is among them, so that a level run and a slope have a velocity in common.
+    """
     heads, results = {headline(first), headline(second)}, {"first": first, "second": second}
-    little = _VELOCITIES if "axial_velocity" in heads else ("velocity",) if "right_facing" in heads else ()
+    little = {*_VELOCITIES} if "axial_velocity" in heads else {"velocity"}
+    little -= heads
+    if any(result.get("facings_differ") and not result.get("goes_uphill") for result in results.values()):
+        little.add("velocity")
     names = {name for name in {*first, *second} if not is_error(name)}.difference(ASIDE, little, ["coverage"])
     rows = []
     for name, (unit, _) in columns_of(names).items():

@@ -180,13 +180,14 @@ def _beside(name: str) -> str:
 
 
 def _by_case(contents: Sequence[Row]) -> Iterator[tuple[str, list[Row], list[str]]]:
-    """The runs of each case, and the keys by which they differ."""
+    """The runs of each case, and the keys by which they differ, without those that follow from given ones."""
     by_case: dict[str, list[Row]] = {}
     for row in contents:
         if row["kind"] == "run":
             by_case.setdefault(row["case"], []).append(row)
     for case, runs in by_case.items():
-        yield case, runs, differing([row["parameters"] for row in runs if row["parameters"]])
+        given, derived = differing([row["parameters"] for row in runs if row["parameters"]])
+        yield case, runs, given or derived
 
 
 def as_json(contents: Sequence[Row]) -> list[dict[str, Any]]:

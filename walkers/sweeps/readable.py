@@ -18,9 +18,9 @@ from walkers.inputs.units import Kind
 
 
 class FlatCase(dict[str, Any]):
-    """The values of a case by dotted key, SI units; ``given`` has the keys that the case itself says."""
+    """The values of a case by dotted key, SI units; ``words`` say where each is from, as `walkers.inputs.origins`."""
 
-    given: frozenset[str] = frozenset()
+    words: Mapping[str, str] = {}
 
 
 def flattened(case: Case) -> FlatCase:
@@ -30,7 +30,7 @@ def flattened(case: Case) -> FlatCase:
     )
     if case.placed:  # which have no origins, because there may be hundreds
         flat["placed"] = [[*bead.at, bead.radius] for bead in case.placed]
-    flat.given = frozenset(["placed", *(origin.key for origin in case.origins if origin.origin == "given")])
+    flat.words = {"placed": "given", **{origin.key: origin.word for origin in case.origins}}
     return flat
 
 
@@ -40,6 +40,8 @@ def readable(key: str, value: Any) -> str:
         return "-"
     if key == "environment.gravity":  # the unit g is the paper's 9.8 m/s², not gravity
         return f"{value:.6g} m/s^2"
+    if key.startswith("contact.roughness."):
+        return f"{value * 1e9:.6g} nm"
     if key == "drive.ramp":  # pairs of a time and a pure number
         return ", ".join(f"({text_of(time, kind_of(key))}, {text_of(factor)})" for time, factor in value)
     return text_of(value, kind_of(key))
@@ -81,15 +83,18 @@ def _ending(key: str) -> str:
     return ".".join(part.partition("[")[0] for part in key.split(".")[-2:])
 
 
-def differing(cases: Sequence[FlatCase]) -> list[str]:
-    """The keys whose values differ among flattened cases, in the cases' order, without those that follow from others.
+def differing(cases: Sequence[FlatCase]) -> tuple[list[str], list[str]]:
+    """The keys whose values differ among flattened cases, in the cases' order: those that a case gives, and others.
 
-    A value that no case gives itself (a time step that ``"auto"`` chose, the properties of a liquid in the library) is
-    left out if a given value differs.
+    No case gives the others itself: a time step that ``"auto"`` chose, the properties of a liquid in the library. A
+    default, or a value derived from others, that some cases do not have is left out: it is of a table that they lack.
     """
     keys = dict.fromkeys(key for case in cases for key in case)
     varied = [key for key in keys if len({_comparable(case.get(key)) for case in cases}) > 1]
-    return [key for key in varied if any(key in case.given for case in cases)] or varied
+    words = {key: {case.words.get(key, "") for case in cases} for key in varied}
+    given = [key for key in varied if any(word.startswith("given") for word in words[key])]
+    rest = [key for key in varied if key not in given]
+    return given, [key for key in rest if "" not in words[key] or words[key] - {"", "default", "derived"}]
 
 
 def short_keys(keys: Sequence[str], reserved: Iterable[str] = ("name",)) -> list[str]:
