@@ -253,15 +253,19 @@ def test_compared_runs_differ_by_so_many_times_both_their_numerical_errors(
     assert re.search(r"\nresult +fast +rough +difference\n", found.text)
 
 
-@pytest.mark.parametrize(("uphill", "shown"), [(True, True), (False, False)])
-def test_a_main_number_is_compared_unless_it_is_a_mean_over_two_directions(
-    uphill: bool, shown: bool, run_directory: Callable[..., Path], tmp_path: Path
+@pytest.mark.parametrize(
+    ("numbers", "shown"),
+    [({"goes_uphill": True}, True), ({"goes_uphill": True, "upright": 0}, False), ({"goes_uphill": False}, False)],
+)
+def test_a_level_run_and_others_have_the_velocity_in_common_unless_it_says_little(
+    numbers: dict[str, float], shown: bool, run_directory: Callable[..., Path], tmp_path: Path
 ) -> None:
-    """The main velocity of a level run, and of a slope that of walkers that face up."""
+    """Of a slope it is that of walkers that face up; on a level plate a mean over two directions says little."""
     run = run_directory(run=TINY)
-    other = _changed(run, tmp_path, "other", velocity=1e-3, facings_differ=True, goes_uphill=uphill)
+    other = _changed(run, tmp_path, "other", velocity=1e-3, facings_differ=True, **numbers)
     rows = compare_runs(Side("level", case_of(run), run), other).contents["results"]
-    assert ("velocity" in {row["quantity"] for row in rows}) == shown
+    shared = {row["quantity"] for row in rows if row["second"] is not None}
+    assert ("velocity" in shared) == shown and "axial_velocity" in shared
 
 
 def test_values_are_shown_as_a_case_file_has_them() -> None:

@@ -87,11 +87,10 @@ def _of_errors(apart: Mapping[str, Mapping[str, Any]], results: Sequence[Results
 def _rows(first: Results, second: Results) -> list[dict[str, Any]]:
     """The numbers of two results, without errors, values of the case and conditions, and means over both facings.
 
-    The main number of each result is among them, so that a level run and a slope have a velocity in common.
+    A level run and a slope have the velocity in common; up the slope alone, if walkers turned over or lean.
     """
     heads, results = {headline(first), headline(second)}, {"first": first, "second": second}
-    little = {*_VELOCITIES} if "axial_velocity" in heads else {"velocity"}
-    little -= heads
+    little = {*_VELOCITIES} if "axial_velocity" in heads else {"velocity"} - heads
     if any(result.get("facings_differ") and not result.get("goes_uphill") for result in results.values()):
         little.add("velocity")
     names = {name for name in {*first, *second} if not is_error(name)}.difference(ASIDE, little, ["coverage"])
