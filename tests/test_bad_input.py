@@ -299,7 +299,7 @@ COMMANDS: list[tuple[str, str]] = [
        'fig1b: liquid.contact_angle = "88 deg": expected')
       for command in ("show", "run", "run --spread")),
     ("sweep fig4 --set 'liquid.name=Si AK5'", 'liquid.name = "Si AK5": varies in this sweep and cannot be set'),
-    ("show fig1b --set drive.freq=2 --set beads.mat=3", '"frequency"?\nfig1b: beads.mat: unknown key'),
+    ("show fig1b --set drive.freq=2 --set beads.mat=3", '"frequency" or "frame"?\nfig1b: beads.mat: unknown key'),
     ("show fig1b --set run.seed=1 --set run.seed=2", "run.seed = 2: is given twice"),
     ("show climber --set 'clusters.angle=45 deg'", "clusters is a list: say which one, such as clusters[0]"),
     *((f"show fig1b --set 'liquid.law=\"{law}\"'", told) for law, told in (
@@ -308,8 +308,12 @@ COMMANDS: list[tuple[str, str]] = [
         ("own.py:law\\nrange", "expected one of"),
         ("os:system", "expected one of"),
     )),
+    ("show fig1b --set beads.material=steel", 'did you mean "chrome steel" or "stainless steel"?'),
+    ("show fig1b --set liquid.name=Glycerol", 'did you mean "glycerol" or "glycerol 87 %" or "water-glycerol"?'),
+    ("library steel", 'steel: not in the library; did you mean "chrome steel" or "stainless steel"?'),
     # Options
     ("run", "CASE"),
+    ("export fig1b", "--to requires an argument. Choose from: deck, vtk, lammps, archive. See: walkers export --help"),
     ("check fig1b --without magic", "--without magic: expected one of"),
     *((f"{command} --engine /nowhere", "--engine /nowhere: expected the name or path of a liggghts binary")
       for command in ("run fig1b", "check engine", "sweep mine.toml")),

@@ -237,6 +237,9 @@ def test_water_and_glycerol_are_as_tabulated_and_follow_fraction_and_temperature
     assert (temperature.text, temperature.origin, "Cheng" in viscosity.source) == ("20 degC", "default", True)
     assert of(temperature="293.15 K").determinants() == case.determinants()
     assert of(temperature="25 degC").liquid.dynamic_viscosity < 0.8 * case.liquid.dynamic_viscosity
+    pure, computed = make_case(liquid={"name": "glycerol"}).liquid, of(mass_fraction=1.0).liquid
+    for key in ("density", "dynamic_viscosity", "surface_tension"):
+        assert getattr(pure, key) == pytest.approx(getattr(computed, key), rel=3e-3)
 
 
 OWN = """

@@ -168,7 +168,30 @@ def test_a_prediction_names_the_contact_that_opens() -> None:
     (opened,) = np.flatnonzero(motion.smallest_normal_force[:, place] <= 0.0)
     assert motion.solved[place]
     assert predict(cases[place])["viscous"]["reason"] == f"{CONTACTS[opened]} would open"
-    assert predict(cases[0])["viscous"]["reason"] is None
+    below = predict(cases[0])
+    assert below["viscous"]["reason"] is None
+    assert below["detachment"]["reason"] == f"{CONTACTS[opened]} would open"
+    before, after = (dimer_of(case).gamma0(case.excitation.peak_acceleration) for case in cases[place - 1 : place + 1])
+    assert before < below["detachment"]["gamma"] < after
+
+
+def test_the_engines_contacts_open_where_the_theory_says(run_directory: Callable[..., Path]) -> None:
+    """At more than three times the drive at which the model of the paper opens one."""
+    case = load_case("fig1b", {"dimers.replicates": 2, "run.cycles": 24, "run.settling_cycles": 12})
+    end = predict(case)["detachment"]
+    assert end["gamma"] > 3.0 * detachment(dimer_of(case).sin_delta).gamma
+    peaks = [f"{dimer_of(case).peak_acceleration(share * end['gamma']):.9g} m/s^2" for share in (0.8, 1.25)]
+    closed, opened = (read(run_directory(case.changed({"drive.peak_acceleration": peak}))) for peak in peaks)
+    assert [closed[f"open_{contact}"] for contact in ("1", "2", "pair_1")] == [0.0] * 3
+    assert (end["reason"], opened["open_pair_1"] > 0.1) == ("bead on bead would open", True)
+
+
+def test_contacts_of_beads_that_slide_at_a_small_friction_stay_closed() -> None:
+    """Up to the strongest drive that is tried, and the sentence says so."""
+    case = load_case("symmetric")
+    prediction, strongest = predict(case), 16.0 * float(Walker.of_case(case).at_rest.max())
+    assert prediction["detachment"] == {"gamma": strongest, "reason": None}
+    assert f"stay closed up to about Γ0 = {strongest:.2g}, the strongest drive tried" in describe(prediction, None)
 
 
 def test_mathieu_parameters_of_the_papers_drives() -> None:

@@ -394,9 +394,11 @@ def test_walkers_in_a_vessel_walk_as_on_a_plane(tmp_path: Path) -> None:
     vessel = Case.read({**plane.document, "boundary": of}, name="vessel")
     speeds = [walkers.run(case, tmp_path).result["velocity"] for case in (plane, vessel)]
     assert speeds[1] == pytest.approx(speeds[0], rel=1e-6)
-    with pytest.raises(InputError, match=r"walls of the vessel; expected at most \d+, a smaller spacing") as refusal:
+    with pytest.raises(InputError, match=r"of the vessel; expected at most \d+, a smaller dimers\.spac") as refusal:
         vessel.changed({"dimers.replicates": 30, "dimers.meet": True})
     most = int(str(refusal.value).split("at most ")[1].split(",")[0])
     assert vessel.changed({"dimers.replicates": most, "dimers.meet": True}).count == 2 * most > 2
+    with pytest.raises(InputError, match=r"dimers\.replicates = 6: the walkers, .* of the vessel; expected 1, a"):
+        Case.read({**load_case("fig1b").document, "boundary": of}, name="vessel")
     with pytest.raises(InputError, match=f"expected at most {most},"):
         vessel.changed({"dimers.replicates": most + 1, "dimers.meet": True})

@@ -120,8 +120,8 @@ def expected_of(word: str, names: Iterable[str]) -> str:
 
 
 def suggestion(word: str, names: Iterable[str]) -> str:
-    """``; did you mean "…"?`` if a name is similar, otherwise empty."""
+    """``; did you mean "…"?`` with the names that contain the word and the most similar one; empty if there is none."""
     names = list(names)
-    begun = [name for name in names if len(word) > 2 and name.startswith(word)]
-    close = begun or difflib.get_close_matches(word, names, n=1, cutoff=0.6)
-    return f'; did you mean "{close[0]}"?' if close else ""
+    near = sorted((name for name in names if len(word) > 2 and word.casefold() in name.casefold()), key=len)
+    near = dict.fromkeys([*near, *difflib.get_close_matches(word, names, n=1, cutoff=0.6)])
+    return "; did you mean " + " or ".join(f'"{name}"' for name in near) + "?" if near else ""

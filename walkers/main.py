@@ -150,7 +150,7 @@ def print_version() -> None:
 
 
 def _report_stop(stop: BaseException, tokens: list[str]) -> int:
-    from cyclopts import CycloptsError, UnusedCliTokensError
+    from cyclopts import CycloptsError, MissingArgumentError, UnusedCliTokensError
 
     if isinstance(stop, SystemExit):
         return stop.code if isinstance(stop.code, int) else 0
@@ -171,6 +171,8 @@ def _report_stop(stop: BaseException, tokens: list[str]) -> int:
         raise stop
     unused = stop.unused_tokens if isinstance(stop, UnusedCliTokensError) else None
     message = f"Unexpected: {' '.join(unused)}." if unused else str(stop)
+    if isinstance(stop, MissingArgumentError) and stop.argument and (choices := stop.argument.get_choices()):
+        message += f" Choose from: {', '.join(choices)}."
     help_command = " ".join(["walkers", *(stop.command_chain or ()), "--help"])
     return _tell(f"{shortened(printable(message), _LONGEST_MESSAGE)} See: {help_command}", 2)
 

@@ -98,10 +98,8 @@ def describe_one(entries: Sequence[Entry], name: str) -> str:
     """All entries of a name: numbers with sources, titles and files; `InputError` if there is none."""
     matching = [entry for entry in entries if entry.name.casefold() == name.casefold()]
     if not matching:
-        names = [entry.name for entry in entries]
-        near = [similar for similar in names if name.casefold() in similar.casefold()]
-        message = f"; expected one of {', '.join(near)}" if near else suggestion(name, names)
-        raise refused(name, f"not in the library{message or '; walkers library lists it'}")
+        near = suggestion(name, (entry.name for entry in entries))
+        raise refused(name, f"not in the library{near or '; walkers library lists it'}")
     # A material, and the pairs that it is part of.
     pairs = [entry for entry in entries if entry.kind == "surface pairs"]
     matching += [pair for pair in pairs if matching[0].name in pair.name.split(" on ")]

@@ -196,7 +196,8 @@ def _check_walls(case: Case, beads: list[_Held]) -> None:
         raise unusable("boundary.width", f"expected more than a bead's diameter, {2e3 * largest:.4g} mm")
     cut = _cut_by_walls(case, beads)
     if cut and cut[0].walker >= 0:
-        raise unusable(f"{cut[0].key}.replicates", _expected_number(case, cut[0].key))
+        number = case.walkers_by_key[cut[0].key].replicates  # also a default, which no document quotes
+        raise unusable(f"{cut[0].key}.replicates", _expected_number(case, cut[0].key), number)
     high = [bead for bead in beads if bead.place[2] + bead.radius > top]
     if walking := [bead for bead in high if bead.walker >= 0]:
         highest = max(walking, key=lambda bead: bead.place[2] + bead.radius)
@@ -214,9 +215,11 @@ def _expected_number(case: Case, key: str) -> str:
         fewer = case.put(f"{key}.replicates", number)
         return any(bead.walker >= 0 for bead in _cut_by_walls(fewer, _held(fewer)))
 
-    most = bisect_left(range(1, case.walkers_by_key[key].replicates), True, key=too_many)
-    expected = f"at most {most}, a smaller spacing or a wider boundary" if most else "a wider boundary"
-    return f"the walkers do not fit between the walls of the {case.boundary.shape}; expected {expected}"
+    walkers = case.walkers_by_key[key]
+    most = bisect_left(range(1, walkers.replicates), True, key=too_many)
+    fewer = f"{'at most ' * (most > 1)}{most}, a smaller {key}.spacing or "
+    apart = f"the walkers, {1e3 * walkers.spacing:.3g} mm apart, do not fit between the walls"
+    return f"{apart} of the {case.boundary.shape}; expected {fewer if most else ''}a wider boundary"
 
 
 def _check_overlaps(beads: list[_Held]) -> None:

@@ -42,6 +42,7 @@ _LEAST_BYTES = 150
 """Smallest size of a complete restart file per atom; measured: 300 to 580."""
 _RMS_VELOCITY = re.compile(rb"^root mean square velocity (\S+)", re.MULTILINE)
 """Mass-weighted velocity of the beads, m/s, which decks print while the beads settle."""
+_STARTING_SECONDS = 1.0  # before that the start of the engine dominates the rate
 
 
 class DamagedSegment(WalkersError):
@@ -139,11 +140,13 @@ def progress_in(run: Run, cycles: int, segment: Segment, step: int, seconds: flo
     before, steps, start = run.steps_until(cycles - 1), run.steps_until(run.cycles), segment.drive_from
     step = max(step, segment.begin)
     done = before + (0 if start is None else step - start)
-    rate = (step - segment.begin) / seconds if seconds else 0.0
-    left = f"{'at most ' * run.until_steady}{duration_text((steps - done) / rate)} left" if rate else "starting"
+    rate = (step - segment.begin) / seconds if seconds >= _STARTING_SECONDS else 0.0
     share, simulated = done / steps, (before + step) * run.time_step
     text = "coming to rest" if start is None else f"{100 * share:.0f} %"
-    return Progress(share, f"{text}, {simulated:.3f} s simulated, {rate:.0f} steps/s, {left}")
+    if not rate:
+        return Progress(share, f"{text}, starting")
+    left = f"{'at most ' * run.until_steady}{duration_text((steps - done) / rate)} left"
+    return Progress(share, f"{text}, {left}, {simulated:.3f} s simulated, {rate:.0f} steps/s")
 
 
 def _are_constant(directory: Path) -> bool:
