@@ -175,7 +175,7 @@ def test_the_speed_of_a_run_that_goes_on_is_that_of_this_call() -> None:
     assert run.steps == 1200
     segment = Segment(1104, 1200, 0)
     assert progress_in(run, 20, segment, 1152, 1.0) == (0.96, "96 %, 1 s left, 0.240 s simulated, 48 steps/s")
-    assert progress_in(run, 20, segment, 1128, 0.9).text == "94 %, starting"
+    assert [progress_in(run, 20, segment, step, 0.9).text for step in (1104, 1128)] == ["starting", "94 %"]
     steady = load_case("fig1b").run
     begin = sum(steady.attempts[:-1]) * steady.steps_per_cycle
     middle = progress_in(steady, steady.cycles, Segment(0, steady.steps, 0), steady.steps // 2, 1.0)

@@ -144,7 +144,7 @@ def progress_in(run: Run, cycles: int, segment: Segment, step: int, seconds: flo
     share, simulated = done / steps, (before + step) * run.time_step
     text = "coming to rest" if start is None else f"{100 * share:.0f} %"
     if not rate:
-        return Progress(share, f"{text}, starting")
+        return Progress(share, text if step > segment.begin else "starting")
     left = f"{'at most ' * run.until_steady}{duration_text((steps - done) / rate)} left"
     return Progress(share, f"{text}, {left}, {simulated:.3f} s simulated, {rate:.0f} steps/s")
 
