@@ -310,6 +310,7 @@ COMMANDS: list[tuple[str, str]] = [
     )),
     ("show fig1b --set beads.material=steel", 'did you mean "chrome steel" or "stainless steel"?'),
     ("show fig1b --set liquid.name=Glycerol", 'did you mean "glycerol" or "glycerol 87 %" or "water-glycerol"?'),
+    ("show fig1b --set 'liquid.name=glycerol 99 %'", 'did you mean "glycerol" or "glycerol 87 %"?'),
     ("library steel", 'steel: not in the library; did you mean "chrome steel" or "stainless steel"?'),
     # Options
     ("run", "CASE"),

@@ -156,8 +156,8 @@ def test_a_lammps_dump_holds_the_motion(directory: Path, motion: Motion, tmp_pat
 
 
 def test_figures_of_runs_come_in_other_formats_and_can_be_printed(directory: Path, tmp_path: Path) -> None:
-    paths = plot_run(directory, tmp_path, "pdf,svg,png")
-    names = [f"{name}.{form}" for name in ("walk", "gait") for form in ("pdf", "svg", "png")]
+    paths = plot_run(directory, tmp_path, "pdf,svg")
+    names = [f"{name}.{form}" for name in ("walk", "gait") for form in ("pdf", "svg")]
     assert [path.name for path in paths] == names
     assert all(directory.name.encode() in path.read_bytes() for path in paths)
     pdf = paths[0].read_bytes()

@@ -120,8 +120,9 @@ def expected_of(word: str, names: Iterable[str]) -> str:
 
 
 def suggestion(word: str, names: Iterable[str]) -> str:
-    """``; did you mean "…"?`` with the names that contain the word and the most similar one; empty if there is none."""
-    names = list(names)
-    holding = sorted((name for name in names if len(word) > 2 and word.casefold() in name.casefold()), key=len)
+    """``; did you mean "…"?`` with the names that contain the word or begin it, and the most similar one; or empty."""
+    names, folded = list(names), word.casefold()
+    alike = (name for name in names if folded in name.casefold() or folded.startswith(f"{name.casefold()} "))
+    holding = sorted(alike, key=len) if len(word) > 2 else []
     near = dict.fromkeys([*holding, *difflib.get_close_matches(word, names, n=1, cutoff=0.6)])
     return "; did you mean " + " or ".join(f'"{name}"' for name in near) + "?" if near else ""
