@@ -28,7 +28,7 @@ from walkers.postprocess.uncertainty import SPREAD_NAME, spread_of
 from walkers.postprocess.walking import _velocities
 from walkers.rounding import rounded
 from walkers.runner.files import write_json
-from walkers.sweeps.accuracy import measure_accuracy
+from walkers.sweeps.accuracy import measure_accuracy, times_of
 from walkers.sweeps.folder import as_text, inventory
 from walkers.sweeps.readable import kind_of
 from walkers.sweeps.scheduler import Options
@@ -248,6 +248,43 @@ def test_walkers_up_and_down_a_slope_both_converge(tmp_path: Path) -> None:
     times, change = next((16.0 * 4.0**place, one) for place, one in enumerate(changes) if one < 0.01)
     assert found["times"] == times
     assert found["change"] == pytest.approx(change, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("modulus", "times"),
+    [
+        *((200.0, [1.0, 4.0, 16.0, 64.0, 256.0]), (800.0, [1.0, 4.0, 16.0, 64.0, 125.0])),
+        *((6250.0, [1.0, 4.0, 16.0]), (51200.0, [1.0, 1.953125]), (90000.0, [1.0])),
+    ],
+)
+def test_beads_are_compared_with_the_hardest_possible(modulus: float, times: list[float], tmp_path: Path) -> None:
+    """Those of 90 GPa cannot be harder: their error is that of the time step alone, and the result says so."""
+    case = Case.read(
+        {
+            "dimers": {"diameters": ["10 mm", "7 mm"], "replicates": 1},
+            "beads": {"material": "chrome steel"},
+            "liquid": {"name": "glycerol"},
+            "boundary": {"material": "glass"},
+            "contact": {"youngs_modulus": f"{modulus} MPa"},
+            "drive": {"frequency": "60 Hz", "peak_acceleration": "5 g"},
+            "run": {"cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5},
+        },
+        name="steel",
+    )
+    assert times_of(case) == times
+    if len(times) > 2:
+        return
+    done = walkers.run(case, tmp_path)
+    own, found = done.result["velocity"], done.accuracy()
+    error = found["errors"]["velocity"]
+    half, harder = (walkers.run(changed(case, *how), tmp_path) for how in ((0.5, 1.0), (times[-1] ** -0.5, times[-1])))
+    assert half.cached and harder.cached
+    assert (own + error["half_step"], own + error["stiffer"]) == pytest.approx(
+        (half.result["velocity"], harder.result["velocity"]), rel=1e-12
+    )
+    assert found["times"] == times[-1]
+    assert found["change"] == pytest.approx(abs(error["stiffer"]) / harder.result["velocity"])
+    assert ("warning: the beads cannot be harder" in done.describe()) == (times == [1.0])
 
 
 def test_the_plan_of_a_sweep_has_the_runs_of_its_spread(in_folder: Path) -> None:

@@ -140,6 +140,8 @@ def read(directory: str | Path, origins: Sequence[Origin] | None = None) -> Resu
     if not accuracy.get("reached", True):
         change = percent(float(f"{accuracy['change']:.2g}"))
         warnings = [*warnings, f"the numerical error is not converged: the hardest beads still change {change}"]
+    if accuracy.get("times") == 1.0:
+        warnings = [*warnings, "the beads cannot be harder: the numerical error is that of the time step alone"]
     return Results(directory, numbers, warnings, about)
 
 
