@@ -55,11 +55,9 @@ CHECKED = Path("figures") / "validation.json"
 _BLOCK = re.compile(r"(?ms)(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n).*?(?=^```)")
 _FACT = re.compile(r"<!--fact (?P<name>\S+)-->[^<]*<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
-_CLIMBS = {f"contact.roughness.bead_{surface}": "0.2 um" for surface in ("bead", "wall")}
-"""The small pile of which clusters climb within its four seconds."""
 _PILES = ("pile-starts", "pile-frictions", "pile-contacts", "pile-paper")
 _OF_CLIMBS = (
-    *("pile", "climbed", "climbs", "rate", "on plain walls", "in corners"),
+    *("pile", "climbed", "half by (s)", "climbs", "rate", "on plain walls", "in corners"),
     *("led by large", "p by chance", "speed (mm/s)"),
 )
 
@@ -111,7 +109,7 @@ _FILM = {"size": (512, 216), "fps": 20, "slowdown": 20.0, "walker": 0, "end": 0.
 _picture("walker.gif", "fig1b", {"run.cycles": 60}, film=_FILM)
 _picture("tray.png", "tray")
 _picture("climber.png", "climber")
-_picture("pile.png", "pile-small", _CLIMBS)
+_picture("pile.png", "pile-small")
 
 
 def _of_paper(name: str, *files: str, sweeps: Iterable[str]) -> None:

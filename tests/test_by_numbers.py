@@ -149,6 +149,8 @@ def test_what_show_prints_of_a_case_is_in_its_units() -> None:
     assert f"1 small and 1 large, {1e6 * DENSITY * volume:.4g} mg, {1e9 * volume:.4g} µL with " in text
     assert f"with {1e7 * volume:.3g} µL of liquid" in text
     assert f"amplitude {1e3 * 39.2 / omega**2:.4g} mm, peak velocity {1e3 * 39.2 / omega:.4g} mm/s" in text
+    mass = DENSITY * volume
+    assert f"M = {1e6 * mass:.4g} mg, weight {9.81e6 * mass:.4g} µN, mean radius 0.25 mm, " in text
     assert f"sin δ = 0.2, mass asymmetry (m1 - m2)/M = {(27 - 8) / (27 + 8):.4g}" in text
     wall = next(line for line in text.splitlines() if "bead 1 on substrate" in line)
     assert f" {1e6 * 4.0 * pi * case.liquid.surface_tension * LARGE:.4g} µN" in wall

@@ -211,7 +211,7 @@ def test_the_program_on_piles(pile_run: Path, in_folder: Path) -> None:
         return call(*command, check=True).stdout.strip()
 
     run, motion = str(pile_run), read_motion(pile_run)
-    assert re.search(r"\n  beads +60\n(.*\n)*  bridges per bead, at rest ", told("run", run))
+    assert re.search(r"\n  beads +60\n(.*\n)*  bridges per bead to others, at rest ", told("run", run))
     assert told("plot", run, "--to", "here") == "here/climb.png"
     assert spoilt(figures_of(read(pile_run))["climb"]) == []
     assert told("render", run, "--to", "here/box.png", "--images", "2") == "here/box.png"

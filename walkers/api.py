@@ -691,7 +691,7 @@ def climb(
                 text = f"{left} of {len(frame)} points are not finished and left out"
                 warnings.warn(f"{directory.name}: {text}", stacklevel=2)
         for label, paths in conditions:
-            words = [directory.name] * (len(references) > 1) + [label] * bool(label)
+            words = [directory.name] * (len(references) > 1 or not label) + [label] * bool(label)
             climbs.append(summarise_climbs(paths, within) | {"condition": ", ".join(words)})
             runs += [path.name for path in paths]
     if to is not None:

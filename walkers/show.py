@@ -223,7 +223,8 @@ def describe(summary: dict[str, Any]) -> str:
         lines.append(f"vessel     {walls}, {'open at its top' if vessel['open'] else 'closed'}")
     if dimer:
         lines.append(
-            f"dimer      M = {dimer['total_mass'] * 1e6:.4g} mg, mean radius {dimer['mean_radius'] * 1e3:.4g} mm, "
+            f"dimer      M = {dimer['total_mass'] * 1e6:.4g} mg, weight {dimer['total_mass'] * gravity * 1e6:.4g} µN, "
+            f"mean radius {dimer['mean_radius'] * 1e3:.4g} mm, "
             f"sin δ = {dimer['sin_delta']:.4g}, mass asymmetry (m1 - m2)/M = {dimer['mass_asymmetry']:.4g}, "
             f"Γ0 = {dimer['gamma0']:.4g}"
         )

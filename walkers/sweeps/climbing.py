@@ -222,7 +222,7 @@ def texts_of(climbs: Mapping[str, Any]) -> dict[str, str]:
         return f"{factor * min(values):.2g} to {factor * max(values):.2g}" if values else "–"
 
     return {
-        "pile": climbs["condition"] or "usual",
+        "pile": climbs["condition"],
         "climbed": f"{climbs['climbed']} of {climbs['runs']}",
         "within (s)": f"{climbs['within']:.3g}",
         "ended before": f"{climbs['ended']}",
@@ -245,8 +245,9 @@ def texts_of(climbs: Mapping[str, Any]) -> dict[str, str]:
 
 
 def describe_climbs(climbs: Sequence[Mapping[str, Any]]) -> str:
-    """`texts_of` conditions, one below the other."""
-    blocks = [aligned([[name, text] for name, text in texts_of(condition).items()]) for condition in climbs]
+    """`texts_of` conditions, one below the other, without what does not exist, such as speeds if nothing climbed."""
+    texts = map(texts_of, climbs)
+    blocks = [aligned([[name, text] for name, text in of_one.items() if text != "–"]) for of_one in texts]
     note = f"rates per run and second; in brackets {percent(_CONFIDENCE)} confidence"
     return "\n\n".join([*blocks, note])
 
@@ -308,7 +309,7 @@ def _draw_rates(panel: Axes, table: pd.DataFrame) -> None:
         errors = [rates - rows["rate_low"], rows["rate_high"] - rates]
         panel.errorbar(rates, at, xerr=errors, fmt=look, label=where, linestyle="none", markersize=3.0)
     # With the last word of each key, such as ``frequency 100 Hz``.
-    named = [re.sub(r"[\w.\[\]]*?(\w+) = ", r"\1 ", condition) or "usual" for condition in first["condition"]]
+    named = [re.sub(r"[\w.\[\]]*?(\w+) = ", r"\1 ", condition) for condition in first["condition"]]
     climbed = zip(named, first["climbed"], first["runs"], strict=True)
     labels = [fill("{}: {}/{} climbed".format(*row), _LETTERS) for row in climbed]
     panel.set_yticks(range(len(labels)), list(map(plain_text, labels)))
