@@ -21,7 +21,7 @@ from walkers.postprocess.gait import gait
 from walkers.postprocess.motion import Group
 from walkers.postprocess.results import read
 from walkers.postprocess.tables import read_table
-from walkers.theory.mathieu import LARGEST_STABLE_V, Alignment, alignment, time_to_turn
+from walkers.theory.mathieu import LARGEST_STABLE_V, Alignment, alignment, time_to_turn, turning_rate
 from walkers.theory.motion import Walker, walk
 from walkers.theory.prediction import alignment_of, describe, motion_of, predict, threshold
 from walkers.theory.quasistatic import CONTACTS, FloatArray, detachment, mass_asymmetry, mean_velocity
@@ -279,3 +279,16 @@ def test_the_program_prints_theory_beside_the_engine(in_folder: Path) -> None:
     (in_folder / "up.toml").write_text(to_toml(document(drive={"axis": "z"})))
     done = call("show", "up.toml", "--theory")
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+
+
+def test_on_a_level_plate_ruby_stays_on_the_axis_and_symmetric_dimers_turn_across_it() -> None:
+    """As in the paper; the rigid cone has no torque for equal beads."""
+    ends = ({"drive.frequency": f, "drive.peak_acceleration": a} for f in ("60 Hz", "90 Hz") for a in ("1.5 g", "10 g"))
+    rates = [turning_rate(load_case("fig1b", drive)) or inf for drive in ends]
+    assert -30.0 < min(rates) < max(rates) < -0.3
+    turns = alignment_of(load_case("fig1b", {"drive.gamma0": 0.5, "dimers.radii": ["0.25 mm", "0.25 mm"]}))
+    assert turns["rate"] == pytest.approx(1.5, rel=0.01)
+    assert (turns["v"], turns["stands"], turns["turns_over_after"]) == (0.0, False, None)
+    told = describe(predict(load_case("symmetric")), None)
+    assert "no torque toward the axis if the beads roll" in told
+    assert "turns away from the axis, from 1° to 10° in about" in told

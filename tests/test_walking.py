@@ -37,6 +37,7 @@ from walkers.runner.directory import FIRST_SEGMENT, case_of, segment_directories
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import RESULT_NAME, read_manifest
 from walkers.sweeps.making import make_runs
+from walkers.theory.mathieu import turning_rate
 
 RunDirectory = Callable[..., Path]
 SHORT = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 20}
@@ -182,7 +183,7 @@ def test_a_run_that_ends_before_its_walker_turns_over_says_how_long_it_must_be(r
     ]
     assert [run.result["turned_over"] for run in shorts] == [0, 0]
     (warning,) = shorts[0].result.warnings
-    assert "1 walker facing up turns faster and faster" in warning
+    assert "1 walker turns faster and faster and will turn over" in warning
     assert not shorts[1].result.warnings
     cycles = int(warning.rpartition("= ")[2])
     assert 60 <= cycles <= 400
@@ -190,6 +191,23 @@ def test_a_run_that_ends_before_its_walker_turns_over_says_how_long_it_must_be(r
     (turned,) = longer.walkers["turned_at"]
     assert 0.5 < turned * longer.case.excitation.frequency / cycles < 0.8
     assert "turn over after the end" not in " ".join(longer.result.warnings)
+
+
+def test_a_walker_on_a_level_plate_that_turns_away_says_when(runs_folder: Path) -> None:
+    """Of steel in glycerol, at the theory's rate, from 10° to 45° as tan ψ grows exponentially; ruby stays."""
+    drive = {"drive.peak_acceleration": "5 g", "drive.frequency": "60 Hz", "run.cycles": 12}
+    steel = {**_STEEL, **drive, "liquid.name": "glycerol 87 %", "boundary.material": "glass", "dimers.angle": "10 deg"}
+    case = load_case("fig1b", {**steel, "dimers.angle_spread": "0 deg"})
+    done = walkers.run(case, runs_folder)
+    (warning,) = done.result.warnings
+    assert warning.startswith("1 walker turns away from the drive axis faster and faster, by 45° after about ")
+    seconds, cycles = float(warning.partition("about ")[2].split()[0]), int(warning.rpartition("= ")[2])
+    angle = abs(done.result["orientation_end"])
+    assert seconds == pytest.approx(-np.log(np.tan(angle)) / turning_rate(case), rel=0.2)
+    table = walkers.run(case.changed({"run.cycles": cycles}), runs_folder).table("cycles")
+    away = table["time"][table["orientation"].abs() > np.pi / 4.0].iloc[0]
+    assert away - done.table("cycles")["time"].iloc[-1] == pytest.approx(seconds, rel=0.25)
+    assert not walkers.run(load_case("fig1b"), runs_folder).result.warnings
 
 
 def test_progress_says_when_results_are_measured(tmp_path: Path) -> None:

@@ -47,6 +47,8 @@ _LITTLE, _FADING, _NO_FASTER = 0.005, 0.9, 1e-4
 """A velocity is constant only if the walker stops turning. Its largest rotation per cycle in the second half of the run
 must be below the first angle (rad) and exceed that in the first half by less than the third angle; or it must be at
 most the second number times that in the first half."""
+GROWS = 0.05
+"""Rate above which small angles to the axis count as growing, 1/s: by half in ten seconds."""
 _NOTHING = 1e-4
 """Increase of the mean angle, rad, that counts as none."""
 _PARTS = 10
@@ -190,23 +192,24 @@ def settled_samples(run: Run) -> slice:
     return slice(run.settled_strobes * samples, run.cycles // run.cycles_per_sample * samples)
 
 
-def turns_over_after(group: Group) -> FloatArray:
-    """Time after the end of the run at which walkers on a slope turn over, s; NaN if their angle does not grow so.
+def turns_away_after(group: Group) -> FloatArray:
+    """Time after the end of the run, s, when walkers have turned away from the axis, shape (W,); NaN if they do not.
 
-    Small angles grow exponentially, and dψ/dt = rate · sin ψ. A walker that faces up and stands will turn over if its
-    mean angle in the last third of the measured cycles exceeds that in the second third by more than 5 %, and grows
-    faster than before.
+    A walker turns away if its mean angle grows at more than `GROWS` from the second to the last third of the measured
+    cycles, and faster than before. Small angles grow exponentially: on a slope dψ/dt = rate · sin ψ, to 90°, where the
+    walker has turned over; on a level floor, where both headings are alike, dψ/dt = rate · sin 2ψ / 2, to 45°.
     """
     run = group.case.run
     angle = np.abs(group.orientation[:: run.samples_per_cycle][run.settled_strobes :])
     if len(angle) < 3:  # too few frames a second, or a dump that was cut short
         return np.full(len(group.walkers), np.nan)
     first, second, last = (part.mean(axis=0) for part in np.array_split(angle, 3))
-    grows = (last > (1.0 + STEADY_DIFFERENCE) * second) & (last - second > np.maximum(second - first, _NOTHING))
     third = len(angle) / 3.0 * run.cycles_per_sample / group.case.excitation.frequency
     with np.errstate(divide="ignore", invalid="ignore"):
-        left = third * np.log(1.0 / np.tan(angle[-1] / 2.0)) / np.log(last / second)
-    return np.where(grows, np.maximum(left, 0.0), np.nan)
+        rate = np.log(last / second) / third
+        left = -np.log(np.tan(angle[-1] / 2.0 if group.case.boundary.tilt else angle[-1])) / rate
+    grows = (rate > GROWS) & (last - second > np.maximum(second - first, _NOTHING))
+    return np.where(grows & (left > 0.0), left, np.nan)
 
 
 def postures(group: Group) -> list[str]:

@@ -71,7 +71,7 @@ def measure(motion: Motion) -> Measured:
         numbers[f"velocity_make_{number}"] = float(velocity.mean())
         numbers[f"walkers_make_{number}"] = len(of_make["velocity"])
         numbers[f"steady_make_{number}"] = int(np.sum(of_make["steady"]))
-    doubts = (*_doubts(numbers, ramp=bool(case.drive.ramp)), *(_falls(groups, walkers) if case.goes_uphill else ()))
+    doubts = (*_doubts(numbers, ramp=bool(case.drive.ramp)), *_turning(groups, walkers))
     return Measured({**tables, "bridges": _bridges(motion)}, numbers, doubts)
 
 
@@ -89,15 +89,18 @@ def _doubts(numbers: Mapping[str, Any], *, ramp: bool) -> Iterable[str]:
         yield "walkers came close to each other and are not independent: increase the spacing"
 
 
-def _falls(groups: Sequence[Group], walkers: Columns) -> Iterable[str]:
-    """A warning if walkers that face up a slope have not turned over yet, but will."""
-    stand = (sides(walkers["facing"], walkers["start_angle"]) > 0) & np.isnan(walkers["turned_at"])
-    left = np.concatenate([gait.turns_over_after(group) for group in groups])[stand]
-    if count := int(np.isfinite(left).sum()):
-        run, frequency = groups[0].case.run, groups[0].case.excitation.frequency
-        cycles = float(f"{_LONGER * (run.cycles + frequency * np.nanmax(left)):.2g}")
-        turn = f"{counted(count, 'walker')} facing up {'turns' if count == 1 else 'turn'} faster and faster"
-        yield f"{turn} and will turn over after the end of the run: set run.cycles = {cycles:.0f}"
+def _turning(groups: Sequence[Group], walkers: Columns) -> Iterable[str]:
+    """A warning if walkers turn away from the drive axis, or will turn over on a slope, but have not yet."""
+    case = groups[0].case
+    left = np.concatenate([gait.turns_away_after(group) for group in groups])[np.isnan(walkers["turned_at"])]
+    if (count := int(np.isfinite(left).sum())) and not (case.meets or case.drive.ramp):
+        seconds = float(np.nanmax(left))
+        cycles = float(f"{_LONGER * (case.run.cycles + case.excitation.frequency * seconds):.2g}")
+        turn = f"{counted(count, 'walker')} {'turns' if count == 1 else 'turn'}"
+        away = f"{turn} away from the drive axis faster and faster, by 45° after about {seconds:.2g} s more"
+        if case.boundary.tilt:
+            away = f"{turn} faster and faster and will turn over after the end of the run"
+        yield f"{away}: set run.cycles = {cycles:.0f}"
 
 
 def _stacked(parts: Sequence[Columns]) -> Columns:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from math import hypot, nan, pi
+from math import hypot, log, nan, pi
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy.typing as npt
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
+from walkers.postprocess.gait import GROWS
 from walkers.postprocess.results import plain
 from walkers.rounding import with_decimals
 from walkers.text import aligned
@@ -22,8 +23,6 @@ from walkers.theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, FloatArr
 
 MOVING = 1e-6
 """A walker faster than this, m/s, moves."""
-GROWS = 0.05
-"""1/s; rate above which small angles to the axis count as growing: by half in ten seconds."""
 _TRIALS = 33
 _ROUNDS = 3
 _STRONGEST = 16.0
@@ -182,12 +181,13 @@ def alignment_of(case: Case) -> dict[str, Any]:
     The table has ``u``, ``v`` and ``damping`` (β, by the bridges) of the Mathieu equation; whether small angles are
     ``stable`` in it; the ``largest_stable_v`` on a level substrate; ``rolling_rate``, the growth rate in it, 1/s;
     ``rate``, the growth rate with sliding contacts and spinning beads, 1/s (negative: decay; at 1° if there is rolling
-    friction), None if the axial motion is not periodic; whether the dimer ``stands``; ``turns_over_after``, s from 1°
-    to 90°.
+    friction), None if the axial motion is not periodic; whether the dimer ``stands`` (on a level substrate: stays on
+    the axis); ``turns_over_after``, s from 1° to 90° on a slope.
     """
     drive = case.excitation
     mathieu = alignment(case)
     rate = turning_rate(case) if drive.peak_acceleration > 0.0 else None
+    falls = rate is not None and rate > GROWS and mathieu.u != 0.0
     return {
         **vars(mathieu),
         "stable": mathieu.stable,
@@ -195,7 +195,7 @@ def alignment_of(case: Case) -> dict[str, Any]:
         "rolling_rate": mathieu.growth * pi * drive.frequency,
         "rate": rate,
         "stands": None if rate is None else rate <= GROWS,
-        "turns_over_after": None if rate is None or rate <= GROWS else time_to_turn(rate),
+        "turns_over_after": time_to_turn(rate) if rate is not None and falls else None,
     }
 
 
@@ -224,15 +224,16 @@ def describe(prediction: dict[str, Any], result: Mapping[str, Any] | None) -> st
     equation = ", ".join(f"{name} = {state[key]:.3g}" for name, key in (("U", "u"), ("V", "v"), ("β", "damping")))
     rolling = f"small angles {'stay small' if state['stable'] else 'grow'} if the beads roll"
     notes = [["contacts", f"with Coulomb friction and drag stay closed up to about Γ0 = {end['gamma']:.2g}{beyond}"]]
-    if state["u"] == 0.0:
-        torque = rolling if state["v"] else "no torque toward the axis"
-        notes += [["alignment", f"Mathieu {equation} (stable for V < {state['largest_stable_v']:.3g}): {torque}"]]
-    else:
-        slip = "unknown: the axial motion is not periodic"
-        if state["rate"] is not None:
-            falls = f"turns over after about {state['turns_over_after'] or 0.0:.2g} s (from 1° to 90°)"
-            slip = f"{'stands' if state['stands'] else falls}; small angles grow by {state['rate']:.3g}/s"
-        notes += [["alignment", f"Mathieu {equation}: {rolling}"], ["with slip", slip]]
+    bound = "" if state["u"] else f" (stable for V < {state['largest_stable_v']:.3g})"
+    rolling = rolling if state["u"] or state["v"] else "no torque toward the axis if the beads roll"
+    slip, rate = "unknown: the axial motion is not periodic", state["rate"]
+    if rate is not None:
+        slip = f"small angles {'grow' if rate > 0.0 else 'decay'} by {abs(rate):.3g}/s"
+        if state["turns_over_after"]:
+            slip += f"; turns over after about {state['turns_over_after']:.2g} s (from 1° to 90°)"
+        elif not state["stands"]:
+            slip += f"; turns away from the axis, from 1° to 10° in about {log(10.0) / rate:.2g} s"
+    notes += [["alignment", f"Mathieu {equation}{bound}: {rolling}"], ["with slip", slip]]
     head = f"Γ0 = {prediction['gamma0']:.3g}, sin δ = {prediction['sin_delta']:.3g}"
     outside = [prediction["outside"]] if prediction.get("outside") else []
     return "\n".join([head, *outside, aligned(rows, right=range(1, 6)), aligned(notes)])
