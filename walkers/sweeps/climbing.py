@@ -292,7 +292,8 @@ def climbs_figure(climbs: Sequence[Mapping[str, Any]]) -> Figure:
     for where, (key, look) in list(_KINDS.items())[1:]:
         of_kind = [climb for climb in risen if (" " in climb["wall_names"]) == (key == "in_corners")]
         sizes, speeds = [climb["size"] for climb in of_kind], [climb["speed"] * 1e3 for climb in of_kind]
-        axes["climbs"].plot(sizes, speeds, look, markerfacecolor="none", label=where, clip_on=False)
+        looks = {"markerfacecolor": "none", "clip_on": False, "in_layout": False}  # without climbs a layout would fail
+        axes["climbs"].plot(sizes, speeds, look, label=where, **looks)
     axes["climbs"].set(xlabel="beads", ylabel="speed (mm/s)", xlim=(0.0, None), ylim=(0.0, None))
     _draw_rates(axes["rates"], table_of(climbs))
     letter_panels(axes.values())
