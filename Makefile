@@ -53,13 +53,16 @@ test: setup cluster chromium .venv/with-dev ## Lint, check types, run the tests 
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/lint-imports
-	@# Both integrators are compiled once, beside the smoke test; each worker would by itself.
-	@{ $(WALKERS) show fig1b --theory; .venv/bin/pytest -q tests/test_check.py -k momentum; } > /dev/null & \
-	  .venv/bin/pytest -q -m smoke tests/test_program.py; smoke=$$?; wait; exit $$smoke
 	@# Types are checked beside the tests, which leave a part of two cores idle.
 	@mkdir -p build; .venv/bin/mypy > build/types.txt & types=$$!; \
-	  .venv/bin/pytest -q -n 3 --dist worksteal -m "not smoke and not slow"; tests=$$?; \
+	  make --silent build/integrators & built=$$!; \
+	  .venv/bin/pytest -q -m smoke tests/test_program.py && { wait $$built; \
+	  .venv/bin/pytest -q -n 3 --dist worksteal -m "not smoke and not slow"; }; tests=$$?; \
 	  wait $$types; typed=$$?; cat build/types.txt; exit $$((tests | typed))
+
+# Both integrators are compiled once, beside the smoke test; each worker of the tests would by itself.
+build/integrators: walkers/theory/stepping.py walkers/check/kernels.py
+	@{ $(WALKERS) show fig1b --theory; .venv/bin/pytest -q tests/test_check.py -k momentum; } > /dev/null && touch $@
 
 .PHONY: test-slow
 test-slow: setup chromium paraview .venv/with-notebooks ## Run what `make test` leaves out: what only a release needs
