@@ -15,7 +15,7 @@ import pytest
 import walkers
 from tests.conftest import TINY, call, document, finished_places, to_toml
 from walkers import load_case
-from walkers.postprocess.uncertainty import ACCURACY_NAME
+from walkers.postprocess.uncertainty import ACCURACY_NAME, SPREAD_NAME, spread_of
 from walkers.runner.directory import case_of, locked
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import MANIFEST_NAME, checksums
@@ -234,23 +234,31 @@ def _changed(run: Path, to: Path, name: str, error: float = 0.0, **numbers: floa
 def test_compared_runs_differ_by_so_many_times_both_their_numerical_errors(
     run_directory: Callable[..., Path], tmp_path: Path
 ) -> None:
-    """Errors of 3 and 4 µm/s make 5 µm/s of a difference of -50 µm/s."""
+    """Errors of 3 and 4 µm/s make 5 µm/s of a difference of -50 µm/s; each run has its band beside it."""
     heads = {"velocity": 10, "right_facing": 20}
-    run = run_directory(run=TINY)
-    fast = _changed(run, tmp_path, "fast", 3e-6, velocity=1.05e-3, right_facing=1.1e-3)
+    settings = {**TINY, "cycles": 5}  # no other test's run
+    run = run_directory(run=settings, uncertain={"contact": {"friction": {"bead_wall": [0.05, 0.2]}}})
+    fast = _changed(run, tmp_path, "fast", 3e-6, velocity=1.05e-3, right_facing=1.1e-3, scatter=4e-9)
     slow = _changed(run, tmp_path, "slow", 4e-6, velocity=1e-3, right_facing=1e-3)
+    (spread := spread_of(tmp_path / "slow")).mkdir()
+    band = {"velocity": {"low": 8e-4, "high": 1.2e-3, "points": 64}}
+    write_json(spread / SPREAD_NAME, {"varied": read_json(run / "result.json")["rests_on"], "bands": band})
     found = compare_runs(fast, slow)
     (velocity,) = (one for one in found.contents["results"] if one["quantity"] == "velocity")
     assert velocity["difference"] == pytest.approx(-5e-5)
     assert velocity["numerical_error"] == pytest.approx(hypot(3e-6, 4e-6))
     lines = [f"{name}: differs by {times} times its numerical error" for name, times in heads.items()]
+    lines += [
+        "fast: velocity rests on 1 uncertain value, 0 guessed; the band over the ranges is unmeasured (--spread)",
+        "slow: velocity (mm/s), band 0.8 to 1.2 (64 draws)",
+    ]
     assert "\n".join(["\n", *lines, ""]) in found.text and "--accuracy" not in found.text
-    assert re.search(r"\nvelocity \(mm/s\) +1\.05 +1 +-0\.05 ", found.text)
+    assert re.search(r"\nvelocity \(mm/s\) +1\.05 +1 +-0\.05 +below 0\.001 +0\.005\n", found.text)
     # Without them the table has no column for them, and a line says how to have them.
     rough = _changed(run, tmp_path, "rough", velocity=1.2e-3)
     found = compare_runs(fast, rough)
-    assert f"\n\nto measure numerical errors: walkers run {rough.directory} --accuracy\n" in found.text
-    assert re.search(r"\nresult +fast +rough +difference\n", found.text)
+    assert f"\nto measure numerical errors: walkers run {rough.directory} --accuracy\n" in found.text
+    assert re.search(r"\nresult +fast +rough +difference +scatter of copies\n", found.text)
 
 
 @pytest.mark.parametrize(
@@ -260,11 +268,12 @@ def test_compared_runs_differ_by_so_many_times_both_their_numerical_errors(
 def test_a_level_run_and_others_have_the_velocity_in_common_unless_it_says_little(
     numbers: dict[str, float], shown: bool, run_directory: Callable[..., Path], tmp_path: Path
 ) -> None:
-    """Of a slope it is that of walkers that face up; on a level plate a mean over two directions says little."""
+    """Of a slope it is that of walkers that face up, and is marked; on a level plate a mean over two says little."""
     run = run_directory(run=TINY)
-    other = _changed(run, tmp_path, "other", velocity=1e-3, facings_differ=True, **numbers)
-    rows = compare_runs(Side("level", case_of(run), run), other).contents["results"]
-    shared = {row["quantity"] for row in rows if row["second"] is not None}
+    other = _changed(run, tmp_path, "other", velocity=1e-3, facings_differ=True, facing_left=3, **numbers)
+    found = compare_runs(Side("level", case_of(run), run), other)
+    shared = {row["quantity"] for row in found.contents["results"] if row["second"] is not None}
+    assert bool(re.search(r"\nvelocity \(mm/s\) +[\d.]+ +1 facing up ", found.text)) == shown
     assert ("velocity" in shared) == shown and "axial_velocity" in shared
 
 

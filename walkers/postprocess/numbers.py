@@ -97,8 +97,8 @@ def in_short(numbers: Mapping[str, Any]) -> str:
 def rows(numbers: Mapping[str, Any]) -> list[Row]:
     """The numbers of a result as text, in displayed units, in the order of their declarations.
 
-    Means that say nothing about any walker are left out: velocities of walkers that came apart, of two directions that
-    differ or under a ramp; orientations of walkers of which some turned round.
+    Numbers that say nothing about any walker are left out: velocities and steadiness of walkers that came apart, means
+    over two directions that differ or under a ramp, orientations of walkers of which some turned round.
     """
     main, hidden = headline(numbers), ASIDE | SHOWN["hidden"]
     if main == "axial_velocity" or (main == "right_facing" and numbers["goes_uphill"]):
@@ -107,12 +107,11 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
         hidden |= {"right_facing", "left_facing", "axial_left_facing"}
     if main != "velocity":
         hidden |= {"velocity"}
-    if numbers.get("came_apart"):
-        hidden |= {"velocity", "right_facing", "left_facing", "lateral_velocity", "axial_velocity", "axial_left_facing"}
     if 0 < numbers.get("turned_round", 0) < numbers.get("walkers", 0):
         hidden |= {"orientation_end"}
-    if "stops_at" in numbers:
-        hidden |= {name for name in numbers if any(fnmatchcase(name, pattern) for pattern in SHOWN["not_of_a_ramp"])}
+    patterns = SHOWN["not_of_a_ramp"] if "stops_at" in numbers else frozenset()
+    patterns |= SHOWN["not_of_parts"] if numbers.get("came_apart") else frozenset()
+    hidden |= {name for name in numbers if any(fnmatchcase(name, pattern) for pattern in patterns)}
     listed = []
     for name in ordered(numbers.keys() - hidden):
         number = numbers[name]
@@ -132,7 +131,12 @@ def _label(quantity: Quantity, numbers: Mapping[str, Any]) -> str:
     if not uphill:
         return label
     label = label.replace("along the drive axis", "up the slope").replace("across the drive axis", "across the slope")
-    return f"{label}, facing up" if numbers.get("facing_left") and _OF_UP in quantity.meaning else label
+    return f"{label}, facing up" if is_of_up(quantity, numbers) else label
+
+
+def is_of_up(quantity: Quantity, numbers: Mapping[str, Any]) -> bool:
+    """Whether a number of a slope leaves out walkers that face down, of which there are some."""
+    return bool(numbers["goes_uphill"] and numbers.get("facing_left") and _OF_UP in quantity.meaning)
 
 
 def shown(number: float, unit: str) -> tuple[str, str]:
@@ -149,17 +153,28 @@ def _errors(numbers: Mapping[str, Any], quantity: Quantity) -> str:
         ends = (shown(numbers[f"orientation_{end}"], quantity.unit)[0] for end in ("smallest", "largest"))
         parts.append(f"walkers {' to '.join(ends)}")
     if isfinite(scatter := numbers.get(quantity.error, nan)):
-        text = shown(scatter, quantity.unit)[0]
         word = "resolution" if quantity.error.endswith("_within") else "scatter"
-        parts.append(f"{word} {'below 0.001' if text == '0' and quantity.unit == 'm/s' else text}")
-    low, high = (numbers.get(f"{quantity.name}_{end}") for end in ("low", "high"))
-    if low is not None and high is not None:
-        draws = draws_text(numbers[f"{quantity.name}_draws"], approximate=numbers[f"{quantity.name}_approximate"])
-        parts.append(f"band {band_text(low, high, quantity.unit)} ({draws})")
+        parts.append(f"{word} {error_text(scatter, quantity.unit)}")
+    parts += filter(None, [band_of(numbers, quantity)])
     if isfinite(error := numbers.get(f"{quantity.name}_error", nan)):
-        text = shown(float(f"{error:.2g}"), quantity.unit)[0]
-        parts.append(f"numerical error {'below 0.001' if text == '0' else text}")
+        parts.append(f"numerical error {error_text(error, quantity.unit)}")
     return ", ".join(parts)
+
+
+def error_text(error: float, unit: str) -> str:
+    """An error (SI) with two digits in the displayed unit, without the unit; a dash for NaN."""
+    usual, factor = unit_shown(unit)
+    text = rounded(float(f"{error * factor:.2g}"), usual)
+    return "below 0.001" if text == "0" and usual == "mm/s" else text
+
+
+def band_of(numbers: Mapping[str, Any], quantity: Quantity) -> str:
+    """The band of a number in the displayed unit, with the number of its draws; empty if it has none."""
+    low, high = (numbers.get(f"{quantity.name}_{end}") for end in ("low", "high"))
+    if low is None or high is None:
+        return ""
+    draws = draws_text(numbers[f"{quantity.name}_draws"], approximate=numbers[f"{quantity.name}_approximate"])
+    return f"band {band_text(low, high, quantity.unit)} ({draws})"
 
 
 def draws_text(draws: object, *, approximate: bool) -> str:

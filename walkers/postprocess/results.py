@@ -188,22 +188,27 @@ def text(results: Results, *, cached: bool = False) -> str:
         first += " (already run)"
     table = [(row.label, row.text, row.unit, row.error) for row in rows(results)]
     label, value, unit = (max((len(row[place]) for row in table), default=0) for place in range(3))
-    main, rests, unmeasured = headline(results), results.about["rests_on"], []
-    if "velocity" in results and not {"numerical_error", "stops_at"} & results.keys():
-        unmeasured.append("numerical error (--accuracy)")
-    if main and f"{main}_low" not in results and any(entry["range"] for entry in rests):
-        unmeasured.append("band over the ranges of these values (--spread)")
     return "\n".join(
         [
             first,
             *(f"  {line}" for line in rest),
             *(f"  {row[0]:{label}}  {row[1]:>{value}} {row[2]:{unit}}  {row[3]}".rstrip() for row in table),
             *(f"  warning: {warning}" for warning in results.warnings),
-            *lines_of_rest(rests),
-            *([f"  unmeasured {', '.join(unmeasured)}"] if unmeasured else []),
+            *lines_of_rest(results.about["rests_on"]),
+            *([f"  unmeasured {errors}"] if (errors := unmeasured(results)) else []),
             f"  run        {results.directory}",
         ]
     )
+
+
+def unmeasured(results: Results) -> str:
+    """The errors of a result that were not measured, each with its option; empty if there are none."""
+    main, errors = headline(results), []
+    if "velocity" in results and not {"numerical_error", "stops_at"} & results.keys():
+        errors.append("numerical error (--accuracy)")
+    if main and f"{main}_low" not in results and any(entry["range"] for entry in results.about["rests_on"]):
+        errors.append("band over the ranges of uncertain values (--spread)")
+    return ", ".join(errors)
 
 
 def headlines(results: Results) -> list[str]:

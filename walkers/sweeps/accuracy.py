@@ -108,6 +108,6 @@ def _errors(row: Mapping[str, Any], finer: pd.Series, hardest: Mapping[Any, Any]
     errors = {}
     for name in row:
         if name.startswith(_FAMILIES) and isfinite(row[name]):
-            half, stiffer = (float(numbers[name]) - row[name] for numbers in (finer, hardest))
+            half, stiffer = (float(run[name]) - row[name] for run in (finer, hardest))
             errors[name] = {"half_step": half, "stiffer": stiffer, "total": hypot(half, stiffer)}
     return errors

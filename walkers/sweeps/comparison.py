@@ -9,10 +9,10 @@ from math import hypot, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from walkers.postprocess.numbers import ASIDE, headline
-from walkers.postprocess.quantities import is_error, scatter_of, unit_shown
+from walkers.postprocess.numbers import ASIDE, band_of, error_text, headline, is_of_up
+from walkers.postprocess.quantities import declared, is_error, scatter_of, unit_shown
 from walkers.postprocess.results import Results, plain, read
-from walkers.rounding import rounded
+from walkers.rounding import counted, rounded
 from walkers.sweeps.readable import differing, flattened, readable
 from walkers.sweeps.table import columns_of, with_unit
 from walkers.text import aligned
@@ -56,12 +56,12 @@ def compare_runs(first: Side, second: Side) -> Comparison:
         rows = _rows(*results)
         apart = {row["quantity"]: row for row in rows if row["first"] != row["second"]}
         if "cycles" in apart and not changed:
-            text = [f"{text[0]}, but ran {' and '.join(_cells(apart['cycles'])[1:3])} cycles"]
+            text = [f"{text[0]}, but ran {' and '.join(_cells(apart['cycles'], results)[1:3])} cycles"]
         if apart:
             heads = ["result", *names, "difference", "scatter of copies", "numerical error"]
-            columns = zip(heads, *map(_cells, apart.values()), strict=True)
+            columns = zip(heads, *(_cells(row, results) for row in apart.values()), strict=True)
             text.append(aligned([*zip(*(column for column in columns if {*column[1:]} != {"-"}), strict=True)]))
-        text += _of_errors(apart, results)
+        text += _of_errors(apart, dict(zip(names, results, strict=True)))
         if same := [row["quantity"] for row in rows if row["quantity"] not in apart]:
             text.append(f"the same in both: {', '.join(same)}" if apart else "all results are the same")
     text += [f"{name}: no finished run; only the parameters are compared" for name in not_run]
@@ -69,19 +69,32 @@ def compare_runs(first: Side, second: Side) -> Comparison:
     return Comparison(contents | {"not_run": not_run, "results": rows}, "\n\n".join(text))
 
 
-def _of_errors(apart: Mapping[str, Mapping[str, Any]], results: Sequence[Results]) -> list[str]:
-    """How many times its numerical error a velocity differs, and which runs' errors are still to be measured."""
-    rows = [apart[name] for name in _VELOCITIES if name in apart]
+def _of_errors(apart: Mapping[str, Mapping[str, Any]], named: Mapping[str, Results]) -> list[str]:
+    """How many times its numerical error a velocity differs, bands of both runs, and which errors are unmeasured."""
+    rows, results = [apart[name] for name in _VELOCITIES if name in apart], named.values()
     lines = [
-        f"{row['quantity']}: differs by {_two_digits(abs(row['difference']) / row['numerical_error'], '')} times "
+        f"{row['quantity']}: differs by {error_text(abs(row['difference']) / row['numerical_error'], '')} times "
         "its numerical error"
         for row in rows
         if row["numerical_error"]
     ]
+    if any(headline(result) in apart for result in results):
+        lines += [f"{name}: {text}" for name, result in named.items() if (text := _of_band(result))]
     unmeasured = [str(result.directory) for result in results if not {"numerical_error", "stops_at"} & result.keys()]
     if rows and unmeasured:
         lines.append(f"to measure numerical errors: walkers run {' '.join(unmeasured)} --accuracy")
     return ["\n".join(lines)] if lines else []
+
+
+def _of_band(result: Results) -> str:
+    """The band of the main number of a run, or on how many uncertain values it rests; empty if there are none."""
+    if not (main := headline(result)):
+        return ""
+    if band := band_of(result, quantity := declared(main)):
+        return f"{with_unit(main, unit_shown(quantity.unit)[0])}, {band}"
+    uncertain = [value["origin"] for value in result.about["rests_on"] if value["range"]]
+    rests = f"rests on {counted(len(uncertain), 'uncertain value')}, {uncertain.count('default')} guessed"
+    return f"{main} {rests}; the band over the ranges is unmeasured (--spread)" if uncertain else ""
 
 
 def _rows(first: Results, second: Results) -> list[dict[str, Any]]:
@@ -110,8 +123,8 @@ def _number(value: Any) -> float:
     return nan if value is None or isinstance(value, str) else float(value)
 
 
-def _cells(row: Mapping[str, Any]) -> list[str]:
-    """A row as text in readable units."""
+def _cells(row: Mapping[str, Any], results: Sequence[Results]) -> list[str]:
+    """A row as text in readable units; a number of walkers that face up says so beside that of all walkers."""
     unit, size = unit_shown(row["unit"])
     first, second, difference = (size * _number(row[name]) for name in ("first", "second", "difference"))
     printed = [rounded(value, unit) for value in (first, second)]
@@ -119,12 +132,10 @@ def _cells(row: Mapping[str, Any]) -> list[str]:
         difference = float(printed[1]) - float(printed[0])
     signed = rounded(difference, unit)
     signed = signed if signed[:1] == "-" or signed == "0" else f"+{signed}"
+    up = [is_of_up(declared(row["quantity"]), result) for result in results]
+    if not all(up):
+        printed = [f"{text}{' facing up' * (facing and text != '-')}" for text, facing in zip(printed, up, strict=True)]
     scatters = [row[f"{side}_scatter"] for side in ("first", "second")]
-    both = " and ".join(_two_digits(size * scatter, unit) for scatter in scatters if scatter is not None) or "-"
-    error = _two_digits(size * _number(row["numerical_error"]), unit)
+    both = " and ".join(error_text(scatter, row["unit"]) for scatter in scatters if scatter is not None) or "-"
+    error = error_text(_number(row["numerical_error"]), row["unit"])
     return [with_unit(row["quantity"], unit), *printed, signed, both, error]
-
-
-def _two_digits(value: float, unit: str) -> str:
-    text = rounded(float(f"{value:.2g}"), unit)
-    return f"{value:.1g}" if text == "0" else text

@@ -16,7 +16,7 @@ from walkers.postprocess.motion import read_motion
 from walkers.postprocess.numbers import MAIN, rows
 from walkers.postprocess.report.page import LARGEST, NAME, check_report, fill, page_of, svg_of
 from walkers.postprocess.report.player import MOST_PLACES, player_of
-from walkers.postprocess.results import Results, headlines, read
+from walkers.postprocess.results import Results, headlines, read, unmeasured
 from walkers.postprocess.uncertainty import held_of, held_text
 from walkers.runner.directory import case_of
 from walkers.runner.files import write_bytes
@@ -68,7 +68,7 @@ def report_run(
 
 
 def shown_of(case: Case, results: Results, origins: Origins = None) -> dict[str, Any]:
-    """Warnings and rows of a result, and parameters of its case with their origins."""
+    """Warnings and rows of a result, what of it is unmeasured, and parameters of its case with their origins."""
     origins = case.origins if origins is None else origins
     parameters = [
         vars(source) | {"range": " … ".join(map(text_of, source.range or ())), "origin": source.word}
@@ -78,6 +78,7 @@ def shown_of(case: Case, results: Results, origins: Origins = None) -> dict[str,
     return {
         "warnings": results.warnings,
         "rows": rows(results),
+        "unmeasured": unmeasured(results),
         "fixed": held_text(held_of(origins)) if banded else "",
         "guessed": [parameter for parameter in parameters if parameter["origin"] == "guessed"],
         "uncertain": [parameter for parameter in parameters if parameter["origin"].endswith("uncertain")],
