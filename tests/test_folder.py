@@ -263,7 +263,10 @@ def test_compared_runs_differ_by_so_many_times_both_their_numerical_errors(
 
 @pytest.mark.parametrize(
     ("numbers", "shown"),
-    [({"goes_uphill": True}, True), ({"goes_uphill": True, "upright": 0}, False), ({"goes_uphill": False}, False)],
+    [
+        *(({"goes_uphill": True}, True), ({"goes_uphill": True, "upright": 0}, False), ({"goes_uphill": False}, False)),
+        ({"goes_uphill": True, "came_apart": True}, False),
+    ],
 )
 def test_a_level_run_and_others_have_the_velocity_in_common_unless_it_says_little(
     numbers: dict[str, float], shown: bool, run_directory: Callable[..., Path], tmp_path: Path
@@ -274,7 +277,7 @@ def test_a_level_run_and_others_have_the_velocity_in_common_unless_it_says_littl
     found = compare_runs(Side("level", case_of(run), run), other)
     shared = {row["quantity"] for row in found.contents["results"] if row["second"] is not None}
     assert bool(re.search(r"\nvelocity \(mm/s\) +[\d.]+ +1 facing up ", found.text)) == shown
-    assert ("velocity" in shared) == shown and "axial_velocity" in shared
+    assert ("velocity" in shared) == shown and ("axial_velocity" in shared) == ("came_apart" not in numbers)
 
 
 def test_values_are_shown_as_a_case_file_has_them() -> None:

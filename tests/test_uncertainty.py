@@ -23,7 +23,7 @@ from walkers.inputs.units import parse_quantity
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.numbers import fell, headline, rows
 from walkers.postprocess.quantities import declared, ordered
-from walkers.postprocess.results import headlines
+from walkers.postprocess.results import headlines, unmeasured
 from walkers.postprocess.tables import read_columns
 from walkers.postprocess.uncertainty import SPREAD_NAME, spread_of
 from walkers.postprocess.walking import _velocities
@@ -154,6 +154,7 @@ def test_walkers_that_came_apart_have_no_velocity_and_are_not_steady_anywhere_in
     assert headlines(apart)[0].endswith(": came apart")
     assert "velocity" in [row.name for row in rows(done.result)]
     assert not [row.name for row in rows(apart) if re.search("velocity|facing|steady", row.name)]
+    assert unmeasured(done.result) and not unmeasured(apart)
 
 
 def test_a_result_that_depends_on_the_start_says_so(runs_folder: Path) -> None:

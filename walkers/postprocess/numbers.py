@@ -109,9 +109,7 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
         hidden |= {"velocity"}
     if 0 < numbers.get("turned_round", 0) < numbers.get("walkers", 0):
         hidden |= {"orientation_end"}
-    patterns = SHOWN["not_of_a_ramp"] if "stops_at" in numbers else frozenset()
-    patterns |= SHOWN["not_of_parts"] if numbers.get("came_apart") else frozenset()
-    hidden |= {name for name in numbers if any(fnmatchcase(name, pattern) for pattern in patterns)}
+    hidden |= saying_nothing(numbers)
     listed = []
     for name in ordered(numbers.keys() - hidden):
         number = numbers[name]
@@ -122,6 +120,13 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
             text, unit = shown(number, quantity.unit)
             listed.append(Row(name, _label(quantity, numbers), text, unit, _errors(numbers, quantity)))
     return listed
+
+
+def saying_nothing(numbers: Mapping[str, Any]) -> set[str]:
+    """Names of the numbers that say nothing about walkers that came apart or under a ramp."""
+    patterns = SHOWN["not_of_a_ramp"] if "stops_at" in numbers else frozenset()
+    patterns |= SHOWN["not_of_parts"] if numbers.get("came_apart") else frozenset()
+    return {name for name in numbers if any(fnmatchcase(name, pattern) for pattern in patterns)}
 
 
 def _label(quantity: Quantity, numbers: Mapping[str, Any]) -> str:

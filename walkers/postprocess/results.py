@@ -203,8 +203,8 @@ def text(results: Results, *, cached: bool = False) -> str:
 
 def unmeasured(results: Results) -> str:
     """The errors of a result that were not measured, each with its option; empty if there are none."""
-    main, errors = headline(results), []
-    if "velocity" in results and not {"numerical_error", "stops_at"} & results.keys():
+    main, errors = "" if results.get("came_apart") else headline(results), []
+    if main and "velocity" in results and not {"numerical_error", "stops_at"} & results.keys():
         errors.append("numerical error (--accuracy)")
     if main and f"{main}_low" not in results and any(entry["range"] for entry in results.about["rests_on"]):
         errors.append("band over the ranges of uncertain values (--spread)")

@@ -9,7 +9,7 @@ from math import hypot, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from walkers.postprocess.numbers import ASIDE, band_of, error_text, headline, is_of_up
+from walkers.postprocess.numbers import ASIDE, band_of, error_text, headline, is_of_up, saying_nothing
 from walkers.postprocess.quantities import declared, is_error, scatter_of, unit_shown
 from walkers.postprocess.results import Results, plain, read
 from walkers.rounding import counted, rounded
@@ -100,13 +100,15 @@ def _of_band(result: Results) -> str:
 def _rows(first: Results, second: Results) -> list[dict[str, Any]]:
     """The numbers of two results, without errors, values of the case and conditions, and means over both facings.
 
-    A level run and a slope have the velocity in common; up the slope alone, if walkers turned over or lean.
+    A level run and a slope have the velocity in common; up the slope alone, if walkers turned over or lean. Runs of
+    which walkers came apart have none.
     """
     heads, results = {headline(first), headline(second)}, {"first": first, "second": second}
     little = {*_VELOCITIES} if "axial_velocity" in heads else {"velocity"} - heads
     if any(result.get("facings_differ") and not result.get("goes_uphill") for result in results.values()):
         little.add("velocity")
-    names = {name for name in {*first, *second} if not is_error(name)}.difference(ASIDE, little, ["coverage"])
+    little.update(ASIDE, ["coverage"], *map(saying_nothing, results.values()))
+    names = {name for name in {*first, *second} - little if not is_error(name)}
     rows = []
     for name, (unit, _) in columns_of(names).items():
         numbers = {side: _number(result.get(name)) for side, result in results.items()}
