@@ -77,7 +77,7 @@ def measure(motion: Motion) -> Measured:
 
 def _doubts(numbers: Mapping[str, Any], *, ramp: bool) -> Iterable[str]:
     """Reasons to doubt the velocity; on trays walkers stop, and a ramp changes the drive."""
-    if (lacking := numbers["walkers"] - numbers["steady"]) and not (numbers["meets"] or ramp):
+    if (lacking := numbers["walkers"] - numbers["steady"]) and not (numbers["meets"] or numbers["came_apart"] or ramp):
         unsteady = f"{lacking} of {numbers['walkers']} walkers {'is' if lacking == 1 else 'are'} not steady"
         yield f"{unsteady}: the velocity depends on the length of the run"
     if numbers["came_apart"]:
