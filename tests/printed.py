@@ -34,6 +34,7 @@ class _Recorder(RendererAgg):
 
 def _drawn(figure: Figure) -> list[Text]:
     figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # it is laid out once, as for a file
     texts = figure.findobj(Text)
     for number, text in enumerate(texts):
         text.set_gid(f"text {number}")

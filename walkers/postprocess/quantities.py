@@ -87,6 +87,8 @@ _NUMBERS = [
 
 def matches(pattern: str, name: str) -> bool:
     """Whether a name is the pattern, or has a number in place of its ``*``: ``rotation_2`` of ``rotation_*``."""
+    if "*" not in pattern:  # most have none, and a pattern takes long to compile
+        return pattern == name
     return bool(re.fullmatch(pattern.replace("*", r"\d+"), name))
 
 
