@@ -239,12 +239,12 @@ def test_a_failure_of_every_point_stops_the_sweep(
 def test_two_sweeps_over_the_same_points_share_them(
     sweep_file: Callable[..., str], in_folder: Path, front: Callable[[str], str]
 ) -> None:
-    """Some points have a deck each, those of 80 Hz share one: each is made once, whichever sweep comes first."""
+    """One point has a deck of its own, those of 80 Hz share one: each is made once, whichever sweep comes first."""
     log = in_folder / "launches"
     engine = front(f'pwd >> {log}\nexec liggghts "$@"')
     points = {
-        "first": [(60, 2), (70, 2), (80, 1), (80, 2), (80, 3)],
-        "second": [(70, 2), (80, 2), (80, 3), (80, 4), (90, 2)],
+        "first": [(70, 2), (80, 1), (80, 2), (80, 3)],
+        "second": [(70, 2), (80, 2), (80, 3), (80, 4)],
     }
     for name, each in points.items():
         values = {"drive.frequency": [f"{hertz} Hz" for hertz, _ in each]}
@@ -259,9 +259,9 @@ def test_two_sweeps_over_the_same_points_share_them(
     runs = {run for name in points for run in zip(points[name], load(f"runs/{name}")["run"], strict=True)}
     made = {str(path.parent.relative_to(in_folder)) for path in in_folder.glob("runs/base-*/manifest.json")}
     assert {run for _, run in runs} == made
-    assert len(made) == len(runs) == 7
+    assert len(made) == len(runs) == 5
     launches = log.read_text().split()
-    assert len(set(launches)) == len(launches) <= 7
+    assert len(set(launches)) == len(launches) <= 5
 
 
 def test_workers_that_are_handed_over_give_the_same(sweep_file: Callable[..., str], in_folder: Path) -> None:
