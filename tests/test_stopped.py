@@ -61,7 +61,7 @@ FILES: dict[str, dict[str, Any]] = {
     },
 }
 FILES["pile"]["liquid"] |= {"conserved": True, "law": "willett"}
-FILES["pile"]["mixture"] |= {"count": 14}
+FILES["pile"]["mixture"] |= {"count": 14, "small": ["0.3 mm"] * 2, "large": ["0.5 mm"] * 2}
 SWEEP, SITE = "sweep sweep.toml -j 2", "sweep sweep.toml --site site.py"
 STOPS: dict[str, tuple[str, int, str, str, int, str]] = {
     # Command, engines at that time, signals, to whom, exit status, last line.
