@@ -183,7 +183,7 @@ def test_a_run_that_ends_before_its_walker_turns_over_says_how_long_it_must_be(r
     ]
     assert [run.result["turned_over"] for run in shorts] == [0, 0]
     (warning,) = shorts[0].result.warnings
-    assert "1 walker turns faster and faster and will turn over" in warning
+    assert "1 of 1 walker turns faster and faster and will turn over" in warning
     assert not shorts[1].result.warnings
     cycles = int(warning.rpartition("= ")[2])
     assert 60 <= cycles <= 400
@@ -200,7 +200,7 @@ def test_a_walker_on_a_level_plate_that_turns_away_says_when(runs_folder: Path) 
     case = load_case("fig1b", {**steel, "dimers.angle_spread": "0 deg"})
     done = walkers.run(case, runs_folder)
     (warning,) = done.result.warnings
-    assert warning.startswith("1 walker turns away from the drive axis faster and faster, by 45° after about ")
+    assert warning.startswith("1 of 1 walker turns away from the drive axis faster and faster, by 45° after about ")
     seconds, cycles = float(warning.partition("about ")[2].split()[0]), int(warning.rpartition("= ")[2])
     angle = abs(done.result["orientation_end"])
     assert seconds == pytest.approx(-np.log(np.tan(angle)) / turning_rate(case), rel=0.2)

@@ -56,7 +56,9 @@ class Round(NamedTuple):
 
     def normals(self, places: FloatArray) -> FloatArray:
         """Unit vectors toward the axis, of the shape of the places."""
-        normals: FloatArray = places * (-1.0, -1.0, 0.0) / (self.radius - self.distances(places))[..., None]
+        normals: FloatArray = (
+            places * (-1.0, -1.0, 0.0) / np.maximum(self.radius - self.distances(places), 1e-300)[..., None]
+        )
         return normals
 
 

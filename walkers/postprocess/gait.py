@@ -49,8 +49,9 @@ must be below the first angle (rad) and exceed that in the first half by less th
 most the second number times that in the first half."""
 GROWS = 0.05
 """Rate above which small angles to the axis count as growing, 1/s: by half in ten seconds."""
-_NOTHING = 1e-4
-"""Increase of the mean angle, rad, that counts as none."""
+_NOTHING, _LITTLE_ASIDE = 1e-4, np.radians(0.8)
+"""Increase of the mean angle, rad, that counts as none; on a level floor, a mean angle, rad, from which it goes on, since
+rolling friction may let smaller angles grow and larger ones decay: glass beads on PTFE stay at 0.76°."""
 _PARTS = 10
 """Parts of an interval between samples at which gaps and the force of the drive are evaluated."""
 
@@ -209,6 +210,7 @@ def turns_away_after(group: Group) -> FloatArray:
         rate = np.log(last / second) / third
         left = -np.log(np.tan(angle[-1] / 2.0 if group.case.boundary.tilt else angle[-1])) / rate
     grows = (rate > GROWS) & (last - second > np.maximum(second - first, _NOTHING))
+    grows &= bool(group.case.boundary.tilt) | (last > _LITTLE_ASIDE)
     return np.where(grows & (left > 0.0), left, np.nan)
 
 

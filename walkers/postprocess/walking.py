@@ -96,7 +96,7 @@ def _turning(groups: Sequence[Group], walkers: Columns) -> Iterable[str]:
     if (count := int(np.isfinite(left).sum())) and not (case.meets or case.drive.ramp):
         seconds = float(np.nanmax(left))
         cycles = float(f"{_LONGER * (case.run.cycles + case.excitation.frequency * seconds):.2g}")
-        turn = f"{counted(count, 'walker')} {'turns' if count == 1 else 'turn'}"
+        turn = f"{count} of {counted(len(walkers['walker']), 'walker')} {'turns' if count == 1 else 'turn'}"
         away = f"{turn} away from the drive axis faster and faster, by 45° after about {seconds:.2g} s more"
         if case.boundary.tilt:
             away = f"{turn} faster and faster and will turn over after the end of the run"

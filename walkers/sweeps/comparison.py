@@ -62,6 +62,10 @@ def compare_runs(first: Side, second: Side) -> Comparison:
             columns = zip(heads, *(_cells(row, results) for row in apart.values()), strict=True)
             text.append(aligned([*zip(*(column for column in columns if {*column[1:]} != {"-"}), strict=True)]))
         text += _of_errors(apart, dict(zip(names, results, strict=True)))
+        doubts = [
+            f"{name}: warning: {doubt}" for name, run in zip(names, results, strict=True) for doubt in run.warnings
+        ]
+        text += ["\n".join(doubts)] if doubts else []
         if same := [row["quantity"] for row in rows if row["quantity"] not in apart]:
             text.append(f"the same in both: {', '.join(same)}" if apart else "all results are the same")
     text += [f"{name}: no finished run; only the parameters are compared" for name in not_run]

@@ -180,9 +180,9 @@ def alignment_of(case: Case) -> dict[str, Any]:
 
     The table has ``u``, ``v`` and ``damping`` (β, by the bridges) of the Mathieu equation; whether small angles are
     ``stable`` in it; the ``largest_stable_v`` on a level substrate; ``rolling_rate``, the growth rate in it, 1/s;
-    ``rate``, the growth rate with sliding contacts and spinning beads, 1/s (negative: decay; at 1° if there is rolling
-    friction), None if the axial motion is not periodic; whether the dimer ``stands`` (on a level substrate: stays on
-    the axis); ``turns_over_after``, s from 1° to 90° on a slope.
+    ``rate``, the growth rate with sliding contacts and spinning beads, 1/s (negative: decay; at 1° if there is
+    ``rolling_friction``, its coefficient), None if the axial motion is not periodic; whether the dimer ``stands`` (on
+    a level substrate: stays on the axis); ``turns_over_after``, s from 1° to 90° on a slope.
     """
     drive = case.excitation
     mathieu = alignment(case)
@@ -194,6 +194,7 @@ def alignment_of(case: Case) -> dict[str, Any]:
         "largest_stable_v": LARGEST_STABLE_V,
         "rolling_rate": mathieu.growth * pi * drive.frequency,
         "rate": rate,
+        "rolling_friction": case.contact.rolling_friction,
         "stands": None if rate is None else rate <= GROWS,
         "turns_over_after": time_to_turn(rate) if rate is not None and falls else None,
     }
@@ -228,7 +229,8 @@ def describe(prediction: dict[str, Any], result: Mapping[str, Any] | None) -> st
     rolling = rolling if state["u"] or state["v"] else "no torque toward the axis if the beads roll"
     slip, rate = "unknown: the axial motion is not periodic", state["rate"]
     if rate is not None:
-        slip = f"small angles {'grow' if rate > 0.0 else 'decay'} by {abs(rate):.3g}/s"
+        at = " at 1° (with rolling friction, smaller ones may grow)" if state["rolling_friction"] else ""
+        slip = f"small angles {'grow' if rate > 0.0 else 'decay'} by {abs(rate):.3g}/s{at}"
         if state["turns_over_after"]:
             slip += f"; turns over after about {state['turns_over_after']:.2g} s (from 1° to 90°)"
         elif not state["stands"]:
