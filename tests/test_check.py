@@ -221,6 +221,8 @@ def test_walls_are_as_far_as_the_boundary_says(bench: Bench) -> None:
         np.testing.assert_allclose(row[:3], place - distance * normal, atol=1e-12)
         np.testing.assert_allclose(row[3:6], place, atol=1e-12)
         assert row[-1] == pytest.approx(RADIUS - distance, abs=1e-13)
+    with np.errstate(all="raise"):  # on the axis no direction is toward it
+        assert not hollow.normals(np.zeros(3)).any()
 
 
 def test_a_wall_that_moves_meets_beads_that_do_not(bench: Bench) -> None:

@@ -50,8 +50,8 @@ most the second number times that in the first half."""
 GROWS = 0.05
 """Rate above which small angles to the axis count as growing, 1/s: by half in ten seconds."""
 _NOTHING, _LITTLE_ASIDE = 1e-4, np.radians(0.8)
-"""Increase of the mean angle, rad, that counts as none; on a level floor, a mean angle, rad, from which it goes on, since
-rolling friction may let smaller angles grow and larger ones decay: glass beads on PTFE stay at 0.76°."""
+"""Increase of the mean angle, rad, that counts as none; on a level floor, a mean angle, rad, from which it goes on:
+rolling friction may let smaller angles grow and larger ones decay, so that glass beads on PTFE stay at 0.76°."""
 _PARTS = 10
 """Parts of an interval between samples at which gaps and the force of the drive are evaluated."""
 
