@@ -181,6 +181,7 @@ def changed(case: Case, shorter: float, harder: float) -> Case:
     return case.changed({"run.time_step": f"{step!r} us", "contact.youngs_modulus": f"{modulus!r} MPa"})
 
 
+@pytest.mark.slow
 def test_the_error_is_the_distance_from_far_harder_beads_at_a_far_smaller_step(tmp_path: Path) -> None:
     """100 times as hard, at half the step that the modulus allows: within the share that was asked for."""
     case = load_case("fig1b", {"drive.frequency": "90 Hz", "drive.peak_acceleration": "10 g"})
