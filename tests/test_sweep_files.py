@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -258,6 +259,10 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     """Glass on polystyrene at 10 g walks or not as one guesses; the single number, exact to 1e-5, does not say so."""
     case = Case.read({**GLASS, "run": {"cycles": 6}}, name="guessed")
     spread = run_spread(case, runs_folder, Options(2), points=4)
+    warned = [run.result.warnings for run in walkers.load(spread.directory).runs if run.result.warnings]
+    assert warned == list(spread.doubts)
+    told = describe(replace(spread, doubts=[["one", "two"], ["three"]]))
+    assert "warning  2 draws with warnings, first: one\n" in told
     rough = {"contact.roughness.bead_bead", "contact.roughness.bead_wall"}  # of the library, for these materials
     assert {one.key for one in spread.varied} == {one.key for one in case.origins if one.guessed} | rough
     given = {"contact.friction.bead_bead", "contact.rolling_friction"}

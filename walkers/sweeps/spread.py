@@ -18,9 +18,10 @@ from walkers.inputs.sweep import Sweep, expand
 from walkers.inputs.units import parse_quantity
 from walkers.postprocess.numbers import MAIN
 from walkers.postprocess.quantities import declared, unit_shown
+from walkers.postprocess.results import read
 from walkers.postprocess.sides import REST
 from walkers.postprocess.uncertainty import SPREAD_NAME, few_draws, held_of, held_text, in_lines, spread_of
-from walkers.rounding import rounded
+from walkers.rounding import counted, rounded
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.runner.files import write_json
@@ -58,6 +59,7 @@ class Spread:
     walkers that came apart; ``depends`` has their rank correlations (Spearman) with the drawn values, the strongest
     first, if larger than two standard errors.
     ``counts`` are numbers of points whose walkers go ``forward`` (along the heading), …; empty for piles.
+    ``doubts`` are the warnings of each point that has any.
     """
 
     directory: Path
@@ -67,6 +69,7 @@ class Spread:
     depends: Mapping[str, Mapping[str, float]]
     counts: Mapping[str, int]
     failures: tuple[Failure, ...]
+    doubts: Sequence[Sequence[str]] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types, SI units."""
@@ -136,7 +139,9 @@ def run_spread(
     """
     options = replace(options, dumps=False)
     record, failures = run_sweep(spread_sweep(case, points, engine), out, options, engine=engine, **how)
-    spread = spread_in(load(record.directory), case, record.directory, failures)
+    table = load(record.directory)
+    warned = [read(run).warnings for run in table.loc[table["status"] == "finished", "run"]]
+    spread = replace(spread_in(table, case, record.directory, failures), doubts=[*filter(None, warned)])
     write_json(record.directory / SPREAD_NAME, {**spread.as_dict(), "directory": record.directory.name})
     return spread
 
@@ -200,4 +205,8 @@ def describe(spread: Spread) -> str:
     draws = [f"{count} {words[name]}" for name, count in spread.counts.items() if count]
     draws += [f"{len(spread.failures)} failed, not in the band"] if spread.failures else []
     lines += [f"    draws    {', '.join(draws)}"] if draws else []
+    if spread.doubts:
+        lines += in_lines(
+            f"    warning  {counted(len(spread.doubts), 'draw')} with warnings, first: {spread.doubts[0][0]}"
+        )
     return "\n".join([*lines, f"    table    {spread.directory}"])
