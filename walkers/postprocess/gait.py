@@ -200,7 +200,7 @@ def turns_away_after(group: Group) -> FloatArray:
     cycles, and faster than before. Small angles grow exponentially: on a slope dψ/dt = rate · sin ψ, to 90°, where the
     walker has turned over; on a level floor, where both headings are alike, dψ/dt = rate · sin 2ψ / 2, to 45°.
     """
-    run = group.case.run
+    run, tilted = group.case.run, bool(group.case.boundary.tilt)
     angle = np.abs(group.orientation[:: run.samples_per_cycle][run.settled_strobes :])
     if len(angle) < 3:  # too few frames a second, or a dump that was cut short
         return np.full(len(group.walkers), np.nan)
@@ -208,9 +208,8 @@ def turns_away_after(group: Group) -> FloatArray:
     third = len(angle) / 3.0 * run.cycles_per_sample / group.case.excitation.frequency
     with np.errstate(divide="ignore", invalid="ignore"):
         rate = np.log(last / second) / third
-        left = -np.log(np.tan(angle[-1] / 2.0 if group.case.boundary.tilt else angle[-1])) / rate
-    grows = (rate > GROWS) & (last - second > np.maximum(second - first, _NOTHING))
-    grows &= bool(group.case.boundary.tilt) | (last > _LITTLE_ASIDE)
+        left = -np.log(np.tan(angle[-1] / 2.0 if tilted else angle[-1])) / rate
+    grows = (rate > GROWS) & (last - second > np.maximum(second - first, _NOTHING)) & (tilted | (last > _LITTLE_ASIDE))
     return np.where(grows & (left > 0.0), left, np.nan)
 
 

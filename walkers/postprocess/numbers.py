@@ -59,10 +59,6 @@ def headline(numbers: Mapping[str, Any]) -> str:
     return "right_facing" if numbers.get("facings_differ") else "velocity"
 
 
-_HEADINGS = ("right_facing", "left_facing")
-"""Velocities along the heading of walkers that started facing right (up) and left (down)."""
-
-
 def fell(numbers: Mapping[str, Any]) -> bool:
     """Whether walkers turned over or lean on a slope: then a velocity along the heading says little about their way."""
     return "upright" in numbers and bool(numbers["upright"] < numbers["walkers"])
@@ -106,7 +102,9 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
     """
     main, hidden = headline(numbers), ASIDE | SHOWN["hidden"]
     if main == "axial_velocity" or (main == "right_facing" and numbers["goes_uphill"]):
-        hidden = hidden - {"axial_velocity", "axial_left_facing"} | ({*_HEADINGS} if fell(numbers) else set())
+        hidden -= {"axial_velocity", "axial_left_facing"}
+    if fell(numbers):
+        hidden |= {"right_facing", "left_facing"}
     if not (numbers.get("facing_right") and numbers.get("facing_left")):  # the velocity is that of the only direction
         hidden |= {"right_facing", "left_facing", "axial_left_facing"}
     if main != "velocity":

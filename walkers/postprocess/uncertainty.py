@@ -73,8 +73,7 @@ def in_lines(text: str) -> list[str]:
 def held_of(origins: Sequence[Origin]) -> tuple[Origin, ...]:
     """Values of a case without a range, which a spread holds fixed: those of the liquid, and other unmeasured ones."""
     keys = {"liquid.name", *OF_LIQUIDS, *unmeasured()}
-    held = (value for value in origins if value.key in keys and value.origin != "derived")
-    return tuple(value for value in held if value.range is None)
+    return tuple(value for value in origins if value.key in keys and value.origin != "derived" and not value.range)
 
 
 def held_text(held: Sequence[Origin]) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.postprocess.numbers import ASIDE, band_of, error_text, headline, is_of_up, saying_nothing
 from walkers.postprocess.quantities import declared, is_error, scatter_of, unit_shown
-from walkers.postprocess.results import Results, plain, read
+from walkers.postprocess.results import Results, plain, read, unmeasured
 from walkers.rounding import counted, rounded
 from walkers.sweeps.readable import differing, flattened, readable
 from walkers.sweeps.table import columns_of, with_unit
@@ -61,11 +61,9 @@ def compare_runs(first: Side, second: Side) -> Comparison:
             heads = ["result", *names, "difference", "scatter of copies", "numerical error"]
             columns = zip(heads, *(_cells(row, results) for row in apart.values()), strict=True)
             text.append(aligned([*zip(*(column for column in columns if {*column[1:]} != {"-"}), strict=True)]))
-        text += _of_errors(apart, dict(zip(names, results, strict=True)))
-        doubts = [
-            f"{name}: warning: {doubt}" for name, run in zip(names, results, strict=True) for doubt in run.warnings
-        ]
-        text += ["\n".join(doubts)] if doubts else []
+        named = dict(zip(names, results, strict=True))
+        doubts = [f"{name}: warning: {doubt}" for name, result in named.items() for doubt in result.warnings]
+        text += ["\n".join(lines) for lines in (_of_errors(apart, named), doubts) if lines]
         if same := [row["quantity"] for row in rows if row["quantity"] not in apart]:
             text.append(f"the same in both: {', '.join(same)}" if apart else "all results are the same")
     text += [f"{name}: no finished run; only the parameters are compared" for name in not_run]
@@ -84,21 +82,21 @@ def _of_errors(apart: Mapping[str, Mapping[str, Any]], named: Mapping[str, Resul
     ]
     if any(headline(result) in apart for result in results):
         lines += [f"{name}: {text}" for name, result in named.items() if (text := _of_band(result))]
-    unmeasured = [str(result.directory) for result in results if not {"numerical_error", "stops_at"} & result.keys()]
-    if rows and unmeasured:
-        lines.append(f"to measure numerical errors: walkers run {' '.join(unmeasured)} --accuracy")
-    return ["\n".join(lines)] if lines else []
+    places = [str(result.directory) for result in results if "--accuracy" in unmeasured(result)]
+    if rows and places:
+        lines.append(f"to measure numerical errors: walkers run {' '.join(places)} --accuracy")
+    return lines
 
 
 def _of_band(result: Results) -> str:
     """The band of the main number of a run, or on how many uncertain values it rests; empty if there are none."""
-    if not (main := headline(result)):
-        return ""
-    if band := band_of(result, quantity := declared(main)):
+    if (main := headline(result)) and (band := band_of(result, quantity := declared(main))):
         return f"{with_unit(main, unit_shown(quantity.unit)[0])}, {band}"
+    if "--spread" not in unmeasured(result):
+        return ""
     uncertain = [value["origin"] for value in result.about["rests_on"] if value["range"]]
     rests = f"rests on {counted(len(uncertain), 'uncertain value')}, {uncertain.count('default')} guessed"
-    return f"{main} {rests}; the band over the ranges is unmeasured (--spread)" if uncertain else ""
+    return f"{main} {rests}; the band over the ranges is unmeasured (--spread)"
 
 
 def _rows(first: Results, second: Results) -> list[dict[str, Any]]:

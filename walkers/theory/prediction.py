@@ -85,7 +85,7 @@ def _smallest_gamma(
 
     The second value is the reason why the walker has no velocity there, None if it has one.
     """
-    dimer, walker, low, high, why = dimer_of(case), Walker.of_case(case), 0.0, most, None
+    dimer, walker, low, high = dimer_of(case), Walker.of_case(case), 0.0, most
     for _ in range(_ROUNDS):
         trials = np.linspace(low, high, _TRIALS)
         accelerations = np.array([dimer.peak_acceleration(float(gamma)) for gamma in trials])
@@ -96,8 +96,7 @@ def _smallest_gamma(
             return nan, None
         first = int(np.argmax(happened))
         low, high = float(trials[max(first - 1, 0)]), float(trials[first])
-        why = _why_unknown(motion, first)
-    return (low + high) / 2.0, why
+    return (low + high) / 2.0, _why_unknown(motion, first)
 
 
 def _opening(case: Case) -> dict[str, Any]:
@@ -187,7 +186,7 @@ def alignment_of(case: Case) -> dict[str, Any]:
     drive = case.excitation
     mathieu = alignment(case)
     rate = turning_rate(case) if drive.peak_acceleration > 0.0 else None
-    falls = rate is not None and rate > GROWS and mathieu.u != 0.0
+    stands = None if rate is None else rate <= GROWS
     return {
         **vars(mathieu),
         "stable": mathieu.stable,
@@ -195,8 +194,8 @@ def alignment_of(case: Case) -> dict[str, Any]:
         "rolling_rate": mathieu.growth * pi * drive.frequency,
         "rate": rate,
         "rolling_friction": case.contact.rolling_friction,
-        "stands": None if rate is None else rate <= GROWS,
-        "turns_over_after": time_to_turn(rate) if rate is not None and falls else None,
+        "stands": stands,
+        "turns_over_after": None if rate is None or stands or not mathieu.u else time_to_turn(rate),
     }
 
 
@@ -223,10 +222,10 @@ def describe(prediction: dict[str, Any], result: Mapping[str, Any] | None) -> st
         rows.append([name, *cells, model.get("reason") or ""])
     beyond = f"; beyond, {end['reason']}" if end["reason"] else ", the strongest drive tried"
     equation = ", ".join(f"{name} = {state[key]:.3g}" for name, key in (("U", "u"), ("V", "v"), ("β", "damping")))
-    rolling = f"small angles {'stay small' if state['stable'] else 'grow'} if the beads roll"
+    small = f"small angles {'stay small' if state['stable'] else 'grow'}"
+    rolling = f"{small if state['u'] or state['v'] else 'no torque toward the axis'} if the beads roll"
     notes = [["contacts", f"with Coulomb friction and drag stay closed up to about Γ0 = {end['gamma']:.2g}{beyond}"]]
     bound = "" if state["u"] else f" (stable for V < {state['largest_stable_v']:.3g})"
-    rolling = rolling if state["u"] or state["v"] else "no torque toward the axis if the beads roll"
     slip, rate = "unknown: the axial motion is not periodic", state["rate"]
     if rate is not None:
         at = " at 1° (with rolling friction, smaller ones may grow)" if state["rolling_friction"] else ""
