@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, sqrt
 from typing import Protocol
 
 import numpy as np
@@ -77,7 +77,7 @@ class Surfaces:
         films that are fuller, because bridges that break leave them more than they took.
         """
         steps = range(-8, 2) if self.liquid.conserved else (0,)
-        return [replace(self, volume=self.volume * 2.0 ** (0.5 * step)) for step in steps]
+        return [replace(self, volume=self.volume * sqrt(2.0**step)) for step in steps]
 
     @property
     def films(self) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from math import cbrt, cos, inf, pi, sqrt
+from math import inf, pi, sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from walkers.cache import kept_numbers, place_of_numbers
+from walkers.physics.portable import cosine, cube_root
 
 if TYPE_CHECKING:
     from walkers.physics.bridge import FloatArray
@@ -74,12 +75,13 @@ def _volume_by_suction(*shape: float) -> FloatArray:
 @cache
 def solver() -> bytes:
     """Identifier of the solver of the Young–Laplace equation, for kept solutions."""
-    return Path(__file__).with_name("laplace.py").read_bytes()
+    folder = Path(__file__).parent
+    return b"".join((folder / name).read_bytes() for name in ("laplace.py", "portable.py"))
 
 
 def cavitation_gap(liquid: BridgeLiquid) -> float:
     """Gap 2γ cos θ/p in which a meniscus has the suction p of the air's pressure, m (`walkers.physics.reynolds`)."""
-    return 2.0 * liquid.surface_tension * cos(liquid.contact_angle) / _AIR_PRESSURE
+    return 2.0 * liquid.surface_tension * float(cosine(liquid.contact_angle)) / _AIR_PRESSURE
 
 
 def largest_normal(reduced_radius: float, roughness: float, liquid: BridgeLiquid) -> float:
@@ -106,7 +108,7 @@ def film_volume(radius: float, volume_fraction: float) -> float:
 
 def bead_volume(radius: float) -> float:
     """Volume of a bead, m³."""
-    return 4.0 / 3.0 * pi * radius**3
+    return 4.0 / 3.0 * pi * (radius * radius * radius)
 
 
 def capillary_force_limit_at_wall(surface_tension: float, radius: float) -> float:
@@ -116,4 +118,4 @@ def capillary_force_limit_at_wall(surface_tension: float, radius: float) -> floa
 
 def rupture_distance(volume: float, contact_angle: float) -> float:
     """Gap at which a bridge breaks, (1 + θ/2) V^(1/3), m (Lian et al. 1993)."""
-    return (1.0 + 0.5 * contact_angle) * cbrt(volume)
+    return (1.0 + 0.5 * contact_angle) * cube_root(volume)

@@ -16,6 +16,8 @@ from __future__ import annotations
 from math import sqrt
 from typing import NamedTuple
 
+from walkers.physics.portable import cube_root
+
 _DURATION = 2.9432750
 """Duration of the Hertz impact in units of δ_max/v_n."""
 
@@ -27,7 +29,10 @@ def reduced_modulus(youngs_modulus: float, poissons_ratio: float) -> float:
 
 def hertz_overlap(force: float, reduced_radius: float, reduced_modulus: float) -> float:
     """Overlap (m) at which the repulsion balances a load (N), with R* in m and E* in Pa; zero for a tensile load."""
-    return float((3.0 * max(force, 0.0) / (4.0 * reduced_modulus * sqrt(reduced_radius))) ** (2.0 / 3.0))
+    if force <= 0.0:
+        return 0.0
+    root = cube_root(3.0 * force / (4.0 * reduced_modulus * sqrt(reduced_radius)))
+    return root * root
 
 
 def hertz_stiffness(overlap: float, reduced_radius: float, reduced_modulus: float) -> float:

@@ -36,8 +36,8 @@ against gap by numerical integration; filling angles that are not monotonic).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
-from math import cbrt, exp, inf, log, nan, pi, sin, sqrt
+from functools import cache, cached_property, lru_cache
+from math import inf, nan, pi, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,26 +45,35 @@ import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
-FloatArray = npt.NDArray[np.float64]
-Array = npt.NDArray[Any]
-"""Real, or complex for derivatives by complex steps."""
-
-_NODES, _WEIGHTS = (
-    0.5 * (part + shift) for part, shift in zip(np.polynomial.legendre.leggauss(48), (1.0, 0.0), strict=True)
+from walkers.physics.portable import (
+    cube_root,
+    exponential,
+    gauss_legendre,
+    logarithm,
+    sine,
+    sine_and_cosine,
+    solve_linear,
 )
-_PLACES = np.append(_NODES, 1.0)
+
+FloatArray = npt.NDArray[np.float64]
+
+_NODES, _WEIGHTS = gauss_legendre(48)
+_PLACES = np.append(0.5 * (_NODES + 1.0), 1.0)
 """Fractions of the profile at which it is computed: those of the integrals, and its end."""
-_HALVES, _AWAY = np.array([1.0, 0.5]), np.array([-1.0, 1.0])
+_WEIGHTS = 0.5 * _WEIGHTS
+_AWAY = np.array([-1.0, 1.0])
+"""Signs of the filling angles in the angles of the profile at its ends."""
 _POSITIVE = np.array([0, 1, 3])
 """Of a bridge: arcs and length."""
 _NEWTON_STEPS = 30
 _CONVERGED = 1e-12
-_COMPLEX_STEP = 1e-30
-_STEPS = 1j * _COMPLEX_STEP * np.eye(5)
-_ARC_STEP, _MOST_STEPS, _LARGEST_TURN = 0.05, 2000, 0.2
+_ARC_STEP = 0.05
+_MOST_STEPS = 2000
+_LARGEST_TURN = 0.2
 _SHARES = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02)
 _GROWTH = 1.2
-_SAME_GAP, _NEAR = 1e-9, 1e-3
+_SAME_GAP = 1e-9
+_NEAR = 1e-3
 _TURNING = 1e-9
 
 
@@ -80,13 +89,91 @@ class ForceCurve(NamedTuple):
     # angle times its radius), excess pressure over the surface tension (1/length), length of the profile
 
 
-def _sinc(x: Array) -> Array:
-    """sin(x)/x, also for complex arguments (derivatives by complex steps)."""
-    small = np.abs(x) < 1e-4
-    if not small.any():
-        return np.asarray(np.sin(x) / x)
-    safe = np.where(small, 1.0, x)
-    return np.where(small, 1.0 - x**2 / 6.0, np.sin(safe) / safe)
+@dataclass(frozen=True)
+class _Turned:
+    """Trigonometric functions of angles x, from those of x/2 alone; all arrays have the shape of the angles."""
+
+    sines: FloatArray  # sin x
+    cosines: FloatArray  # cos x
+    sincs: FloatArray  # sin(x)/x
+    sinc_slopes: FloatArray  # derivative of sin(x)/x
+    half_sincs: FloatArray  # sin(x/2)/(x/2)
+    half_sinc_slopes: FloatArray  # derivative of sin(y)/y at y = x/2
+
+    @classmethod
+    def of(cls, angles: FloatArray) -> _Turned:
+        """Compute the functions of angles (rad)."""
+        halves = 0.5 * angles
+        sines, cosines = sine_and_cosine(halves)
+        tiny = np.abs(halves) < 1e-4
+        half_sincs = np.where(tiny, 1.0 - halves * halves / 6.0, sines / np.where(tiny, 1.0, halves))
+        sincs = half_sincs * cosines
+        whole_cosines = 1.0 - 2.0 * sines * sines
+        return cls(
+            sines=2.0 * sines * cosines,
+            cosines=whole_cosines,
+            sincs=sincs,
+            sinc_slopes=_sinc_slope(angles, whole_cosines, sincs),
+            half_sincs=half_sincs,
+            half_sinc_slopes=_sinc_slope(halves, cosines, half_sincs),
+        )
+
+    def part(self, columns: slice) -> _Turned:
+        """The functions of some columns of the angles."""
+        return _Turned(**{name: values[:, columns] for name, values in vars(self).items()})
+
+
+def _sinc_slope(x: FloatArray, cosines: FloatArray, sincs: FloatArray) -> FloatArray:
+    """Derivative of sin(x)/x, (cos x - sin(x)/x)/x; a series where both terms cancel."""
+    small = np.abs(x) < 0.02
+    square = x * x
+    series = -x / 3.0 * (1.0 - square / 10.0 * (1.0 - square / 28.0 * (1.0 - square / 54.0)))
+    return np.where(small, series, (cosines - sincs) / np.where(small, 1.0, x))
+
+
+@dataclass(frozen=True)
+class _Solids:
+    """Both solids at their wetting lines for n bridges; each array has the shape (n, 2), a column for a solid.
+
+    ``…_by_arc`` are derivatives with respect to the arc of the same solid.
+    """
+
+    radii: FloatArray  # of the wetting lines
+    radii_by_arc: FloatArray
+    rises: FloatArray  # heights of the caps below the wetting lines
+    rises_by_arc: FloatArray
+    uprights: FloatArray  # r sin φ of the profile
+    uprights_by_arc: FloatArray
+    outwards: FloatArray  # r cos φ of the profile
+    outwards_by_arc: FloatArray
+
+
+class _WithSlopes(NamedTuple):
+    """A quantity along n profiles and its derivatives, each of shape (n, 49)."""
+
+    values: FloatArray
+    by_arc: FloatArray  # of the first solid
+    by_pressure: FloatArray
+    by_length: FloatArray
+
+    @property
+    def slopes(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The derivatives, in the order of `_PROFILE_COLUMNS`."""
+        return self.by_arc, self.by_pressure, self.by_length
+
+
+_PROFILE_COLUMNS = (0, 2, 3)
+"""Of a bridge, the numbers on which its profile depends: first arc, pressure, length."""
+
+
+@dataclass(frozen=True)
+class _Profile:
+    """Profiles of n bridges at `_PLACES`, and the solids at their ends."""
+
+    solids: _Solids
+    squares: _WithSlopes  # r²
+    uprights: _WithSlopes  # r sin φ
+    outwards: _WithSlopes  # r cos φ
 
 
 @dataclass(frozen=True)
@@ -99,54 +186,142 @@ class _Family:
     curvatures: tuple[float, float]
     contact_angles: tuple[float, float]
 
-    def ends(self, slopes: Array, radii: Array) -> tuple[Array, Array]:
-        """The profile's r sin φ and r cos φ at both solids, shape (..., 2), of filling angles and wetting lines."""
-        angles = np.array([pi - self.contact_angles[0], self.contact_angles[1]]) + _AWAY * slopes
-        return radii * np.sin(angles), radii * np.cos(angles)
+    def solids(self, arcs: FloatArray, turned: _Turned | None = None) -> _Solids:
+        """The solids at wetting lines with these arcs, shape (n, 2); ``turned``: of the filling angles."""
+        curvatures = np.array(self.curvatures)
+        slopes = curvatures * arcs
+        turned = turned or _Turned.of(slopes)
+        radii = arcs * turned.sincs
+        # The angle of the profile is π - θ1 - α1 at the first solid and θ2 + α2 at the second one.
+        contact_sines, contact_cosines = self.contact
+        sines = contact_sines * turned.cosines + _AWAY * contact_cosines * turned.sines
+        cosines = contact_cosines * turned.cosines - _AWAY * contact_sines * turned.sines
+        turning = _AWAY * curvatures
+        return _Solids(
+            radii=radii,
+            radii_by_arc=turned.cosines,
+            rises=0.5 * slopes * arcs * turned.half_sincs**2,
+            rises_by_arc=turned.sines,
+            uprights=radii * sines,
+            uprights_by_arc=turned.cosines * sines + turning * radii * cosines,
+            outwards=radii * cosines,
+            outwards_by_arc=turned.cosines * cosines - turning * radii * sines,
+        )
 
-    def misfit(self, x: Array) -> Array:
-        """Residuals of the boundary conditions, shape (..., 4): end on the second solid, contact angle, volume."""
-        arcs, pressure, length, curvatures = x[..., :2], x[..., 2:3], x[..., 3:4], np.array(self.curvatures)
-        at, slopes = length * _PLACES, curvatures * arcs
-        turns = pressure * at
-        (of_slopes, of_halves), (swings, halves) = (_sinc(np.multiply.outer(_HALVES, x)) for x in (slopes, turns))
-        radii, rises = arcs * of_slopes, 0.5 * curvatures * arcs**2 * of_halves**2
-        caps = pi / 6.0 * rises * (3.0 * radii**2 + rises**2)
-        uprights, outwards = self.ends(slopes, radii)
-        upright, outward = uprights[..., :1], outwards[..., :1]
-        start, bend = upright**2 + outward**2, 1.0 - pressure * upright
-        squared = start + bend * at**2 * halves**2 + 2.0 * outward * at * swings
-        along = upright + 0.5 * pressure * (squared - start)
-        weighted, radius = _WEIGHTS * along[..., :-1], np.sqrt(squared[..., :-1])
-        last = outward[..., 0] * np.cos(turns[..., -1]) + bend[..., 0] * x[..., 3] * swings[..., -1]
-        misfit = np.empty_like(x[..., :4])
-        misfit[..., 0] = along[..., -1] - uprights[..., 1]
-        misfit[..., 1] = last - outwards[..., 1]
-        misfit[..., 2] = x[..., 3] * (weighted / radius).sum(axis=-1) - x[..., 4] - rises.sum(axis=-1)
-        misfit[..., 3] = pi * x[..., 3] * (weighted * radius).sum(axis=-1) - 1.0 - caps.sum(axis=-1)
-        return misfit
+    @cached_property
+    def contact(self) -> tuple[FloatArray, FloatArray]:
+        """Sine and cosine of the angle of the profile at wetting lines on flat solids, each of shape (2,)."""
+        first, second = self.contact_angles
+        return sine_and_cosine([pi - first, second])
 
-    def jacobian(self, x: FloatArray) -> FloatArray:
-        """Derivatives of the misfit, shape (..., 4, 5), exact: by complex steps."""
-        return np.swapaxes(self.misfit(x[..., None, :] + _STEPS).imag, -1, -2) / _COMPLEX_STEP
+    def profile(self, x: FloatArray) -> _Profile:
+        """Profiles of n bridges x, shape (n, 5), and the solids at their ends."""
+        pressure, length = x[:, 2:3], x[:, 3:4]
+        along = length * _PLACES
+        slopes = np.array(self.curvatures) * x[:, :2]
+        turned = _Turned.of(np.concatenate([pressure * along, slopes], axis=1))
+        turned_profile, turned_slopes = turned.part(slice(0, -2)), turned.part(slice(-2, None))
+        solids = self.solids(x[:, :2], turned_slopes)
+        radius, radius_by_arc = solids.radii[:, :1], solids.radii_by_arc[:, :1]
+        upright, upright_by_arc = solids.uprights[:, :1], solids.uprights_by_arc[:, :1]
+        outward, outward_by_arc = solids.outwards[:, :1], solids.outwards_by_arc[:, :1]
+
+        # swing = sin(ps)/p and lift = 2 (1 - cos ps)/p², both smooth at p = 0.
+        swing = along * turned_profile.sincs
+        swing_by_pressure = along * along * turned_profile.sinc_slopes
+        lift = (along * turned_profile.half_sincs) ** 2
+        lift_by_pressure = along * along * along * turned_profile.half_sincs * turned_profile.half_sinc_slopes
+        bend = 1.0 - pressure * upright
+        bend_by_arc = -pressure * upright_by_arc
+
+        # r² = r0² + bend · lift + 2 r0 cos φ0 · swing, and r sin φ = r0 sin φ0 + p (r² - r0²)/2.
+        grown = bend * lift + 2.0 * outward * swing
+        grown_by_arc = bend_by_arc * lift + 2.0 * outward_by_arc * swing
+        grown_by_pressure = -upright * lift + bend * lift_by_pressure + 2.0 * outward * swing_by_pressure
+        # r cos φ is half the derivative of r² with respect to s.
+        outwards = outward * turned_profile.cosines + bend * swing
+        outwards_by_arc = outward_by_arc * turned_profile.cosines + bend_by_arc * swing
+        outwards_by_pressure = -outward * turned_profile.sines * along - upright * swing + bend * swing_by_pressure
+        outwards_by_length = (-outward * turned_profile.sines * pressure + bend * turned_profile.cosines) * _PLACES
+        grown_by_length = 2.0 * outwards * _PLACES
+        return _Profile(
+            solids=solids,
+            squares=_WithSlopes(
+                radius * radius + grown,
+                2.0 * radius * radius_by_arc + grown_by_arc,
+                grown_by_pressure,
+                grown_by_length,
+            ),
+            uprights=_WithSlopes(
+                upright + 0.5 * pressure * grown,
+                upright_by_arc + 0.5 * pressure * grown_by_arc,
+                0.5 * grown + 0.5 * pressure * grown_by_pressure,
+                0.5 * pressure * grown_by_length,
+            ),
+            outwards=_WithSlopes(outwards, outwards_by_arc, outwards_by_pressure, outwards_by_length),
+        )
+
+    def misfit(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Residuals of n bridges x, shape (n, 5), and their derivatives.
+
+        Returns
+        -------
+        residuals : ndarray, shape (n, 4)
+            Of r sin φ and r cos φ at the second solid, the gap, and the volume.
+        jacobian : ndarray, shape (n, 4, 5)
+        """
+        profile = self.profile(x)
+        solids, length = profile.solids, x[:, 3]
+        residuals = np.zeros((len(x), 4))
+        jacobian = np.zeros((len(x), 4, 5))
+
+        residuals[:, 0] = profile.uprights.values[:, -1] - solids.uprights[:, 1]
+        residuals[:, 1] = profile.outwards.values[:, -1] - solids.outwards[:, 1]
+        jacobian[:, 0, 1] = -solids.uprights_by_arc[:, 1]
+        jacobian[:, 1, 1] = -solids.outwards_by_arc[:, 1]
+        for column, upright_slope, outward_slope in zip(
+            _PROFILE_COLUMNS, profile.uprights.slopes, profile.outwards.slopes, strict=True
+        ):
+            jacobian[:, 0, column] = upright_slope[:, -1]
+            jacobian[:, 1, column] = outward_slope[:, -1]
+
+        # Height ∫ sin φ ds and volume π ∫ r² sin φ ds.
+        squares, uprights = profile.squares.values[:, :-1], profile.uprights.values[:, :-1]
+        radii = np.sqrt(squares)
+        height = (_WEIGHTS * uprights / radii).sum(axis=1)
+        volume = (_WEIGHTS * uprights * radii).sum(axis=1)
+        caps, caps_by_arc = _caps(solids)
+        residuals[:, 2] = length * height - x[:, 4] - solids.rises.sum(axis=1)
+        residuals[:, 3] = pi * length * volume - 1.0 - caps.sum(axis=1)
+        half = 0.5 * uprights / squares
+        for column, upright_slope, square_slope in zip(
+            _PROFILE_COLUMNS, profile.uprights.slopes, profile.squares.slopes, strict=True
+        ):
+            by_radius = half * square_slope[:, :-1]
+            height_slope = (_WEIGHTS * (upright_slope[:, :-1] - by_radius) / radii).sum(axis=1)
+            volume_slope = (_WEIGHTS * (upright_slope[:, :-1] + by_radius) * radii).sum(axis=1)
+            jacobian[:, 2, column] = length * height_slope
+            jacobian[:, 3, column] = pi * length * volume_slope
+        jacobian[:, 2, :2] -= solids.rises_by_arc
+        jacobian[:, 2, 3] += height
+        jacobian[:, 2, 4] = -1.0
+        jacobian[:, 3, :2] -= caps_by_arc
+        jacobian[:, 3, 3] += pi * volume
+        return residuals, jacobian
 
     def forces(self, x: FloatArray) -> FloatArray:
         """F/γ at the starts of the profiles."""
-        slopes = np.array(self.curvatures) * x[:, :2]
-        radii = x[:, :2] * _sinc(slopes)
-        return pi * (2.0 * self.ends(slopes, radii)[0] - x[:, 2:3] * radii**2)[:, 0]
+        solids = self.solids(x[:, :2])
+        return pi * (2.0 * solids.uprights - x[:, 2:3] * solids.radii**2)[:, 0]
 
     def solve(self, x: FloatArray, row: FloatArray, values: FloatArray) -> FloatArray:
         """Newton's method from n bridges x, shape (n, 5), for bridges with row · x = value; NaN where it fails."""
         solved, left = np.full_like(x, nan), np.arange(len(x))
         for _ in range(_NEWTON_STEPS):
-            misfit, matrices = np.empty((len(x), 5, 1)), np.empty((len(x), 5, 5))
-            misfit[:, :4, 0], misfit[:, 4, 0] = self.misfit(x), x @ row - values
-            matrices[:, :4], matrices[:, 4] = self.jacobian(x), row
-            try:
-                step = np.linalg.solve(matrices, misfit)[..., 0]
-            except np.linalg.LinAlgError:
-                break
+            residuals, jacobian = self.misfit(x)
+            misfit = np.column_stack([residuals, (x * row).sum(axis=1) - values])
+            matrices = np.concatenate([jacobian, np.tile(row, (len(x), 1, 1))], axis=1)
+            step = solve_linear(matrices, misfit)
             change = np.abs(step[:, _POSITIVE] / x[:, _POSITIVE]).max(axis=1)
             x = x - step * np.minimum(1.0, 0.3 / (change + 1e-300))[:, None]
             sound = (x[:, _POSITIVE] > 0.0).all(axis=1)
@@ -165,8 +340,26 @@ class _Family:
 
     def tangent(self, x: FloatArray, before: FloatArray, scale: FloatArray) -> FloatArray:
         """Direction of the family at x, of length 1 in units of `scale`, onward from `before`."""
-        direction = np.linalg.svd(self.jacobian(x) * scale)[2][-1] * scale
-        return direction if (direction / scale) @ (before / scale) > 0.0 else -direction  # type: ignore[no-any-return]
+        jacobian = self.misfit(x[None])[1][0]
+        onward = before / scale
+        # J t = 0 and t · onward = 1, in units of `scale`.
+        matrix = np.concatenate([jacobian * scale, onward[None]])
+        direction = solve_linear(matrix[None], np.array([[0.0, 0.0, 0.0, 0.0, 1.0]]))[0]
+        return np.asarray(direction * scale / _norm(direction))
+
+
+def _caps(solids: _Solids) -> tuple[FloatArray, FloatArray]:
+    """Volumes of the caps of the solids below the wetting lines, and their slopes, both of shape (n, 2)."""
+    radii, rises = solids.radii, solids.rises
+    volumes = pi / 6.0 * rises * (3.0 * radii**2 + rises**2)
+    by_radius = pi * rises * radii
+    by_rise = 0.5 * pi * (radii**2 + rises**2)
+    return volumes, by_radius * solids.radii_by_arc + by_rise * solids.rises_by_arc
+
+
+def _norm(vector: FloatArray) -> float:
+    """Length of a vector of 5 numbers."""
+    return float(np.sqrt((vector * vector).sum()))
 
 
 _GAP = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
@@ -178,11 +371,11 @@ def _toroid(family: _Family) -> FloatArray:
     arc = np.full(2, sqrt(2.0 / sqrt(pi * sum(family.curvatures))))
     curvatures = np.array(family.curvatures)
     slopes = curvatures * arc
-    height = float(sum(0.5 * curvatures * arc**2 * _sinc(0.5 * slopes) ** 2))
+    height = float((0.5 * slopes * arc * _Turned.of(slopes).half_sincs ** 2).sum())
     angles = [angle + float(slope) for angle, slope in zip(family.contact_angles, slopes, strict=True)]
     turn = 0.5 * (pi - sum(angles))
-    length = height / float(_sinc(np.array(turn)))
-    return np.array([*arc, 1.0 / arc[0] - 2.0 * sin(turn) / height, length, 0.0])
+    length = height / float(_Turned.of(np.array(turn)).sincs)
+    return np.array([*arc, 1.0 / arc[0] - 2.0 * float(sine(turn)) / height, length, 0.0])
 
 
 def _family_of(radii: tuple[float, float], volume: float, contact_angle: float | tuple[float, float]) -> _Family:
@@ -192,7 +385,7 @@ def _family_of(radii: tuple[float, float], volume: float, contact_angle: float |
     angles = contact_angle if isinstance(contact_angle, tuple) else (contact_angle, contact_angle)
     if not all(0.0 <= angle < pi for angle in angles):
         raise ValueError(f"contact angles {angles}: expected 0 to π")
-    unit = cbrt(volume)
+    unit = cube_root(volume)
     return _Family((unit / radii[0], unit / radii[1]), angles)
 
 
@@ -221,7 +414,7 @@ def _branch(family: _Family) -> tuple[FloatArray, FloatArray, FloatArray]:
     arcs, bridges, tangents = [0.0], [x], [tangent]
     for _ in range(_MOST_STEPS):
         onward = _onward(family, x, tangent, step, scale)
-        if onward is None or float(np.linalg.norm((onward[1] - tangent) / scale)) > _LARGEST_TURN:
+        if onward is None or _norm((onward[1] - tangent) / scale) > _LARGEST_TURN:
             step *= 0.5
             continue
         if onward[1][4] <= 0.0:
@@ -241,7 +434,7 @@ def _onward(
 ) -> tuple[FloatArray, FloatArray] | None:
     """The bridge one step further along the family, and the tangent of the family there."""
     row = tangent / scale**2
-    bridge = family.nearest(x + step * tangent, row, float(row @ x) + step)
+    bridge = family.nearest(x + step * tangent, row, float((row * x).sum()) + step)
     return None if bridge is None else (bridge, family.tangent(bridge, tangent, scale))
 
 
@@ -276,7 +469,7 @@ def force_curve(
     so large that the liquid is not held between them).
     """
     family = _family_of((radius_1, radius_2), volume, contact_angle)
-    unit, largest = cbrt(volume), float(_branch(family)[1][-1, 4])
+    unit, largest = cube_root(volume), float(_branch(family)[1][-1, 4])
     scaled = np.asarray(gaps, np.float64) / unit
     if scaled.min() < 0.0 or scaled.max() > largest * (1.0 + 1e-12):
         raise ValueError(f"gaps: expected 0 to {largest * unit:.6g}, where the bridge ruptures")
@@ -305,7 +498,7 @@ def _stable(family: _Family, gaps: FloatArray) -> FloatArray:
     for number in np.flatnonzero(far):
         chord = branch[pieces[number] + 1] - branch[pieces[number]]
         bridges[number] = _across(family, cubics[:, number], chord, (lows[number], highs[number]), gaps[number])
-    lost = ~(np.maximum(np.abs(bridges[:, 4] - gaps), np.max(np.abs(family.misfit(bridges)), axis=1)) <= _SAME_GAP)
+    lost = ~(np.maximum(np.abs(bridges[:, 4] - gaps), np.max(np.abs(family.misfit(bridges)[0]), axis=1)) <= _SAME_GAP)
     if lost.any():
         raise NoBridgeError(f"no bridge was found at a gap of {gaps[lost][0]:.6g} of the volume's cube root")
     return bridges
@@ -322,7 +515,7 @@ def _across(family: _Family, cubic: FloatArray, chord: FloatArray, ends: tuple[f
 
     def at(arc: float) -> FloatArray:
         near = _cubic(cubic, arc - ends[0])
-        exact = family.nearest(near, chord, float(chord @ near))
+        exact = family.nearest(near, chord, float((chord * near).sum()))
         return near if exact is None else exact
 
     last = at(ends[1])
@@ -333,7 +526,7 @@ def rupture_distance(
     radius_1: float, radius_2: float, volume: float, contact_angle: float | tuple[float, float]
 ) -> float:
     """Largest gap at which a bridge of this volume exists; parameters and errors as for `force_curve`."""
-    return cbrt(volume) * float(_branch(_family_of((radius_1, radius_2), volume, contact_angle))[1][-1, 4])
+    return cube_root(volume) * float(_branch(_family_of((radius_1, radius_2), volume, contact_angle))[1][-1, 4])
 
 
 def volume_at_contact(radius_1: float, radius_2: float, contact_angle: float, meniscus_radius: float) -> float:
@@ -342,16 +535,17 @@ def volume_at_contact(radius_1: float, radius_2: float, contact_angle: float, me
     Parameters as for `force_curve`. `NoBridgeError` if bridges up to half of the smaller sphere have more suction, or
     bridges as small as 1e-9 of it have less.
     """
-    ends = [log(share * 4.0 / 3.0 * pi * min(radius_1, radius_2) ** 3) for share in (1e-9, 0.5)]
+    sphere = 4.0 / 3.0 * pi * min(radius_1, radius_2) ** 2 * min(radius_1, radius_2)
+    ends = [float(logarithm(share * sphere)) for share in (1e-9, 0.5)]
 
     @cache
     def missing(log_volume: float) -> float:
         """Suction that is missing, over the wanted one."""
-        volume = exp(log_volume)
-        pressure = _touching(_family_of((radius_1, radius_2), volume, contact_angle))[2] / cbrt(volume)
+        volume = float(exponential(log_volume))
+        pressure = _touching(_family_of((radius_1, radius_2), volume, contact_angle))[2] / cube_root(volume)
         return float(1.0 + pressure * meniscus_radius)
 
     if not missing(ends[0]) < 0.0 < missing(ends[1]):
         radius = f"a meniscus radius of {1e6 * meniscus_radius:g} um"
         raise NoBridgeError(f"no bridge between touching surfaces has {radius}")
-    return exp(brentq(missing, *ends, xtol=1e-12))
+    return float(exponential(brentq(missing, *ends, xtol=1e-12)))

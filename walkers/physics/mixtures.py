@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from itertools import pairwise
-from math import exp, pi, sin
+from math import pi, sqrt
+
+from walkers.physics.portable import exponential, power, sine
 
 _TENSIONS = ((0.0, 73.05), (0.05, 72.9), (0.1, 72.9), (0.2, 72.4), (0.3, 72.0), (0.5, 70.0), (0.85, 66.0), (1.0, 63.0))
 """Mass fraction of glycerol and surface tension at 18 °C, mN/m: that of water by IAPWS, the others of the handbook."""
@@ -39,26 +41,26 @@ MIXTURES: Mapping[str, Callable[[float, float], dict[str, float]]] = {"water-gly
 
 def _viscosity(share: float, celsius: float) -> float:
     """Cheng's Eqs. 6, 21 and 22 with his exponent α, mPa s."""
-    water = 1.790 * exp((-1230.0 - celsius) * celsius / (36100.0 + 360.0 * celsius))
-    glycerol = 12100.0 * exp((-1233.0 + celsius) * celsius / (9900.0 + 70.0 * celsius))
+    water = 1.790 * float(exponential((-1230.0 - celsius) * celsius / (36100.0 + 360.0 * celsius)))
+    glycerol = 12100.0 * float(exponential((-1233.0 + celsius) * celsius / (9900.0 + 70.0 * celsius)))
     a = 0.705 - 0.0017 * celsius
-    b = (4.9 + 0.036 * celsius) * a**2.5
+    b = (4.9 + 0.036 * celsius) * (a * a * sqrt(a))
     alpha = 1.0 - share + a * b * share * (1.0 - share) / (a * share + b * (1.0 - share))
-    return float(water**alpha * glycerol ** (1.0 - alpha))
+    return float(power(water, alpha) * power(glycerol, 1.0 - alpha))
 
 
 def _density(share: float, celsius: float) -> float:
     """Density with the volume contraction of Volk and Kähler, kg/m³."""
-    glycerol, water = 1273.3 - 0.6121 * celsius, 1000.0 * (1.0 - abs((celsius - 3.98) / 615.0) ** 1.71)
+    glycerol, water = 1273.3 - 0.6121 * celsius, 1000.0 * (1.0 - float(power(abs((celsius - 3.98) / 615.0), 1.71)))
     contraction = 1.78e-6 * celsius**2 - 1.82e-4 * celsius + 1.41e-2
     added = 1.0 / (share / glycerol + (1.0 - share) / water)
-    return float(added * (1.0 + contraction * max(0.0, sin(share**1.31 * pi)) ** 0.81))
+    return float(added * (1.0 + contraction * float(power(max(0.0, float(sine(power(share, 1.31) * pi))), 0.81))))
 
 
 def _tension_of_water(celsius: float) -> float:
     """IAPWS R1-76(2014), mN/m."""
     tau = 1.0 - (celsius + 273.15) / 647.096
-    return float(235.8 * tau**1.256 * (1.0 - 0.625 * tau))
+    return float(235.8 * float(power(tau, 1.256)) * (1.0 - 0.625 * tau))
 
 
 def _tension(share: float, celsius: float) -> float:

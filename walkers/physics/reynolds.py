@@ -55,15 +55,16 @@ J. R. Smart, D. T. Leighton, Phys. Fluids A 1 (1989) 52-60, doi 10.1063/1.857523
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import pi, sqrt
 
 import numpy as np
 
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
 from walkers.physics.capillary import cavitation_gap
+from walkers.physics.portable import logarithm_of_one_plus, polynomial, power
 
-_A, _B = 2.0 - sqrt(2.5), 2.0 + sqrt(2.5)
+_A = 2.0 - sqrt(2.5)
 _THIN = 1e-5
 
 
@@ -91,8 +92,8 @@ def resistances(surfaces: Surfaces, gaps: FloatArray) -> tuple[FloatArray, Float
     normal = 6.0 * pi * viscosity * reduced**2 / wide * (1.0 - wide / np.sqrt(wide**2 + spread)) ** 2
     deep = np.sqrt(liquid_gaps**2 + spread) / liquid_gaps - 1.0  # y
     bend = 0.5 * (1.0 / surfaces.radius - 1.0 / surfaces.other_radius)
-    tilting = 96.0 * pi * viscosity * reduced**3 * _tilted(deep)
-    shear = 2.0 * pi * viscosity * reduced * np.log1p(deep)
+    tilting = 96.0 * pi * viscosity * (reduced * reduced * reduced) * _tilted(deep)
+    shear = 2.0 * pi * viscosity * reduced * logarithm_of_one_plus(deep)
     return normal, shear + bend**2 * tilting, -bend * tilting, tilting
 
 
@@ -105,10 +106,52 @@ def _tilted(deep: FloatArray) -> FloatArray:
 
     the second term by Green's identity; y³/96 where y is small and the terms cancel.
     """
-    from scipy.special import hyp2f1  # takes half a second, which `walkers show` does not need
-
-    lifted = hyp2f1(_A, _B, 2.0, -deep)
-    slope = 1.0 - _A * _B * deep * hyp2f1(_A + 1.0, _B + 1.0, 3.0, -deep) / lifted
+    slope = _logarithmic_slope(deep)
     wide = 1.0 + deep
-    exact = (np.log1p(deep) - deep / wide) / 20.0 + deep / (100.0 * wide) * ((1.0 - 3.0 * deep) / wide - slope)
-    return np.where(deep < _THIN, deep**3 / 96.0, exact)
+    exact = (logarithm_of_one_plus(deep) - deep / wide) / 20.0
+    exact += deep / (100.0 * wide) * ((1.0 - 3.0 * deep) / wide - slope)
+    return np.where(deep < _THIN, deep * deep * deep / 96.0, exact)
+
+
+def _logarithmic_slope(deep: FloatArray) -> FloatArray:
+    """L = d ln f/d ln x of the homogeneous solution f = x ₂F₁(a, 4 - a; 2; -y), a = 2 - √10/2, at y = x².
+
+    By Pfaff's transformation ₂F₁ is (1 + y)^-a G(w) with G = ₂F₁(a, a - 2; 2; w) and w = y/(1 + y), so that
+    L = 1 - 2 a w + 2 w (1 - w) G'/G. G is a power series in w up to w = 1/2, and two series in 1 - w above it.
+    """
+    wide = 1.0 + deep
+    w, rest = deep / wide, 1.0 / wide
+    near = np.minimum(w, 0.5)
+    series = polynomial(_NEAR, near)
+    slope = polynomial(_slopes(_NEAR), near)
+    far = np.minimum(rest, 0.5)
+    scale = _SECOND * power(far, _EXPONENT)
+    second = scale * polynomial(_FAR_SECOND, far)
+    second_slope = scale * (_EXPONENT / far * polynomial(_FAR_SECOND, far) + polynomial(_slopes(_FAR_SECOND), far))
+    far_series = polynomial(_FAR_FIRST, far) + second
+    far_slope = -(polynomial(_slopes(_FAR_FIRST), far) + second_slope)
+    of_logarithm = np.where(w <= 0.5, slope / series, far_slope / far_series)
+    return np.asarray(1.0 - 2.0 * _A * w + 2.0 * w * rest * of_logarithm)
+
+
+def _hypergeometric(a: float, b: float, c: float) -> tuple[float, ...]:
+    """Coefficients of ₂F₁(a, b; c; x) from the highest power to the constant; below 1e-18 of it for x up to 1/2."""
+    terms = [1.0]
+    for number in range(_TERMS):
+        terms.append(terms[-1] * (a + number) * (b + number) / ((c + number) * (1.0 + number)))
+    return tuple(reversed(terms))
+
+
+def _slopes(coefficients: Sequence[float]) -> list[float]:
+    """Coefficients of the derivative of a polynomial, from the highest power to the constant."""
+    highest = len(coefficients) - 1
+    return [(highest - place) * coefficient for place, coefficient in enumerate(coefficients[:-1])]
+
+
+_TERMS = 56
+_EXPONENT = 4.0 - 2.0 * _A
+_SECOND = 0.24851522586732902
+"""Γ(2a - 4) Γ(2 - a) Γ(4 - a) / (Γ(4 - 2a) Γ(a) Γ(a - 2)): of the second series in 1 - w over the first one."""
+_NEAR = _hypergeometric(_A, _A - 2.0, 2.0)
+_FAR_FIRST = _hypergeometric(_A, _A - 2.0, 2.0 * _A - 3.0)
+_FAR_SECOND = _hypergeometric(2.0 - _A, 4.0 - _A, 5.0 - 2.0 * _A)

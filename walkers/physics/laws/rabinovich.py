@@ -14,13 +14,14 @@ P. Lambert, A. Chau, A. Delchambre, S. Régnier, Langmuir 24 (2008) 3157–3163,
 
 from __future__ import annotations
 
-from math import cos, pi
+from math import pi
 
 import numpy as np
 
 from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Surfaces
 from walkers.physics.capillary import derjaguin_radius, rupture_distance
+from walkers.physics.portable import cosine, sine
 
 
 def lambert(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
@@ -32,7 +33,7 @@ def lambert(radius_1: float, radius_2: float, volume: float, contact_angle: floa
     radius = derjaguin_radius(radius_1, radius_2)
     # h / 2d without a division by h.
     immersed = np.sqrt(gaps**2 + 2.0 * volume / (pi * radius)) - gaps
-    return 2.0 * pi * radius * cos(contact_angle) / (1.0 + gaps / immersed)
+    return 2.0 * pi * radius * float(cosine(contact_angle)) / (1.0 + gaps / immersed)
 
 
 def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
@@ -41,7 +42,7 @@ def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, 
     immersed = np.sqrt(gaps**2 + 2.0 * volume / (pi * radius)) - gaps
     embracing = np.sqrt(immersed / radius)
     pressed = lambert(radius_1, radius_2, volume, contact_angle, gaps)
-    return pressed + 2.0 * pi * radius * np.sin(embracing) * np.sin(contact_angle + embracing)
+    return pressed + 2.0 * pi * radius * sine(embracing) * sine(contact_angle + embracing)
 
 
 def law(surfaces: Surfaces) -> Curve:

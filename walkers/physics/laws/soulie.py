@@ -15,12 +15,13 @@ Nase et al. as in D. Shi, J. J. McCarthy, Powder Technology 184 (2008) 65–75, 
 
 from __future__ import annotations
 
-from math import inf, log, pi, sqrt
+from math import inf, pi, sqrt
 
 import numpy as np
 
 from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
 from walkers.physics.capillary import rupture_distance
+from walkers.physics.portable import exponential, logarithm, power
 
 
 def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
@@ -30,11 +31,12 @@ def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, 
     """
     (first, second), times = ((radius_1, radius_1), 2.0) if radius_2 == inf else ((radius_1, radius_2), 1.0)
     larger = max(first, second)
-    scaled = log(volume / larger**3)
-    a = -1.1 * (volume / larger**3) ** -0.53
+    relative_volume = volume / (larger * larger * larger)
+    scaled = float(logarithm(relative_volume))
+    a = -1.1 * float(power(relative_volume, -0.53))
     b = (-0.148 * scaled - 0.96) * contact_angle**2 - 0.0082 * scaled + 0.48
     c = 0.0018 * scaled + 0.078
-    return np.asarray(times * pi * sqrt(first * second) * (np.exp(a * np.maximum(gaps, 0.0) / larger + b) + c))
+    return np.asarray(times * pi * sqrt(first * second) * (exponential(a * np.maximum(gaps, 0.0) / larger + b) + c))
 
 
 def law(surfaces: Surfaces) -> Curve:
@@ -45,6 +47,6 @@ def law(surfaces: Surfaces) -> Curve:
     def forces(gaps: FloatArray) -> Forces:
         near, none = np.maximum(surfaces.roughness, gaps) / reduced, np.zeros_like(gaps)
         pulled = liquid.surface_tension * pull(*shape, surfaces.volume, liquid.contact_angle, gaps)
-        return Forces(pulled, stokes / near, stokes * (8.0 / 15.0 * np.log(1.0 / near) + 0.9588), none, none)
+        return Forces(pulled, stokes / near, stokes * (8.0 / 15.0 * logarithm(1.0 / near) + 0.9588), none, none)
 
     return Curve(forces, rupture_distance(surfaces.volume, liquid.contact_angle))

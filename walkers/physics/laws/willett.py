@@ -11,13 +11,50 @@ C. D. Willett, M. J. Adams, S. A. Johnson, J. P. K. Seville, Langmuir 16 (2000) 
 
 from __future__ import annotations
 
-from math import cbrt, log, pi, sqrt
+from collections.abc import Sequence
+from math import pi, sqrt
 
 import numpy as np
 
 from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Surfaces
 from walkers.physics.capillary import derjaguin_radius
+from walkers.physics.portable import cube_root, exponential, logarithm
+
+# Coefficients of the appendix: a row for each power of ln(V/R³) from 0, a column for each power of θ.
+_F1 = (
+    (-0.44507, 0.050832, -1.1466),
+    (-0.1119, -0.000411, -0.1490),
+    (-0.012101, -0.0036456, -0.01255),
+    (-0.0005, -0.0003505, -0.00029076),
+)
+_F2 = (
+    (1.9222, -0.57473, -1.2918),
+    (-0.0668, -0.1201, -0.22574),
+    (-0.0013375, -0.0068988, -0.01137),
+)
+_F3 = (
+    (1.268, -0.01396, -0.23566),
+    (0.198, 0.092, -0.06418),
+    (0.02232, 0.02238, -0.009853),
+    (0.0008585, 0.001318, -0.00053),
+)
+_F4 = (
+    (-0.010703, 0.073776, -0.34742),
+    (0.03345, 0.04543, -0.09056),
+    (0.0018574, 0.004456, -0.006257),
+)
+
+
+def _by_volume_and_angle(
+    coefficients: Sequence[tuple[float, float, float]], log_volume: float, contact_angle: float
+) -> float:
+    """A polynomial in ln(V/R³) whose coefficients are polynomials in the contact angle, rad."""
+    value = 0.0
+    for constant, linear, quadratic in reversed(coefficients):
+        at_angle = constant + linear * contact_angle + quadratic * (contact_angle * contact_angle)
+        value = value * log_volume + at_angle
+    return value
 
 
 def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
@@ -26,39 +63,18 @@ def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, 
     Parameters and result as for `walkers.physics.laws.soulie.pull`.
     """
     radius = derjaguin_radius(radius_1, radius_2)
-    v, t = log(volume / radius**3), np.array([1.0, contact_angle, contact_angle**2])
-    f1 = (
-        t @ [-0.44507, 0.050832, -1.1466]
-        + t @ [-0.1119, -0.000411, -0.1490] * v
-        + t @ [-0.012101, -0.0036456, -0.01255] * v**2
-        + t @ [-0.0005, -0.0003505, -0.00029076] * v**3
-    )
-    f2 = (
-        t @ [1.9222, -0.57473, -1.2918]
-        + t @ [-0.0668, -0.1201, -0.22574] * v
-        + t @ [-0.0013375, -0.0068988, -0.01137] * v**2
-    )
-    f3 = (
-        t @ [1.268, -0.01396, -0.23566]
-        + t @ [0.198, 0.092, -0.06418] * v
-        + t @ [0.02232, 0.02238, -0.009853] * v**2
-        + t @ [0.0008585, 0.001318, -0.00053] * v**3
-    )
-    f4 = (
-        t @ [-0.010703, 0.073776, -0.34742]
-        + t @ [0.03345, 0.04543, -0.09056] * v
-        + t @ [0.0018574, 0.004456, -0.006257] * v**2
-    )
+    v = float(logarithm(volume / (radius * radius * radius)))
+    f1, f2, f3, f4 = (_by_volume_and_angle(rows, v, contact_angle) for rows in (_F1, _F2, _F3, _F4))
     # At contact ln s is -∞; a very small gap gives the same force.
-    s = np.log(np.maximum(gaps, 1e-9 * radius) / 2.0 / sqrt(volume / radius))
-    apart = np.where(gaps > 0.0, np.exp(f3 * s + f4 * s**2), 0.0)
-    return 2.0 * pi * radius * np.exp(f1 - f2 * apart)
+    s = logarithm(np.maximum(gaps, 1e-9 * radius) / 2.0 / sqrt(volume / radius))
+    apart = np.where(gaps > 0.0, exponential(f3 * s + f4 * s**2), 0.0)
+    return 2.0 * pi * radius * exponential(f1 - f2 * apart)
 
 
 def rupture(radius_1: float, radius_2: float, volume: float, contact_angle: float) -> float:
     """Willett et al. (2000), Eq. 15, for equal spheres: (1 + θ/2) (V^(1/3) + 0.1 V^(2/3) / R), m."""
     radius = derjaguin_radius(radius_1, radius_2)
-    return (1.0 + 0.5 * contact_angle) * (cbrt(volume) + 0.1 * cbrt(volume) ** 2 / radius)
+    return (1.0 + 0.5 * contact_angle) * (cube_root(volume) + 0.1 * cube_root(volume) ** 2 / radius)
 
 
 def law(surfaces: Surfaces) -> Curve:

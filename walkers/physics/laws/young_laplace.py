@@ -22,6 +22,7 @@ from walkers.cache import kept_numbers, place_of_numbers
 from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Surfaces
 from walkers.physics.capillary import solver
+from walkers.physics.portable import chebyshev_coefficients, chebyshev_nodes
 
 NODES = (48, 96)
 """Numbers of gaps at which the equation is solved, increased until the last coefficients are small; the largest one
@@ -54,7 +55,7 @@ def unsolved(bridges: Iterable[Surfaces]) -> int:
 def _shape(surfaces: Surfaces) -> _Shape:
     """The other radius and the volume in units of the bead's radius, and the contact angle."""
     radius, angle = surfaces.radius, surfaces.liquid.contact_angle
-    numbers = (surfaces.other_radius / radius, surfaces.volume / radius**3, angle)
+    numbers = (surfaces.other_radius / radius, surfaces.volume / (radius * radius * radius), angle)
     other_radius, volume, angle = (float(f"{number:.14g}") for number in numbers)
     return other_radius, volume, angle
 
@@ -78,9 +79,9 @@ def _solve(shape: _Shape) -> FloatArray:
     bridge = (1.0, *shape)
     rupture = rupture_distance(*bridge)
     for nodes in NODES:
-        smooth = Chebyshev.interpolate(
-            lambda part: force_curve(*bridge, rupture * (1.0 - part**2)).forces, nodes - 1, domain=[0.0, 1.0]
-        )
+        parts = 0.5 * (1.0 + chebyshev_nodes(nodes))
+        forces = force_curve(*bridge, rupture * (1.0 - parts**2)).forces
+        smooth = Chebyshev(chebyshev_coefficients(forces), domain=[0.0, 1.0])
         if np.abs(smooth.coef[-4:]).max() < _SMALL * abs(smooth(1.0)):
             break
     return np.array([rupture, *smooth.coef])
