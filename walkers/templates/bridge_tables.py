@@ -46,7 +46,8 @@ class Table:
     def within(self, parts: FloatArray) -> FloatArray:
         """Gaps at the given parts of all cells, m."""
         mantissas = (1.0 + (np.arange(self.cells)[:, None] + parts).ravel() / self.cells)[None, :]
-        near = self.scale * ((2.0 ** np.arange(self.octaves)[:, None] * mantissas).ravel() - 1.0)
+        octaves = np.ldexp(1.0, np.arange(self.octaves))[:, None]
+        near = self.scale * ((octaves * mantissas).ravel() - 1.0)
         middle = self.scale * (2.0**self.octaves - 1.0)
         even = (np.arange(2 * self.cells)[:, None] + parts).ravel() / (2 * self.cells)
         far = middle + (self.curve.rupture - middle) * (1.0 - (1.0 - even) ** 2)
@@ -54,16 +55,24 @@ class Table:
 
     def interpolated(self, gaps: FloatArray) -> FloatArray:
         """Forces at gaps (m), shape (n, 5), as the engine interpolates them: by a cubic through the rows of a cell."""
-        rupture, middle, powers = self.curve.rupture, self.scale * (2.0**self.octaves - 1.0), np.arange(4)
-        fours = np.lib.stride_tricks.sliding_window_view(self.rows, 4, axis=0)[::3]
-        cubics = fours @ np.linalg.inv((powers[:, None] / 3.0) ** powers).T
+        rupture = self.curve.rupture
+        middle = self.scale * (2.0**self.octaves - 1.0)
         gaps = np.clip(gaps, 0.0, rupture)
         mantissa, exponent = np.frexp(1.0 + gaps / self.scale)
         near = self.cells * ((exponent - 1) + 2.0 * mantissa - 1.0)
         far = self.cells * (self.octaves + 2.0 * (1.0 - np.sqrt((rupture - gaps) / (rupture - middle))))
         place = np.where(gaps < middle, near, far)
-        cell = np.minimum(place.astype(int), len(cubics) - 1)
-        return np.asarray(np.einsum("nck,nk->nc", cubics[cell], (place - cell)[:, None] ** powers))
+        cell = np.minimum(place.astype(int), (len(self.rows) - 1) // 3 - 1)
+        # Lagrange's polynomials of the rows at 0, 1/3, 2/3 and 1 of the cell; products and sums alone
+        # have the same bits on every processor.
+        part = 3.0 * (place - cell)[:, None]
+        first, second, third, fourth = (self.rows[3 * cell + number] for number in range(4))
+        return np.asarray(
+            -first * (part - 1.0) * (part - 2.0) * (part - 3.0) / 6.0
+            + second * part * (part - 2.0) * (part - 3.0) / 2.0
+            - third * part * (part - 1.0) * (part - 3.0) / 2.0
+            + fourth * part * (part - 1.0) * (part - 2.0) / 6.0
+        )
 
     def text(self) -> str:
         """The text of the table in the engine's file; twelve digits, far more accurate than `TOLERANCE`."""
