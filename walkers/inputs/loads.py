@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import lru_cache
+from itertools import combinations_with_replacement
 from math import inf, pi
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -12,6 +14,7 @@ from walkers.physics.bridge import BridgeLaw, Surfaces
 from walkers.physics.capillary import bead_volume, largest_normal
 from walkers.physics.contact import hertz_overlap, hertz_stiffness, reduced_modulus
 from walkers.physics.dimer import Dimer
+from walkers.rounding import percent
 
 if TYPE_CHECKING:
     from walkers.inputs.bodies import Walkers
@@ -60,6 +63,34 @@ def resistances_at_rest(case: Case, radius: float, other_radius: float) -> tuple
     return sliding, coupling, rolling
 
 
+LARGEST_DELAY = 0.025
+"""Largest delay of contacts by bridges, rad, at which velocities are within 2 % of those of rigid beads."""
+
+
+_NOTICED_DELAY = 0.1
+"""Delay from which results of loose beads say how much it slows them, rad."""
+_MEASURED_DELAYS = (0.0, 0.13, 0.34, 0.6, 1.5, 3.8)
+"""Delays, rad, of the shipped ``cluster`` with glycerol and glycerol 87 %, of 50 to 800 MPa."""
+_MEASURED_SLOWDOWNS = (0.0, 0.01, 0.02, 0.04, 0.15, 0.53)
+"""The share by which the cluster is then slower than with beads of 12.8 GPa."""
+
+
+def softness_warning(case: Case) -> str | None:
+    """What the delay of contacts does to the loose beads of a case; None if that is little."""
+    if (phase := delay_of_loose_beads(case)) < _NOTICED_DELAY:
+        return None
+    slower = percent(float(np.interp(phase, _MEASURED_DELAYS, _MEASURED_SLOWDOWNS)))
+    return (
+        f"soft beads: bridges delay contacts by {phase:.2g} rad, which slows clusters by some {slower} "
+        "(in a corner; more on a plain wall); a higher contact.youngs_modulus reduces it"
+    )
+
+
+def delay_of(case: Case) -> float:
+    """The largest phase by which bridges delay any contact of a case, rad: of its walkers and of its loose beads."""
+    return max([delay_of_loose_beads(case), *(delay(case, walkers) for walkers in case.walkers)])
+
+
 def delay(case: Case, walkers: Walkers) -> float:
     """Phase by which bridges delay the contacts of walkers in the drive, ωN/k, rad.
 
@@ -67,27 +98,53 @@ def delay(case: Case, walkers: Walkers) -> float:
     bridge's normal resistance N. Friction is limited by the elastic force, and follows as late. Velocities differ from
     those of rigid beads by about 0.7 of this phase, and sliding by 2.5 (Figs. 2, 4a and 4b, up to 3.2 GPa).
     """
+    return _largest_delay(case, contact_loads(case, walkers))
+
+
+def delay_of_loose_beads(case: Case) -> float:
+    """The same phase for the placed beads and the mixture of a case, rad: the largest of any two beads or a wall.
+
+    The contacts are loaded by their bridges alone, as at an upright wall.
+    """
+    return _largest_delay(case, _loads_of_loose_beads(case))
+
+
+def _loads_of_loose_beads(case: Case) -> list[Load]:
+    """Contacts of each radius of the placed beads and the mixture with the wall and with each other radius."""
+    radii = {bead.radius for bead in case.placed}
+    if case.mixture is not None:
+        radii |= {*case.mixture.small_radii, *case.mixture.large_radii}
+    pairs = combinations_with_replacement([*sorted(radii), inf], 2)
+    return [_with_overlap(case, bridge_at_rest(case, *pair)) for pair in pairs if pair != (inf, inf)]
+
+
+def _with_overlap(case: Case, bridge: Load, weight: float = 0.0) -> Load:
+    """A bridge with the overlap at which the repulsion balances its pull and a weight, N."""
     modulus = reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
-    times = [
-        largest_normal(of.reduced_radius, of.roughness, of.liquid) / hertz_stiffness(depth, of.reduced_radius, modulus)
-        for of, *_, depth in contact_loads(case, walkers)
-        if depth
-    ]
-    return 2.0 * pi * case.excitation.fastest * max(times, default=0.0)
+    return bridge._replace(overlap=hertz_overlap(bridge.pull + weight, bridge.surfaces.reduced_radius, modulus))
+
+
+def _largest_delay(case: Case, loads: Iterable[Load]) -> float:
+    """The largest 2πfN/k of contacts, rad; contacts without a load have none."""
+    modulus = reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
+    longest = 0.0
+    for load in loads:
+        if load.overlap:
+            radius = load.surfaces.reduced_radius
+            resistance = largest_normal(radius, load.surfaces.roughness, load.surfaces.liquid)
+            longest = max(longest, resistance / hertz_stiffness(load.overlap, radius, modulus))
+    return 2.0 * pi * case.excitation.fastest * longest
 
 
 def contact_loads(case: Case, walkers: Walkers | None = None) -> list[Load]:
     """The contacts of a case's first (or other) walkers at rest: each bead on the floor, then each pair of beads."""
-    make, contact = walkers or case.walkers[0], case.contact
-    modulus = reduced_modulus(contact.youngs_modulus, contact.poissons_ratio)
+    make = walkers or case.walkers[0]
     density, gravity = case.beads.density, case.pressing_gravity
     held = [(radius, inf, bead_volume(radius) * density * gravity) for radius in make.radii]
     loads = []
     pairs = [(make.radii[first], make.radii[second], 0.0) for first, second in make.pairs]
     for radius, other_radius, weight in [*held, *pairs]:
-        bridge = bridge_at_rest(case, radius, other_radius)
-        overlap = hertz_overlap(bridge.pull + weight, bridge.surfaces.reduced_radius, modulus)
-        loads.append(bridge._replace(overlap=overlap))
+        loads.append(_with_overlap(case, bridge_at_rest(case, radius, other_radius), weight))
     return loads
 
 

@@ -18,10 +18,10 @@ from walkers.inputs.boundary import BOTTOM, Plane
 from walkers.inputs.drive import common_frequency, unit_vector
 from walkers.inputs.keys import MISSING, parts_of, value_at
 from walkers.inputs.library import Library, LibraryNumber, unmeasured
-from walkers.inputs.loads import bridge_at_rest, contact_loads, delay, dimer_of, reach
+from walkers.inputs.loads import LARGEST_DELAY, bridge_at_rest, contact_loads, delay_of, dimer_of, reach
 from walkers.inputs.origins import Source
 from walkers.inputs.record import Record
-from walkers.inputs.run import with_run
+from walkers.inputs.run import limits_of, with_run
 from walkers.inputs.standing import OVERLAP, check_bodies, overlaps
 from walkers.inputs.table import alternatives, changed
 from walkers.inputs.units import ACCELERATION, LENGTH, TEMPERATURE, parse_quantity, quantity_text
@@ -33,8 +33,10 @@ if TYPE_CHECKING:
     from walkers.inputs.case import Case
 
 _PACKING = 0.55  # packing fraction of a settled wet pile, for the count that fills a height
-_SOFTEST, _LATEST = 5e7, 0.025
-"""Lowest Young's modulus of ``"auto"``, Pa, and the largest `delay`, rad: velocities are then within 2 %."""
+_SOFTEST = 5e7
+"""Lowest Young's modulus of ``"auto"``, Pa."""
+_HARDEST = 4.0**5 * _SOFTEST
+"""Highest one, 51.2 GPa: four times as much is beyond what a case may have."""
 _ROUGHEST = 0.01
 """Largest roughness over the radius of a bead: the wedge of liquid between smooth spheres is then no model."""
 _MEET = 0.01  # largest difference of the ends of a record that repeats, over its peak acceleration
@@ -373,16 +375,25 @@ def _law(case: Case) -> Case:
 
 
 def _modulus(case: Case) -> Case:
-    """Young's modulus of ``"auto"``: walkers depend on it by the delay of their contacts."""
+    """Young's modulus of ``"auto"``: the lowest at which bridges delay contacts little (`LARGEST_DELAY`).
+
+    In a mixture a higher modulus must not shorten the time step: hard beads would cost several times as much.
+    """
     if case.contact.youngs_modulus is not None:
         return case
-    modulus, late = _SOFTEST, inf
-    while late > _LATEST:
-        softened = case.put("contact.youngs_modulus", modulus)
-        late = max((delay(softened, walkers) for walkers in case.walkers), default=0.0)
-        modulus *= 4.0
-    why = f"auto: bridges delay contacts by {late:.1g} rad" if case.walkers else "auto"
+    softened = case.put("contact.youngs_modulus", _SOFTEST)
+    while delay_of(softened) > LARGEST_DELAY and softened.contact.youngs_modulus < _HARDEST:
+        harder = softened.put("contact.youngs_modulus", 4.0 * softened.contact.youngs_modulus)
+        if case.mixture is not None and _longest_step(harder) < _longest_step(softened):
+            break
+        softened = harder
+    why = f"auto: bridges delay contacts by {delay_of(softened):.1g} rad"
     return case.filled("contact.youngs_modulus", softened.contact.youngs_modulus, why)
+
+
+def _longest_step(case: Case) -> float:
+    """The time step that is recommended for a case, s."""
+    return limits_of(case).recommended(loose=case.loose)[0]
 
 
 def _uphill(case: Case) -> Case:

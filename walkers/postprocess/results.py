@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, refused
+from walkers.inputs.loads import softness_warning
 from walkers.inputs.run import limits_of
 from walkers.postprocess import meetings, piles, threshold, walking
 from walkers.postprocess.caption import conditions
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from walkers.inputs.case import Case
     from walkers.inputs.origins import Origin
 
-VERSION = 1
+VERSION = 2
 """Of all methods together: a result of another version is measured again."""
 _BESIDE = ("case", "drive", "rests_on", "by_hand", "tables", "warnings")
 """Entries of ``result.json`` beside the numbers."""
@@ -103,6 +104,8 @@ def measure(directory: Path) -> None:
     warnings = [*notes, *(warning for part in parts for warning in part.warnings)]
     if names := limits_of(case).exceeded_by(case.run.time_step):
         warnings.append(f"the time step is beyond a limit of stability ({', '.join(names)}): the results are wrong")
+    if (softness := softness_warning(case)) is not None:
+        warnings.append(softness)
     if motion.truncated:
         warnings.append("the dump ends within a frame")
     contents = {
