@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import cache
 from hashlib import sha256
 from math import inf
@@ -11,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.conftest import call, document, make_case, to_toml
+from tests.conftest import brief_pile, call, document, make_case, to_toml
 from tests.test_physics import OWN
+from walkers import run as run_case
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case, shipped
@@ -22,7 +24,17 @@ from walkers.physics.laws import LAWS, by_name
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.templates.bridge_tables import TOLERANCE, RecordedLaw, tabulated
-from walkers.templates.deck import CONTENT_VERSION, Deck, Segment, compose, plan_of, render_deck, settling_steps
+from walkers.templates.deck import (
+    BEADS_NAME,
+    CONTENT_VERSION,
+    Deck,
+    Segment,
+    compose,
+    plan_of,
+    processor_grid,
+    render_deck,
+    settling_steps,
+)
 from walkers.templates.scene import place
 
 
@@ -34,10 +46,48 @@ def test_numbers_are_rendered_in_full_precision(name: str) -> None:
     assert "timestep        ${time_step}\n" in deck
     assert 1.0 / (float(given["frequency"]) * int(given["steps_per_cycle"])) == case.run.time_step
     assert float(given["friction_bead_wall"]) == case.contact.friction.bead_wall
-    lines = (line.split() for line in deck.splitlines() if line.startswith("create_atoms"))
-    assert [tuple(map(float, line[3:6])) for line in lines] == [bead.centre for bead in place((case,))[0].beads]
+    beads = place((case,))[0].beads
+    assert _centres(render_deck(case)) == [bead.centre for bead in beads]
     rolls = "rolling_friction cdt" in deck
     assert rolls == (case.contact.rolling_friction > 0.0)
+
+
+def _centres(deck: Deck) -> list[tuple[float, ...]]:
+    """Centres of the beads as the engine reads them, from the commands or from the file of many beads."""
+    if BEADS_NAME not in deck.files:
+        lines = [line.split() for line in deck.text.splitlines() if line.startswith("create_atoms")]
+        return [tuple(map(float, line[3:6])) for line in lines]
+    atoms = deck.files[BEADS_NAME].partition("Atoms\n\n")[2].partition("\n\n")[0]
+    return [tuple(map(float, line.split()[4:7])) for line in atoms.splitlines()]
+
+
+def test_beads_from_a_file_are_those_that_commands_create(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The engine's dumps are the same bytes, of beads of two sizes that fall and are shaken."""
+    dumps = []
+    for most_created in (19, 20):
+        monkeypatch.setattr("walkers.templates.deck.MOST_CREATED", most_created)
+        case = brief_pile()
+        assert (BEADS_NAME in render_deck(case).files) == (most_created == 19)
+        place = run_case(case, tmp_path / str(most_created)).directory
+        names = ("beads.bin", "bridges.pairs.txt", "bridges.walls.txt")
+        dumps.append([path.read_bytes() for name in names for path in sorted(place.rglob(name))])
+    assert dumps[0] == dumps[1]
+    assert len(dumps[0]) >= 6
+
+
+def test_walkers_are_not_sorted_and_piles_are() -> None:
+    assert "atom_modify     map array sort 0 0.0\n" in render_deck(load_case("fig1b")).text
+    assert "atom_modify     map array\n" in render_deck(load_case("pile-ci")).text
+
+
+@pytest.mark.parametrize(
+    ("ranks", "width", "depth", "grid"),
+    [(1, 1.0, 1.0, (1, 1)), (2, 1.0, 1.0, (2, 1)), (2, 1.0, 3.0, (1, 2)), (4, 1.0, 1.0, (2, 2)), (6, 6.0, 1.0, (6, 1))],
+)
+def test_ranks_form_a_grid_with_short_cuts(ranks: int, width: float, depth: float, grid: tuple[int, int]) -> None:
+    plan = plan_of(load_case("pile-ci"))
+    box = replace(plan.scene, lower=(0.0, 0.0, 0.0), upper=(width, depth, 9.0))
+    assert processor_grid(replace(plan, scene=box, ranks=ranks)) == grid
 
 
 def test_a_mixture_is_placed_by_its_seed() -> None:
@@ -56,7 +106,7 @@ def test_bridges_may_push_loose_beads_and_have_no_viscosity() -> None:
     assert not any(map(any, resistances))
 
 
-CONTENT = {9: "b5bc9e772130d902"}
+CONTENT = {10: "ea7962106a2b1f1e"}
 """Digest of all that the engine reads of some cases, for the version of the decks' content."""
 
 

@@ -225,6 +225,11 @@ def write_segment_record(
     return record
 
 
+def has_tables_of(segment: Path, deck: Deck) -> bool:
+    """Whether the bridge tables of a complete segment are those of a deck, byte for byte."""
+    return (segment / BRIDGES_NAME).read_bytes() == deck.files[BRIDGES_NAME].encode("utf-8")
+
+
 @contextmanager
 def room_on_disk(incomplete: Path, needed: int | None = None) -> Iterator[None]:
     """Turn the system's errors for a full disk and a removed directory into `DiskFull` (bytes) and `OutputGone`."""

@@ -14,7 +14,7 @@ from walkers.runner.binary import Engine, plugin_of, read_audit
 from walkers.runner.files import checksum, read_json, write_json
 from walkers.runner.launch import EngineReport
 from walkers.runner.provenance import software
-from walkers.templates.deck import CONTENT_VERSION
+from walkers.templates.deck import CONTENT_VERSION, bridge_tables_digest
 
 MANIFEST_NAME = "manifest.json"
 RESULT_NAME = "result.json"
@@ -43,6 +43,7 @@ def write_manifest(
             "audit": audit,
         },
         "deck_version": CONTENT_VERSION,
+        "bridge_tables": bridge_tables_digest(case),
         "contact_model": model,
         **software(),
         "host": platform.node(),

@@ -26,9 +26,9 @@ from walkers.rounding import percent
 from walkers.runner import directory as on_disk
 from walkers.runner.binary import find_engine, plugin_of, write_run_script
 from walkers.runner.failures import EngineFailure, MissingFrames
-from walkers.runner.files import read_json, write_json
+from walkers.runner.files import checksum, read_json, write_json
 from walkers.runner.launch import judge
-from walkers.runner.manifest import MANIFEST_NAME, read_manifest, write_manifest
+from walkers.runner.manifest import MANIFEST_NAME, checksums, read_manifest, write_manifest
 from walkers.sweeps.readable import kind_of
 from walkers.templates import deck as decks
 from walkers.templates.deck import PRINTED, Segment, suffixes
@@ -71,7 +71,8 @@ def write_folder(case: Case, folder: Path) -> Path:
         write_run_script(folder, engine, plugin, deck.layout.ranks)
         if law := source_of(case.liquid.law):
             shutil.copyfile(law, folder / on_disk.LAW_NAME)
-        write_json(folder / on_disk.DECK_RECORD_NAME, {"case": case.as_dict(), "deck": deck.text})
+        record = {"case": case.as_dict(), "deck": deck.text, "sha256": checksums(folder, deck.files)}
+        write_json(folder / on_disk.DECK_RECORD_NAME, record)
     except OSError as error:  # a disk that is full names no file
         error.filename = str(folder)
         shutil.rmtree(folder, ignore_errors=True)
@@ -133,6 +134,7 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
         case = _edited(case, values, edited, f"{folder}: the edited deck")
     edits = [f"{name} {value:g}, was {was[name]:g}" for name, value in edited.items()]
     edits += _other_edits(record["deck"], deck.read_text(encoding="utf-8", errors="surrogateescape"), values)
+    edits += _edited_files(record.get("sha256", {}), folder)
     rest = int(values.get("rest_steps", 0))
     segment = Segment(0, rest + case.run.steps, rest)
     rendered = decks.render_deck(case, segment)
@@ -155,6 +157,8 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
         on_disk.write_segment_record(folder, segment, report, by_hand=notes)
     measure(folder)
     about: dict[str, Any] = {"drive_from": rest, "segments": 1, "by_hand": notes}
+    scaled = folder / decks.SCALED_BRIDGES_NAME
+    about["bridge_tables"] = checksum(scaled if scaled.is_file() else folder / decks.BRIDGES_NAME)
     write_manifest(case, folder.name, None, report, started=time.time(), directory=folder, **about)
 
 
@@ -203,6 +207,12 @@ def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float]
     lasts = {"time_step": step, "steps_per_cycle": steps, "cycles": cycles}
     kept = ("samples_per_cycle", "cycles_per_sample", "samples_per_bridge_sample")
     return ran.but(run=ran.run.but(**lasts, **{name: getattr(case.run, name) for name in kept}))
+
+
+def _edited_files(written: Mapping[str, str], folder: Path) -> list[str]:
+    """A line about files of the deck whose checksums are not those with which they were written."""
+    edited = [name for name in sorted(written) if checksum(folder / name) != written[name]]
+    return [f"{', '.join(edited)}, of which the case knows nothing"] if edited else []
 
 
 def _other_edits(written: str, edited_text: str, parameters: Collection[str]) -> list[str]:

@@ -9,12 +9,15 @@ from math import hypot, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from walkers.physics.laws import LAWS
 from walkers.postprocess.numbers import ASIDE, band_of, error_text, headline, is_of_up, saying_nothing
 from walkers.postprocess.quantities import declared, is_error, scatter_of, unit_shown
 from walkers.postprocess.results import Results, plain, read, unmeasured
 from walkers.rounding import counted, rounded
+from walkers.runner.manifest import read_manifest
 from walkers.sweeps.readable import differing, flattened, readable
 from walkers.sweeps.table import columns_of, with_unit
+from walkers.templates.deck import bridge_tables_digest
 from walkers.text import aligned
 
 if TYPE_CHECKING:
@@ -66,9 +69,26 @@ def compare_runs(first: Side, second: Side) -> Comparison:
         text += ["\n".join(lines) for lines in (_of_errors(apart, named), doubts) if lines]
         if same := [row["quantity"] for row in rows if row["quantity"] not in apart]:
             text.append(f"the same in both: {', '.join(same)}" if apart else "all results are the same")
+    text += _of_tables(first, second)
     text += [f"{name}: no finished run; only the parameters are compared" for name in not_run]
     contents = {"first": first.name, "second": second.name, "parameters": parameters, "sources": sources}
     return Comparison(contents | {"not_run": not_run, "results": rows}, "\n\n".join(text))
+
+
+def _of_tables(*sides: Side) -> list[str]:
+    """A line for each finished run whose bridge tables are not those that this program makes of its case."""
+    lines = []
+    for side in sides:
+        if side.directory is None or side.case.liquid.law not in LAWS:
+            continue
+        manifest = read_manifest(side.directory)
+        if manifest.get("by_hand") or manifest.get("bridge_tables") in (None, bridge_tables_digest(side.case)):
+            continue
+        lines.append(
+            f"{side.name}: its bridge tables are not those of this program: made by another version, "
+            "or on another kind of machine"
+        )
+    return lines
 
 
 def _of_errors(apart: Mapping[str, Mapping[str, Any]], named: Mapping[str, Results]) -> list[str]:

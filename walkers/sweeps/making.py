@@ -49,6 +49,10 @@ class DamagedSegment(WalkersError):
     """A segment of an unfinished run from which the run cannot continue."""
 
 
+class BridgeTablesDiffer(WalkersError):
+    """The complete segments of an unfinished run have other bridge tables than the next one would have."""
+
+
 def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
     """Refuse an engine whose audit failed (`AuditFailed`), unless allowed; warn once of an engine without audit."""
     model = model_sha256(engine)
@@ -215,6 +219,12 @@ class OpenRun:
         folder, number = self.directory / on_disk.SEGMENTS, len(self.done)
         new, before = folder / f"{number:04d}.new", folder / f"{number - 1:04d}"
         shutil.rmtree(new, ignore_errors=True)
+        if number and not on_disk.has_tables_of(before, deck):
+            raise BridgeTablesDiffer(
+                f"{before / decks.BRIDGES_NAME} has other forces than this program computes: the run was begun "
+                "by another version, or on another kind of machine; "
+                f"delete {self.directory} and repeat the run, or continue it there"
+            )
         with on_disk.room_on_disk(new, deck.layout.bead_dump_bytes):
             new.mkdir()
             on_disk.write_deck(deck, new, before if number else None)

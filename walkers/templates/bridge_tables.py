@@ -134,8 +134,14 @@ def bridge_tables(
                         numbers = " ".join(map(repr, (meeting.volume, *chain(*meeting.films))))
                         parts.append(f"liquid {numbers}\n")
                     tolerance = _COARSE if liquid.conserved else TOLERANCE
-                    parts.append(tabulated(law or by_name(liquid.law), meeting, tolerance).text())
+                    parts.append(_table_text(law or by_name(liquid.law), meeting, tolerance))
     return "".join(parts)
+
+
+@lru_cache(maxsize=256)
+def _table_text(law: BridgeLaw, surfaces: Surfaces, tolerance: float) -> str:
+    """The text of the table of a law for two surfaces; a deck and the manifest of its run need it."""
+    return tabulated(law, surfaces, tolerance).text()
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, inf, prod, sqrt
@@ -26,6 +27,8 @@ DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"
 LAYOUT_NAME = "layout.json"
 BRIDGES_NAME = "bridges.txt"
+SCALED_BRIDGES_NAME = "bridges.scaled.txt"
+"""Tables that a deck run by hand writes if its viscosity was edited."""
 LOADS_NAME = "loads.txt"
 FACETS_NAME = "facets.txt"
 BEADS_NAME = "beads.data"
@@ -34,7 +37,7 @@ RUN_NAME = "run.sh"
 SCALE_NAME = "scale.awk"
 """Script beside decks to be run by hand: rescales the tables for an edited viscosity."""
 _NAMES = {
-    **{"layout": LAYOUT_NAME, "bridges": BRIDGES_NAME, "scaled": "bridges.scaled.txt"},
+    **{"layout": LAYOUT_NAME, "bridges": BRIDGES_NAME, "scaled": SCALED_BRIDGES_NAME},
     **{"loads": LOADS_NAME, "facets": FACETS_NAME, "beads": BEADS_NAME, "run": RUN_NAME, "scale": SCALE_NAME},
 }
 STATUS_LINES_PER_CYCLE = 4
@@ -257,6 +260,18 @@ def tables_of(case: Case, surfaces: Sequence[Surface], sizes: Collection[tuple[i
         return bridge_tables(surfaces, sizes, case.recorded_law)
     except ValueError as error:
         raise InputError(case.name, [Problem("liquid.law", case.liquid.law, str(error))]) from error
+
+
+def bridge_tables_digest(case: Case) -> str:
+    """SHA-256 of the bridge tables that the engine reads for a case, hexadecimal.
+
+    The tables follow from the case and the program. They are not part of a run's name, which must be
+    known before bridges are solved; the manifest has this digest.
+    """
+    scene, _ = place((case,))
+    sizes = {(bead.surface, bead.radius) for bead in scene.beads}
+    tables = tables_of(case, scene.surfaces or (surface_of(case),), sizes)
+    return hashlib.sha256(tables.encode("utf-8", "surrogateescape")).hexdigest()
 
 
 def _loads(scene: Scene) -> str:
