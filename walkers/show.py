@@ -99,6 +99,8 @@ def notes(case: Case) -> list[str]:
         lines = [f"the time step is {_two_digits(1.0 / times)} times smaller than needed ({reason})"]
     elif times > 1.01:
         lines = [f"the time step is {times:.2g} times the largest of auto ({reason})"]
+    if case.excitation.record:
+        lines += case.excitation.record.notes
     if case.run.ranks > (cores := cores_here()):
         share = f"{case.run.ranks} MPI processes (run.ranks) share {counted(cores, 'core')} of this machine"
         lines.append(f"{share}: the run takes many times longer than predicted")

@@ -220,7 +220,7 @@ class Case(Table):
             document = with_files(document)
             records = document.pop("records", {})
             if isinstance(file := value_at(document, ("drive", "record")), str):
-                document["drive"] = {**document["drive"], "record": {"file": file, "rows": records[file]}}
+                document["drive"] = {**document["drive"], "record": {"file": file, **records[file]}}
             tables, sources, unknown = supplied(cls, document, library_of(document, source))
             try:
                 case = validated(cls, tables, source, further=[*unknown, *contradictions(cls, tables)])
@@ -305,7 +305,8 @@ class Case(Table):
         """Origins of the values, in the order of the tables of a case file."""
         origins: dict[str, Origin] = {}
         for name, value, field in self.leaves():
-            if name in ("title", "uncertain", "drive.record.rows") or name.startswith(("placed[", "boundary.planes[")):
+            in_no_file = ("title", "uncertain", "drive.record.rows", "drive.record.ignored_columns")
+            if name in in_no_file or name.startswith(("placed[", "boundary.planes[")):
                 continue
             raw, kind = value_at(self.document, parts_of(name)), kind_in([*field.metadata, field.annotation])
             if raw is not MISSING and not units.is_auto(raw):

@@ -13,7 +13,10 @@ from walkers.errors import refused, unusable
 from walkers.inputs.keys import parts_of, value_at
 
 _MOST_BYTES = 16 << 20
-_FILES = {"boundary.mesh": ("meshes", "vessel", "read_mesh"), "drive.record": ("records", "record", "read_record")}
+_FILES = {
+    "boundary.mesh": ("meshes", "vessel", "read_mesh"),
+    "drive.record": ("records", "record_file", "read_record"),
+}
 """Keys that name files, the tables of their contents by these names, and their readers."""
 
 

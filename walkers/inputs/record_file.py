@@ -1,0 +1,218 @@
+"""Files of recorded shaking, as data loggers write them: a header, and rows of numbers.
+
+This module reads a file. Whether its rows are a motion that can be run is a matter of `walkers.inputs.record`.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+import stat
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import TypedDict
+
+from walkers.inputs.units import ACCELERATION, TIME, Kind, parse_quantity
+
+_MOST_BYTES = 64 << 20
+_EXAMPLE = '"time (ms), x (g), z (m/s^2)"'
+_EXPECTED_HEADER = f"expected a header that names the time and accelerations along x, y or z, such as {_EXAMPLE}"
+_QUOTED = 60  # longest quotation of a line of the file, in letters
+_NAME_AND_UNIT = re.compile(r"(?P<name>[^\[\]()]*)[\[(](?P<unit>[^\[\]()]*)[\])]\s*")
+_TIME_NAMES = frozenset({"t", "time", "timestamp"})
+_AXIS_NAME = re.compile(r"(linear )?(a|acc|accel|acceleration)? ?(?P<axis>[xyz])|(?P<first>[xyz]) (acc|acceleration)")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
+_METRE_PER_SECOND_SQUARED = frozenset({"m/s2", "m/s^2", "m/s²", "m/s**2", "m/s/s", "m s-2", "m s^-2", "m·s⁻²", "ms^-2"})
+
+
+class RecordContents(TypedDict):
+    """What a file of recorded shaking contains.
+
+    ``rows`` have the time, s, and the acceleration along x, y and z, m/s². ``ignored_columns`` are the names of the
+    other columns.
+    """
+
+    rows: list[list[float]]
+    ignored_columns: list[str]
+
+
+@dataclass(frozen=True)
+class _Column:
+    """A column that is read: its place in a row of the file, its place in a row of the record, its unit in SI units."""
+
+    number: int
+    place: int
+    factor: float
+    head: str
+
+
+def read_record(path: Path) -> RecordContents:
+    """Read a file of recorded shaking.
+
+    The header is the first line that is not empty and does not begin with ``#``; the last line with a ``#`` if numbers
+    follow it. Columns are separated by commas, semicolons or tabs, as in the header. With semicolons and tabs, numbers
+    may have decimal commas. The time and the accelerations are found by their names, whatever their case, and have
+    their units in brackets. Other columns are left out.
+
+    Parameters
+    ----------
+    path
+        A text file in UTF-8.
+
+    Returns
+    -------
+    RecordContents
+        Its rows in SI units, and the names of the columns that were left out.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read, or its header or a row is not understood. The message names the line or row.
+    """
+    lines = [line for line in _text_of(path).splitlines() if line.strip()]
+    comments = [line for line in lines if line.lstrip().startswith("#")]
+    lines = [line for line in lines if not line.lstrip().startswith("#")]
+    if not lines and not comments:
+        raise ValueError(f"is empty; {_EXPECTED_HEADER}")
+    if comments and (not lines or _is_of_numbers(lines[0])):
+        lines.insert(0, comments[-1].lstrip("# "))
+    separator = _separator_of(lines[0])
+    try:
+        header, *rows = csv.reader(lines, delimiter=separator, skipinitialspace=True)
+    except csv.Error as error:
+        raise ValueError(f"expected rows of numbers below a header: {error}") from error
+    heads = _without_empty_end(header)
+    columns, ignored = _columns_of(heads, lines[0])
+    numbers = [_row_of(row, number, heads, columns, separator) for number, row in enumerate(rows, 1)]
+    if any("," in row[column.number] for row in rows for column in columns):
+        _check_decimal_commas(rows, columns)
+    return {"rows": numbers, "ignored_columns": ignored}
+
+
+def _text_of(path: Path) -> str:
+    """The text of a file."""
+    try:
+        status = path.stat()
+        if stat.S_ISDIR(status.st_mode):
+            raise ValueError("cannot be read: Is a directory")
+        if not stat.S_ISREG(status.st_mode) or status.st_size > _MOST_BYTES:
+            raise ValueError(f"expected a file of at most {_MOST_BYTES >> 20} MB")
+        contents = path.read_bytes()
+    except OSError as error:
+        raise ValueError(f"cannot be read: {error.strerror}") from error
+    try:
+        text = contents.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = contents.count(b"\n", 0, error.start) + 1
+        byte = f"byte {contents[error.start]:#04x} in line {line}"
+        raise ValueError(f"expected UTF-8 text, found {byte}: save the file as UTF-8") from error
+    if "\0" in text:
+        raise ValueError("expected UTF-8 text, found zero bytes: save the file as UTF-8")
+    return text
+
+
+def _separator_of(header: str) -> str:
+    """What separates the columns of a file with this header."""
+    for separator in ("\t", ";"):
+        if separator in header:
+            return separator
+    return ","
+
+
+def _is_of_numbers(line: str) -> bool:
+    """Whether a line begins with a number."""
+    first = line.split(_separator_of(line), maxsplit=1)[0].strip().replace(",", ".")
+    return _NUMBER.fullmatch(first) is not None
+
+
+def _without_empty_end(fields: Sequence[str]) -> list[str]:
+    """The fields of a line up to the last one that is not empty: loggers end lines with a separator."""
+    kept = list(fields)
+    while kept and not kept[-1].strip():
+        kept.pop()
+    return kept
+
+
+def _columns_of(heads: Sequence[str], line: str) -> tuple[list[_Column], list[str]]:
+    """The columns of the time and of accelerations, and the names of the others."""
+    columns: list[_Column] = []
+    ignored: list[str] = []
+    for number, head in enumerate(heads):
+        match = _NAME_AND_UNIT.fullmatch(head.strip())
+        name, unit = (match["name"], match["unit"].strip()) if match else (head, "")
+        place = _place_of(name)
+        if place is None:
+            ignored.append(head.strip() or f"number {number + 1}")
+            continue
+        kind = TIME if place == 0 else ACCELERATION
+        columns.append(_Column(number, place, _factor_of(head.strip(), unit, kind), head.strip()))
+    for place, what in enumerate(("time", *(f"acceleration along {axis}" for axis in "xyz"))):
+        same = [f'"{column.head}"' for column in columns if column.place == place]
+        if len(same) > 1:
+            raise ValueError(f"columns {' and '.join(same)} are both the {what}; expected one of them")
+    places = {column.place for column in columns}
+    if 0 not in places or len(places) < 2:
+        found = line.strip() if len(line.strip()) <= _QUOTED else f"{line.strip()[:_QUOTED]}..."
+        missing = "names no time" if 0 not in places and places else "names no acceleration along x, y or z"
+        if places:
+            raise ValueError(f'{_EXPECTED_HEADER}; "{found}" {missing}')
+        raise ValueError(f'{_EXPECTED_HEADER}, found "{found}": replace all lines above the numbers by a header')
+    return columns, ignored
+
+
+def _place_of(name: str) -> int | None:
+    """Place of a column in the rows of a record by its name: 0 for the time, 1 to 3 for x, y and z; None for others."""
+    plain = re.sub(r"[\s_.\-]+", " ", name).strip().lower()
+    if plain in _TIME_NAMES:
+        return 0
+    match = _AXIS_NAME.fullmatch(plain)
+    if match is None:
+        return None
+    return 1 + "xyz".index(match["axis"] or match["first"])
+
+
+def _factor_of(head: str, unit: str, kind: Kind) -> float:
+    """A unit in SI units."""
+    symbol = "m/s^2" if unit in _METRE_PER_SECOND_SQUARED else unit
+    try:
+        return parse_quantity(f"1 {symbol}", kind)
+    except ValueError as error:
+        raise ValueError(f'column "{head}": {error}, in brackets behind the name') from error
+
+
+def _row_of(
+    fields: Sequence[str], number: int, heads: Sequence[str], columns: Sequence[_Column], separator: str
+) -> list[float]:
+    """A row of the record."""
+    if len(_without_empty_end(fields)) > len(heads):
+        counts = f"row {number} has {len(_without_empty_end(fields))} values, the header {len(heads)} names"
+        if separator == ",":
+            raise ValueError(f"{counts}: decimal commas? Then separate the columns by semicolons")
+        raise ValueError(f"{counts}; expected a name for each column")
+    row = [0.0, 0.0, 0.0, 0.0]
+    for column in columns:
+        text = fields[column.number].strip() if column.number < len(fields) else ""
+        plain = text.replace(",", ".") if text.count(",") == 1 and "." not in text else text
+        value = float(plain) if _NUMBER.fullmatch(plain) else float("nan")
+        if not isfinite(value):
+            raise ValueError(f'row {number}: column "{column.head}" is "{text[:_QUOTED]}"; expected a number')
+        row[column.place] = value * column.factor
+    return row
+
+
+def _texts(rows: Sequence[Sequence[str]], columns: Sequence[_Column]) -> Iterator[str]:
+    """The numbers of a file as it writes them."""
+    for row in rows:
+        for column in columns:
+            yield row[column.number]
+
+
+def _check_decimal_commas(rows: Sequence[Sequence[str]], columns: Sequence[_Column]) -> None:
+    """Refuse a file whose numbers have both decimal commas and decimal points: commas may separate thousands."""
+    with_comma = next(text for text in _texts(rows, columns) if "," in text)
+    with_point = next((text for text in _texts(rows, columns) if "." in text), None)
+    if with_point is not None:
+        both = f'numbers with a comma, "{with_comma.strip()}", and with a point, "{with_point.strip()}"'
+        raise ValueError(f"has {both}; expected either decimal commas or decimal points")

@@ -1,0 +1,137 @@
+"""Numerics of sampled signals: Hann-weighted means, slow parts and local amplitudes.
+
+The functions take evenly spaced samples, one signal a column. They know nothing of records and their files.
+
+A Hann window weights with sin²(πt/T) over its width T. It suppresses a sine of n periods in the window by
+1/(π n (n² - 1)) at worst, and entirely if n is a whole number from two on. A plain mean only suppresses it by 1/(π n).
+"""
+
+from __future__ import annotations
+
+from math import pi
+from typing import TypeVar, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from walkers.physics.bridge import FloatArray
+
+ComplexArray = npt.NDArray[np.complex128]
+Samples = TypeVar("Samples", FloatArray, ComplexArray)
+
+
+def hann(points: int) -> FloatArray:
+    """Weights of a Hann window with a sum of one, shape (points,); the zeros at its ends are left out."""
+    weights = np.sin(pi * np.arange(1, points + 1) / (points + 1)) ** 2
+    return np.asarray(weights / weights.sum())
+
+
+def leakage(periods: FloatArray) -> FloatArray:
+    """Largest share of a sine's amplitude in the Hann-weighted mean over a number of its periods, from two on."""
+    return np.asarray(1.0 / (pi * periods * (periods**2 - 1.0)))
+
+
+def hann_mean(samples: FloatArray) -> FloatArray:
+    """Hann-weighted mean of all samples, shape (K,)."""
+    return np.asarray(hann(len(samples)) @ samples)
+
+
+def slow_part(samples: FloatArray, width: int) -> FloatArray:
+    """The part of signals that changes slowly compared with a window.
+
+    This is the Hann-weighted mean in a window around each sample. Half a window from an end, it is the Hann-weighted
+    straight line of the first or last whole window. The mean of what it leaves is added, so that the error for a
+    parabola is of second order.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (N, K)
+        Evenly spaced signals.
+    width
+        Number of samples in a window; at most all of them.
+
+    Returns
+    -------
+    ndarray, shape (N, K)
+        Motions of two periods or more in a window are suppressed; of a motion of one period, three quarters are left
+        in the signal without its slow part, and slower ones belong to the slow part.
+    """
+    first = _smoothed(samples, width)
+    return first + _smoothed(samples - first, width)
+
+
+def _smoothed(samples: FloatArray, width: int) -> FloatArray:
+    """Hann-weighted means around each sample, and straight lines near both ends."""
+    weights = hann(min(width, len(samples)))
+    points = len(weights)
+    middle = _convolved(samples, weights)
+    offset = np.arange(points) - (points - 1) / 2.0
+    slope = weights * offset / np.sum(weights * offset**2)
+    first = middle[0] + np.outer(offset, slope @ samples[:points])
+    last = middle[-1] + np.outer(offset, slope @ samples[-points:])
+    before = points // 2
+    after = len(samples) - len(middle) - before
+    return np.concatenate([first[:before], middle, last[points - after :]])
+
+
+def local_amplitude(samples: FloatArray, frequency: float, width: int) -> FloatArray:
+    """Amplitude of the component at one frequency in a Hann window around each sample.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (N, K)
+        Evenly spaced components of one vector.
+    frequency
+        In cycles per sample.
+    width
+        Number of samples in a window; at most all of them. Closer than half of it to an end, the amplitude is that of
+        the first or last whole window.
+
+    Returns
+    -------
+    ndarray, shape (N,)
+        Largest length of the vector in a cycle.
+    """
+    weights = hann(min(width, len(samples)))
+    turned = samples * np.exp(-2j * pi * frequency * np.arange(len(samples)))[:, None]
+    phasor = 2.0 * _convolved(turned, weights)
+    amplitude = longest(phasor)
+    before = len(weights) // 2
+    return np.pad(amplitude, (before, len(samples) - len(amplitude) - before), "edge")
+
+
+def periods_by_phase(samples: FloatArray, periods: float) -> float:
+    """Number of periods of a line in all samples, from the change of its phase between both halves.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (N, K)
+        Evenly spaced components of one vector.
+    periods
+        The number within one.
+    """
+    half = len(samples) // 2
+    weights = hann(half)
+    apart = len(samples) - half
+    for _ in range(2):
+        turned = samples * np.exp(-2j * pi * periods / len(samples) * np.arange(len(samples)))[:, None]
+        first = weights @ turned[:half]
+        second = weights @ turned[apart:]
+        periods += float(np.angle(np.vdot(first, second))) / (2.0 * pi) * len(samples) / apart
+    return periods
+
+
+def longest(phasor: ComplexArray) -> FloatArray:
+    """Largest length of vectors Re(phasor exp(iωt)) in a cycle, of phasors of shape (N, K).
+
+    A vector describes an ellipse, and is longest along its semi-major axis.
+    """
+    squares = np.sum(np.abs(phasor) ** 2, axis=1)
+    return np.asarray(np.sqrt((squares + np.abs(np.sum(phasor**2, axis=1))) / 2.0))
+
+
+def _convolved(samples: Samples, weights: FloatArray) -> Samples:
+    """Weighted means of all whole windows, shape (N - width + 1, K)."""
+    from scipy.signal import oaconvolve
+
+    return cast(Samples, oaconvolve(samples, weights[:, None], mode="valid", axes=0))
