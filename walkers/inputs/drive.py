@@ -10,15 +10,15 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
-from math import degrees, gcd, hypot, inf, isclose, isfinite, lcm, pi
+from math import degrees, floor, gcd, hypot, inf, isclose, isfinite, lcm, pi
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
-from walkers.errors import Problem
+from walkers.errors import Problem, unusable
 from walkers.inputs import units
-from walkers.inputs.record import Record, course_text, record_of
+from walkers.inputs.record import FEWEST_PERIODS, Record, course_text, record_of
 from walkers.inputs.table import Choice, Filled, Indirect, Table, key
 from walkers.inputs.units import Angle, Coefficient
 from walkers.physics.bridge import FloatArray
@@ -38,6 +38,7 @@ WAVEFORMS: Mapping[str, tuple[tuple[int, float], ...]] = {
 }
 """Of the acceleration: multiples of the frequency and shares of the peak. A triangle's series is cut at 0.96 of it."""
 _FEW = 3
+_SAME_TIME = 1e-9  # relative error of times, and of numbers of cycles
 MOST_PERIODS = 1000
 """Largest number of periods of the fastest sine in a cycle."""
 
@@ -59,16 +60,18 @@ _Recorded = Annotated[Any, BeforeValidator(record_of), WithJsonSchema({"type": "
 Ramp = tuple[tuple[float, float], ...]
 
 
-def _increasing(ramp: Ramp) -> Ramp:
-    """A ramp whose times increase."""
+def _usable_ramp(ramp: Ramp) -> Ramp:
+    """A ramp whose times increase and whose factors are not all zero."""
     if any(time >= later for (time, _), (later, _) in pairwise(ramp)):
         raise ValueError("expected times that increase")
+    if ramp and not any(factor for _, factor in ramp):
+        raise ValueError("expected a factor above zero at some time")
     return ramp
 
 
 _Factors = Annotated[
     tuple[tuple[units.NonNegativeDuration, Coefficient], ...],
-    AfterValidator(_increasing),
+    AfterValidator(_usable_ramp),
     WithJsonSchema({"type": "array", "items": {"type": "array", "minItems": 2, "maxItems": 2}}),
 ]
 
@@ -203,15 +206,34 @@ class Excitation:
 
     @property
     def amplitude(self) -> float:
-        """Largest displacement that the harmonics could add up to, m."""
+        """Largest displacement that the harmonics could add up to, or of a record without its slow part, m."""
         largest = self.record.largest(0) if self.record else sum(sine.amplitude for sine in self.harmonics)
         return self.largest_factor * largest
 
     @property
     def peak_velocity(self) -> float:
-        """Largest speed that the harmonics could add up to, m/s."""
+        """Largest speed that the harmonics could add up to, or of a record without its slow part, m/s."""
         largest = self.record.largest(1) if self.record else sum(sine.peak_velocity for sine in self.harmonics)
         return self.largest_factor * largest
+
+    @property
+    def farthest(self) -> float:
+        """Largest displacement of the boundary in the frame ``lab``, with the slow part of a record, m."""
+        return self.largest_factor * self.record.farthest if self.record else self.amplitude
+
+    @property
+    def changes(self) -> bool:
+        """Whether the strength of the drive changes: by a ramp, or because a record is not stationary."""
+        return bool(self.ramp) or (self.record is not None and not self.record.is_stationary)
+
+    def local_amplitude(self, time: FloatArray) -> FloatArray:
+        """Peak acceleration of the largest harmonic at times (s), m/s², shape (N,).
+
+        This is its constant one times the factor of the ramp; of a record, `Record.local_amplitude` times the factor.
+        """
+        if self.record:
+            return np.asarray(self.factor(time) * self.record.local_amplitude(time))
+        return np.asarray(self.factor(time) * self.largest.peak_acceleration)
 
     @property
     def largest_factor(self) -> float:
@@ -220,9 +242,27 @@ class Excitation:
 
     @property
     def cycles(self) -> tuple[float, float]:
-        """Smallest and largest number of cycles of a run: to the end of the ramp, and of a record that ends."""
-        record, fewest = self.record, self.ramp[-1][0] * self.frequency if self.ramp else 0.0
-        return fewest, record.length * self.frequency if record and not record.repeats else inf
+        """Smallest and largest number of cycles of a run: to the end of the ramp, and of a record that ends.
+
+        A ramp that ends with the record ends with its last whole cycle.
+        """
+        end = self.ramp[-1][0] if self.ramp else 0.0
+        fewest, most = end * self.frequency, inf
+        if self.ends:
+            most = self.length * self.frequency
+            if end <= self.length * (1.0 + _SAME_TIME):
+                fewest = min(fewest, floor(most + _SAME_TIME))
+        return fewest, most
+
+    @property
+    def ends(self) -> bool:
+        """Whether the drive is a record that does not repeat."""
+        return self.record is not None and not self.record.repeats
+
+    @property
+    def length(self) -> float:
+        """Length of a record that does not repeat, s; infinite for other drives."""
+        return self.record.length if self.record and self.ends else inf
 
     @cached_property
     def factor(self) -> PPoly:
@@ -236,6 +276,19 @@ class Excitation:
         places = ((knots[1:] + knots[:-1]) / 2.0, knots[:-1], knots[:-1])  # the second derivative is not continuous
         mean = [even(at + cycle / 2.0, k) - even(at - cycle / 2.0, k) for k, at in zip((2, 1, 0), places, strict=True)]
         return PPoly(np.stack(mean) / [[2.0 * cycle], [cycle], [cycle]], knots)
+
+    def shaking(self, time: FloatArray) -> FloatArray:
+        """Displacement along x, y and z at times (s), m, shape (N, 3), without the slow part of a record.
+
+        Pictures show this displacement. See `Record.slow_course`.
+        """
+        if self.record:
+            displacement = self.record.shaking(time)
+            if self.ramp:
+                displacement = displacement * self.factor(time)[:, None]
+            return displacement
+        parts = [np.outer(course[0], direction) for direction, course in self.motions(time)]
+        return np.asarray(np.sum(parts, axis=0))
 
     def motions(self, time: FloatArray) -> Iterator[tuple[Vector, tuple[FloatArray, ...]]]:
         """Direction of each harmonic or axis of a record, and displacement, velocity and acceleration at times (s)."""
@@ -281,6 +334,46 @@ class Excitation:
             highest = max(harmonic.frequency for harmonic in self.harmonics)
             words.append(f"{len(self.harmonics) - 1} harmonics up to {highest:g} Hz")
         return " + ".join(words) + ramp
+
+
+def check_drive(drive: Excitation) -> None:
+    """Refuse a drive that is too strong or too fast, or a record that is too short or changes beside a ramp.
+
+    Parameters
+    ----------
+    drive
+        The drive of a case whose peak accelerations are known.
+
+    Raises
+    ------
+    InputError
+        With the key ``drive.record`` or ``drive.ramp``.
+    """
+    record = drive.record
+    if record:
+        _check_record(record)
+    largest = units.ACCELERATION.largest
+    if drive.ramp and drive.peak_acceleration > largest:
+        found = f"the largest one gives {drive.peak_acceleration:.4g} m/s²"
+        raise unusable("drive.ramp", f"expected factors that give accelerations up to {largest:g} m/s²; {found}")
+    if drive.ramp and record and not record.is_stationary:
+        low, high = (amplitude / units.ACCELERATION_OF_ONE_G for amplitude in record.amplitude_range)
+        changes = f"the amplitude of drive.record changes by itself, from {low:.3g} to {high:.3g} g"
+        raise unusable("drive.ramp", f"expected none: {changes}")
+
+
+def _check_record(record: Record) -> None:
+    """Refuse a record that is too fast, or too short for its offset."""
+    highest = units.FREQUENCY.largest
+    if record.frequencies[1] > highest:
+        found = f"found {record.frequencies[1]:.4g} Hz: is the unit of the time right?"
+        raise unusable("drive.record", f"expected frequencies up to {highest:g} Hz; {found}", record.file)
+    periods = record.strongest_line * record.length
+    if not record.repeats and periods < FEWEST_PERIODS:
+        least = f"expected at least {FEWEST_PERIODS:g} periods of its strongest line, found {periods:.2g}"
+        reason = "the offset of the sensor cannot be told from the shaking"
+        cure = "drive.repeats = true takes it as a whole period"
+        raise unusable("drive.record", f"{least}: {reason}; {cure}", record.file)
 
 
 def common_frequency(frequencies: list[float]) -> float:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from walkers.errors import Problem, expected_of, shown, unusable
 from walkers.inputs.bodies import ARRANGEMENTS, MOST_BEADS, Cluster, Walkers, touching
 from walkers.inputs.boundary import BOTTOM, Plane
-from walkers.inputs.drive import common_frequency, unit_vector
+from walkers.inputs.drive import check_drive, common_frequency, unit_vector
 from walkers.inputs.keys import MISSING, parts_of, value_at
 from walkers.inputs.library import Library, LibraryNumber, unmeasured
 from walkers.inputs.loads import LARGEST_DELAY, bridge_at_rest, contact_loads, delay_of, dimer_of, reach
@@ -322,6 +322,7 @@ def _drive(case: Case) -> Case:
     if case.drive.frame == "lab" and not case.excitation.is_plain:
         message = "several harmonics, or one with a phase, are driven in the container's frame"
         raise unusable("drive.frame", f'expected "container": {message}')
+    check_drive(case.excitation)
     return case
 
 
@@ -330,11 +331,12 @@ def _record(case: Case, record: Record) -> Case:
     first, last = (record.rows[end][1:] for end in (0, -1))
     if record.repeats and dist(first, last) > _MEET * record.largest(2):
         raise unusable("drive.repeats", "expected a record that ends with the first row of the next period")
+    check_drive(case.excitation)
     why = "all lines are multiples" if record.repeats else "the strongest line"
     frequency = f"{case.excitation.frequency:.6g} Hz"
     peak = quantity_text(case.excitation.peak_acceleration, ACCELERATION)
     case = case.noted("drive.frequency", f"of the spectrum of the record: {why}", text=frequency)
-    return case.noted("drive.peak_acceleration", "of the record, without its mean", text=peak)
+    return case.noted("drive.peak_acceleration", "of the record, without its offset", text=peak)
 
 
 def _surfaces(case: Case) -> Case:

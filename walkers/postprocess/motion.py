@@ -43,7 +43,8 @@ class Motion:
         position, velocity, spin : ndarray, shape (F, N, 3)
             Position and velocity of the centres; angular velocity, rad/s.
         substrate : ndarray, shape (F, 3)
-            Displacement of the boundary in the laboratory, for both frames of the drive, m.
+            Displacement of the boundary in the laboratory, for both frames of the drive, m; of a record, without its
+            slow part (`walkers.inputs.record.Record.slow_course`).
         radius : ndarray, shape (N,)
         walkers
             The walkers with the indices of their beads, from 0.
@@ -339,7 +340,7 @@ def _joined(case: Case, paths: Sequence[Path]) -> Motion:
         position=vectors("x") - shift[:, None],
         velocity=vectors("vx") - speed[:, None],
         spin=vectors("omegax"),
-        substrate=boundary_motion(case.excitation, time)[0],
+        substrate=visible_displacement(case.excitation, time),
         radius=values[0, :, layout.bead_columns.index("radius")],
         walkers=tuple(replace(walker, beads=tuple(bead - 1 for bead in walker.beads)) for walker in layout.walkers),
         frames=frames,
@@ -363,6 +364,11 @@ def boundary_motion(drive: Excitation, time: FloatArray) -> tuple[FloatArray, Fl
         displacement += np.outer(place * driven, direction)
         velocity += np.outer(speed * driven, direction)
     return displacement, velocity
+
+
+def visible_displacement(drive: Excitation, time: FloatArray) -> FloatArray:
+    """Displacement of the boundary in pictures, m, shape (F, 3): without the slow part of a record, zero before 0 s."""
+    return drive.shaking(time) * (time >= 0.0)[:, None]
 
 
 @dataclass(frozen=True)

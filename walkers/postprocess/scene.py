@@ -21,7 +21,7 @@ from walkers.inputs.boundary import Flat, Round
 from walkers.inputs.case import Case
 from walkers.postprocess import piles
 from walkers.postprocess.dump import FloatArray, IntArray
-from walkers.postprocess.motion import Motion, between, boundary_motion
+from walkers.postprocess.motion import Motion, between, visible_displacement
 from walkers.postprocess.necks import BLUE, NO_BRIDGES, OPACITY, ends_of, necks_of, triangles_of
 
 if TYPE_CHECKING:
@@ -403,7 +403,7 @@ class Window:
             place = between(motion.select(slice(number, number + 2)), share)[0]
         if self._scene.shaken:
             time = np.interp([frame], np.arange(len(motion.time)), motion.time)
-            shift = 1e3 * boundary_motion(motion.case.excitation, time)[0][0]
+            shift = 1e3 * visible_displacement(motion.case.excitation, time)[0]
         self._beads.colour(self._scene.colours(self._scene.pointed_out[number])[self._pale].swapaxes(0, 1))
         self._beads.move(1e3 * place + shift, None if turned is None else rotations_at(turned, frame))
         if self._bare:

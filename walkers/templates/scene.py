@@ -125,7 +125,7 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
 def _room(cases: Sequence[Case], grid: Sequence[tuple[float, float]], spacing: float) -> tuple[Vector, Vector]:
     far = max(spacing / 2.0, *(reach(case) for case in cases))
     largest = max(max(case.radii) for case in cases)
-    amplitude = max(case.excitation.amplitude for case in cases)
+    amplitude = max(case.excitation.farthest for case in cases)
     placed = [bead.at for case in cases for bead in case.placed]
     return cases[0].boundary.room(
         half_x=max([x for x, _ in grid] + [abs(x) for x, _, _ in placed], default=0.0) + far,
