@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil, inf
+from math import ceil, floor, inf
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from pydantic import Field
@@ -164,11 +164,8 @@ def with_run(case: Case) -> Case:
         message = f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed}, "
         raise unusable("run.time_step", f'{message}"auto", or allow_unstable = true')
     time_step, steps = fit_into_cycle(largest, frequency, samples)
-    fewest, most = case.excitation.cycles
-    needed: float = table.cycles or table.most_cycles or ceil(fewest) or int(min(_MOST_CYCLES, most))
-    if table.duration is not None:
-        needed = table.duration * case.excitation.frequency * (1.0 - 1e-12)
-    cycles, until_steady = ceil(needed / cycles_per_sample) * cycles_per_sample, _until_steady(case, cycles_per_sample)
+    cycles = _number_of_cycles(case, cycles_per_sample)
+    until_steady = _until_steady(case, cycles_per_sample)
     settling = table.settling_cycles
     if settling is None:
         settling = settling_of(cycles) if case.walkers else 0
@@ -194,9 +191,34 @@ def with_run(case: Case) -> Case:
     return case.but(run=run, sources={**case.sources, **_sources(run, case, reason)})
 
 
+def _number_of_cycles(case: Case, cycles_per_sample: int) -> int:
+    """Number of cycles of a run, a multiple of the cycles between samples.
+
+    It follows from ``cycles``, ``most_cycles`` or ``duration``. Without them, a run lasts to the
+    end of its ramp, to the last whole cycle of a record that does not repeat, or for 60 cycles. A
+    duration within a record ends with the last whole cycle of the record at the latest.
+    """
+    table, drive = case.run, case.excitation
+    fewest, most = drive.cycles
+    all_of_record = inf
+    if drive.ends:
+        all_of_record = floor((most + 1e-9) / cycles_per_sample) * cycles_per_sample
+    if table.duration is not None:
+        needed = ceil(table.duration * case.excitation.frequency * (1.0 - 1e-12) / cycles_per_sample)
+        cycles = needed * cycles_per_sample
+        within_record = table.duration <= drive.length * (1.0 + 1e-9)
+        return int(min(cycles, all_of_record)) if within_record else cycles
+    needed = table.cycles or table.most_cycles or ceil(fewest)
+    if not needed and drive.ends:
+        return int(all_of_record)
+    return ceil((needed or _MOST_CYCLES) / cycles_per_sample) * cycles_per_sample
+
+
 def _sources(run: Run, case: Case, reason: str) -> dict[str, Source]:
     """Sources of the values of a run that its table does not give."""
     cycles_from, cycles, settling = "from the duration" if run.duration else "not checked earlier", "", ""
+    if case.excitation.ends and not run.duration:
+        cycles_from = f"of the {case.excitation.length:.4g} s of the record"
     if run.until_steady:
         cycles_from = "checked after 12 and 24 cycles"
         cycles = f"until constant within {percent(CONSTANT)}, at most {run.cycles}"
@@ -273,8 +295,11 @@ def _until_steady(case: Case, cycles_per_sample: int) -> bool:
         raise unusable(f"run.{given[0]}", message)
     if until and not case.apart:
         raise unusable(f"run.{until[0]}", "expected run.duration: a run until steady needs independent walkers")
-    if until and case.drive.ramp:
-        raise unusable(f"run.{until[0]}", "expected a number of cycles: with drive.ramp no velocity is constant")
+    if until and case.excitation.changes:
+        changing = "with drive.ramp" if case.drive.ramp else "as the amplitude of drive.record changes"
+        raise unusable(f"run.{until[0]}", f"expected a number of cycles: {changing}, no velocity is constant")
+    if case.excitation.ends and not until:
+        return False
     if case.drive.ramp or not case.apart or given or table.ranks != 1 or cycles_per_sample != 1:
         return False
     # A few cycles suffice for asymmetric dimers that start near the axis.
