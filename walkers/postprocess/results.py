@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from walkers.errors import InputError, refused
 from walkers.inputs.loads import softness_warning
 from walkers.inputs.run import limits_of
-from walkers.postprocess import meetings, piles, threshold, walking
+from walkers.postprocess import meetings, piles, record_part, threshold, walking
 from walkers.postprocess.caption import conditions
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.numbers import headline, rows, state
@@ -75,7 +75,13 @@ class Results(dict[str, Any]):
 
 def modules_of(case: Case) -> dict[str, Any]:
     """The modules that measure a case, in the order of results, by the groups of their numbers."""
-    modules = {"walking": walking, "threshold": threshold, "meetings": meetings, "piles": piles}
+    modules = {
+        "walking": walking,
+        "threshold": threshold,
+        "meetings": meetings,
+        "piles": piles,
+        "record": record_part,
+    }
     return {name: module for name, module in modules.items() if module.applies(case)}
 
 

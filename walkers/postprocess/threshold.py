@@ -1,4 +1,7 @@
-"""The threshold of motion in one run: a ramp lowers the drive slowly until walkers stop, or raises it until they start.
+"""The threshold of motion in one run: the drive falls slowly until walkers stop, or rises until they start.
+
+The drive changes by a ramp, or because the amplitude of a record changes. Its strength is the local amplitude of its
+acceleration (`walkers.inputs.drive.Excitation.local_amplitude`).
 
 A window is a few cycles. A walker moves in it if it is faster than `walkers.postprocess.sides.REST`. It stops at the
 end of the last window in which it moves while the drive falls, and starts at the begin of the first one in which it
@@ -7,13 +10,14 @@ moves while the drive rises, if it rests in others. The resolution is the change
 
 from __future__ import annotations
 
-from math import nan
+from math import isfinite, nan
 
 import numpy as np
 
 from walkers.inputs.case import Case
 from walkers.inputs.loads import dimer_of
-from walkers.postprocess.dump import BoolArray, FloatArray
+from walkers.inputs.units import ACCELERATION_OF_ONE_G
+from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.gait import distance_walked
 from walkers.postprocess.motion import Motion
 from walkers.postprocess.numbers import Measured
@@ -21,11 +25,15 @@ from walkers.postprocess.sides import REST
 
 WINDOW = 8
 """Cycles of a window."""
+_EXACT = 1e-9
+"""Largest change of a constant drive with a ramp, over its strength: rounding errors."""
+_REVERSAL = 0.05
+"""Largest reversal of a falling or rising record that is noise, over the largest amplitude."""
 
 
 def applies(case: Case) -> bool:
-    """Whether a case has walkers, and a drive with a ramp."""
-    return bool(case.walkers and case.drive.ramp) and case.run.cycles_per_sample == 1
+    """Whether a case has walkers, and a drive whose strength changes."""
+    return bool(case.walkers and case.excitation.changes) and case.run.cycles_per_sample == 1
 
 
 def derived(case: Case) -> dict[str, float]:  # noqa: ARG001
@@ -34,11 +42,17 @@ def derived(case: Case) -> dict[str, float]:  # noqa: ARG001
 
 
 def measure(motion: Motion) -> Measured:
-    """The table ``ramp`` and the numbers: means over the walkers that stop or start."""
-    drive, walked = motion.case.excitation, [distance_walked(group) for group in motion.groups]
-    times, whole = walked[0][0][::WINDOW], np.concatenate([distance[::WINDOW] for _, distance in walked], axis=1)
+    """The table ``ramp`` and the numbers: means over the walkers that stop or start.
+
+    If the amplitude of a record changes, but no walker stops or starts, there are no numbers: the mean velocity stands,
+    with a warning.
+    """
+    case, drive = motion.case, motion.case.excitation
+    walked = [distance_walked(group) for group in motion.groups]
+    times = walked[0][0][::WINDOW]
+    whole = np.concatenate([distance[::WINDOW] for _, distance in walked], axis=1)
     velocity = np.diff(whole, axis=0) / np.diff(times)[:, None]
-    peaks = drive.factor(times) * drive.peak_acceleration / (drive.largest_factor or 1.0)
+    peaks = drive.local_amplitude(times)
     middle = (peaks[1:] + peaks[:-1]) / 2.0
     owner = [walker.walker for group in motion.groups for walker in group.walkers]
     columns = {
@@ -47,15 +61,77 @@ def measure(motion: Motion) -> Measured:
         "peak_acceleration": np.tile(middle, len(owner)),
         "velocity": velocity.T.reshape(-1),
     }
-    moves, change = np.abs(velocity) > REST, np.diff(peaks)
-    stops, stops_within = _crossed(moves[change < 0.0], peaks[1:][change < 0.0], -change[change < 0.0])
-    rises = np.flatnonzero(change > 0.0)[::-1]
-    starts, starts_within = _crossed(moves[rises], peaks[rises], change[rises])
-    numbers = {"stops_at": stops, "stops_within": stops_within, "starts_at": starts, "starts_within": starts_within}
-    if len(motion.case.walkers[0].radii) == 2:
-        gamma0 = dimer_of(motion.case).gamma0
+    numbers = _thresholds(np.abs(velocity) > REST, peaks, by_ramp=bool(drive.ramp))
+    if not drive.ramp and not any(map(isfinite, numbers.values())):
+        low, high = (amplitude / ACCELERATION_OF_ONE_G for amplitude in (peaks.min(), peaks.max()))
+        changing = f"the amplitude of the record changes from {low:.3g} to {high:.3g} g"
+        return Measured({"ramp": columns}, {}, (f"{changing}: the velocity is a mean over different drives",))
+    if len(case.walkers[0].radii) == 2:
+        gamma0 = dimer_of(case).gamma0
         numbers |= {f"gamma0_{name}": gamma0(number) for name, number in numbers.items()}
     return Measured({"ramp": columns}, numbers)
+
+
+def _thresholds(moves: BoolArray, peaks: FloatArray, *, by_ramp: bool) -> dict[str, float]:
+    """Drive at which walkers stop and start, m/s², and resolutions; NaN if they do not.
+
+    Parameters
+    ----------
+    moves : ndarray of bool, shape (K, W)
+        Whether walkers move in each window.
+    peaks : ndarray, shape (K + 1,)
+        Local amplitude of the drive at the ends of the windows, m/s².
+    by_ramp
+        Whether a ramp changes the drive, so that its amplitude has no noise.
+    """
+    change = np.diff(peaks)
+    direction = directions(peaks, (_EXACT if by_ramp else _REVERSAL) * float(peaks.max()))
+    falls = np.flatnonzero(direction < 0)
+    rises = np.flatnonzero(direction > 0)[::-1]
+    stops, stops_within = _crossed(moves[falls], peaks[falls + 1], np.abs(change[falls]))
+    starts, starts_within = _crossed(moves[rises], peaks[rises], np.abs(change[rises]))
+    return {
+        "stops_at": stops,
+        "stops_within": stops_within,
+        "starts_at": starts,
+        "starts_within": starts_within,
+    }
+
+
+def directions(peaks: FloatArray, least: float) -> IntArray:
+    """Whether the drive rises (1), falls (-1) or neither (0) in each window, shape (K,).
+
+    It rises from a minimum to the next maximum, and falls from a maximum to the next minimum. Reversals by ``least`` or
+    less are noise. Windows in which the drive stays exactly as it is are a plateau: it does neither.
+
+    Parameters
+    ----------
+    peaks : ndarray, shape (K + 1,)
+        Amplitude of the drive at the ends of the windows, m/s².
+    least
+        Largest change that is noise, m/s².
+    """
+    direction = np.zeros(len(peaks) - 1, dtype=np.int64)
+    highest = lowest = start = 0
+    toward = 0
+    for number, peak in enumerate(peaks.tolist()):
+        if peak > peaks[highest]:
+            highest = number
+        if peak < peaks[lowest]:
+            lowest = number
+        if toward >= 0 and peak < peaks[highest] - least:  # the maximum is behind
+            direction[start:highest] = toward
+            start, lowest, toward = highest, number, -1
+        elif toward <= 0 and peak > peaks[lowest] + least:
+            direction[start:lowest] = toward
+            start, highest, toward = lowest, number, 1
+        if toward > 0:
+            lowest = highest
+        elif toward < 0:
+            highest = lowest
+    direction[start : highest if toward > 0 else lowest] = toward
+    direction[np.diff(peaks) == 0.0] = 0
+    return direction
 
 
 def _crossed(moves: BoolArray, peaks: FloatArray, change: FloatArray) -> tuple[float, float]:

@@ -71,19 +71,20 @@ def measure(motion: Motion) -> Measured:
         numbers[f"velocity_make_{number}"] = float(velocity.mean())
         numbers[f"walkers_make_{number}"] = len(of_make["velocity"])
         numbers[f"steady_make_{number}"] = int(np.sum(of_make["steady"]))
-    doubts = (*_doubts(numbers, ramp=bool(case.drive.ramp)), *_turning(groups, walkers))
+    doubts = (*_doubts(numbers, changes=case.excitation.changes), *_turning(groups, walkers))
     return Measured({**tables, "bridges": _bridges(motion)}, numbers, doubts)
 
 
-def _doubts(numbers: Mapping[str, Any], *, ramp: bool) -> Iterable[str]:
-    """Reasons to doubt the velocity; on trays walkers stop, and a ramp changes the drive."""
-    if (lacking := numbers["walkers"] - numbers["steady"]) and not (numbers["meets"] or numbers["came_apart"] or ramp):
+def _doubts(numbers: Mapping[str, Any], *, changes: bool) -> Iterable[str]:
+    """Reasons to doubt the velocity; on trays walkers stop, and the drive may change."""
+    lacking = numbers["walkers"] - numbers["steady"]
+    if lacking and not (numbers["meets"] or numbers["came_apart"] or changes):
         unsteady = f"{lacking} of {numbers['walkers']} walkers {'is' if lacking == 1 else 'are'} not steady"
         yield f"{unsteady}: the velocity depends on the length of the run"
     if numbers["came_apart"]:
         share = percent(round(numbers["separated_fraction"], 2))
         yield f"walkers came apart: beads are beyond the rupture distance for {share} of the time"
-    if numbers["depends_on_start"] and not ramp:
+    if numbers["depends_on_start"] and not changes:
         yield f"steady copies differ by more than {percent(SAME)}: the velocity depends on the start"
     if numbers["walkers_met"] and not numbers["meets"]:
         yield "walkers came close to each other and are not independent: increase the spacing"
@@ -93,7 +94,7 @@ def _turning(groups: Sequence[Group], walkers: Columns) -> Iterable[str]:
     """A warning if walkers turn away from the drive axis, or will turn over on a slope, but have not yet."""
     case = groups[0].case
     left = np.concatenate([gait.turns_away_after(group) for group in groups])[np.isnan(walkers["turned_at"])]
-    if (count := int(np.isfinite(left).sum())) and not (case.meets or case.drive.ramp):
+    if (count := int(np.isfinite(left).sum())) and not (case.meets or case.excitation.changes):
         seconds = float(np.nanmax(left))
         cycles = float(f"{_LONGER * (case.run.cycles + case.excitation.frequency * seconds):.2g}")
         turn = f"{count} of {counted(len(walkers['walker']), 'walker')} {'turns' if count == 1 else 'turn'}"

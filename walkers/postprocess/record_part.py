@@ -1,0 +1,28 @@
+"""The part of a record that a run contains, and reasons to doubt what the record does.
+
+A record that does not repeat is run up to a whole number of cycles.
+"""
+
+from __future__ import annotations
+
+from walkers.inputs.case import Case
+from walkers.postprocess.motion import Motion
+from walkers.postprocess.numbers import Measured
+
+
+def applies(case: Case) -> bool:
+    """Whether the drive of a case is a record that does not repeat."""
+    return case.excitation.ends
+
+
+def derived(case: Case) -> dict[str, float]:
+    """The length of the record, s."""
+    return {"record_length": case.excitation.length}
+
+
+def measure(motion: Motion) -> Measured:
+    """The time for which the record was run, its share, and the doubts of the record."""
+    drive = motion.case.excitation
+    run = max(float(motion.time[-1]), 0.0)
+    doubts = tuple(drive.record.doubts) if drive.record else ()
+    return Measured({}, {"record_run": run, "record_share": min(run / drive.length, 1.0)}, doubts)
