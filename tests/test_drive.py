@@ -19,7 +19,7 @@ from walkers.postprocess.motion import boundary_motion
 from walkers.postprocess.numbers import rows, state
 from walkers.postprocess.quantities import declared
 from walkers.postprocess.sides import REST
-from walkers.postprocess.threshold import _crossed, measure
+from walkers.postprocess.threshold import _crossed, _thresholds, measure
 from walkers.runner.binary import find_engine
 from walkers.sweeps.making import make_runs
 from walkers.templates.scene import sharing_key
@@ -71,7 +71,17 @@ def test_a_ramp_multiplies_the_displacement() -> None:
         plain = 39.2 / turn**2 * np.sin(turn * time)
         assert place[0, 0] == pytest.approx(factor * plain)
         assert speed[0, 0] == pytest.approx(factor * 39.2 / turn * np.cos(turn * time) + slope * plain)
-    assert case.excitation.peak_acceleration == pytest.approx(1.25 * 39.2)
+
+
+def test_largest_values_are_those_at_the_largest_factor_of_a_ramp() -> None:
+    """4 g at 80 Hz; the factor is largest in the middle."""
+    ramp = [["0.01 s", 0.5], ["0.03 s", 1.25], ["0.06 s", 0.75]]
+    drive = make_case(run=BRIEF, drive={"ramp": ramp}).excitation
+    turn = 2.0 * pi * 80.0
+    assert drive.peak_acceleration == pytest.approx(1.25 * 39.2)
+    assert drive.peak_velocity == pytest.approx(1.25 * 39.2 / turn)
+    assert drive.amplitude == pytest.approx(1.25 * 39.2 / turn**2)
+    assert drive.amplitude == pytest.approx(0.1939e-3, rel=1e-3)
 
 
 @pytest.mark.parametrize("with_record", [False, True])
@@ -160,9 +170,14 @@ def test_a_ramp_finds_the_threshold(ramp: list[float], name: str, tmp_path: Path
     points = [["0 s", ramp[0]], ["0.6 s", ramp[1]]]
     changes = {"drive.peak_acceleration": "1 g", "dimers.replicates": 1, "run.samples_per_cycle": 1}
     done = run(load_case("fig1b", {**changes, "drive.ramp": points}), tmp_path)
-    found, windows = done.result, done.result.table("ramp")
-    moves = windows[windows["velocity"].abs() > REST]["peak_acceleration"]
-    assert found[name] == pytest.approx(moves.min() - found[name.replace("_at", "_within")] / 2.0, rel=1e-6)
+    found = done.result
+    # By hand: the drive at the weakest end of the windows of 8 cycles in which the walker moves.
+    distance = done.result.table("cycles")["distance"].to_numpy()[::8]
+    moves = np.abs(np.diff(distance)) / (8.0 * PERIOD) > REST
+    times = 8.0 * PERIOD * np.arange(len(distance))
+    peaks = 9.8 * (ramp[0] + (ramp[1] - ramp[0]) * times / 0.6)
+    weakest = np.minimum(peaks[1:], peaks[:-1])[moves].min()
+    assert found[name] == pytest.approx(weakest, rel=1e-6)
     first, _, row = done.describe().split("\n")[:3]
     assert first == f"fig1b: {name.replace('_', ' ')} {found[name] / 9.8:.4g} g"
     assert re.fullmatch(rf"  {declared(name).label} .*  resolution \S+", row)
@@ -179,6 +194,24 @@ def test_a_ramp_finds_the_threshold(ramp: list[float], name: str, tmp_path: Path
     centre = done.motion.groups[0].mass_centre
     backward = replace(done.motion, position=done.motion.position - 2.0 * (centre - centre[0]))
     assert measure(backward).numbers[name] == found[name]
+
+
+def test_plateaus_of_a_ramp_neither_fall_nor_rise(tmp_path: Path) -> None:
+    """A walker stops while the drive falls and starts while it rises, with 4 g and rests of 0.2 s between."""
+    factors = [["0.2 s", 1], ["0.6 s", 0.1], ["0.8 s", 0.1], ["1.2 s", 1], ["1.4 s", 1]]
+    changes = {"drive.ramp": factors, "dimers.replicates": 1, "run.samples_per_cycle": 1}
+    found = run(load_case("fig1b", changes), tmp_path).result
+    for name in ("stops", "starts"):
+        assert found[f"{name}_within"] == pytest.approx(0.9 * 39.2 * 0.1 / 0.4, rel=0.02)
+        assert found[f"{name}_at"] == pytest.approx(0.9 * 9.8, abs=found[f"{name}_within"])
+
+
+def test_a_plateau_at_the_start_does_not_rise() -> None:
+    """A walker moves while the drive is held at 2, stops while it falls, and starts while it rises again."""
+    peaks = np.array([2.0, 2.0, 2.0, 1.0, 0.5, 0.5, 1.0, 2.0, 2.0])
+    moves = np.array([[1], [1], [1], [0], [0], [0], [1], [1]], dtype=np.bool_)
+    found = _thresholds(moves, peaks, by_ramp=True)
+    assert found == {"stops_at": 1.0, "stops_within": 1.0, "starts_at": 1.0, "starts_within": 1.0}
 
 
 @pytest.mark.parametrize(

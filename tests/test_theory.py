@@ -159,6 +159,14 @@ def test_walkers_rest_just_below_the_threshold_and_move_just_above(changes: dict
     assert 0.0 <= speeds[0] < 1e-6 < speeds[1] < 2e-6
 
 
+def test_the_threshold_does_not_depend_on_the_order_of_the_beads() -> None:
+    """With the small bead first, a walker goes backward, and begins to do so at the same drive."""
+    first, second = (make_case(dimers={"radii": radii}) for radii in (["0.3 mm", "0.2 mm"], ["0.2 mm", "0.3 mm"]))
+    assert float(motion_of(second).velocity[0]) == pytest.approx(-float(motion_of(first).velocity[0]), rel=1e-4)
+    assert threshold(second) == pytest.approx(threshold(first), rel=1e-3)
+    assert threshold(second) == pytest.approx(0.0811, rel=0.01)
+
+
 def test_a_prediction_names_the_contact_that_opens() -> None:
     """At the weakest drive, in steps of 1 g, at which one does: the two others stay closed."""
     rough = {"contact.friction.bead_wall": 0.7}

@@ -354,7 +354,7 @@ def check_drive(drive: Excitation) -> None:
         _check_record(record)
     largest = units.ACCELERATION.largest
     if drive.ramp and drive.peak_acceleration > largest:
-        found = f"the largest one gives {drive.peak_acceleration:.4g} m/s²"
+        found = f"the largest one gives {drive.peak_acceleration:.6g} m/s²"
         raise unusable("drive.ramp", f"expected factors that give accelerations up to {largest:g} m/s²; {found}")
     if drive.ramp and record and not record.is_stationary:
         low, high = (amplitude / units.ACCELERATION_OF_ONE_G for amplitude in record.amplitude_range)

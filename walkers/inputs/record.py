@@ -119,7 +119,7 @@ class Record(Table):
         """
         time = self.course.x
         if order < 2 and not self.repeats:
-            margin = min(_SLOW / 2.0 / self._lines[0], 0.4) * self.length
+            margin = min(_SLOW / self._lines[0], 0.4) * self.length
             time = time[(time >= margin) & (time <= self.length - margin)]
         return float(np.linalg.norm(self.shaking(time, order), axis=1).max())
 

@@ -296,8 +296,8 @@ def _until_steady(case: Case, cycles_per_sample: int) -> bool:
     if until and not case.apart:
         raise unusable(f"run.{until[0]}", "expected run.duration: a run until steady needs independent walkers")
     if until and case.excitation.changes:
-        changing = "with drive.ramp" if case.drive.ramp else "as the amplitude of drive.record changes"
-        raise unusable(f"run.{until[0]}", f"expected a number of cycles: {changing}, no velocity is constant")
+        changing = "with drive.ramp" if case.drive.ramp else "with the changing amplitude of drive.record"
+        raise unusable(f"run.{until[0]}", f"expected a number of cycles: {changing} no velocity is constant")
     if case.excitation.ends and not until:
         return False
     if case.drive.ramp or not case.apart or given or table.ranks != 1 or cycles_per_sample != 1:
