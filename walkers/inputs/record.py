@@ -76,7 +76,7 @@ class Record(Table):
     @cached_property
     def course(self) -> PPoly:
         """Displacement along x, y and z, m, against the time since the first row, s."""
-        course = _spline(np.array(self.rows), self.repeats).antiderivative(2)
+        course = _without_offset(np.array(self.rows), self.repeats).antiderivative(2)
         drift = course(course.x[-1]) / course.x[-1]
         course.c[-2] -= drift
         course.c[-1] -= drift * course.x[:-1, None]
@@ -305,13 +305,18 @@ def _as_tilt(acceleration: float) -> str:
     return f"{share:.2g} g, like a tilt of {tilt:.2g}°"
 
 
-def _spline(rows: FloatArray, repeats: bool = False) -> PPoly:
-    """The acceleration through rows, shape (N, 4), without its offset."""
+def _through(rows: FloatArray, repeats: bool = False) -> PPoly:
+    """The spline of the acceleration through rows, shape (N, 4)."""
     from scipy.interpolate import CubicSpline
 
     if repeats:
         rows[-1, 1:] = rows[0, 1:]
-    spline = CubicSpline(rows[:, 0] - rows[0, 0], rows[:, 1:], bc_type="periodic" if repeats else "not-a-knot")
+    return CubicSpline(rows[:, 0] - rows[0, 0], rows[:, 1:], bc_type="periodic" if repeats else "not-a-knot")
+
+
+def _without_offset(rows: FloatArray, repeats: bool = False) -> PPoly:
+    """The acceleration through rows, shape (N, 4), without its offset."""
+    spline = _through(rows, repeats)
     length = spline.x[-1]
     if repeats:
         offset = spline.integrate(0.0, length) / length
@@ -353,8 +358,10 @@ def _check(rows: Sequence[Sequence[float]]) -> None:
     if spread.max() < 2.0 * ACCELERATION.smallest:
         amplitude = f"{spread.max() / 2.0:.2g} m/s²"
         raise ValueError(f"expected an acceleration of {ACCELERATION.smallest:g} m/s² or more, found {amplitude}")
-    whole, half = (_spline(part)(array[:, 0] - array[0, 0]) for part in (array, array[::2]))
-    change = float(np.linalg.norm((whole - half)[:-1]) / np.linalg.norm(whole))
+    time = array[:, 0] - array[0, 0]
+    from_half = _through(array[::2])(time)
+    difference = (array[:, 1:] - from_half)[:-1]  # half of the rows may end before the last one
+    change = float(np.linalg.norm(difference) / np.linalg.norm(_without_offset(array)(time)))
     if change > _COARSE:
         message = "rows are too far apart, or too noisy: leaving out every second one changes the acceleration by"
         raise ValueError(f"{message} {change:.0%} (root mean square); expected at most {_COARSE:.0%}")
