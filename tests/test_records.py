@@ -277,6 +277,14 @@ def test_the_slow_part_of_a_parabola_is_the_parabola() -> None:
     assert slow_part(parabola + fast, 160)[middle] == pytest.approx(parabola[middle], abs=1e-5)
 
 
+@pytest.mark.parametrize(("periods", "share"), [(0.25, 0.0), (1.0, 0.25), (2.0, 1.0), (2.5, 1.0), (4.0, 1.0)])
+def test_the_slow_part_has_a_stated_limit(periods: float, share: float) -> None:
+    """What is left of a motion of some periods in a window of 400 samples."""
+    motion = np.sin(2.0 * pi * periods / 400.0 * np.arange(8000))[:, None]
+    left = motion - slow_part(motion, 400)
+    assert np.abs(left[800:-800]).max() == pytest.approx(share, abs=0.04)
+
+
 def test_pictures_do_not_show_the_drift_of_a_sensor(tmp_path: Path) -> None:
     """The boundary of a film shakes in place; the walls of a run in the laboratory follow the record."""
     time = np.arange(0.0, 0.5, 2e-4)

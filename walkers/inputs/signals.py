@@ -53,8 +53,8 @@ def slow_part(samples: FloatArray, width: int) -> FloatArray:
     Returns
     -------
     ndarray, shape (N, K)
-        Motions of two periods or more in a window are suppressed; of a motion of one period, three quarters are left
-        in the signal without its slow part, and slower ones belong to the slow part.
+        It contains nothing of motions of two periods or more in a window, three quarters of a motion
+        of one period, and slower motions as a whole.
     """
     first = _smoothed(samples, width)
     return first + _smoothed(samples - first, width)
