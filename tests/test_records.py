@@ -282,7 +282,7 @@ def test_the_slow_part_has_a_stated_limit(periods: float, share: float) -> None:
     """What is left of a motion of some periods in a window of 400 samples."""
     motion = np.sin(2.0 * pi * periods / 400.0 * np.arange(8000))[:, None]
     left = motion - slow_part(motion, 400)
-    assert np.abs(left[800:-800]).max() == pytest.approx(share, abs=0.04)
+    assert np.abs(left[800:-800]).max() == pytest.approx(share, abs=0.06)
 
 
 def test_pictures_do_not_show_the_drift_of_a_sensor(tmp_path: Path) -> None:

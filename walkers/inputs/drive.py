@@ -354,8 +354,8 @@ def check_drive(drive: Excitation) -> None:
         _check_record(record)
     largest = units.ACCELERATION.largest
     if drive.ramp and drive.peak_acceleration > largest:
-        found = f"the largest one gives {drive.peak_acceleration:.6g} m/s²"
-        raise unusable("drive.ramp", f"expected factors that give accelerations up to {largest:g} m/s²; {found}")
+        strongest = f"the largest one gives {drive.peak_acceleration:.6g} m/s²"
+        raise unusable("drive.ramp", f"expected factors that give accelerations up to {largest:g} m/s²; {strongest}")
     if drive.ramp and record and not record.is_stationary:
         low, high = (amplitude / units.ACCELERATION_OF_ONE_G for amplitude in record.amplitude_range)
         changes = f"the amplitude of drive.record changes by itself, from {low:.3g} to {high:.3g} g"
@@ -366,8 +366,8 @@ def _check_record(record: Record) -> None:
     """Refuse a record that is too fast, or too short for its offset."""
     highest = units.FREQUENCY.largest
     if record.frequencies[1] > highest:
-        found = f"found {record.frequencies[1]:.4g} Hz: is the unit of the time right?"
-        raise unusable("drive.record", f"expected frequencies up to {highest:g} Hz; {found}", record.file)
+        actual = f"found {record.frequencies[1]:.4g} Hz: is the unit of the time right?"
+        raise unusable("drive.record", f"expected frequencies up to {highest:g} Hz; {actual}", record.file)
     periods = record.strongest_line * record.length
     if not record.repeats and periods < FEWEST_PERIODS:
         least = f"expected at least {FEWEST_PERIODS:g} periods of its strongest line, found {periods:.2g}"

@@ -148,17 +148,17 @@ def _columns_of(heads: Sequence[str], line: str) -> tuple[list[_Column], list[st
             continue
         kind = TIME if place == 0 else ACCELERATION
         columns.append(_Column(number, place, _factor_of(head.strip(), unit, kind), head.strip()))
-    for place, what in enumerate(("time", *(f"acceleration along {axis}" for axis in "xyz"))):
+    for place, quantity in enumerate(("time", *(f"acceleration along {axis}" for axis in "xyz"))):
         same = [f'"{column.head}"' for column in columns if column.place == place]
         if len(same) > 1:
-            raise ValueError(f"columns {' and '.join(same)} are both the {what}; expected one of them")
+            raise ValueError(f"columns {' and '.join(same)} are both the {quantity}; expected one of them")
     places = {column.place for column in columns}
     if 0 not in places or len(places) < 2:
-        found = line.strip() if len(line.strip()) <= _QUOTED else f"{line.strip()[:_QUOTED]}..."
+        quotation = line.strip() if len(line.strip()) <= _QUOTED else f"{line.strip()[:_QUOTED]}..."
         missing = "names no time" if 0 not in places and places else "names no acceleration along x, y or z"
         if places:
-            raise ValueError(f'{_EXPECTED_HEADER}; "{found}" {missing}')
-        raise ValueError(f'{_EXPECTED_HEADER}, found "{found}": replace all lines above the numbers by a header')
+            raise ValueError(f'{_EXPECTED_HEADER}; "{quotation}" {missing}')
+        raise ValueError(f'{_EXPECTED_HEADER}, found "{quotation}": replace all lines above the numbers by a header')
     return columns, ignored
 
 
