@@ -1,15 +1,18 @@
 """Recorded shaking: the acceleration of the boundary against time, from the rows of a file.
 
-Between its rows the acceleration is a cubic spline, without its offset: that of a sensor, and gravity along z. The
-offset is a mean with the weights of a Hann window, sin²(πt/T) for a record of length T. Recorded sines rarely end
-after whole periods, and the plain mean of a part of a period is not zero: subtracted, it acts as a tilt of the
-substrate. Only a record that repeats has its plain mean subtracted, because it consists of whole periods.
+Between its rows the acceleration is a cubic spline, without its offset: that of a sensor, and
+gravity along z. The offset is a mean with the weights of a Hann window, sin²(πt/T) for a record of
+length T. Recorded sines rarely end after whole periods, and the plain mean of a part of a period is
+not zero: subtracted, it acts as a tilt of the substrate. Only a record that repeats has its plain
+mean subtracted, because it consists of whole periods.
 
-Integrated twice, the acceleration gives the displacement, a polynomial of fifth order from row to row. Two constants
-are free: the boundary starts at no displacement, and a constant velocity, which no bead feels, brings it back to it at
-the end of the record. The velocities at both ends differ unless the record repeats.
+Integrated twice, the acceleration gives the displacement, a polynomial of fifth order from row to
+row. Two constants are free: the boundary starts at no displacement, and a constant velocity, which
+no bead feels, brings it back to it at the end of the record. The velocities at both ends differ
+unless the record repeats.
 
-With p rows a period, the spline of a sine is off by (2π/p)⁴/384 of its peak: 4e-5 with 18 rows, 2e-10 with 400.
+With p rows a period, the spline of a sine is off by (2π/p)⁴/384 of its peak: 4e-5 with 18 rows,
+2e-10 with 400.
 
 Files are read in `walkers.inputs.record_file`.
 """
@@ -63,9 +66,10 @@ _DISPLACEMENTS = 1e-9, 1.0  # smallest and largest amplitude of an electrodynami
 
 
 class Record(Table):
-    """The rows of a file: time (s), acceleration along x, y and z (m/s²); whether they are a period, which repeats.
+    """The rows of a file: time (s), acceleration along x, y and z (m/s²).
 
-    ``ignored_columns`` are the names of columns of the file that are neither a time nor an acceleration.
+    ``repeats`` says whether they are a period, which repeats. ``ignored_columns`` are the names of
+    columns of the file that are neither a time nor an acceleration.
     """
 
     file: Annotated[str, SAME_RUN] = ""
@@ -86,9 +90,10 @@ class Record(Table):
     def slow_course(self) -> PPoly | None:
         """The slow part of the displacement along x, y and z, m, against time, s; None if the record repeats.
 
-        The error of a sensor, integrated twice, grows to millimetres within a second. What changes slowly compared with
-        four periods of the slowest line is no shaking, and no bead feels it: amplitudes and pictures
-        leave it out (`walkers.inputs.signals.slow_part`). The run contains it.
+        The error of a sensor, integrated twice, grows to millimetres within a second. What changes
+        slowly compared with four periods of the slowest line is no shaking, and no bead feels it:
+        amplitudes and pictures leave it out (`walkers.inputs.signals.slow_part`). The run contains
+        it.
         """
         from scipy.interpolate import CubicSpline
 
@@ -114,8 +119,8 @@ class Record(Table):
     def largest(self, order: int) -> float:
         """Largest displacement (order 0, m), velocity (1, m/s) or acceleration (2, m/s²) at the rows.
 
-        It is the largest length of the vector. Displacement and velocity are without their slow part, which is
-        uncertain near both ends of a record: they are not evaluated there.
+        It is the largest length of the vector. Displacement and velocity are without their slow
+        part, which is uncertain near both ends of a record: they are not evaluated there.
         """
         time = self.course.x
         if order < 2 and not self.repeats:
@@ -209,17 +214,19 @@ class Record(Table):
         periods = self.strongest_line * self.length
         width = WINDOW / periods
         # Beats with another line, which come and go within a few cycles, are no change of the amplitude.
-        nearest = min((abs(line - periods) for line in self._lines if abs(line - periods) >= _BEATS), default=count)
-        width = max(width, 2.0 / nearest)
+        beats = [abs(line - periods) for line in self._lines]
+        fewest = min((number for number in beats if number >= _BEATS), default=count)
+        width = max(width, 2.0 / fewest)
         return local_amplitude(self._even, periods / count, max(int(width * count), 2))
 
     def local_amplitude(self, time: FloatArray) -> FloatArray:
         """Local amplitude of the acceleration at times (s), m/s², shape (N,).
 
-        This is the amplitude of the strongest line of the spectrum in a Hann window of eight of its periods, as a
-        lock-in amplifier measures it: noise, harmonics and other lines do not count. The window is two beats of the
-        strongest line with the nearest other one, if these are longer. In the half window at either end, the amplitude
-        is that of the first or last whole window. A record that repeats has one amplitude.
+        This is the amplitude of the strongest line of the spectrum in a Hann window of eight of its
+        periods, as a lock-in amplifier measures it: noise, harmonics and other lines do not count.
+        The window is two beats of the strongest line with the nearest other one, if these are
+        longer. In the half window at either end, the amplitude is that of the first or last whole
+        window. A record that repeats has one amplitude.
         """
         even = np.arange(len(self.rows)) * self.length / len(self.rows)
         return np.interp(time, even, self._amplitudes)

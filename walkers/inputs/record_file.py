@@ -1,6 +1,7 @@
 """Files of recorded shaking, as data loggers write them: a header, and rows of numbers.
 
-This module reads a file. Whether its rows are a motion that can be run is a matter of `walkers.inputs.record`.
+This module reads a file. Whether its rows are a motion that can be run is a matter of
+`walkers.inputs.record`.
 """
 
 from __future__ import annotations
@@ -22,16 +23,19 @@ _EXPECTED_HEADER = f"expected a header that names the time and accelerations alo
 _QUOTED = 60  # longest quotation of a line of the file, in letters
 _NAME_AND_UNIT = re.compile(r"(?P<name>[^\[\]()]*)[\[(](?P<unit>[^\[\]()]*)[\])]\s*")
 _TIME_NAMES = frozenset({"t", "time", "timestamp"})
-_AXIS_NAME = re.compile(r"(linear )?(a|acc|accel|acceleration)? ?(?P<axis>[xyz])|(?P<first>[xyz]) (acc|acceleration)")
+_AXIS_NAME = re.compile(
+    r"(linear )?(a|acc|accel|acceleration)? ?(?P<axis>[xyz])"  # such as "acc x", "ax", "x"
+    r"|(?P<first>[xyz]) (acc|acceleration)"
+)
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
-_METRE_PER_SECOND_SQUARED = frozenset({"m/s2", "m/s^2", "m/s²", "m/s**2", "m/s/s", "m s-2", "m s^-2", "m·s⁻²", "ms^-2"})
+_METRE_PER_SECOND_SQUARED = frozenset(("m/s2", "m/s^2", "m/s²", "m/s**2", "m/s/s", "m s-2", "m s^-2", "m·s⁻²", "ms^-2"))
 
 
 class RecordContents(TypedDict):
     """What a file of recorded shaking contains.
 
-    ``rows`` have the time, s, and the acceleration along x, y and z, m/s². ``ignored_columns`` are the names of the
-    other columns.
+    ``rows`` have the time, s, and the acceleration along x, y and z, m/s². ``ignored_columns`` are
+    the names of the other columns.
     """
 
     rows: list[list[float]]
@@ -40,7 +44,11 @@ class RecordContents(TypedDict):
 
 @dataclass(frozen=True)
 class _Column:
-    """A column that is read: its place in a row of the file, its place in a row of the record, its unit in SI units."""
+    """A column that is read.
+
+    ``number`` is its place in a row of the file, ``place`` its place in a row of the record,
+    ``factor`` its unit in SI units, ``head`` its name and unit in the header.
+    """
 
     number: int
     place: int
@@ -51,10 +59,11 @@ class _Column:
 def read_record(path: Path) -> RecordContents:
     """Read a file of recorded shaking.
 
-    The header is the first line that is not empty and does not begin with ``#``; the last line with a ``#`` if numbers
-    follow it. Columns are separated by commas, semicolons or tabs, as in the header. With semicolons and tabs, numbers
-    may have decimal commas. The time and the accelerations are found by their names, whatever their case, and have
-    their units in brackets. Other columns are left out.
+    The header is the first line that is not empty and does not begin with ``#``; the last line with
+    a ``#`` if numbers follow it. Columns are separated by commas, semicolons or tabs, as in the
+    header. With semicolons and tabs, numbers may have decimal commas. The time and the
+    accelerations are found by their names, whatever their case, and have their units in brackets.
+    Other columns are left out.
 
     Parameters
     ----------
@@ -69,7 +78,8 @@ def read_record(path: Path) -> RecordContents:
     Raises
     ------
     ValueError
-        If the file cannot be read, or its header or a row is not understood. The message names the line or row.
+        If the file cannot be read, or its header or a row is not understood. The message names the
+        line or row.
     """
     lines = [line for line in _text_of(path).splitlines() if line.strip()]
     comments = [line for line in lines if line.lstrip().startswith("#")]
@@ -155,15 +165,16 @@ def _columns_of(heads: Sequence[str], line: str) -> tuple[list[_Column], list[st
     places = {column.place for column in columns}
     if 0 not in places or len(places) < 2:
         quotation = line.strip() if len(line.strip()) <= _QUOTED else f"{line.strip()[:_QUOTED]}..."
-        missing = "names no time" if 0 not in places and places else "names no acceleration along x, y or z"
+        missing = "names no acceleration along x, y or z" if 0 in places else "names no time"
         if places:
             raise ValueError(f'{_EXPECTED_HEADER}; "{quotation}" {missing}')
-        raise ValueError(f'{_EXPECTED_HEADER}, found "{quotation}": replace all lines above the numbers by a header')
+        cure = "replace all lines above the numbers by a header"
+        raise ValueError(f'{_EXPECTED_HEADER}, found "{quotation}": {cure}')
     return columns, ignored
 
 
 def _place_of(name: str) -> int | None:
-    """Place of a column in the rows of a record by its name: 0 for the time, 1 to 3 for x, y and z; None for others."""
+    """Place of a column in the rows of a record: 0 for the time, 1 to 3 for x, y and z, or None."""
     plain = re.sub(r"[\s_.\-]+", " ", name).strip().lower()
     if plain in _TIME_NAMES:
         return 0
@@ -210,7 +221,7 @@ def _texts(rows: Sequence[Sequence[str]], columns: Sequence[_Column]) -> Iterato
 
 
 def _check_decimal_commas(rows: Sequence[Sequence[str]], columns: Sequence[_Column]) -> None:
-    """Refuse a file whose numbers have both decimal commas and decimal points: commas may separate thousands."""
+    """Refuse a file whose numbers have commas and points: the commas may separate thousands."""
     with_comma = next(text for text in _texts(rows, columns) if "," in text)
     with_point = next((text for text in _texts(rows, columns) if "." in text), None)
     if with_point is not None:

@@ -1,9 +1,11 @@
 """Numerics of sampled signals: Hann-weighted means, slow parts and local amplitudes.
 
-The functions take evenly spaced samples, one signal a column. They know nothing of records and their files.
+The functions take evenly spaced samples, one signal a column. They know nothing of records and
+their files.
 
-A Hann window weights with sin²(πt/T) over its width T. It suppresses a sine of n periods in the window by
-1/(π n (n² - 1)) at worst, and entirely if n is a whole number from two on. A plain mean only suppresses it by 1/(π n).
+A Hann window weights with sin²(πt/T) over its width T. It suppresses a sine of n periods in the
+window by 1/(π n (n² - 1)) at worst, and entirely if n is a whole number from two on. A plain mean
+only suppresses it by 1/(π n).
 """
 
 from __future__ import annotations
@@ -39,9 +41,9 @@ def hann_mean(samples: FloatArray) -> FloatArray:
 def slow_part(samples: FloatArray, width: int) -> FloatArray:
     """The part of signals that changes slowly compared with a window.
 
-    This is the Hann-weighted mean in a window around each sample. Half a window from an end, it is the Hann-weighted
-    straight line of the first or last whole window. The mean of what it leaves is added, so that the error for a
-    parabola is of second order.
+    This is the Hann-weighted mean in a window around each sample. Half a window from an end, it is
+    the Hann-weighted straight line of the first or last whole window. The mean of what it leaves is
+    added, so that the error for a parabola is of second order.
 
     Parameters
     ----------
@@ -53,8 +55,8 @@ def slow_part(samples: FloatArray, width: int) -> FloatArray:
     Returns
     -------
     ndarray, shape (N, K)
-        It contains nothing of motions of two periods or more in a window, three quarters of a motion
-        of one period, and slower motions as a whole.
+        It contains nothing of motions of two periods or more in a window, three quarters of a
+        motion of one period, and slower motions as a whole.
     """
     first = _smoothed(samples, width)
     return first + _smoothed(samples - first, width)
@@ -84,8 +86,8 @@ def local_amplitude(samples: FloatArray, frequency: float, width: int) -> FloatA
     frequency
         In cycles per sample.
     width
-        Number of samples in a window; at most all of them. Closer than half of it to an end, the amplitude is that of
-        the first or last whole window.
+        Number of samples in a window; at most all of them. Closer than half of it to an end, the
+        amplitude is that of the first or last whole window.
 
     Returns
     -------

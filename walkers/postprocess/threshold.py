@@ -1,11 +1,12 @@
 """The threshold of motion in one run: the drive falls slowly until walkers stop, or rises until they start.
 
-The drive changes by a ramp, or because the amplitude of a record changes. Its strength is the local amplitude of its
-acceleration (`walkers.inputs.drive.Excitation.local_amplitude`).
+The drive changes by a ramp, or because the amplitude of a record changes. Its strength is the local
+amplitude of its acceleration (`walkers.inputs.drive.Excitation.local_amplitude`).
 
-A window is a few cycles. A walker moves in it if it is faster than `walkers.postprocess.sides.REST`. It stops at the
-end of the last window in which it moves while the drive falls, and starts at the begin of the first one in which it
-moves while the drive rises, if it rests in others. The resolution is the change of the drive in this window.
+A window is a few cycles. A walker moves in it if it is faster than
+`walkers.postprocess.sides.REST`. It stops at the end of the last window in which it moves while the
+drive falls, and starts at the begin of the first one in which it moves while the drive rises, if it
+rests in others. The resolution is the change of the drive in this window.
 """
 
 from __future__ import annotations
@@ -44,8 +45,8 @@ def derived(case: Case) -> dict[str, float]:  # noqa: ARG001
 def measure(motion: Motion) -> Measured:
     """The table ``ramp`` and the numbers: means over the walkers that stop or start.
 
-    If the amplitude of a record changes, but no walker stops or starts, there are no numbers: the mean velocity stands,
-    with a warning.
+    If the amplitude of a record changes, but no walker stops or starts, there are no numbers: the
+    mean velocity stands, with a warning.
     """
     case, drive = motion.case, motion.case.excitation
     walked = [distance_walked(group) for group in motion.groups]
@@ -101,8 +102,9 @@ def _thresholds(moves: BoolArray, peaks: FloatArray, *, by_ramp: bool) -> dict[s
 def directions(peaks: FloatArray, least: float) -> IntArray:
     """Whether the drive rises (1), falls (-1) or neither (0) in each window, shape (K,).
 
-    It rises from a minimum to the next maximum, and falls from a maximum to the next minimum. Reversals by ``least`` or
-    less are noise. Windows in which the drive stays exactly as it is are a plateau: it does neither.
+    It rises from a minimum to the next maximum, and falls from a maximum to the next minimum.
+    Reversals by ``least`` or less are noise. Windows in which the drive stays exactly as it is are
+    a plateau: it does neither.
 
     Parameters
     ----------
