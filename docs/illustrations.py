@@ -66,20 +66,35 @@ Make: TypeAlias = Callable[[Path, Path], object]
 """Makes the files of an illustration from the folders of runs and docs."""
 
 
+class Versions(NamedTuple):
+    """Versions of the decks and of the results with which an illustration was made."""
+
+    decks: int = CONTENT_VERSION
+    results: int = VERSION
+
+
 class Illustration(NamedTuple):
-    """Files of docs/, the cases that they show, and the function that makes them."""
+    """Files of docs/, the cases that they show, and the function and the versions that make them."""
 
     files: tuple[str, ...]
     cases: Callable[[], Iterable[Case]]
     make: Make
+    versions: Versions
+
+
+_TODAY = Versions()
+_OF_PILES = Versions(decks=9, results=1)
+"""Statistics of chaotic piles stand until what piles do changes: four core-hours, for other last digits of tables."""
 
 
 ILLUSTRATIONS: dict[str, Illustration] = {}
 
 
-def _illustration(name: str, *files: str, cases: Callable[[], Iterable[Case]]) -> Callable[[Make], Make]:
+def _illustration(
+    name: str, *files: str, cases: Callable[[], Iterable[Case]], versions: Versions = _TODAY
+) -> Callable[[Make], Make]:
     def enter(make: Make) -> Make:
-        ILLUSTRATIONS[name] = Illustration(files, cases, make)
+        ILLUSTRATIONS[name] = Illustration(files, cases, make, versions)
         return make
 
     return enter
@@ -152,7 +167,9 @@ for _name in _SWEEPS:
     _of_sweep(_name)
 
 
-@_illustration("pile-climbs", "figures/pile-climbs.png", "figures/pile-climbs.md", cases=_cases(*_PILES))
+@_illustration(
+    "pile-climbs", "figures/pile-climbs.png", "figures/pile-climbs.md", cases=_cases(*_PILES), versions=_OF_PILES
+)
 def _make_climbs(out: Path, docs: Path) -> None:
     climbs = climb([sweep(name, out).directory for name in _PILES], to=docs / "figures" / "pile-climbs.png")
     rows = [{name: texts[name] for name in _OF_CLIMBS} for texts in map(texts_of, climbs)]
@@ -247,9 +264,10 @@ def _make_calibration(out: Path, docs: Path) -> None:
         shutil.copy(out / "ruby" / name, docs / file)
 
 
-def digest(cases: Iterable[Case]) -> str:
-    """Twelve hex digits over cases, deck version and version of the results; the engine binary does not count."""
-    contents = {"cases": [case.determinants() for case in cases], "decks": CONTENT_VERSION, "results": VERSION}
+def digest(illustration: Illustration) -> str:
+    """Twelve hex digits over the cases of an illustration and its versions; the engine binary does not count."""
+    cases = [case.determinants() for case in illustration.cases()]
+    contents = {"cases": cases, **illustration.versions._asdict()}
     return hashlib.sha256(json.dumps(contents, sort_keys=True).encode()).hexdigest()[:12]
 
 
@@ -257,7 +275,7 @@ def stale(docs: Path) -> dict[str, list[str]]:
     """The illustrations with files that are missing or show other cases than the current ones, and these files."""
     record, old = read_json(docs / RECORD), {}
     for name, illustration in ILLUSTRATIONS.items():
-        today = digest(illustration.cases())
+        today = digest(illustration)
         old[name] = [file for file in illustration.files if record.get(file) != today or not (docs / file).is_file()]
     return {name: files for name, files in old.items() if files}
 
@@ -275,7 +293,7 @@ def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[
         print(f"walkers: {name}", file=sys.stderr)
         illustration = ILLUSTRATIONS[name]
         illustration.make(out, docs)
-        record = read_json(docs / RECORD) | dict.fromkeys(illustration.files, digest(illustration.cases()))
+        record = read_json(docs / RECORD) | dict.fromkeys(illustration.files, digest(illustration))
         write_json(docs / RECORD, dict(sorted(record.items())))
         written += [docs / file for file in illustration.files]
     numbers = facts(docs)

@@ -74,6 +74,7 @@ CASES: list[tuple[dict[str, Any], str]] = [
     ({"liquid": {"contact_angle": "84 deg"}}, "expected a smaller angle or less liquid: at rest, the"),
     ({"liquid": {"contact_angle": "90 deg"}, "environment": {"gravity": "0 g"}}, "bead 1 and the boundary apart"),
     ({"run": {"time_step": "20 us"}}, 'run.time_step = "20 us": beyond the rayleigh'),
+    ({"run": {"until": "climb"}}, 'run.until = "climb": expected none: only clusters of a [mixture] climb'),
     ({"run": {"cycles": 10, "settling_cycles": 10}}, "run.settling_cycles = 10: expected at most"),
     ({"mixture": {**MIXTURE, "count": 200_001}}, "mixture.count = 200001: expected at most 200000"),
     ({"run": {"cycles": None, "settling_cycles": None, "duration": "1e4 s"}},

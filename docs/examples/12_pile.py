@@ -3,7 +3,7 @@ A pile in a box
 ===============
 
 Pour 60 wet beads of two sizes into a box 4 mm wide and shake it vertically. This run is too short for clusters to
-climb; in ``pile-small``, three do within 4 s.
+climb; ``pile-small`` is shaken until one has.
 """
 
 import matplotlib.pyplot as plt

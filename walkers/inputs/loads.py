@@ -14,7 +14,6 @@ from walkers.physics.bridge import BridgeLaw, Surfaces
 from walkers.physics.capillary import bead_volume, largest_normal
 from walkers.physics.contact import hertz_overlap, hertz_stiffness, reduced_modulus
 from walkers.physics.dimer import Dimer
-from walkers.rounding import percent
 
 if TYPE_CHECKING:
     from walkers.inputs.bodies import Walkers
@@ -79,9 +78,9 @@ def softness_warning(case: Case) -> str | None:
     """What the delay of contacts does to the loose beads of a case; None if that is little."""
     if (phase := delay_of_loose_beads(case)) < _NOTICED_DELAY:
         return None
-    slower = percent(float(np.interp(phase, _MEASURED_DELAYS, _MEASURED_SLOWDOWNS)))
+    slower = 100.0 * float(np.interp(phase, _MEASURED_DELAYS, _MEASURED_SLOWDOWNS))
     return (
-        f"soft beads: bridges delay contacts by {phase:.2g} rad, which slows clusters by some {slower} "
+        f"soft beads: bridges delay contacts by {phase:.2g} rad, which slows clusters by some {slower:.0f} % "
         "(in a corner; more on a plain wall); a higher contact.youngs_modulus reduces it"
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import ceil, floor, inf
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -63,6 +63,12 @@ class Run(Table):
     )
     most_cycles: Indirect[_Cycles] = key('Upper limit for `cycles = "auto"`. Default: 60.', None, 60)
     duration: Indirect[Duration] = key("Duration of the drive, instead of `cycles`. Loose beads need it.", None)
+    until: Annotated[Literal["climb"] | None, AUTO] = key(
+        'Event that ends the run of a pile before its `duration`: `"climb"`, the first climb. '
+        "The run ends with the segment in which the climb qualifies.",
+        None,
+        "climb",
+    )
     settling_cycles: Filled[Whole] = key(
         "Cycles at the start, which are not measured. Default: a third, at most 20.", None, 20, ge=0, le=1_000_000
     )
@@ -247,6 +253,8 @@ def _check_length(case: Case, run: Run, longest: float) -> None:
     """Refuse a run that is too short or too long for what is measured, for its drive, or for the engine (cycles)."""
     drive, cycles, settling, every = case.excitation, run.cycles, run.settling_cycles, run.cycles_per_sample
     (fewest, most), name = drive.cycles, "run.cycles" if run.duration is None else "run.duration"
+    if run.until and case.mixture is None:
+        raise unusable("run.until", "expected none: only clusters of a [mixture] climb out of a pile")
     if cycles < 2:
         raise unusable(name, f"expected at least two cycles of the drive, {2.0 / drive.frequency:.4g} s")
     if cycles - settling < 2:

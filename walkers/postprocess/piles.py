@@ -31,6 +31,11 @@ def derived(case: Case) -> dict[str, float]:
     return {"beads": case.count, "large": case.large, "duration": case.duration}
 
 
+def has_climbed(motion: Motion) -> bool:
+    """Whether a cluster of a pile has climbed so far."""
+    return bool(measure(motion).numbers["climbs"])
+
+
 def measure(motion: Motion) -> Measured:
     """Tables and numbers of the bed and of the clusters."""
     case = motion.case
@@ -64,7 +69,8 @@ def measure(motion: Motion) -> Measured:
     }
     counts = {f"events_{event}": int(np.sum(events["event"] == event)) for event in clusters.EVENTS}
     numbers = {"clusters": len(tracks), **counts, **_of_climbs(climbs), **_of_bed(motion, bed)}
-    if numbers["driven"] < _WHOLE * case.duration:
+    ended_by_climb = case.run.until == "climb" and numbers["climbs"] > 0
+    if numbers["driven"] < _WHOLE * case.duration and not ended_by_climb:
         early = f"shaken for {numbers['driven']:.3g} s of {case.duration:.3g} s: climbers left the container"
         return Measured(tables, numbers, (early,))
     return Measured(tables, numbers)

@@ -38,8 +38,9 @@ _FORCES_VERSION = re.compile(rb"^// FORCES_VERSION \d+$", re.MULTILINE)
 """The line of ``bridge.cpp`` that is part of the names of runs and audits; the rest of the sources is not."""
 _PACKAGES = "g++ libliggghts-dev libopenmpi-dev"
 _HEADERS = Path("/usr/include/liggghts")
-# All machines of an architecture give the same numbers: -O3 does not reorder, and there are no fused operations. Only
-# without traps does it compute several contacts at once.
+# This code gives the same numbers on all machines of an architecture: -O3 does not reorder, and there are no fused
+# operations. (The C library's sine, of the drive, differs in its last digit without fused multiply-add.) Only without
+# traps does it compute several contacts at once.
 _OPTIONS = (
     *("-shared", "-fPIC", "-std=gnu++11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
     *("-DNDEBUG", "-DOMPI_SKIP_MPICXX", "-Wall", "-Wextra"),

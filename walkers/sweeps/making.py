@@ -149,7 +149,7 @@ def progress_in(run: Run, cycles: int, segment: Segment, step: int, seconds: flo
     text = "coming to rest" if start is None else f"{100 * share:.0f} %"
     if not rate:
         return Progress(share, text if step > segment.begin else "starting")
-    left = f"{'at most ' * run.until_steady}{duration_text((steps - done) / rate)} left"
+    left = f"{'at most ' if run.until_steady or run.until else ''}{duration_text((steps - done) / rate)} left"
     return Progress(share, f"{text}, {left}, {simulated:.3f} s simulated, {rate:.0f} steps/s")
 
 
@@ -199,6 +199,9 @@ class OpenRun:
                 tell = _teller(self.case.run, cycles, segment, on_progress)
                 try:
                     self._make(segment, render(case, segment), tell, time_limit)
+                    if self.case.run.until == "climb" and self._has_climbed():
+                        self.ended = "a cluster has climbed (run.until)"
+                        return
                 except BeadsOverTheTop as over:
                     begun_at = on_disk.drive_from(self.case, self.done)
                     if not case.boundary.closed or begun_at is None or segment.begin <= begun_at:
@@ -209,6 +212,15 @@ class OpenRun:
                     return
             if cycles < self.case.run.cycles and _are_constant(self.directory):
                 return
+
+    def _has_climbed(self) -> bool:
+        """Whether a cluster has climbed in the complete segments."""
+        from walkers.postprocess.motion import read_motion  # numpy is loaded while the engine runs
+        from walkers.postprocess.piles import has_climbed
+
+        if on_disk.drive_from(self.case, self.done[:-1]) is None:  # the beads came to rest in this segment
+            return False
+        return has_climbed(read_motion(self.directory))
 
     def _next_segment(self, case: Case) -> Segment:
         return decks.next_segment(
