@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import math
 import os
 import re
 import shutil
@@ -12,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import walkers
@@ -33,7 +36,9 @@ from tests.conftest import (
     wait_for,
 )
 from walkers import run as run_case
+from walkers.cache import is_trusted
 from walkers.inputs.case import Case
+from walkers.physics.laws import young_laplace
 from walkers.runner import binary, failures
 from walkers.runner.binary import find_engine, plugin_of
 from walkers.runner.directory import (
@@ -258,6 +263,90 @@ def test_a_contact_model_that_may_not_be_the_compiled_is_compiled_anew(
     os.chown(model.parent, 12345, 12345)
     with pytest.raises(failures.ContactModelMissing, match=r"belongs to another user.*set XDG_CACHE_HOME"):
         plugin_of(find_engine())
+
+
+NOBODY = 65534
+
+
+def _double(file: Path) -> None:
+    """Double the numbers of a file of the cache, with the right checksum."""
+    numbers = 2.0 * np.frombuffer(file.read_bytes()[32:])
+    checksum = hashlib.sha256(file.stem.encode() + numbers.tobytes()).digest()
+    file.write_bytes(checksum + numbers.tobytes())
+
+
+def _folder_of_another_user(file: Path) -> None:
+    os.chown(file.parent, NOBODY, NOBODY)
+    os.chown(file, NOBODY, NOBODY)
+
+
+def _link_of_another_user(file: Path) -> None:
+    elsewhere = file.parent.rename(file.parents[1] / "elsewhere")
+    file.parent.symlink_to(elsewhere)
+    os.chown(file.parent, NOBODY, NOBODY, follow_symlinks=False)
+
+
+PLANTED: dict[str, Callable[[Path], object]] = {
+    "a file of another user": lambda file: os.chown(file, NOBODY, NOBODY),
+    "a file that others can write": lambda file: file.chmod(0o666),
+    "a folder that others can write": lambda file: file.parent.chmod(0o777),
+    "a folder of another user": _folder_of_another_user,
+    "a link of another user": _link_of_another_user,
+    "a cache that others can write": lambda file: file.parents[1].chmod(0o777),
+    "a cache of another user": lambda file: os.chown(file.parents[1], NOBODY, NOBODY),
+}
+"""How the numbers in a file of the cache can be those of another user."""
+
+
+@pytest.fixture
+def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache without contents, and a solver that has forgotten its solutions."""
+    if os.geteuid():
+        pytest.skip("only root can give files away")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    young_laplace._solved.cache_clear()
+    return tmp_path / "cache" / "granular-walkers"
+
+
+def _force_at_contact() -> float:
+    """Capillary force of a bead on a substrate at contact, in units of R γ."""
+    young_laplace._solved.cache_clear()
+    _, force = young_laplace._solved((math.inf, 0.01, 0.0))
+    return float(force(1.0))
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_capillary_forces_that_another_user_wrote_are_not_believed(name: str, empty_cache: Path) -> None:
+    """They are computed again, and a cache of the user's own keeps them."""
+    force = _force_at_contact()
+    assert 9.0 < force < 4.0 * math.pi, "the bridge pulls a little less than 4 π R γ"
+    (file,) = empty_cache.glob("young-laplace/*.bin")
+    _double(file)
+    assert _force_at_contact() == 2.0 * force, "numbers of the user are read"
+    PLANTED[name](file)
+    assert _force_at_contact() == force
+    is_foreign = name == "a cache of another user"
+    assert is_trusted(file) != is_foreign
+    assert (_force_at_contact(), empty_cache.stat().st_uid == NOBODY) == (force, is_foreign)
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_audits_that_another_user_wrote_are_not_believed(name: str, empty_cache: Path) -> None:
+    passed = {"passed": True, "lines": 80, "failures": [], "date": "2026-01-01T00:00:00Z"}
+    binary.write_audit("engine", {"contact_model": "0" * 64, **passed})
+    assert binary.read_audit("engine", None) == passed
+    (file,) = empty_cache.glob("audits/*.json")
+    PLANTED[name](file)
+    assert binary.read_audit("engine", None) is None
+
+
+def test_an_audit_is_kept_whatever_files_others_of_the_group_may_write(empty_cache: Path) -> None:
+    before = os.umask(0o002)
+    try:
+        binary.write_audit("engine", {"contact_model": "0", "passed": True, "lines": 1, "failures": [], "date": ""})
+    finally:
+        os.umask(before)
+    assert binary.read_audit("engine", "0") is not None
 
 
 def test_another_version_of_the_forces_is_another_engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

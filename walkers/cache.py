@@ -1,8 +1,17 @@
-"""The program's folder in the user's cache, and numbers that are kept there because they take long to compute."""
+"""The program's folder in the user's cache, and numbers that are kept there because they take long to compute.
+
+What the cache contains is executed (the contact model) or believed (numbers, audits). Therefore only contents that
+nobody but the user and root can have written are used. A cache that others can write is closed, and all of its
+contents are forgotten.
+"""
 
 from __future__ import annotations
 
+import os
+import shutil
+import stat
 import tempfile
+import threading
 from collections.abc import Callable
 from contextlib import suppress
 from hashlib import sha256
@@ -12,7 +21,16 @@ import numpy as np
 import numpy.typing as npt
 from platformdirs import user_cache_path
 
+from walkers.regular_files import read_regular
+
 _NOWHERE = Path("/proc/no-home")  # a folder that nobody can make
+_CHECKSUM_BYTES = 32
+_securing = threading.Lock()
+"""Held while contents are forgotten, so that no thread writes what another one removes."""
+
+
+class ForeignCacheError(PermissionError):
+    """The folder of the cache belongs to another user."""
 
 
 def cache_folder() -> Path:
@@ -24,12 +42,96 @@ def cache_folder() -> Path:
 
 
 def make_cache_folder(name: str = "") -> Path:
-    """Make the folder, which nobody but the user can enter, or a folder in it; `OSError` if that is not possible."""
+    """Make the folder, or a folder in it, which nobody but the user can enter.
+
+    Parameters
+    ----------
+    name
+        Name of a folder within the cache; empty: the folder of the cache itself.
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be made or secured (`secure_cache`).
+    """
+    secure_cache()
     folder = cache_folder()
     folder.parent.mkdir(parents=True, exist_ok=True)
     folder.mkdir(mode=0o700, exist_ok=True)
-    (folder / name).mkdir(exist_ok=True)
-    return folder / name
+    if not name:
+        return folder
+    inner = folder / name
+    with _securing:
+        if os.path.lexists(inner) and not _is_safe_folder(inner):
+            _forget(inner)
+    inner.mkdir(mode=0o700, exist_ok=True)
+    return inner
+
+
+# --- trust ------------------------------------------------------------------------------------------------------------
+
+
+def secure_cache() -> None:
+    """Close the cache to other users, and forget all of its contents if others could write them.
+
+    Raises
+    ------
+    ForeignCacheError
+        If the cache belongs to another user.
+    OSError
+        If the cache cannot be closed.
+    """
+    folder = cache_folder()
+    with _securing:
+        if not folder.exists() or is_safe(folder):
+            return
+        if folder.stat().st_uid != os.geteuid():
+            raise ForeignCacheError(f"{folder} belongs to another user")
+        folder.chmod(0o700)
+        for path in folder.iterdir():
+            _forget(path)
+
+
+def is_safe(path: Path) -> bool:
+    """Whether only the user and root can write a file or a folder, which is not a symbolic link."""
+    about = path.lstat()
+    is_link = stat.S_ISLNK(about.st_mode)
+    return _is_ours(about) and not is_link and not about.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
+def is_trusted(path: Path) -> bool:
+    """Whether a file in a folder of the cache exists and can only have been written by the user or root."""
+    try:
+        return is_safe(cache_folder()) and _is_safe_folder(path.parent) and is_safe(path)
+    except OSError:
+        return False
+
+
+def _is_safe_folder(folder: Path) -> bool:
+    """Whether a folder is safe; it may be a link of the user's own to a safe folder."""
+    return _is_ours(folder.lstat()) and is_safe(folder.resolve())
+
+
+def _is_ours(about: os.stat_result) -> bool:
+    return about.st_uid in (0, os.geteuid())
+
+
+def _forget(path: Path) -> None:
+    """Remove a file, a link or a folder of the cache, or at least its name."""
+    if path.is_symlink() or not path.is_dir():
+        path.unlink(missing_ok=True)
+        return
+    shutil.rmtree(path, ignore_errors=True)
+    if path.exists():  # files of another user, in a folder of that user
+        path.rename(tempfile.mkdtemp(prefix="forgotten-", dir=path.parent))
+
+
+# --- numbers ----------------------------------------------------------------------------------------------------------
 
 
 def place_of_numbers(kind: str, key: bytes) -> Path:
@@ -38,11 +140,26 @@ def place_of_numbers(kind: str, key: bytes) -> Path:
 
 
 def kept_numbers(place: Path, compute: Callable[[], npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:
-    """The numbers at a place of the cache, shape (n,); they are computed if there are none, or others than written."""
-    with suppress(OSError):
-        contents = place.read_bytes()
-        if contents[:32] == _checksum(place, contents[32:]):
-            return np.frombuffer(contents[32:])
+    """Numbers that are kept at a place of the cache.
+
+    Parameters
+    ----------
+    place
+        Path of the numbers (`place_of_numbers`).
+    compute
+        Computes the numbers if the place has none, if they are damaged, or if another user can have written them.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        The numbers.
+    """
+    if is_trusted(place):
+        with suppress(OSError):
+            contents = read_regular(place)
+            numbers_read = contents[_CHECKSUM_BYTES:]
+            if contents[:_CHECKSUM_BYTES] == _checksum(place, numbers_read):
+                return np.frombuffer(numbers_read)
     numbers = compute()
     with suppress(OSError):  # renamed, because other processes may write it too
         make_cache_folder(place.parent.name)

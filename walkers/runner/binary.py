@@ -14,7 +14,6 @@ import os
 import re
 import shlex
 import shutil
-import stat
 import subprocess
 import tempfile
 from collections.abc import Mapping
@@ -25,7 +24,14 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from walkers.cache import cache_folder, make_cache_folder
+from walkers.cache import (
+    ForeignCacheError,
+    cache_folder,
+    is_safe,
+    is_trusted,
+    make_cache_folder,
+    secure_cache,
+)
 from walkers.runner.failures import AUDITED_VERSION, ContactModelMissing, EngineFailure, EngineMissing, OtherEngine
 from walkers.runner.files import checksum, read_json, write_json
 from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, RUN_NAME
@@ -100,9 +106,12 @@ def plugin_of(engine: Engine) -> Path:
         raise ContactModelMissing(f"{place} has a space or a colon, which the system's loader takes for a separator")
     _check_version(engine)
     try:
-        _secure(place.parent)
+        secure_cache()
         if not _is_as_compiled(place, fingerprint):
             _compile(place, fingerprint)
+    except ForeignCacheError as error:
+        why = f"{place.parent} belongs to another user, whose code the engine would run"
+        raise ContactModelMissing(f"{why}; set XDG_CACHE_HOME to a folder of your own") from error
     except OSError as error:
         why = f"{place} cannot be written ({error.strerror}); set XDG_CACHE_HOME to a folder in which files can be"
         raise ContactModelMissing(why) from error
@@ -126,30 +135,11 @@ def _place() -> tuple[Path, str]:
     return cache_folder() / f"bridge-{fingerprint.hexdigest()[:16]}.so", fingerprint.hexdigest()
 
 
-def _is_safe(path: Path) -> bool:
-    """Whether only the user and root can write a file or a folder, which is no symbolic link."""
-    about = path.lstat()
-    ours = about.st_uid in (0, os.geteuid()) and not stat.S_ISLNK(about.st_mode)
-    return ours and not about.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-
-
-def _secure(folder: Path) -> None:
-    """Refuse the cache of another user; close the user's to others, and forget models that they could write."""
-    if not folder.exists() or _is_safe(folder):
-        return
-    if folder.stat().st_uid != os.geteuid():
-        why = f"{folder} belongs to another user, whose code the engine would run"
-        raise ContactModelMissing(f"{why}; set XDG_CACHE_HOME to a folder of your own")
-    folder.chmod(0o700)
-    for record in folder.glob("bridge-*.json"):
-        record.unlink()
-
-
 def _is_as_compiled(place: Path, fingerprint: str) -> bool:
     """Whether a compiled model agrees with its record, and no other user can write the two."""
     record = place.with_suffix(".json")
     with suppress(OSError, ValueError):
-        return _is_safe(place) and _is_safe(record) and read_json(record) == _record(place, fingerprint)
+        return is_safe(place) and is_safe(record) and read_json(record) == _record(place, fingerprint)
     return False
 
 
@@ -211,8 +201,11 @@ def compile_model() -> None:
 
 def read_audit(engine: str, model: str | None) -> dict[str, Any] | None:
     """Outcome of the audit of a binary, by its hash; None without one with this contact model (its hash; None: any)."""
+    path = cache_folder() / "audits" / f"{engine}.json"
+    if not is_trusted(path):
+        return None
     with suppress(OSError, ValueError, KeyError):
-        record = read_json(cache_folder() / "audits" / f"{engine}.json")
+        record = read_json(path)
         if model in (None, record["contact_model"]):
             return {name: record[name] for name in ("passed", "lines", "failures", "date")}
     return None
@@ -229,4 +222,6 @@ def is_new(engine: str, model: str | None) -> bool:
 
 def write_audit(engine: str, record: Mapping[str, Any]) -> None:
     """Save the record of a binary in place of the one before. Raises `OSError` if the cache cannot be written."""
-    write_json(make_cache_folder("audits") / f"{engine}.json", record)
+    path = make_cache_folder("audits") / f"{engine}.json"
+    write_json(path, record)
+    path.chmod(0o644)  # whatever the umask: a record that others can write is not believed

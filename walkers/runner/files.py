@@ -12,10 +12,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from walkers.regular_files import open_regular, read_regular
+
 
 def read_json(path: Path) -> dict[str, Any]:
     """Read a JSON object; raises `OSError` or `ValueError` if the file is unreadable or contains something else."""
-    contents = path.read_bytes()
+    contents = read_regular(path)
     try:
         value = json.loads(contents)
     except (ValueError, RecursionError) as error:
@@ -46,7 +48,7 @@ def write_bytes(path: Path, contents: bytes, *, at_once: bool = True) -> None:
 
 def checksum(path: Path) -> str:
     """SHA-256 of a file, hexadecimal."""
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 

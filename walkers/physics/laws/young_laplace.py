@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.polynomial import Chebyshev
 
-from walkers.cache import kept_numbers, place_of_numbers
+from walkers.cache import is_trusted, kept_numbers, place_of_numbers
 from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, FloatArray, Surfaces
 from walkers.physics.capillary import solver
@@ -49,7 +49,7 @@ def law(surfaces: Surfaces) -> Curve:
 
 def unsolved(bridges: Iterable[Surfaces]) -> int:
     """Number of bridge shapes without a cached solution; each takes a tenth of a second."""
-    return sum(not _place(shape).is_file() for shape in {_shape(surfaces) for surfaces in bridges})
+    return sum(not is_trusted(_place(shape)) for shape in {_shape(surfaces) for surfaces in bridges})
 
 
 def _shape(surfaces: Surfaces) -> _Shape:
