@@ -18,6 +18,7 @@ from walkers.archive.verification import SUMS_NAME
 from walkers.errors import refused
 from walkers.extras import require
 from walkers.inputs.toml import toml_bytes
+from walkers.regular_files import open_regular
 from walkers.runner.directory import CASE_NAME, case_of, name_of
 from walkers.runner.files import beside, checksum, json_bytes
 from walkers.runner.manifest import MANIFEST_NAME, FileChanged, read_manifest
@@ -55,7 +56,7 @@ class File(NamedTuple):
 
     def open(self) -> BinaryIO:
         """The contents, to be read."""
-        return io.BytesIO(self.source) if isinstance(self.source, bytes) else self.source.open("rb")
+        return io.BytesIO(self.source) if isinstance(self.source, bytes) else open_regular(self.source)
 
 
 class Contents(NamedTuple):

@@ -6,6 +6,7 @@ processes, then for each process int32 count and that many float64. The layout h
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -15,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.errors import WalkersError
+from walkers.regular_files import open_regular
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -51,7 +53,9 @@ class BinaryDump:
 
     def __init__(self, path: Path, columns: tuple[str, ...]) -> None:
         self.path, self.columns, self.truncated = path, columns, False
-        self._bytes = np.memmap(path, np.uint8, "r").data if path.stat().st_size else memoryview(b"")
+        with open_regular(path) as file:
+            is_empty = not os.fstat(file.fileno()).st_size
+            self._bytes = memoryview(b"") if is_empty else np.memmap(file, np.uint8, "r").data
         self._frames: list[_Frame] = []
         try:
             while (end := self._frames[-1].end if self._frames else 0) < len(self._bytes):
@@ -107,7 +111,7 @@ def local_frames(path: Path, columns: tuple[str, ...]) -> Iterator[tuple[int, Fl
     `DumpError` if the file is not such a dump, ends within a frame, or holds a NaN or an infinity.
     """
     try:
-        file = path.open("rb")
+        file = open_regular(path)
     except OSError as error:
         raise DumpError(f"{path}: cannot be read ({error.strerror})") from error
     with file:

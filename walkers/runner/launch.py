@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from walkers.regular_files import open_regular, read_regular
 from walkers.runner import failures
 from walkers.runner.binary import Engine, plugin_of, version_in, write_run_script
 from walkers.runner.failures import AUDITED_VERSION
@@ -116,7 +117,7 @@ def launch(
 
 def last_step(log: Path) -> int:
     """The step of the last status line in the log of an engine; 0 where there is none."""
-    with log.open("rb") as output:
+    with open_regular(log) as output:
         output.seek(max(0, log.stat().st_size - _TAIL_BYTES))
         lines = _STATUS_LINE.findall(output.read())
     return int(lines[-1][0]) if lines else 0
@@ -262,7 +263,7 @@ class _Watch:
 
     def look(self) -> None:
         """Read the output since the last look, up to the limit of the log, or add to the time of silence."""
-        with self.log.open("rb") as output:
+        with open_regular(self.log) as output:
             output.seek(self.read)
             while self.read <= self.deck.log_limit and (chunk := output.read(_CHUNK_BYTES)):
                 self.read += len(chunk)
@@ -355,6 +356,8 @@ class _Watch:
         if self.error or status > 0:
             why = _text(self.error) if self.error else f"exit status {status}{words}"
             raise failures.EngineError(f"the engine stopped: {why}", self.directory)
+        if status == -signal.SIGXFSZ:
+            raise failures.FileTooLarge(self.directory)
         if status < 0:
             name = signal.Signals(-status).name if -status in set(signal.Signals) else f"signal {-status}"
             raise failures.EngineKilled(f"the engine was killed by {name}", self.directory)
@@ -370,7 +373,7 @@ class _Watch:
 
 def _complete_frames(path: Path) -> int:
     """Number of complete frames of a local dump: the last one counts only with all of its rows."""
-    text = path.read_bytes() if path.exists() else b""
+    text = read_regular(path) if path.exists() else b""
     frames = text.count(b"ITEM: TIMESTEP")
     last = text[text.rfind(b"ITEM: TIMESTEP") :].split(b"\n")
     # Nine lines of header, the fourth being the number of rows, then the rows, each ended by a newline.
