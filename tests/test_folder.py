@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+import pty
 import re
 import shutil
+import subprocess
 from collections.abc import Callable, Iterator
 from math import hypot
 from pathlib import Path
@@ -13,11 +16,23 @@ from typing import Any
 import pytest
 
 import walkers
-from tests.conftest import TINY, call, document, finished_places, to_toml
+from tests.conftest import (
+    PATIENCE,
+    PROGRAM,
+    TINY,
+    call,
+    document,
+    engines_in,
+    finished_places,
+    to_toml,
+    wait_for,
+)
 from walkers import load_case
+from walkers.inputs.reading import shipped
+from walkers.inputs.toml import read_toml
 from walkers.postprocess.uncertainty import ACCURACY_NAME, SPREAD_NAME, spread_of
 from walkers.runner.directory import case_of, locked
-from walkers.runner.files import read_json, write_json
+from walkers.runner.files import read_json, scratch_folder, write_json
 from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.sweeps.comparison import Side, compare_runs
 from walkers.sweeps.folder import bytes_text, weigh
@@ -285,3 +300,61 @@ def test_values_are_shown_as_a_case_file_has_them() -> None:
     values = {"boundary.opening": 1.0, "liquid.temperature": 293.15, "contact.friction.bead_wall": 0.2}
     texts = [readable(key, value) for key, value in {**values, "drive.ramp": [[0.0, 1.0], [1.2, 0.5]]}.items()]
     assert texts == ["57.2958 deg", "20 degC", "0.2", "(0 s, 1), (1.2 s, 0.5)"]
+
+
+def test_a_pile_that_was_interrupted_says_how_much_of_it_is_done(in_folder: Path) -> None:
+    """It continues after its last complete segment, of which there is one of three here."""
+    short = {"longest_settling": "0 s", "duration": "0.03 s", "time_step": "3 us", "segment": "0.01 s"}
+    tables = {**read_toml(shipped("case")["pile-ci"]), "run": short}
+    (in_folder / "pile.toml").write_text(to_toml(tables))
+    (in_folder / "piles.toml").write_text('case = "pile.toml"\n[axes]\nrun.seed = [1, 2]\n')
+    program = subprocess.Popen(
+        [PROGRAM, "sweep", "piles.toml", "-j", "1"], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
+    )
+    try:
+        wait_for(lambda: list(in_folder.rglob("segments/0000/segment.json")))
+    finally:
+        program.kill()
+        program.wait(PATIENCE)
+    wait_for(lambda: not engines_in(in_folder))
+    (begun,) = in_folder.rglob("*.incomplete")
+    *_, last = sorted(begun.glob("segments/000?"))
+    run = case_of(begun).run
+    simulated = read_json(last / "segment.json")["end"] * run.time_step
+    whole = run.cycles / 170.0
+    assert 0.0 < simulated < whole
+    share = f"{100 * simulated / whole:.0f} % done"
+    told = call("list", "piles", check=True).stdout
+    assert "piles: 2 points, 2 missing\n  interrupted  point 0: " + share + "\n" in told
+    assert f"interrupted: {share}" in call("list", "--all", check=True).stdout
+    assert f"{share}, can be continued" in call("clean").stdout
+
+
+def test_exports_that_were_killed_are_removed_later(out: Path) -> None:
+    """By the next export and by `clean`; a folder that an export fills and a user's folder stay."""
+    run = next(iter(finished_places(out).values()))
+    users, filled = run / ".vtk-mine", out / ".vtk-killed" / "new"
+    (users / "notes").mkdir(parents=True)
+    filled.mkdir(parents=True)
+    (run / ".vtk-killed" / "new").mkdir(parents=True)
+    with scratch_folder(run, ".vtk-") as busy:
+        assert not (run / ".vtk-killed").exists()
+        done = call("clean", "--yes", check=True)
+        assert "1 unfinished export to remove" in done.stdout
+        assert (busy.exists(), users.exists(), filled.exists()) == (True, True, False)
+    assert not busy.parent.exists()
+    (run / ".vtk-killed" / "new").mkdir(parents=True)
+    call("export", str(run), "--to", "vtk", check=True)
+    assert [path.name for path in run.glob(".vtk-*")] == [users.name]
+
+
+def test_the_end_of_the_input_removes_nothing(out: Path) -> None:
+    run = next(iter(finished_places(out).values()))
+    ours, theirs = pty.openpty()
+    command = [PROGRAM, "clean", run.name]
+    program = subprocess.Popen(command, stdin=theirs, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    os.write(ours, b"\x04")
+    told, _ = program.communicate(timeout=PATIENCE)
+    os.close(ours)
+    os.close(theirs)
+    assert (program.returncode, told.splitlines()[-1], run.exists()) == (0, "nothing removed", True)

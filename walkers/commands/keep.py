@@ -110,13 +110,23 @@ def clean(
 
     plan = folder.plan_cleaning(out, apply_all(place_of, runs))
     print(plan.as_text())
-    if not (plan.remove or plan.locks):
+    if plan.is_empty:
         return 0
     if not yes:
         refuse("--yes", not sys.stdin.isatty(), "expected, because there is no terminal to ask for confirmation")
-        if input("remove them? [y/N] ").strip().lower() not in ("y", "yes"):
+        if not _is_confirmed("remove them?"):
             print("nothing removed")
             return 0
     left = folder.clean(plan)
     tell(*(f"{directory}: {why}" for directory, why in left.items()))
     return 1 if left else 0
+
+
+def _is_confirmed(question: str) -> bool:
+    """Whether the user answers yes; the end of the input (Ctrl-D) means no."""
+    try:
+        answer = input(f"{question} [y/N] ")
+    except EOFError:
+        print()
+        return False
+    return answer.strip().lower() in ("y", "yes")

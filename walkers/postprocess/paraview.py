@@ -11,7 +11,6 @@ import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
@@ -23,6 +22,7 @@ from walkers.postprocess.clusters import connected
 from walkers.postprocess.motion import Bridges, Motion, read_bridges, read_motion
 from walkers.postprocess.necks import ends_of
 from walkers.postprocess.scene import Scene, camera_axes, gathered, mesh_of, walls_of
+from walkers.runner.files import VTK_SCRATCH, scratch_folder
 
 if TYPE_CHECKING:
     import meshio
@@ -59,9 +59,7 @@ def write_vtk(directory: Path, destination: Path | None = None, *, every: int | 
     entries = ElementTree.SubElement(root, "Collection")
     place.parent.mkdir(parents=True, exist_ok=True)
     try:
-        with TemporaryDirectory(prefix=".vtk-", dir=place.parent, ignore_cleanup_errors=True) as beside:
-            new = Path(beside, "vtk")
-            new.mkdir()
+        with scratch_folder(place.parent, VTK_SCRATCH) as new:
             for frame, meshes in _frames(motion, every or motion.case.run.samples_per_cycle):
                 for part, (kind, mesh) in enumerate(meshes.items()):
                     entry = {"timestep": repr(float(motion.time[frame])), "part": str(part), "name": kind}

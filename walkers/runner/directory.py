@@ -25,10 +25,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from walkers.errors import refused
 from walkers.inputs.case import Case
 from walkers.physics.laws import LAWS, source_of, source_sha256
+from walkers.regular_files import open_regular
 from walkers.runner.binary import Engine
-from walkers.runner.failures import DiskFull, OutputGone, RunBusy
+from walkers.runner.failures import DiskFull, FileTooLarge, OutputGone, RunBusy
 from walkers.runner.files import fsync_path, link_or_copy, read_json, write_bytes, write_json
 from walkers.runner.launch import EngineReport
 from walkers.runner.manifest import FORMAT, MANIFEST_NAME, check_unchanged, checksums, iso_time, read_manifest, sums_of
@@ -232,13 +234,28 @@ def has_tables_of(segment: Path, deck: Deck) -> bool:
 
 @contextmanager
 def room_on_disk(incomplete: Path, needed: int | None = None) -> Iterator[None]:
-    """Turn the system's errors for a full disk and a removed directory into `DiskFull` (bytes) and `OutputGone`."""
+    """Turn errors of the system while a run is written into failures of the run.
+
+    Parameters
+    ----------
+    incomplete
+        The directory of the unfinished run.
+    needed
+        Bytes that are still to be written, for the message; None: unknown.
+
+    Raises
+    ------
+    DiskFull, FileTooLarge, OutputGone
+        For a full disk, a limit of the size of files, and a directory that was removed.
+    """
     try:
         yield
     except OSError as error:
         # Whoever removes the directory may not have come to the end.
         if error.errno == errno.ENOENT and Path(error.filename or "").absolute().is_relative_to(incomplete.absolute()):
             raise OutputGone(incomplete) from error
+        if error.errno == errno.EFBIG:
+            raise FileTooLarge(incomplete) from error
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
         raise DiskFull(needed, shutil.disk_usage(incomplete.parent).free, incomplete) from error
@@ -313,7 +330,10 @@ def recomputed(directory: Path, names: Collection[str]) -> Iterator[None]:
 
 
 def _lock(file: Path, end: float) -> int | None:
-    """Lock a file that other processes may be removing: the lock counts only if the file still has the name."""
+    """Lock a file that other processes may be removing: the lock counts only if the file still has the name.
+
+    None if another process holds the lock until ``end``; `InputError` if the file system has no locks.
+    """
     while True:
         descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
         try:
@@ -326,14 +346,26 @@ def _lock(file: Path, end: float) -> int | None:
                 os.close(descriptor)
                 return None
             time.sleep(_LOOK_SECONDS)
+        except OSError as error:
+            os.close(descriptor)
+            file.unlink(missing_ok=True)
+            needed = "expected a folder on a file system with locks (flock)"
+            advice = "choose another one with --out, or out= in Python"
+            message = f"files cannot be locked ({error.strerror}): {needed}; {advice}"
+            raise refused(file.parent, message) from error
         os.close(descriptor)
 
 
 def is_locked(place: Path) -> bool:
-    """Whether a process is making the run of this place."""
-    with suppress(FileNotFoundError), _lock_file(place).open("rb") as file:
+    """Whether a process is making the run of this place; on a file system without locks none can."""
+    file = _lock_file(place)
+    if not file.is_file():
+        return False
+    with suppress(FileNotFoundError), open_regular(file) as opened:
         try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            fcntl.flock(opened, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:
             return True
+        except OSError:
+            return False
     return False

@@ -6,6 +6,7 @@ Failures are therefore detected from its output, mostly in `walkers.runner.launc
 
 from __future__ import annotations
 
+import resource
 from pathlib import Path
 
 from walkers.errors import WalkersError
@@ -105,6 +106,19 @@ class DiskFull(EngineFailure, hits="every point"):
     def __init__(self, needed: int | None, free: int, directory: Path) -> None:
         missing = "" if needed is None else f"{needed / 1e6:.3g} MB are still to be written, "
         super().__init__(f"disk full: {missing}{free / 1e6:.3g} MB are free", directory)
+
+
+class FileTooLarge(EngineFailure, hits="every point"):
+    """A file of the run exceeds the limit of the shell (``ulimit -f``) or of the file system."""
+
+    def __init__(self, directory: Path) -> None:
+        limit, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
+        if limit == resource.RLIM_INFINITY:
+            text = "a file is larger than the file system allows: choose a folder on another one"
+        else:
+            limit_text = f"{limit / 1e3:g} kB (ulimit -f)"
+            text = f"a file is larger than the limit of {limit_text}: raise it with ulimit -f unlimited"
+        super().__init__(text, directory)
 
 
 class OutputGone(EngineFailure, hits="every point"):

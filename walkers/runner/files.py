@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import json
 import os
 import shutil
+import tempfile
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from walkers.errors import refused
 from walkers.regular_files import open_regular, read_regular
 
 
@@ -74,6 +77,79 @@ def beside(path: Path) -> Iterator[Path]:
         with suppress(OSError):
             new.unlink(missing_ok=True)
         raise
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder that is to contain runs, if it does not exist; `InputError` if that is not possible."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        expected = "expected a folder in which files can be written"
+        raise refused(folder, f"cannot create the folder ({error.strerror}): {expected}") from error
+
+
+# --- folders that are filled before they get their name ---------------------------------------------------------------
+
+VTK_SCRATCH = ".vtk-"
+"""Start of the names of the scratch folders of exports to VTK."""
+_FILLED = "new"
+"""The only entry of a scratch folder: what is to be renamed."""
+_FILLED_BEFORE = "vtk"
+"""This entry in scratch folders of earlier versions."""
+
+
+@contextmanager
+def scratch_folder(parent: Path, prefix: str) -> Iterator[Path]:
+    """Yield a new folder to be filled and renamed, and remove what is left of it at the end.
+
+    It is in a folder ``parent/PREFIX…`` that is locked with ``flock``, so that others recognise what a process that
+    was killed has left behind (`abandoned`); such folders in the same place are removed first.
+
+    Parameters
+    ----------
+    parent
+        A folder on the file system of the final place.
+    prefix
+        Start of the name of the locked folder.
+    """
+    for left in abandoned(parent, prefix):
+        shutil.rmtree(left, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix=prefix, dir=parent, ignore_cleanup_errors=True) as name:
+        descriptor = os.open(name, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            with suppress(OSError):  # a file system without locks
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            new = Path(name, _FILLED)
+            new.mkdir()
+            yield new
+        finally:
+            os.close(descriptor)
+
+
+def abandoned(parent: Path, prefix: str) -> list[Path]:
+    """Folders of `scratch_folder` that no process fills any more."""
+    left = []
+    for folder in sorted(parent.glob(f"{prefix}*")):
+        if folder.is_symlink() or not folder.is_dir():
+            continue
+        names = [path.name for path in folder.iterdir()]
+        if names not in ([_FILLED], [_FILLED_BEFORE]):  # a user's, or one that is just being made
+            continue
+        if not _is_in_use(folder):
+            left.append(folder)
+    return left
+
+
+def _is_in_use(folder: Path) -> bool:
+    """Whether a process holds the lock of a folder; True if the file system has no locks."""
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return False
+        finally:
+            os.close(descriptor)
+    return True
 
 
 def fsync_path(path: Path) -> None:

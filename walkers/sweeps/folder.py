@@ -25,7 +25,7 @@ from walkers.postprocess.results import plain, read
 from walkers.postprocess.uncertainty import ACCURACY, SPREAD
 from walkers.rounding import counted, duration_text
 from walkers.runner import directory as on_disk
-from walkers.runner.files import read_json
+from walkers.runner.files import VTK_SCRATCH, abandoned, read_json
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.sweeps.making import progress_at
 from walkers.sweeps.readable import FlatCase, differing, flattened, has_value, readable, short_keys
@@ -95,6 +95,8 @@ def _run(path: Path, now: float) -> Row | None:
     reason, status = state.reason, "interrupted" if state.status == "missing" else state.status
     if status == "running" and (progress := progress_at(place)):
         reason = progress.text.partition(",")[0]
+    if status == "interrupted":
+        reason = state.message
     values |= {"age": max(now - newest, 0.0), "reason": reason, "message": state.message}
     return _row("run", place.name, path, status, **values)
 
@@ -240,18 +242,38 @@ def bytes_text(size: int) -> str:
 
 @dataclass(frozen=True)
 class Cleaning:
-    """The plan of a cleaning: the rows of the `inventory` and the stale lock files to remove; remarks to print."""
+    """The plan of a cleaning.
+
+    Attributes
+    ----------
+    remove
+        Rows of the `inventory`: the runs and sweeps to remove.
+    locks
+        Lock files without a process.
+    exports
+        Folders that exports left behind when they were killed.
+    remarks
+        Lines to print.
+    """
 
     remove: Sequence[Row]
     locks: Sequence[Path]
+    exports: Sequence[Path]
     remarks: Sequence[str]
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is nothing to remove."""
+        return not (self.remove or self.locks or self.exports)
 
     def as_text(self) -> str:
         """The removed runs and sweeps with the total size, and the remarks."""
         rows, kinds, total = [], Counter[str](), 0
         for row in self.remove:
             kind = "sweep" if row["kind"] == "sweep" else f"{row['status']} run"
-            size, why = row["size"], row["reason"] or ("" if row["status"] == "finished" else "can be continued")
+            size, why = row["size"], row["reason"] or ""
+            if row["status"] == "interrupted":
+                why = ", ".join(filter(None, [row["reason"], "can be continued"]))
             if row["directory"].is_symlink():
                 size, why = 0, "a symbolic link: its target stays"
             elif row["kind"] == "sweep":
@@ -261,6 +283,8 @@ class Cleaning:
             kinds[kind] += 1
             total += size
         kinds["stale lock"] = len(self.locks)
+        kinds["unfinished export"] = len(self.exports)
+        total += sum(weigh(path)[0] for path in self.exports)
         lines = [aligned(rows[:_MOST_LINES])] if rows else []
         lines += [f"and {len(rows) - _MOST_LINES} more"] if len(rows) > _MOST_LINES else []
         removed = ", ".join(counted(number, kind) for kind, number in kinds.items() if number) or "nothing"
@@ -299,7 +323,18 @@ def plan_cleaning(out: Path, given: Sequence[Path] = ()) -> Cleaning:
     remarks += [f"stays: {len(rows)} {why}" for why, rows in stays.items() if rows]
     locks = [] if given else sorted(out.glob("*.lock"))
     stale = [lock for lock in locks if on_disk.is_run_name(lock.stem) and not on_disk.is_locked(lock.with_suffix(""))]
-    return Cleaning(remove, stale, remarks)
+    exports = [] if given else _abandoned_exports(out, contents)
+    return Cleaning(remove, stale, exports, remarks)
+
+
+def _abandoned_exports(out: Path, contents: Sequence[Row]) -> list[Path]:
+    """Folders that killed exports left in the folder of runs and in finished runs."""
+    folders = [out] if out.is_dir() else []
+    folders += [row["directory"] for row in contents if row["status"] == "finished"]
+    exports = []
+    for folder in folders:
+        exports += abandoned(folder, VTK_SCRATCH)
+    return exports
 
 
 def _rows_at(place: Path, contents: Sequence[Row]) -> list[Row]:
@@ -338,6 +373,11 @@ def clean(cleaning: Cleaning) -> dict[Path, str]:
                     shutil.rmtree(directory)
             except OSError as error:
                 left[directory] = f"cannot be removed whole: {error.strerror or error} ({error.filename})"
+    for export in cleaning.exports:
+        try:
+            shutil.rmtree(export)
+        except OSError as error:
+            left[export] = f"cannot be removed whole: {error.strerror or error} ({error.filename})"
     with on_disk.locked(lock.with_suffix("") for lock in cleaning.locks if lock.exists()):
         pass  # a lock file goes with its lock
     return left

@@ -30,7 +30,7 @@ from walkers.rounding import duration_text
 from walkers.runner import directory as on_disk
 from walkers.runner.binary import Engine, is_new, model_sha256, read_audit
 from walkers.runner.failures import AuditFailed, BeadsOverTheTop, UnauditedEngineWarning
-from walkers.runner.files import fsync_path, link_or_copy, read_json, write_json
+from walkers.runner.files import fsync_path, link_or_copy, make_folder, read_json, write_json
 from walkers.runner.launch import EngineReport, check_room, last_step, launch
 from walkers.runner.manifest import write_manifest
 from walkers.templates import deck as decks
@@ -84,7 +84,7 @@ def make_runs(
     is the wall time in s of a segment. Returns the finished runs by name, and whether this call made them; without
     those that another process makes.
     """
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     places = {on_disk.run_place(case, engine, out): case for case in cases}
     with on_disk.locked(places) as ours:
         for place in ours:
@@ -137,6 +137,36 @@ def progress_at(place: Path, case: Case | None = None) -> Progress | None:
     except (OSError, ValueError, KeyError, TypeError, WalkersError):
         return None
     return progress_in(run, cycles, Segment(begin, begin, start), step, seconds)
+
+
+def share_kept(place: Path) -> float | None:
+    """Share of an interrupted run that is complete, and from which it continues.
+
+    Parameters
+    ----------
+    place
+        The final directory of the run.
+
+    Returns
+    -------
+    float or None
+        From 0 to 1; None if there is no unfinished run, or its files cannot be read.
+    """
+    directory = on_disk.unfinished(place)
+    try:
+        case = on_disk.case_of(directory)
+        segments = on_disk.segment_directories(directory)
+        if not segments:
+            return 0.0
+        done = [_read_segment(path) for path in segments]
+        cycles = case.run.cycles
+        if case.run.until_steady:
+            cycles = on_disk.layout_of(segments[-1]).steps // case.run.steps_per_cycle
+    except (OSError, ValueError, KeyError, TypeError, WalkersError):
+        return None
+    end = int(done[-1]["end"])
+    segment = Segment(end, end, on_disk.drive_from(case, done))
+    return progress_in(case.run, cycles, segment, end, 0.0).share
 
 
 def progress_in(run: Run, cycles: int, segment: Segment, step: int, seconds: float) -> Progress:

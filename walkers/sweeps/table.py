@@ -31,7 +31,8 @@ from walkers.postprocess.results import Results, modules_of, read
 from walkers.postprocess.sides import SEPARATED
 from walkers.rounding import counted, rounded
 from walkers.runner.directory import FAILURE_NAME, is_finished, is_locked, unfinished
-from walkers.runner.files import json_bytes, read_json, write_bytes, write_json
+from walkers.runner.files import json_bytes, make_folder, read_json, write_bytes, write_json
+from walkers.sweeps.making import share_kept
 from walkers.sweeps.readable import short_keys
 from walkers.text import aligned
 
@@ -46,7 +47,7 @@ STATE = {
     "status": ("", "finished, failed, running or missing"),
     "lost": ("", "number of beads that left the simulation box; a run that loses beads has no result"),
     "reason": ("", "name of the failure, or empty"),
-    "message": ("", "message of the failure, or empty"),
+    "message": ("", "message of the failure, how much of an interrupted run is done, or empty"),
     "run": ("", "run directory, relative to the folder in which the table was written"),
 }
 _RESULTS = ("velocity", "climbs")
@@ -91,7 +92,7 @@ class SweepRecord:
 
 def write_record(record: SweepRecord) -> None:
     """Write ``sweep.json`` into the sweep's directory, which is made if necessary."""
-    record.directory.mkdir(parents=True, exist_ok=True)
+    make_folder(record.directory)
     sweep = record.sweep
     contents = {"format": _FORMAT, "file": dict(sweep.file), "case": sweep.case_name, "base": dict(sweep.base)}
     write_json(record.directory / RECORD_NAME, {**contents, "runs": list(record.runs)})
@@ -124,7 +125,8 @@ class PointState:
     """State of a point: finished, failed, running or missing.
 
     ``directory`` is the directory of the finished or failed run, ``result`` its result if it was read. ``reason``,
-    ``message`` and ``lost`` describe a failure.
+    ``message`` and ``lost`` describe a failure. The ``message`` of a missing point whose run was interrupted says how
+    much of it is done.
     """
 
     status: str
@@ -166,7 +168,9 @@ def state_at(place: Path, directory: Path | None = None) -> PointState:
         reason, message = str(failure["reason"]), str(failure["message"])
         return PointState("failed", directory, reason, message, int(failure.get("lost", 0)))
     except (OSError, ValueError, KeyError, TypeError):
-        return PointState("missing")
+        share = share_kept(place)
+        done = None if share is None else f"{100 * share:.0f} % done"
+        return PointState("missing", message=done)
 
 
 # --- the table --------------------------------------------------------------------------------------------------------
@@ -411,6 +415,8 @@ def describe_status(frame: pd.DataFrame) -> str:
     lines += [f"  failed     point {row.point}: {row.message}" for row in failed[:_MOST_FAILURES].itertuples()]
     if len(failed) > _MOST_FAILURES:
         lines.append(f"             and {len(failed) - _MOST_FAILURES} more")
+    begun = frame[(frame["status"] == "missing") & (frame["message"] != "")]
+    lines += [f"  interrupted  point {row.point}: {row.message}" for row in begun.itertuples()]
     if frame.attrs["until_below"] is not None:
         lines += [f"  {line}" for line in short_text(thresholds(frame)).splitlines()]
     return "\n".join(lines)
