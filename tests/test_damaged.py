@@ -7,13 +7,15 @@ import json
 import os
 import re
 import shutil
+import signal
+import socket
 import struct
 import subprocess
 import zipfile
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
@@ -43,7 +45,7 @@ from walkers.postprocess.report.run import result_html
 from walkers.postprocess.results import measure, read
 from walkers.runner.directory import CASE_NAME, FIRST_SEGMENT, case_of, locked, recomputed
 from walkers.runner.failures import DiskFull, RunBusy
-from walkers.runner.files import write_json
+from walkers.runner.files import read_json, write_json
 from walkers.runner.launch import launch
 from walkers.sweeps.table import load as load_table
 from walkers.templates.deck import Deck, render_deck
@@ -240,6 +242,125 @@ def test_a_local_dump_is_read_whole_or_not_at_all(run_directory: Callable[..., P
             list(local_frames(path, columns))
 
 
+@contextmanager
+def _at_most(seconds: int) -> Iterator[None]:
+    """Raise `TimeoutError` in what takes longer, also if it waits for a file."""
+
+    def stop(_number: int, _frame: object) -> NoReturn:
+        raise TimeoutError(f"took more than {seconds} s")
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+READ_FILES = (
+    "case.json",
+    "manifest.json",
+    "result.json",
+    "trajectory.parquet",
+    "segments/0001/layout.json",
+    "segments/0001/segment.json",
+    "segments/0001/beads.bin",
+    "segments/0001/bridges.pairs.txt",
+)
+WAYS_TO_READ = (
+    "list",
+    "show {run}",
+    "compare {run} {run}",
+    "plot {run}",
+    "export {run} --to lammps -o out.lammpstrj",
+    "export {run} --to vtk -o vtk",
+    "export {run} --to archive -o out.zip",
+    "check files {run}",
+    "run {run}",
+)
+
+
+@pytest.mark.parametrize("name", READ_FILES)
+def test_nothing_waits_for_a_fifo_in_place_of_a_file(name: str, parts: Path) -> None:
+    """Commands that need the file refuse it in a line, and the list has the other runs."""
+    (parts / name).unlink()
+    os.mkfifo(parts / name)
+    refusals = 0
+    for command in WAYS_TO_READ:
+        with _at_most(60):
+            done = call(*command.format(run=parts).split())
+        assert "Traceback" not in done.stderr, (command, done.stderr)
+        assert done.returncode in (0, 1, 2)
+        if command == "list":
+            assert (done.returncode, "1 run" in done.stdout) == (0, True), done
+        refusals += done.returncode != 0
+    assert refusals
+
+
+@pytest.mark.parametrize("kind", ["fifo", "socket", "device", "folder"])
+def test_only_regular_files_are_opened(kind: str, in_folder: Path) -> None:
+    place = in_folder / "file.json"
+    if kind == "fifo":
+        os.mkfifo(place)
+    elif kind == "socket":
+        with socket.socket(socket.AF_UNIX) as bound:
+            bound.bind("file.json")
+    elif kind == "device":
+        place.symlink_to("/dev/zero")
+    else:
+        place.mkdir()
+    with _at_most(60), pytest.raises(OSError, match=r"(not a regular file|Is a directory): .*file\.json"):
+        read_json(place)
+
+
+def test_a_fifo_in_place_of_a_lock_is_no_lock(parts: Path) -> None:
+    os.mkfifo(parts.with_name(f"{parts.name}.lock"))
+    with _at_most(60):
+        assert call("list", check=True).stdout.count(parts.name) == 1
+
+
+NO_LOCKS = "#include <errno.h>\nint flock(int file, int operation) { errno = ENOLCK; return -1; }\n"
+
+
+def _built(source: str, folder: Path) -> str:
+    """A library that replaces functions of the system, for ``LD_PRELOAD``."""
+    library = folder / "shim.so"
+    command = ["g++", "-shared", "-fPIC", "-x", "c", "-", "-o", str(library)]
+    subprocess.run(command, input=source, text=True, check=True)
+    return str(library)
+
+
+def test_a_file_system_without_locks_is_named_with_advice(short_case: Path, tmp_path: Path) -> None:
+    shim = _built(NO_LOCKS, tmp_path)
+    command = [PROGRAM, "run", "short.toml"]
+    done = subprocess.run(command, env={**os.environ, "LD_PRELOAD": shim}, capture_output=True, text=True, check=False)
+    told = [line for line in done.stderr.splitlines() if "ERROR: ld.so" not in line]
+    assert (done.returncode, len(told)) == (2, 1), done
+    assert re.search(r"runs: files cannot be locked \(No locks available\): .*--out", told[0])
+
+
+@pytest.mark.parametrize("kilobytes", [20, 600])
+def test_a_limit_of_the_size_of_files_is_named_with_advice(kilobytes: int, short_case: Path) -> None:
+    """The first limit stops the deck, the second one the engine."""
+    many = "run.samples_per_cycle=250"
+    script = f"ulimit -f {kilobytes}; exec {PROGRAM} run short.toml --set {many} --set run.cycles=40"
+    # Python does not notice that byte code which it writes was cut.
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
+    done = subprocess.run(["bash", "-c", script], env=environment, capture_output=True, text=True, check=False)
+    last = done.stderr.splitlines()[-1]
+    assert (done.returncode, "Traceback" in done.stderr) == (1, False), done
+    assert re.search(rf"limit of {kilobytes * 1.024:g} kB \(ulimit -f\): .*\(see runs/short-", last), last
+
+
+def test_a_folder_that_cannot_be_made_is_named(short_case: Path) -> None:
+    for command in ("run short.toml", "sweep sweep.toml"):
+        done = call(*command.split(), "--out", "/proc/runs")
+        assert done.returncode == 2
+        assert "/proc/runs" in done.stderr
+        assert "cannot create the folder" in done.stderr
+
+
 FULL = {
     "run short.toml --out {}/a": 1,
     "sweep sweep.toml --out {}/c": 2,
@@ -265,6 +386,16 @@ def test_a_full_disk_is_told_in_a_line_and_nothing_half_written_stays(short_case
         assert not (disk / "deck").exists()
         assert [path for path in disk.rglob("*") if path.is_file() and path.stat().st_size] == [ballast]
         assert not [path for path in disk.rglob("*") if ".new" in path.name or path.suffix == ".lock"]
+
+
+def test_a_case_file_that_cannot_be_written_is_not_left_behind(tmp_path: Path) -> None:
+    with mounted(tmp_path / "disk", "256k") as disk:
+        ballast = fill(disk)
+        done = call("new", str(disk / "x"))
+        assert (done.returncode, "No space left on device" in done.stderr) == (2, True)
+        assert list(disk.iterdir()) == [ballast]
+        ballast.unlink()
+        call("new", str(disk / "x"), check=True)
 
 
 def test_mpirun_needs_room_for_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -306,6 +437,26 @@ def test_a_reader_may_have_had_enough(command: str, short_case: Path) -> None:
     assert (done.returncode, re.search("Traceback|BrokenPipe", done.stderr)) == (0, None), done
     if command != "--help":
         assert read(next(Path("runs").glob("short-*")))["velocity"] > 0.0
+
+
+def test_a_closed_output_is_no_error(short_case: Path) -> None:
+    script = f"exec {PROGRAM} run short.toml <&- >&- 2>&-"
+    done = subprocess.run(["bash", "-c", script], check=False)
+    assert done.returncode == 0
+    assert read(next(Path("runs").glob("short-*")))["velocity"] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("variable", "value", "command"),
+    [("PYTHONIOENCODING", "ascii", "show fig1b"), ("MPLBACKEND", "nonsense", "plot short.toml")],
+)
+def test_an_odd_environment_does_not_matter(variable: str, value: str, command: str, short_case: Path) -> None:
+    """An encoding without the letters of units, and a backend that matplotlib does not have."""
+    call("run", "short.toml", check=True)
+    environment = {**os.environ, variable: value}
+    done = subprocess.run([PROGRAM, *command.split()], env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
+    assert r"m/s\xb2" in done.stdout or "walk.png" in done.stdout
 
 
 def test_what_is_no_file_to_read_is_refused_at_once(tmp_path: Path) -> None:

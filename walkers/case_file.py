@@ -39,8 +39,7 @@ def new(path: str | Path, case: str = "fig1b", *, schema: bool = False) -> list[
         raise refused(case, expected_of(case, cases))
     text = cases[case].read_text("utf-8")
     try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(f"#:schema {_SCHEMA}\n\n{text}" if schema else text)
+        _write_new(path, f"#:schema {_SCHEMA}\n\n{text}" if schema else text)
     except FileExistsError as error:
         raise refused(path, "exists already: it is not overwritten; expected another name") from error
     except OSError as error:
@@ -51,3 +50,14 @@ def new(path: str | Path, case: str = "fig1b", *, schema: bool = False) -> list[
 
     write_json(path.with_name(_SCHEMA), case_schema())
     return [path, path.with_name(_SCHEMA)]
+
+
+def _write_new(path: Path, text: str) -> None:
+    """Write a file that does not exist yet; after an error, such as a full disk, nothing of it is left."""
+    with path.open("x", encoding="utf-8") as file:
+        try:
+            file.write(text)
+            file.flush()
+        except OSError:
+            path.unlink(missing_ok=True)
+            raise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import subprocess
@@ -51,11 +52,29 @@ def _on_signal(number: int, _frame: FrameType | None) -> NoReturn:
 
 def main(arguments: list[str] | None = None) -> NoReturn:
     """Run the program and exit."""
+    _prepare_streams()
+    os.environ["MPLBACKEND"] = "agg"  # the program opens no windows, and matplotlib refuses unknown names
     signal.signal(signal.SIGTERM, _on_signal)
     if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
         signal.signal(signal.SIGHUP, _on_signal)
     warnings.showwarning = lambda message, *_, **__: print(f"walkers: warning: {message}", file=sys.stderr)
     sys.exit(_status(sys.argv[1:] if arguments is None else arguments))
+
+
+def _prepare_streams() -> None:
+    """Make output possible where it was closed, and where its encoding lacks letters such as Γ and ²."""
+    for descriptor in (0, 1, 2):
+        try:
+            os.fstat(descriptor)
+        except OSError:  # otherwise the next file to be opened, such as a lock, would be the output
+            os.open(os.devnull, os.O_RDWR)  # which takes the lowest free number
+    if sys.stdout is None:
+        sys.stdout = open(1, "w", encoding="utf-8")  # noqa: SIM115
+    if sys.stderr is None:
+        sys.stderr = open(2, "w", encoding="utf-8")  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _status(tokens: list[str]) -> int:
@@ -165,8 +184,8 @@ def _report_stop(stop: BaseException, tokens: list[str]) -> int:
     if isinstance(stop if isinstance(stop, OSError) else stop.__context__, BrokenPipeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # the end of the interpreter flushes it again
         return 0
-    if isinstance(stop, OSError):  # a given path cannot be read or written
-        return _tell(f"{stop.filename}: {stop.strerror}" if stop.filename else str(stop), 2)
+    if message := _message_of_system(stop):
+        return _tell(message, 2)
     if not isinstance(stop, CycloptsError):
         raise stop
     unused = stop.unused_tokens if isinstance(stop, UnusedCliTokensError) else None
@@ -175,6 +194,15 @@ def _report_stop(stop: BaseException, tokens: list[str]) -> int:
         message += f" Choose from: {', '.join(choices)}."
     help_command = " ".join(["walkers", *(stop.command_chain or ()), "--help"])
     return _tell(f"{shortened(printable(message), _LONGEST_MESSAGE)} See: {help_command}", 2)
+
+
+def _message_of_system(stop: BaseException) -> str:
+    """Message about a path that cannot be read or written, or about an impossible clock; empty for other errors."""
+    if isinstance(stop, OSError):
+        return f"{stop.filename}: {stop.strerror}" if stop.filename else str(stop)
+    if isinstance(stop, OverflowError) and "timestamp" in str(stop):
+        return f"the clock of this machine is wrong ({stop})"
+    return ""
 
 
 def _options_of(names: str, tokens: list[str]) -> str:
