@@ -3,8 +3,10 @@
 import hashlib
 import importlib.resources
 import io
+import re
 import shutil
 import subprocess
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,12 +15,15 @@ import pandas as pd
 import pytest
 from rocrate.rocrate import ROCrate
 
-from tests.conftest import SHORT, call, document, make_case, to_toml
+import walkers
+from tests.conftest import SHORT, brief_pile, call, document, make_case, to_toml
 from walkers import Run, load_case
-from walkers.archive.crate import PAPER, describe_crate
+from walkers.archive.crate import PAPER, Author, describe_crate
 from walkers.archive.writing import Contents, contents_of, write_archive
 from walkers.inputs.case import Case
+from walkers.runner.binary import model_version
 from walkers.runner.directory import leave_out_dumps
+from walkers.runner.files import write_json
 from walkers.runner.manifest import FileChanged, read_manifest
 from walkers.runner.provenance import software
 from walkers.sweeps.table import load
@@ -140,7 +145,7 @@ def test_an_archive_of_a_run(run: Path, tmp_path: Path) -> None:
 
 def test_an_archive_has_the_date_of_its_last_run() -> None:
     dates = ("2026-03-01T10:00:00Z", "2026-03-02T09:00:00Z", "2026-02-28T23:00:00Z")
-    assert Contents("three", "", {date: {"finished": date} for date in dates}, {}).finished == dates[1]
+    assert Contents("three", "", {date: {"finished": date} for date in dates}, {}, []).finished == dates[1]
 
 
 def test_the_tables_of_an_archive_are_made_by_the_program_that_made_the_last(shared: Path) -> None:
@@ -237,3 +242,150 @@ def test_archives_whose_lists_are_not_what_they_hold(
     path = files.get(name, tmp_path / "unpacked" / name)
     path.unlink() if contents is None else path.write_bytes(contents)
     assert any(said in line for line in _verified(tmp_path / "unpacked", status))
+
+
+@pytest.fixture(scope="session")
+def built_model(archive: Path, once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
+    """The contact model as it is compiled from the sources in an archive: four seconds."""
+
+    def fill(folder: Path) -> None:
+        shutil.unpack_archive(archive, folder)
+        subprocess.run(["sh", "contact_model/build.sh"], cwd=folder, check=True)
+
+    return once("built-model", fill) / "contact_model" / "bridge.so"
+
+
+Repeat = Callable[[Path, str], subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture
+def repeat(built_model: Path) -> Repeat:
+    """Calls the script of an unpacked archive that repeats a run; it knows of no granular-walkers."""
+
+    def called(unpacked: Path, run: str) -> subprocess.CompletedProcess[str]:
+        shutil.copy(built_model, unpacked / "contact_model")
+        command = ["sh", "repeat.sh", f"runs/{run}", "repeated"]
+        return subprocess.run(command, cwd=unpacked, capture_output=True, text=True, check=False)
+
+    return called
+
+
+def _long_run(folder: Path) -> Path:
+    """A pile in three segments."""
+    return walkers.run(brief_pile(), folder / "runs").directory
+
+
+def _parallel_run(folder: Path) -> Path:
+    """A pile by two MPI processes, which wait for each other where cores are busy."""
+    return walkers.run(brief_pile(ranks=2, duration="0.01 s"), folder / "runs").directory
+
+
+def _edited_deck(folder: Path) -> Path:
+    """A deck that was edited and run by hand, with tables that the engine rescales for its viscosity."""
+    (folder / "case.toml").write_text(to_toml(document(run=SHORT)))
+    deck = folder / "by-hand"
+    call("export", str(folder / "case.toml"), "--to", "deck", "-o", str(deck), check=True)
+    text = (deck / "walker.lig").read_text()
+    (deck / "walker.lig").write_text(re.sub(r"(variable +viscosity string) \S+", r"\1 0.01", text))
+    subprocess.run(["sh", "run.sh"], cwd=deck, check=True)
+    call("run", str(deck), check=True)
+    return deck
+
+
+@pytest.mark.parametrize("make", [_long_run, pytest.param(_parallel_run, marks=pytest.mark.slow), _edited_deck])
+def test_liggghts_alone_repeats_the_run_of_an_archive(
+    make: Callable[[Path], Path], repeat: Repeat, tmp_path: Path
+) -> None:
+    """By the words of its README: the contact model is compiled from the sources in the archive."""
+    directory = make(tmp_path)
+    call("export", str(directory), "--to", "archive", "-o", str(tmp_path / "run.zip"), check=True)
+    unpacked = tmp_path / "unpacked"
+    shutil.unpack_archive(tmp_path / "run.zip", unpacked)
+    shutil.rmtree(tmp_path / "runs", ignore_errors=True)
+    done = repeat(unpacked, directory.name)
+    assert done.returncode == 0, done.stderr
+    dumps = len([*unpacked.glob("runs/**/beads.bin"), *unpacked.glob("runs/**/bridges.*s.txt")])
+    assert done.stdout.count("the same   ") == len(done.stdout.splitlines()) == dumps >= 3
+    assert f"sh repeat.sh runs/{directory.name} repeated" in (unpacked / "README.md").read_text()
+    # A dump that is not the engine's is found.
+    beads = sorted(unpacked.glob("runs/**/beads.bin"))[-1]
+    beads.write_bytes(beads.read_bytes()[:-1] + b"x")
+    shutil.rmtree(unpacked / "repeated")
+    again = repeat(unpacked, directory.name)
+    assert (again.returncode, again.stdout.count("different  ")) == (1, 1)
+
+
+def test_an_archive_says_what_it_cannot_repeat(shared: Path, repeat: Repeat, tmp_path: Path) -> None:
+    """A shared deck is run for all of its runs; without tables of forces there is nothing to run."""
+    call("export", str(shared / "angles"), "--to", "archive", "-o", str(tmp_path / "two.zip"), check=True)
+    unpacked = tmp_path / "unpacked"
+    shutil.unpack_archive(tmp_path / "two.zip", unpacked)
+    run = Path(pd.read_csv(unpacked / "runs" / "angles" / "table.csv")["run"][0]).name
+    done = repeat(unpacked, run)
+    assert done.returncode == 0, done.stderr
+    assert "written    shared_deck/beads.bin (nothing to compare with)" in done.stdout
+    assert (unpacked / "repeated" / "shared_deck" / "beads.bin").stat().st_size > 10_000
+    shutil.rmtree(unpacked / "repeated")
+    (unpacked / "runs" / run / "shared_deck" / "bridges.txt").unlink()
+    refused = repeat(unpacked, run)
+    assert (refused.returncode, "tables of forces (bridges.txt) were left out" in refused.stderr) == (2, True)
+
+
+def test_the_readme_says_who_made_the_archive_and_with_which_contact_model(run: Path, tmp_path: Path) -> None:
+    assert read_manifest(run)["contact_model"].items() >= model_version().items()
+    author = [Author("A. User")]
+    texts = []
+    for version in (model_version(), {"forces_version": model_version()["forces_version"]}, {}):
+        manifest = read_manifest(run)
+        manifest["contact_model"] = {"path": "", "sha256": "", **version}
+        write_json(run / "manifest.json", manifest)
+        with zipfile.ZipFile(write_archive(run, tmp_path / "run.zip", authors=author)) as packed:
+            texts.append(packed.read("README.md").decode())
+    assert "computed from it.\n\nBy A. User. Licence: CC-BY-4.0" in texts[0]
+    same, other, unknown = texts
+    assert "The runs were made with these sources." in same
+    assert "other sources that compute the same forces" in other
+    assert "or do not record it" in unknown
+
+
+@pytest.fixture(scope="session")
+def uncertain(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
+    """A folder with a sweep of two points, each with a spread, and with the accuracy of the first one."""
+
+    def fill(folder: Path) -> None:
+        ranges = {"uncertain": {"contact.restitution": [0.2, 0.5]}}
+        (folder / "base.toml").write_text(to_toml(document(run=SHORT, **ranges)))
+        (folder / "angles.toml").write_text('case = "base.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
+        command = ["sweep", "angles.toml", "-j", "1", "--spread", "--points", "2"]
+        call(*command, check=True, folder=folder)
+        call("run", "base.toml", "--accuracy", check=True, folder=folder)
+
+    return once("uncertain", fill)
+
+
+@pytest.mark.parametrize("what", ["a run", "a sweep"])
+def test_archives_have_the_spread_and_the_accuracy(what: str, uncertain: Path, tmp_path: Path) -> None:
+    """A colleague sees the same band, error and figures, and the check finds nothing missing."""
+    table = load(uncertain / "runs" / "angles")
+    runs = [Path(run).name for run in table["run"]]
+    packed = runs[0] if what == "a run" else "angles"
+    archive, unpacked = tmp_path / "archive.zip", tmp_path / "unpacked"
+    command = ["export", str(uncertain / "runs" / packed), "--to", "archive", "-o", str(archive)]
+    call(*command, check=True)
+    shutil.unpack_archive(archive, unpacked)
+    assert _issues(archive, tmp_path) == []
+    there = unpacked / "runs"
+    assert len(_verified(unpacked)) == 1
+    for run in runs[:1] if what == "a run" else runs:
+        before, after = (Run(folder / run).result for folder in (uncertain / "runs", there))
+        assert {"velocity_low", "velocity_high", "velocity_draws"} <= after.keys()
+        assert after == before
+        assert list(load(there / f"{run}-spread")["status"]) == ["finished"] * len(load(there / f"{run}-spread"))
+        call("plot", str(there / f"{run}-spread"), "--to", str(tmp_path / "draws.png"), check=True)
+    assert Run(there / runs[0]).result["velocity_error"] == Run(uncertain / "runs" / runs[0]).result["velocity_error"]
+    assert (there / f"{runs[0]}-accuracy" / "sweep.json").is_file()
+    told = call("run", str(there / runs[0]), check=True).stdout
+    assert re.search(r"velocity along the heading .* band [0-9.]+ to [0-9.]+", told)
+    if what == "a sweep":
+        columns = ["velocity", "velocity_low", "velocity_high"]
+        assert load(there / "angles")[columns].equals(table[columns])

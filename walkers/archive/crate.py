@@ -20,6 +20,8 @@ CRATE = "https://w3id.org/ro/crate/1.1"
 """Version of RO-Crate that the profile extends."""
 PROFILE = "https://w3id.org/ro/wfrun/process/0.5"
 ENGINE_HOME = "https://github.com/CFDEMproject/LIGGGHTS-PUBLIC"
+_ENGINE_LICENCE = "GPL-2.0-or-later"
+"""Licence of the contact model, which is loaded into LIGGGHTS."""
 PAPER = "https://doi.org/10.48550/arXiv.1003.1623"
 _PAPER_PROPERTIES = {
     "name": "Self-assembled granular walkers",
@@ -102,7 +104,12 @@ def _describe_file(graph: _Graph, place: str, file: File) -> Reference:
         size = opened.seek(0, 2)
     path = Path(place)
     media = _MEDIA.get(path.suffix, "application/octet-stream" if file.role == "dump" else "text/plain")
-    about = {"name": path.name, "encodingFormat": media, "contentSize": str(size), "sha256": file.sha256}
+    about: dict[str, Any] = {"name": path.name, "encodingFormat": media, "contentSize": str(size)}
+    about["sha256"] = file.sha256
+    if file.role == "engine":
+        text = {"name": _ENGINE_LICENCE, "identifier": _ENGINE_LICENCE}
+        spdx = f"https://spdx.org/licenses/{_ENGINE_LICENCE}"
+        about["license"] = graph.add(spdx, "CreativeWork", **text)
     return graph.add(quote(place), "File", **about)
 
 

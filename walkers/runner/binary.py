@@ -51,6 +51,7 @@ _OPTIONS = (
     *("-shared", "-fPIC", "-std=gnu++11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
     *("-DNDEBUG", "-DOMPI_SKIP_MPICXX", "-Wall", "-Wextra"),
 )
+_LINKED = ("-Wl,-Bsymbolic", "-l:libliggghts.so.3")
 _BANNER = re.compile(rb"\(Version ([^,\n]+),")
 _VERSION = re.compile(rb"LIGGGHTS[\w-]* [\d.]+(?=, compiled)")
 _LIBRARY = re.compile(r"libliggghts\S* => (\S+)")
@@ -118,6 +119,33 @@ def plugin_of(engine: Engine) -> Path:
     return place
 
 
+def model_sources() -> list[Path]:
+    """Files from which the contact model is built, with its licence and its manual."""
+    kinds = ("*.cpp", "*.h", "*.map", "COPYING", "README.md")
+    return sorted(path for kind in kinds for path in SOURCES.glob(kind))
+
+
+def model_version() -> dict[str, Any]:
+    """Version of the forces of the contact model, and SHA-256 of the sources that are compiled."""
+    (line,) = _FORCES_VERSION.findall((SOURCES / "bridge.cpp").read_bytes())
+    sources = {name: checksum(SOURCES / name) for name in _MODEL}
+    return {"forces_version": int(line.split()[-1]), "sources": sources}
+
+
+def build_script() -> str:
+    """A shell script that compiles the contact model in its own folder, as `plugin_of` does."""
+    options = " ".join(option for option in _OPTIONS if not option.startswith("-W"))
+    return f"""#!/bin/sh
+# Compiles the contact model "cohesion bridge" for the liggghts of this machine: bridge.so, beside this script.
+# Needs: apt-get install {_PACKAGES}
+set -eu
+cd "$(dirname "$0")"
+g++ {options} -I. -isystem {_HEADERS} \\
+    $(mpicxx --showme:incdirs | sed 's/[^ ]*/-isystem &/g') bridge.cpp -o bridge.so \\
+    -Wl,--version-script=bridge.map {" ".join(_LINKED)}
+"""
+
+
 def model_sha256(engine: Engine) -> str | None:
     """SHA-256 of the contact model for an engine, compiled on first use; None if `plugin_of` fails."""
     with suppress(EngineFailure):
@@ -164,7 +192,7 @@ def _compile(place: Path, fingerprint: str) -> None:
         raise ContactModelMissing(f"it is compiled once; install what that needs: apt-get install {_PACKAGES}")
     mpi_folders = subprocess.run([mpi, "--showme:incdirs"], capture_output=True, text=True, check=False)
     included = [option for folder in (str(_HEADERS), *mpi_folders.stdout.split()) for option in ("-isystem", folder)]
-    linked = [f"-Wl,--version-script={SOURCES / 'bridge.map'}", "-Wl,-Bsymbolic", "-l:libliggghts.so.3"]
+    linked = [f"-Wl,--version-script={SOURCES / 'bridge.map'}", *_LINKED]
     with tempfile.TemporaryDirectory(dir=make_cache_folder()) as folder:
         library = Path(folder) / place.name
         command = [compiler, *_OPTIONS, f"-I{SOURCES}", *included, str(SOURCES / "bridge.cpp"), "-o", str(library)]

@@ -10,7 +10,7 @@ from typing import Any
 
 from walkers.errors import WalkersError
 from walkers.inputs.case import Case
-from walkers.runner.binary import Engine, plugin_of, read_audit
+from walkers.runner.binary import Engine, model_version, plugin_of, read_audit
 from walkers.runner.files import checksum, read_json, write_json
 from walkers.runner.launch import EngineReport
 from walkers.runner.provenance import software
@@ -27,7 +27,9 @@ def write_manifest(
     """Write the manifest of a run, after its other files; ``started`` in s after the epoch; no engine: run by hand."""
     finished = time.time()
     plugin = plugin_of(engine) if engine else None
-    model = {"path": str(plugin), "sha256": checksum(plugin)} if plugin else None
+    model = None
+    if plugin:
+        model = {"path": str(plugin), "sha256": checksum(plugin), **model_version()}
     audit = read_audit(engine.sha256, model["sha256"]) if engine and model else None
     paths = [path for path in sorted(directory.rglob("*")) if path.is_file()]
     files = {path.relative_to(directory).as_posix(): path.stat().st_size for path in paths}
