@@ -9,7 +9,7 @@ PILE ?= pile-small
 FILM ?= 360p
 SWEEP ?= fig2
 CALIBRATION ?= ruby
-PIP := .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile -c requirements.txt
+PIP := .venv/bin/python -m pip install --quiet --disable-pip-version-check -c requirements.txt
 
 .PHONY: help
 help: ## List the targets
@@ -113,6 +113,8 @@ extras: setup .venv/with-all ## Install what reports, archives, calibrations, th
 
 .PHONY: setup
 setup: engine .venv/ready ## Install what is missing: liggghts and what compiles its contact model (apt-get), and .venv
+	@# Where PYTHONDONTWRITEBYTECODE is set, each command would compile what it imports: half of its time.
+	@.venv/bin/python -m compileall -q walkers
 	@.venv/bin/python -c "from walkers.runner.binary import compile_model; compile_model()"
 
 # Debian packages of targets, and the commands and files without which they are installed.

@@ -37,6 +37,8 @@ from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.sweeps.comparison import Side, compare_runs
 from walkers.sweeps.folder import bytes_text, weigh
 from walkers.sweeps.readable import readable
+from walkers.sweeps.scheduler import Options, plan_sweep
+from walkers.sweeps.table import read_record
 
 
 @pytest.fixture
@@ -358,3 +360,12 @@ def test_the_end_of_the_input_removes_nothing(out: Path) -> None:
     os.close(ours)
     os.close(theirs)
     assert (program.returncode, told.splitlines()[-1], run.exists()) == (0, "nothing removed", True)
+
+
+def test_a_large_sweep_says_how_far_it_is_before_it_runs(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Here of twelve points, each of which is told."""
+    monkeypatch.setattr("walkers.sweeps.scheduler._RESOLVED_AT_ONCE", 1)
+    sweep, told = read_record(out / "three").sweep, list[str]()
+    plan = plan_sweep(sweep, out, Options(1), on_progress=lambda progress: told.append(progress.text))
+    assert [text.partition(",")[0] for text in told] == [f"{n} of 12 points resolved" for n in range(1, 13)]
+    assert len(plan.cases) == 12

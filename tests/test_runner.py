@@ -499,3 +499,20 @@ def test_lines_of_a_log_are_judged(tmp_path: Path) -> None:
         log.write_text("\n".join(["LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0, x)", *lines, ""]))
         with pytest.raises(kind, match=told):
             judge(deck, tmp_path, log)
+
+
+def test_tables_of_an_edited_deck_have_decimal_points_in_any_language(
+    in_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The engine calls awk, which would write the decimal commas of the user's language."""
+    (in_folder / "bin").mkdir()
+    awk = in_folder / "bin" / "awk"
+    awk.write_text(f'#!/bin/sh\necho "$LC_ALL" >> {in_folder}/language\nexec {shutil.which("awk")} "$@"\n')
+    awk.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{in_folder}/bin:{os.environ['PATH']}")
+    monkeypatch.setenv("LC_ALL", "de_DE.UTF-8")
+    call("export", _toml(in_folder), "--to", "deck", "-o", "deck", check=True)
+    deck = in_folder / "deck" / "walker.lig"
+    deck.write_text(re.sub(r"(variable +viscosity string) \S+", r"\1 0.01", deck.read_text()))
+    subprocess.run(["sh", "run.sh"], cwd=deck.parent, check=True)
+    assert (in_folder / "language").read_text() == "C\n"

@@ -11,8 +11,12 @@ from cyclopts import Parameter
 import walkers
 from walkers.commands.options import NOT_NEGATIVE, At, By, Case, Jobs, Json, print_as, print_lines, refuse, tell
 from walkers.errors import apply_all
+from walkers.progress import progress_of
+from walkers.rounding import duration_text
 
 _MANY = 10_000
+"""Number of points of a sweep that take long enough to say so."""
+_RESOLVED_PER_SECOND = 2_000
 """Number of points that take seconds to resolve."""
 
 
@@ -149,7 +153,7 @@ def sweep(
     site
         Site file of a cluster to run on: TOML for SLURM, or Python with a configuration of Parsl.
     dry_run
-        Print the plan and its predicted cost, and run nothing.
+        Print the plan and its predicted cost, and run nothing. A site file in Python is executed all the same.
     limit
         Time limit in s for each deck.
     spread
@@ -167,10 +171,13 @@ def sweep(
     loaded = load_sweep(sweep, at.values)
     refuse("--jobs", jobs is not None and site is not None, "the site file sets how many decks run at once")
     if len(loaded.rows) > _MANY:
-        tell(f"{loaded.name}: resolving {len(loaded.rows)} points, about 2,000 per second")
+        seconds = duration_text(len(loaded.rows) / _RESOLVED_PER_SECOND)
+        tell(f"{loaded.name}: resolving {len(loaded.rows)} points, which takes about {seconds}")
     if dry_run:
         options = Options(jobs, load_site(site) if site else None)
-        print(plan_sweep(loaded, at.out, options, by.engine).as_text())
+        with progress_of(loaded.name) as advance:
+            plan = plan_sweep(loaded, at.out, options, by.engine, advance)
+        print(plan.as_text())
         if spread:
             sweeps = (spread_sweep(case, draws, by.engine) for case in loaded.cases())
             plans = [plan_sweep(drawn, at.out, options, by.engine) for drawn in sweeps]

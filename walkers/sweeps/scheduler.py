@@ -56,6 +56,8 @@ LONGEST_SECONDS = 60.0
 """Limit of the predicted time of a deck of several points, so that results appear regularly."""
 _TRIALS = 24
 _AS_GOOD = 1.02
+_RESOLVED_AT_ONCE = 1_000
+"""Number of points after which the progress of resolving them is reported."""
 _LOOK_SECONDS = 0.25
 _MEASURING = 0.995
 """Share of the work of the engine from which on running points count as being measured."""
@@ -236,11 +238,31 @@ class SweepPlan:
         )
 
 
-def plan_sweep(sweep: Sweep, out: Path, options: Options, engine: str | None = None) -> SweepPlan:
+def _resolved(sweep: Sweep, tell: Tell) -> list[Case]:
+    """The cases of all points, which take a second for two thousand."""
+    cases: list[Case] = []
+    points = len(sweep.rows)
+    begin = time.perf_counter()
+    for case in sweep.cases():
+        cases.append(case)
+        if len(cases) % _RESOLVED_AT_ONCE == 0:
+            share = len(cases) / points
+            left = duration_text((1.0 / share - 1.0) * (time.perf_counter() - begin))
+            tell(Progress(share, f"{len(cases)} of {points} points resolved, {left} left"))
+    return cases
+
+
+def plan_sweep(
+    sweep: Sweep,
+    out: Path,
+    options: Options,
+    engine: str | None = None,
+    on_progress: Tell | None = None,
+) -> SweepPlan:
     """Resolve the points of a sweep and find the missing ones; nothing is written. Arguments: see `run_sweep`."""
     check_utf8(out.absolute())
     binary = find_engine(engine)
-    cases = list(sweep.cases())
+    cases = _resolved(sweep, on_progress or (lambda _: None))
     options = options.for_ranks(max(case.run.ranks for case in cases))
     if sweep.until_below is not None and not any(case.walkers for case in cases):
         raise InputError(sweep.source, [Problem("descend", None, "expected walkers: a pile has no velocity")])
@@ -282,7 +304,7 @@ def run_sweep(
     `EngineFailure` if there is no engine, its audit failed, or the sweep's directory was removed during the sweep;
     `SweepStopped` if a failure hits every point, or the jobs of the cluster end without doing any work.
     """
-    plan = plan_sweep(sweep, out, options, engine)
+    plan = plan_sweep(sweep, out, options, engine, on_progress)
     record = plan.record
     if plan.decks:
         check_audit(plan.engine, allow_failed_audit)
