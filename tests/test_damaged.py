@@ -11,6 +11,7 @@ import signal
 import socket
 import struct
 import subprocess
+import tracemalloc
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -40,6 +41,7 @@ from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.dump import BinaryDump, DumpError, local_frames
+from walkers.postprocess.motion import read_motion
 from walkers.postprocess.paraview import write_vtk
 from walkers.postprocess.report.run import result_html
 from walkers.postprocess.results import measure, read
@@ -223,6 +225,19 @@ def test_a_dump_of_beads_is_read_but_for_a_last_frame_that_was_cut(
         for read_it in (lambda: BinaryDump(short, BEAD_COLUMNS), lambda: list(local_frames(short, ("x",)))):
             with pytest.raises(DumpError, match="short"):
                 read_it()
+
+
+def test_motion_takes_little_more_memory_than_its_arrays(run_directory: Callable[..., Path]) -> None:
+    """Position, velocity and two spins are 96 bytes a bead and frame; copies would take as much again."""
+    directory = run_directory(dimers={"replicates": 40}, run={**SHORT, "samples_per_cycle": 20})
+    read_motion(directory)  # what is imported and kept takes memory once
+    tracemalloc.start()
+    motion = read_motion(directory)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    frames, beads, _ = motion.position.shape
+    assert motion.mean_spin is not None
+    assert 96.0 <= peak / (frames * beads) < 130.0
 
 
 def test_a_local_dump_is_read_whole_or_not_at_all(run_directory: Callable[..., Path], tmp_path: Path) -> None:

@@ -171,8 +171,8 @@ def sweep(
     loaded = load_sweep(sweep, at.values)
     refuse("--jobs", jobs is not None and site is not None, "the site file sets how many decks run at once")
     if len(loaded.rows) > _MANY:
-        seconds = duration_text(len(loaded.rows) / _RESOLVED_PER_SECOND)
-        tell(f"{loaded.name}: resolving {len(loaded.rows)} points, which takes about {seconds}")
+        duration = duration_text(len(loaded.rows) / _RESOLVED_PER_SECOND)
+        tell(f"{loaded.name}: resolving {len(loaded.rows)} points, which takes about {duration}")
     if dry_run:
         options = Options(jobs, load_site(site) if site else None)
         with progress_of(loaded.name) as advance:

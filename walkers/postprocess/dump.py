@@ -83,17 +83,30 @@ class BinaryDump:
             raise DumpError(f"{self.path}: the parts of the frame of step {step} do not add up")
         return _Frame(start, end, step, parts)
 
-    def stack(self) -> FloatArray:
-        """All frames, shape (frames, rows, columns); `DumpError` if the number of rows changes or is not a number."""
+    @property
+    def rows(self) -> int:
+        """Number of rows of each frame, 0 without frames; `DumpError` if it changes."""
         sizes = {sum(count for _, count in frame.parts) for frame in self._frames}
         if len(sizes) > 1:
             raise DumpError(f"{self.path}: the number of beads changes")
-        stacked = np.empty((len(self), max(sizes, default=0) // len(self.columns), len(self.columns)))
-        for values, frame in zip(stacked.reshape(len(self), -1) if stacked.size else (), self._frames, strict=False):
-            np.concatenate([np.frombuffer(self._bytes, float, count, at) for at, count in frame.parts], out=values)
-        if not np.isfinite(stacked).all():
-            frame, _, column = (places[0] for places in np.nonzero(~np.isfinite(stacked)))
-            raise NoNumberError(f"{self.path}: {self.columns[column]} is not a number at step {self.steps[frame]}")
+        return max(sizes, default=0) // len(self.columns)
+
+    def frame(self, number: int) -> FloatArray:
+        """Values of a frame, shape (rows, columns); `NoNumberError` if one of them is not a number."""
+        parts = [np.frombuffer(self._bytes, float, count, start) for start, count in self._frames[number].parts]
+        values = (parts[0] if len(parts) == 1 else np.concatenate(parts)).reshape(-1, len(self.columns))
+        is_finite = np.isfinite(values)
+        if not is_finite.all():
+            _, columns = np.nonzero(~is_finite)
+            name, step = self.columns[columns[0]], self.steps[number]
+            raise NoNumberError(f"{self.path}: {name} is not a number at step {step}")
+        return values
+
+    def stack(self) -> FloatArray:
+        """All frames, shape (frames, rows, columns); errors of `rows` and `frame`."""
+        stacked = np.empty((len(self), self.rows, len(self.columns)))
+        for number in range(len(self)):
+            stacked[number] = self.frame(number)
         return stacked
 
     def write_like(self, stacked: FloatArray, path: Path) -> None:

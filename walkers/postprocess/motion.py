@@ -300,53 +300,96 @@ def _opened(path: Path) -> tuple[dict[str, Any], Layout, BinaryDump]:
         raise DumpError(f"{place}: cannot be read ({error})") from error
 
 
-def _joined(case: Case, paths: Sequence[Path]) -> Motion:
+@dataclass(frozen=True)
+class _Part:
+    """A segment of a run: its record, layout and dump, and the number of the first frame that is new in it."""
+
+    path: Path
+    record: dict[str, Any]
+    layout: Layout
+    dump: BinaryDump
+    first: int
+
+    @property
+    def frames(self) -> range:
+        """Numbers of the frames that the segment before does not have."""
+        return range(self.first, len(self.dump))
+
+
+def _parts_of(case: Case, paths: Sequence[Path]) -> list[_Part]:
+    """The segments of a run; `DumpError` if they do not continue each other, or a dump has the wrong size."""
+    parts: list[_Part] = []
     steps: list[int] = []
-    stacks: list[FloatArray] = []
-    frames: list[tuple[Path, int]] = []
-    start = None  # step at which the drive begins
     for path in paths:
         record, layout, dump = _opened(path)
         if record["begin"] != (steps[-1] if steps else 0):
             raise DumpError(f"{path}: the segment before it is missing")
-        values = dump.stack()
-        whole = len(values) and not dump.truncated and dump.steps[-1] == record["end"]
-        if not whole and (len(paths) > 1 or case.run.rests):
+        is_whole = len(dump) and not dump.truncated and dump.steps[-1] == record["end"]
+        if not is_whole and (len(paths) > 1 or case.run.rests):
             raise DumpError(f"{path}: its dump is incomplete")
-        if len(values) < 2:
-            raise DumpError(f"{dump.path}: {len(values)} complete frames, too few for a motion")
-        if values.shape[1] != layout.atoms:
-            raise DumpError(f"{path}: {values.shape[1]} rows, expected {layout.atoms}")
+        if len(dump) < 2:
+            raise DumpError(f"{dump.path}: {len(dump)} complete frames, too few for a motion")
+        if dump.rows != layout.atoms:
+            raise DumpError(f"{path}: {dump.rows} rows, expected {layout.atoms}")
         first = 1 if steps else 0  # the first frame repeats the last one of the previous segment
-        stacks.append(values[first:])
+        parts.append(_Part(path, record, layout, dump, first))
         steps += dump.steps[first:].tolist()
-        frames += [(path, number) for number in range(first, len(values))]
-        start = record["drive_from"] if start is None else start
-    values, run = np.concatenate(stacks) if len(stacks) > 1 else stacks[0], case.run
+    return parts
+
+
+def _vectors(parts: Sequence[_Part]) -> dict[str, FloatArray]:
+    """Vectors of the beads in all frames, by the names of their first columns; shape (F, N, 3).
+
+    Each array is filled once: a stack of whole frames, and copies of parts of it, would need twice the memory.
+    """
+    names = ["x", "vx", "omegax"]
+    if MEAN_SPIN_COLUMNS[0] in parts[-1].layout.bead_columns:
+        names.append(MEAN_SPIN_COLUMNS[0])
+    frames = sum(len(part.frames) for part in parts)
+    vectors = {name: np.empty((frames, parts[-1].layout.atoms, 3)) for name in names}
+    place = 0
+    for part in parts:
+        columns = {name: part.layout.bead_columns.index(name) for name in names}
+        for number in part.frames:
+            values = part.dump.frame(number)
+            for name, column in columns.items():
+                vectors[name][place] = values[:, column : column + 3]
+            place += 1
+    return vectors
+
+
+def _joined(case: Case, paths: Sequence[Path]) -> Motion:
+    """The motion over all segments of a run."""
+    parts, run = _parts_of(case, paths), case.run
+    last = parts[-1]
+    steps = np.concatenate([part.dump.steps[part.first :] for part in parts])
+    starts = [part.record["drive_from"] for part in parts]
+    start = next((step for step in starts if step is not None), None)
     # Without a drive yet, it begins in the frame after the last one.
-    time = (np.array(steps) - (steps[-1] + run.steps_per_sample if start is None else start)) * run.time_step
+    begin = steps[-1] + run.steps_per_sample if start is None else start
+    time = (steps - begin) * run.time_step
+    vectors = _vectors(parts)
     shift, speed = prescribed_motion(case.excitation, time)
     if start:  # in the last frame at rest the walls do not move yet
         speed[time == 0.0] = 0.0
-
-    def vectors(name: str) -> FloatArray:
-        column = layout.bead_columns.index(name)
-        return values[:, :, column : column + 3]
-
-    cycles = record["end"] // run.steps_per_cycle if run.until_steady else run.cycles
+    vectors["x"] -= shift[:, None]
+    vectors["vx"] -= speed[:, None]
+    cycles = last.record["end"] // run.steps_per_cycle if run.until_steady else run.cycles
     return Motion(
         case=case.for_cycles(cycles) if run.until_steady else case,
         time=time,
-        position=vectors("x") - shift[:, None],
-        velocity=vectors("vx") - speed[:, None],
-        spin=vectors("omegax"),
+        position=vectors["x"],
+        velocity=vectors["vx"],
+        spin=vectors["omegax"],
         substrate=visible_displacement(case.excitation, time),
-        radius=values[0, :, layout.bead_columns.index("radius")],
-        walkers=tuple(replace(walker, beads=tuple(bead - 1 for bead in walker.beads)) for walker in layout.walkers),
-        frames=frames,
-        truncated=dump.truncated,
+        radius=parts[0].dump.frame(0)[:, parts[0].layout.bead_columns.index("radius")].copy(),
+        walkers=tuple(
+            replace(walker, beads=tuple(bead - 1 for bead in walker.beads)) for walker in last.layout.walkers
+        ),
+        frames=[(part.path, number) for part in parts for number in part.frames],
+        truncated=last.dump.truncated,
         ended_early=cycles < run.cycles,
-        mean_spin=vectors(MEAN_SPIN_COLUMNS[0]) if MEAN_SPIN_COLUMNS[0] in layout.bead_columns else None,
+        mean_spin=vectors.get(MEAN_SPIN_COLUMNS[0]),
     )
 
 
