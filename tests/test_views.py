@@ -3,6 +3,7 @@
 import json
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from PIL import Image
+from scipy.interpolate import Akima1DInterpolator
 
 import walkers
 from tests.conftest import call
@@ -23,7 +25,7 @@ from tests.printed import letters, spoilt
 from walkers.errors import InputError
 from walkers.inputs.boundary import Boundary
 from walkers.inputs.loads import bridge_at_rest
-from walkers.postprocess.figures import MOST_NAMED, figures_of, looks_of, plot_run
+from walkers.postprocess.figures import MOST_NAMED, _interpolated, figures_of, looks_of, plot_run
 from walkers.postprocess.film_options import FilmOptions
 from walkers.postprocess.films import film_times
 from walkers.postprocess.motion import Group, Motion, read_bridges, read_motion
@@ -180,6 +182,32 @@ def test_gaits_are_smooth_and_go_through_the_samples(directory: Path) -> None:
         assert len(cycle) == 10 * (len(samples) - 1) + 1
         np.testing.assert_allclose(values[::10], 1e3 * samples[name], atol=1e-9)
         assert np.abs(np.diff(values, 2)).max() < 0.5 * np.abs(np.diff(values[::10], 2)).max()
+
+
+@pytest.mark.parametrize("shape", ["random", "with a flat part", "constant", "three samples"])
+def test_smooth_curves_are_those_of_scipy(shape: str) -> None:
+    """Its modified Akima interpolation takes half a second to import."""
+    generator = np.random.default_rng(7)
+    places = np.cumsum(generator.uniform(0.1, 2.0, 3 if shape == "three samples" else 40))
+    values = generator.normal(size=len(places))
+    if shape == "with a flat part":
+        values[15:25] = values[15]
+    if shape == "constant":
+        values[:] = 0.5
+    dense = np.linspace(places[0], places[-1], 501)
+    expected = Akima1DInterpolator(places, values, method="makima")(dense)
+    np.testing.assert_allclose(_interpolated(places, values, dense), expected, rtol=0.0, atol=1e-13)
+
+
+def test_plots_of_walkers_load_neither_scipy_nor_pandas(directory: Path, tmp_path: Path) -> None:
+    """Each takes a third of a second or more."""
+    script = (
+        "import sys; from pathlib import Path; from walkers.postprocess.figures import plot_run\n"
+        "plot_run(Path(sys.argv[1]), Path(sys.argv[2]))\n"
+        "print({'scipy', 'pandas', 'pyarrow.dataset'} & {*sys.modules})"
+    )
+    command = [sys.executable, "-c", script, str(directory), str(tmp_path)]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "set()\n"
 
 
 @pytest.fixture(scope="module")

@@ -91,7 +91,25 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
 def read_columns(directory: Path, name: str) -> Columns:
     """Like `read_table`, as arrays without pandas."""
     table = _read(directory, name)
-    return {column: table[column].to_numpy() for column in table.column_names}
+    return {name: _numpy(table[name]) for name in table.column_names}
+
+
+def _numpy(column: Any) -> npt.NDArray[Any]:
+    """Values of a column of an arrow table; its ``to_numpy`` would import pandas."""
+    import pyarrow as pa
+
+    if pa.types.is_string(column.type):
+        return np.array(column.to_pylist(), dtype=object)
+    if column.null_count or not pa.types.is_primitive(column.type) or not len(column):
+        values: npt.NDArray[Any] = column.to_numpy()
+        return values
+    array = column.combine_chunks()
+    _, buffer = array.buffers()
+    if pa.types.is_boolean(array.type):
+        bits = np.unpackbits(np.frombuffer(buffer, np.uint8), bitorder="little")
+        return bits[array.offset : array.offset + len(array)].astype(np.bool_)
+    numbers = np.frombuffer(buffer, dtype=array.type.to_pandas_dtype())
+    return numbers[array.offset : array.offset + len(array)].copy()
 
 
 def _read(directory: Path, name: str) -> Any:
