@@ -67,21 +67,22 @@ LARGEST_DELAY = 0.025
 
 
 _NOTICED_DELAY = 0.1
-"""Delay from which results of loose beads say how much it slows them, rad."""
-_MEASURED_DELAYS = (0.0, 0.13, 0.34, 0.6, 1.5, 3.8)
-"""Delays, rad, of the shipped ``cluster`` with glycerol and glycerol 87 %, of 50 to 800 MPa."""
-_MEASURED_SLOWDOWNS = (0.0, 0.01, 0.02, 0.04, 0.15, 0.53)
-"""The share by which the cluster is then slower than with beads of 12.8 GPa."""
+"""Delay from which results of loose beads name the error of their softness, rad."""
+_MEASURED_DELAYS = (0.0, 0.13, 0.34, 1.5, 3.8)
+"""Delays, rad, of the shipped climbers with glycerol and glycerol 87 %, of 50 to 800 MPa."""
+_MEASURED_ERRORS = (0.0, 0.03, 0.09, 0.15, 1.3)
+"""The largest share by which one of them (diamond, dimer, cluster in a corner) then climbs faster or
+more slowly than with beads of 12.8 GPa. At the last one, the dimer goes down."""
 
 
 def softness_warning(case: Case) -> str | None:
-    """What the delay of contacts does to the loose beads of a case; None if that is little."""
+    """How far the delay of contacts changes the speeds of the loose beads of a case; None if little."""
     if (phase := delay_of_loose_beads(case)) < _NOTICED_DELAY:
         return None
-    slower = 100.0 * float(np.interp(phase, _MEASURED_DELAYS, _MEASURED_SLOWDOWNS))
+    error = 100.0 * float(np.interp(phase, _MEASURED_DELAYS, _MEASURED_ERRORS))
     return (
-        f"soft beads: bridges delay contacts by {phase:.2g} rad, which slows clusters by some {slower:.0f} % "
-        "(in a corner; more on a plain wall); a higher contact.youngs_modulus reduces it"
+        f"soft beads: bridges delay contacts by {phase:.2g} rad; the speeds of climbing clusters are "
+        f"then up to {error:.0f} % off those of hard beads (contact.youngs_modulus)"
     )
 
 
