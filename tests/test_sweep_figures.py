@@ -12,7 +12,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 import walkers
-from tests.conftest import document, to_toml
+from tests.conftest import TINY, document, to_toml
 from walkers.errors import InputError
 from walkers.runner.directory import case_of
 from walkers.sweeps.figure import SCATTER, LeftOutWarning, factors_of, figure_of
@@ -200,6 +200,65 @@ def test_theory_is_what_the_theory_says_of_each_point(looked_through: Path) -> N
     assert 100.0 < axes.get_ylim()[1] < 120.0
     with pytest.warns(LeftOutWarning, match="6 of 6 points: the theory has no orientation_end"):
         walkers.load(directory).figure(y="orientation_end", theory=True)
+
+
+@pytest.fixture(scope="module")
+def without_units(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with sweeps of a walker along Γ0, along a friction, and along the number of replicates."""
+    folder = tmp_path_factory.mktemp("without-units")
+    tables = document(run=TINY, dimers={"replicates": 2, "angle_spread": "1 deg"})
+    tables["drive"] = {"frequency": "80 Hz", "gamma0": 0.6}
+    (folder / "walker.toml").write_text(to_toml(tables))
+    axes: dict[str, tuple[str, list[float]]] = {
+        "driven": ("drive.gamma0", [0.3, 0.6, 0.9]),
+        "rubbed": ("contact.friction.bead_wall", [0.05, 0.1, 0.2]),
+        "repeated": ("dimers.replicates", [1, 3]),
+    }
+    for name, (key, values) in axes.items():
+        sweep = {"case": "walker.toml", "axes": {key: values}}
+        (folder / f"{name}.toml").write_text(to_toml(sweep))
+        walkers.sweep(folder / f"{name}.toml", folder / "runs", jobs=1)
+    return folder / "runs"
+
+
+def _of_theory(axes: Axes) -> list[tuple[Any, Any]]:
+    """Of the line of each model its x and its y."""
+    return [line.get_data() for line in axes.lines if line.get_linestyle() in ("--", ":")]
+
+
+@pytest.mark.parametrize("name", ["driven", "rubbed"])
+def test_the_theory_is_a_fine_curve_along_keys_without_a_unit(name: str, without_units: Path) -> None:
+    sweep = walkers.load(without_units / name)
+    (axes,) = _panels(sweep.figure(theory=True))
+    ((points, _, _),) = _drawn(axes)
+    predicted = [predict(case_of(Path(run))) for run in sweep.table()["run"]]
+    lines = _of_theory(axes)
+    assert len(lines) == 2
+    for (x, y), model in zip(lines, ("viscous", "paper"), strict=True):
+        assert (len(x), x[0], x[-1]) == (61, points[0], points[-1])
+        velocities = [one[model]["velocity"] * 1e3 for one in predicted]
+        assert np.interp(points, x, y) == pytest.approx(velocities, rel=5e-3)
+
+
+def test_a_curve_along_a_number_that_follows_from_the_key_is_in_the_unit_of_the_axis(
+    without_units: Path, looked_through: Path
+) -> None:
+    """The acceleration (in g) that follows from Γ0, and Γ0, which follows from the acceleration."""
+    for sweep, x in ((without_units / "driven", "peak_acceleration"), (looked_through / "grid", "gamma0")):
+        (axes,) = _panels(walkers.load(sweep).figure(theory=True, x=x))
+        points = [x for x, _, _ in _drawn(axes)]
+        lines = _of_theory(axes)
+        assert len(lines) == 2 * len(points)
+        for line, (at, _) in enumerate(lines):
+            ends = points[line // 2][[0, -1]]
+            assert len(at) == 61
+            assert at[[0, -1]] == pytest.approx(ends, rel=1e-9)
+
+
+def test_numbers_of_replicates_have_no_theory_between_them(without_units: Path) -> None:
+    """From 1 to 3 in 61 steps, 2 alone is one."""
+    (axes,) = _panels(walkers.load(without_units / "repeated").figure(theory=True))
+    assert [list(x) for x, _ in _of_theory(axes)] == [[1.0, 2.0, 3.0]] * 2
 
 
 def test_points_that_are_not_finished_are_left_out_and_counted(looked_through: Path, tmp_path: Path) -> None:

@@ -318,11 +318,16 @@ class _Theory:
         key, name = moving[0], x.keys[0]
         if key.endswith(_OF_SHAPE) or points[key].dtype.kind not in "if":
             return of_points
-        low, high, unit = points[key].min(), points[key].max(), self.done.attrs["units"][key] or ""
-        cases: list[tuple[float, Case]] = []
-        for value in (np.geomspace if "x" in self.log and low > 0.0 else np.linspace)(low, high, _CURVE).tolist():
-            with suppress(InputError, ValueError):  # a value that no case may have
-                cases.append((value, case.changed({key: f"{value!r} {unit}".strip()})))
+        low, high = float(points[key].min()), float(points[key].max())
+        spacing = np.geomspace if "x" in self.log and low > 0.0 else np.linspace
+        numbers = spacing(low, high, _CURVE).tolist()
+        unit = self.done.attrs["units"][key] or ""
+        cases = [(low, _with_number(case, key, low, unit))]
+        for value in numbers[1:-1]:
+            # Between two points there may be values that no case has, such as half an integer.
+            with suppress(InputError):
+                cases.append((value, _with_number(case, key, value, unit)))
+        cases.append((high, _with_number(case, key, high, unit)))
         predicted, remarks = self.predict([moved for _, moved in cases], self.column)
         if predicted.keys() != self.values.keys():
             return of_points
@@ -332,6 +337,13 @@ class _Theory:
         along = [value if name == key else _factor(self.done, name) * derived(moved)[name] for value, moved in cases]
         factor = _factor(self.done, self.column)
         return np.array(along), {model: factor * values for model, values in predicted.items()}
+
+
+def _with_number(case: Case, key: str, value: float, unit: str) -> Case:
+    """The case with a number of a key in a unit; without a unit it is a plain number, in case files too."""
+    if unit:
+        return case.changed({key: f"{value!r} {unit}"})
+    return case.changed({key: int(value) if value.is_integer() else value})
 
 
 def _factor(done: pd.DataFrame, column: str) -> float:
