@@ -218,6 +218,49 @@ def test_a_fall_ends_a_climb_at_its_top() -> None:
     assert (climb.end, climb.gain) == pytest.approx((2.0, 6e-3), rel=0.02)
 
 
+def test_a_fall_does_not_count_in_the_speed_of_the_climb_before_it() -> None:
+    """Up 6 mm in 2 s, then down at 2 mm/s."""
+    (climb,) = seen(np.minimum(UP, 6e-3 - 2e-3 * (TIME[:, None] - 2.0))).climbs
+    assert climb.speed == pytest.approx(3e-3, rel=0.01)
+
+
+def _jitter(seed: int) -> npt.NDArray[np.float64]:
+    """Heights that differ from frame to frame as those of clusters that hang on a shaken wall."""
+    return np.random.default_rng(seed).normal(0.0, 5e-6, (FRAMES, 1))
+
+
+@pytest.mark.parametrize("seed", [None, 0, 1, 2])
+@pytest.mark.parametrize(
+    ("height", "begin", "end"),
+    [
+        (3e-3 * np.clip(TIME - 2.0, 0.0, None), 2.0, TIME[-1]),
+        (3e-3 * np.clip(TIME, None, 2.0), 0.0, 2.0),
+        (3e-3 * np.clip(TIME - 1.0, 0.0, 1.5), 1.0, 2.5),
+        (1e-3 * np.clip(1.0 - TIME, 0.0, None) + 3e-3 * np.clip(TIME - 2.0, 0.0, None), 2.0, TIME[-1]),
+    ],
+    ids=["hangs, rises", "rises, hangs", "hangs, rises, hangs", "sinks, hangs, rises"],
+)
+def test_the_time_for_which_a_cluster_hangs_still_is_not_part_of_its_climb(
+    height: npt.NDArray[np.float64], begin: float, end: float, seed: int | None
+) -> None:
+    """At 3 mm/s a frame gains 0.06 mm; the jitter may move either end by one frame."""
+    jitter = 0.0 if seed is None else _jitter(seed)
+    (climb,) = seen(height[:, None] + jitter).climbs
+    assert climb.climbed
+    assert climb.speed == pytest.approx(3e-3, rel=0.01)
+    assert (climb.begin, climb.onset, climb.end) == pytest.approx((begin, begin, end), abs=0.021)
+    assert climb.gain == pytest.approx(np.ptp(height[TIME >= begin]), abs=4e-5)
+
+
+@pytest.mark.parametrize("seed", [None, 0, 1, 2])
+def test_a_hop_between_two_heights_at_which_a_cluster_hangs_is_no_climb(seed: int | None) -> None:
+    jitter = 0.0 if seed is None else _jitter(seed)
+    (climb,) = seen(_hop(100) + jitter).climbs
+    assert climb.gain == pytest.approx(4e-3, abs=5e-5)
+    assert not climb.climbed
+    assert np.isnan(climb.speed)
+
+
 def test_the_bulk_and_its_segregation() -> None:
     """The bulk is what is on the floor and the component of most beads; the index is 1 with all small ones below."""
     for walls, bulk in (({}, BULK), ({20: 0}, [*BULK, 20, 21])):

@@ -32,6 +32,12 @@ Cluster = tuple[frozenset[int], frozenset[int]]
 
 MIN_RISE = 2e-3
 """Smallest rise of a climb, m: about two diameters of the paper's large beads."""
+MAX_REST = 5e-5
+"""Heights that differ by less, m, are equal when the start and the end of a rise are sought.
+
+Clusters that hang on a shaken wall are as high in each frame within about 5e-6 m. A climb at 3 mm/s gains 5e-5 m from
+one frame to the next.
+"""
 MAX_GAP = 0.1
 """Longest time, s, for which a cluster may touch the pile or lose the wall within a track."""
 MIN_OVERLAP = 0.5
@@ -156,6 +162,11 @@ def _left_bulk(track: Track, beads: Beads) -> bool:
 def climbs_of(tracks: Sequence[Track], beads: Beads) -> Columns:
     """Table ``clusters``: the largest rise of each track of `follow`, and whether the track is a climb.
 
+    The largest rise goes from the lowest height to the greatest one after it. A cluster may hang still before and after
+    the rise, and this time must not count in the speed. The rise therefore begins in the last frame that is within
+    `MAX_REST` of its lowest height, and ends in the first frame thereafter that is within `MAX_REST` of its top. The
+    speed is the mean between these two frames; the gain is that from the lowest height to the top.
+
     A rise maximises the gain: the speed of a short and unsteady climb is too large. Its standard error, of the mean
     over up to ten equal parts, is too small if the speed changes more slowly. ``onset`` and ``qualified`` do not depend
     on later frames: up to a given time, records of any length contain the same climbs.
@@ -183,8 +194,9 @@ def _climb_of(number: int, track: Track, beads: Beads) -> dict[str, Any]:
     frames, height = np.array(track.frames), beads.height
     gained, seconds = _gained(track, beads.time, height)
     risen = gained - np.minimum.accumulate(gained)
-    last = int(np.argmax(risen))
-    first = int(np.argmin(gained[: last + 1]))
+    top = int(np.argmax(risen))
+    first = int(_starts_of_rises(gained)[top])
+    last = _end_of_rise(gained, first, top)
     rise, end = slice(first, last + 1), frames[last]
     onset, qualified = beads.time[frames[moments]] if (moments := _qualified(gained)) else (np.nan, np.nan)
     speed, error = _speed(seconds[rise], gained[rise])
@@ -202,7 +214,7 @@ def _climb_of(number: int, track: Track, beads: Beads) -> dict[str, Any]:
         "out_of_pile": _left_bulk(track, beads),
         "onset": onset,
         "qualified": qualified,
-        "gain": risen[last],
+        "gain": risen[top],
         "speed": speed,
         "standard_error": error,
         "climbed": moments is not None,
@@ -218,17 +230,34 @@ def _climb_of(number: int, track: Track, beads: Beads) -> dict[str, Any]:
     }
 
 
+def _starts_of_rises(gained: FloatArray) -> IntArray:
+    """Of each frame the last one up to it that is as high as the lowest until then, within `MAX_REST`."""
+    lowest = np.minimum.accumulate(gained)
+    is_start = gained <= lowest + MAX_REST
+    starts: IntArray = np.maximum.accumulate(np.where(is_start, np.arange(len(gained)), 0))
+    return starts
+
+
+def _end_of_rise(gained: FloatArray, start: int, top: int) -> int:
+    """The first frame from the start of a rise on that is as high as its top, within `MAX_REST`."""
+    is_high = gained[start : top + 1] >= gained[top] - MAX_REST
+    return start + int(np.argmax(is_high))
+
+
 def _qualified(gained: FloatArray) -> list[int] | None:
-    """Begin of the rise that makes a track a climb, and the frame at which it qualifies; None without a climb.
+    """Start of the rise that makes a track a climb, and the frame at which it qualifies; None without a climb.
 
     Its height above its lowest is then a maximum so far, and at least `MIN_RISE`; a hop between two frames is no climb.
     """
-    places, least = np.arange(len(gained)), np.minimum.accumulate(gained)
-    risen = gained - least
-    lowest = np.maximum.accumulate(np.where(np.diff(least, prepend=np.inf) < 0.0, places, 0))
-    farthest = risen == np.maximum.accumulate(risen)
-    qualifying = np.flatnonzero(farthest & (risen >= MIN_RISE) & (places - lowest + 1 >= _FEWEST_FRAMES))
-    return [int(lowest[qualifying[0]]), int(qualifying[0])] if len(qualifying) else None
+    risen = gained - np.minimum.accumulate(gained)
+    starts = _starts_of_rises(gained)
+    is_farthest = risen == np.maximum.accumulate(risen)
+    for frame in np.flatnonzero(is_farthest & (risen >= MIN_RISE)).tolist():
+        start = int(starts[frame])
+        frames_of_rise = _end_of_rise(gained, start, frame) - start + 1
+        if frames_of_rise >= _FEWEST_FRAMES:
+            return [start, frame]
+    return None
 
 
 def _gained(track: Track, time: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray]:
