@@ -13,19 +13,30 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 import pytest
+from matplotlib.axes import Axes
 from scipy.stats import poisson
 
 import walkers
 from docs import tables
 from tests.conftest import call, to_toml
 from walkers.inputs.reading import shipped
-from walkers.sweeps.climbing import PARTS, conditions_in, leaders, summary, survival, table_of, texts_of
+from walkers.sweeps.climbing import (
+    PARTS,
+    climbs_figure,
+    conditions_in,
+    leaders,
+    summary,
+    survival,
+    table_of,
+    texts_of,
+)
 
 BEADS, LARGE, LENGTH = 20, 4, 10.0
-CLIMB: dict[str, Any] = {"speed": 2e-3, "height": 0.01, "out_of_pile": True, "large": 1, "leader_large": True}
+CLIMB: dict[str, Any] = {"speed": 2e-3, "height": 0.01, "out_of_pile": True, "large": 1, "leader_large": True, "walls": 1}
 CLIMBS = pd.DataFrame(
     [
-        CLIMB | {"onset": 6.0, "qualified": 7.0, "wall_names": "+x +y", "leader": 1, "leader_large": False, "size": 4},
+        CLIMB | {"onset": 6.0, "qualified": 7.0, "wall_names": "+x +y", "leader": 1, "leader_large": False, "size": 4}
+        | {"walls": 2},
         CLIMB | {"onset": 1.5, "qualified": 2.0, "wall_names": "+x", "leader": 0, "size": 2},
         CLIMB
         | {"onset": 3.0, "qualified": 4.0, "wall_names": "-y", "leader": 0, "size": 3, "speed": 4e-3}
@@ -158,10 +169,48 @@ def test_the_parts_of_climbs_are_judged_at_the_time_of_the_whole() -> None:
     hung = drawn([0.5, 1.0, 1.5, 2.0], np.full(4, 8.0), 1.0, out_of_pile=[False, True, False, True])
     assert (hung["climbed"], hung["out_of_pile"]["climbed"], hung["out_of_pile"]["onsets"]) == (4, 2, [1.0, 2.0])
     assert hung["median"] == 2.0  # half have qualified then; half had begun a second before
-    found = drawn([5.0, 1.0, 20.0], np.array([9.0, 7.0, 8.0]), 1.0, wall_names=["+x", "+x +y", "+x"])
+    found = drawn([5.0, 1.0, 20.0], np.array([9.0, 7.0, 8.0]), 1.0, walls=[1, 2, 1])
     parts = [found, found["on_plain_walls"], found["in_corners"]]
     assert [one["within"] for one in parts] == [8.0] * 3
     assert [one["probability"] for one in parts] == pytest.approx([2 / 3, 1 / 3, 1 / 3])
+
+
+def _found(condition: str, climbs: pd.DataFrame = CLIMBS) -> dict[str, Any]:
+    """The statistics of a condition as `walkers.climb` returns them."""
+    return {**summary(PILES, climbs), "condition": condition, "each": climbs.to_dict("records")}
+
+
+def _points(axes: Axes) -> dict[Any, list[Any]]:
+    """The points of each line of a panel, by label."""
+    return {line.get_label(): np.array(line.get_data()).T.tolist() for line in axes.lines}
+
+
+def test_the_figure_shows_speeds_in_mm_per_s_against_sizes_on_plain_walls_and_in_corners() -> None:
+    survival_panel, climbs_panel, _ = climbs_figure([_found("usual")]).axes
+    assert climbs_panel.get_xlabel() == "beads"
+    assert climbs_panel.get_ylabel() == "speed (mm/s)"
+    points = _points(climbs_panel)
+    assert points["plain walls"] == [[2.0, pytest.approx(2.0)], [3.0, pytest.approx(4.0)]]
+    assert points["corners"] == [[4.0, pytest.approx(2.0)]]
+    # One of four has climbed from 2 s on, two from 4 s on.
+    (share,) = survival_panel.lines
+    assert share.get_xydata().tolist() == [[0.0, 0.0], [2.0, 0.25], [4.0, 0.5], [10.0, 0.5]]  # type: ignore[union-attr]
+
+
+def test_the_figure_has_the_rates_of_each_condition_beside_its_name() -> None:
+    """Three climbs in 40 s, two of them on plain walls; and one."""
+    conditions = [_found("drive.frequency = 100 Hz"), _found("mixture.count = 60", CLIMBS[1:2])]
+    rates = climbs_figure(conditions).axes[2]
+    labels = [label.get_text() for label in rates.get_yticklabels()]
+    assert labels == ["frequency 100 Hz: 2/4 climbed", "count 60: 1/4 climbed"]
+    drawn = {container.get_label(): container for container in rates.containers}
+    expected = {"all": [3, 1], "plain walls": [2, 1], "corners": [1, 0]}
+    assert drawn.keys() == expected.keys()
+    for label, climbs in expected.items():
+        line, _, (bars,) = drawn[label]  # type: ignore[misc]
+        assert list(line.get_xdata()) == pytest.approx([number / 40.0 for number in climbs])
+        ends = [segment[:, 0].tolist() for segment in bars.get_segments()]
+        assert np.array(ends) * 40.0 == pytest.approx(np.array([GARWOOD[number] for number in climbs]), abs=6e-5)
 
 
 def test_a_band_of_the_share_that_has_climbed_does_not_fall() -> None:

@@ -8,13 +8,16 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 import pytest
 
+from walkers.inputs.reading import load_case
 from walkers.postprocess import clusters
 from walkers.postprocess.clusters import Beads, Track, assembly_of, bulk_of, climbs_of, connected
 from walkers.postprocess.motion import Bridges
 from walkers.postprocess.piles import segregation
 from walkers.postprocess.tables import Columns
+from walkers.sweeps.climbing import summary
 
 BULK = list(range(20))
 TIME = np.arange(0.0, 4.0, 0.02)
@@ -259,6 +262,32 @@ def test_a_hop_between_two_heights_at_which_a_cluster_hangs_is_no_climb(seed: in
     assert climb.gain == pytest.approx(4e-3, abs=5e-5)
     assert not climb.climbed
     assert np.isnan(climb.speed)
+
+
+@pytest.mark.parametrize(
+    ("case", "changes", "walls", "where"),
+    [
+        ("pile-trough", {}, [1], "on_plain_walls"),
+        ("pile-trough", {}, [3], "on_plain_walls"),
+        ("pile-trough", {}, [1, 3], "in_corners"),
+        ("pile-ci", {}, [1], "on_plain_walls"),
+        ("pile-ci", {}, [1, 3], "in_corners"),
+        ("pile-ci", {"boundary.shape": "cylinder", "boundary.width": "6 mm"}, [1], "on_plain_walls"),
+    ],
+    ids=["a face", "a face normal to an axis", "two faces", "a side", "a corner", "a cylinder"],
+)
+def test_a_climb_is_in_a_corner_if_two_walls_hold_it(
+    case: str, changes: dict[str, Any], walls: list[int], where: str
+) -> None:
+    names = [wall.name for wall in load_case(case, changes).boundary.walls]
+    held = dict(zip((20, 21), walls, strict=False))
+    scene = seen(UP, walls=lambda frame: held)
+    table = climbs_of(scene.tracks, replace(scene.beads, wall_names=names))
+    assert table["wall_names"].tolist() == [" ".join(names[wall] for wall in walls)]
+    piles = pd.DataFrame({"beads": [24], "large": [1], "driven": [TIME[-1]]})
+    found = summary(piles, pd.DataFrame(table).assign(pile=0))
+    expected = {"on_plain_walls": 0, "in_corners": 0, where: 1}
+    assert {part: found[part]["climbs"] for part in expected} == expected
 
 
 def test_the_bulk_and_its_segregation() -> None:

@@ -36,6 +36,8 @@ _CONFIDENCE = 0.95
 _DRAWS = 10_000
 PARTS = ("on_plain_walls", "in_corners", "out_of_pile")
 """Subsets of the climbs; the last one leaves out clusters that were on a wall before the drive."""
+_WALLS_OF_CORNER = 2
+"""Smallest number of side walls that hold a climb in a corner."""
 _ROW = 2.1  # inches
 _ALIKE = 1e-6  # relative difference below which lengths of runs are equal
 _LETTERS = 44  # of a line in labels of conditions
@@ -90,8 +92,8 @@ def summary(piles: pd.DataFrame, climbs: pd.DataFrame, within: float | None = No
     # If a climber left the container, the run ended; a longer run would show the same first climb.
     at = float(still.min() if len(still) else piles["driven"].max()) if within is None else within
     cut = inf if within is None else within
-    walls = climbs["wall_names"].map(lambda names: len(names.split()))
-    parts = (walls == 1, walls > 1, climbs["out_of_pile"].astype(bool))
+    in_corners = climbs["walls"] >= _WALLS_OF_CORNER
+    parts = (~in_corners, in_corners, climbs["out_of_pile"].astype(bool))
     of_parts = {name: statistics(piles, climbs[rows], cut, at) for name, rows in zip(PARTS, parts, strict=True)}
     return statistics(piles, climbs, cut, at) | of_parts
 
@@ -290,7 +292,7 @@ def climbs_figure(climbs: Sequence[Mapping[str, Any]]) -> Figure:
     )
     risen = [climb for climb in climbs[0]["each"] if climb["speed"] is not None]
     for where, (key, look) in list(_KINDS.items())[1:]:
-        of_kind = [climb for climb in risen if (" " in climb["wall_names"]) == (key == "in_corners")]
+        of_kind = [climb for climb in risen if _is_in_corner(climb) == (key == "in_corners")]
         sizes, speeds = [climb["size"] for climb in of_kind], [climb["speed"] * 1e3 for climb in of_kind]
         looks = {"markerfacecolor": "none", "clip_on": False, "in_layout": False}  # without climbs a layout would fail
         axes["climbs"].plot(sizes, speeds, look, label=where, **looks)
@@ -299,6 +301,11 @@ def climbs_figure(climbs: Sequence[Mapping[str, Any]]) -> Figure:
     letter_panels(axes.values())
     figure.legend(*axes["rates"].get_legend_handles_labels(), loc="outside lower center", ncols=len(_KINDS))
     return figure
+
+
+def _is_in_corner(climb: Mapping[str, Any]) -> bool:
+    """Whether two or more side walls hold a climb; names of walls may have spaces, such as ``face 4``."""
+    return bool(climb["walls"] >= _WALLS_OF_CORNER)
 
 
 def _draw_rates(panel: Axes, table: pd.DataFrame) -> None:
