@@ -32,10 +32,18 @@ from walkers.sweeps.climbing import (
 )
 
 BEADS, LARGE, LENGTH = 20, 4, 10.0
-CLIMB: dict[str, Any] = {"speed": 2e-3, "height": 0.01, "out_of_pile": True, "large": 1, "leader_large": True, "walls": 1}
+CLIMB: dict[str, Any] = {
+    "speed": 2e-3,
+    "height": 0.01,
+    "out_of_pile": True,
+    "large": 1,
+    "leader_large": True,
+    "walls": 1,
+}
 CLIMBS = pd.DataFrame(
     [
-        CLIMB | {"onset": 6.0, "qualified": 7.0, "wall_names": "+x +y", "leader": 1, "leader_large": False, "size": 4}
+        CLIMB
+        | {"onset": 6.0, "qualified": 7.0, "wall_names": "+x +y", "leader": 1, "leader_large": False, "size": 4}
         | {"walls": 2},
         CLIMB | {"onset": 1.5, "qualified": 2.0, "wall_names": "+x", "leader": 0, "size": 2},
         CLIMB

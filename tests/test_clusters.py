@@ -1,6 +1,6 @@
 """Climbs of made-up trajectories: what counts, what does not, and what becomes of clusters that meet or part."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -13,7 +13,7 @@ import pytest
 
 from walkers.inputs.reading import load_case
 from walkers.postprocess import clusters
-from walkers.postprocess.clusters import Beads, Track, assembly_of, bulk_of, climbs_of, connected
+from walkers.postprocess.clusters import Beads, Track, assembly_of, at_sides, bulk_of, climbs_of, connected, floor_of
 from walkers.postprocess.motion import Bridges
 from walkers.postprocess.piles import segregation
 from walkers.postprocess.tables import Columns
@@ -47,6 +47,7 @@ def seen(
     pairs: Callable[[int], list[tuple[int, int]]] = lambda frame: [],
     walls: Callable[[int], dict[int, int]] = lambda frame: {20: SIDE},
     joined: Callable[[int], list[tuple[int, int]]] = lambda frame: [(20, 21), *ON_PILE],
+    names: Sequence[str] = NAMES,
 ) -> Any:
     """24 beads, 20 of them the bulk; 20 is large and leads 21, held to the wall, 22 and 23 stay on the bulk.
 
@@ -60,9 +61,10 @@ def seen(
     for frame in range(FRAMES):
         bridges = bridges_of([*pairwise(BULK), *joined(frame), *pairs(frame)], {0: SIDE, 1: 0, **walls(frame)})
         labels = connected(24, bridges.beads)
-        bulks.append(bulk_of(labels, bridges))
-        held.append(list(clusters.held_clusters(labels, bridges, bulks[-1])))
-    beads = Beads(TIME, height, np.arange(24) == 20, np.zeros(FRAMES), bulks, 0, NAMES)
+        floor = floor_of(names)
+        bulks.append(bulk_of(labels, bridges, floor=floor))
+        held.append(list(clusters.held_clusters(labels, bridges, bulks[-1], floor)))
+    beads = Beads(TIME, height, np.arange(24) == 20, np.zeros(FRAMES), bulks, 0, names)
     tracks = clusters.follow(TIME, held)
     table = climbs_of(tracks, beads)
     events = [(one.event, one.track, one.other) for one in rows_of(clusters.events_of(tracks, table, beads))]
@@ -252,7 +254,7 @@ def test_the_time_for_which_a_cluster_hangs_still_is_not_part_of_its_climb(
     assert climb.climbed
     assert climb.speed == pytest.approx(3e-3, rel=0.01)
     assert (climb.begin, climb.onset, climb.end) == pytest.approx((begin, begin, end), abs=0.021)
-    assert climb.gain == pytest.approx(np.ptp(height[TIME >= begin]), abs=4e-5)
+    assert climb.gain == pytest.approx(height.max() - height[FRAMES // 4 : FRAMES // 2].min(), abs=4e-5)
 
 
 @pytest.mark.parametrize("seed", [None, 0, 1, 2])
@@ -267,6 +269,7 @@ def test_a_hop_between_two_heights_at_which_a_cluster_hangs_is_no_climb(seed: in
 @pytest.mark.parametrize(
     ("case", "changes", "walls", "where"),
     [
+        ("pile-trough", {}, [0], "on_plain_walls"),
         ("pile-trough", {}, [1], "on_plain_walls"),
         ("pile-trough", {}, [3], "on_plain_walls"),
         ("pile-trough", {}, [1, 3], "in_corners"),
@@ -274,20 +277,30 @@ def test_a_hop_between_two_heights_at_which_a_cluster_hangs_is_no_climb(seed: in
         ("pile-ci", {}, [1, 3], "in_corners"),
         ("pile-ci", {"boundary.shape": "cylinder", "boundary.width": "6 mm"}, [1], "on_plain_walls"),
     ],
-    ids=["a face", "a face normal to an axis", "two faces", "a side", "a corner", "a cylinder"],
+    ids=["the first face", "a face", "a face normal to an axis", "two faces", "a side", "a corner", "a cylinder"],
 )
 def test_a_climb_is_in_a_corner_if_two_walls_hold_it(
     case: str, changes: dict[str, Any], walls: list[int], where: str
 ) -> None:
     names = [wall.name for wall in load_case(case, changes).boundary.walls]
     held = dict(zip((20, 21), walls, strict=False))
-    scene = seen(UP, walls=lambda frame: held)
-    table = climbs_of(scene.tracks, replace(scene.beads, wall_names=names))
-    assert table["wall_names"].tolist() == [" ".join(names[wall] for wall in walls)]
+    scene = seen(UP, walls=lambda frame: held, names=names)
+    assert scene.table["wall_names"].tolist() == [" ".join(names[wall] for wall in walls)]
     piles = pd.DataFrame({"beads": [24], "large": [1], "driven": [TIME[-1]]})
-    found = summary(piles, pd.DataFrame(table).assign(pile=0))
+    found = summary(piles, pd.DataFrame(scene.table).assign(pile=0))
     expected = {"on_plain_walls": 0, "in_corners": 0, where: 1}
     assert {part: found[part]["climbs"] for part in expected} == expected
+
+
+def test_a_trough_has_no_floor_but_a_first_side() -> None:
+    """A bead that is held by the first wall: in a box it lies on the floor, in a trough it hangs on a side."""
+    bridges = bridges_of([*pairwise(BULK), (20, 21)], {20: 0})
+    labels = connected(24, bridges.beads)
+    on_floor, on_side = floor_of(NAMES), floor_of(("face 1", "face 2", "-y", "+y"))
+    assert np.flatnonzero(bulk_of(labels, bridges, floor=on_floor)).tolist() == [*BULK, 20, 21]
+    assert np.flatnonzero(bulk_of(labels, bridges, floor=on_side)).tolist() == BULK
+    assert not at_sides(bridges, 24, on_floor).any()
+    assert np.flatnonzero(at_sides(bridges, 24, on_side)).tolist() == [20]
 
 
 def test_the_bulk_and_its_segregation() -> None:

@@ -1,10 +1,10 @@
 """Clusters that are free of the pile: tracks through time, events, and climbs.
 
 Bridges, touching or open, divide the beads of a pile into connected components. The *bulk* is the largest component
-together with all components that are bridged to the floor. A *cluster* is a component of at least two beads that is
-*free*, that is, not part of the bulk. It is *held* if a bridge joins one of its beads to a side wall. A *track* follows
-a cluster through time: in each frame it continues with the cluster that shares most of its beads. A track does not end
-if the cluster touches the pile or loses the wall for at most `MAX_GAP`.
+together with all components that are bridged to the floor; some vessels have no floor. A *cluster* is a component of at
+least two beads that is *free*, that is, not part of the bulk. It is *held* if a bridge joins one of its beads to a side
+wall. A *track* follows a cluster through time: in each frame it continues with the cluster that shares most of its
+beads. A track does not end if the cluster touches the pile or loses the wall for at most `MAX_GAP`.
 
 A *climb* is a track that rises by at least `MIN_RISE` while its cluster is free and held. The rise
 between two successive frames is the change of the mean height of the beads that the cluster has in both, so that beads
@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from walkers.inputs.boundary import FLOOR as FLOOR_NAME
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import FLOOR, Bridges
 from walkers.postprocess.tables import Columns, columns_of
@@ -42,6 +43,8 @@ MAX_GAP = 0.1
 """Longest time, s, for which a cluster may touch the pile or lose the wall within a track."""
 MIN_OVERLAP = 0.5
 """Smallest share of common beads (of the smaller cluster) in successive clusters of a track."""
+NO_FLOOR = -1
+"""Index of the floor of a vessel whose walls are all side walls."""
 EVENTS = ("freed", "split", "merged", "rejoined", "detached")
 """Events of clusters, see `events_of`."""
 _FEWEST_BEADS = 2
@@ -71,26 +74,31 @@ def connected(count: int, pairs: IntArray) -> IntArray:
     return labels
 
 
-def bulk_of(labels: IntArray, bridges: Bridges, *, heap: bool = True) -> BoolArray:
+def floor_of(wall_names: Sequence[str]) -> int:
+    """Index of the floor among the walls of a container; `NO_FLOOR` in a vessel without one, such as a trough."""
+    return FLOOR if wall_names[FLOOR] == FLOOR_NAME else NO_FLOOR
+
+
+def bulk_of(labels: IntArray, bridges: Bridges, *, heap: bool = True, floor: int = FLOOR) -> BoolArray:
     """Whether beads are part of the bulk, shape (N,).
 
     Without a ``heap`` (placed beads) the largest component may be a cluster on a wall, and does not count.
     """
     beads, walls = bridges.at_walls
-    on_floor = labels[beads[walls == FLOOR]]
+    on_floor = labels[beads[walls == floor]]
     most = [np.bincount(labels).argmax()] if heap else []
     return np.isin(labels, [*most, *on_floor])
 
 
-def at_sides(bridges: Bridges, count: int) -> BoolArray:
+def at_sides(bridges: Bridges, count: int, floor: int = FLOOR) -> BoolArray:
     """Whether a bridge joins a bead to a side wall, shape (count,)."""
     beads, walls = bridges.at_walls
-    return np.isin(np.arange(count), beads[walls != FLOOR])
+    return np.isin(np.arange(count), beads[walls != floor])
 
 
-def held_clusters(labels: IntArray, bridges: Bridges, bulk: BoolArray) -> Iterator[Cluster]:
+def held_clusters(labels: IntArray, bridges: Bridges, bulk: BoolArray, floor: int = FLOOR) -> Iterator[Cluster]:
     """The clusters that are free and held in a frame."""
-    beads, walls = bridges.at_walls[:, bridges.at_walls[1] != FLOOR]
+    beads, walls = bridges.at_walls[:, bridges.at_walls[1] != floor]
     for label in np.unique(labels[beads[~bulk[beads]]]):
         members = np.flatnonzero(labels == label)
         if len(members) >= _FEWEST_BEADS:
@@ -328,7 +336,7 @@ def assembly_of(tracks: Sequence[Track], climbs: Columns, beads: Beads, bridges:
     ]
     rows: list[list[tuple[Any, ...]]] = [[] for _ in climbing]
     for now in takewhile(lambda now: now.frame <= max(ends), bridges if ends else ()):
-        walled = at_sides(now, len(beads.large))
+        walled = at_sides(now, len(beads.large), floor_of(beads.wall_names))
         for number, until, members, of_climb in zip(climbing, ends, members_of_climbs, rows, strict=True):
             if not max(beads.first - 1, 0) <= now.frame <= until:
                 continue

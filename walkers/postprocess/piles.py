@@ -39,15 +39,20 @@ def has_climbed(motion: Motion) -> bool:
 def measure(motion: Motion) -> Measured:
     """Tables and numbers of the bed and of the clusters."""
     case = motion.case
+    wall_names = [wall.name for wall in case.boundary.walls]
+    floor = clusters.floor_of(wall_names)
+    heap = case.mixture is not None
     rows, bulks, held = [], [], []
     for bridges in read_bridges(motion):
         labels = clusters.connected(len(motion.radius), bridges.beads)
-        bulks.append(clusters.bulk_of(labels, bridges, heap=case.mixture is not None))
+        bulks.append(clusters.bulk_of(labels, bridges, heap=heap, floor=floor))
         # While the pile settles, most beads are free of the bulk.
         driven = motion.time[bridges.frame] >= 0.0
-        held.append(list(clusters.held_clusters(labels, bridges, bulks[-1])) if driven else [])
-        rows.append(_state_of(motion, bridges, bulks[-1], held[-1]))
-    bed, walls = {name: np.array([row[name] for row in rows]) for name in rows[0]}, case.boundary.walls
+        present = clusters.held_clusters(labels, bridges, bulks[-1], floor)
+        held.append(list(present) if driven else [])
+        at_wall = clusters.at_sides(bridges, len(motion.radius), floor)
+        rows.append(_state_of(motion, bridges, bulks[-1], held[-1], at_wall))
+    bed = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     beads = Beads(
         time=motion.time,
         height=motion.position[..., 2],
@@ -55,7 +60,7 @@ def measure(motion: Motion) -> Measured:
         surface=bed["surface"],
         bulk=bulks,
         first=motion.first_driven,
-        wall_names=[wall.name for wall in walls],
+        wall_names=wall_names,
     )
     tracks = clusters.follow(motion.time, held)
     climbs = clusters.climbs_of(tracks, beads)
@@ -115,9 +120,11 @@ def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
     return track, np.append(climbed, False)[track]
 
 
-def _state_of(motion: Motion, bridges: Bridges, bulk: BoolArray, held: Sequence[Cluster]) -> dict[str, Any]:
+def _state_of(
+    motion: Motion, bridges: Bridges, bulk: BoolArray, held: Sequence[Cluster], at_wall: BoolArray
+) -> dict[str, Any]:
     """The columns of ``bed`` in a frame."""
-    frame, at_wall = bridges.frame, clusters.at_sides(bridges, len(motion.radius))
+    frame = bridges.frame
     position, radius, large = motion.position[frame], motion.radius, motion.large
     # Cells of the cross-section are about four large radii wide. Without a bulk the floor is the surface.
     tops = _surface_cells(position[bulk], radius[bulk], motion.case.boundary, 4.0 * float(radius.max()))
