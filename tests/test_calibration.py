@@ -71,6 +71,10 @@ def test_numbers_are_means_and_ratios_of_means() -> None:
         ({"of": ["a"], "quantity": "largest_angle"}, np.nan),
     ]:
         assert fact(value=1.0, **given).of_numbers(numbers) == pytest.approx(expected, nan_ok=True)
+    # Of walkers that walk backward, and of which one does.
+    numbers |= {name: {**NO_NUMBERS, "velocity": -v} for name, v in [("-a", 1e-3), ("-b", 2e-3)]}
+    for of, over, expected in [("-b", "-a", 2.0), ("b", "-b", -2.0), ("-a", "a", -0.5)]:
+        assert fact(value=1.0, of=[of], over=[over]).of_numbers(numbers) == pytest.approx(expected)
     ends = pd.DataFrame({"orientation_end": np.radians([3.0, -8.0, 178.0, 95.0, -270.0])})
     np.testing.assert_allclose(misalignment(ends), [3.0, 8.0, 2.0, 85.0, 90.0])
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +59,23 @@ def test_quantities_are_read_in_si_and_nothing_else_is() -> None:
                 parse_quantity(text, kind)
     assert quantity_text(293.15, units.TEMPERATURE) == "20 degC"
     assert quantity_text(39.2, units.ACCELERATION) == "4 g"
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "bounds"),
+    [
+        ("150 degC", units.TEMPERATURE, "0 and 100 degC"),
+        ("-10 °C", units.TEMPERATURE, "0 and 100 °C"),
+        ("3 K", units.TEMPERATURE, "273.1 and 373.1 K"),
+        ("1 um", replace(units.LENGTH, smallest=2e-6, largest=0.04), "2 and 40000 um"),
+        ("5 cm", replace(units.LENGTH, smallest=2e-6, largest=0.04), "0.0002 and 4 cm"),
+        ("2000 g", units.ACCELERATION, "1.02e-10 and 1020 g"),
+        ("1e30 inch", units.LENGTH, "3.937e-08 and 39.37 inch"),
+    ],
+)
+def test_bounds_of_a_quantity_are_told_in_its_unit(text: str, kind: units.Kind, bounds: str) -> None:
+    with pytest.raises(ValueError, match=f"it must lie between {re.escape(bounds)}$"):
+        parse_quantity(text, kind)
 
 
 # Glass beads on polystyrene in glycol, materials that the paper names: nobody has measured how they touch.
@@ -285,6 +304,17 @@ def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(in_folde
     with pytest.raises(InputError, match=r'beads\.material = "my beads": not in the library'):
         load_case("mine.toml")
     assert "my beads  " not in call("library", check=True).stdout
+
+
+@pytest.mark.parametrize("materials", [["my beads", "glass"], ["glass", "my beads"]])
+def test_a_pair_of_surfaces_is_found_in_either_order(materials: list[str]) -> None:
+    """Each is the material of the beads once, and that of the substrate once."""
+    library = tomllib.loads(OWN)
+    library["surface_pairs"][0]["materials"] = materials
+    for bead, wall in (("my beads", "glass"), ("glass", "my beads")):
+        tables = {**document(beads={"material": bead}, boundary={"material": wall}), "library": library}
+        del tables["contact"]["friction"]
+        assert Case.read(tables, name="pair").contact.friction.bead_wall == 0.21
 
 
 def test_ranges_of_roughness_end_where_a_case_is_refused() -> None:

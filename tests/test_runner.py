@@ -10,6 +10,7 @@ import re
 import shutil
 import signal
 import subprocess
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -40,6 +41,8 @@ from walkers.cache import is_trusted
 from walkers.inputs.case import Case
 from walkers.physics.laws import young_laplace
 from walkers.runner import binary, failures
+
+from walkers.runner import binary, directory, failures
 from walkers.runner.binary import find_engine, plugin_of
 from walkers.runner.directory import (
     FIRST_SEGMENT,
@@ -47,14 +50,15 @@ from walkers.runner.directory import (
     is_finished,
     is_locked,
     layout_of,
+    leave_out_dumps,
     locked,
     run_place,
 )
 from walkers.runner.failures import EngineNeverStarted
-from walkers.runner.launch import judge
-from walkers.runner.manifest import read_manifest
+from walkers.runner.launch import EngineReport, judge
+from walkers.runner.manifest import read_manifest, write_manifest
 from walkers.sweeps.making import make_runs
-from walkers.templates.deck import Deck, Segment, render_deck, whole
+from walkers.templates.deck import RESTART_NAME, Deck, Segment, render_deck, whole
 
 PATIENCE_OF_LOCKS = "walkers.runner.directory._PATIENCE_SECONDS"
 
@@ -516,3 +520,36 @@ def test_tables_of_an_edited_deck_have_decimal_points_in_any_language(
     deck.write_text(re.sub(r"(variable +viscosity string) \S+", r"\1 0.01", deck.read_text()))
     subprocess.run(["sh", "run.sh"], cwd=deck.parent, check=True)
     assert (in_folder / "language").read_text() == "C\n"
+
+def test_a_pile_without_dumps_has_no_restart_files(pile_run: Path, tmp_path: Path) -> None:
+    """The run of a pile has segments, and a file to continue from after each."""
+    copy = Path(shutil.copytree(pile_run, tmp_path / pile_run.name))
+    assert len(list(copy.rglob(RESTART_NAME))) > 1
+    leave_out_dumps(copy)
+    assert not list(copy.rglob(RESTART_NAME))
+    assert walkers.load(copy).result.as_dict() == walkers.load(pile_run).result.as_dict()
+
+
+def test_steps_per_second_are_those_of_the_engines_loop(tmp_path: Path) -> None:
+    """1000 steps in 2 s; the engine also took 2 s to start."""
+    report = EngineReport("LIGGGHTS", wall_seconds=4.0, loop_seconds=2.0, steps=1000)
+    write_manifest(make_case(), "test-0123456789ab", None, report, started=time.time() - 5.0, directory=tmp_path)
+    manifest = read_manifest(tmp_path)
+    assert (manifest["steps"], manifest["steps_per_second"]) == (1000, 500.0)
+    assert (manifest["seconds"]["engine"], manifest["seconds"]["engine_loop"]) == (4.0, 2.0)
+    assert manifest["seconds"]["total"] == pytest.approx(5.0, abs=1.0)
+
+
+@pytest.mark.parametrize("name", ["CONTENT_VERSION", "FORMAT"])
+def test_decks_of_another_version_are_other_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    case, engine = make_case(), find_engine()
+    place = run_place(case, engine, tmp_path)
+    assert run_place(case, engine, tmp_path) == place
+    monkeypatch.setattr(directory, name, getattr(directory, name) + 1)
+    assert run_place(case, engine, tmp_path) != place
+
+
+def test_another_engine_makes_other_runs(tmp_path: Path) -> None:
+    case, engine = make_case(), find_engine()
+    other = replace(engine, sha256="0" * 64)
+    assert run_place(case, other, tmp_path) != run_place(case, engine, tmp_path)

@@ -100,6 +100,16 @@ def test_what_may_differ_within_a_deck() -> None:
         compose(plan_of(shared[0], apart[0]))
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_deck_of_several_processes_takes_as_many_cores(ranks: int, in_folder: Path) -> None:
+    sweep = {"case": "pile-ci", "set": {"run.ranks": ranks}, "axes": {"run.seed": [1, 2]}}
+    (in_folder / "piles.toml").write_text(to_toml(sweep))
+    plan = plan_sweep(load_sweep("piles.toml"), Path("runs"), Options(2))
+    engine_seconds = sum(deck.seconds for deck in plan.decks)
+    assert engine_seconds > 0.0
+    assert plan.core_seconds == pytest.approx(ranks * engine_seconds + plan.overhead)
+
+
 @pytest.mark.parametrize("workers", [1, 16])
 @pytest.mark.parametrize("sweep", ["fig2", "alignment"])
 def test_every_point_travels_once_and_cores_finish_together(sweep: str, workers: int) -> None:

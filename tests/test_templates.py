@@ -89,6 +89,50 @@ def test_ranks_form_a_grid_with_short_cuts(ranks: int, width: float, depth: floa
     box = replace(plan.scene, lower=(0.0, 0.0, 0.0), upper=(width, depth, 9.0))
     assert processor_grid(replace(plan, scene=box, ranks=ranks)) == grid
 
+UNITS = {
+    "frequency": "Hz",
+    "peak_acceleration": "m/s^2",
+    "gravity": "m/s^2",
+    "density": "kg/m^3",
+    "youngs_modulus": "Pa",
+    "viscosity": "Pa s",
+    "amplitude": "m",
+    "time_step": "s",
+}
+"""Units of the parameters of every deck of a walker."""
+
+
+@pytest.mark.parametrize(
+    ("drive", "more"),
+    [
+        ({}, {}),
+        ({"phase": "30 deg"}, {"phase": "rad"}),
+        ({"frame": "lab"}, {"peak_velocity": "m/s"}),
+    ],
+)
+def test_parameters_of_a_deck_have_si_units(drive: dict[str, str], more: dict[str, str]) -> None:
+    deck = render_deck(make_case(drive=drive)).text
+    notes = dict(re.findall(r"^variable +(\w+) string .*? # (.*)$", deck, re.MULTILINE))
+    expected = UNITS | more
+    found = {name: note.partition(":")[0] for name, note in notes.items() if name in expected}
+    assert found == expected
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_box_of_a_deck_has_room_for_beads_that_are_placed_far_from_the_origin(axis: int, sign: int) -> None:
+    place_of_bead = [0.0, 0.0, 0.5]
+    place_of_bead[axis] = 30.0 * sign
+    at = [f"{coordinate} mm" for coordinate in place_of_bead]
+    tables = document(run={"duration": "0.1 s"}, placed=[{"radius": "0.5 mm", "at": at}])
+    for key in ("cycles", "settling_cycles"):
+        del tables["run"][key]
+    scene, _ = place((Case.read(tables, name="far"),))
+    outer = [scene.lower, scene.upper][sign > 0][axis]
+    other = [scene.lower, scene.upper][sign > 0][1 - axis]
+    assert 30.5e-3 < sign * outer < 45e-3
+    assert sign * other < 30e-3
+
 
 def test_a_mixture_is_placed_by_its_seed() -> None:
     pile = load_case("pile-ci")
