@@ -66,6 +66,7 @@ build/integrators: walkers/theory/stepping.py walkers/check/kernels.py
 
 .PHONY: test-slow
 test-slow: setup chromium paraview .venv/with-notebooks ## Run what `make test` leaves out: what only a release needs
+	.venv/bin/python tests/tools/plant_faults.py check
 	.venv/bin/pytest -q -n 2 -m slow
 
 .PHONY: audit

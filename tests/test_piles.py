@@ -118,6 +118,17 @@ def test_a_container_holds_its_beads(shape: str, walls: int, tmp_path: Path) -> 
     assert shape == "octagon" or all(len(beads) == len(set(beads.tolist())) for beads in held)
 
 
+def test_all_walls_of_a_trough_are_side_walls(tmp_path: Path) -> None:
+    """It is two slanted faces without a floor: what touches either is at a wall."""
+    tables = document("pile-trough", mixture={"count": 20}, run={"duration": "0.02 s", **QUICK})
+    done = walkers.run(Case.read(tables, name="trough"), tmp_path)
+    frames = list(read_bridges(done.motion))
+    touched = [bridges.at_walls for bridges in frames]
+    assert {0, 1} <= set(touched[-1][1].tolist())
+    beads_at_walls = [len(set(beads.tolist())) for beads, _ in touched]
+    assert done.table("bed")["at_wall"].tolist() == beads_at_walls
+
+
 def test_a_climber_that_leaves_the_container_ends_the_run(tmp_path: Path) -> None:
     """It climbs at 8.6 mm/s; its upper bead is 3.2 mm below where the walls end; segments are of 0.05 s."""
     beads = [(radius, 2.5001 - radius, height) for radius, height in ((0.545, 2.0), (0.3075, 1.18135))]

@@ -1,10 +1,13 @@
 """Plant the faults of ``faults.toml`` one by one, and see whether the tests catch each.
 
+    python tests/tools/plant_faults.py check
     python tests/tools/plant_faults.py TABLE.md [WORD]
 
-TABLE.md gets a row for each fault: caught or not, and the first test that failed. WORD chooses faults by their name or
-file. Each entry of a fault's ``tests`` is what pytest is given (``tests/test_runner.py -k lost``), by itself, until one
-fails. A fault is taken back however its tests end, also after Ctrl-C.
+``check`` names the faults whose text is no longer in the code exactly once, and those whose tests have gone. It plants
+nothing. The other form checks first, then plants: TABLE.md gets a row for each fault, caught or not, and the first test
+that failed. WORD chooses faults by their name or file. Each entry of a fault's ``tests`` is what pytest is given
+(``tests/test_runner.py -k lost``), by itself, until one fails. A fault is taken back however its tests end, also after
+Ctrl-C.
 """
 
 from __future__ import annotations
@@ -17,7 +20,8 @@ import subprocess
 import sys
 import time
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -30,12 +34,10 @@ SECONDS = 600
 @contextmanager
 def planted(fault: Mapping[str, Any]) -> Iterator[None]:
     """Have the fault in its file for a while."""
-    path, old = ROOT / fault["file"], fault["old"]
+    path = ROOT / fault["file"]
     sound = path.read_text("utf-8")
-    if sound.count(old) != 1:
-        raise SystemExit(f"{fault['name']}: the old text is {sound.count(old)} times in {fault['file']}, not once")
     try:
-        path.write_text(sound.replace(old, fault["new"]), "utf-8")
+        path.write_text(sound.replace(fault["old"], fault["new"]), "utf-8")
         yield
     finally:
         path.write_text(sound, "utf-8")
@@ -61,13 +63,48 @@ def failing(arguments: list[str]) -> str | None:
     return found[1] if found else None
 
 
+def problems_of(faults: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What keeps faults from being planted, or their tests from being found: a line for each problem."""
+    problems = []
+    for fault in faults:
+        name, path = fault["name"], ROOT / fault["file"]
+        times = path.read_text("utf-8").count(fault["old"]) if path.is_file() else 0
+        if times != 1:
+            problems.append(f"{name}: the old text is {times} times in {fault['file']}, not once")
+        if fault["old"] == fault["new"]:
+            problems.append(f"{name}: the new text is the old one")
+        for entry in fault["tests"]:
+            problems += [f"{name}: {problem}" for problem in _problems_of_tests(entry)]
+    names = Counter(fault["name"] for fault in faults)
+    problems += [f"{name}: the name of {number} faults" for name, number in names.items() if number > 1]
+    return problems
+
+
+def _problems_of_tests(entry: str) -> list[str]:
+    """What is wrong with an entry of ``tests``: its file has gone, or a word after ``-k`` is not in the file."""
+    file, *options = shlex.split(entry)
+    path = ROOT / file
+    if not path.is_file():
+        return [f"there is no {file}"]
+    text = path.read_text("utf-8")
+    words = re.findall(r"\w+", " ".join(options).replace("-k", " "))
+    gone = [word for word in words if word not in ("or", "and", "not") and word not in text]
+    return [f"{file} has no {' '.join(gone)}"] if gone else []
+
+
 def main(table: str, word: str = "") -> None:
-    """Plant what is asked for and write the table."""
+    """Check the faults; unless ``table`` is ``check``, plant those that are asked for and write the table."""
     for number in (signal.SIGTERM, signal.SIGINT):  # which a shell has those ignore that it starts with "&"
         signal.signal(number, signal.default_int_handler)
     known = tomllib.loads(Path(__file__).with_name("faults.toml").read_text("utf-8"))["fault"]
+    chosen = [fault for fault in known if word in fault["name"] + fault["file"]]
+    if problems := problems_of(chosen):
+        raise SystemExit("\n".join(problems))
+    if table == "check":
+        print(f"{len(chosen)} faults can be planted")
+        return
     rows = ["| Fault | File | Caught | First failing test | s |", "| --- | --- | --- | --- | --- |"]
-    for fault in (one for one in known if word in one["name"] + one["file"]):
+    for fault in chosen:
         began = time.monotonic()
         with planted(fault):
             first = next((test for entry in fault["tests"] if (test := failing(shlex.split(entry)))), None)
