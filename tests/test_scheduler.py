@@ -134,37 +134,75 @@ def test_of_plans_that_take_as_long_the_smallest_decks_are_made() -> None:
     assert makespan((deck.seconds for deck in decks), 2) == decks[0].seconds
 
 
-def test_the_table_of_a_sweep(sweep_file: Callable[..., str]) -> None:
-    """In all of its forms."""
-    text = '[axes]\ndimers.radii = [["0.3 mm", "0.2 mm"], ["0.25 mm", "0.25 mm"]]\nrun.time_step = ["2 us", "auto"]'
-    name = sweep_file(text, dimers={"replicates": 2})
-    for text in ("4 points in ", "0 points in 0 decks"):
-        assert Path("runs").exists() == text.startswith("0")
-        assert text in call("sweep", name, "--dry-run").stdout
-        assert call("sweep", name).stdout.splitlines()[0] == "test: 4 points, 4 finished"
-    shutil.rmtree(load("runs/test")["run"][3])
-    frame = load("runs/test")
-    wanted = {"point": [0, 1, 2, 3], "dimers.radii[0]": [0.3, 0.3, 0.25, 0.25], "lost": [0] * 4}
-    wanted |= {"run.time_step": [2.0, "auto"] * 2, "status": [DONE] * 3 + ["missing"]}
-    assert {name: list(frame[name]) for name in wanted} == wanted
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a sweep over radii and time steps, whose last point is missing."""
+    folder = tmp_path_factory.mktemp("swept")
+    (folder / "base.toml").write_text(to_toml(document(run=TINY, dimers={"replicates": 2})))
+    radii = [["0.3 mm", "0.2 mm"], ["0.25 mm", "0.25 mm"]]
+    sweep = {"case": "base.toml", "axes": {"dimers.radii": radii, "run.time_step": ["2 us", "auto"]}}
+    (folder / "test.toml").write_text(to_toml(sweep))
+    assert call("sweep", "test.toml", folder=folder).stdout.splitlines()[0] == "test: 4 points, 4 finished"
+    shutil.rmtree(load(folder / "runs" / "test")["run"][3])
+    return folder
+
+
+def test_a_plan_of_a_sweep_runs_nothing_and_counts_what_is_missing(sweep_file: Callable[..., str]) -> None:
+    name = sweep_file("[axes]\nrun.seed = [1, 2]")
+    assert "2 points in 1 deck\n" in call("sweep", name, "-j", "1", "--dry-run", check=True).stdout
+    assert not Path("runs").exists()
+    call("sweep", name, check=True)
+    assert "0 points in 0 decks" in call("sweep", name, "--dry-run", check=True).stdout
+
+
+def test_a_table_has_the_values_of_each_point_in_the_units_of_the_sweep(swept: Path) -> None:
+    frame = load(swept / "runs" / "test")
+    expected = {
+        "point": [0, 1, 2, 3],
+        "dimers.radii[0]": [0.3, 0.3, 0.25, 0.25],
+        "run.time_step": [2.0, "auto", 2.0, "auto"],
+        "status": [DONE, DONE, DONE, "missing"],
+        "lost": [0, 0, 0, 0],
+    }
+    assert {name: list(frame[name]) for name in expected} == expected
     units = frame.attrs["units"]
     assert (units["run.time_step"], units["dimers.radii[1]"], units["velocity"]) == ("us", "mm", "m/s")
+
+
+def test_a_table_has_the_results_of_its_runs(swept: Path) -> None:
+    frame = load(swept / "runs" / "test")
     for row in frame[:3].itertuples():
-        case = case_of(Path(row.run))
-        numbers = json.loads((Path(row.run) / "result.json").read_text())["numbers"]
+        directory = Path(row.run)
+        numbers = json.loads((directory / "result.json").read_text())["numbers"]
         assert [row.velocity, row.smallest] == [numbers["velocity"], numbers["smallest"]]
+        case = case_of(directory)
         assert row.gamma0 == pytest.approx(dimer_of(case).gamma0(case.excitation.peak_acceleration))
-    for file in ("table.csv", "table.parquet"):
-        call("list", "runs/test", "--to", file, check=True)
-    np.testing.assert_array_equal(pd.read_csv("table.csv")["velocity (m/s)"], frame["velocity"])
-    contents = json.loads(call("list", "runs/test", "--json", check=True).stdout)
-    assert [point["amplitude"] for point in contents["points"]][:3] == list(frame["amplitude"][:3])
-    table = pq.read_table("table.parquet")
+    assert np.isnan(frame["velocity"][3])
+
+
+def test_a_table_is_written_as_csv_with_the_units_in_its_header(swept: Path) -> None:
+    call("list", "runs/test", "--to", "table.csv", check=True, folder=swept)
+    written = pd.read_csv(swept / "table.csv")["velocity (m/s)"]
+    np.testing.assert_array_equal(written, load(swept / "runs" / "test")["velocity"])
+
+
+def test_a_table_is_written_as_parquet_with_types_for_missing_points(swept: Path) -> None:
+    """Of numbers and words all become words; truths stay truths."""
+    call("list", "runs/test", "--to", "table.parquet", check=True, folder=swept)
+    table = pq.read_table(swept / "table.parquet")
     assert table.schema.field("velocity").metadata[b"unit"] == b"m/s"
-    assert table.column("run.time_step").to_pylist() == ["2.0", "auto"] * 2, "numbers and words become words"
-    assert table.column("walkers_met").to_pylist() == [False] * 3 + [None], "truths where a point is missing"
-    shown = call("list", "test", check=True).stdout
-    assert ("velocity (mm/s)" in shown, len(shown.splitlines()), frame["run"][0] in shown) == (True, 9, False)
+    assert table.column("run.time_step").to_pylist() == ["2.0", "auto", "2.0", "auto"]
+    assert table.column("walkers_met").to_pylist() == [False, False, False, None]
+
+
+def test_a_table_is_printed_as_json_and_as_text(swept: Path) -> None:
+    frame = load(swept / "runs" / "test")
+    contents = json.loads(call("list", "runs/test", "--json", check=True, folder=swept).stdout)
+    assert [point["amplitude"] for point in contents["points"]][:3] == list(frame["amplitude"][:3])
+    text = call("list", "test", check=True, folder=swept).stdout
+    assert "velocity (mm/s)" in text
+    assert len(text.splitlines()) == 9
+    assert Path(frame["run"][0]).name not in text
 
 
 def test_a_descent_finds_where_the_walkers_stop(sweep_file: Callable[..., str], in_folder: Path) -> None:

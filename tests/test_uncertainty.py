@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from itertools import pairwise
 from math import hypot
 from pathlib import Path
+from typing import Any
 from zipfile import ZipFile
 
 import numpy as np
@@ -53,58 +55,105 @@ def test_what_is_usual_lies_within_its_range() -> None:
         assert low < value < high or (key == "liquid.contact_angle" and value == low == 0.0), key
 
 
-def test_a_slope_is_in_the_headline_and_its_walkers_face_up(tmp_path: Path) -> None:
-    tables = {
-        "dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 2},
-        "beads": {"material": "ruby"},
-        "liquid": {"surface_tension": "20 mN/m", "kinematic_viscosity": "5 mm^2/s", "density": "0.9 g/cm^3"},
-        "boundary": {"material": "glass", "tilt": "20 deg"},
-        "drive": {"frequency": "80 Hz", "peak_acceleration": "4 g"},
-        "contact": {"rolling_friction": 0.0},
-        "run": {"cycles": 4},
-    }
-    case = Case.read(tables, name="steep")
-    done = walkers.run(case, tmp_path)
-    assert "plane tilted by 20°, right is up" in done.describe()
-    result = done.result
-    assert np.isnan([result["right_scatter"], result["left_scatter"]]).all()  # one walker a side
+SLOPE: dict[str, Any] = {
+    "dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 2},
+    "beads": {"material": "ruby"},
+    "liquid": {"surface_tension": "20 mN/m", "kinematic_viscosity": "5 mm^2/s", "density": "0.9 g/cm^3"},
+    "boundary": {"material": "glass", "tilt": "20 deg"},
+    "drive": {"frequency": "80 Hz", "peak_acceleration": "4 g"},
+    "contact": {"rolling_friction": 0.0},
+    "run": {"cycles": 4},
+}
+
+
+@pytest.fixture(scope="module")
+def steep(tmp_path_factory: pytest.TempPathFactory) -> walkers.Run:
+    """Two dimers on a slope of 20°, one that faces up and one that faces down; the only run of its folder."""
+    return walkers.run(Case.read(SLOPE, name="steep"), tmp_path_factory.mktemp("steep"))
+
+
+def test_walkers_that_face_up_and_down_a_slope_differ(steep: walkers.Run) -> None:
+    """Each of both has one velocity, and the mean over both is no walker's."""
+    result = steep.result
+    up, down = steep.walkers.sort_values("facing", ascending=False)["velocity"]
+    assert (result["right_facing"], result["left_facing"]) == (up, down)
+    assert up < down
     assert result["facings_differ"]
-    (engine,) = (line for line in describe(predict(case), result).splitlines() if line.startswith("engine"))
-    assert engine.split()[:3] == ["engine,", "facing", "up"]
-    assert float(engine.split()[3]) == pytest.approx(1e3 * result["right_facing"], abs=1e-3)
-    shown = {row.name: row.text for row in rows(result)}
+    assert np.isnan([result["right_scatter"], result["left_scatter"]]).all()
+
+
+def test_a_slope_is_in_the_headline_of_a_run_and_of_its_report(steep: walkers.Run, tmp_path: Path) -> None:
+    assert "plane tilted by 20°, right is up" in steep.describe()
+    assert "plane tilted by 20°" in steep.report(tmp_path / "report.html").read_text("utf-8")
+
+
+def test_the_theory_is_beside_the_engines_walkers_that_face_up(steep: walkers.Run) -> None:
+    lines = describe(predict(steep.case), steep.result).splitlines()
+    (engine,) = [line.split() for line in lines if line.startswith("engine")]
+    assert engine[:3] == ["engine,", "facing", "up"]
+    assert float(engine[3]) == pytest.approx(1e3 * steep.result["right_facing"], abs=1e-3)
+
+
+def test_the_printed_result_of_a_slope_has_the_velocities_of_both_ways(steep: walkers.Run) -> None:
+    shown = {row.name: row.text for row in rows(steep.result)}
     assert "velocity" not in shown
     for name in ("axial_velocity", "axial_left_facing"):
-        assert float(shown[name]) == float(rounded(1e3 * result[name], "mm/s"))
-    up, down = (rounded(1e3 * result[name], "mm/s") for name in ("right_facing", "left_facing"))
-    assert f" {up} mm/s facing up, {down} facing down " in as_text(inventory(tmp_path))
-    # The band of a spread is that of one side.
-    own = result["right_facing"]
-    spread = spread_of(done.directory.resolve())
+        assert float(shown[name]) == float(rounded(1e3 * steep.result[name], "mm/s"))
+
+
+def test_the_inventory_has_the_velocities_of_both_ways(steep: walkers.Run) -> None:
+    up, down = (rounded(1e3 * steep.result[name], "mm/s") for name in ("right_facing", "left_facing"))
+    assert f" {up} mm/s facing up, {down} facing down " in as_text(inventory(steep.directory.parent))
+
+
+@pytest.mark.parametrize(("name", "shown"), [("right_facing", True), ("velocity", False)])
+def test_on_a_slope_the_band_of_a_spread_is_that_of_one_way(steep: walkers.Run, name: str, shown: bool) -> None:
+    """It is widened to the result of the case itself; that of the mean over both ways is not printed."""
+    own = steep.result["right_facing"]
+    spread = spread_of(steep.directory.resolve())
     spread.mkdir()
-    for name, low in (("right_facing", own - 1e-3), ("velocity", own - 2e-3)):
-        bands = {name: {"low": low, "high": own - 1e-4, "points": 64}}
-        write_json(spread / SPREAD_NAME, {"varied": result.about["rests_on"], "bands": bands})
-        assert (done.result[f"{name}_low"], done.result[f"{name}_high"]) == (low, own)  # with the result of the case
-        errors = {row.name: row.error for row in rows(done.result)}
-        assert errors["right_facing"].endswith("(64 draws)") == (name == "right_facing")
-    assert "plane tilted by 20°" in done.report(tmp_path / "report.html").read_text("utf-8")
-    gentle = Case.read({**tables, "boundary": {"material": "glass", "tilt": "10 deg"}}, name="gentle")
-    walkers.run(gentle, tmp_path)
-    text = walkers.compare(*(walkers.load(one, tmp_path).directory for one in (case, gentle))).text
+    try:
+        band = {"low": own - 1e-3, "high": own - 1e-4, "points": 64}
+        write_json(spread / SPREAD_NAME, {"varied": steep.result.about["rests_on"], "bands": {name: band}})
+        assert (steep.result[f"{name}_low"], steep.result[f"{name}_high"]) == (own - 1e-3, own)
+        errors = {row.name: row.error for row in rows(steep.result)}
+        assert errors["right_facing"].endswith("(64 draws)") == shown
+    finally:
+        shutil.rmtree(spread)
+
+
+def test_slopes_are_compared_by_the_walkers_that_face_up(steep: walkers.Run, tmp_path: Path) -> None:
+    tables = {**SLOPE, "boundary": {"material": "glass", "tilt": "10 deg"}}
+    gentle = walkers.run(Case.read(tables, name="gentle"), tmp_path)
+    text = walkers.compare(steep.directory, gentle.directory).text
     assert "\nright_facing (mm/s)" in text
-    assert "\nvelocity (mm/s)" not in text  # the mean over both is no walker's
-    # Of walkers that turned over it is the velocity up the slope that counts, at one point of a sweep for all.
-    turned = {**result, "turned_round": 1, "upright": 1, "turned_over": 1}
+    assert "\nvelocity (mm/s)" not in text
+
+
+def test_the_main_number_of_points_depends_on_what_their_walkers_do(steep: walkers.Run) -> None:
+    """Of walkers that turned over it is the velocity up the slope, at one point of a sweep for all."""
+    result = dict(steep.result)
     level = {**result, "facings_differ": False}
-    for some, column in (([result], "right_facing"), ([level], "velocity"), ([result, turned], "axial_velocity")):
-        assert default_column(pd.DataFrame([dict(one) for one in some])) == headline(some[-1]) == column
-    assert not fell({"goes_uphill": True, "climbs": 0})  # a pile
-    # Nor has any walker the mean angle of those that turned over and those that did not.
-    assert ["orientation_end" in {row.name for row in rows(one)} for one in ({**result}, turned)] == [True, False]
-    ends = [rounded(np.degrees(end), "°") for end in sorted(done.walkers["orientation_end"])]
-    for walkers_, error in ((2, f"walkers {ends[0]} to {ends[1]}"), (1, "")):
-        assert [row.error for row in rows({**result, "walkers": walkers_}) if row.name == "orientation_end"] == [error]
+    turned = {**result, "turned_round": 1, "upright": 1, "turned_over": 1}
+    for points, column in (([result], "right_facing"), ([level], "velocity"), ([result, turned], "axial_velocity")):
+        assert default_column(pd.DataFrame(points)) == column
+        assert headline(points[-1]) == column
+
+
+def test_a_pile_that_climbs_has_not_fallen() -> None:
+    assert not fell({"goes_uphill": True, "climbs": 0})
+
+
+def test_the_final_angle_is_printed_unless_some_walkers_turned_over(steep: walkers.Run) -> None:
+    """A mean over those that did and those that did not is no walker's; of one walker there is no range."""
+    result = dict(steep.result)
+    turned = {**result, "turned_round": 1, "upright": 1, "turned_over": 1}
+    assert "orientation_end" in {row.name for row in rows(result)}
+    assert "orientation_end" not in {row.name for row in rows(turned)}
+    low, high = (rounded(np.degrees(end), "°") for end in sorted(steep.walkers["orientation_end"]))
+    for number, expected in ((2, f"walkers {low} to {high}"), (1, "")):
+        errors = {row.name: row.error for row in rows({**result, "walkers": number})}
+        assert errors["orientation_end"] == expected
 
 
 def test_clusters_on_a_slope_are_averaged_by_the_way_they_face_and_lean_by_how_far_they_turned(tmp_path: Path) -> None:
