@@ -289,6 +289,86 @@ def test_a_tray_that_has_hardly_been_driven_has_meetings_alone() -> None:
     assert measured.numbers == {"merged": 1, "parted": 0, "largest_group": 2}
 
 
+def _tray(bridges: dict[int, list[tuple[int, int, int]]], **tables: Any) -> Motion:
+    """Three dimers, of beads 0 to 5, in whose cycles these bridges (two beads or -1, a wall or -1) are there."""
+    dimers = {"radii": ["0.3 mm", "0.2 mm"], "replicates": 3, "meet": True, "angle_spread": "0 deg", "facing": "both"}
+    motion = resting(case_of(dimers=dimers, **tables))
+    samples = motion.case.run.samples_per_cycle
+    seen = []
+    for cycle in range(motion.case.run.cycles + 1):
+        contacts = [(0, -1, FLOOR), *bridges.get(cycle, [])]
+        ones = np.ones(len(contacts))
+        seen.append(Bridges(cycle * samples, np.array(contacts), ones, ones))
+    motion.__dict__["bridges"] = seen
+    return motion
+
+
+def test_a_meeting_lasts_from_the_first_bridge_to_the_last_one() -> None:
+    """Walkers 0 and 1 have two bridges, then one, in cycles 1 to 3; 1 and 2 have one from cycle 2 on."""
+    first, second, other = (0, 3, -1), (1, 2, -1), (3, 4, -1)
+    motion = _tray({1: [first, second], 2: [second, other], 3: [first, other], 4: [other], 5: [other], 6: [other]})
+    measured = meetings.measure(motion)
+    table = measured.tables["meetings"]
+    assert table["event"].tolist() == ["merged", "merged", "parted"]
+    assert [*zip(table["walker"].tolist(), table["other"].tolist(), strict=True)] == [(0, 1), (1, 2), (0, 1)]
+    assert table["size"].tolist() == [2, 3, 1]
+    assert table["time"] == pytest.approx(np.array([1.0, 2.0, 4.0]) / 80.0)
+    assert [walker.facing for walker in motion.walkers] == [1, -1, -1]
+    assert table["angle"] == pytest.approx([pi, 0.0, pi])
+    numbers = measured.numbers
+    assert (numbers["merged"], numbers["parted"], numbers["largest_group"]) == (2, 1, 3)
+    assert (numbers["largest_cluster"], numbers["clustered_share"]) == (2, pytest.approx(2.0 / 3.0))
+    assert numbers["meeting_rate"] == pytest.approx(2 * 2 / (3 * 6.0 / 80.0))
+
+
+def test_a_cluster_is_held_where_one_of_its_beads_has_a_bridge_to_a_side_wall() -> None:
+    """Walkers 0 and 1 are joined, and 1 is held: both are; the floor holds nobody."""
+    box = {"shape": "box", "width": "20 mm", "height": "10 mm", "material": "chromium-coated glass"}
+    motion = _tray({6: [(0, 3, -1), (3, -1, SIDE)]}, boundary=box)
+    assert meetings.measure(motion).numbers["held_share"] == pytest.approx(2.0 / 3.0)
+    assert meetings.measure(_tray({6: [(0, 3, -1)]}, boundary=box)).numbers["held_share"] == 0.0
+    # A side wall that another walker touches holds that one alone.
+    alone = _tray({6: [(0, 3, -1), (5, -1, SIDE)]}, boundary=box)
+    assert meetings.measure(alone).numbers["held_share"] == pytest.approx(1.0 / 3.0)
+
+
+def test_all_walls_of_a_groove_are_its_floor_for_walkers() -> None:
+    """A walker in it has bridges to both walls always, and is not held by them."""
+    motion = _tray({6: [(0, -1, 1)]}, boundary={"shape": "groove", "opening": "100 deg", "material": "glass"})
+    assert meetings.measure(motion).numbers["held_share"] == 0.0
+
+
+@pytest.mark.parametrize("turn", [0.0, 90.0])
+def test_the_order_of_walkers_is_about_the_axis_of_the_drive(turn: float) -> None:
+    """Of three that face along the axis, against it and across: (1 + 1 - 1)/3, and a mean heading of 1/3."""
+    axis = np.array([np.cos(np.radians(turn)), np.sin(np.radians(turn))])
+    across = np.array([-axis[1], axis[0]])
+    heading = np.broadcast_to([axis, -axis, across], (11, 3, 2))
+    alone, free = np.ones((11, 3), dtype=np.int64), np.zeros((11, 3), dtype=bool)
+    time = np.linspace(0.0, 1.0, 11)
+    found = meetings.collective(time, 1e-3 * time[:, None, None] * heading, heading, alone, free, 0, axis)
+    assert found["nematic_order"] == pytest.approx(1.0 / 3.0)
+    assert found["polar_order"] == pytest.approx(1.0 / 3.0)
+    assert found["free_speed"] == pytest.approx(1e-3)
+    assert (found["slow_share"], found["clustered_share"], found["held_share"]) == (0.0, 0.0, 0.0)
+    assert np.isnan([found["joined_speed"], found["speed_ratio"]]).all()
+
+
+def test_the_end_of_a_tray_is_the_last_tenth_of_its_drive() -> None:
+    """A walker that stops after 0.85 s of 1 s is slow at the end; one that slows down to a fifth is not."""
+    time = np.linspace(0.0, 1.0, 101)
+    stops = 1e-3 * np.minimum(time, 0.85)
+    slows = 1e-3 * np.where(time < 0.85, time, 0.85 + 0.2 * (time - 0.85))
+    centre = np.stack([1e-3 * time, stops, slows], axis=1)[..., None] * np.array([1.0, 0.0])
+    turned = np.where(time < 0.85, 0.0, 1.0)[:, None]
+    late = np.stack([1.0 - turned[:, 0], turned[:, 0]], axis=1)
+    heading = np.stack([late, late, late], axis=1)
+    alone, free = np.ones((101, 3), dtype=np.int64), np.zeros((101, 3), dtype=bool)
+    found = meetings.collective(time, centre, heading, alone, free, 0, np.array([1.0, 0.0]))
+    assert found["slow_share"] == pytest.approx(1.0 / 3.0)
+    assert found["nematic_order"] == pytest.approx(-1.0)
+
+
 def test_the_state_of_a_bed() -> None:
     """Two large beads that touch, one on the floor; a small one at a side wall, with an open bridge; one alone."""
     motion = resting(case_of(**PILE), 2)
