@@ -28,7 +28,7 @@ from walkers.postprocess.piles import _of_climbs, _state_of
 from walkers.postprocess.report.player import _points
 from walkers.postprocess.scene import Scene, rotations_at, turned_in
 from walkers.postprocess.uncertainty import SPREAD_NAME, bands_of, spread_of
-from walkers.postprocess.walking import _scatter, tables_of
+from walkers.postprocess.walking import _doubts, _posture, _scatter, _velocities, tables_of
 from walkers.runner.files import write_json
 from walkers.runner.manifest import iso_time
 from walkers.show import describe, predicted_overhead, summarise
@@ -219,6 +219,157 @@ def test_scatter_and_slopes_of_walkers() -> None:
     np.testing.assert_allclose(fit_slopes(time, values), expected, rtol=1e-9)
 
 
+WALKERS = {
+    "make": np.zeros(5, dtype=int),
+    "facing": np.array([1, 1, 1, -1, -1]),
+    "start_angle": np.zeros(5),
+    "velocity": np.array([1e-3, 2e-3, 4e-3, 5e-3, 8e-3]),
+    "axial_velocity": np.array([1.1e-3, 2.1e-3, 4.1e-3, -5.1e-3, -8.1e-3]),
+    "lateral_velocity": np.array([3e-5, 1e-5, -2e-5, 4e-5, -6e-5]),
+    "separated_fraction": np.array([0.0, 0.02, 0.04, 0.0, 0.04]),
+    "orientation_end": np.array([0.1, -0.2, 0.3, 0.0, -0.4]),
+    "turned_at": np.array([np.nan, np.nan, 2.0, np.nan, 1.0]),
+    "steady": np.array([True, True, False, True, False]),
+}
+"""Three walkers that face right and two that face left; nothing of one is as large as that of another."""
+
+
+def test_the_numbers_of_walkers_of_both_headings() -> None:
+    found = _velocities(WALKERS, make_case())
+    expected = {
+        "velocity": 4e-3,
+        "scatter": sqrt((9 + 4 + 0 + 1 + 16) / 4.0) * 1e-3,
+        "smallest": 1e-3,
+        "largest": 8e-3,
+        "right_facing": 7e-3 / 3.0,
+        "left_facing": 6.5e-3,
+        "right_scatter": sqrt(7.0 / 3.0) * 1e-3,
+        "left_scatter": sqrt(4.5) * 1e-3,
+        "axial_velocity": 7.3e-3 / 3.0,  # of those that face right: over all, both ways would cancel
+        "axial_left_facing": -6.6e-3,
+        "lateral_velocity": 0.0,
+        "separated_fraction": 0.02,
+        "orientation_end": -0.04,
+        "orientation_smallest": -0.4,
+        "orientation_largest": 0.3,
+    }
+    assert {name: found[name] for name in expected} == pytest.approx(expected, abs=1e-12)
+    counts = {"walkers": 5, "facing_right": 3, "facing_left": 2, "steady": 3, "turned_round": 2}
+    assert {name: found[name] for name in counts} == counts
+    # On a level floor under a sine both headings are one, and the steady ones differ: 1, 2 and 5 mm/s.
+    assert (found["facings_differ"], found["depends_on_start"], found["came_apart"]) == (False, True, False)
+
+
+def test_on_a_tray_axial_velocities_of_both_ways_cancel() -> None:
+    case = make_case(dimers={"replicates": 5, "meet": True, "spacing": "2 mm"}, run={"cycles": 6, "settling_cycles": 2})
+    found = _velocities(WALKERS, case)
+    assert found["axial_velocity"] == pytest.approx((1.1 + 2.1 + 4.1 - 5.1 - 8.1) * 1e-3 / 5.0)
+    assert not found["depends_on_start"]
+
+
+def test_on_a_slope_means_are_those_of_the_walkers_that_face_up() -> None:
+    found = _velocities(WALKERS, make_case(boundary={"tilt": "10 deg"}))
+    expected = {"velocity": 7e-3 / 3.0, "smallest": 1e-3, "largest": 4e-3, "axial_velocity": 7.3e-3 / 3.0}
+    assert {name: found[name] for name in expected} == pytest.approx(expected)
+    assert found["facings_differ"]
+
+
+def test_walkers_that_turned_to_the_other_side_before_the_start_face_there() -> None:
+    """The second one starts at 170° to the right, the fourth at -170° to the left."""
+    angles = np.radians([0.0, 170.0, 0.0, -170.0, 0.0])
+    found = _velocities({**WALKERS, "start_angle": angles}, make_case())
+    assert (found["right_facing"], found["left_facing"]) == pytest.approx((10e-3 / 3.0, 5e-3))
+    assert (found["facing_right"], found["facing_left"]) == (3, 2)
+
+
+@pytest.mark.parametrize(
+    ("velocities", "depends"),
+    [
+        ([1e-3, 1.04e-3, 9e-3, 1.02e-3, 9e-3], False),
+        ([1e-3, 1.08e-3, 9e-3, 1.02e-3, 9e-3], True),
+        ([1e-6, 9e-6, 9e-3, 5e-6, 9e-3], False),
+    ],
+    ids=["within 5 %", "by more", "at rest"],
+)
+def test_steady_walkers_that_differ_depend_on_their_start(velocities: list[float], depends: bool) -> None:
+    """The third and the last one are not steady: they do not count."""
+    found = _velocities({**WALKERS, "velocity": np.array(velocities)}, make_case())
+    assert found["depends_on_start"] == depends
+
+
+def test_kinds_of_walkers_differ_without_depending_on_their_start() -> None:
+    """The second kind has the fourth walker, which is twice as fast as the steady ones of the first."""
+    kinds = {**WALKERS, "velocity": np.array([1e-3, 1e-3, 9e-3, 2e-3, 9e-3]), "make": np.array([0, 0, 0, 1, 1])}
+    assert not _velocities(kinds, make_case())["depends_on_start"]
+    assert _velocities({**kinds, "make": np.zeros(5, dtype=int)}, make_case())["depends_on_start"]
+
+
+def test_walkers_of_two_tones_have_a_velocity_for_each_heading() -> None:
+    """The tones push one way: walkers of one heading are alike, and those of the other are faster."""
+    tones = [{"frequency": "80 Hz", "peak_acceleration": "4 g"}, {"frequency": "160 Hz", "peak_acceleration": "3 g"}]
+    case = case_of(dimers={"radii": ["0.3 mm", "0.2 mm"], "replicates": 5}, drive={"harmonics": tones})
+    found = _velocities({**WALKERS, "velocity": np.array([1e-3, 1e-3, 1e-3, 2e-3, 2e-3])}, case)
+    assert (found["facings_differ"], found["depends_on_start"]) == (True, False)
+
+
+def test_postures_and_ways_of_walkers_on_a_slope() -> None:
+    """Of five: two turned over, after 1 and 2 s; one is at rest within 2 µm/s; two go up, two down."""
+    case = make_case(boundary={"tilt": "10 deg"}, dimers={"replicates": 5}, run=FEW)
+    (group,) = resting(case).groups
+    angles = np.radians([0.0, 10.0, 100.0, 20.0, 120.0])
+    turned = replace(group)
+    turned.__dict__["orientation"] = np.linspace(0.0 * angles, angles, len(group.time))
+    axial = np.array([1e-3, 1e-6, -1e-3, 3e-6, -3e-6])
+    found = _posture([turned], {**WALKERS, "axial_velocity": axial, "orientation_end": angles})
+    # The second one still turns, and leans.
+    assert {name: found[name] for name in ("upright", "leaning", "turned_over")} == {
+        "upright": 1,
+        "leaning": 2,
+        "turned_over": 2,
+    }
+    assert (found["climbing"], found["descending"]) == (2, 2)
+    assert (found["turned_first"], found["turned_last"]) == (1.0, 2.0)
+    assert found["ends_within"] == pytest.approx(np.radians(20.0))
+
+
+_SOUND = {
+    "walkers": 3,
+    "steady": 3,
+    "meets": False,
+    "came_apart": False,
+    "separated_fraction": 0.0,
+    "depends_on_start": False,
+    "walkers_met": False,
+}
+
+
+@pytest.mark.parametrize(
+    ("changes", "ramp", "told"),
+    [
+        ({}, False, ""),
+        ({"steady": 2}, False, "1 of 3 walkers is not steady: the velocity depends on the length of the run"),
+        ({"steady": 1}, False, "2 of 3 walkers are not steady: the velocity depends on the length of the run"),
+        ({"steady": 1}, True, ""),
+        ({"steady": 1, "meets": True}, False, ""),
+        (
+            {"steady": 1, "came_apart": True, "separated_fraction": 0.254},
+            False,
+            "walkers came apart: beads are beyond the rupture distance for 25 % of the time",
+        ),
+        ({"depends_on_start": True}, False, "steady copies differ by more than 5 %: the velocity depends on the start"),
+        ({"depends_on_start": True}, True, ""),
+        (
+            {"walkers_met": True},
+            False,
+            "walkers came close to each other and are not independent: increase the spacing",
+        ),
+        ({"walkers_met": True, "meets": True}, False, ""),
+    ],
+)
+def test_reasons_to_doubt_a_velocity(changes: dict[str, Any], ramp: bool, told: str) -> None:
+    assert "\n".join(_doubts({**_SOUND, **changes}, ramp=ramp)) == told
+
+
 def test_a_walker_is_separated_where_any_of_its_pairs_is() -> None:
     """The last bead of three goes away for the last ten of 40 measured samples, the others touch."""
     case = case_of(clusters=[{"arrangement": "chain", "radii": ["0.3 mm", "0.2 mm", "0.2 mm"], "replicates": 1}])
@@ -317,7 +468,7 @@ def test_a_meeting_lasts_from_the_first_bridge_to_the_last_one() -> None:
     assert table["angle"] == pytest.approx([pi, 0.0, pi])
     numbers = measured.numbers
     assert (numbers["merged"], numbers["parted"], numbers["largest_group"]) == (2, 1, 3)
-    assert (numbers["largest_cluster"], numbers["clustered_share"]) == (2, pytest.approx(2.0 / 3.0))
+    assert (numbers["largest_cluster"], numbers["clustered_share"]) == (2, pytest.approx(2.0 / 3.0))  # at the end
     assert numbers["meeting_rate"] == pytest.approx(2 * 2 / (3 * 6.0 / 80.0))
 
 
@@ -330,6 +481,23 @@ def test_a_cluster_is_held_where_one_of_its_beads_has_a_bridge_to_a_side_wall() 
     # A side wall that another walker touches holds that one alone.
     alone = _tray({6: [(0, 3, -1), (5, -1, SIDE)]}, boundary=box)
     assert meetings.measure(alone).numbers["held_share"] == pytest.approx(1.0 / 3.0)
+
+
+@pytest.mark.parametrize(
+    ("boundary", "floor"),
+    [
+        ({}, 3 * (2.0 * 2.0)),
+        ({"shape": "channel", "width": "1.5 mm"}, 3 * (2.0 * 1.5)),
+        ({"shape": "box", "width": "20 mm", "height": "10 mm"}, 20.0**2),
+        ({"shape": "cylinder", "width": "20 mm", "height": "10 mm"}, pi * 10.0**2),
+    ],
+)
+def test_the_coverage_is_that_of_the_floor_of_all_walkers(boundary: dict[str, Any], floor: float) -> None:
+    """Of three dimers of beads of 0.3 and 0.2 mm, 2 mm apart; in mm²."""
+    dimers = {"radii": ["0.3 mm", "0.2 mm"], "replicates": 3, "meet": True, "spacing": "2 mm", "angle_spread": "0 deg"}
+    case = case_of(dimers=dimers, boundary={"material": "chromium-coated glass", **boundary})
+    expected = 3 * pi * (0.3**2 + 0.2**2) / floor
+    assert meetings.derived(case)["coverage"] == pytest.approx(expected, rel=5e-3)
 
 
 def test_all_walls_of_a_groove_are_its_floor_for_walkers() -> None:
@@ -367,6 +535,15 @@ def test_the_end_of_a_tray_is_the_last_tenth_of_its_drive() -> None:
     found = meetings.collective(time, centre, heading, alone, free, 0, np.array([1.0, 0.0]))
     assert found["slow_share"] == pytest.approx(1.0 / 3.0)
     assert found["nematic_order"] == pytest.approx(-1.0)
+
+
+def test_the_end_of_a_drive_of_two_frames_is_the_time_between_them() -> None:
+    time, heading = np.array([0.0, 0.1]), np.broadcast_to([[1.0, 0.0], [1.0, 0.0]], (2, 2, 2))
+    centre = np.zeros((2, 2, 2))
+    centre[1, 0] = [1e-4, 0.0]  # one walks at 1 mm/s, one rests: their mean is 0.5 mm/s
+    alone, free = np.ones((2, 2), dtype=np.int64), np.zeros((2, 2), dtype=bool)
+    found = meetings.collective(time, centre, heading, alone, free, 0, np.array([1.0, 0.0]))
+    assert (found["free_speed"], found["slow_share"]) == (pytest.approx(5e-4), 0.5)
 
 
 def test_the_state_of_a_bed() -> None:

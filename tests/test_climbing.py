@@ -141,9 +141,62 @@ def test_as_many_large_leaders_by_chance_are_enumerated() -> None:
     among_beads = np.mean([one + other >= 2 for one, other in product(first, second)])
     assert found["p_among_beads"] == pytest.approx(among_beads, abs=0.01)
     assert found["share_of_large"] == LARGE / BEADS
+    # Both of two beads that lead are large, of two large ones in three: 2/3 · 1/2.
+    pair = CLIMBS[:2].assign(leader=[0, 1], leader_large=True)
+    few = leaders(PILES.assign(beads=3, large=2), pair)
+    assert (few["led_by_large"], few["p_among_beads"]) == (2, pytest.approx(1.0 / 3.0, abs=0.02))
     # One bead that leads twice counts twice: 4 of 20 beads are large.
     twice = leaders(PILES, CLIMBS[1:2].iloc[[0, 0]])
     assert twice["p_among_beads"] == pytest.approx(LARGE / BEADS, abs=0.02)
+
+
+@pytest.mark.parametrize(("shortest", "has_dispersion"), [(9.1, True), (8.9, False)])
+def test_runs_whose_lengths_differ_by_more_than_a_tenth_have_no_dispersion(
+    shortest: float, has_dispersion: bool
+) -> None:
+    """Numbers of climbs of runs of different lengths vary even if climbs are as frequent."""
+    found = summary(PILES.assign(driven=[10.0, 10.0, 10.0, shortest]), CLIMBS)
+    assert (found["dispersion"] is not None) == has_dispersion
+
+
+def test_chances_are_printed_with_the_share_of_large_beads() -> None:
+    """Of 4 large beads in 20; a probability cannot be told below two of the 10,000 draws."""
+    found = summary(PILES, CLIMBS)
+    printed = texts_of({**found, "condition": ""})
+    assert printed["large beads (%)"] == "20"
+    assert float(printed["p by chance"]) == pytest.approx(found["p_among_beads"], rel=0.05)
+    rare = texts_of({**found, "condition": "", "p_among_beads": 1e-4})
+    assert rare["p by chance"] == "0.0002"
+    none = texts_of({**summary(PILES, CLIMBS[:0]), "condition": ""})
+    absent = ("p by chance", "dispersion", "half by (s)", "speed (mm/s)", "median speed (mm/s)", "height (mm)", "beads")
+    assert {name: none[name] for name in absent} == dict.fromkeys(absent, "–")
+    assert (none["climbed"], none["led by large"]) == ("0 of 4", "0 of 0")
+
+
+def test_speeds_of_two_climbs_are_told_by_their_range_and_median() -> None:
+    """2 and 4 mm/s, and one that was not measured."""
+    climbs = CLIMBS.assign(speed=[np.nan, 2e-3, 4e-3], height=[5e-3, 10e-3, 12e-3])
+    printed = texts_of({**summary(PILES, climbs), "condition": ""})
+    assert (printed["speed (mm/s)"], printed["median speed (mm/s)"]) == ("2 to 4", "3")
+    assert printed["height (mm)"] == "5 to 12"
+
+
+@pytest.mark.parametrize(
+    ("times", "within", "probability", "estimator"),
+    [([np.inf] * 4, 9.5, 0.0, "Clopper-Pearson"), ([1.0, 2.0, 3.0, 9.0], 9.5, 1.0, "Clopper-Pearson")],
+    ids=["none", "all"],
+)
+def test_where_none_or_all_have_climbed_the_interval_is_exact(
+    times: list[float], within: float, probability: float, estimator: str
+) -> None:
+    """Though runs ended before: of four, one without a climb at 9 s leaves three to tell of 9.5 s."""
+    watched = np.array([10.0, 10.0, 10.0, 9.0])
+    found = survival(np.array(times), watched, within)
+    assert (found["probability"], found["estimator"]) == (probability, estimator)
+    followed = 3 if probability == 0.0 else 4
+    edge = 0.025 ** (1.0 / followed)
+    expected = [0.0, 1.0 - edge] if probability == 0.0 else [edge, 1.0]
+    assert found["interval"] == pytest.approx(expected)
 
 
 def test_a_longer_run_does_not_make_climbs_likelier() -> None:
