@@ -513,8 +513,9 @@ def test_the_order_of_walkers_is_about_the_axis_of_the_drive(turn: float) -> Non
     across = np.array([-axis[1], axis[0]])
     heading = np.broadcast_to([axis, -axis, across], (11, 3, 2))
     alone, free = np.ones((11, 3), dtype=np.int64), np.zeros((11, 3), dtype=bool)
-    time = np.linspace(0.0, 1.0, 11)
-    found = meetings.collective(time, 1e-3 * time[:, None, None] * heading, heading, alone, free, 0, axis)
+    time = np.linspace(2.0, 3.0, 11)
+    found = meetings.collective(time, 1e-3 * time[:, None, None] * heading, heading, alone, free, 6, axis)
+    assert found["meeting_rate"] == pytest.approx(2 * 6 / 3.0)
     assert found["nematic_order"] == pytest.approx(1.0 / 3.0)
     assert found["polar_order"] == pytest.approx(1.0 / 3.0)
     assert found["free_speed"] == pytest.approx(1e-3)
@@ -523,10 +524,10 @@ def test_the_order_of_walkers_is_about_the_axis_of_the_drive(turn: float) -> Non
 
 
 def test_the_end_of_a_tray_is_the_last_tenth_of_its_drive() -> None:
-    """A walker that stops after 0.85 s of 1 s is slow at the end; one that slows down to a fifth is not."""
+    """A walker that stops after 0.85 s of 1 s is slow at the end; one that slows down to 0.15 is not: that is 0.1."""
     time = np.linspace(0.0, 1.0, 101)
     stops = 1e-3 * np.minimum(time, 0.85)
-    slows = 1e-3 * np.where(time < 0.85, time, 0.85 + 0.2 * (time - 0.85))
+    slows = 1e-3 * np.where(time < 0.85, time, 0.85 + 0.15 * (time - 0.85))
     centre = np.stack([1e-3 * time, stops, slows], axis=1)[..., None] * np.array([1.0, 0.0])
     turned = np.where(time < 0.85, 0.0, 1.0)[:, None]
     late = np.stack([1.0 - turned[:, 0], turned[:, 0]], axis=1)

@@ -150,6 +150,12 @@ def test_as_many_large_leaders_by_chance_are_enumerated() -> None:
     assert twice["p_among_beads"] == pytest.approx(LARGE / BEADS, abs=0.02)
 
 
+def test_piles_that_were_not_driven_have_no_rate() -> None:
+    found = summary(PILES.assign(driven=0.0), CLIMBS[:0])
+    assert (found["seconds"], found["rate"], found["rate_interval"]) == (0.0, None, None)
+    assert texts_of({**found, "condition": ""})["rate"] == "–"
+
+
 @pytest.mark.parametrize(("shortest", "has_dispersion"), [(9.1, True), (8.9, False)])
 def test_runs_whose_lengths_differ_by_more_than_a_tenth_have_no_dispersion(
     shortest: float, has_dispersion: bool
