@@ -267,6 +267,22 @@ def test_a_hop_between_two_heights_at_which_a_cluster_hangs_is_no_climb(seed: in
     assert np.isnan(climb.speed)
 
 
+@pytest.mark.parametrize(("frames", "climbed"), [(2, False), (3, True), (4, True)])
+def test_a_rise_through_three_frames_is_a_climb(frames: int, climbed: bool) -> None:
+    """3 mm, from one frame to the next or through one or two in between."""
+    height = np.interp(np.arange(FRAMES), [100, 100 + frames - 1], [0.0, 3e-3])
+    (climb,) = seen(height[:, None]).climbs
+    assert climb.climbed == climbed
+    assert climb.gain == pytest.approx(3e-3)
+
+
+@pytest.mark.parametrize(("rise", "climbed"), [(1.99e-3, False), (2.01e-3, True)])
+def test_a_rise_of_2_mm_is_a_climb(rise: float, climbed: bool) -> None:
+    (climb,) = seen(np.clip(UP, None, rise)).climbs
+    assert climb.climbed == climbed
+    assert climb.gain == pytest.approx(rise)
+
+
 @pytest.mark.parametrize(
     ("case", "changes", "walls", "where"),
     [
@@ -302,6 +318,11 @@ def test_a_trough_has_no_floor_but_a_first_side() -> None:
     assert np.flatnonzero(bulk_of(labels, bridges, floor=on_side)).tolist() == BULK
     assert not at_sides(bridges, 24, on_floor).any()
     assert np.flatnonzero(at_sides(bridges, 24, on_side)).tolist() == [20]
+    # The second wall of both is a side.
+    aside = bridges_of([*pairwise(BULK), (20, 21)], {20: 1})
+    for floor in (on_floor, on_side):
+        assert np.flatnonzero(bulk_of(labels, aside, floor=floor)).tolist() == BULK
+        assert np.flatnonzero(at_sides(aside, 24, floor)).tolist() == [20]
 
 
 def test_the_bulk_and_its_segregation() -> None:

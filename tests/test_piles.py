@@ -88,6 +88,20 @@ def test_bridges_and_tables_are_of_the_beads(pile_run: Path) -> None:
         assert [result[f"{name}_at_rest"], result[f"{name}_shaken"]] == pytest.approx([rest[name], late[name].mean()])
 
 
+def test_numbers_at_the_start_are_those_of_the_first_frame_of_the_drive(pile_run: Path) -> None:
+    """Not of the first frame of the run, in which the beads still fall."""
+    result = read(pile_run)
+    bed = result.table("bed")
+    driven = bed[bed["time"] >= 0.0]
+    for name in ("surface", "brazil_nut"):
+        assert bed[name].iloc[0] != driven[name].iloc[0] != driven[name].iloc[-1]
+        assert result[f"{name}_start"] == pytest.approx(driven[name].iloc[0])
+        assert result[f"{name}_end"] == pytest.approx(driven[name].iloc[-1])
+    assert bed["time"].iloc[0] < 0.0
+    assert result["settling"] == pytest.approx(-bed["time"].iloc[0])
+    assert result["driven"] == pytest.approx(bed["time"].iloc[-1])
+
+
 def test_both_frames_shake_alike(tmp_path: Path) -> None:
     """Until chaotic trajectories part; in the laboratory the container's motion is taken off at any phase."""
     run = {"duration": "0.03 s", "frames_per_second": 680.0, **QUICK}
