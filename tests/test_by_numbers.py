@@ -557,7 +557,7 @@ def test_the_state_of_a_bed() -> None:
     bridges = Bridges(1, contacts, np.array([1e-6, 3e-6, 1e-6, 1e-6]), np.array([-1e-9, 2e-6, -1e-9, -1e-9]))
     bulk = np.array([True, True, False, False])
     moved = replace(motion, position=position, velocity=velocity)
-    state = _state_of(moved, bridges, bulk, [(frozenset({2, 3}), frozenset({SIDE}))])
+    state = _state_of(moved, bridges, bulk, [(frozenset({2, 3}), frozenset({SIDE}))], FLOOR)
     bed = SimpleNamespace(**state)
     assert (bed.touching, bed.opened, bed.contacts, bed.bridges) == (1, 1, 0.5, 1.0)
     assert (bed.at_wall, bed.large_at_wall, bed.bulk, bed.clusters) == (1, 0, 2, 1)

@@ -50,8 +50,7 @@ def measure(motion: Motion) -> Measured:
         driven = motion.time[bridges.frame] >= 0.0
         present = clusters.held_clusters(labels, bridges, bulks[-1], floor)
         held.append(list(present) if driven else [])
-        at_wall = clusters.at_sides(bridges, len(motion.radius), floor)
-        rows.append(_state_of(motion, bridges, bulks[-1], held[-1], at_wall))
+        rows.append(_state_of(motion, bridges, bulks[-1], held[-1], floor))
     bed = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     beads = Beads(
         time=motion.time,
@@ -120,11 +119,10 @@ def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
     return track, np.append(climbed, False)[track]
 
 
-def _state_of(
-    motion: Motion, bridges: Bridges, bulk: BoolArray, held: Sequence[Cluster], at_wall: BoolArray
-) -> dict[str, Any]:
+def _state_of(motion: Motion, bridges: Bridges, bulk: BoolArray, held: Sequence[Cluster], floor: int) -> dict[str, Any]:
     """The columns of ``bed`` in a frame."""
     frame = bridges.frame
+    at_wall = clusters.at_sides(bridges, len(motion.radius), floor)
     position, radius, large = motion.position[frame], motion.radius, motion.large
     # Cells of the cross-section are about four large radii wide. Without a bulk the floor is the surface.
     tops = _surface_cells(position[bulk], radius[bulk], motion.case.boundary, 4.0 * float(radius.max()))
