@@ -40,8 +40,6 @@ from walkers import run as run_case
 from walkers.cache import is_trusted
 from walkers.inputs.case import Case
 from walkers.physics.laws import young_laplace
-from walkers.runner import binary, failures
-
 from walkers.runner import binary, directory, failures
 from walkers.runner.binary import find_engine, plugin_of
 from walkers.runner.directory import (
@@ -520,6 +518,7 @@ def test_tables_of_an_edited_deck_have_decimal_points_in_any_language(
     deck.write_text(re.sub(r"(variable +viscosity string) \S+", r"\1 0.01", deck.read_text()))
     subprocess.run(["sh", "run.sh"], cwd=deck.parent, check=True)
     assert (in_folder / "language").read_text() == "C\n"
+
 
 def test_a_pile_without_dumps_has_no_restart_files(pile_run: Path, tmp_path: Path) -> None:
     """The run of a pile has segments, and a file to continue from after each."""

@@ -89,6 +89,7 @@ def test_ranks_form_a_grid_with_short_cuts(ranks: int, width: float, depth: floa
     box = replace(plan.scene, lower=(0.0, 0.0, 0.0), upper=(width, depth, 9.0))
     assert processor_grid(replace(plan, scene=box, ranks=ranks)) == grid
 
+
 UNITS = {
     "frequency": "Hz",
     "peak_acceleration": "m/s^2",
