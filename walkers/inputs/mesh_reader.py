@@ -1,0 +1,317 @@
+"""Read one mesh file in a process of its own: ``python -m walkers.inputs.mesh_reader FILE``.
+
+Libraries that read meshes end the process, or ask for all memory, where a file is damaged or made to
+do harm. So `walkers.inputs.mesh` starts this module with limits of time and memory. The module writes
+the points and triangles to standard output as an npz file, or the reason why there are none as text,
+with exit status `REFUSED`. It imports nothing of this project, so that it starts quickly.
+"""
+
+from __future__ import annotations
+
+import re
+import resource
+import sys
+from collections.abc import Iterable, Sequence
+from contextlib import redirect_stdout
+from importlib import import_module
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+Polygons = list[npt.NDArray[np.int64]]
+"""Corners of polygons: arrays of shape (polygons, corners), one for each number of corners."""
+
+REFUSED = 3
+"""Exit status where the file is no mesh that can be read."""
+MOST_BYTES = 3 << 30
+"""Address space that reading may take, bytes."""
+MOST_SECONDS = 60
+"""CPU time that reading may take, s."""
+_MOST_ITEMS = 3_000_000  # points, cells or values that a file may announce
+_LEAST_DETAIL = 1e-5  # of the extent of a mesh: what single precision must resolve
+
+_VTK_READERS = {
+    ".stl": ("vtkIOGeometry", "vtkSTLReader"),
+    ".obj": ("vtkIOGeometry", "vtkOBJReader"),
+    ".ply": ("vtkIOPLY", "vtkPLYReader"),
+    ".vtp": ("vtkIOXML", "vtkXMLPolyDataReader"),
+    ".vtu": ("vtkIOXML", "vtkXMLUnstructuredGridReader"),
+    ".vtk": ("vtkIOLegacy", "vtkGenericDataObjectReader"),
+}
+_CORNERS_OF_VTK_CELLS = {
+    5: (0, 1, 2),
+    8: (0, 1, 3, 2),  # a pixel, whose corners are in rows
+    9: (0, 1, 2, 3),
+    22: (0, 1, 2),  # quadratic cells, of which the corners come first
+    23: (0, 1, 2, 3),
+    28: (0, 1, 2, 3),
+    34: (0, 1, 2),
+}
+_VTK_POLYGON = 7
+_CORNERS_OF_MESHIO_CELLS = {"triangle": 3, "quad": 4}
+
+
+def _numpy_support() -> Any:
+    """VTK's functions for arrays of numpy, which have no types."""
+    return import_module("vtkmodules.util.numpy_support")
+
+
+def _points_of(dataset: Any) -> FloatArray:
+    """The points of a VTK dataset, shape (P, 3)."""
+    vtk_to_numpy = _numpy_support().vtk_to_numpy
+
+    points = dataset.GetPoints()
+    if points is None or points.GetNumberOfPoints() == 0:
+        raise ValueError("it has no points")
+    return shortest_decimals(vtk_to_numpy(points.GetData()))
+
+
+def shortest_decimals(points: npt.NDArray[Any]) -> FloatArray:
+    """The points in double precision; those of single precision by the fewest digits that name them.
+
+    So 2.65 of a binary STL file is 2.65 and not 2.6500000953674316.
+    """
+    if points.dtype.itemsize >= 8:
+        return points.astype(np.float64)
+    return points.astype(np.float32).astype(str).astype(np.float64)
+
+
+def _triangulated(polydata: Any) -> npt.NDArray[np.int64]:
+    """Triangles of the polygons and strips of VTK polydata, shape (T, 3)."""
+    vtk_to_numpy = _numpy_support().vtk_to_numpy
+    from vtkmodules.vtkFiltersCore import vtkTriangleFilter
+
+    cut = vtkTriangleFilter()
+    cut.SetInputData(polydata)
+    cut.PassLinesOff()
+    cut.PassVertsOff()
+    cut.Update()
+    cells = cut.GetOutput().GetPolys()
+    corners = vtk_to_numpy(cells.GetConnectivityArray())
+    triangles: npt.NDArray[np.int64] = corners.astype(np.int64).reshape(-1, 3)
+    return triangles
+
+
+def _check_precision(path: Path, points: FloatArray) -> None:
+    """Refuse a text file whose points are so far from the origin that single precision loses them.
+
+    VTK reads text into single precision, 7 digits. Files of single precision have no more to lose.
+    """
+    start = path.read_bytes()[:2000]
+    if path.suffix.lower() not in (".obj", ".ply", ".stl") or not len(points):
+        return
+    if b"\0" in start and b"property double" not in start:
+        return
+    extent = float(np.ptp(points, axis=0).max())
+    farthest = float(np.abs(points).max())
+    if extent > 0.0 and farthest * np.finfo(np.float32).eps > _LEAST_DETAIL * extent:
+        away = f"its points are up to {farthest:g} from the origin and {extent:g} across"
+        raise ValueError(f"{away}, too far for 7 digits; move the mesh to the origin")
+
+
+def _check_indices(groups: Iterable[npt.NDArray[np.int64]], count: int) -> None:
+    """Refuse polygons of points that the file does not have."""
+    for group in groups:
+        wrong = group[(group < 0) | (group >= count)]
+        if wrong.size:
+            raise ValueError(f"a polygon has the corner {wrong[0] + 1}, but there are {count} points")
+
+
+def _triangles_of_polygons(points: FloatArray, polygons: Polygons) -> npt.NDArray[np.int64]:
+    """Triangles of polygons, which VTK cuts where they are not convex, shape (T, 3)."""
+    support = _numpy_support()
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+
+    _check_indices(polygons, len(points))
+    if not polygons:
+        return np.empty((0, 3), dtype=np.int64)
+    sizes = np.concatenate([np.full(len(group), group.shape[1]) for group in polygons])
+    offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+    corners = np.concatenate([group.ravel() for group in polygons]).astype(np.int64)
+    cells = vtkCellArray()
+    cells.SetData(support.numpy_to_vtkIdTypeArray(offsets, 1), support.numpy_to_vtkIdTypeArray(corners, 1))
+    places = vtkPoints()
+    places.SetData(support.numpy_to_vtk(np.ascontiguousarray(points), 1))
+    surface = vtkPolyData()
+    surface.SetPoints(places)
+    surface.SetPolys(cells)
+    return _triangulated(surface)
+
+
+def _polygons_of_grid(grid: Any) -> Polygons:
+    """The flat cells of a VTK unstructured grid."""
+    vtk_to_numpy = _numpy_support().vtk_to_numpy
+
+    if grid.GetNumberOfCells() == 0:
+        return []
+    offsets = vtk_to_numpy(grid.GetCells().GetOffsetsArray())
+    corners = vtk_to_numpy(grid.GetCells().GetConnectivityArray())
+    polygons: Polygons = []
+    for number, kind in enumerate(vtk_to_numpy(grid.GetCellTypes())):
+        cell = corners[offsets[number] : offsets[number + 1]]
+        if kind == _VTK_POLYGON:
+            polygons.append(cell[None].astype(np.int64))
+        elif kind in _CORNERS_OF_VTK_CELLS:
+            order = list(_CORNERS_OF_VTK_CELLS[kind])
+            polygons.append(cell[order][None].astype(np.int64))
+    return polygons
+
+
+def _check_announced_sizes(path: Path) -> None:
+    """Refuse XML files of VTK that announce more data than a vessel has, before VTK makes room for it."""
+    text = path.read_bytes()
+    for name, digits in re.findall(rb'\b(Number\w*)\s*=\s*["\']\s*(\d+)', text):
+        if int(digits) > _MOST_ITEMS:
+            announced = f"{name.decode()} = {digits.decode()}"
+            raise ValueError(f"it announces {announced}; at most {_MOST_ITEMS:,} are read")
+
+
+def _read_by_vtk(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    module, name = _VTK_READERS[path.suffix.lower()]
+    if path.suffix.lower() in (".vtp", ".vtu"):
+        _check_announced_sizes(path)
+    reader = getattr(import_module(f"vtkmodules.{module}"), name)()
+    reader.SetFileName(str(path))
+    if path.suffix.lower() == ".stl":
+        reader.MergingOff()
+    reader.Update()
+    dataset = reader.GetOutput()
+    if dataset is None:
+        raise ValueError("it has no surface")
+    if dataset.IsA("vtkPolyData"):
+        points = _points_of(dataset)
+        _check_precision(path, points)
+        return points, _triangulated(dataset)
+    if dataset.IsA("vtkUnstructuredGrid"):
+        points = _points_of(dataset)
+        return points, _triangles_of_polygons(points, _polygons_of_grid(dataset))
+    raise ValueError(f"it has a {dataset.GetClassName()[3:]}, which is no surface")
+
+
+def _lines_of_off(path: Path) -> list[list[str]]:
+    """Words of the lines of an OFF file, without comments and empty lines."""
+    lines = []
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+        words = line.split("#")[0].split()
+        if words:
+            lines.append(words)
+    return lines
+
+
+def _read_off(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    """The Object File Format as text: polygons of any number of corners, colours, comments."""
+    lines = _lines_of_off(path)
+    if not lines or not lines[0][0].endswith("OFF"):
+        raise ValueError("it does not begin with OFF")
+    counts = lines[0][1:] or lines[1]
+    rest = lines[1:] if lines[0][1:] else lines[2:]
+    point_count, face_count = int(counts[0]), int(counts[1])
+    if len(rest) < point_count + face_count:
+        announced = f"{point_count} points and {face_count} faces"
+        raise ValueError(f"it announces {announced}, and has {len(rest)} lines of them")
+    points = np.array([[float(word) for word in words[:3]] for words in rest[:point_count]])
+    polygons: Polygons = []
+    for words in rest[point_count : point_count + face_count]:
+        corners = words[1 : 1 + int(words[0])]
+        polygons.append(np.array([corners], dtype=np.int64))
+    return points, _triangles_of_polygons(points.reshape(-1, 3), polygons)
+
+
+def _check_other_files(path: Path) -> None:
+    """Refuse files whose points are in other files, which may be any on this machine."""
+    if path.suffix.lower() in (".xdmf", ".xmf"):
+        text = path.read_text(encoding="utf-8", errors="replace")
+        for kind in re.findall(r'Format\s*=\s*["\'](\w+)', text):
+            if kind.upper() != "XML":
+                raise ValueError(f'its data are in another file (Format="{kind}"); write them into it')
+    if path.suffix.lower() == ".inp" and re.search(rb"(?im)^\s*\*\s*include", path.read_bytes()):
+        raise ValueError("it includes another file; write all into one")
+
+
+def _read_by_meshio(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    import meshio
+
+    _check_other_files(path)
+    with redirect_stdout(sys.stderr):
+        mesh = meshio.read(path)
+    given = np.asarray(mesh.points)[:, :3]
+    points = shortest_decimals(np.pad(given, ((0, 0), (0, 3 - given.shape[1]))))
+    polygons: Polygons = []
+    for block in mesh.cells:
+        count = _CORNERS_OF_MESHIO_CELLS.get(block.type.rstrip("0123456789"), 0)
+        if block.type == "polygon":
+            polygons += [np.array([corners], dtype=np.int64) for corners in block.data]
+        elif count:
+            polygons.append(np.array(block.data, dtype=np.int64)[:, :count])
+    return points, _triangles_of_polygons(points, polygons)
+
+
+def read(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    """The surface of a mesh file.
+
+    Parameters
+    ----------
+    path : Path
+        A file; its ending says which format it has.
+
+    Returns
+    -------
+    points : ndarray
+        Shape (P, 3), in the unit of the file.
+    triangles : ndarray
+        Indices of their corners, shape (T, 3). Polygons are cut into triangles; lines, points and
+        volumes are left out.
+
+    Raises
+    ------
+    ValueError
+        If the file is not of its format. The readers raise other errors too.
+    """
+    if path.suffix.lower() in _VTK_READERS:
+        points, triangles = _read_by_vtk(path)
+    elif path.suffix.lower() == ".off":
+        points, triangles = _read_off(path)
+    else:
+        points, triangles = _read_by_meshio(path)
+    _check_indices([triangles], len(points))
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if bad.size:
+        place = ", ".join(f"{x:g}" for x in points[bad[0]])
+        raise ValueError(f"point {bad[0] + 1} is ({place}), which is no place")
+    return points, triangles
+
+
+def _limit(kind: int, most: int) -> None:
+    """Lower a limit of this process."""
+    _, hard = resource.getrlimit(kind)
+    if hard != resource.RLIM_INFINITY:
+        most = min(most, hard)
+    resource.setrlimit(kind, (most, hard))
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Read the file of the only argument; see the module."""
+    _limit(resource.RLIMIT_AS, MOST_BYTES)
+    _limit(resource.RLIMIT_CPU, MOST_SECONDS)
+    _limit(resource.RLIMIT_CORE, 0)
+    try:
+        points, triangles = read(Path(arguments[0]))
+    except MemoryError:
+        sys.stdout.write(f"it takes more than {MOST_BYTES >> 30} GB to read")
+        return REFUSED
+    except (Exception, SystemExit) as error:  # meshio ends the process where a file is not of its format
+        sys.stdout.write(str(error))
+        return REFUSED
+    arrays = BytesIO()
+    np.savez(arrays, points=points, triangles=triangles)
+    sys.stdout.buffer.write(arrays.getvalue())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
