@@ -15,14 +15,17 @@ from walkers.errors import Problem
 from walkers.inputs import units
 from walkers.inputs.drive import Vector
 from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, key, within
-from walkers.inputs.vessel import Facet, Vessel, named, vessel_between
+from walkers.inputs.vessel import Facet, Vessel
+from walkers.inputs.vessel_planes import vessel_between
+from walkers.inputs.wall_names import FLOOR_NAME, names_of_faces
 from walkers.physics.bridge import FloatArray
 
-FLOOR = "floor"
+FLOOR = FLOOR_NAME
 LOOSE = 1.03
 """Pitch of the places from which beads are poured, in diameters of the largest bead."""
 _SLOPE = f'{units.NOT_NEGATIVE}; boundary.uphill = "180 deg" turns the slope'
 _LEAST = 1e-13
+_PLACES_AT_ONCE = 5000  # from which beads are poured, whose distances from walls are found together
 _RIM = 2e-4  # m; the simulation box of a container reaches this far beyond its walls
 
 
@@ -126,7 +129,7 @@ class Boundary(Table):
     width: Filled[units.Length] = key("Width of a channel; inner side or diameter of a container.", None, "5.3 mm")
     height: Filled[units.Length] = key("Height of a container. Beads are lost above twice this height.", None, "5.3 mm")
     mesh: Indirect[str] = key(
-        "File of a vessel of your own: its inner surface as triangles or polygons, in any format of meshio.",
+        "File of a vessel of your own: its inner surface, or a solid, as STL, OBJ, PLY, VTP or in another format.",
         None,
         "funnel.stl",
     )
@@ -182,7 +185,10 @@ class Boundary(Table):
         if self.triangles:
             return self.vessel.facets
         if self.shape == "vessel":
-            return tuple(Flat(plane.point, plane.normal, named(plane.normal, k)) for k, plane in enumerate(self.planes))
+            first = self.planes[0]
+            level = first.normal[2] > 1.0 - 1e-12 and abs(first.point[2]) < 1e-9
+            names = names_of_faces([plane.normal for plane in self.planes], floor=level)
+            return tuple(Flat(plane.point, plane.normal, name) for plane, name in zip(self.planes, names, strict=True))
         if self.shape == "groove":
             across, up = cos(self.opening / 2.0), sin(self.opening / 2.0)
             return (Flat(BOTTOM.point, (0.0, across, up), "-y"), Flat(BOTTOM.point, (0.0, -across, up), "+y"))
@@ -281,17 +287,21 @@ def _vessel_of(boundary: Boundary) -> Vessel:
     return vessel_between([(plane.point, plane.normal) for plane in boundary.planes], boundary.height)
 
 
-@lru_cache(maxsize=16)
-def _layers_in(boundary: Boundary, largest: float, floor: float) -> tuple[Layer, ...]:
-    """Layers of a vessel of the user's own, see `Boundary.layers`."""
-    deep, layers = 2.0 * LOOSE * largest, []
-    line = deep * (np.arange(ceil(boundary.width / deep)) - (ceil(boundary.width / deep) - 1) / 2.0)
-    for level in (np.arange(max(int((2.0 * boundary.height - floor) / deep), 0)) + 0.5) * deep:
-        places = np.stack(np.meshgrid(line, line, [floor + level]), axis=-1).reshape(-1, 3)
-        clear = np.minimum(boundary.side_clearance(places), places[:, 2])
-        if len(free := places[clear > (1.0 - 1e-9) * LOOSE * largest]):
-            layers.append(Layer([(x, y) for x, y, _ in free.tolist()], deep, True, float(level)))
-    return tuple(layers)
+def _layers_in(boundary: Boundary, largest: float, floor: float) -> Iterator[Layer]:
+    """Layers of a vessel of the user's own, see `Boundary.layers`; a wide layer comes in several strips."""
+    pitch = 2.0 * LOOSE * largest
+    columns = ceil(boundary.width / pitch)
+    line = pitch * (np.arange(columns) - (columns - 1) / 2.0)
+    rows_at_once = max(1, _PLACES_AT_ONCE // columns)
+    levels = (np.arange(max(int((2.0 * boundary.height - floor) / pitch), 0)) + 0.5) * pitch
+    for level in levels.tolist():
+        for first in range(0, columns, rows_at_once):
+            strip = line[first : first + rows_at_once]
+            places = np.stack(np.meshgrid(line, strip, [floor + level]), axis=-1).reshape(-1, 3)
+            clear = np.minimum(boundary.side_clearance(places), places[:, 2])
+            free = places[clear > (1.0 - 1e-9) * LOOSE * largest]
+            if len(free):
+                yield Layer([(x, y) for x, y, _ in free.tolist()], pitch, True, level)
 
 
 def _round(value: float) -> float:

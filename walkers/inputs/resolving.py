@@ -19,13 +19,14 @@ from walkers.inputs.drive import check_drive, common_frequency, unit_vector
 from walkers.inputs.keys import MISSING, parts_of, value_at
 from walkers.inputs.library import Library, LibraryNumber, unmeasured
 from walkers.inputs.loads import LARGEST_DELAY, bridge_at_rest, contact_loads, delay_of, dimer_of, reach
+from walkers.inputs.mesh_surface import vessel_of
 from walkers.inputs.origins import Source
 from walkers.inputs.record import Record
 from walkers.inputs.run import limits_of, with_run
 from walkers.inputs.standing import OVERLAP, check_bodies, overlaps
 from walkers.inputs.table import alternatives, changed
 from walkers.inputs.units import ACCELERATION, LENGTH, TEMPERATURE, parse_quantity, quantity_text
-from walkers.inputs.vessel import SHARP, vessel_of
+from walkers.inputs.vessel import SHARP
 from walkers.physics.capillary import DEFAULT_LAW, bridge_volume
 from walkers.physics.mixtures import MIXTURES
 

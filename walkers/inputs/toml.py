@@ -14,7 +14,7 @@ from walkers.inputs.keys import parts_of, value_at
 
 _MOST_BYTES = 16 << 20
 _FILES = {
-    "boundary.mesh": ("meshes", "vessel", "read_mesh"),
+    "boundary.mesh": ("meshes", "mesh", "read_mesh"),
     "drive.record": ("records", "record_file", "read_record"),
 }
 """Keys that name files, the tables of their contents by these names, and their readers."""

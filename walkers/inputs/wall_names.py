@@ -1,0 +1,75 @@
+"""Names of the walls of a vessel: by the side where they are, and their height."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from math import acos, atan2, degrees
+
+from walkers.inputs.drive import Vector
+
+FLOOR_NAME = "floor"
+"""Name of a level face at the lowest point."""
+
+
+def names_of_faces(
+    normals: Sequence[Vector], heights: Sequence[tuple[float, float]] = (), *, floor: bool = False
+) -> list[str]:
+    """Names of the flat walls of a vessel by the side where they are, and by their height where that is not enough.
+
+    Parameters
+    ----------
+    normals : sequence of Vector
+        Unit normals of the walls, toward the beads.
+    heights : sequence of tuple
+        Lowest and highest point of each, m; empty of planes without end.
+    floor : bool
+        Whether the first one is a level wall at the lowest point.
+
+    Returns
+    -------
+    list of str
+        ``floor``; ``-x``, ``+x``, ``-y``, ``+y`` for upright walls on these sides; ``60°`` for an upright wall
+        at this azimuth from the x axis toward y; ``60° slope 45°`` for one that rises by 45° there, above 90° for
+        one that hangs over; ``level`` and ``lid`` for level ones above the floor that look up and down. Walls
+        of the same name are told apart by their height, ``+x 2–5 mm``, and those of the same height by numbers.
+    """
+    names = [_side(normal) for normal in normals]
+    if floor:
+        names[0] = FLOOR_NAME
+    if heights:
+        times = Counter(names)
+        for number, (low, high) in enumerate(heights):
+            if times[names[number]] > 1:
+                names[number] += f" {span_text([low, high])}"
+    return numbered(names)
+
+
+def _side(normal: Vector) -> str:
+    """Name of a wall by its normal, toward the beads."""
+    x, y, z = normal
+    slope = round(degrees(acos(max(-1.0, min(1.0, z)))), 1)
+    if slope == 0.0:
+        return "level"
+    if slope == 180.0:
+        return "lid"
+    azimuth = round(degrees(atan2(-y, -x)), 1) % 360.0
+    side = {0.0: "+x", 90.0: "+y", 180.0: "-x", 270.0: "-y"}.get(azimuth, f"{azimuth:g}°")
+    return side if slope == 90.0 else f"{side} slope {slope:g}°"
+
+
+def span_text(heights: Sequence[float]) -> str:
+    """A range of heights (m) as text: ``2–5 mm``."""
+    low, high = (f"{1e3 * height + 0.0:.3g}" for height in (min(heights), max(heights)))
+    return f"{low} mm" if low == high else f"{low}–{high} mm"
+
+
+def numbered(names: Sequence[str]) -> list[str]:
+    """The names, those that are given several times with numbers."""
+    times = Counter(names)
+    used: Counter[str] = Counter()
+    numbered = []
+    for name in names:
+        used[name] += 1
+        numbered.append(f"{name} no. {used[name]}" if times[name] > 1 else name)
+    return numbered
