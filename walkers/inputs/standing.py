@@ -144,10 +144,7 @@ def _check_vessel(case: Case) -> None:
 def _check_pour(mixture: Mixture, boundary: Boundary, floor: float) -> None:
     largest = max(mixture.large_radii)
     if boundary.shape == "vessel":
-        room = sum(len(layer.places) for layer in boundary.layers(max(mixture.radii), floor))
-        if room < mixture.count:
-            fits = f"the vessel has places for {room} beads to be poured from, up to twice its height"
-            raise unusable("mixture.count", f"{fits} of {1e3 * boundary.height:.4g} mm; expected at most {room}")
+        _check_places(mixture, boundary, floor)
         return
     if boundary.width < 4.0 * largest:
         raise unusable("boundary.width", "expected at least two of the large beads side by side")
@@ -159,6 +156,25 @@ def _check_pour(mixture: Mixture, boundary: Boundary, floor: float) -> None:
     if level > 2.0 * boundary.height:  # walls and simulation go on to there
         needed = f"{level / 2.0 * 1e3:.3g} mm"
         raise unusable("boundary.height", f"too low for {mixture.count} beads; expected {needed} or more")
+
+
+def _check_places(mixture: Mixture, boundary: Boundary, floor: float) -> None:
+    """Refuse more beads than there are places in a vessel of the user's own, which are counted until they suffice."""
+    room = 0
+    for layer in boundary.layers(max(mixture.radii), floor):
+        room += len(layer.places)
+        if room >= mixture.count:
+            return
+    upto = f"up to twice its height of {1e3 * boundary.height:.4g} mm"
+    if room:
+        fits = f"the vessel has places for {room} beads to be poured from, {upto}"
+        raise unusable("mixture.count", f"{fits}; expected at most {room}")
+    across = f"{2e3 * max(mixture.radii):.4g} mm"
+    none = f"the vessel has no place to pour a bead of {across} from, {upto}"
+    cure = "expected a larger vessel (boundary.scale) or smaller beads"
+    if not boundary.vessel.rims:
+        cure += ", or a vessel that is open at its top"
+    raise unusable("mixture.count", f"{none}; {cure}")
 
 
 class _Held(NamedTuple):
