@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import asdict
-from math import ceil, inf, isfinite
+from math import acos, ceil, degrees, inf, isfinite
 from typing import Any
 
 from walkers.inputs.bodies import Walkers
@@ -31,6 +31,12 @@ _WALKER_MICROSECONDS = 0.22
 _BEAD_STEPS_PER_SECOND, _PILE_MICROSECONDS = 10.7e6, 1.5
 """For loose beads, and per step in addition; measured from settled piles on, bead-steps per second: 11.0 million with
 200 beads and 10.2 with 1,630 on a quiet core, 5.7 million with 60 on a busy one."""
+_NEAR_FACET_MICROSECONDS = 0.1
+"""For each bead and each facet of a vessel near it, per step: measured 0.08 to 0.14 with 4 to 60 facets near a bead."""
+_FACET_MICROSECONDS = 4e-4
+"""For each bead and each facet anywhere, per step, as the lists of those that are near are made anew now and then:
+measured 0.3 to 0.6 ns with 2,700 and 10,000 facets."""
+_FACET_START_UP_SECONDS = 4e-5  # for each facet in each segment: measured 0.4 s with 10,000 facets
 _SOLVING_SECONDS = 0.25  # for each shape of bridge without a cached solution: measured 0.2 to 0.3
 _MEASURING_SECONDS, _FRAME_MICROSECONDS = 0.037, 30.0
 """For the tables and the result of a run, and in addition for each bead of walkers in each frame."""
@@ -59,7 +65,19 @@ def predicted_seconds(case: Case, walkers: int | None = None) -> float:
         seconds_a_step += case.count / (_BEAD_STEPS_PER_SECOND * (1.0 + _GAIN_PER_RANK * (run.ranks - 1)))
     else:
         seconds_a_step = (_STEP_MICROSECONDS + _WALKER_MICROSECONDS * count) * 1e-6
-    return START_UP_SECONDS * segments + steps * seconds_a_step
+    start_up = START_UP_SECONDS
+    if case.boundary.triangles:
+        beads = case.count if walkers is None else 2 * walkers
+        seconds_a_step += beads * _seconds_at_facets(case) / (1.0 + _GAIN_PER_RANK * (run.ranks - 1))
+        start_up += _FACET_START_UP_SECONDS * len(case.boundary.walls)
+    return start_up * segments + steps * seconds_a_step
+
+
+def _seconds_at_facets(case: Case) -> float:
+    """Time in s that a bead takes in each step at the facets of a vessel, as if it touched the vessel."""
+    near = case.boundary.vessel.facets_near_bead(min(case.radii))
+    microseconds = _NEAR_FACET_MICROSECONDS * near + _FACET_MICROSECONDS * len(case.boundary.walls)
+    return microseconds * 1e-6
 
 
 def predicted_overhead(cases: Iterable[Case]) -> float:
@@ -132,9 +150,11 @@ def summarise(case: Case) -> dict[str, Any]:
     -------
     dict
         ``case`` (resolved), ``drive`` (its largest harmonic, the sum of all), ``beads`` (numbers, mass, liquid),
-        ``dimer`` (M, R̄, Γ0, sin δ, mass asymmetry; of dimers), ``vessel`` (numbers of its walls; whether it is open),
-        ``contacts`` (forces, bridges, overlaps of each make of walkers), ``time_step`` (limits, None if one does not
-        apply; the chosen step; its shares of the limits and those of ``"auto"``), ``run`` (steps, samples, predicted
+        ``dimer`` (M, R̄, Γ0, sin δ, mass asymmetry; of dimers),
+        ``vessel`` (numbers of its planes, triangles and faces; whether it is open; extent of the opening and
+        direction out of it; height; volume), ``contacts`` (forces, bridges, overlaps of each make of walkers),
+        ``time_step`` (limits, None if one does not apply; the chosen step; its shares of the limits and those of
+        ``"auto"``), ``run`` (steps, samples, predicted
         seconds).
     """
     run, drive, limits = case.run, case.excitation, vars(limits_of(case))
@@ -170,15 +190,49 @@ def summarise(case: Case) -> dict[str, Any]:
         },
     }
     if case.boundary.shape == "vessel":
-        vessel = case.boundary.vessel
-        summary["vessel"] = {"planes": len(case.boundary.planes), "triangles": len(vessel.triangles)}
-        summary["vessel"] |= {"faces": len({*vessel.faces.tolist()}), "open": bool(vessel.rims)}
+        summary["vessel"] = _vessel(case)
     if case.walkers and len(case.walkers[0].radii) == 2:
         dimer = dimer_of(case)
         numbers = ("total_mass", "mean_radius", "sin_delta", "mass_asymmetry")
         summary["dimer"] = {name: getattr(dimer, name) for name in numbers}
         summary["dimer"] |= {"masses": list(dimer.masses), "gamma0": dimer.gamma0(drive.peak_acceleration)}
     return summary
+
+
+def _vessel(case: Case) -> dict[str, Any]:
+    """The vessel of the user's own: its walls, opening (m), height (m) and volume (m³)."""
+    vessel = case.boundary.vessel
+    mesh = case.document.get("meshes", {}).get(case.boundary.mesh or "")
+    return {
+        "planes": len(case.boundary.planes),
+        "triangles": len(vessel.triangles),
+        "triangles_of_file": len(mesh["triangles"]) if mesh else None,
+        "faces": len({*vessel.faces.tolist()}),
+        "open": bool(vessel.rims),
+        "opening": list(vessel.opening),
+        "facing": vessel.facing.tolist(),
+        "height": case.boundary.height,
+        "volume": vessel.volume(),
+    }
+
+
+def _text_of_vessel(vessel: dict[str, Any]) -> str:
+    """Walls, opening, height and volume of a vessel as text."""
+    if vessel["planes"]:
+        walls = counted(vessel["planes"], "plane")
+    else:
+        walls = f"{counted(vessel['triangles'], 'triangle')} in {counted(vessel['faces'], 'face')}"
+    of_file = vessel["triangles_of_file"]
+    if of_file is not None and of_file != vessel["triangles"]:
+        walls += f" (the mesh has {of_file} triangles)"
+    size = f"{1e3 * vessel['height']:.4g} mm high"
+    volume = f"{1e6 * vessel['volume']:.3g} cm³"
+    if not vessel["open"]:
+        return f"vessel     {walls}, closed: beads are within this surface, {size}, {volume} inside"
+    x, y = (f"{1e3 * extent:.3g}" for extent in vessel["opening"])
+    tilt = degrees(acos(min(1.0, vessel["facing"][2])))
+    oblique = f", oblique by {tilt:.2g}°" if tilt > 1.0 else ""
+    return f"vessel     {walls}, open toward +z, {x} mm × {y} mm wide{oblique}, {size}, {volume}"
 
 
 def _liquid(case: Case, volume: float) -> float:
@@ -220,9 +274,7 @@ def describe(summary: dict[str, Any]) -> str:
         f"{beads['volume'] * 1e9:.4g} µL with {beads['liquid'] * 1e9:.3g} µL of liquid{softened}",
     ]
     if vessel := summary.get("vessel"):
-        of_mesh = f"{counted(vessel['triangles'], 'triangle')} in {counted(vessel['faces'], 'face')}"
-        walls = counted(vessel["planes"], "plane") if vessel["planes"] else of_mesh
-        lines.append(f"vessel     {walls}, {'open at its top' if vessel['open'] else 'closed'}")
+        lines.append(_text_of_vessel(vessel))
     if dimer:
         lines.append(
             f"dimer      M = {dimer['total_mass'] * 1e6:.4g} mg, weight {dimer['total_mass'] * gravity * 1e6:.4g} µN, "
