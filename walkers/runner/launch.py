@@ -305,11 +305,18 @@ class _Watch:
         # A bead that has left the box since the last line was at least as fast as this.
         if clearance is not None and clearance > fastest * seconds:
             return self._blow_up(clearance / seconds if seconds else math.inf)
-        sentence = (
-            f"{lost} bead(s) left the simulation box before step {step}: walkers left its sides (increase their "
-            "spacing, shorten the run, or reduce the acceleration if beads fly off), or climbers rose above its top, "
-            "at twice boundary.height"
-        )
+        left = f"{lost} bead(s) left the simulation box before step {step}"
+        if self.layout.walkers:
+            cause = (
+                "walkers left its sides (increase their spacing, shorten the run, or reduce the acceleration if "
+                "beads fly off), or climbers rose above its top, at twice boundary.height"
+            )
+        else:
+            cause = (
+                "beads left the vessel over its rim or rose above twice boundary.height (use higher walls, fewer "
+                "beads or a lower acceleration), or left the sides of a boundary without a rim"
+            )
+        sentence = f"{left}: {cause}"
         return (failures.BeadsOverTheTop if over else failures.BeadsLost)(sentence, self.directory, lost=lost)
 
     def _blow_up(self, speed: float) -> failures.BlowUp:
