@@ -272,6 +272,16 @@ def test_a_vessel_is_as_high_as_the_lowest_point_of_its_rim(tmp_path: Path) -> N
     assert boundary.volume(2.0 * height) == pytest.approx(6.0 * (4e-3) ** 2 / sqrt(3.0) * height)
 
 
+def test_liquid_runs_out_at_the_lowest_point_of_a_rim() -> None:
+    """A rim that rises from 1 m to 2 m across a square of 1 m: there is 1 m³, however high the level."""
+    corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+    points = np.array([*((x, y, 0.0) for x, y in corners), *((x, y, 1.0 + x) for x, y in corners)])
+    walls = [side for a, b in ((0, 1), (1, 2), (2, 3), (3, 0)) for side in ((a, 4 + b, b), (a, 4 + a, 4 + b))]
+    square = Vessel(points, np.array([(0, 1, 2), (0, 2, 3), *walls]))
+    assert [square.volume(level) for level in (0.5, 1.0, 1.5, 3.0)] == pytest.approx([0.5, 1.0, 1.0, 1.0])
+    assert square.volume() == pytest.approx(1.0)
+
+
 def test_beads_are_poured_above_others_up_to_twice_the_height(tmp_path: Path) -> None:
     """As many as there are places."""
     mesh, at = write(tmp_path, prism(6, 2.5e-3, 8e-3)), ["0 mm", "0 mm", "2 mm"]
@@ -353,7 +363,7 @@ def test_a_bowl_of_facets_becomes_round(tmp_path: Path) -> None:
     centres = np.array([0.0, 0.0, size]) - near * (
         away * [1.0, 1.0, 0.0] + [0.0, 0.0, 3.0] * np.abs(away)
     ) / np.linalg.norm(away * [1.0, 1.0, 0.0] + [0.0, 0.0, 3.0] * np.abs(away), axis=1, keepdims=True)
-    distances = np.array([wall.distances(centres) for wall in case.boundary.walls if wall.name.startswith("f")])
+    distances = np.array([wall.distances(centres) for wall in case.boundary.walls if wall.kind == "face"])
     np.testing.assert_allclose(distances.min(axis=0), size - near, atol=0.01 * size)
     np.testing.assert_allclose(case.boundary.side_clearance(centres), distances.min(axis=0), atol=1e-12)
     assert (distances < np.inf).sum() / len(centres) == pytest.approx(1.0 / 0.9**2, rel=0.03)
