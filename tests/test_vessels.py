@@ -354,7 +354,8 @@ def test_a_bowl_of_facets_becomes_round(tmp_path: Path) -> None:
         assert case.boundary.volume(size / 2) == pytest.approx(half, rel=3 * off[-1])
     assert off[1] / off[2] == pytest.approx(4.0, rel=0.1)
     walls = f"{len(vessel.triangles)} triangles in {len({*vessel.faces})} faces"
-    assert f"vessel     {walls}, open at its top" in describe(summarise(case))
+    opened = "(the mesh has 2048 triangles), open toward +z, 10 mm × 10 mm wide, 5 mm high"
+    assert f"vessel     {walls} {opened}" in describe(summarise(case))
     with pytest.raises(
         InputError, match=r"faces, edges and corners; expected at most .* for 50000 beads: a coarser mesh"
     ):
