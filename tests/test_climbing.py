@@ -43,7 +43,7 @@ CLIMB: dict[str, Any] = {
 CLIMBS = pd.DataFrame(
     [
         CLIMB
-        | {"onset": 6.0, "qualified": 7.0, "wall_names": "+x +y", "leader": 1, "leader_large": False, "size": 4}
+        | {"onset": 6.0, "qualified": 7.0, "wall_names": "+x, +y", "leader": 1, "leader_large": False, "size": 4}
         | {"walls": 2},
         CLIMB | {"onset": 1.5, "qualified": 2.0, "wall_names": "+x", "leader": 0, "size": 2},
         CLIMB

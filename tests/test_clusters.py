@@ -11,9 +11,20 @@ import numpy.typing as npt
 import pandas as pd
 import pytest
 
+from walkers.inputs.boundary import Flat
 from walkers.inputs.reading import load_case
 from walkers.postprocess import clusters
-from walkers.postprocess.clusters import Beads, Track, assembly_of, at_sides, bulk_of, climbs_of, connected, floor_of
+from walkers.postprocess.clusters import (
+    Beads,
+    Track,
+    _walls_apart,
+    assembly_of,
+    at_sides,
+    bulk_of,
+    climbs_of,
+    connected,
+    floor_of,
+)
 from walkers.postprocess.motion import Bridges
 from walkers.postprocess.piles import segregation
 from walkers.postprocess.tables import Columns
@@ -302,7 +313,7 @@ def test_a_climb_is_in_a_corner_if_two_walls_hold_it(
     names = [wall.name for wall in load_case(case, changes).boundary.walls]
     held = dict(zip((20, 21), walls, strict=False))
     scene = seen(UP, walls=lambda frame: held, names=names)
-    assert scene.table["wall_names"].tolist() == [" ".join(names[wall] for wall in walls)]
+    assert scene.table["wall_names"].tolist() == [", ".join(names[wall] for wall in walls)]
     piles = pd.DataFrame({"beads": [24], "large": [1], "driven": [TIME[-1]]})
     found = summary(piles, pd.DataFrame(scene.table).assign(pile=0))
     expected = {"on_plain_walls": 0, "in_corners": 0, where: 1}
@@ -334,3 +345,26 @@ def test_the_bulk_and_its_segregation() -> None:
     assert segregation(np.array([2.0, 2.0, 0.0, 0.0]), large) == pytest.approx(1.0)
     assert segregation(np.array([1.0, 2.0, 2.0, 1.0]), large) == pytest.approx(0.0)
     assert segregation(np.ones(3), np.zeros(3, dtype=bool)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("turn", "walls"),
+    [(15.0, 1), (44.0, 1), (46.0, 2), (90.0, 2), (180.0, 2)],
+    ids=["faces of a round vessel", "below 45°", "above 45°", "corner of a box", "two walls of a slot"],
+)
+def test_walls_that_turn_little_are_no_corner(turn: float, walls: int) -> None:
+    """A cluster in the middle of two planes whose normals are at an angle."""
+    angle = np.radians(turn)
+    planes = [Flat((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), Flat((0.0, 0.0, 0.0), (np.cos(angle), np.sin(angle), 0.0))]
+    beads = Beads(
+        TIME,
+        np.zeros((FRAMES, 24)),
+        np.arange(24) == 20,
+        np.zeros(FRAMES),
+        [],
+        0,
+        ["+x", "side"],
+        walls=planes,
+        position=np.ones((FRAMES, 24, 3)),
+    )
+    assert _walls_apart([0, 1], 3, [0, 1], beads) == walls

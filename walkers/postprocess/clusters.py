@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from walkers.inputs.boundary import FLOOR as FLOOR_NAME
+from walkers.inputs.boundary import Wall
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import FLOOR, Bridges
 from walkers.postprocess.tables import Columns, columns_of
@@ -49,6 +50,8 @@ EVENTS = ("freed", "split", "merged", "rejoined", "detached")
 """Events of clusters, see `events_of`."""
 _FEWEST_BEADS = 2
 _FEWEST_FRAMES = 3
+_CORNER_COSINE = 0.7072
+"""Cosine of the angle between the normals of two walls below which they form a corner: 45°."""
 _MOST_BLOCKS, _FEWEST_BLOCKS = 10, 4
 """Number of parts of a climb for the standard error of its speed."""
 
@@ -157,6 +160,8 @@ class Beads:
     bulk: Sequence[BoolArray]
     first: int
     wall_names: Sequence[str]
+    walls: Sequence[Wall] = ()
+    position: FloatArray | None = None
 
 
 def _left_bulk(track: Track, beads: Beads) -> bool:
@@ -165,6 +170,22 @@ def _left_bulk(track: Track, beads: Beads) -> bool:
     in_bulk = [bulk[members].mean() >= MIN_OVERLAP for bulk in beads.bulk[before]]
     seconds = np.diff(beads.time[beads.first : track.frames[0] + 1])[in_bulk].sum()
     return bool(seconds >= MAX_GAP)
+
+
+def _walls_apart(walls: Sequence[int], frame: int, members: Sequence[int], beads: Beads) -> int:
+    """Number of walls, seen from the middle of a cluster, that meet at a turn of 45° or more; two in a corner.
+
+    A round vessel of a mesh has many faces: a cluster that touches two of them is not in a corner.
+    """
+    if beads.position is None:
+        return len(walls)
+    middle = beads.position[frame, members].mean(axis=0)
+    apart: list[FloatArray] = []
+    for wall in walls:
+        normal = beads.walls[wall].normals(middle)
+        if all(normal @ other < _CORNER_COSINE for other in apart):
+            apart.append(normal)
+    return len(apart)
 
 
 def climbs_of(tracks: Sequence[Track], beads: Beads) -> Columns:
@@ -232,8 +253,8 @@ def _climb_of(number: int, track: Track, beads: Beads) -> dict[str, Any]:
         "above_surface": height[end, leader] - beads.surface[end],
         "size": len(track.members[last]),
         "large": beads.large[list(track.members[last])].sum(),
-        "walls": len(walls),
-        "wall_names": " ".join(beads.wall_names[wall] for wall in walls),
+        "walls": _walls_apart(walls, end, sorted(track.members[last]), beads),
+        "wall_names": ", ".join(beads.wall_names[wall] for wall in walls),
         "merged_into": track.merged_into,
     }
 

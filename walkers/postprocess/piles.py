@@ -60,6 +60,8 @@ def measure(motion: Motion) -> Measured:
         bulk=bulks,
         first=motion.first_driven,
         wall_names=wall_names,
+        walls=case.boundary.walls,
+        position=motion.position,
     )
     tracks = clusters.follow(motion.time, held)
     climbs = clusters.climbs_of(tracks, beads)
