@@ -2,6 +2,10 @@
 
 The same beads, from the end of a shaken pile, in liggghts and in Debian's lammps and yade: with the same sizes,
 density, walls, drive and time step, on one core. Codes run in turn, several times.
+
+Beads at rest must touch as many neighbours in each code, or the comparison is of unlike piles: without adhesion, beads
+that bridges had pressed together spring apart, and a dry pile would be timed in flight. Dry piles are therefore settled
+first, by their own code, until they lie.
 """
 
 from __future__ import annotations
@@ -30,6 +34,9 @@ from walkers.templates.scene import Bead
 
 _PILES = {"pile-small": 20_000, "pile-fig1a": 6_000}
 """Cases and steps."""
+_SETTLING_STEPS = {"pile-small": 300_000, "pile-fig1a": 150_000}
+"""Steps after which dry beads lie at rest."""
+_SETTLED = "settled.restart"
 _END = "end.txt"
 _LAMMPS = ("lmp", "-log", "none", "-in")
 _YADE = ("yade", "-n", "-x", "-j", "1")
@@ -39,7 +46,7 @@ atom_style sphere
 boundary f f f
 newton off
 comm_modify vel yes
-read_data beads.data
+{start}
 neighbor 2e-4 bin
 neigh_modify delay 0
 {contacts}
@@ -49,6 +56,9 @@ fix motion all nve/sphere
 timestep {dt}
 run STEPS
 write_dump all custom {end} x y z modify sort id format float %.17g
+"""
+_SETTLE_AND_KEEP = f"""
+write_restart {_SETTLED}
 """
 _GRANULAR = """
 pair_style granular
@@ -92,11 +102,15 @@ numpy.savetxt("{end}", [bead.state.pos for bead in beads])
 
 
 class Script(NamedTuple):
-    """How to run a code: its command, its input with STEPS for the number of steps, its environment."""
+    """How to run a code: its command, its input with STEPS for the number of steps, its environment.
+
+    ``settling`` is the input that settles the beads first, in the same folder; empty if they lie already.
+    """
 
     command: tuple[str, ...]
     text: str
     environment: Mapping[str, str]
+    settling: str = ""
 
 
 def main() -> None:
@@ -109,9 +123,9 @@ def main() -> None:
             still = [replace(bead, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)) for bead in beads]
             for _ in range(REPEATS):
                 for column, (start, peak) in enumerate(((beads, None), (still, 0.0))):
-                    place = Path(folder) / f"{case}-{column}"
-                    place.mkdir(exist_ok=True)
-                    for code, script in scripts(case, start, steps, place, peak).items():
+                    for code, script in scripts(case, start, steps, Path(folder) / f"{case}-{column}", peak).items():
+                        place = Path(folder) / f"{case}-{column}" / re.sub(r"\W+", "-", code)
+                        _settle(script, place, _SETTLING_STEPS[case])
                         seconds = cpu_time(place, script.command, script.text, steps, script.environment)
                         row = rows.setdefault(code, [[] for _ in range(4)])
                         row[2 * column].append(1e-6 * len(beads) * steps / seconds)
@@ -120,11 +134,18 @@ def main() -> None:
                 print(f"| {code} | {len(beads)} |", *(f"{median(values):.1f} |" for values in row), flush=True)
 
 
-def scripts(case: str, beads: list[Bead], steps: int, place: Path, peak: float | None) -> dict[str, Script]:
-    """Scripts of a pile for the codes that are installed, with their files; ``peak`` (m/s²): None for the drive's."""
+def _settle(script: Script, place: Path, steps: int) -> None:
+    """Let the beads of a script come to rest, once."""
+    if script.settling and not (place / _SETTLED).is_file():
+        cpu_time(place, script.command, script.settling, steps, script.environment)
+
+
+def scripts(case: str, beads: list[Bead], steps: int, folder: Path, peak: float | None) -> dict[str, Script]:
+    """Scripts of a pile for the codes that are installed; each code has its files in a folder by its name.
+
+    ``peak`` is the acceleration of the drive, m/s²; None for that of the case.
+    """
     deck, loaded = compose_from(case, steps, beads), load_case(case)
-    write_deck(deck, place)
-    _write_beads(place, beads, loaded)
     values = _values(loaded, peak)
     changed = r"\g<1> {peak!r}".format(**values)
     ours, stock = (
@@ -143,10 +164,20 @@ def scripts(case: str, beads: list[Bead], steps: int, place: Path, peak: float |
             "lammps: hertz/history, dry": (_HISTORY, "{stiffness} NULL 3e9 NULL {friction} 1".format(**values)),
         }
         for name, (block, law) in laws.items():
-            text = _LAMMPS_PILE.format(contacts=block.format(law=law, **values), **values)
-            found[name] = Script(_LAMMPS, text, environment(stock=True))
+            contacts = block.format(law=law, **values)
+            fresh = _LAMMPS_PILE.format(start="read_data beads.data", contacts=contacts, **values)
+            if peak == 0.0 and name.endswith("dry"):
+                settled = _LAMMPS_PILE.format(start=f"read_restart {_SETTLED}", contacts=contacts, **values)
+                found[name] = Script(_LAMMPS, settled, environment(stock=True), fresh + _SETTLE_AND_KEEP)
+            else:
+                found[name] = Script(_LAMMPS, fresh, environment(stock=True))
     if shutil.which(_YADE[0]):
         found["yade: Rabinovich"] = Script(_YADE, _YADE_PILE.format(**values), {})
+    for name in found:
+        place = folder / re.sub(r"\W+", "-", name)
+        place.mkdir(parents=True, exist_ok=True)
+        write_deck(deck, place)
+        _write_beads(place, beads, loaded)
     return found
 
 

@@ -344,7 +344,7 @@ _SOUND = {
 
 
 @pytest.mark.parametrize(
-    ("changes", "ramp", "told"),
+    ("numbers", "changes", "told"),
     [
         ({}, False, ""),
         ({"steady": 2}, False, "1 of 3 walkers is not steady: the velocity depends on the length of the run"),
@@ -366,8 +366,8 @@ _SOUND = {
         ({"walkers_met": True, "meets": True}, False, ""),
     ],
 )
-def test_reasons_to_doubt_a_velocity(changes: dict[str, Any], ramp: bool, told: str) -> None:
-    assert "\n".join(_doubts({**_SOUND, **changes}, ramp=ramp)) == told
+def test_reasons_to_doubt_a_velocity(numbers: dict[str, Any], changes: bool, told: str) -> None:
+    assert "\n".join(_doubts({**_SOUND, **numbers}, changes=changes)) == told
 
 
 def test_a_walker_is_separated_where_any_of_its_pairs_is() -> None:

@@ -81,7 +81,10 @@ def _of_tables(*sides: Side) -> list[str]:
     for side in sides:
         if side.directory is None or side.case.liquid.law not in LAWS:
             continue
-        manifest = read_manifest(side.directory)
+        try:
+            manifest = read_manifest(side.directory)
+        except (OSError, ValueError):  # what else reads it says so
+            continue
         if manifest.get("by_hand") or manifest.get("bridge_tables") in (None, bridge_tables_digest(side.case)):
             continue
         lines.append(
