@@ -183,7 +183,7 @@ def _walls_apart(walls: Sequence[int], frame: int, members: Sequence[int], beads
     apart: list[FloatArray] = []
     for wall in walls:
         normal = beads.walls[wall].normals(middle)
-        if all(normal @ found < _CORNER_COSINE for found in apart):
+        if all(normal @ normal_before < _CORNER_COSINE for normal_before in apart):
             apart.append(normal)
     return len(apart)
 
