@@ -443,3 +443,23 @@ def test_a_case_written_to_a_file_is_refused_in_one_line(tmp_path: Path) -> None
     told = "expected frequencies up to 1e+06 Hz; found 8.4e+07 Hz: is the unit of the time right?"
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
     assert told in done.stderr
+
+
+def test_a_comment_below_the_numbers_is_no_header(tmp_path: Path) -> None:
+    """Loggers write a line such as ``# end`` when they stop."""
+    file = tmp_path / "log.csv"
+    rows = "\n".join(f"{number},{number % 3}" for number in range(20))
+    file.write_text(f"# a logger\n# time (ms), x (g)\n{rows}\n# end\n", encoding="utf-8")
+    contents = read_record(file)
+    assert len(contents["rows"]) == 20
+    assert contents["rows"][2][:2] == pytest.approx([2e-3, 2.0 * 9.8])
+
+
+@pytest.mark.parametrize("width", [20, 21])
+def test_windows_are_around_their_samples(width: int) -> None:
+    """A straight line and the middle of a parabola are their own slow parts, for even and odd widths."""
+    time = np.arange(200.0)
+    signals = np.stack([3.0 * time - 7.0, (time - 100.0) ** 2], axis=1)
+    slow = slow_part(signals, width)
+    np.testing.assert_allclose(slow[:, 0], signals[:, 0], atol=1e-9)
+    np.testing.assert_allclose(slow[60:140, 1], signals[60:140, 1], atol=1e-8)

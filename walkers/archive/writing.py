@@ -294,7 +294,7 @@ class _Packing:
         from walkers.sweeps.table import encoded, load
 
         place, table = f"{RUNS}/{name}", load(record.directory)
-        # Not where this machine has the runs.
+        # Places in the archive, not paths on this machine.
         table["run"] = [f"{RUNS}/{Path(run).name}" if run else "" for run in table["run"]]
         self.add(f"{place}/{RECORD_NAME}", record.directory / RECORD_NAME)
         for form in ("csv", "parquet"):
@@ -305,7 +305,10 @@ class _Packing:
         return list(dict.fromkeys(places))
 
     def add_companions(self, run: Path) -> None:
-        """Add the spread and the accuracy of a run, which are sweeps beside it, if it has any."""
+        """Add the spread and the accuracy of a run, which are sweeps beside it, if it has any.
+
+        One that was interrupted is added as far as it is; it can be continued from the archive.
+        """
         for suffix in (SPREAD, ACCURACY):
             directory = run.with_name(f"{run.name}{suffix}")
             if not (directory / RECORD_NAME).is_file():

@@ -67,23 +67,27 @@ LARGEST_DELAY = 0.025
 
 
 _NOTICED_DELAY = 0.1
-"""Delay from which results of loose beads name the error of their softness, rad."""
+"""Smallest delay of loose beads at which a result warns of their softness, rad."""
 _MEASURED_DELAYS = (0.0, 0.13, 0.34, 1.5, 3.8)
-"""Delays, rad, of the shipped climbers with glycerol and glycerol 87 %, of 50 to 800 MPa."""
+"""Delays of the shipped climbers, rad: with glycerol 87 % at 200 and 50 MPa, with glycerol at 200 and 50 MPa."""
 _MEASURED_ERRORS = (0.0, 0.03, 0.09, 0.15, 1.3)
 """The largest share by which one of them (diamond, dimer, cluster in a corner) then climbs faster or
 more slowly than with beads of 12.8 GPa. At the last one, the dimer goes down."""
 
 
 def softness_warning(case: Case) -> str | None:
-    """How far the delay of contacts changes the speeds of the loose beads of a case; None if little."""
-    if (phase := delay_of_loose_beads(case)) < _NOTICED_DELAY:
+    """How far the delay of contacts changes the speeds of the loose beads of a case.
+
+    None below `_NOTICED_DELAY`.
+    """
+    phase = delay_of_loose_beads(case)
+    if phase < _NOTICED_DELAY:
         return None
+    soft = f"soft beads: bridges delay contacts by {phase:.2g} rad; the speeds of climbing clusters are then"
+    if phase > _MEASURED_DELAYS[-2]:
+        return f"{soft} wrong by half or more (set a higher contact.youngs_modulus)"
     error = 100.0 * float(np.interp(phase, _MEASURED_DELAYS, _MEASURED_ERRORS))
-    return (
-        f"soft beads: bridges delay contacts by {phase:.2g} rad; the speeds of climbing clusters are "
-        f"then up to {error:.0f} % off those of hard beads (contact.youngs_modulus)"
-    )
+    return f"{soft} up to {error:.0f} % off those of hard beads (contact.youngs_modulus)"
 
 
 def delay_of(case: Case) -> float:

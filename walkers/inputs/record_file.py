@@ -59,11 +59,11 @@ class _Column:
 def read_record(path: Path) -> RecordContents:
     """Read a file of recorded shaking.
 
-    The header is the first line that is not empty and does not begin with ``#``; the last line with
-    a ``#`` if numbers follow it. Columns are separated by commas, semicolons or tabs, as in the
-    header. With semicolons and tabs, numbers may have decimal commas. The time and the
-    accelerations are found by their names, whatever their case, and have their units in brackets.
-    Other columns are left out.
+    The header is the first line that is not empty and does not begin with ``#``. If that line
+    already has numbers, the header is the last ``#`` line above it. All other ``#`` lines are left
+    out. Columns are separated by commas, semicolons or tabs, as in the header. With semicolons and
+    tabs, numbers may have decimal commas. The time and the accelerations are found by their names,
+    whatever their case, and have their units in brackets. Other columns are left out.
 
     Parameters
     ----------
@@ -81,13 +81,7 @@ def read_record(path: Path) -> RecordContents:
         If the file cannot be read, or its header or a row is not understood. The message names the
         line or row.
     """
-    lines = [line for line in _text_of(path).splitlines() if line.strip()]
-    comments = [line for line in lines if line.lstrip().startswith("#")]
-    lines = [line for line in lines if not line.lstrip().startswith("#")]
-    if not lines and not comments:
-        raise ValueError(f"is empty; {_EXPECTED_HEADER}")
-    if comments and (not lines or _is_of_numbers(lines[0])):
-        lines.insert(0, comments[-1].lstrip("# "))
+    lines = _lines_of(_text_of(path))
     separator = _separator_of(lines[0])
     try:
         header, *rows = csv.reader(lines, delimiter=separator, skipinitialspace=True)
@@ -121,6 +115,23 @@ def _text_of(path: Path) -> str:
     if "\0" in text:
         raise ValueError("expected UTF-8 text, found zero bytes: save the file as UTF-8")
     return text
+
+
+def _lines_of(text: str) -> list[str]:
+    """The header and the rows of a file, without comments."""
+    comments_above: list[str] = []
+    lines: list[str] = []
+    for line in text.splitlines():
+        if line.lstrip().startswith("#"):
+            if not lines:
+                comments_above.append(line.lstrip("# "))
+        elif line.strip():
+            lines.append(line)
+    if comments_above and (not lines or _is_of_numbers(lines[0])):
+        lines.insert(0, comments_above[-1])
+    if not lines:
+        raise ValueError(f"is empty; {_EXPECTED_HEADER}")
+    return lines
 
 
 def _separator_of(header: str) -> str:

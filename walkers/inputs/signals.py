@@ -41,16 +41,18 @@ def hann_mean(samples: FloatArray) -> FloatArray:
 def slow_part(samples: FloatArray, width: int) -> FloatArray:
     """The part of signals that changes slowly compared with a window.
 
-    This is the Hann-weighted mean in a window around each sample. Half a window from an end, it is
-    the Hann-weighted straight line of the first or last whole window. The mean of what it leaves is
-    added, so that the error for a parabola is of second order.
+    This is the Hann-weighted mean in a window around each sample. Closer than half a window to an
+    end, it is the straight line that fits the first or last whole window with Hann weights. What
+    is left of the signals is smoothed in the same way and added, so that a parabola comes out
+    exactly, away from the ends.
 
     Parameters
     ----------
     samples : ndarray, shape (N, K)
         Evenly spaced signals.
     width
-        Number of samples in a window; at most all of them.
+        Number of samples in a window. It is reduced to an odd number, and to all samples if there
+        are fewer.
 
     Returns
     -------
@@ -64,7 +66,7 @@ def slow_part(samples: FloatArray, width: int) -> FloatArray:
 
 def _smoothed(samples: FloatArray, width: int) -> FloatArray:
     """Hann-weighted means around each sample, and straight lines near both ends."""
-    weights = hann(min(width, len(samples)))
+    weights = _centred_window(samples, width)
     points = len(weights)
     middle = _convolved(samples, weights)
     offset = np.arange(points) - (points - 1) / 2.0
@@ -74,6 +76,12 @@ def _smoothed(samples: FloatArray, width: int) -> FloatArray:
     before = points // 2
     after = len(samples) - len(middle) - before
     return np.concatenate([first[:before], middle, last[points - after :]])
+
+
+def _centred_window(samples: FloatArray, width: int) -> FloatArray:
+    """Weights of a window with a sample in its middle: of an odd number of samples."""
+    longest_window = min(width, len(samples))
+    return hann(longest_window - (longest_window + 1) % 2)
 
 
 def local_amplitude(samples: FloatArray, frequency: float, width: int) -> FloatArray:
@@ -86,15 +94,16 @@ def local_amplitude(samples: FloatArray, frequency: float, width: int) -> FloatA
     frequency
         In cycles per sample.
     width
-        Number of samples in a window; at most all of them. Closer than half of it to an end, the
-        amplitude is that of the first or last whole window.
+        Number of samples in a window. It is reduced to an odd number, and to all samples if there
+        are fewer. Closer than half of it to an end, the amplitude is that of the first or last
+        whole window.
 
     Returns
     -------
     ndarray, shape (N,)
         Largest length of the vector in a cycle.
     """
-    weights = hann(min(width, len(samples)))
+    weights = _centred_window(samples, width)
     turned = samples * np.exp(-2j * pi * frequency * np.arange(len(samples)))[:, None]
     phasor = 2.0 * _convolved(turned, weights)
     amplitude = longest(phasor)

@@ -154,9 +154,9 @@ class Vessel:
 
     @cached_property
     def face_normals(self) -> FloatArray:
-        """Normal of the face of each triangle, shape (T, 3).
+        """Unit normal, toward the beads, of the face of each triangle, shape (T, 3).
 
-        That of a narrow triangle itself may be far off: its corners are rounded.
+        The normal of a narrow triangle itself can be far off, because its corners are rounded.
         """
         planes = self._faces_and_planes[1]
         return np.array([planes[face][1] for face in self.faces.tolist()])
@@ -184,19 +184,20 @@ class Vessel:
         return bool(self.points[self.triangles[self.faces == face], 2].max() < lowest)
 
     def planes(self) -> list[tuple[Vector, Vector]]:
-        """Points and normals of the planes that are the same vessel, the floor first; empty if there are none.
+        """Points and normals of planes without end that are equivalent to the vessel, the floor first.
 
-        There are none if faces turn at an edge by less than `SHARP`, or flare at the rim: planes go on above it.
+        Empty if there are none: if faces turn at an edge by less than `SHARP`, if an edge stands out
+        toward the beads, or if faces are not upright at the rim, above which planes go on.
         """
         at_rim = np.isin(self.triangles, [point for rim in self.rims for point in rim]).any(axis=1)
-        flared = (np.abs(self.face_normals[at_rim, 2]) > _UPRIGHT).any()
+        not_upright = (np.abs(self.face_normals[at_rim, 2]) > _UPRIGHT).any()
         edges = [pair for pair in self.sharing.values() if len({self.faces[triangle] for triangle, _ in pair}) == 2]
-        obtuse = any(
+        has_unfit_edge = any(
             self.face_normals[before] @ self.face_normals[after[0]] > cos(SHARP)
             or self._inwards[after] @ self.face_normals[before] <= 0.0
             for (before, _), after in edges
         )
-        if flared or obtuse:
+        if not_upright or has_unfit_edge:
             return []
         planes = self._faces_and_planes[1]
         through = [planes[face] for face in self._in_order()]

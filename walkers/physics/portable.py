@@ -151,7 +151,7 @@ def cube_root(x: float) -> float:
 
 
 def solve_linear(matrices: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve n systems of m linear equations by Gaussian elimination with partial pivoting.
+    """Solve n systems of m linear equations by Gauss–Jordan elimination with partial pivoting.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def solve_linear(matrices: FloatArray, right: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray, shape (n, m)
-        Solutions; not finite where a matrix is singular.
+        Solutions; not finite, or very large, where a matrix is singular.
     """
     rows = np.concatenate([matrices, right[..., None]], axis=-1)
     systems, size = np.arange(len(rows)), right.shape[1]

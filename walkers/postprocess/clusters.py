@@ -51,7 +51,7 @@ EVENTS = ("freed", "split", "merged", "rejoined", "detached")
 _FEWEST_BEADS = 2
 _FEWEST_FRAMES = 3
 _CORNER_COSINE = 0.7072
-"""Cosine of the angle between the normals of two walls below which they form a corner: 45°."""
+"""Cosine of 45°, the smallest angle between the normals of two walls that form a corner."""
 _MOST_BLOCKS, _FEWEST_BLOCKS = 10, 4
 """Number of parts of a climb for the standard error of its speed."""
 
@@ -173,7 +173,7 @@ def _left_bulk(track: Track, beads: Beads) -> bool:
 
 
 def _walls_apart(walls: Sequence[int], frame: int, members: Sequence[int], beads: Beads) -> int:
-    """Number of walls, seen from the middle of a cluster, that meet at a turn of 45° or more; two in a corner.
+    """Number of walls at a cluster whose normals differ by 45° or more; two in a corner.
 
     A round vessel of a mesh has many faces: a cluster that touches two of them is not in a corner.
     """

@@ -86,7 +86,8 @@ def _thresholds(moves: BoolArray, peaks: FloatArray, *, by_ramp: bool) -> dict[s
         Whether a ramp changes the drive, so that its amplitude has no noise.
     """
     change = np.diff(peaks)
-    direction = directions(peaks, (_EXACT if by_ramp else _REVERSAL) * float(peaks.max()))
+    noise = (_EXACT if by_ramp else _REVERSAL) * float(peaks.max())
+    direction = directions(peaks, noise)
     falls = np.flatnonzero(direction < 0)
     rises = np.flatnonzero(direction > 0)[::-1]
     stops, stops_within = _crossed(moves[falls], peaks[falls + 1], np.abs(change[falls]))
@@ -99,39 +100,35 @@ def _thresholds(moves: BoolArray, peaks: FloatArray, *, by_ramp: bool) -> dict[s
     }
 
 
-def directions(peaks: FloatArray, least: float) -> IntArray:
-    """Whether the drive rises (1), falls (-1) or neither (0) in each window, shape (K,).
+def directions(peaks: FloatArray, noise: float) -> IntArray:
+    """Whether the drive rises (1), falls (-1) or neither (0) in each window, shape (K,) for K windows.
 
     It rises from a minimum to the next maximum, and falls from a maximum to the next minimum.
-    Reversals by ``least`` or less are noise. Windows in which the drive stays exactly as it is are
-    a plateau: it does neither.
+    Reversals by ``noise`` or less count as going on: a small rise in a fall is part of the fall.
+    Windows in which the drive stays exactly as it is are a plateau: it does neither.
 
     Parameters
     ----------
     peaks : ndarray, shape (K + 1,)
         Amplitude of the drive at the ends of the windows, m/s².
-    least
-        Largest change that is noise, m/s².
+    noise
+        Largest change that is no reversal, m/s².
     """
     direction = np.zeros(len(peaks) - 1, dtype=np.int64)
-    highest = lowest = start = 0
-    toward = 0
+    highest = lowest = last_turn = 0
+    current = 0
     for number, peak in enumerate(peaks.tolist()):
         if peak > peaks[highest]:
             highest = number
         if peak < peaks[lowest]:
             lowest = number
-        if toward >= 0 and peak < peaks[highest] - least:  # the maximum is behind
-            direction[start:highest] = toward
-            start, lowest, toward = highest, number, -1
-        elif toward <= 0 and peak > peaks[lowest] + least:
-            direction[start:lowest] = toward
-            start, highest, toward = lowest, number, 1
-        if toward > 0:
-            lowest = highest
-        elif toward < 0:
-            highest = lowest
-    direction[start : highest if toward > 0 else lowest] = toward
+        if current >= 0 and peak < peaks[highest] - noise:  # the maximum is behind
+            direction[last_turn:highest] = current
+            last_turn, lowest, current = highest, number, -1
+        elif current <= 0 and peak > peaks[lowest] + noise:
+            direction[last_turn:lowest] = current
+            last_turn, highest, current = lowest, number, 1
+    direction[last_turn : highest if current > 0 else lowest] = current
     direction[np.diff(peaks) == 0.0] = 0
     return direction
 

@@ -326,7 +326,7 @@ def processor_grid(plan: Plan) -> tuple[int, int]:
     def length_of_cuts(along_x: int) -> float:
         return (along_x - 1) * depth + (plan.ranks // along_x - 1) * width
 
-    divisors = [number for number in range(plan.ranks, 0, -1) if plan.ranks % number == 0]
+    divisors = [divisor for divisor in range(plan.ranks, 0, -1) if plan.ranks % divisor == 0]
     along_x = min(divisors, key=length_of_cuts)
     return along_x, plan.ranks // along_x
 
