@@ -283,6 +283,18 @@ def test_a_walker_on_a_level_plate_that_turns_away_says_when(runs_folder: Path) 
     assert not walkers.run(load_case("fig1b"), runs_folder).result.warnings
 
 
+def test_symmetric_walkers_that_turn_away_tell_that_small_angles_grow_too(runs_folder: Path) -> None:
+    """All six turn in a longer run: a warning about one of them does not mean that five stay."""
+    done = walkers.run("symmetric", runs_folder)
+    (warning,) = done.result.warnings
+    assert "1 of 6 walkers turns away from the drive axis" in warning
+    assert "; the small angles of 5 others grow too: set run.cycles = " in warning
+
+
+def test_small_angles_that_decay_are_not_said_to_grow(runs_folder: Path) -> None:
+    assert not walkers.run(load_case("fig1b"), runs_folder).result.warnings
+
+
 def test_progress_says_when_results_are_measured(tmp_path: Path) -> None:
     told: list[Progress] = []
     make_runs([Case.read(document(run=SHORT), name="short")], tmp_path, find_engine(), on_progress=told.append)

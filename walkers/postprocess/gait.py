@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from walkers.inputs.run import CONSTANT, Run
-from walkers.postprocess.dump import DumpError, FloatArray
+from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
 from walkers.postprocess.motion import Group, between, read_motion
 from walkers.postprocess.sides import REST, SEPARATED, STEADY_SPEED
 from walkers.postprocess.tables import Columns
@@ -194,23 +194,49 @@ def settled_samples(run: Run) -> slice:
 
 
 def turns_away_after(group: Group) -> FloatArray:
-    """Time after the end of the run, s, when walkers have turned away from the axis, shape (W,); NaN if they do not.
+    """Time after the end of the run, s, when walkers have turned away from the axis, shape (W,).
 
-    A walker turns away if its mean angle grows at more than `GROWS` from the second to the last third of the measured
-    cycles, and faster than before. Small angles grow exponentially: on a slope dψ/dt = rate · sin ψ, to 90°, where the
-    walker has turned over; on a level floor, where both headings are alike, dψ/dt = rate · sin 2ψ / 2, to 45°.
+    NaN if they do not. Small angles grow exponentially: on a slope dψ/dt = rate · sin ψ, to 90°,
+    where the walker has turned over; on a level floor, where both headings are alike,
+    dψ/dt = rate · sin 2ψ / 2, to 45°. On a level floor, smaller angles than `_LITTLE_ASIDE` do not
+    count, because rolling friction may hold them.
     """
-    run, tilted = group.case.run, bool(group.case.boundary.tilt)
+    tilted = bool(group.case.boundary.tilt)
+    growth = _growth_of_angles(group)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        left = -np.log(np.tan(growth.end / 2.0 if tilted else growth.end)) / growth.rate
+    turns = growth.grows & (tilted | (growth.mean > _LITTLE_ASIDE))
+    return np.where(turns & (left > 0.0), left, np.nan)
+
+
+def small_angles_grow(group: Group) -> BoolArray:
+    """Whether walkers on a level floor have an angle below `_LITTLE_ASIDE` that grows, shape (W,)."""
+    growth = _growth_of_angles(group)
+    return growth.grows & (growth.mean <= _LITTLE_ASIDE) & (not group.case.boundary.tilt)
+
+
+class _Growth(NamedTuple):
+    """How the angles of walkers to the axis grow, each of shape (W,)."""
+
+    rate: FloatArray  # from the second to the last third of the measured cycles, 1/s
+    mean: FloatArray  # of the last third, rad
+    end: FloatArray  # at the end of the run, rad
+    grows: BoolArray  # at more than `GROWS`, and faster than before
+
+
+def _growth_of_angles(group: Group) -> _Growth:
+    """The growth of the angles of walkers; none for runs with fewer than three measured cycles."""
+    run = group.case.run
     angle = np.abs(group.orientation[:: run.samples_per_cycle][run.settled_strobes :])
     if len(angle) < 3:  # too few frames a second, or a dump that was cut short
-        return np.full(len(group.walkers), np.nan)
+        missing = np.full(len(group.walkers), np.nan)
+        return _Growth(missing, missing, missing, np.zeros(len(group.walkers), dtype=bool))
     first, second, last = (part.mean(axis=0) for part in np.array_split(angle, 3))
     third = len(angle) / 3.0 * run.cycles_per_sample / group.case.excitation.frequency
     with np.errstate(divide="ignore", invalid="ignore"):
         rate = np.log(last / second) / third
-        left = -np.log(np.tan(angle[-1] / 2.0 if tilted else angle[-1])) / rate
-    grows = (rate > GROWS) & (last - second > np.maximum(second - first, _NOTHING)) & (tilted | (last > _LITTLE_ASIDE))
-    return np.where(grows & (left > 0.0), left, np.nan)
+    grows = (rate > GROWS) & (last - second > np.maximum(second - first, _NOTHING))
+    return _Growth(rate, last, angle[-1], grows)
 
 
 def postures(group: Group) -> list[str]:
