@@ -2,8 +2,8 @@
 The gait of a walker
 ====================
 
-Plot what each bead of the walker of Fig. 4b does in two cycles of the drive. The drive is so strong that the beads
-separate from each other and from the substrate in every cycle.
+Plot what each bead of the walker of Fig. 4b does in two cycles of the drive. Its contacts stay closed: a negative gap is
+an overlap, which shows how the load moves between the contacts.
 """
 
 import matplotlib.pyplot as plt
@@ -23,7 +23,7 @@ speeds.plot(cycles["cycle"], 1e3 * cycles["velocity"], "k", label="mass centre, 
 speeds.plot(cycles["cycle"], 1e3 * cycles["rotation_1"], "C0", label="rotation of the large bead")
 speeds.plot(cycles["cycle"], 1e3 * cycles["rotation_2"], "C1", label="rotation of the small bead")
 speeds.set(ylabel="velocity (mm/s)")
-speeds.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize="small", frameon=False)
+speeds.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize="small", frameon=False)
 contacts = {"gap_1": "large bead on substrate", "gap_2": "small bead on substrate", "gap_pair_1": "bead on bead"}
 for column, name in contacts.items():
     gaps.plot(cycles["cycle"], 1e6 * cycles[column], label=name)

@@ -2,7 +2,7 @@
 A tray of walkers that meet
 ===========================
 
-Place nine walkers close to each other. They meet, stick together and separate.
+Place nine walkers close to each other. They meet and stick together in pairs.
 """
 
 import walkers
