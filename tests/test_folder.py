@@ -266,11 +266,14 @@ def test_compared_runs_differ_by_so_many_times_both_their_numerical_errors(
     assert velocity["numerical_error"] == pytest.approx(hypot(3e-6, 4e-6))
     lines = [f"{name}: differs by {times} times its numerical error" for name, times in heads.items()]
     lines += [
-        "fast: velocity rests on 1 uncertain value, 0 guessed; the band over the ranges is unmeasured (--spread)",
+        "fast: velocity rests on 1 uncertain value, 0 guessed; the band over the ranges is not computed (--spread)",
         "slow: velocity (mm/s), band 0.8 to 1.2 (64 draws)",
+        "1 uncertain value belongs to both runs and may be equal in both: "
+        "the bands may overlap although the difference is certain",
     ]
     assert "\n".join(["\n", *lines, ""]) in found.text and "--accuracy" not in found.text
     assert re.search(r"\nvelocity \(mm/s\) +1\.05 +1 +-0\.05 +below 0\.001 +0\.005\n", found.text)
+    assert "\n\nscatter of copies: how much copies differ by their start; no error of the difference\n" in found.text
     # Without them the table has no column for them, and a line says how to have them.
     rough = _changed(run, tmp_path, "rough", velocity=1.2e-3)
     found = compare_runs(fast, rough)

@@ -34,7 +34,7 @@ from walkers.postprocess.numbers import rows, shown
 from walkers.postprocess.report.page import LARGEST, svg_of
 from walkers.postprocess.report.player import camera_of, player_of
 from walkers.postprocess.report.run import report_run
-from walkers.postprocess.results import read, unmeasured
+from walkers.postprocess.results import not_computed, read
 from walkers.postprocess.scene import gathered
 from walkers.postprocess.tables import read_table
 from walkers.rounding import rounded
@@ -101,13 +101,13 @@ def swept_report(swept: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", ["walked", "pile"])
-def test_numbers_of_a_report_are_the_results_with_what_is_unmeasured_and_parameters_say_whence(
+def test_numbers_of_a_report_are_the_results_with_what_is_not_computed_and_parameters_say_whence(
     name: str, request: pytest.FixtureRequest
 ) -> None:
     path, directory = (request.getfixturevalue(f"{name}_{what}") for what in ("report", "run"))
     page, results = Report(path), read(directory)
     assert all(f"{row.label}{row.text}{row.unit}{row.error}" in page.words for row in rows(results))
-    assert f"Unmeasured: {unmeasured(results)}." in page.words
+    assert f"Uncertainty not computed: {not_computed(results).text}." in page.words
     assert path.stat().st_size < LARGEST
     origins = walkers.load(directory).case.origins
     for said in ("given", "library", *(told for one in origins for told in (one.key, one.text, one.word))):

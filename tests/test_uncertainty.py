@@ -25,7 +25,7 @@ from walkers.inputs.units import parse_quantity
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.numbers import fell, headline, rows
 from walkers.postprocess.quantities import declared, ordered
-from walkers.postprocess.results import headlines, unmeasured
+from walkers.postprocess.results import NotComputed, headlines, not_computed, text
 from walkers.postprocess.tables import read_columns
 from walkers.postprocess.uncertainty import SPREAD_NAME, spread_of
 from walkers.postprocess.walking import _velocities
@@ -203,7 +203,33 @@ def test_walkers_that_came_apart_have_no_velocity_and_are_not_steady_anywhere_in
     assert headlines(apart)[0].endswith(": came apart")
     assert "velocity" in [row.name for row in rows(done.result)]
     assert not [row.name for row in rows(apart) if re.search("velocity|facing|steady", row.name)]
-    assert unmeasured(done.result) and not unmeasured(apart)
+    assert not_computed(done.result)
+    assert not not_computed(apart)
+
+
+def test_what_is_not_computed_stands_right_below_the_head_of_a_result(runs_folder: Path) -> None:
+    """Six values of Fig. 1b have a range; no option has been used."""
+    done = walkers.run(load_case("fig1b"), runs_folder)
+    lines = done.describe().splitlines()
+    assert lines[1] == "  uncertainty not computed: 6 uncertain values (--spread), numerical error (--accuracy)"
+    assert not_computed(done.result) == NotComputed(uncertain_values=6, numerical_error=True)
+
+
+def test_scatter_of_copies_is_named_as_such(runs_folder: Path) -> None:
+    done = walkers.run(load_case("fig1b"), runs_folder)
+    (velocity,) = [row for row in rows(done.result) if row.name == "velocity"]
+    assert velocity.error == "scatter of copies below 0.001"
+
+
+def test_a_band_tells_that_it_leaves_out_the_error_of_the_model(runs_folder: Path) -> None:
+    done = walkers.run(load_case("fig1b"), runs_folder)
+    note = "of uncertain values only; the error of the model is not in it"
+    assert note not in done.describe()
+    result = done.result
+    result |= {"velocity_low": 1e-3, "velocity_high": 3e-3, "velocity_draws": 32, "velocity_approximate": False}
+    described = text(result)
+    assert note in described
+    assert "uncertain values (--spread)" not in described
 
 
 def test_a_result_that_depends_on_the_start_says_so(runs_folder: Path) -> None:

@@ -166,7 +166,10 @@ def test_the_result_follows_the_papers_protocol(directory: Path) -> None:
     errors = {
         row.name: row.error for row in rows({**result, "scatter": 1e-5, "right_scatter": 2e-5, "left_scatter": 3e-5})
     }
-    said = {name: float(errors[name].removeprefix("scatter ")) for name in ("velocity", "right_facing", "left_facing")}
+    said = {
+        name: float(errors[name].removeprefix("scatter of copies "))
+        for name in ("velocity", "right_facing", "left_facing")
+    }
     assert said == {"velocity": 0.01, "right_facing": 0.02, "left_facing": 0.03}
 
 

@@ -157,7 +157,7 @@ def sweep(
     limit
         Time limit in s for each deck.
     spread
-        Also run each point with its unmeasured values drawn from their ranges: plots of the sweep show the bands.
+        Also run each point with its uncertain values drawn from their ranges: plots of the sweep show the bands.
     points
         Number of runs of each point for --spread; default: 32.
     """

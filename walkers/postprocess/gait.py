@@ -211,8 +211,10 @@ def turns_away_after(group: Group) -> FloatArray:
 
 def small_angles_grow(group: Group) -> BoolArray:
     """Whether walkers on a level floor have an angle below `_LITTLE_ASIDE` that grows, shape (W,)."""
+    if group.case.boundary.tilt:
+        return np.zeros(len(group.walkers), dtype=bool)
     growth = _growth_of_angles(group)
-    return growth.grows & (growth.mean <= _LITTLE_ASIDE) & (not group.case.boundary.tilt)
+    return np.asarray(growth.grows & (growth.mean <= _LITTLE_ASIDE))
 
 
 class _Growth(NamedTuple):

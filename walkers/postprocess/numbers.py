@@ -160,7 +160,7 @@ def _errors(numbers: Mapping[str, Any], quantity: Quantity) -> str:
         ends = (shown(numbers[f"orientation_{end}"], quantity.unit)[0] for end in ("smallest", "largest"))
         parts.append(f"walkers {' to '.join(ends)}")
     if isfinite(scatter := numbers.get(quantity.error, nan)):
-        word = "resolution" if quantity.error.endswith("_within") else "scatter"
+        word = "resolution" if quantity.error.endswith("_within") else "scatter of copies"
         parts.append(f"{word} {error_text(scatter, quantity.unit)}")
     parts += filter(None, [band_of(numbers, quantity)])
     if isfinite(error := numbers.get(f"{quantity.name}_error", nan)):

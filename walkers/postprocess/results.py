@@ -7,6 +7,7 @@ three functions: ``applies(case)``; ``derived(case)``, numbers that follow from 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from math import isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,10 +18,10 @@ from walkers.inputs.run import limits_of
 from walkers.postprocess import meetings, piles, record_part, threshold, walking
 from walkers.postprocess.caption import conditions
 from walkers.postprocess.motion import read_motion
-from walkers.postprocess.numbers import headline, rows, state
+from walkers.postprocess.numbers import MAIN, headline, rows, state
 from walkers.postprocess.tables import Columns, read_columns, read_table, write_table
 from walkers.postprocess.uncertainty import accuracy_of, bands_of, lines_of_rest, rests_on
-from walkers.rounding import percent
+from walkers.rounding import counted, percent
 from walkers.runner.directory import SEGMENT_NAME, files_of_segments, recomputed, segment_directories
 from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import RESULT_NAME, check_unchanged
@@ -191,33 +192,80 @@ def plain(numbers: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def text(results: Results, *, cached: bool = False) -> str:
-    """A result in lines: state or drive, numbers with errors, warnings, origins of values, directory."""
+    """A result in lines: state or drive, what is not computed, numbers, warnings, origins of values, directory."""
     first, *rest = headlines(results)
     if cached and not results.about["by_hand"]:  # it was never made by a command
         first += " (already run)"
     table = [(row.label, row.text, row.unit, row.error) for row in rows(results)]
     label, value, unit = (max((len(row[place]) for row in table), default=0) for place in range(3))
+    missing = []
+    if lacks := not_computed(results):
+        missing.append(f"  uncertainty not computed: {lacks.text}")
+    banded = []
+    if has_band(results):
+        banded.append(f"  band       {BAND_NOTE}")
     return "\n".join(
         [
             first,
             *(f"  {line}" for line in rest),
+            *missing,
             *(f"  {row[0]:{label}}  {row[1]:>{value}} {row[2]:{unit}}  {row[3]}".rstrip() for row in table),
             *(f"  warning: {warning}" for warning in results.warnings),
             *lines_of_rest(results.about["rests_on"]),
-            *([f"  unmeasured {errors}"] if (errors := unmeasured(results)) else []),
+            *banded,
             f"  run        {results.directory}",
         ]
     )
 
 
-def unmeasured(results: Results) -> str:
-    """The errors of a result that were not measured, each with its option; empty if there are none."""
-    main, errors = "" if results.get("came_apart") else headline(results), []
-    if main and "velocity" in results and not {"numerical_error", "stops_at"} & results.keys():
-        errors.append("numerical error (--accuracy)")
-    if main and f"{main}_low" not in results and any(entry["range"] for entry in results.about["rests_on"]):
-        errors.append("band over the ranges of uncertain values (--spread)")
-    return ", ".join(errors)
+@dataclass(frozen=True)
+class NotComputed:
+    """Uncertainties of a result that nobody has computed; false if there are none.
+
+    Attributes
+    ----------
+    uncertain_values
+        Number of uncertain values over whose ranges there is no band; 0 if there is a band.
+    numerical_error
+        Whether the numerical error is missing.
+    """
+
+    uncertain_values: int = 0
+    numerical_error: bool = False
+
+    def __bool__(self) -> bool:
+        return self.uncertain_values > 0 or self.numerical_error
+
+    @property
+    def text(self) -> str:
+        """What is missing, each with the option that computes it."""
+        parts = []
+        if self.uncertain_values:
+            parts.append(f"{counted(self.uncertain_values, 'uncertain value')} (--spread)")
+        if self.numerical_error:
+            parts.append("numerical error (--accuracy)")
+        return ", ".join(parts)
+
+
+def not_computed(results: Results) -> NotComputed:
+    """The uncertainties of the main number of a result that have not been computed."""
+    main = headline(results)
+    if not main or results.get("came_apart"):
+        return NotComputed()
+    values = 0
+    if f"{main}_low" not in results:
+        values = sum(1 for entry in results.about["rests_on"] if entry["range"])
+    has_error = not {"numerical_error", "stops_at"}.isdisjoint(results)
+    return NotComputed(values, "velocity" in results and not has_error)
+
+
+BAND_NOTE = "5 to 95 % over the ranges of uncertain values only; the error of the model is not in it"
+"""What a band is, below a result and in reports."""
+
+
+def has_band(results: Mapping[str, Any]) -> bool:
+    """Whether a main number of a result has a band."""
+    return any(f"{name}_low" in results for name in MAIN)
 
 
 def headlines(results: Results) -> list[str]:

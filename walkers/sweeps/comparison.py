@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from walkers.physics.laws import LAWS
 from walkers.postprocess.numbers import ASIDE, band_of, error_text, headline, is_of_up, saying_nothing
 from walkers.postprocess.quantities import declared, is_error, scatter_of, unit_shown
-from walkers.postprocess.results import Results, plain, read, unmeasured
+from walkers.postprocess.results import Results, not_computed, plain, read
 from walkers.rounding import counted, rounded
 from walkers.runner.manifest import read_manifest
 from walkers.sweeps.readable import differing, flattened, readable
@@ -63,7 +63,10 @@ def compare_runs(first: Side, second: Side) -> Comparison:
         if apart:
             heads = ["result", *names, "difference", "scatter of copies", "numerical error"]
             columns = zip(heads, *(_cells(row, results) for row in apart.values()), strict=True)
-            text.append(aligned([*zip(*(column for column in columns if {*column[1:]} != {"-"}), strict=True)]))
+            shown = [column for column in columns if {*column[1:]} != {"-"}]
+            text.append(aligned([*zip(*shown, strict=True)]))
+            if heads[4] in [column[0] for column in shown]:
+                text.append("scatter of copies: how much copies differ by their start; no error of the difference")
         named = dict(zip(names, results, strict=True))
         doubts = [f"{name}: warning: {doubt}" for name, result in named.items() for doubt in result.warnings]
         text += ["\n".join(lines) for lines in (_of_errors(apart, named), doubts) if lines]
@@ -95,7 +98,7 @@ def _of_tables(*sides: Side) -> list[str]:
 
 
 def _of_errors(apart: Mapping[str, Mapping[str, Any]], named: Mapping[str, Results]) -> list[str]:
-    """How many times its numerical error a velocity differs, bands of both runs, and which errors are unmeasured."""
+    """How many times its numerical error a velocity differs, bands of both runs, and which errors are not computed."""
     rows, results = [apart[name] for name in _VELOCITIES if name in apart], named.values()
     lines = [
         f"{row['quantity']}: differs by {error_text(abs(row['difference']) / row['numerical_error'], '')} times "
@@ -105,21 +108,34 @@ def _of_errors(apart: Mapping[str, Mapping[str, Any]], named: Mapping[str, Resul
     ]
     if any(headline(result) in apart for result in results):
         lines += [f"{name}: {text}" for name, result in named.items() if (text := _of_band(result))]
-    places = [str(result.directory) for result in results if "--accuracy" in unmeasured(result)]
+        if shared := _shared_unknowns(*results):
+            values = "1 uncertain value belongs" if len(shared) == 1 else f"{len(shared)} uncertain values belong"
+            lines.append(
+                f"{values} to both runs and may be equal in both: the bands may overlap although the difference is certain"
+            )
+    places = [str(result.directory) for result in results if not_computed(result).numerical_error]
     if rows and places:
         lines.append(f"to measure numerical errors: walkers run {' '.join(places)} --accuracy")
     return lines
+
+
+def _shared_unknowns(*results: Results) -> set[str]:
+    """Keys of the uncertain values on which all of some results rest."""
+    keys = []
+    for result in results:
+        keys.append({value["key"] for value in result.about["rests_on"] if value["range"]})
+    return set.intersection(*keys)
 
 
 def _of_band(result: Results) -> str:
     """The band of the main number of a run, or on how many uncertain values it rests; empty if there are none."""
     if (main := headline(result)) and (band := band_of(result, quantity := declared(main))):
         return f"{with_unit(main, unit_shown(quantity.unit)[0])}, {band}"
-    if "--spread" not in unmeasured(result):
+    if not not_computed(result).uncertain_values:
         return ""
     uncertain = [value["origin"] for value in result.about["rests_on"] if value["range"]]
     rests = f"rests on {counted(len(uncertain), 'uncertain value')}, {uncertain.count('default')} guessed"
-    return f"{main} {rests}; the band over the ranges is unmeasured (--spread)"
+    return f"{main} {rests}; the band over the ranges is not computed (--spread)"
 
 
 def _rows(first: Results, second: Results) -> list[dict[str, Any]]:

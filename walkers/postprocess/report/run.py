@@ -13,10 +13,10 @@ from walkers.inputs.origins import Origin, text_of
 from walkers.postprocess.caption import caption
 from walkers.postprocess.figures import figures_of
 from walkers.postprocess.motion import read_motion
-from walkers.postprocess.numbers import MAIN, rows
+from walkers.postprocess.numbers import rows
 from walkers.postprocess.report.page import LARGEST, NAME, check_report, fill, page_of, svg_of
 from walkers.postprocess.report.player import MOST_PLACES, player_of
-from walkers.postprocess.results import Results, headlines, read, unmeasured
+from walkers.postprocess.results import BAND_NOTE, Results, has_band, headlines, not_computed, read
 from walkers.postprocess.uncertainty import held_of, held_text
 from walkers.runner.directory import case_of
 from walkers.runner.files import write_bytes
@@ -68,17 +68,18 @@ def report_run(
 
 
 def shown_of(case: Case, results: Results, origins: Origins = None) -> dict[str, Any]:
-    """Warnings and rows of a result, what of it is unmeasured, and parameters of its case with their origins."""
+    """Warnings and rows of a result, what of it is not computed, and parameters of its case with their origins."""
     origins = case.origins if origins is None else origins
     parameters = [
         vars(source) | {"range": " … ".join(map(text_of, source.range or ())), "origin": source.word}
         for source in origins
     ]
-    banded = not results.keys().isdisjoint(f"{name}_low" for name in MAIN)
+    banded = has_band(results)
     return {
         "warnings": results.warnings,
         "rows": rows(results),
-        "unmeasured": unmeasured(results),
+        "not_computed": not_computed(results).text,
+        "band": BAND_NOTE,
         "fixed": held_text(held_of(origins)) if banded else "",
         "guessed": [parameter for parameter in parameters if parameter["origin"] == "guessed"],
         "uncertain": [parameter for parameter in parameters if parameter["origin"].endswith("uncertain")],
