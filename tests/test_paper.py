@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Callable
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.sweep import expand
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
-from walkers.paper.comparison import compare
+from walkers.paper.comparison import _text_of, compare
 from walkers.paper.figures import theory_of_cycles
 from walkers.paper.make import FIGURES, make_figures
 from walkers.paper.sources import NothingFinishedError, Sources, of_facts, ruby, sets, sweep_of
@@ -241,3 +242,21 @@ def test_a_run_that_failed_is_left_out_and_told(tmp_path: Path) -> None:
     assert {failure.reason for failure in made.failures["fig3"]} == {"TimeLimitExceeded"}
     assert list(made.left_out) == ["fig3"]
     assert not made.files
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.84985, "0.8498"),
+        (0.8503, "0.8503"),
+        (0.8523, "0.852"),
+        (1.0, "1"),
+        (0.7, "0.7"),
+        (1e-5, "0"),
+        (nan, None),
+    ],
+)
+def test_a_number_of_the_comparison_has_the_digits_that_decide(value: float, text: str | None) -> None:
+    """1 ± 0.15 is expected: 0.84985 does not agree, and is not printed as the limit, 0.85."""
+    (observation,) = [one for one in ruby().file.observations if one.name == "frequency_4g"]
+    assert _text_of(value, observation) == text

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping
-from math import nan
+from math import isclose, isnan, nan
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,9 @@ from walkers.theory.prediction import MODEL, PAPER, predicted_column
 
 Numbers = Mapping[str, Mapping[str, float]]
 """Quantities of walkers by experiment of the calibration."""
+_NOTHING = 5e-4
+"""In the unit of a fact, what is shown as zero."""
+_MOST_DIGITS = 6
 _PLACES = 6
 """Decimal places at which drives and asymmetries of a sweep are the same."""
 
@@ -28,10 +31,10 @@ def compare(sources: Sources) -> dict[str, Any]:
     """The comparison, as in ``comparison.json``; None for numbers that do not exist.
 
     ``sets``: for each parameter set the number of facts that ``agree``, their number (``of``), and its ``parameters``.
-    ``facts``: the sentence of the paper (``says``) and its ``source``, the ``expected`` value, our ``values`` and
-    whether they ``agree`` by set, the ``theory`` of the shipped set, and whether the fact is ``derived`` from others
-    and not counted. ``thresholds``: Γc as from `thresholds_with_theory`. ``curve``: engine and theory beside the
-    one-parameter curve of Figs. 2 and 3, which is no measurement, mm/s.
+    ``facts``: the sentence of the paper (``says``) and its ``source``, the ``expected`` value, our ``values``, their
+    ``texts`` and whether they ``agree`` by set, the ``theory`` of the shipped set, and whether the fact is ``derived``
+    from others and not counted. ``thresholds``: Γc as from `thresholds_with_theory`. ``curve``: engine and theory
+    beside the one-parameter curve of Figs. 2 and 3, which is no measurement, mm/s.
     """
     experiments = list(ruby().experiments)
     cases = {name: dict(zip(experiments, sweep_of(of_facts(name)).cases(), strict=True)) for name in sets()}
@@ -81,9 +84,31 @@ def _fact(observation: Observation, numbers: Mapping[str, Numbers], theory: Numb
         **{name: getattr(observation, name) for name in ("name", "title", "says", "source", "derived")},
         "expected": observation.text,
         "values": plain({name: value * scale for name, value in values.items()}),
+        "texts": {name: _text_of(value, observation) for name, value in values.items()},
         "agree": {name: observation.agrees(value) for name, value in values.items()},
         **plain({"theory": observation.of_numbers(theory) * scale}),
     }
+
+
+def _text_of(value: float, observation: Observation) -> str | None:
+    """A number (SI) in the unit of a fact, with three digits, or as many more as a reader needs for the verdict.
+
+    The text is no limit of the fact, and agrees with it if the number does. Numbers below 0.0005 are zero, so that
+    rounding errors are not shown. None for NaN.
+    """
+    if isnan(value):
+        return None
+    scale = observation.unit[1]
+    shown = value * scale
+    if abs(shown) < _NOTHING:
+        shown = 0.0
+    for digits in range(3, _MOST_DIGITS):
+        text = f"{shown:.{digits}g}"
+        printed = float(text) / scale
+        is_limit = isclose(abs(observation.residual(printed)), 1.0)
+        if not is_limit and observation.agrees(printed) == observation.agrees(value):
+            return text
+    return f"{shown:.{_MOST_DIGITS}g}"
 
 
 def _curve(sources: Sources, sweep: str, column: str, label: Callable[[float], str]) -> list[dict[str, Any]]:
