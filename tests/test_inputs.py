@@ -7,6 +7,8 @@ import re
 import sys
 import tomllib
 from dataclasses import replace
+
+from math import pi
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from walkers.errors import InputError
 from walkers.inputs import units
 from walkers.inputs.case import Case
 from walkers.inputs.library import library_of, unmeasured
+from walkers.inputs.loads import gravity_warnings
 from walkers.inputs.origins import Origin
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.sweep import expand
@@ -323,3 +326,26 @@ def test_ranges_of_roughness_end_where_a_case_is_refused() -> None:
     assert origins(case)["contact.roughness.bead_wall"].range == ("22.4 nm", "2000 nm")
     assert origins(load_case("fig1b"))["contact.roughness.bead_wall"].range == ("14.1 nm", "141 nm")
     assert len(list(spread_sweep(case, 2).cases())) == 2
+
+
+@pytest.mark.parametrize("name", sorted(shipped("case")))
+def test_beads_of_shipped_cases_are_light_and_small_enough_for_bridges_without_gravity(name: str) -> None:
+    assert gravity_warnings(load_case(name)) == []
+
+
+def test_beads_beyond_the_capillary_length_that_the_liquid_does_not_hold_are_reported() -> None:
+    """Ruby beads of 3 mm in silicone oil, whose capillary length is √(γ/ρg) = 1.46 mm."""
+    case = load_case("fig1b", {"dimers.radii": ["3 mm", "2 mm"]})
+    length, weight = gravity_warnings(case)
+    assert "R = 3 mm exceed the capillary length of the liquid, 1.5 mm" in length
+    mass = 4.0e3 * 4.0 / 3.0 * pi * 3e-3**3
+    pull = 4.0 * pi * 19.2e-3 * 3e-3  # of a perfectly wetted bead on a plane, at most
+    assert float(weight.partition("weigh ")[2].split()[0]) == pytest.approx(mass * 9.81 / pull, rel=0.1)
+    assert gravity_warnings(case.changed({"environment.gravity": "0 m/s^2"})) == []
+
+
+def test_beads_that_are_heavier_than_the_pull_of_their_bridge_alone_are_reported() -> None:
+    """The weight grows as R³ and the pull as R: ruby in silicone oil has equal ones near R = 1.2 mm."""
+    for radius, reported in ((1.1, 0), (1.4, 1)):
+        case = load_case("fig1b", {"dimers.radii": [f"{radius} mm", "1 mm"]})
+        assert len(gravity_warnings(case)) == reported

@@ -14,7 +14,7 @@ from typing import Any
 from walkers.inputs.bodies import Walkers
 from walkers.inputs.case import Case
 from walkers.inputs.library import library_of
-from walkers.inputs.loads import contact_loads, dimer_of
+from walkers.inputs.loads import contact_loads, dimer_of, gravity_warnings
 from walkers.inputs.run import CONSTANT, limits_of
 from walkers.inputs.units import ACCELERATION_OF_ONE_G, MODULUS, parse_quantity
 from walkers.physics.capillary import bead_volume, capillary_force_limit_at_wall
@@ -110,13 +110,17 @@ def pairs_of_beads(case: Case) -> int:
 
 
 def notes(case: Case) -> list[str]:
-    """Notes on a case before it is run: a long time step, few cores; of a pile, beads of one size and low walls."""
+    """Notes on a case before it is run.
+
+    About a long time step, heavy beads and few cores; of a pile, about beads of one size and low walls.
+    """
     largest, reason = limits_of(case).recommended(loose=case.loose)
     times, lines = case.run.time_step / largest, []
     if times < 1e-2:
         lines = [f"the time step is {_two_digits(1.0 / times)} times smaller than needed ({reason})"]
     elif times > 1.01:
         lines = [f"the time step is {times:.2g} times the largest of auto ({reason})"]
+    lines += gravity_warnings(case)
     if case.excitation.record:
         lines += case.excitation.record.notes
     if case.run.ranks > (cores := cores_here()):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import lru_cache
 from itertools import combinations_with_replacement
-from math import inf, pi
+from math import inf, pi, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -88,6 +88,35 @@ def softness_warning(case: Case) -> str | None:
         return f"{soft} wrong by half or more (set a higher contact.youngs_modulus)"
     error = 100.0 * float(np.interp(phase, _MEASURED_DELAYS, _MEASURED_ERRORS))
     return f"{soft} up to {error:.0f} % off those of hard beads (contact.youngs_modulus)"
+
+
+def gravity_warnings(case: Case) -> list[str]:
+    """What is doubtful about bridges of beads that are large or heavy; empty for small beads or without gravity.
+
+    The bridge laws leave out gravity. It deforms menisci as large as the capillary length √(γ/ρg), which the bridges of
+    larger beads can be. A bead that is heavier than the pull of its bridge to a plane is not held by the liquid.
+    """
+    gravity = case.environment.gravity
+    if gravity <= 0.0:
+        return []
+    radius, liquid = max(case.radii), case.liquid
+    pull = bridge_at_rest(case, radius, inf).pull
+    if pull <= 0.0:  # without liquid
+        return []
+    warnings = []
+    beads = f"beads of R = {1e3 * radius:.3g} mm"
+    if liquid.density:
+        length = sqrt(liquid.surface_tension / (liquid.density * gravity))
+        if radius > length:
+            warnings.append(
+                f"{beads} exceed the capillary length of the liquid, {1e3 * length:.2g} mm: "
+                "gravity deforms their menisci, which the bridge laws leave out"
+            )
+    weight = bead_volume(radius) * case.beads.density * gravity
+    if weight > pull:
+        times = f"{weight / pull:.2g} times the pull of their bridge to a plane"
+        warnings.append(f"{beads} weigh {times}: the liquid does not hold them")
+    return warnings
 
 
 def delay_of(case: Case) -> float:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, refused
-from walkers.inputs.loads import softness_warning
+from walkers.inputs.loads import gravity_warnings, softness_warning
 from walkers.inputs.run import limits_of
 from walkers.postprocess import meetings, piles, record_part, threshold, walking
 from walkers.postprocess.caption import conditions
@@ -113,6 +113,7 @@ def measure(directory: Path) -> None:
         warnings.append(f"the time step is beyond a limit of stability ({', '.join(names)}): the results are wrong")
     if (softness := softness_warning(case)) is not None:
         warnings.append(softness)
+    warnings += gravity_warnings(case)
     if motion.truncated:
         warnings.append("the dump ends within a frame")
     contents = {
