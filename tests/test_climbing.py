@@ -326,8 +326,9 @@ def test_clusters_climb_from_the_friction_of_no_velocity_on() -> None:
 
 
 def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
-    """Two starts that do not climb."""
+    """Two starts that do not climb, of beads whose friction nobody gave."""
     tables = tomllib.loads(shipped("case")["pile-ci"].read_text())
+    del tables["contact"]["friction"]
     tables["run"] |= {"duration": "0.02 s", "time_step": "3 us", "longest_settling": "0.05 s"}
     (tmp_path / "base.toml").write_text(to_toml(tables))
     (tmp_path / "starts.toml").write_text('case = "base.toml"\n[axes]\nrun.seed = [1, 2]\n')
@@ -347,6 +348,8 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
         done = call("climb", "starts", run, *out, "--to", f"{to}{form}", "--within", within, check=True)
         assert [done.stdout.count(f"0 of {number}\n") for number in (2, 1)] == [1, 1], done.stdout
         assert "warning" not in done.stderr  # such as one of a layout that failed
+        lines = [line for line in done.stdout.splitlines() if line.startswith("guessed")]
+        assert len(lines) == 2 and all("friction.bead_wall 0.25" in line for line in lines)
     written = pd.read_csv(f"{to}.csv")
     assert written["condition"].drop_duplicates().to_list() == ["starts", starts.runs[0].directory.name]
     assert written["rate_high"].to_list()[:3] == pytest.approx([upper] * 3, rel=1e-4)

@@ -65,6 +65,15 @@ def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
     return [line for text in texts for line in in_lines(text)]
 
 
+def guesses(rests: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Values of a result (`rests_on`) that the program guessed, as text: ``friction.bead_wall 0.25``."""
+    return [
+        f"{value['key'].partition('.')[2]} {value['value']}"
+        for value in rests
+        if value["guessed"] and value["origin"] == "default"
+    ]
+
+
 def in_lines(text: str) -> list[str]:
     """A text beside a head of 13 letters, in lines for a terminal."""
     return textwrap.wrap(text, _WIDTH, subsequent_indent=" " * 13, break_on_hyphens=False)

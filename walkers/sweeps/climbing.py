@@ -22,6 +22,7 @@ from walkers.errors import refused
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, save_figure, styled
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.results import plain, read
+from walkers.postprocess.uncertainty import guesses
 from walkers.rounding import percent
 from walkers.runner.files import write_bytes
 from walkers.sweeps.table import SEEDS, groups, key_texts
@@ -68,7 +69,8 @@ def conditions_in(frame: pd.DataFrame) -> Iterator[tuple[str, list[Path]]]:
 def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[str, Any]:
     """`summary` of the climbs in run directories of piles that differ only in their seed.
 
-    ``each`` has all climbs as in the table ``clusters``, whenever they qualified, with the names of their runs.
+    ``each`` has all climbs as in the table ``clusters``, whenever they qualified, with the names of their runs;
+    ``guessed`` are the values of the case that the program guessed, as texts.
     """
     import pandas as pd
 
@@ -80,7 +82,8 @@ def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[
     climbs = pd.concat([result.table("clusters").assign(pile=pile) for pile, result in enumerate(results)])
     climbs = climbs[climbs["climbed"].astype(bool)]
     records: Any = climbs.assign(run=[runs[pile].name for pile in climbs["pile"]]).to_dict("records")
-    return {**summary(piles, climbs, within), "each": list(map(plain, records))}
+    guessed = guesses(results[0].about["rests_on"])
+    return {**summary(piles, climbs, within), "each": list(map(plain, records)), "guessed": guessed}
 
 
 def summary(piles: pd.DataFrame, climbs: pd.DataFrame, within: float | None = None) -> dict[str, Any]:
@@ -243,6 +246,7 @@ def texts_of(climbs: Mapping[str, Any]) -> dict[str, str]:
         "height (mm)": between(climbs["heights"], 1e3),
         "speed (mm/s)": between(climbs["speeds"], 1e3),
         "median speed (mm/s)": f"{1e3 * np.median(climbs['speeds']):.2g}" if climbs["speeds"] else "–",
+        "guessed": ", ".join(climbs.get("guessed", [])) or "–",
     }
 
 
