@@ -64,6 +64,16 @@ def ends_of(motion: Motion, place: FloatArray, contacts: IntArray) -> Ends:
     return begins, ends
 
 
+def at_front_walls(motion: Motion, contacts: IntArray, ends: Ends, toward: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which contacts are with walls between the beads and a camera in the direction ``toward``, shape (K,).
+
+    Pictures do not draw these walls, so that the beads are visible.
+    """
+    begins, others = ends
+    to_walls = contacts[:, 2] >= 0
+    return np.asarray(to_walls & ((others - begins) @ toward > 0.5 * motion.radius[contacts[:, 0]]))
+
+
 def necks_of(
     motion: Motion, contacts: IntArray, between: Ends, rings: int, sides: int, share: FloatArray | float = 1.0
 ) -> Ends:

@@ -22,7 +22,7 @@ from walkers.inputs.case import Case
 from walkers.postprocess import piles
 from walkers.postprocess.dump import FloatArray, IntArray
 from walkers.postprocess.motion import Motion, between, visible_displacement
-from walkers.postprocess.necks import BLUE, NO_BRIDGES, OPACITY, ends_of, necks_of, triangles_of
+from walkers.postprocess.necks import BLUE, NO_BRIDGES, OPACITY, at_front_walls, ends_of, necks_of, triangles_of
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -428,7 +428,7 @@ class Window:
 
         motion = self._scene.motion
         begins, ends = ends_of(motion, place, bridges)
-        before = (bridges[:, 2] >= 0) & ((ends - begins) @ self._scene.axes[2] > 0.5 * motion.radius[bridges[:, 0]])
+        before = at_front_walls(motion, bridges, (begins, ends), self._scene.axes[2])
         contacts, between = bridges[~before], (begins[~before], ends[~before])
         self._necks.visibility = bool(len(contacts))
         if not len(contacts):

@@ -16,7 +16,16 @@ from walkers.extras import require
 from walkers.postprocess import scene as view
 from walkers.postprocess.dump import FloatArray, IntArray
 from walkers.postprocess.motion import Motion
-from walkers.postprocess.necks import BLUE, OPACITY, bridges_at, bridges_text, ends_of, necks_of, triangles_of
+from walkers.postprocess.necks import (
+    BLUE,
+    OPACITY,
+    at_front_walls,
+    bridges_at,
+    bridges_text,
+    ends_of,
+    necks_of,
+    triangles_of,
+)
 
 if TYPE_CHECKING:
     import k3d
@@ -72,7 +81,8 @@ def player_of(
             part.model_matrix = _series(shown, back)
     if motion.case.boundary.tilted and motion.case.environment.gravity:
         captions.append(f"{motion.case.boundary.tilted.capitalize()}; gravity points down at first.")
-    for part in [*boundary, *beads, *_necks(shown, motion.position[::stride], bridges, path)]:
+    toward = _axes_of_camera(motion)[2]
+    for part in [*boundary, *beads, *_necks(shown, motion.position[::stride], bridges, path, toward)]:
         plot += part
     plot.fps_meter, plot.camera = False, camera_of(motion, scene.path)
     # K3D's own player plays the run in 12 s.
@@ -86,14 +96,19 @@ def camera_of(motion: Motion, path: FloatArray | None = None) -> list[float]:
 
     ``path`` is subtracted from the positions of the beads (`walkers.postprocess.scene.Scene`).
     """
-    toward = view.camera_axes(motion)[2]
-    if motion.case.boundary.closed:
-        toward = np.array([-0.25, -1.0, 0.2 if view.from_the_side(motion.case) else 2.0])
-    axes = view.axes_toward(toward, view.against_gravity(motion))
+    axes = _axes_of_camera(motion)
     seen = view.Scene.around(motion, axes, _AROUND, shaken=False, path=path)
     distance = seen.height(_ASPECT) / 2.0 / tan(radians(_VIEW / 2.0)) + float(seen.high[2] - seen.low[2]) / 2.0
     place, middle, up = seen.camera(distance)
     return [*place.tolist(), *middle.tolist(), *up.tolist()]
+
+
+def _axes_of_camera(motion: Motion) -> FloatArray:
+    """The axes of the picture that the camera sees: to the right, up, and toward the camera, unit vectors."""
+    toward = view.camera_axes(motion)[2]
+    if motion.case.boundary.closed:
+        toward = np.array([-0.25, -1.0, 0.2 if view.from_the_side(motion.case) else 2.0])
+    return view.axes_toward(toward, view.against_gravity(motion))
 
 
 def _thinned(motion: Motion, places: int) -> tuple[Motion, int, list[str]]:
@@ -135,10 +150,13 @@ def _balls(motion: Motion, turned: FloatArray, colours: FloatArray) -> list[Any]
     return balls
 
 
-def _necks(motion: Motion, place: FloatArray, bridges: list[IntArray], path: FloatArray | None) -> list[Any]:
+def _necks(
+    motion: Motion, place: FloatArray, bridges: list[IntArray], path: FloatArray | None, toward: FloatArray
+) -> list[Any]:
     """The necks of all bridges as one mesh with a time series of its points.
 
-    A bridge that is not there has no width; its neck grows and vanishes in place.
+    A bridge that is not there has no width; its neck grows and vanishes in place. Bridges to walls in front of the
+    beads, as the camera first sees them, have no width either.
     """
     import k3d
 
@@ -151,8 +169,9 @@ def _necks(motion: Motion, place: FloatArray, bridges: list[IntArray], path: Flo
     points = np.zeros((len(bridges), len(contacts) * fine[0] * fine[1], 3))
     for frame, present in enumerate(bridged):
         near = np.flatnonzero(bridged[max(frame - 1, 0) : frame + 2].any(axis=0))
-        width = present[near].astype(float)
         ends = ends_of(motion, place[frame], contacts[near])
+        hidden = at_front_walls(motion, contacts[near], ends, toward)
+        width = (present[near] & ~hidden).astype(float)
         necks = necks_of(motion, contacts[near], ends, *fine, width)[0]
         points[frame].reshape(len(contacts), -1, 3)[near] = necks - (0.0 if path is None else path[frame])
     look = {"color": BLUE, "opacity": OPACITY, "flat_shading": True, "name": "bridges"}
