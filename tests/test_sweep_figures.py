@@ -37,12 +37,27 @@ def _legend(figure: Figure) -> list[str]:
     return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
 
 
+COLOURS = ("#111111", "#1f4e8c")
+"""The first two of `walkers/postprocess/style.mplstyle`."""
+
+
 def _table(units: dict[str, str], rows: list[list[Any]], **speeds: Any) -> pd.DataFrame:
     """That of a sweep with a single axis as far as what varies goes, and columns of velocities, m/s."""
     table = pd.DataFrame(rows, columns=list(units)).assign(point=range(len(rows)), status="finished", **speeds)
     table.attrs |= {"units": units | dict.fromkeys(speeds, "m/s"), "varied": list(units), "axes": [tuple(units)]}
     table.attrs["title"] = ""
     return table
+
+
+def test_a_figure_keeps_the_colours_of_the_project_wherever_it_is_drawn() -> None:
+    """The names C0, C1, … would be looked up in the style of the program that draws it."""
+    keys = {"drive.frequency": "Hz", "contact.friction.bead_wall": ""}
+    rows = [[frequency, friction] for friction in (0.1, 0.2) for frequency in (60.0, 70.0)]
+    table = _table(keys, rows, velocity=[1e-3, 2e-3, 3e-3, 4e-3])
+    table.attrs["axes"] = [(key,) for key in keys]
+    (panel,) = _panels(figure_of(table))
+    drawn_in = [line.get_color() for line in panel.lines if len(line.get_xdata()) == 2 and line.get_marker() != "None"]
+    assert drawn_in == list(COLOURS[:2])
 
 
 @pytest.mark.parametrize(("error", "bars"), [(2e-4, 3), (2e-6, 0)])
@@ -178,7 +193,7 @@ def test_theory_is_what_the_theory_says_of_each_point(looked_through: Path) -> N
     figure = walkers.load(directory).figure(theory=True)
     (axes,) = _panels(figure)
     assert _legend(figure)[2:] == [MODEL, PAPER]
-    lines = {line.get_linestyle(): line for line in axes.lines if line.get_color() == "C1"}
+    lines = {line.get_linestyle(): line for line in axes.lines if line.get_color() == COLOURS[1]}
     table = walkers.load(directory).table()
     predicted = [predict(case_of(Path(run))) for run in table.loc[table["drive.frequency"] == 80.0, "run"]]
     for style, model in (("--", "viscous"), (":", "paper")):

@@ -213,8 +213,8 @@ def test_bands_along_a_sweep_are_those_of_each_points_spread(tmp_path: Path) -> 
     assert table["velocity_high"].is_monotonic_increasing
     assert "velocity_low (mm/s)  velocity_high (mm/s)" in sweep.describe()
     figure = sweep.figure()
-    band = "5 to 95 % of 4 draws, approximate"
-    assert figure.get_suptitle().endswith(f"bands over uncertain values: {band}")
+    band = "band: uncertain values only, 5 to 95 % of 4 draws, approximate"
+    assert " ".join(figure.get_suptitle().split()).endswith(f"{band}; the error of the model is not in it")
     assert [text.get_text() for text in figure.legends[0].get_texts()] == [band]
 
 

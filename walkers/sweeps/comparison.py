@@ -110,9 +110,8 @@ def _of_errors(apart: Mapping[str, Mapping[str, Any]], named: Mapping[str, Resul
         lines += [f"{name}: {text}" for name, result in named.items() if (text := _of_band(result))]
         if shared := _shared_unknowns(*results):
             values = "1 uncertain value belongs" if len(shared) == 1 else f"{len(shared)} uncertain values belong"
-            lines.append(
-                f"{values} to both runs and may be equal in both: the bands may overlap although the difference is certain"
-            )
+            may = "may be equal in both: the bands may overlap although the difference is certain"
+            lines.append(f"{values} to both runs and {may}")
     places = [str(result.directory) for result in results if not_computed(result).numerical_error]
     if rows and places:
         lines.append(f"to measure numerical errors: walkers run {' '.join(places)} --accuracy")
@@ -121,10 +120,12 @@ def _of_errors(apart: Mapping[str, Mapping[str, Any]], named: Mapping[str, Resul
 
 def _shared_unknowns(*results: Results) -> set[str]:
     """Keys of the uncertain values on which all of some results rest."""
-    keys = []
-    for result in results:
-        keys.append({value["key"] for value in result.about["rests_on"] if value["range"]})
-    return set.intersection(*keys)
+    first, *others = [_uncertain_keys(result) for result in results]
+    return first.intersection(*others)
+
+
+def _uncertain_keys(result: Results) -> set[str]:
+    return {value["key"] for value in result.about["rests_on"] if value["range"]}
 
 
 def _of_band(result: Results) -> str:

@@ -47,6 +47,9 @@ Predict = Callable[[Sequence[Case], str], tuple[Mapping[str, FloatArray], Mappin
 """Function of N cases and a column: predictions of models, SI units, shape (N,); remarks, with the number of cases."""
 SCATTER = "bars: standard deviation of the copies (uncertain parameters not varied)"
 """What the error bars of a sweep are."""
+_BAND = "band: uncertain values only"
+"""What the bands of a sweep are, in the legend."""
+_NOT_IN_BAND = "the error of the model is not in it"
 _UP: dict[str, Any] = {"marker": "o", "color": "0.3", "label": "started facing right (up)"}
 _DOWN: dict[str, Any] = {"marker": "v", "color": "0.3", "label": "started facing left (down)"}
 _MOST_PANELS = 12
@@ -420,15 +423,25 @@ def _draw(
     _scale_y(grid[0, 0], points, list(theory.values.values()) if theory else [], log)
     for axes in grid.flat[len(parts) :]:
         axes.set_axis_off()
-    band = f"5 to 95 % of {_draws(done, column)}" if "low" in points else ""
+    band = f"{_BAND}, 5 to 95 % of {_draws(done, column)}" if "low" in points else ""
     _legend(figure, grid, hue, looks, list(theory.values) if theory else [], down="down" in points, band=band)
-    texts += [f"bands over uncertain values: {band}"] if band else []
+    texts += _remarks(done, points, band)
+    figure.suptitle(plain_text("\n".join(line for text in texts for line in wrap(text, round(14.0 * width)))))
+    return figure
+
+
+def _remarks(done: pd.DataFrame, points: pd.DataFrame, band: str) -> list[str]:
+    """What the bands and the error bars of a figure are, for its title."""
+    remarks = []
+    if band:
+        remarks.append(f"{band}; {_NOT_IN_BAND}")
     if points["error"].notna().any():
         banded = band or {*unmeasured()} & {*done.attrs["varied"]}
         bars = SCATTER.partition(" (")[0] if banded else SCATTER
-        texts.append(bars + ("" if errors_seen(points["error"], points["value"]) else ", smaller than the symbols"))
-    figure.suptitle(plain_text("\n".join(line for text in texts for line in wrap(text, round(14.0 * width)))))
-    return figure
+        if not errors_seen(points["error"], points["value"]):
+            bars += ", smaller than the symbols"
+        remarks.append(bars)
+    return remarks
 
 
 def _with_usual_others(x: Factor, along: Sequence[Factor]) -> npt.NDArray[np.bool_]:
@@ -446,12 +459,14 @@ def _where(factor: Factor | None, level: Any) -> npt.NDArray[np.bool_]:
 def _looks(factor: Factor | None, *, hollow: bool) -> dict[Any, dict[str, Any]]:
     """Colours and symbols of the levels of a factor."""
     from matplotlib import colormaps
+    from matplotlib.colors import to_hex
 
     levels: list[Any] = factor.levels if factor else [None]
     many = colormaps["turbo"](np.linspace(0.0, 0.92, len(levels))) if len(levels) > _MOST_COLOURS else None
     looks = {}
     for place, level in enumerate(levels):
-        colour = f"C{place}" if many is None else many[place]
+        # "C0" would be looked up when the figure is drawn, in the style of whoever draws it then.
+        colour = to_hex(f"C{place}") if many is None else many[place]
         # Symbols that are drawn later are smaller, so that those of coinciding points are seen.
         size = 4.5 + min(1.0, 4.0 / len(levels)) * (len(levels) - 1 - place)
         marker = _MARKERS[place % len(_MARKERS)]
