@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 
 from docs import effects, tables
@@ -151,6 +152,28 @@ _SWEEPS: Mapping[str, tuple[Mapping[str, str], Callable[[Any], list[dict[str, st
 """Sweeps, how their figures show them, and the rows of their tables if they have one."""
 
 
+_ZOOS = ("zoo", "zoo-corner")
+"""Sweeps of clusters, whose figures show how many stay upright."""
+
+
+def mark_upright(figure: Figure, table: pd.DataFrame) -> None:
+    """Fill the symbols of clusters by how many of their walkers stay upright: all, some, or none."""
+    (axes,) = [panel for panel in figure.axes if panel.lines]
+    (points,) = [line for line in axes.lines if line.get_marker() == "o"]
+    shares = table["upright"].to_numpy(dtype=float) / table["walkers"].to_numpy(dtype=float)
+    places, heights = map(np.asarray, points.get_data())
+    points.set_marker("none")
+    kinds = {
+        "all upright": ("full", shares == 1.0),
+        "some upright": ("left", (shares > 0.0) & (shares < 1.0)),
+        "none upright": ("none", shares == 0.0),
+    }
+    for label, (fill, of_kind) in kinds.items():
+        look = {"fillstyle": fill, "markerfacecoloralt": "white", "markersize": 6.0, "clip_on": False}
+        axes.plot(places[of_kind], heights[of_kind], "ko", label=label, zorder=3, **look)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+
+
 def _of_sweep(name: str) -> None:
     options, rows = _SWEEPS[name]
     files = [f"figures/{name}.png", *([f"figures/{name}.md"] if rows else [])]
@@ -158,7 +181,10 @@ def _of_sweep(name: str) -> None:
     @_illustration(name, *files, cases=_cases(name))
     def make(out: Path, docs: Path) -> None:
         done = sweep(name, out)
-        save_figure(done.figure(**options), docs / files[0], [point.directory.name for point in done.runs])
+        figure = done.figure(**options)
+        if name in _ZOOS:
+            mark_upright(figure, done.table())
+        save_figure(figure, docs / files[0], [point.directory.name for point in done.runs])
         if rows:
             write_bytes(docs / files[1], tables.page(f"walkers list {name}", rows(done.table())).encode())
 

@@ -2,8 +2,8 @@
 The gait of a walker
 ====================
 
-Plot what each bead of the walker of Fig. 4b does in two cycles of the drive. Its contacts stay closed: a negative gap is
-an overlap, which shows how the load moves between the contacts.
+Plot what each bead of the walker of Fig. 4b does in two cycles of the drive. Its contacts stay closed: a negative gap
+is an overlap, which shows how the load moves between the contacts.
 """
 
 import matplotlib.pyplot as plt
