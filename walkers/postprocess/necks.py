@@ -69,9 +69,9 @@ def at_front_walls(motion: Motion, contacts: IntArray, ends: Ends, toward: Float
 
     Pictures do not draw these walls, so that the beads are visible.
     """
-    begins, others = ends
+    begins, second_ends = ends
     to_walls = contacts[:, 2] >= 0
-    return np.asarray(to_walls & ((others - begins) @ toward > 0.5 * motion.radius[contacts[:, 0]]))
+    return np.asarray(to_walls & ((second_ends - begins) @ toward > 0.5 * motion.radius[contacts[:, 0]]))
 
 
 def necks_of(

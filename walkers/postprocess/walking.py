@@ -93,14 +93,14 @@ def _doubts(numbers: Mapping[str, Any], *, changes: bool) -> Iterable[str]:
 def _turning(groups: Sequence[Group], walkers: Columns) -> Iterable[str]:
     """A warning if walkers turn away from the drive axis, or will turn over on a slope, but have not yet."""
     case = groups[0].case
-    here = np.isnan(walkers["turned_at"])
-    left = np.concatenate([gait.turns_away_after(group) for group in groups])[here]
+    not_turned = np.isnan(walkers["turned_at"])
+    left = np.concatenate([gait.turns_away_after(group) for group in groups])[not_turned]
     if (count := int(np.isfinite(left).sum())) and not (case.meets or case.excitation.changes):
         seconds = float(np.nanmax(left))
         cycles = float(f"{_LONGER * (case.run.cycles + case.excitation.frequency * seconds):.2g}")
         turn = f"{count} of {counted(len(walkers['walker']), 'walker')} {'turns' if count == 1 else 'turn'}"
         away = f"{turn} away from the drive axis faster and faster, by 45° after about {seconds:.2g} s more"
-        small = int(np.concatenate([gait.small_angles_grow(group) for group in groups])[here].sum())
+        small = int(np.concatenate([gait.small_angles_grow(group) for group in groups])[not_turned].sum())
         if small == 1:
             away += "; the small angle of 1 other grows too"
         elif small:

@@ -120,8 +120,7 @@ def _of_errors(apart: Mapping[str, Mapping[str, Any]], named: Mapping[str, Resul
 
 def _shared_unknowns(*results: Results) -> set[str]:
     """Keys of the uncertain values on which all of some results rest."""
-    first, *others = [_uncertain_keys(result) for result in results]
-    return first.intersection(*others)
+    return set.intersection(*[_uncertain_keys(result) for result in results])
 
 
 def _uncertain_keys(result: Results) -> set[str]:
