@@ -156,6 +156,7 @@ _ZOOS = ("zoo", "zoo-corner")
 """Sweeps of clusters, whose figures show how many stay upright."""
 
 
+@styled
 def mark_upright(figure: Figure, table: pd.DataFrame) -> None:
     """Fill the symbols of clusters by how many of their walkers stay upright: all, some, or none."""
     (axes,) = [panel for panel in figure.axes if panel.lines]

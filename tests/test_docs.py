@@ -12,11 +12,13 @@ from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 
+import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
 import walkers
 from docs._ext import generated
-from docs.illustrations import facts, output_of, pages_of, refreshed, stale, without_hashes
+from docs.illustrations import facts, mark_upright, output_of, pages_of, refreshed, stale, without_hashes
 from walkers import load_case
 from walkers.runner.files import read_json
 from walkers.text import rendered
@@ -165,6 +167,20 @@ def test_the_first_velocity_stands_beside_the_curve_of_the_paper() -> None:
     curve = 1e3 * predicted_column([load_case("fig1b")], "velocity")[0][PAPER][0]
     assert f"{100.0 * (velocity / curve - 1.0):.0f} % above the curve" in text
     assert f"({curve:.2f} mm/s at this drive, no measured point)" in text
+
+
+def test_symbols_of_clusters_are_filled_by_how_many_stay_upright() -> None:
+    figure = Figure()
+    axes = figure.subplots()
+    axes.errorbar([0.0, 1.0, 2.0], [3.0, 4.0, 5.0], marker="o", ls="none")
+    mark_upright(figure, pd.DataFrame({"upright": [6, 1, 0], "walkers": 6}))
+    shown = {line.get_label(): line for line in axes.lines if line.get_marker() == "o"}
+    assert {label: line.get_fillstyle() for label, line in shown.items()} == {
+        "all upright": "full",
+        "some upright": "left",
+        "none upright": "none",
+    }
+    assert [list(line.get_ydata()) for line in shown.values()] == [[3.0], [4.0], [5.0]]
 
 
 @pytest.mark.parametrize("path", sorted((DOCS / "examples").glob("*.py")), ids=lambda path: path.stem)
