@@ -7,7 +7,6 @@ import re
 import sys
 import tomllib
 from dataclasses import replace
-
 from math import pi
 from pathlib import Path
 from typing import Any
