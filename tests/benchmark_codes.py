@@ -165,7 +165,7 @@ def scripts(case: str, beads: list[Bead], steps: int, folder: Path, peak: float 
         }
         for name, (block, law) in laws.items():
             contacts = block.format(law=law, **values)
-            fresh = _LAMMPS_PILE.format(start="read_data beads.data", contacts=contacts, **values)
+            fresh = _LAMMPS_PILE.format(start="read_data lammps.data", contacts=contacts, **values)
             if peak == 0.0 and name.endswith("dry"):
                 settled = _LAMMPS_PILE.format(start=f"read_restart {_SETTLED}", contacts=contacts, **values)
                 found[name] = Script(_LAMMPS, settled, environment(stock=True), fresh + _SETTLE_AND_KEEP)
@@ -215,7 +215,7 @@ def _write_beads(place: Path, beads: list[Bead], case: Case) -> None:
         lines.append(" ".join(map(repr, (bead.id, 1, 2.0 * bead.radius, case.beads.density, *bead.centre))))
     lines += ["", "Velocities", ""]
     lines += [" ".join(map(repr, (bead.id, *bead.velocity, *bead.spin))) for bead in beads]
-    (place / "beads.data").write_text("\n".join(lines) + "\n", "utf-8")
+    (place / "lammps.data").write_text("\n".join(lines) + "\n", "utf-8")
 
 
 def _neighbours(place: Path, beads: list[Bead]) -> float:
