@@ -23,7 +23,17 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tests.benchmark import ENGINE, REPEATS, compose_from, cpu_time, environment, minimal, shaken, without_steps
+from tests.benchmark import (
+    ENGINE,
+    REPEATS,
+    compose_for_stock,
+    compose_from,
+    cpu_time,
+    environment,
+    minimal,
+    shaken,
+    without_steps,
+)
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
 from walkers.physics.capillary import bead_volume
@@ -146,10 +156,11 @@ def scripts(case: str, beads: list[Bead], steps: int, folder: Path, peak: float 
     ``peak`` is the acceleration of the drive, m/s²; None for that of the case.
     """
     deck, loaded = compose_from(case, steps, beads), load_case(case)
+    stock_deck = compose_for_stock(case, steps, beads)
     values = _values(loaded, peak)
     changed = r"\g<1> {peak!r}".format(**values)
     ours, stock = (
-        re.sub(r"(peak_acceleration string) \S+", changed, one) for one in (deck.text, minimal(deck, loaded))
+        re.sub(r"(peak_acceleration string) \S+", changed, one) for one in (deck.text, minimal(stock_deck, loaded))
     )
     material = "{modulus} {e} {poisson}".format(**values)
     slip = "tangential mindlin NULL 1.0 {friction} damping tsuji".format(**values)
