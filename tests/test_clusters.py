@@ -210,6 +210,15 @@ def test_where_the_beads_of_a_climb_came_from() -> None:
     assert [row.neighbours for row in rows[-3:]] == [1, 2, 1]
 
 
+def test_a_bead_on_the_first_wall_of_a_vessel_without_a_floor_is_at_a_wall() -> None:
+    names = ("60°", "-60°", "-y", "+y")
+    pairs = [[(20, 21), *ON_PILE]] * FRAMES
+    scene = seen(UP, walls=lambda frame: {20: 0}, names=names)
+    bridges = [replace(bridges_of([*pairwise(BULK), *some], {20: 0}), frame=n) for n, some in enumerate(pairs)]
+    rows = rows_of(assembly_of(scene.tracks, scene.table, scene.beads, bridges))
+    assert {row.bead for row in rows if row.at_wall} == {20}
+
+
 def test_what_comes_later_does_not_change_when_a_climb_qualified() -> None:
     """Up 2.4 mm, down by more, up twice as far, a hop: records of any length tell the same of the time they share."""
     up = np.interp(TIME, [0.0, 0.8, 1.6, 3.2, 3.5, 3.52], [0.0, 2.4e-3, -0.5e-3, 4.8e-3, 0.0, 6e-3])[:, None]

@@ -206,6 +206,16 @@ def test_plateaus_of_a_ramp_neither_fall_nor_rise(tmp_path: Path) -> None:
         assert found[f"{name}_at"] == pytest.approx(0.9 * 9.8, abs=found[f"{name}_within"])
 
 
+def test_a_ramp_of_a_few_per_cent_has_a_threshold() -> None:
+    """From 4.00 to 3.88 g and back, in steps of 0.02 g; the walker moves above 3.93 g."""
+    falling = np.arange(400, 386, -2) / 100.0
+    peaks = np.concatenate([falling, falling[-2::-1]])
+    moves = ((peaks[1:] + peaks[:-1]) / 2.0 > 3.93)[:, None]
+    found = _thresholds(moves, peaks, by_ramp=True)
+    expected = {"stops_at": 3.94, "stops_within": 0.02, "starts_at": 3.94, "starts_within": 0.02}
+    assert found == pytest.approx(expected, abs=1e-9)
+
+
 def test_a_plateau_at_the_start_does_not_rise() -> None:
     """A walker moves while the drive is held at 2, stops while it falls, and starts while it rises again."""
     peaks = np.array([2.0, 2.0, 2.0, 1.0, 0.5, 0.5, 1.0, 2.0, 2.0])

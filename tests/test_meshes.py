@@ -121,11 +121,23 @@ VTP = """<VTKFile type="PolyData" version="0.1"><PolyData><Piece NumberOfPoints=
 PLY = """ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y
 property float z\nelement face 12\nproperty list uchar int vertex_indices\nend_header\n"""
 FAR = "\n".join([*(f"v 50000{x} {y} 0.5" for x in range(3) for y in range(3)), "f 1 2 4", "f 2 4 5", "f 3 4 5"])
+FAR_STL = "\n".join(
+    [
+        "solid far",
+        *(
+            f"facet normal 0 0 1\nouter loop\nvertex 1000000.{k} 0 0\nvertex 1000020 0 0\nvertex 1000020 {k + 1} 0\n"
+            "endloop\nendfacet"
+            for k in range(3)
+        ),
+        "endsolid far",
+    ]
+)
 UNREADABLE = {
     "words.obj": ("v a b c", "Failed to parse 0th vertex value at L.1"),
     "nan.obj": ("v nan 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3", "point 1 is (nan, 0, 0), which is no place"),
     "beyond.obj": ("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 9", "a polygon has the corner 9, but there are 3 points"),
     "far.obj": (FAR, "too far for 7 digits; move the mesh to the origin"),
+    "far.stl": (FAR_STL, "too far for 7 digits; move the mesh to the origin"),
     "empty.stl": ("", "Premature EOF while reading header"),
     "empty.obj": ("", "it has no points"),
     "short.off": ("OFF\n8 6 0\n0 0 0\n", "it announces 8 points and 6 faces, and has 1 lines of them"),

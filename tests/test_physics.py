@@ -259,6 +259,14 @@ def test_menisci_of_one_radius_have_one_suction(other: float, meniscus: float) -
     assert volume == pytest.approx(4.0 * pi * given.reduced_radius * 1e-16, rel=0.03, abs=0.0)
 
 
+def test_the_modulus_of_auto_ends_at_51_gpa() -> None:
+    """In glycerol at 1 kHz, contacts would be late even with four times as much, which a case may not have."""
+    changes = {"liquid.name": "glycerol", "drive.frequency": "1 kHz", "run.cycles": 3}
+    case = load_case("fig1b", changes)
+    assert case.contact.youngs_modulus == 51.2e9
+    assert delay(case, case.walkers[0]) > 0.025
+
+
 @pytest.mark.parametrize(
     ("name", "modulus"), [("fig1b", 50e6), ("fig4a", 200e6), ("fig4b", 800e6), ("climber", 3.2e9), ("pile-ci", 50e6)]
 )

@@ -463,3 +463,12 @@ def test_windows_are_around_their_samples(width: int) -> None:
     slow = slow_part(signals, width)
     np.testing.assert_allclose(slow[:, 0], signals[:, 0], atol=1e-9)
     np.testing.assert_allclose(slow[60:140, 1], signals[60:140, 1], atol=1e-8)
+
+
+def test_a_header_behind_a_hash_may_stand_above_decimal_commas(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    rows = [f"{number / 1e3:.4f};{9.81 * (number % 3):.3f}".replace(".", ",") for number in range(20)]
+    file.write_text("\n".join(["# time (s);z (m/s^2)", *rows]) + "\n", encoding="utf-8")
+    contents = read_record(file)
+    assert len(contents["rows"]) == 20
+    assert contents["rows"][5] == pytest.approx([5e-3, 0.0, 0.0, 19.62])

@@ -29,13 +29,14 @@ from walkers.templates.deck import (
     CONTENT_VERSION,
     Deck,
     Segment,
+    _beads_data,
     compose,
     plan_of,
     processor_grid,
     render_deck,
     settling_steps,
 )
-from walkers.templates.scene import place
+from walkers.templates.scene import Bead, Scene, place
 
 
 @pytest.mark.parametrize("name", shipped("case"))
@@ -73,6 +74,14 @@ def test_beads_from_a_file_are_those_that_commands_create(tmp_path: Path, monkey
         dumps.append([path.read_bytes() for name in names for path in sorted(place.rglob(name))])
     assert dumps[0] == dumps[1]
     assert len(dumps[0]) >= 6
+
+
+def test_beads_of_a_file_may_have_densities_of_their_own() -> None:
+    """Id, type, diameter (m), density (kg/m³), centre (m); 4000 kg/m³ for beads without their own."""
+    beads = (Bead(1, (0.0, 0.0, 1e-3), 1e-3), Bead(2, (0.0, 3e-3, 1e-3), 1e-3, surface=2, density=2500.0))
+    scene = Scene(beads, (), (-1.0, -1.0, 0.0), (1.0, 1.0, 1.0))
+    atoms = _beads_data(scene, 4000.0, types=3).partition("Atoms\n\n")[2].splitlines()[:2]
+    assert atoms == ["1 1 0.002 4000.0 0.0 0.0 0.001", "2 2 0.002 2500.0 0.0 0.003 0.001"]
 
 
 def test_walkers_are_not_sorted_and_piles_are() -> None:
