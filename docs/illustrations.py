@@ -261,7 +261,7 @@ def _experiments(bench: Bench) -> Figure:
         strengths.plot(experiments.STRENGTHS, curve, lw=1.0, color=f"C{number}")
     for label, how in (
         ("70 GPa", {}),
-        ("70 GPa, bridge from the film on", {"law": f"{experiments.__name__}:filmed"}),
+        ("70 GPa, bridge from the film on", {"law": f"{experiments.__file__}:filmed"}),
         ("50 MPa", {"modulus": 5e7}),
     ):
         stokes, e = experiments.restitutions(bench, **how)
