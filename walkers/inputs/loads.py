@@ -84,8 +84,8 @@ def softness_warning(case: Case) -> str | None:
     if phase < _NOTICED_DELAY:
         return None
     soft = f"soft beads: bridges delay contacts by {phase:.2g} rad; the speeds of climbing clusters are then"
-    if phase > _MEASURED_DELAYS[-2]:
-        return f"{soft} wrong by half or more (set a higher contact.youngs_modulus)"
+    if phase > _MEASURED_DELAYS[-1]:
+        return f"{soft} wrong, even in their direction (set a higher contact.youngs_modulus)"
     error = 100.0 * float(np.interp(phase, _MEASURED_DELAYS, _MEASURED_ERRORS))
     return f"{soft} up to {error:.0f} % off those of hard beads (contact.youngs_modulus)"
 
