@@ -306,7 +306,7 @@ def test_liggghts_alone_repeats_the_run_of_an_archive(
     assert done.returncode == 0, done.stderr
     dumps = len([*unpacked.glob("runs/**/beads.bin"), *unpacked.glob("runs/**/bridges.*s.txt")])
     assert done.stdout.count("the same   ") == len(done.stdout.splitlines()) == dumps >= 3
-    assert f"sh repeat.sh runs/{directory.name} repeated" in (unpacked / "README.md").read_text()
+    assert f"sh repeat.sh runs/{directory.name} ../repeated-by-liggghts" in (unpacked / "README.md").read_text()
     # A dump that is not the engine's is found.
     beads = sorted(unpacked.glob("runs/**/beads.bin"))[-1]
     beads.write_bytes(beads.read_bytes()[:-1] + b"x")

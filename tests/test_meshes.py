@@ -258,7 +258,7 @@ REFUSED = {
     "two-boxes-side-by-side.stl": r"a closed part beside the vessel, at \(9, -4, 0\) mm; expected parts within it",
     "open-box-and-box-beside.stl": r"a closed part beside the vessel, at \(15, -4, 0\) mm; expected parts within it",
     "above.stl": r"a closed part above the vessel, at \(-1, -1, 25\) mm; expected parts within it",
-    "bowtie.stl": r"openings that meet in a point, at \(0, 0, 8\) mm; expected one, at its top",
+    "bowtie.stl": r"openings that meet in a point, or .*, at \(0, 0, 8\) mm; expected one, at its top",
     "slot.stl": r"a rim that dips by 6.74 mm, at \(5, 2, 1\) mm; expected a rim about in one plane: close slots",
     "slotlid.stl": r"an opening that faces \+x, at \(5, 0, 4.5\) mm; expected one that faces \+z",
     "window.stl": r"an opening that faces \+x, at \(5, 0, 4\) mm; expected .* close a hole in its side",

@@ -381,7 +381,8 @@ def test_a_record_that_changes_without_a_threshold_has_a_velocity(tmp_path: Path
     done = run(load_case("fig1b", {**changes, "drive.record": str(tmp_path / "record.csv")}), tmp_path)
     assert "stops_at" not in done.result
     assert done.result.warnings == [
-        "the amplitude of the record changes from 3.49 to 3.96 g: the velocity is a mean over different drives"
+        "the amplitude of the strongest line of the record lies between 3.49 and 3.96 g: "
+        "the velocity is a mean over different drives"
     ]
     assert len(done.result.table("ramp")) == 6
 
@@ -472,3 +473,20 @@ def test_a_header_behind_a_hash_may_stand_above_decimal_commas(tmp_path: Path) -
     contents = read_record(file)
     assert len(contents["rows"]) == 20
     assert contents["rows"][5] == pytest.approx([5e-3, 0.0, 0.0, 19.62])
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("mg", 9.8e-3), ("G", 9.8), ("m/s2", 1.0)])
+def test_units_of_accelerometers(unit: str, factor: float, tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    rows = "\n".join(f"{number},{number % 3}" for number in range(20))
+    file.write_text(f"time (ms),Acc X ({unit})\n{rows}\n", encoding="utf-8")
+    assert read_record(file)["rows"][2][1] == pytest.approx(2.0 * factor)
+
+
+def test_the_largest_acceleration_is_that_of_the_spline() -> None:
+    """With six rows a period at 30°, 90°, … rows meet the peak of a sine; at 0°, 60°, … they miss it by 13 %."""
+    time = np.arange(0.0, 61.0) / 6.0 / F
+    sine = 39.2 * np.sin(2.0 * np.pi * F * time)
+    record = Record(rows=tuple((t, a, 0.0, 0.0) for t, a in zip(time.tolist(), sine.tolist(), strict=True)))
+    assert np.abs(sine).max() == pytest.approx(0.866 * 39.2, rel=1e-3)
+    assert record.largest(2) == pytest.approx(39.2, rel=0.01)

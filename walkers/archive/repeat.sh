@@ -30,13 +30,15 @@ else
     fail "$run: no deck (walker.lig) in it"
 fi
 
+for folder in $folders; do
+    [ -f "$run/$folder/bridges.txt" ] || fail "$run/$folder: its tables of forces (bridges.txt) were left out"
+done
 [ -f "$model/bridge.so" ] || sh "$model/build.sh"
 mkdir -p "$2"
 new=$(cd "$2" && pwd)
 status=0
 before=
 for folder in $folders; do
-    [ -f "$run/$folder/bridges.txt" ] || fail "$run/$folder: its tables of forces (bridges.txt) were left out"
     mkdir -p "$new/$folder"
     for file in "$run/$folder"/*; do
         case ${file##*/} in

@@ -37,6 +37,7 @@ WAVEFORMS: Mapping[str, tuple[tuple[int, float], ...]] = {
     "sawtooth": tuple((k, 2.0 / pi / k * (-1.0) ** (k + 1)) for k in range(1, 10)),
 }
 """Of the acceleration: multiples of the frequency and shares of the peak. A triangle's series is cut at 0.96 of it."""
+_LINE_ALONE = 0.95  # share of the largest acceleration of a record below which its line is named beside it
 _FEW = 3
 _SAME_TIME = 1e-9  # relative error of times, and of numbers of cycles
 MOST_PERIODS = 1000
@@ -323,7 +324,9 @@ class Excitation:
         """The drive in a few words, such as ``80 Hz, a0 = 39.2 m/s² + 160 Hz, a0 = 29.4 m/s², 90°``."""
         ramp = f", ramp {' to '.join(f'{factor:g}' for _, factor in self.ramp)}" if self.ramp else ""
         if self.record:
-            return f"record, {self.frequency:.4g} Hz, a0 = {self.record.largest(2):.4g} m/s²{ramp}"
+            largest, line = self.record.largest(2), self.record.amplitude_range[1]
+            of_line = f" (its line: {line:.4g} m/s²)" if line < _LINE_ALONE * largest else ""
+            return f"record, {self.frequency:.4g} Hz, a0 = {largest:.4g} m/s²{of_line}{ramp}"
         shown = self.harmonics if len(self.harmonics) <= _FEW else (self.largest,)
         words = [
             f"{harmonic.frequency:g} Hz, a0 = {harmonic.peak_acceleration:.4g} m/s²"

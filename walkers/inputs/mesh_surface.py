@@ -109,7 +109,8 @@ def _check_rims(vessel: Vessel) -> None:
     starts = Counter(vessel.ends(*shared[0])[0] for shared in vessel.sharing.values() if len(shared) == 1)
     for point, times in starts.items():
         if times > 1:
-            raise _broken("has openings that meet in a point,", vessel.points[point], _ONE_OPENING)
+            message = "has openings that meet in a point, or a corner within an edge of another part,"
+            raise _broken(message, vessel.points[point], _ONE_OPENING)
     rims = vessel.rims
     if len(rims) > 1:
         lowest = min((vessel.points[rim][vessel.points[rim, 2].argmin()] for rim in rims), key=lambda point: point[2])
@@ -229,7 +230,7 @@ def _without_skin(vessel: Vessel) -> Vessel:
         return Vessel(points, np.concatenate([skin.triangles, len(skin.points) + within.triangles]))
     if basin and basin.depth > _DOUBTFUL_BASIN * height:
         lowest = solid.points[min(basin.points, key=lambda point: solid.points[point, 2])]
-        hollow = f"is closed, with a hollow in its top, {1e3 * basin.depth:.3g} mm deep,"
+        hollow = f"is closed, with a hollow in its top, {1e3 * basin.depth:.3g} mm deep (to a slot in its wall?),"
         raise _broken(hollow, lowest, "the inner surface of a vessel alone, open at its top")
     _check_room(solid)
     return vessel
@@ -253,7 +254,8 @@ def _check_room(solid: Vessel) -> None:
         basin = _deepest(Vessel(turned, solid.triangles))
         if basin and basin.depth > _DEEP_BASIN * np.ptp(turned[:, 2]):
             message = f"is a solid whose inside opens toward {name},"
-            raise _broken(message, centre, "an opening toward +z, which is up: rotate the mesh")
+            at_opening = solid.points[turned[:, 2].argmax()]
+            raise _broken(message, at_opening, "an opening toward +z, which is up: rotate the mesh")
     volume = float(_volume(solid))
     share = volume / ConvexHull(solid.points).volume
     if share < _THINNEST_ROOM:

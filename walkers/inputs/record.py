@@ -117,12 +117,15 @@ class Record(Table):
         return {axis: place for place, axis in enumerate("xyz") if any(row[1 + place] for row in self.rows)}
 
     def largest(self, order: int) -> float:
-        """Largest displacement (order 0, m), velocity (1, m/s) or acceleration (2, m/s²) at the rows.
+        """Largest displacement (order 0, m), velocity (1, m/s) or acceleration (2, m/s²) of the spline.
 
-        It is the largest length of the vector. Displacement and velocity are without their slow
-        part, which is uncertain near both ends of a record: they are not evaluated there.
+        It is the largest length of the vector, at the rows and at three times between any two: with
+        six rows a period, the rows alone miss the peak of a sine by up to 13 %. Displacement and
+        velocity are without their slow part, which is uncertain near both ends of a record: they
+        are not evaluated there.
         """
-        time = self.course.x
+        rows = np.arange(len(self.course.x))
+        time = np.interp(np.arange(0.0, rows[-1] + 0.125, 0.25), rows, self.course.x)
         if order < 2 and not self.repeats:
             margin = min(_SLOW / self._lines[0], 0.4) * self.length
             time = time[(time >= margin) & (time <= self.length - margin)]

@@ -197,9 +197,15 @@ def _place_of(name: str) -> int | None:
 
 def _factor_of(head: str, unit: str, kind: Kind) -> float:
     """A unit in SI units."""
-    symbol = "m/s^2" if unit in _METRE_PER_SECOND_SQUARED else unit
+    if kind is ACCELERATION:
+        if unit in _METRE_PER_SECOND_SQUARED:
+            unit = "m/s^2"
+        elif unit in ("mg", "mG"):  # of an acceleration, never milligrams
+            return 1e-3 * parse_quantity("1 g", kind)
+        elif unit == "G":
+            unit = "g"
     try:
-        return parse_quantity(f"1 {symbol}", kind)
+        return parse_quantity(f"1 {unit}", kind)
     except ValueError as error:
         raise ValueError(f'column "{head}": {error}, in brackets behind the name') from error
 

@@ -26,6 +26,8 @@ from walkers.postprocess.sides import REST
 
 WINDOW = 8
 """Cycles of a window."""
+_COARSE = 0.3
+"""Share of a threshold above which its resolution is told as a doubt."""
 _EXACT = 1e-9
 """Largest change of a constant drive with a ramp, over its strength: rounding errors."""
 _REVERSAL = 0.05
@@ -65,12 +67,18 @@ def measure(motion: Motion) -> Measured:
     numbers = _thresholds(np.abs(velocity) > REST, peaks, by_ramp=bool(drive.ramp))
     if not drive.ramp and not any(map(isfinite, numbers.values())):
         low, high = (amplitude / ACCELERATION_OF_ONE_G for amplitude in (peaks.min(), peaks.max()))
-        changing = f"the amplitude of the record changes from {low:.3g} to {high:.3g} g"
+        changing = f"the amplitude of the strongest line of the record lies between {low:.3g} and {high:.3g} g"
         return Measured({"ramp": columns}, {}, (f"{changing}: the velocity is a mean over different drives",))
+    doubts = []
+    for verb in ("stops", "starts"):
+        within = numbers[f"{verb}_within"]
+        if within > _COARSE * numbers[f"{verb}_at"]:
+            change = f"{within / ACCELERATION_OF_ONE_G:.2g} g in {WINDOW} cycles"
+            doubts.append(f"the drive at which a walker {verb} is uncertain: it changes by {change}")
     if len(case.walkers[0].radii) == 2:
         gamma0 = dimer_of(case).gamma0
         numbers |= {f"gamma0_{name}": gamma0(number) for name, number in numbers.items()}
-    return Measured({"ramp": columns}, numbers)
+    return Measured({"ramp": columns}, numbers, tuple(doubts))
 
 
 def _thresholds(moves: BoolArray, peaks: FloatArray, *, by_ramp: bool) -> dict[str, float]:

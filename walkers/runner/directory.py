@@ -266,6 +266,9 @@ def move_into_place(complete: Path, place: Path) -> None:
     recover(place)
     replaced = place.with_name(place.name + REPLACED)
     if place.exists():
+        for case_file in place.glob("*.toml"):  # of an unpacked archive: it may be the file that was run
+            if not (complete / case_file.name).exists():
+                link_or_copy(case_file, complete / case_file.name)
         place.rename(replaced)
     complete.rename(place)
     fsync_path(place.parent)
