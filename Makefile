@@ -32,7 +32,7 @@ sweep: setup $(if $(SITE),.venv/with-cluster) ## Run what is missing of SWEEP=fi
 	  [ $$status -gt 1 ] || $(WALKERS) list $(basename $(notdir $(SWEEP))) --out $(OUT); exit $$status
 
 .PHONY: pile
-pile: setup ## Shake the small pile (or PILE=pile-fig1a): what climbed, pictures, a film; goes on where it was interrupted
+pile: setup ## Shake the small pile until a cluster climbs (or PILE=pile-fig1a): pictures, a film; goes on where it was interrupted
 	@$(MAKE) --no-print-directory walker CASE=$(PILE) OUT=$(OUT) FILM=$(if $(filter file,$(origin FILM)),720p,$(FILM))
 
 .PHONY: figures

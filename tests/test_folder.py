@@ -19,6 +19,7 @@ import walkers
 from tests.conftest import (
     PATIENCE,
     PROGRAM,
+    SHORT,
     TINY,
     call,
     document,
@@ -372,3 +373,15 @@ def test_a_large_sweep_says_how_far_it_is_before_it_runs(out: Path, monkeypatch:
     plan = plan_sweep(sweep, out, Options(1), on_progress=lambda progress: told.append(progress.text))
     assert [text.partition(",")[0] for text in told] == [f"{n} of 12 points resolved" for n in range(1, 13)]
     assert len(plan.cases) == 12
+
+
+def test_a_case_file_in_the_folder_of_its_run_survives_the_run(in_folder: Path) -> None:
+    """As in an unpacked archive, whose case files are in the folders of their runs."""
+    Path("short.toml").write_text(to_toml(document(run=SHORT)), encoding="utf-8")
+    call("run", "short.toml", check=True)
+    (run,) = Path("runs").glob("short-*")
+    inside = Path("short.toml").rename(run / "short.toml")
+    for _ in range(2):
+        call("run", str(inside), "--force", check=True)
+    assert inside.is_file()
+    assert [path.name for path in Path("runs").glob("short-*")] == [run.name]
