@@ -478,9 +478,11 @@ def test_what_is_no_file_to_read_is_refused_at_once(tmp_path: Path) -> None:
     """A byte order mark is no mistake."""
     os.mkfifo(tmp_path / "fifo.toml")
     (tmp_path / "large.toml").write_text(f'title = "{"x" * (17 << 20)}"\n')
-    for path in (Path("/dev/zero"), tmp_path / "fifo.toml", tmp_path / "large.toml"):
-        with pytest.raises(InputError, match="expected a file of at most 16 MB"):
+    for path in (Path("/dev/zero"), tmp_path / "fifo.toml"):
+        with pytest.raises(InputError, match="is a pipe, a socket or a device; expected a file"):
             read_toml(path)
+    with pytest.raises(InputError, match="expected a file of at most 16 MB"):
+        read_toml(tmp_path / "large.toml")
     (tmp_path / "windows.toml").write_text(to_toml(document()), encoding="utf-8-sig")
     assert load_case(tmp_path / "windows.toml") == make_case().but(name="windows")
 

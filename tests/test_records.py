@@ -1,5 +1,6 @@
 """Files of recorded shaking, the offset and the slow drift of sensors, and amplitudes that change."""
 
+import os
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -490,3 +491,9 @@ def test_the_largest_acceleration_is_that_of_the_spline() -> None:
     record = Record(rows=tuple((t, a, 0.0, 0.0) for t, a in zip(time.tolist(), sine.tolist(), strict=True)))
     assert np.abs(sine).max() == pytest.approx(0.866 * 39.2, rel=1e-3)
     assert record.largest(2) == pytest.approx(39.2, rel=0.01)
+
+
+def test_a_record_that_is_no_file_is_refused_without_waiting(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "record.csv")
+    with pytest.raises(ValueError, match="is a pipe, a socket or a device; expected a file"):
+        read_record(tmp_path / "record.csv")

@@ -101,7 +101,9 @@ def _text_of(path: Path) -> str:
         status = path.stat()
         if stat.S_ISDIR(status.st_mode):
             raise ValueError("cannot be read: Is a directory")
-        if not stat.S_ISREG(status.st_mode) or status.st_size > _MOST_BYTES:
+        if not stat.S_ISREG(status.st_mode):
+            raise ValueError("is a pipe, a socket or a device; expected a file")
+        if status.st_size > _MOST_BYTES:
             raise ValueError(f"expected a file of at most {_MOST_BYTES >> 20} MB")
         contents = path.read_bytes()
     except OSError as error:

@@ -31,7 +31,9 @@ def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file; an `InputError` if it cannot be read, is no TOML, no regular file, or larger than 16 MB."""
     try:
         about = path.stat()
-        if not stat.S_ISDIR(about.st_mode) and (not stat.S_ISREG(about.st_mode) or about.st_size > _MOST_BYTES):
+        if not stat.S_ISDIR(about.st_mode) and not stat.S_ISREG(about.st_mode):
+            raise refused(path, "is a pipe, a socket or a device; expected a file")
+        if about.st_size > _MOST_BYTES:
             raise refused(path, f"expected a file of at most {_MOST_BYTES >> 20} MB")
         return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except UnicodeDecodeError as error:
