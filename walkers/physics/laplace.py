@@ -90,7 +90,7 @@ class ForceCurve(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _Turned:
+class _Trigonometry:
     """Trigonometric functions of angles x, from those of x/2 alone; all arrays have the shape of the angles."""
 
     sines: FloatArray  # sin x
@@ -101,7 +101,7 @@ class _Turned:
     half_sinc_slopes: FloatArray  # derivative of sin(y)/y at y = x/2
 
     @classmethod
-    def of(cls, angles: FloatArray) -> _Turned:
+    def of(cls, angles: FloatArray) -> _Trigonometry:
         """Compute the functions of angles (rad)."""
         halves = 0.5 * angles
         sines, cosines = sine_and_cosine(halves)
@@ -118,9 +118,9 @@ class _Turned:
             half_sinc_slopes=_sinc_slope(halves, cosines, half_sincs),
         )
 
-    def part(self, columns: slice) -> _Turned:
+    def part(self, columns: slice) -> _Trigonometry:
         """The functions of some columns of the angles."""
-        return _Turned(**{name: values[:, columns] for name, values in vars(self).items()})
+        return _Trigonometry(**{name: values[:, columns] for name, values in vars(self).items()})
 
 
 def _sinc_slope(x: FloatArray, cosines: FloatArray, sincs: FloatArray) -> FloatArray:
@@ -186,26 +186,26 @@ class _Family:
     curvatures: tuple[float, float]
     contact_angles: tuple[float, float]
 
-    def solids(self, arcs: FloatArray, turned: _Turned | None = None) -> _Solids:
-        """The solids at wetting lines with these arcs, shape (n, 2); ``turned``: of the filling angles."""
+    def solids(self, arcs: FloatArray, trigonometry: _Trigonometry | None = None) -> _Solids:
+        """The solids at wetting lines with these arcs, shape (n, 2); ``trigonometry``: of the filling angles."""
         curvatures = np.array(self.curvatures)
-        slopes = curvatures * arcs
-        turned = turned or _Turned.of(slopes)
-        radii = arcs * turned.sincs
+        filling_angles = curvatures * arcs
+        trigonometry = trigonometry or _Trigonometry.of(filling_angles)
+        radii = arcs * trigonometry.sincs
         # The angle of the profile is π - θ1 - α1 at the first solid and θ2 + α2 at the second one.
         contact_sines, contact_cosines = self.contact
-        sines = contact_sines * turned.cosines + _AWAY * contact_cosines * turned.sines
-        cosines = contact_cosines * turned.cosines - _AWAY * contact_sines * turned.sines
+        sines = contact_sines * trigonometry.cosines + _AWAY * contact_cosines * trigonometry.sines
+        cosines = contact_cosines * trigonometry.cosines - _AWAY * contact_sines * trigonometry.sines
         turning = _AWAY * curvatures
         return _Solids(
             radii=radii,
-            radii_by_arc=turned.cosines,
-            rises=0.5 * slopes * arcs * turned.half_sincs**2,
-            rises_by_arc=turned.sines,
+            radii_by_arc=trigonometry.cosines,
+            rises=0.5 * filling_angles * arcs * trigonometry.half_sincs**2,
+            rises_by_arc=trigonometry.sines,
             uprights=radii * sines,
-            uprights_by_arc=turned.cosines * sines + turning * radii * cosines,
+            uprights_by_arc=trigonometry.cosines * sines + turning * radii * cosines,
             outwards=radii * cosines,
-            outwards_by_arc=turned.cosines * cosines - turning * radii * sines,
+            outwards_by_arc=trigonometry.cosines * cosines - turning * radii * sines,
         )
 
     @cached_property
@@ -218,19 +218,19 @@ class _Family:
         """Profiles of n bridges x, shape (n, 5), and the solids at their ends."""
         pressure, length = x[:, 2:3], x[:, 3:4]
         along = length * _PLACES
-        slopes = np.array(self.curvatures) * x[:, :2]
-        turned = _Turned.of(np.concatenate([pressure * along, slopes], axis=1))
-        turned_profile, turned_slopes = turned.part(slice(0, -2)), turned.part(slice(-2, None))
-        solids = self.solids(x[:, :2], turned_slopes)
+        filling_angles = np.array(self.curvatures) * x[:, :2]
+        trigonometry = _Trigonometry.of(np.concatenate([pressure * along, filling_angles], axis=1))
+        on_profile, at_ends = trigonometry.part(slice(0, -2)), trigonometry.part(slice(-2, None))
+        solids = self.solids(x[:, :2], at_ends)
         radius, radius_by_arc = solids.radii[:, :1], solids.radii_by_arc[:, :1]
         upright, upright_by_arc = solids.uprights[:, :1], solids.uprights_by_arc[:, :1]
         outward, outward_by_arc = solids.outwards[:, :1], solids.outwards_by_arc[:, :1]
 
         # swing = sin(ps)/p and lift = 2 (1 - cos ps)/p², both smooth at p = 0.
-        swing = along * turned_profile.sincs
-        swing_by_pressure = along * along * turned_profile.sinc_slopes
-        lift = (along * turned_profile.half_sincs) ** 2
-        lift_by_pressure = along * along * along * turned_profile.half_sincs * turned_profile.half_sinc_slopes
+        swing = along * on_profile.sincs
+        swing_by_pressure = along * along * on_profile.sinc_slopes
+        lift = (along * on_profile.half_sincs) ** 2
+        lift_by_pressure = along * along * along * on_profile.half_sincs * on_profile.half_sinc_slopes
         bend = 1.0 - pressure * upright
         bend_by_arc = -pressure * upright_by_arc
 
@@ -239,10 +239,10 @@ class _Family:
         grown_by_arc = bend_by_arc * lift + 2.0 * outward_by_arc * swing
         grown_by_pressure = -upright * lift + bend * lift_by_pressure + 2.0 * outward * swing_by_pressure
         # r cos φ is half the derivative of r² with respect to s.
-        outwards = outward * turned_profile.cosines + bend * swing
-        outwards_by_arc = outward_by_arc * turned_profile.cosines + bend_by_arc * swing
-        outwards_by_pressure = -outward * turned_profile.sines * along - upright * swing + bend * swing_by_pressure
-        outwards_by_length = (-outward * turned_profile.sines * pressure + bend * turned_profile.cosines) * _PLACES
+        outwards = outward * on_profile.cosines + bend * swing
+        outwards_by_arc = outward_by_arc * on_profile.cosines + bend_by_arc * swing
+        outwards_by_pressure = -outward * on_profile.sines * along - upright * swing + bend * swing_by_pressure
+        outwards_by_length = (-outward * on_profile.sines * pressure + bend * on_profile.cosines) * _PLACES
         grown_by_length = 2.0 * outwards * _PLACES
         return _Profile(
             solids=solids,
@@ -371,10 +371,10 @@ def _toroid(family: _Family) -> FloatArray:
     arc = np.full(2, sqrt(2.0 / sqrt(pi * sum(family.curvatures))))
     curvatures = np.array(family.curvatures)
     slopes = curvatures * arc
-    height = float((0.5 * slopes * arc * _Turned.of(slopes).half_sincs ** 2).sum())
+    height = float((0.5 * slopes * arc * _Trigonometry.of(slopes).half_sincs ** 2).sum())
     angles = [angle + float(slope) for angle, slope in zip(family.contact_angles, slopes, strict=True)]
     turn = 0.5 * (pi - sum(angles))
-    length = height / float(_Turned.of(np.array(turn)).sincs)
+    length = height / float(_Trigonometry.of(np.array(turn)).sincs)
     return np.array([*arc, 1.0 / arc[0] - 2.0 * float(sine(turn)) / height, length, 0.0])
 
 
