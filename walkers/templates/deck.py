@@ -172,7 +172,7 @@ def compose(plan: Plan) -> Deck:
     liquid, contacts = surfaces[0][1], [contact for contact, _ in surfaces]
     # Resistances of built-in laws are proportional to the viscosity.
     scalable = len(surfaces) == 1 and liquid.law in LAWS and liquid.viscosity > 0.0
-    files = {BRIDGES_NAME: tables_of(case, surfaces, {(bead.surface, bead.radius) for bead in scene.beads})}
+    files = {BRIDGES_NAME: _tables_of_scene(case, scene)}
     record = case.excitation.record
     files |= case.excitation.courses()
     files |= {LOADS_NAME: _loads(scene)} if len(scene.loadings) > 1 else {}
@@ -262,6 +262,12 @@ def tables_of(case: Case, surfaces: Sequence[Surface], sizes: Collection[tuple[i
         raise InputError(case.name, [Problem("liquid.law", case.liquid.law, str(error))]) from error
 
 
+def _tables_of_scene(case: Case, scene: Scene) -> str:
+    """The bridge tables of the beads of a scene, whose cases have the law of this one."""
+    sizes = {(bead.surface, bead.radius) for bead in scene.beads}
+    return tables_of(case, scene.surfaces or (surface_of(case),), sizes)
+
+
 def bridge_tables_digest(case: Case) -> str:
     """SHA-256 of the bridge tables that the engine reads for a case, hexadecimal.
 
@@ -269,8 +275,7 @@ def bridge_tables_digest(case: Case) -> str:
     known before bridges are solved; the manifest has this digest.
     """
     scene, _ = place((case,))
-    sizes = {(bead.surface, bead.radius) for bead in scene.beads}
-    tables = tables_of(case, scene.surfaces or (surface_of(case),), sizes)
+    tables = _tables_of_scene(case, scene)
     return hashlib.sha256(tables.encode("utf-8", "surrogateescape")).hexdigest()
 
 
