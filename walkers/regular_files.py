@@ -50,6 +50,26 @@ def read_regular(path: Path) -> bytes:
         return file.read()
 
 
+def read_limited(path: Path, most_bytes: int) -> bytes:
+    """Contents of a file that a user names, of at most so many bytes.
+
+    Raises
+    ------
+    ValueError
+        If it is no regular file, or larger; the message says which.
+    OSError
+        If it is a folder, or cannot be read.
+    """
+    status = path.stat()
+    if stat.S_ISDIR(status.st_mode):
+        raise _not_regular(path)
+    if not stat.S_ISREG(status.st_mode):
+        raise ValueError("is a pipe, a socket or a device; expected a file")
+    if status.st_size > most_bytes:
+        raise ValueError(f"expected a file of at most {most_bytes >> 20} MB")
+    return read_regular(path)
+
+
 def _not_regular(path: Path) -> OSError:
     if path.is_dir():
         return IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import re
-import stat
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import TypedDict
 
 from walkers.inputs.units import ACCELERATION, TIME, Kind, parse_quantity
+from walkers.regular_files import read_limited
 
 _MOST_BYTES = 64 << 20
 _EXAMPLE = '"time (ms), x (g), z (m/s^2)"'
@@ -98,14 +98,7 @@ def read_record(path: Path) -> RecordContents:
 def _text_of(path: Path) -> str:
     """The text of a file."""
     try:
-        status = path.stat()
-        if stat.S_ISDIR(status.st_mode):
-            raise ValueError("cannot be read: Is a directory")
-        if not stat.S_ISREG(status.st_mode):
-            raise ValueError("is a pipe, a socket or a device; expected a file")
-        if status.st_size > _MOST_BYTES:
-            raise ValueError(f"expected a file of at most {_MOST_BYTES >> 20} MB")
-        contents = path.read_bytes()
+        contents = read_limited(path, _MOST_BYTES)
     except OSError as error:
         raise ValueError(f"cannot be read: {error.strerror}") from error
     try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import stat
 import tomllib
 from collections.abc import Iterable, Mapping
 from importlib import import_module
@@ -11,6 +10,7 @@ from typing import Any
 
 from walkers.errors import refused, unusable
 from walkers.inputs.keys import parts_of, value_at
+from walkers.regular_files import read_limited
 
 _MOST_BYTES = 16 << 20
 _FILES = {
@@ -30,19 +30,18 @@ def toml_bytes(tables: Mapping[str, Any]) -> bytes:
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file; an `InputError` if it cannot be read, is no TOML, no regular file, or larger than 16 MB."""
     try:
-        about = path.stat()
-        if not stat.S_ISDIR(about.st_mode) and not stat.S_ISREG(about.st_mode):
-            raise refused(path, "is a pipe, a socket or a device; expected a file")
-        if about.st_size > _MOST_BYTES:
-            raise refused(path, f"expected a file of at most {_MOST_BYTES >> 20} MB")
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        contents = read_limited(path, _MOST_BYTES)
+    except ValueError as error:
+        raise refused(path, str(error)) from error
+    except OSError as error:
+        raise refused(path, f"cannot be read: {error.strerror}") from error
+    try:
+        return tomllib.loads(contents.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         actual = f"byte {error.object[error.start]:#04x} at offset {error.start}"
         raise refused(path, f"expected UTF-8 text, found {actual}") from error
     except (ValueError, RecursionError) as error:  # TOML's own errors, integers of 5000 digits, brackets without end
         raise refused(path, f"not TOML: {error}") from error
-    except OSError as error:
-        raise refused(path, f"cannot be read: {error.strerror}") from error
 
 
 def with_files(
