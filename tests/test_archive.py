@@ -20,10 +20,10 @@ from tests.conftest import SHORT, brief_pile, call, document, make_case, to_toml
 from walkers import Run, load_case
 from walkers.archive.crate import PAPER, Author, describe_crate
 from walkers.archive.writing import Contents, contents_of, write_archive
+from walkers.files import write_json
 from walkers.inputs.case import Case
 from walkers.runner.binary import model_version
 from walkers.runner.directory import leave_out_dumps
-from walkers.runner.files import write_json
 from walkers.runner.manifest import FileChanged, read_manifest
 from walkers.runner.provenance import software
 from walkers.sweeps.table import load

@@ -14,6 +14,7 @@ import pytest
 
 import walkers
 from tests.conftest import document, make_case
+from walkers.files import write_json
 from walkers.inputs.axes import Range
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Harmonic, waveform
@@ -29,7 +30,6 @@ from walkers.postprocess.report.player import _points
 from walkers.postprocess.scene import Scene, rotations_at, turned_in
 from walkers.postprocess.uncertainty import SPREAD_NAME, bands_of, spread_of
 from walkers.postprocess.walking import _doubts, _posture, _scatter, _velocities, tables_of
-from walkers.runner.files import write_json
 from walkers.runner.manifest import iso_time
 from walkers.show import describe, predicted_overhead, summarise
 from walkers.sweeps.making import progress_in

@@ -37,6 +37,7 @@ from tests.conftest import (
 from walkers import run as run_case
 from walkers.archive.writing import write_archive
 from walkers.errors import InputError
+from walkers.files import read_json, write_json
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
 from walkers.inputs.toml import read_toml
@@ -47,7 +48,6 @@ from walkers.postprocess.report.run import result_html
 from walkers.postprocess.results import measure, read
 from walkers.runner.directory import CASE_NAME, FIRST_SEGMENT, case_of, locked, recomputed
 from walkers.runner.failures import DiskFull, RunBusy
-from walkers.runner.files import read_json, write_json
 from walkers.runner.launch import launch
 from walkers.sweeps.table import load as load_table
 from walkers.templates.deck import Deck, render_deck

@@ -20,7 +20,7 @@ import walkers
 from docs._ext import generated
 from docs.illustrations import facts, mark_upright, output_of, pages_of, refreshed, stale, without_hashes
 from walkers import load_case
-from walkers.runner.files import read_json
+from walkers.files import read_json
 from walkers.text import rendered
 from walkers.theory.prediction import PAPER, predicted_column
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import jinja2
 
-from walkers.runner.files import read_json
+from walkers.files import read_json
 
 ROOT = Path(__file__).resolve().parents[1]
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))

@@ -17,7 +17,7 @@ import walkers
 from tests.conftest import wait_for
 from tests.test_report import browser, walked_run  # noqa: F401
 from walkers.api import Pictures
-from walkers.runner.files import read_json
+from walkers.files import read_json
 
 EXAMPLE = Path(__file__).parents[1] / "docs" / "examples" / "01_first_walk.py"
 CELLS = {

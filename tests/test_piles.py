@@ -12,6 +12,7 @@ import walkers
 from tests.conftest import HALF, call
 from tests.printed import spoilt
 from walkers.errors import InputError
+from walkers.files import read_json
 from walkers.inputs.case import Case
 from walkers.inputs.loads import bridge_at_rest, delay_of, delay_of_loose_beads, softness_warning
 from walkers.inputs.reading import load_case, shipped
@@ -19,7 +20,6 @@ from walkers.inputs.toml import read_toml
 from walkers.postprocess.figures import figures_of
 from walkers.postprocess.motion import FLOOR, read_bridges, read_motion
 from walkers.postprocess.results import read
-from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.show import notes
 

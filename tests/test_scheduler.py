@@ -25,13 +25,13 @@ import pytest
 from tests.cluster import LOCAL, slurm_cluster, why_not
 from tests.conftest import PATIENCE, PROGRAM, TINY, bits, call, document, finished_places, make_case, to_toml, wait_for
 from walkers.errors import InputError
+from walkers.files import write_json
 from walkers.inputs.loads import dimer_of
 from walkers.inputs.sweep import load_sweep
 from walkers.progress import Progress
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import case_of, unfinished
 from walkers.runner.failures import WalkersMet
-from walkers.runner.files import write_json
 from walkers.sweeps.making import DECK_FOLDER, make_runs, progress_at
 from walkers.sweeps.scheduler import (
     LONGEST_SECONDS,

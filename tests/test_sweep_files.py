@@ -16,6 +16,7 @@ import walkers
 from tests.conftest import REFERENCE, TINY, document, make_case, to_toml
 from tests.test_inputs import GLASS
 from walkers.errors import InputError
+from walkers.files import read_json
 from walkers.inputs.case import Case
 from walkers.inputs.library import unmeasured
 from walkers.inputs.loads import dimer_of
@@ -24,7 +25,6 @@ from walkers.postprocess import meetings
 from walkers.postprocess.dump import DumpError
 from walkers.postprocess.numbers import band_text
 from walkers.postprocess.uncertainty import SPREAD_NAME, held_text, spread_of
-from walkers.runner.files import read_json
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.spread import describe, run_spread, spread_in, spread_sweep
 from walkers.sweeps.table import groups, thresholds

@@ -18,6 +18,7 @@ import pytest
 import walkers
 from tests.conftest import call, make_case
 from walkers.commands.catalogue import catalogue
+from walkers.files import write_json
 from walkers.inputs import library
 from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
@@ -30,7 +31,6 @@ from walkers.postprocess.tables import read_columns
 from walkers.postprocess.uncertainty import SPREAD_NAME, spread_of
 from walkers.postprocess.walking import _velocities
 from walkers.rounding import rounded
-from walkers.runner.files import write_json
 from walkers.sweeps.accuracy import measure_accuracy, times_of
 from walkers.sweeps.folder import as_text, inventory
 from walkers.sweeps.readable import kind_of

@@ -18,6 +18,7 @@ import walkers
 from tests.conftest import document
 from walkers.api import compare
 from walkers.errors import InputError, Stopped
+from walkers.files import read_json, write_json
 from walkers.inputs.case import Case
 from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.reading import load_case, shipped
@@ -35,7 +36,6 @@ from walkers.postprocess.walking import measure, walkers_met
 from walkers.progress import Progress
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import FIRST_SEGMENT, case_of, segment_directories
-from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import RESULT_NAME, read_manifest
 from walkers.sweeps.making import make_runs
 from walkers.theory.mathieu import turning_rate

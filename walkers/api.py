@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from walkers import DEFAULT_OUT, RECORDS
 from walkers.errors import InputError, Problem, WalkersError, apply_all, check_utf8, expected_of, refused
+from walkers.files import read_json
 from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess import results
@@ -35,7 +36,6 @@ from walkers.progress import Progress, in_notebook, progress_of
 from walkers.runner import directory as on_disk
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import EngineMissing, RunBusy
-from walkers.runner.files import read_json
 from walkers.runner.manifest import read_manifest
 from walkers.sweeps import table as of_points
 from walkers.sweeps.accuracy import measure_accuracy

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from walkers.errors import check_utf8, expected_of, refused
+from walkers.files import write_json
 from walkers.inputs.reading import shipped
-from walkers.runner.files import write_json
 
 _SCHEMA = "case.schema.json"
 

@@ -13,10 +13,10 @@ import numpy as np
 from walkers.calibration.calibrate import PROPOSED, Outcome
 from walkers.calibration.file import Calibration
 from walkers.calibration.observations import FloatArray
+from walkers.files import write_bytes, write_json
 from walkers.inputs.keys import flatten
 from walkers.inputs.toml import toml_bytes
 from walkers.postprocess.drawing import TWO_COLUMNS, new_figure, save_figure, styled
-from walkers.runner.files import write_bytes, write_json
 from walkers.text import aligned, rendered
 
 if TYPE_CHECKING:

@@ -194,7 +194,7 @@ def calibrate(
         A calibration file, or the name of a shipped calibration such as ruby.
     """
     from walkers.calibration.report import RECORD_NAME, summary, write_outcome
-    from walkers.runner.files import read_json
+    from walkers.files import read_json
 
     outcome = walkers.calibrate(calibration, out, jobs=jobs, progress=True, **vars(by))
     tell(*(f"{name}: {len(failures)} points failed" for name, failures in outcome.failures.items()))

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.errors import refused
 from walkers.extras import require
+from walkers.files import write_bytes, write_json
 from walkers.paper.comparison import compare
 from walkers.paper.figures import fig1b, fig2_threshold, fig3, fig4, of_sweep
 from walkers.paper.sources import NothingFinishedError, Sources, of_facts, sets, sweep_of
 from walkers.postprocess.drawing import check_formats, save_figure
 from walkers.progress import progress_of
-from walkers.runner.files import write_bytes, write_json
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
 from walkers.text import rendered
 

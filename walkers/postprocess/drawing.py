@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import numpy as np
 
 from walkers.errors import refused
-from walkers.runner.files import beside
+from walkers.files import beside
 from walkers.text import printable
 
 if TYPE_CHECKING:

@@ -17,6 +17,7 @@ import numpy as np
 
 from walkers.errors import WalkersError, refused
 from walkers.extras import require
+from walkers.files import beside
 from walkers.postprocess import scene as view
 from walkers.postprocess.drawing import check_place
 from walkers.postprocess.dump import FloatArray
@@ -24,7 +25,6 @@ from walkers.postprocess.film_options import FilmOptions
 from walkers.postprocess.motion import Motion, read_motion
 from walkers.postprocess.necks import bridges_at, bridges_text
 from walkers.progress import Progress, Tell
-from walkers.runner.files import beside
 
 _AROUND, _AROUND_TRAY = 1.2, 1.3  # extent of the picture over that of the paths of the beads, or of the tray
 _LETTERS, _WIDE, _LEAST_LETTERS = 24, 42, 15  # lines and heights of a line per picture; smallest height, pixels

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from walkers.files import read_json
 from walkers.inputs.bodies import Walkers
 from walkers.inputs.case import Case
 from walkers.inputs.drive import Excitation
 from walkers.postprocess.dump import BinaryDump, BoolArray, DumpError, FloatArray, IntArray, NoNumberError, local_frames
 from walkers.runner.directory import SEGMENT_NAME, case_of, layout_of, run_of, segment_directories
-from walkers.runner.files import read_json
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.templates.layout import MEAN_SPIN_COLUMNS, Layout, PlacedWalker
 

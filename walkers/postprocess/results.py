@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, refused
+from walkers.files import read_json, write_json
 from walkers.inputs.loads import gravity_warnings, softness_warning
 from walkers.inputs.run import limits_of
 from walkers.postprocess import meetings, piles, record_part, threshold, walking
@@ -23,7 +24,6 @@ from walkers.postprocess.tables import Columns, read_columns, read_table, write_
 from walkers.postprocess.uncertainty import accuracy_of, bands_of, lines_of_rest, rests_on
 from walkers.rounding import counted, percent
 from walkers.runner.directory import SEGMENT_NAME, files_of_segments, recomputed, segment_directories
-from walkers.runner.files import read_json, write_json
 from walkers.runner.manifest import RESULT_NAME, check_unchanged
 
 if TYPE_CHECKING:

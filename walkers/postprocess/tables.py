@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.errors import refused
+from walkers.files import beside
 from walkers.postprocess.quantities import TABLES, declared, matches
 from walkers.regular_files import read_regular
-from walkers.runner.files import beside
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from walkers.errors import check_limits
+from walkers.files import beside
 from walkers.postprocess.drawing import check_place
 from walkers.postprocess.motion import read_motion
-from walkers.runner.files import beside
 
 _COLUMNS = ("id", "type", "mol", "radius", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz")
 _FORMAT = "%d %d %d" + " %.10g" * 10

@@ -32,8 +32,8 @@ from walkers.cache import (
     make_cache_folder,
     secure_cache,
 )
+from walkers.files import checksum, read_json, write_json
 from walkers.runner.failures import AUDITED_VERSION, ContactModelMissing, EngineFailure, EngineMissing, OtherEngine
-from walkers.runner.files import checksum, read_json, write_json
 from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, RUN_NAME
 
 ENGINE_VARIABLE = "WALKERS_ENGINE"

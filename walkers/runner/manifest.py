@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from walkers.errors import WalkersError
+from walkers.files import checksum, read_json, write_json
 from walkers.inputs.case import Case
 from walkers.runner.binary import Engine, model_version, plugin_of, read_audit
-from walkers.runner.files import checksum, read_json, write_json
 from walkers.runner.launch import EngineReport
 from walkers.runner.provenance import software
 from walkers.templates.deck import CONTENT_VERSION, bridge_tables_digest

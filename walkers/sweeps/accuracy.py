@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import refused
+from walkers.files import write_json
 from walkers.inputs.case import STIFFEST, Case
 from walkers.inputs.sweep import Sweep, expand
 from walkers.postprocess.results import recorded
@@ -21,7 +22,6 @@ from walkers.postprocess.sides import STEADY_SPEED
 from walkers.postprocess.uncertainty import ACCURACY, ACCURACY_NAME
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import case_of, recomputed, run_place
-from walkers.runner.files import write_json
 from walkers.sweeps.scheduler import Options, SweepStopped, run_sweep
 from walkers.sweeps.table import SIDES, load, main_columns, sides_differ
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from walkers.errors import refused
+from walkers.files import checksum, read_json, write_json
 from walkers.inputs.case import Case
 from walkers.inputs.run import CONSTANT, settling_of
 from walkers.inputs.table import changed
@@ -26,7 +27,6 @@ from walkers.rounding import percent
 from walkers.runner import directory as on_disk
 from walkers.runner.binary import find_engine, plugin_of, write_run_script
 from walkers.runner.failures import EngineFailure, MissingFrames
-from walkers.runner.files import checksum, read_json, write_json
 from walkers.runner.launch import judge
 from walkers.runner.manifest import MANIFEST_NAME, checksums, read_manifest, write_manifest
 from walkers.sweeps.readable import kind_of

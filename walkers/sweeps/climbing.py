@@ -19,12 +19,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.errors import refused
+from walkers.files import write_bytes
 from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, save_figure, styled
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.results import plain, read
 from walkers.postprocess.uncertainty import guesses
 from walkers.rounding import percent
-from walkers.runner.files import write_bytes
 from walkers.sweeps.table import SEEDS, groups, key_texts
 from walkers.text import aligned
 

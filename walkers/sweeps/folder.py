@@ -19,13 +19,13 @@ from stat import S_ISDIR
 from typing import Any, TypeAlias
 
 from walkers.errors import InputError, refused, suggestion
+from walkers.files import VTK_SCRATCH, abandoned, read_json
 from walkers.inputs.case import Case
 from walkers.postprocess.numbers import headline, in_short
 from walkers.postprocess.results import plain, read
 from walkers.postprocess.uncertainty import ACCURACY, SPREAD
 from walkers.rounding import counted, duration_text
 from walkers.runner import directory as on_disk
-from walkers.runner.files import VTK_SCRATCH, abandoned, read_json
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.sweeps.making import progress_at
 from walkers.sweeps.readable import FlatCase, differing, flattened, has_value, readable, short_keys

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from walkers.errors import Stopped, WalkersError
+from walkers.files import fsync_path, link_or_copy, make_folder, read_json, write_json
 from walkers.inputs.case import Case
 from walkers.inputs.run import Run
 from walkers.postprocess.results import measure
@@ -30,7 +31,6 @@ from walkers.rounding import duration_text
 from walkers.runner import directory as on_disk
 from walkers.runner.binary import Engine, is_new, model_sha256, read_audit
 from walkers.runner.failures import AuditFailed, BeadsOverTheTop, UnauditedEngineWarning
-from walkers.runner.files import fsync_path, link_or_copy, make_folder, read_json, write_json
 from walkers.runner.launch import EngineReport, check_room, last_step, launch
 from walkers.runner.manifest import write_manifest
 from walkers.templates import deck as decks

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from walkers.errors import InputError
+from walkers.files import write_bytes
 from walkers.postprocess.report.page import NAME, check_report, fill, page_of, svg_of
 from walkers.postprocess.results import read
 from walkers.postprocess.uncertainty import lines_of_rest
-from walkers.runner.files import write_bytes
 from walkers.sweeps.figure import LeftOutWarning, figure_of, readable_key
 from walkers.sweeps.table import cells_of, load
 

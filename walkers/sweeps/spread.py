@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, check_limits, refused, unusable
+from walkers.files import write_json
 from walkers.inputs.axes import Range, ranges_of, unit_cube, written
 from walkers.inputs.case import Case
 from walkers.inputs.messages import blaming
@@ -24,7 +25,6 @@ from walkers.postprocess.uncertainty import SPREAD_NAME, few_draws, held_of, hel
 from walkers.rounding import counted, rounded
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
-from walkers.runner.files import write_json
 from walkers.sweeps.figure import LeftOutWarning, figure_of, rank_correlations
 from walkers.sweeps.readable import kind_of
 from walkers.sweeps.scheduler import Failure, Options, run_sweep

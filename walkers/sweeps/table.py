@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, refused, suggestion
+from walkers.files import json_bytes, make_folder, read_json, write_bytes, write_json
 from walkers.inputs.axes import ranges_of
 from walkers.inputs.origins import text_of
 from walkers.postprocess.numbers import headline
@@ -31,7 +32,6 @@ from walkers.postprocess.results import Results, modules_of, read
 from walkers.postprocess.sides import SEPARATED
 from walkers.rounding import counted, rounded
 from walkers.runner.directory import FAILURE_NAME, is_finished, is_locked, unfinished
-from walkers.runner.files import json_bytes, make_folder, read_json, write_bytes, write_json
 from walkers.sweeps.making import share_kept
 from walkers.sweeps.readable import short_keys
 from walkers.text import aligned

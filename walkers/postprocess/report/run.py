@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.extras import require
+from walkers.files import write_bytes
 from walkers.inputs.case import Case
 from walkers.inputs.origins import Origin, text_of
 from walkers.postprocess.caption import caption
@@ -19,7 +20,6 @@ from walkers.postprocess.report.player import MOST_PLACES, player_of
 from walkers.postprocess.results import BAND_NOTE, Results, has_band, headlines, not_computed, read
 from walkers.postprocess.uncertainty import held_of, held_text
 from walkers.runner.directory import case_of
-from walkers.runner.files import write_bytes
 from walkers.runner.manifest import read_manifest
 
 if TYPE_CHECKING:
