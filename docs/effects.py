@@ -15,8 +15,8 @@ from numba import njit
 
 from docs.tables import page
 from walkers import load_case
-from walkers.inputs.case import Case
-from walkers.inputs.loads import contact_loads, dimer_of
+from walkers.inputs.resolving.loads import contact_loads, dimer_of
+from walkers.inputs.tables.case import Case
 from walkers.theory.motion import Walker, walk
 from walkers.theory.quasistatic import FloatArray
 

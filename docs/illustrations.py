@@ -37,8 +37,8 @@ from walkers.check.lines import as_dict, failures, run_checks
 from walkers.check.literature import LITERATURE
 from walkers.errors import InputError, Problem
 from walkers.files import read_json, write_bytes, write_json
-from walkers.inputs.case import Case
 from walkers.inputs.sweep import Sweep, load_sweep
+from walkers.inputs.tables.case import Case
 from walkers.paper.make import COMPARED, FIGURES, make_figures
 from walkers.paper.sources import sweep_of
 from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, save_figure, styled

@@ -18,8 +18,8 @@ from pathlib import Path
 from statistics import median
 
 import walkers
-from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
+from walkers.inputs.tables.case import Case
 from walkers.runner.binary import find_engine, plugin_of
 from walkers.runner.directory import write_deck
 from walkers.runner.launch import ALONE

@@ -34,8 +34,8 @@ from tests.benchmark import (
     shaken,
     without_steps,
 )
-from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
+from walkers.inputs.tables.case import Case
 from walkers.physics.capillary import bead_volume
 from walkers.postprocess.dump import BinaryDump
 from walkers.runner.directory import write_deck

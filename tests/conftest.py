@@ -24,10 +24,10 @@ from tomli_w import dumps as to_toml
 from walkers import run as run_case
 from walkers.archive.writing import write_archive
 from walkers.cache import make_cache_folder
-from walkers.inputs.case import Case
 from walkers.inputs.origins import Origin
 from walkers.inputs.reading import shipped
 from walkers.inputs.sweep import expand
+from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
 from walkers.main import main
 from walkers.postprocess import series

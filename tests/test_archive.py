@@ -21,7 +21,7 @@ from walkers import Run, load_case
 from walkers.archive.crate import PAPER, Author, describe_crate
 from walkers.archive.writing import Contents, contents_of, write_archive
 from walkers.files import write_json
-from walkers.inputs.case import Case
+from walkers.inputs.tables.case import Case
 from walkers.runner.binary import model_version
 from walkers.runner.directory import leave_out_dumps
 from walkers.runner.manifest import FileChanged, read_manifest

@@ -14,11 +14,11 @@ import pytest
 
 import walkers
 from tests.conftest import REFERENCE, make_case
-from walkers.inputs.boundary import Boundary
-from walkers.inputs.case import Case
-from walkers.inputs.loads import contact_loads
 from walkers.inputs.reading import load_case, shipped
-from walkers.inputs.standing import standing
+from walkers.inputs.resolving.loads import contact_loads
+from walkers.inputs.resolving.standing import standing
+from walkers.inputs.tables.boundary import Boundary
+from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.figures import figures_of
 from walkers.postprocess.gait import postures

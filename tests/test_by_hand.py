@@ -13,8 +13,8 @@ import walkers
 from tests.conftest import REFERENCE, SHORT, call, document, make_case, wait_for
 from walkers import run as run_case
 from walkers.errors import InputError
-from walkers.inputs.case import Case
-from walkers.inputs.table import changed
+from walkers.inputs.config_table import changed
+from walkers.inputs.tables.case import Case
 from walkers.runner.directory import FIRST_SEGMENT
 from walkers.sweeps.by_hand import take_in, write_folder
 from walkers.sweeps.readable import differing, flattened

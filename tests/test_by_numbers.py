@@ -16,10 +16,10 @@ import walkers
 from tests.conftest import document, make_case
 from walkers.files import write_json
 from walkers.inputs.axes import Range
-from walkers.inputs.case import Case
-from walkers.inputs.drive import Harmonic, waveform
-from walkers.inputs.loads import bridge_at_rest, contact_loads
 from walkers.inputs.reading import load_case
+from walkers.inputs.resolving.loads import bridge_at_rest, contact_loads
+from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.drive import Harmonic, waveform
 from walkers.postprocess import meetings
 from walkers.postprocess.films import speed_text
 from walkers.postprocess.gait import averages, fit_slopes, settled_samples

@@ -37,10 +37,10 @@ from walkers.check.scenes import (
     second_engine,
     standing,
 )
-from walkers.inputs.boundary import BOTTOM, Flat, Round, Wall
-from walkers.inputs.case import Case
-from walkers.inputs.drive import Vector
 from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.tables.boundary import BOTTOM, Flat, Round, Wall
+from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.drive import Vector
 from walkers.inputs.toml import read_toml
 from walkers.physics.bridge import Surfaces
 from walkers.physics.contact import hertz_overlap, reduced_modulus
@@ -210,7 +210,7 @@ def _rows(bench: Bench, plan: Plan) -> tuple[FloatArray, FloatArray]:
 
 
 def test_walls_are_as_far_as_the_boundary_says(bench: Bench) -> None:
-    """Planes in any direction and a cylinder: overlaps and nearest points are those of `walkers.inputs.boundary`."""
+    """Planes in any direction and a cylinder: overlaps and nearest points are those of `walkers.inputs.tables.boundary`."""
     leaning, hollow = Flat((1e-4, 2e-4, -3e-4), (0.48, -0.36, 0.8), "leaning"), Round(2.5e-3)
     turn, out = 2.0, 2.5e-3 - RADIUS + 1e-6
     beads = [over(leaning, -1e-6, RADIUS), Bead(0, (out * cos(turn), out * sin(turn), 4e-3), RADIUS)]

@@ -11,8 +11,8 @@ import numpy.typing as npt
 import pandas as pd
 import pytest
 
-from walkers.inputs.boundary import Flat
 from walkers.inputs.reading import load_case
+from walkers.inputs.tables.boundary import Flat
 from walkers.postprocess import clusters
 from walkers.postprocess.clusters import (
     Beads,

@@ -38,8 +38,8 @@ from walkers import run as run_case
 from walkers.archive.writing import write_archive
 from walkers.errors import InputError
 from walkers.files import read_json, write_json
-from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
+from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.dump import BinaryDump, DumpError, local_frames
 from walkers.postprocess.motion import read_motion

@@ -13,8 +13,8 @@ import pytest
 from tests.conftest import call, document, make_case, to_toml
 from walkers import load_case, run
 from walkers.check.crosscheck import compare
-from walkers.inputs.case import Case
 from walkers.inputs.sweep import load_sweep
+from walkers.inputs.tables.case import Case
 from walkers.postprocess.motion import boundary_motion
 from walkers.postprocess.numbers import rows, state
 from walkers.postprocess.quantities import declared

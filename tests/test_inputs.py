@@ -16,13 +16,13 @@ import pytest
 from tests.conftest import REFERENCE, call, document, make_case, origins, to_toml
 from walkers.errors import InputError
 from walkers.inputs import units
-from walkers.inputs.case import Case
-from walkers.inputs.library import library_of, unmeasured
-from walkers.inputs.loads import gravity_warnings
+from walkers.inputs.config_table import changed
 from walkers.inputs.origins import Origin
 from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.resolving.library import library_of, unmeasured
+from walkers.inputs.resolving.loads import gravity_warnings
 from walkers.inputs.sweep import expand
-from walkers.inputs.table import changed
+from walkers.inputs.tables.case import Case
 from walkers.inputs.units import parse_quantity, quantity_text
 from walkers.physics.mixtures import water_glycerol
 from walkers.postprocess.uncertainty import lines_of_rest, rests_on

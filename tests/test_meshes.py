@@ -14,13 +14,13 @@ import pytest
 import walkers
 from tests.test_vessels import bowl, cuboid, poured, prism, write
 from walkers.errors import InputError
-from walkers.inputs.boundary import Boundary
-from walkers.inputs.case import Case
-from walkers.inputs.flat_faces import LEAST_STEP
-from walkers.inputs.mesh import MOST_BYTES, read_mesh
-from walkers.inputs.mesh_surface import vessel_of
-from walkers.inputs.vessel import Vessel
-from walkers.inputs.wall_names import names_of_faces
+from walkers.inputs.meshes.flat_faces import LEAST_STEP
+from walkers.inputs.meshes.mesh_file import MOST_BYTES, read_mesh
+from walkers.inputs.meshes.mesh_surface import vessel_of
+from walkers.inputs.meshes.vessel import Vessel
+from walkers.inputs.meshes.wall_names import names_of_faces
+from walkers.inputs.tables.boundary import Boundary
+from walkers.inputs.tables.case import Case
 from walkers.postprocess.dump import FloatArray
 from walkers.runner import failures
 from walkers.show import describe, predicted_seconds, summarise

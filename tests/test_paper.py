@@ -14,8 +14,8 @@ from tests.conftest import call
 from tests.printed import letters, spoilt
 from walkers.calibration.observations import numbers_of
 from walkers.inputs.keys import flatten
-from walkers.inputs.loads import dimer_of
 from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.sweep import expand
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
@@ -231,7 +231,7 @@ def test_dimers_turn_as_the_pendulum_does_but_as_much_faster_as_their_beads_are_
 
 
 def test_the_program_draws_what_is_asked_for(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("walkers.inputs.run._MOST_CYCLES", 12)  # of 60: Fig. 4b would take them all
+    monkeypatch.setattr("walkers.inputs.tables.run._MOST_CYCLES", 12)  # of 60: Fig. 4b would take them all
     done = call("paper", "figures", "--only", "fig4", "--format", "svg", "-j", "1", check=True)
     assert done.stdout.splitlines() == ["figures/fig4.svg"]
 

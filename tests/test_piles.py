@@ -13,9 +13,9 @@ from tests.conftest import HALF, call
 from tests.printed import spoilt
 from walkers.errors import InputError
 from walkers.files import read_json
-from walkers.inputs.case import Case
-from walkers.inputs.loads import bridge_at_rest, delay_of, delay_of_loose_beads, softness_warning
 from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.resolving.loads import bridge_at_rest, delay_of, delay_of_loose_beads, softness_warning
+from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.figures import figures_of
 from walkers.postprocess.motion import FLOOR, read_bridges, read_motion

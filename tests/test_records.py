@@ -12,9 +12,9 @@ from tests.conftest import call, document, to_toml
 from tests.test_drive import BRIEF, RAMP, csv, recorded
 from walkers import load_case, run
 from walkers.errors import InputError
-from walkers.inputs.record import Record, record_of
-from walkers.inputs.record_file import read_record
-from walkers.inputs.signals import slow_part
+from walkers.inputs.records.record import Record, record_of
+from walkers.inputs.records.record_file import read_record
+from walkers.inputs.records.signals import slow_part
 from walkers.postprocess.motion import boundary_motion, read_motion
 from walkers.postprocess.scene import Scene
 from walkers.postprocess.threshold import applies, directions

@@ -38,7 +38,7 @@ from tests.conftest import (
 )
 from walkers import run as run_case
 from walkers.cache import is_trusted
-from walkers.inputs.case import Case
+from walkers.inputs.tables.case import Case
 from walkers.physics.laws import young_laplace
 from walkers.runner import binary, directory, failures
 from walkers.runner.binary import find_engine, plugin_of

@@ -26,7 +26,7 @@ from tests.cluster import LOCAL, slurm_cluster, why_not
 from tests.conftest import PATIENCE, PROGRAM, TINY, bits, call, document, finished_places, make_case, to_toml, wait_for
 from walkers.errors import InputError
 from walkers.files import write_json
-from walkers.inputs.loads import dimer_of
+from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.sweep import load_sweep
 from walkers.progress import Progress
 from walkers.runner.binary import find_engine

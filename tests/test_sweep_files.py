@@ -17,10 +17,10 @@ from tests.conftest import REFERENCE, TINY, document, make_case, to_toml
 from tests.test_inputs import GLASS
 from walkers.errors import InputError
 from walkers.files import read_json
-from walkers.inputs.case import Case
-from walkers.inputs.library import unmeasured
-from walkers.inputs.loads import dimer_of
+from walkers.inputs.resolving.library import unmeasured
+from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.sweep import Sweep, expand, load_sweep
+from walkers.inputs.tables.case import Case
 from walkers.postprocess import meetings
 from walkers.postprocess.dump import DumpError
 from walkers.postprocess.numbers import band_text

@@ -15,10 +15,10 @@ import pytest
 from tests.conftest import brief_pile, call, document, make_case, to_toml
 from tests.test_physics import OWN
 from walkers import run as run_case
-from walkers.inputs.boundary import Boundary
-from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.sweep import load_sweep
+from walkers.inputs.tables.boundary import Boundary
+from walkers.inputs.tables.case import Case
 from walkers.physics.bridge import Surfaces
 from walkers.physics.laws import LAWS, by_name
 from walkers.runner.binary import find_engine

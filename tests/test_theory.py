@@ -13,9 +13,9 @@ from numba import njit
 from scipy.special import mathieu_a, mathieu_b
 
 from tests.conftest import call, document, make_case, to_toml
-from walkers.inputs.case import Case
-from walkers.inputs.loads import dimer_of, resistances_at_rest
 from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.resolving.loads import dimer_of, resistances_at_rest
+from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.gait import gait
 from walkers.postprocess.motion import Group

@@ -19,9 +19,9 @@ import walkers
 from tests.conftest import call, make_case
 from walkers.commands.catalogue import catalogue
 from walkers.files import write_json
-from walkers.inputs import library
-from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
+from walkers.inputs.resolving.steps import library
+from walkers.inputs.tables.case import Case
 from walkers.inputs.units import parse_quantity
 from walkers.postprocess.motion import read_motion
 from walkers.postprocess.numbers import fell, headline, rows

@@ -16,12 +16,12 @@ from tests.conftest import to_toml
 from walkers.check.crosscheck import compare
 from walkers.check.scenes import DRY, Bench, bench_case, full_case, prescribed, standing
 from walkers.errors import InputError
-from walkers.inputs.boundary import FLOOR, LOOSE
-from walkers.inputs.case import Case
+from walkers.inputs.meshes.vessel import Vessel
 from walkers.inputs.reading import load_case
-from walkers.inputs.standing import standing as starts
+from walkers.inputs.resolving.standing import standing as starts
 from walkers.inputs.sweep import load_sweep
-from walkers.inputs.vessel import Vessel
+from walkers.inputs.tables.boundary import FLOOR, LOOSE
+from walkers.inputs.tables.case import Case
 from walkers.postprocess.dump import FloatArray
 from walkers.postprocess.motion import read_bridges
 from walkers.postprocess.necks import ends_of

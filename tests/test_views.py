@@ -23,8 +23,8 @@ import walkers
 from tests.conftest import call
 from tests.printed import letters, spoilt
 from walkers.errors import InputError
-from walkers.inputs.boundary import Boundary
-from walkers.inputs.loads import bridge_at_rest
+from walkers.inputs.resolving.loads import bridge_at_rest
+from walkers.inputs.tables.boundary import Boundary
 from walkers.postprocess.figures import MOST_NAMED, _interpolated, figures_of, looks_of, plot_run
 from walkers.postprocess.film_options import FilmOptions
 from walkers.postprocess.films import film_times

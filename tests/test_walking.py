@@ -19,9 +19,9 @@ from tests.conftest import document
 from walkers.api import compare
 from walkers.errors import InputError, Stopped
 from walkers.files import read_json, write_json
-from walkers.inputs.case import Case
-from walkers.inputs.loads import contact_loads, dimer_of
 from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.resolving.loads import contact_loads, dimer_of
+from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.dump import DumpError
 from walkers.postprocess.figures import figures_of

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from walkers.api import Run, Sweep, calibrate, climb, compare, load, predict, run, sweep
-    from walkers.case_file import new
+    from walkers.inputs.new import new
     from walkers.inputs.reading import load_case
 
 __all__ = ["Run", "Sweep", "calibrate", "climb", "compare", "load", "load_case", "new", "predict", "run", "sweep"]
@@ -24,7 +24,7 @@ _PACKAGES = (
     *("physics", "inputs", "templates", "runner", "postprocess"),
     *("sweeps", "archive", "check", "theory", "paper", "calibration"),
 )
-_MODULES = {**dict.fromkeys(__all__, "api"), **{"load_case": "inputs.reading", "new": "case_file"}}
+_MODULES = {**dict.fromkeys(__all__, "api"), **{"load_case": "inputs.reading", "new": "inputs.new"}}
 """Modules of the public names."""
 
 

@@ -59,8 +59,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from walkers.calibration.calibrate import Outcome
-    from walkers.inputs.case import Case
     from walkers.inputs.origins import Origin
+    from walkers.inputs.tables.case import Case
 
 Named: TypeAlias = "Case | str | Path | Mapping[str, Any]"
 Changes: TypeAlias = "Mapping[str, Any] | None"

@@ -11,11 +11,11 @@ from dataclasses import asdict
 from math import acos, ceil, degrees, inf, isfinite
 from typing import Any
 
-from walkers.inputs.bodies import Walkers
-from walkers.inputs.case import Case
-from walkers.inputs.library import library_of
-from walkers.inputs.loads import contact_loads, dimer_of, gravity_warnings
-from walkers.inputs.run import CONSTANT, limits_of
+from walkers.inputs.resolving.library import library_of
+from walkers.inputs.resolving.loads import contact_loads, dimer_of, gravity_warnings
+from walkers.inputs.tables.bodies import Walkers
+from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.run import CONSTANT, limits_of
 from walkers.inputs.units import ACCELERATION_OF_ONE_G, MODULUS, parse_quantity
 from walkers.physics.capillary import bead_volume, capillary_force_limit_at_wall
 from walkers.physics.time_step import FRACTIONS

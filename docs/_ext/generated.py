@@ -22,10 +22,10 @@ from pydantic.fields import FieldInfo
 from docs.tables import markdown
 from walkers.commands import commands
 from walkers.commands.catalogue import COMMANDS, NOT_KNOWN, catalogue
-from walkers.inputs.case import Case
-from walkers.inputs.library import LibraryNumber
-from walkers.inputs.resolving import SUPPLIED
-from walkers.inputs.table import Table, example_of, keys_in, table_in
+from walkers.inputs.config_table import Table, example_of, keys_in, table_in
+from walkers.inputs.resolving.library import LibraryNumber
+from walkers.inputs.resolving.steps import SUPPLIED
+from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION, AUTO, TEMPERATURE, Kind, kind_in, quantity_text
 from walkers.main import print_help, program
 from walkers.postprocess.quantities import GROUPS, TABLES, Quantity

@@ -25,9 +25,9 @@ from typing import Any
 import pandas as pd
 
 from walkers import load_case, run
-from walkers.inputs.case import Case
 from walkers.inputs.reading import shipped
 from walkers.inputs.sweep import load_sweep
+from walkers.inputs.tables.case import Case
 from walkers.templates.deck import render_deck, whole
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -17,12 +17,12 @@ from scipy.stats import truncnorm, uniform
 
 from walkers.calibration.observations import FloatArray, Names, Observation
 from walkers.errors import InputError, Problem, suggestion
-from walkers.inputs.case import Case
+from walkers.inputs.config_table import Table, changed
 from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import validated
 from walkers.inputs.reading import find_input
 from walkers.inputs.sweep import Sweep, expand
-from walkers.inputs.table import Table, changed
+from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import Number, Whole
 

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, ValidationInfo, field_validator
 
-from walkers.inputs.table import Table
+from walkers.inputs.config_table import Table
 from walkers.inputs.units import ANGLE, SPEED, WRITTEN, Kind, Number, parse_quantity
 from walkers.postprocess.gait import misalignment, settled_samples, steady_walkers, together
 from walkers.postprocess.results import read

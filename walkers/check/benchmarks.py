@@ -20,7 +20,7 @@ from walkers.check.engine import SecondEngine
 from walkers.check.kernels import FloatArray
 from walkers.check.lines import Line
 from walkers.check.scenes import DRY, FLOOR, bench_case
-from walkers.inputs.case import Friction, Roughness
+from walkers.inputs.tables.case import Friction, Roughness
 from walkers.physics.contact import Impact, reduced_modulus
 
 READING, STEP, SLIDING = 0.02, 2e-3, 4e-3

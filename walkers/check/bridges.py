@@ -15,8 +15,8 @@ import numpy as np
 
 from walkers.api import run
 from walkers.check.lines import Line
-from walkers.inputs.loads import dimer_of, surfaces_of
 from walkers.inputs.reading import load_case
+from walkers.inputs.resolving.loads import dimer_of, surfaces_of
 from walkers.physics import capillary
 from walkers.physics.bridge import FloatArray
 from walkers.physics.laws import rabinovich, soulie, willett, young_laplace

@@ -19,8 +19,8 @@ from walkers.api import run
 from walkers.check.engine import SecondEngine
 from walkers.check.kernels import FloatArray
 from walkers.check.lines import Line, Verdict
-from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.gait import averages, walk
 from walkers.postprocess.motion import Motion

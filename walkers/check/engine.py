@@ -12,9 +12,9 @@ from scipy.interpolate import CubicSpline
 from walkers.check import kernels
 from walkers.check.kernels import CELLS, Bridges, Constants, FloatArray, State
 from walkers.errors import refused
-from walkers.inputs.boundary import Flat, Round, Wall
-from walkers.inputs.case import Case
-from walkers.inputs.loads import surfaces_of
+from walkers.inputs.resolving.loads import surfaces_of
+from walkers.inputs.tables.boundary import Flat, Round, Wall
+from walkers.inputs.tables.case import Case
 from walkers.physics.bridge import BridgeLaw, Surfaces
 
 TERMS = ("capillary", "lubrication", "damping", "friction", "rolling-friction", "gravity", "drive")

@@ -21,11 +21,11 @@ from walkers.api import run
 from walkers.check.kernels import FloatArray
 from walkers.check.lines import Line
 from walkers.check.scenes import DRY, FLOOR, STILL, Bench, R, bench_case, over, recording
-from walkers.inputs.boundary import Flat, Wall
-from walkers.inputs.case import Case
-from walkers.inputs.drive import Harmonic
-from walkers.inputs.loads import bridge_at_rest, contact_loads, resistances_at_rest
 from walkers.inputs.reading import load_case
+from walkers.inputs.resolving.loads import bridge_at_rest, contact_loads, resistances_at_rest
+from walkers.inputs.tables.boundary import Flat, Wall
+from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.drive import Harmonic
 from walkers.physics.bridge import Curve, Surfaces
 from walkers.physics.capillary import bead_volume
 from walkers.physics.contact import Impact, reduced_modulus

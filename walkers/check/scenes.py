@@ -23,11 +23,11 @@ from walkers.check.engine import SecondEngine
 from walkers.check.kernels import FloatArray
 from walkers.check.lines import Line
 from walkers.errors import Stopped
-from walkers.inputs.boundary import BOTTOM, Flat, Round, Wall
-from walkers.inputs.case import Case
-from walkers.inputs.drive import Vector
-from walkers.inputs.loads import surfaces_of
 from walkers.inputs.reading import load_case
+from walkers.inputs.resolving.loads import surfaces_of
+from walkers.inputs.tables.boundary import BOTTOM, Flat, Round, Wall
+from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.drive import Vector
 from walkers.physics.bridge import Curve, Forces, Surfaces
 from walkers.physics.laws import LAWS, by_name
 from walkers.postprocess.dump import BinaryDump

@@ -8,8 +8,8 @@ from importlib import resources
 from pathlib import Path
 
 from walkers.errors import refused, suggestion
-from walkers.inputs.library import HALF, Library, LibraryNumber, read_library, unmeasured
 from walkers.inputs.reading import shipped
+from walkers.inputs.resolving.library import HALF, Library, LibraryNumber, read_library, unmeasured
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import TEMPERATURE, quantity_text
 from walkers.physics.laws import LAWS

@@ -12,8 +12,8 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from walkers.errors import InputError, Problem, shown, suggestion, unusable
+from walkers.inputs.config_table import Table, example_of, keys_in, keys_of, table_in
 from walkers.inputs.keys import MISSING, joined, parts_of, value_at
-from walkers.inputs.table import Table, example_of, keys_in, keys_of, table_in
 from walkers.inputs.units import AUTO, WRITTEN
 
 File = TypeVar("File", bound=BaseModel)

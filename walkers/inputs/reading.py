@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, check_utf8, refused, shortened, suggestion, unusable
 from walkers.inputs.keys import MISSING, value_at
-from walkers.inputs.library import FILE_NAME, read_library
 from walkers.inputs.messages import blaming
+from walkers.inputs.resolving.library import FILE_NAME, read_library
 from walkers.inputs.toml import read_toml, with_files
 
 if TYPE_CHECKING:
-    from walkers.inputs.case import Case
+    from walkers.inputs.tables.case import Case
 
 _HERE = Path(__file__).parent
 _COMMANDS = {
@@ -64,7 +64,7 @@ def load_case(case: str | Path | Mapping[str, Any], changes: Mapping[str, Any] |
     path = Path("case.toml") if isinstance(case, Mapping) else find_input(case, "case")
     document = case if isinstance(case, Mapping) else read_case(path)
     # Not above: a missing file is reported before the models of a case are built, which takes time.
-    from walkers.inputs.case import Case
+    from walkers.inputs.tables.case import Case
 
     source = "<case>" if isinstance(case, Mapping) else str(case)
     return Case.read(document, source=source, name=path.stem, changes=changes, around=True)

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core.core_schema import NullableSchema, TupleSchema, WithDefaultSchema
 
-from walkers.inputs.case import Case
+from walkers.inputs.tables.case import Case
 
 _LINK = re.compile(r" See \[\]\(\S+\)\.")  # to a page, from the page of keys
 

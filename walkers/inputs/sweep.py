@@ -24,11 +24,11 @@ from walkers.inputs.axes import (
     sampled,
     zipped,
 )
-from walkers.inputs.case import Case
+from walkers.inputs.config_table import Table, alternatives, changed
 from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import blaming, check_key, validated
 from walkers.inputs.reading import find_input, read_case, shipped
-from walkers.inputs.table import Table, alternatives, changed
+from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml, with_files
 from walkers.inputs.units import Speed, Whole
 

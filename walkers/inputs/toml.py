@@ -14,8 +14,8 @@ from walkers.regular_files import read_limited
 
 _MOST_BYTES = 16 << 20
 _FILES = {
-    "boundary.mesh": ("meshes", "mesh", "read_mesh"),
-    "drive.record": ("records", "record_file", "read_record"),
+    "boundary.mesh": ("meshes", "meshes.mesh_file", "read_mesh"),
+    "drive.record": ("records", "records.record_file", "read_record"),
 }
 """Keys that name files, the tables of their contents by these names, and their readers."""
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from walkers.calibration.observations import LEAST_SPEED, Observation, numbers_in
-from walkers.inputs.case import Case
+from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.paper.sources import Sources, of_facts, ruby, sets, sweep_of, thresholds_with_theory
 from walkers.postprocess.results import plain

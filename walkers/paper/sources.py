@@ -11,9 +11,9 @@ import numpy as np
 
 from walkers.calibration.file import Calibration, load_calibration
 from walkers.errors import WalkersError
-from walkers.inputs.case import Case
 from walkers.inputs.reading import load_case
 from walkers.inputs.sweep import Sweep, load_sweep
+from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.caption import liquid_text, radii_text
 from walkers.postprocess.motion import Group, read_motion

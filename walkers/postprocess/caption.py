@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import degrees
 
-from walkers.inputs.case import Case
+from walkers.inputs.tables.case import Case
 from walkers.rounding import counted
 
 

@@ -23,8 +23,8 @@ from typing import Any
 
 import numpy as np
 
-from walkers.inputs.boundary import FLOOR as FLOOR_NAME
-from walkers.inputs.boundary import Wall
+from walkers.inputs.tables.boundary import FLOOR as FLOOR_NAME
+from walkers.inputs.tables.boundary import Wall
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import FLOOR, Bridges
 from walkers.postprocess.tables import Columns, columns_of

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.errors import refused
-from walkers.inputs.case import Case
+from walkers.inputs.tables.case import Case
 from walkers.postprocess.caption import caption
 from walkers.postprocess.drawing import (
     FORMATS,

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from walkers.inputs.run import CONSTANT, Run
+from walkers.inputs.tables.run import CONSTANT, Run
 from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
 from walkers.postprocess.motion import Group, between, read_motion
 from walkers.postprocess.sides import REST, SEPARATED, STEADY_SPEED

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from walkers.inputs.boundary import FLOOR
-from walkers.inputs.case import Case
+from walkers.inputs.tables.boundary import FLOOR
+from walkers.inputs.tables.case import Case
 from walkers.postprocess.clusters import connected
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.motion import Bridges, Motion

@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.files import read_json
-from walkers.inputs.bodies import Walkers
-from walkers.inputs.case import Case
-from walkers.inputs.drive import Excitation
+from walkers.inputs.tables.bodies import Walkers
+from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.drive import Excitation
 from walkers.postprocess.dump import BinaryDump, BoolArray, DumpError, FloatArray, IntArray, NoNumberError, local_frames
 from walkers.runner.directory import SEGMENT_NAME, case_of, layout_of, run_of, segment_directories
 from walkers.runner.manifest import MANIFEST_NAME
@@ -44,7 +44,7 @@ class Motion:
             Position and velocity of the centres; angular velocity, rad/s.
         substrate : ndarray, shape (F, 3)
             Displacement of the boundary in the laboratory, for both frames of the drive, m; of a record, without its
-            slow part (`walkers.inputs.record.Record.slow_course`).
+            slow part (`walkers.inputs.records.record.Record.slow_course`).
         radius : ndarray, shape (N,)
         walkers
             The walkers with the indices of their beads, from 0.
@@ -202,7 +202,7 @@ class Group:
         """Headings: unit vectors in the plane of the floor, shape (F, W, 3).
 
         They point from the centroid of the small beads to that of the large beads; with beads of one size, from the
-        hindmost to the foremost beads (`walkers.inputs.bodies.Walkers.toward_large`).
+        hindmost to the foremost beads (`walkers.inputs.tables.bodies.Walkers.toward_large`).
         """
         arm = np.einsum("fwbx,b->fwx", self.position, np.array(self.make.toward_large))
         arm[..., 2] = 0.0

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.boundary import Flat, Round
-from walkers.inputs.case import Case
+from walkers.inputs.tables.boundary import Flat, Round
+from walkers.inputs.tables.case import Case
 from walkers.physics.capillary import bridge_volume
 from walkers.postprocess.dump import FloatArray, IntArray
 from walkers.postprocess.motion import Motion, read_bridges

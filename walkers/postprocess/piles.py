@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from walkers.inputs.boundary import Boundary
-from walkers.inputs.case import Case
+from walkers.inputs.tables.boundary import Boundary
+from walkers.inputs.tables.case import Case
 from walkers.postprocess import clusters
 from walkers.postprocess.clusters import Beads, Cluster
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray

@@ -5,7 +5,7 @@ A record that does not repeat is run up to a whole number of cycles.
 
 from __future__ import annotations
 
-from walkers.inputs.case import Case
+from walkers.inputs.tables.case import Case
 from walkers.postprocess.motion import Motion
 from walkers.postprocess.numbers import Measured
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, refused
 from walkers.files import read_json, write_json
-from walkers.inputs.loads import gravity_warnings, softness_warning
-from walkers.inputs.run import limits_of
+from walkers.inputs.resolving.loads import gravity_warnings, softness_warning
+from walkers.inputs.tables.run import limits_of
 from walkers.postprocess import meetings, piles, record_part, threshold, walking
 from walkers.postprocess.caption import conditions
 from walkers.postprocess.motion import read_motion
@@ -29,8 +29,8 @@ from walkers.runner.manifest import RESULT_NAME, check_unchanged
 if TYPE_CHECKING:
     import pandas as pd
 
-    from walkers.inputs.case import Case
     from walkers.inputs.origins import Origin
+    from walkers.inputs.tables.case import Case
 
 VERSION = 2
 """Of all methods together: a result of another version is measured again."""

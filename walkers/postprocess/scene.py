@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.errors import refused
-from walkers.inputs.boundary import Flat, Round
-from walkers.inputs.case import Case
+from walkers.inputs.tables.boundary import Flat, Round
+from walkers.inputs.tables.case import Case
 from walkers.postprocess import piles
 from walkers.postprocess.dump import FloatArray, IntArray
 from walkers.postprocess.motion import Motion, between, visible_displacement

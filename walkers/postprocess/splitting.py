@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from walkers.files import write_json
-from walkers.inputs.case import Case
+from walkers.inputs.tables.case import Case
 from walkers.postprocess.dump import BinaryDump, local_frames, write_local_dump
 from walkers.postprocess.motion import NEAR, came_near
 from walkers.runner.failures import WalkersMet

@@ -1,7 +1,7 @@
 """The threshold of motion in one run: the drive falls slowly until walkers stop, or rises until they start.
 
 The drive changes by a ramp, or because the amplitude of a record changes. Its strength is the local
-amplitude of its acceleration (`walkers.inputs.drive.Excitation.local_amplitude`).
+amplitude of its acceleration (`walkers.inputs.tables.drive.Excitation.local_amplitude`).
 
 A window is a few cycles. A walker moves in it if it is faster than
 `walkers.postprocess.sides.REST`. It stops at the end of the last window in which it moves while the
@@ -15,8 +15,8 @@ from math import isfinite, nan
 
 import numpy as np
 
-from walkers.inputs.case import Case
-from walkers.inputs.loads import dimer_of
+from walkers.inputs.resolving.loads import dimer_of
+from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.gait import distance_walked

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from walkers.inputs.case import Case
-from walkers.inputs.loads import contact_loads, dimer_of
+from walkers.inputs.resolving.loads import contact_loads, dimer_of
+from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess import gait
 from walkers.postprocess.dump import FloatArray, IntArray

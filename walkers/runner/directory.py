@@ -27,7 +27,7 @@ from typing import Any
 
 from walkers.errors import refused
 from walkers.files import fsync_path, link_or_copy, read_json, write_bytes, write_json
-from walkers.inputs.case import Case
+from walkers.inputs.tables.case import Case
 from walkers.physics.laws import LAWS, source_of, source_sha256
 from walkers.regular_files import open_regular
 from walkers.runner.binary import Engine

@@ -10,7 +10,7 @@ from typing import Any
 
 from walkers.errors import WalkersError
 from walkers.files import checksum, read_json, write_json
-from walkers.inputs.case import Case
+from walkers.inputs.tables.case import Case
 from walkers.runner.binary import Engine, model_version, plugin_of, read_audit
 from walkers.runner.launch import EngineReport
 from walkers.runner.provenance import software

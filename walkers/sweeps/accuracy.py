@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.errors import refused
 from walkers.files import write_json
-from walkers.inputs.case import STIFFEST, Case
 from walkers.inputs.sweep import Sweep, expand
+from walkers.inputs.tables.case import STIFFEST, Case
 from walkers.postprocess.results import recorded
 from walkers.postprocess.sides import STEADY_SPEED
 from walkers.postprocess.uncertainty import ACCURACY, ACCURACY_NAME

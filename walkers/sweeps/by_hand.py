@@ -17,9 +17,9 @@ from typing import Any
 
 from walkers.errors import refused
 from walkers.files import checksum, read_json, write_json
-from walkers.inputs.case import Case
-from walkers.inputs.run import CONSTANT, settling_of
-from walkers.inputs.table import changed
+from walkers.inputs.config_table import changed
+from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.run import CONSTANT, settling_of
 from walkers.physics.laws import source_of
 from walkers.postprocess.dump import DumpError
 from walkers.postprocess.results import measure

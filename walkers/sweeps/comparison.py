@@ -21,7 +21,7 @@ from walkers.templates.deck import bridge_tables_digest
 from walkers.text import aligned
 
 if TYPE_CHECKING:
-    from walkers.inputs.case import Case
+    from walkers.inputs.tables.case import Case
 
 _VELOCITIES = ("velocity", "right_facing", "left_facing")
 """Numbers whose scatter is in the result."""

@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.errors import InputError, expected_of, refused
-from walkers.inputs.case import Case
-from walkers.inputs.library import unmeasured
+from walkers.inputs.resolving.library import unmeasured
+from walkers.inputs.tables.case import Case
 from walkers.postprocess.drawing import TWO_COLUMNS, errors_seen, letter_panels, new_figure, plain_text, styled
 from walkers.postprocess.numbers import draws_text
 from walkers.postprocess.quantities import declared, is_declared, scatter_of, unit_shown

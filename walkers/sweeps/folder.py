@@ -20,7 +20,7 @@ from typing import Any, TypeAlias
 
 from walkers.errors import InputError, refused, suggestion
 from walkers.files import VTK_SCRATCH, abandoned, read_json
-from walkers.inputs.case import Case
+from walkers.inputs.tables.case import Case
 from walkers.postprocess.numbers import headline, in_short
 from walkers.postprocess.results import plain, read
 from walkers.postprocess.uncertainty import ACCURACY, SPREAD

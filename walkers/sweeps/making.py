@@ -23,8 +23,8 @@ from typing import Any
 
 from walkers.errors import Stopped, WalkersError
 from walkers.files import fsync_path, link_or_copy, make_folder, read_json, write_json
-from walkers.inputs.case import Case
-from walkers.inputs.run import Run
+from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.run import Run
 from walkers.postprocess.results import measure
 from walkers.progress import Progress, Tell
 from walkers.rounding import duration_text

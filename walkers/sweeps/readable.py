@@ -11,9 +11,9 @@ from pydantic_core import to_jsonable_python
 
 from walkers.errors import refused
 from walkers.inputs import units
-from walkers.inputs.case import Case
+from walkers.inputs.config_table import keys_of
 from walkers.inputs.origins import text_of
-from walkers.inputs.table import keys_of
+from walkers.inputs.tables.case import Case
 from walkers.inputs.units import Kind
 
 

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 from walkers.errors import InputError, check_limits, refused, unusable
 from walkers.files import write_json
 from walkers.inputs.axes import Range, ranges_of, unit_cube, written
-from walkers.inputs.case import Case
 from walkers.inputs.messages import blaming
 from walkers.inputs.origins import Origin
 from walkers.inputs.sweep import Sweep, expand
+from walkers.inputs.tables.case import Case
 from walkers.inputs.units import parse_quantity
 from walkers.postprocess.numbers import MAIN
 from walkers.postprocess.quantities import declared, unit_shown

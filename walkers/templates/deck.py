@@ -9,11 +9,11 @@ from math import ceil, inf, prod, sqrt
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.errors import InputError, Problem
-from walkers.inputs.boundary import Flat, Round
-from walkers.inputs.case import Case
-from walkers.inputs.drive import AXES, Excitation, Vector
-from walkers.inputs.loads import bridge_at_rest, hop_height, reach
-from walkers.inputs.run import limits_of
+from walkers.inputs.resolving.loads import bridge_at_rest, hop_height, reach
+from walkers.inputs.tables.boundary import Flat, Round
+from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.drive import AXES, Excitation, Vector
+from walkers.inputs.tables.run import limits_of
 from walkers.physics.capillary import bead_volume
 from walkers.physics.laws import LAWS
 from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, MEAN_SPIN_COLUMNS, Layout, PlacedWalker
@@ -21,7 +21,7 @@ from walkers.templates.scene import Scene, Surface, place, surface_of
 from walkers.text import rendered
 
 if TYPE_CHECKING:
-    from walkers.inputs.vessel import Facet
+    from walkers.inputs.meshes.vessel import Facet
 
 DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"

@@ -26,8 +26,8 @@ from math import log, pi, radians, sqrt, tan
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.case import Case
-from walkers.inputs.loads import dimer_of
+from walkers.inputs.resolving.loads import dimer_of
+from walkers.inputs.tables.case import Case
 from walkers.physics.dimer import Dimer
 from walkers.theory.motion import Walker, walk
 from walkers.theory.quasistatic import FloatArray, inertia_matrix, normal_force_matrix, rolling_matrix, translation

@@ -24,8 +24,8 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.extras import require
-from walkers.inputs.case import Case
-from walkers.inputs.loads import contact_loads, dimer_of, resistances_at_rest
+from walkers.inputs.resolving.loads import contact_loads, dimer_of, resistances_at_rest
+from walkers.inputs.tables.case import Case
 from walkers.theory.quasistatic import FloatArray, inertia_matrix, normal_force_matrix, rolling_matrix, translation
 
 if TYPE_CHECKING:

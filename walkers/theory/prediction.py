@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.case import Case
-from walkers.inputs.loads import dimer_of
+from walkers.inputs.resolving.loads import dimer_of
+from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.gait import GROWS
 from walkers.postprocess.results import plain

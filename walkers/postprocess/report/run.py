@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.extras import require
 from walkers.files import write_bytes
-from walkers.inputs.case import Case
 from walkers.inputs.origins import Origin, text_of
+from walkers.inputs.tables.case import Case
 from walkers.postprocess.caption import caption
 from walkers.postprocess.figures import figures_of
 from walkers.postprocess.motion import read_motion

@@ -99,7 +99,7 @@ def _number(table: Mapping[str, Any], of: Collection, liquids: tuple[str, ...] =
 
 def check_library(tables: object, source: str) -> None:
     """Check a library: raises `InputError` with ``source`` and the keys at fault."""
-    from walkers.inputs.library_file import LibraryFile
+    from walkers.inputs.resolving.library_file import LibraryFile
 
     if not isinstance(tables, Mapping):
         raise refused(source, "expected the tables of a library: materials, liquids, surface_pairs")

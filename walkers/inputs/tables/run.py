@@ -9,14 +9,14 @@ from pydantic import Field
 
 from walkers.errors import unusable
 from walkers.inputs import units
+from walkers.inputs.config_table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, key
 from walkers.inputs.origins import Source
-from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, key
 from walkers.inputs.units import AUTO, Duration, Number, Whole
 from walkers.physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
 from walkers.rounding import percent
 
 if TYPE_CHECKING:
-    from walkers.inputs.case import Case
+    from walkers.inputs.tables.case import Case
 
 MOST_STEPS = 2**31 - 1
 FIRST_ATTEMPTS = (12, 24)

@@ -18,8 +18,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from walkers.errors import Problem, unusable
 from walkers.inputs import units
-from walkers.inputs.record import FEWEST_PERIODS, Record, course_text, record_of
-from walkers.inputs.table import Choice, Filled, Indirect, Table, key
+from walkers.inputs.config_table import Choice, Filled, Indirect, Table, key
+from walkers.inputs.records.record import FEWEST_PERIODS, Record, course_text, record_of
 from walkers.inputs.units import Angle, Coefficient
 from walkers.physics.bridge import FloatArray
 

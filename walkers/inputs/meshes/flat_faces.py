@@ -6,7 +6,7 @@ from collections import defaultdict
 
 import numpy as np
 
-from walkers.inputs.triangles import IntArray
+from walkers.inputs.meshes.triangles import IntArray
 from walkers.physics.bridge import FloatArray
 
 LEAST_STEP = 1e-9

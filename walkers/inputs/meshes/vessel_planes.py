@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from walkers.errors import unusable
-from walkers.inputs.drive import Vector
-from walkers.inputs.triangles import merged
-from walkers.inputs.vessel import Vessel
+from walkers.inputs.meshes.triangles import merged
+from walkers.inputs.meshes.vessel import Vessel
+from walkers.inputs.tables.drive import Vector
 
 
 def vessel_between(planes: Sequence[tuple[Vector, Vector]], height: float) -> Vessel:

@@ -16,8 +16,8 @@ from walkers.physics.contact import hertz_overlap, hertz_stiffness, reduced_modu
 from walkers.physics.dimer import Dimer
 
 if TYPE_CHECKING:
-    from walkers.inputs.bodies import Walkers
-    from walkers.inputs.case import Case
+    from walkers.inputs.tables.bodies import Walkers
+    from walkers.inputs.tables.case import Case
 
 
 def dimer_of(case: Case) -> Dimer:

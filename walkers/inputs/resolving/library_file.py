@@ -7,7 +7,7 @@ from typing import Annotated, Any, Generic, TypeVar
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from walkers.inputs import units
-from walkers.inputs.table import Table
+from walkers.inputs.config_table import Table
 from walkers.inputs.units import Coefficient, Number
 
 Q = TypeVar("Q")

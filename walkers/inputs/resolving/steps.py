@@ -13,25 +13,25 @@ from math import acos, atan2, degrees, dist, inf
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import Problem, expected_of, shown, unusable
-from walkers.inputs.bodies import ARRANGEMENTS, MOST_BEADS, Cluster, Walkers, touching
-from walkers.inputs.boundary import BOTTOM, Plane
-from walkers.inputs.drive import check_drive, common_frequency, unit_vector
+from walkers.inputs.config_table import alternatives, changed
 from walkers.inputs.keys import MISSING, parts_of, value_at
-from walkers.inputs.library import Library, LibraryNumber, unmeasured
-from walkers.inputs.loads import LARGEST_DELAY, bridge_at_rest, contact_loads, delay_of, dimer_of, reach
-from walkers.inputs.mesh_surface import vessel_of
+from walkers.inputs.meshes.mesh_surface import vessel_of
+from walkers.inputs.meshes.vessel import SHARP
 from walkers.inputs.origins import Source
-from walkers.inputs.record import Record
-from walkers.inputs.run import limits_of, with_run
-from walkers.inputs.standing import OVERLAP, check_bodies, overlaps
-from walkers.inputs.table import alternatives, changed
+from walkers.inputs.records.record import Record
+from walkers.inputs.resolving.library import Library, LibraryNumber, unmeasured
+from walkers.inputs.resolving.loads import LARGEST_DELAY, bridge_at_rest, contact_loads, delay_of, dimer_of, reach
+from walkers.inputs.resolving.standing import OVERLAP, check_bodies, overlaps
+from walkers.inputs.tables.bodies import ARRANGEMENTS, MOST_BEADS, Cluster, Walkers, touching
+from walkers.inputs.tables.boundary import BOTTOM, Plane
+from walkers.inputs.tables.drive import check_drive, common_frequency, unit_vector
+from walkers.inputs.tables.run import limits_of, with_run
 from walkers.inputs.units import ACCELERATION, LENGTH, TEMPERATURE, parse_quantity, quantity_text
-from walkers.inputs.vessel import SHARP
 from walkers.physics.capillary import DEFAULT_LAW, bridge_volume
 from walkers.physics.mixtures import MIXTURES
 
 if TYPE_CHECKING:
-    from walkers.inputs.case import Case
+    from walkers.inputs.tables.case import Case
 
 _PACKING = 0.55  # packing fraction of a settled wet pile, for the count that fills a height
 _SOFTEST = 5e7

@@ -1,7 +1,7 @@
-"""Read one mesh file in a process of its own: ``python -m walkers.inputs.mesh_reader FILE``.
+"""Read one mesh file in a process of its own: ``python -m walkers.inputs.meshes.mesh_reader FILE``.
 
 Libraries that read meshes end the process, or ask for all memory, where a file is damaged or made to
-do harm. So `walkers.inputs.mesh` starts this module with limits of time and memory. The module writes
+do harm. So `walkers.inputs.meshes.mesh_file` starts this module with limits of time and memory. The module writes
 the points and triangles to standard output as an npz file, or the reason why there are none as text,
 with exit status `REFUSED`. It imports nothing of this project, so that it starts quickly.
 """

@@ -1,4 +1,6 @@
-"""A case in SI units, whose fields are the keys of a file, with what the file leaves out (`walkers.inputs.resolving`).
+"""A case in SI units, whose fields are the keys of a file.
+
+What a file leaves out is completed by `walkers.inputs.resolving.steps`.
 
 A deck is rendered from it, a run directory stores it as ``case.json``, and the hash in a run's name is made of it.
 """
@@ -17,16 +19,7 @@ from pydantic import BeforeValidator, Field, ValidationError
 from walkers.errors import InputError, Problem, apply_all, refused, unusable
 from walkers.inputs import units
 from walkers.inputs.axes import ranges_of
-from walkers.inputs.bodies import MOST_BEADS, Cluster, Dimers, Mixture, PlacedBead, Walkers
-from walkers.inputs.boundary import Boundary
-from walkers.inputs.drive import AXES, Drive, Excitation, Vector
-from walkers.inputs.keys import MISSING, flatten, is_axis, parts_of, value_at
-from walkers.inputs.library import library_of
-from walkers.inputs.messages import blaming, check_key, validated
-from walkers.inputs.origins import Origin, Source, Whence, text_of
-from walkers.inputs.resolving import NAMES, SUPPLIED, resolve, supplied
-from walkers.inputs.run import Run, settling_of
-from walkers.inputs.table import (
+from walkers.inputs.config_table import (
     SAME_RUN,
     Choice,
     Derived,
@@ -38,6 +31,15 @@ from walkers.inputs.table import (
     contradictions,
     key,
 )
+from walkers.inputs.keys import MISSING, flatten, is_axis, parts_of, value_at
+from walkers.inputs.messages import blaming, check_key, validated
+from walkers.inputs.origins import Origin, Source, Whence, text_of
+from walkers.inputs.resolving.library import library_of
+from walkers.inputs.resolving.steps import NAMES, SUPPLIED, resolve, supplied
+from walkers.inputs.tables.bodies import MOST_BEADS, Cluster, Dimers, Mixture, PlacedBead, Walkers
+from walkers.inputs.tables.boundary import Boundary
+from walkers.inputs.tables.drive import AXES, Drive, Excitation, Vector
+from walkers.inputs.tables.run import Run, settling_of
 from walkers.inputs.toml import with_files
 from walkers.inputs.units import Coefficient, Number, kind_in
 from walkers.physics.bridge import BridgeLaw
@@ -117,7 +119,7 @@ class Contact(Table):
     """``[contact]``: the model of the contacts, with the Young's modulus of softened beads and walls.
 
     The modulus of ``"auto"`` is 50 MPa for loose beads; for walkers it is the lowest of 50, 200, 800, ... MPa at which
-    bridges hardly delay the contacts (`walkers.inputs.loads.delay`).
+    bridges hardly delay the contacts (`walkers.inputs.resolving.loads.delay`).
     """
 
     friction: Friction = key("")

@@ -1,7 +1,7 @@
 """Mesh files: what may be read, in which process, and what is said where it cannot be.
 
-The reading itself is in `walkers.inputs.mesh_reader`, which runs in a process of its own. What becomes
-of the triangles is in `walkers.inputs.mesh_surface`.
+The reading itself is in `walkers.inputs.meshes.mesh_reader`, which runs in a process of its own. What becomes
+of the triangles is in `walkers.inputs.meshes.mesh_surface`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from walkers.inputs import mesh_reader
+from walkers.inputs.meshes import mesh_reader
 
 MOST_TRIANGLES = 20_000
 """Triangles of a vessel at most."""
@@ -72,7 +72,7 @@ def _check_file(path: Path) -> None:
 
 def _read_apart(path: Path) -> tuple[Any, Any]:
     """Points and triangles of a file by a process with limits of time and memory."""
-    package = str(Path(__file__).parents[2])
+    package = str(Path(__file__).parents[3])
     environment = {
         **os.environ,
         "PYTHONPATH": os.pathsep.join(filter(None, [package, os.environ.get("PYTHONPATH")])),

@@ -14,7 +14,7 @@ unless the record repeats.
 With p rows a period, the spline of a sine is off by (2π/p)⁴/384 of its peak: 4e-5 with 18 rows,
 2e-10 with 400.
 
-Files are read in `walkers.inputs.record_file`.
+Files are read in `walkers.inputs.records.record_file`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from walkers.inputs.signals import (
+from walkers.inputs.config_table import SAME_RUN, Table
+from walkers.inputs.records.signals import (
     ComplexArray,
     hann_mean,
     leakage,
@@ -35,7 +36,6 @@ from walkers.inputs.signals import (
     periods_by_phase,
     slow_part,
 )
-from walkers.inputs.table import SAME_RUN, Table
 from walkers.inputs.units import ACCELERATION, ACCELERATION_OF_ONE_G
 from walkers.physics.bridge import FloatArray
 from walkers.rounding import counted
@@ -92,7 +92,7 @@ class Record(Table):
 
         The error of a sensor, integrated twice, grows to millimetres within a second. What changes
         slowly compared with four periods of the slowest line is no shaking, and no bead feels it:
-        amplitudes and pictures leave it out (`walkers.inputs.signals.slow_part`). The run contains
+        amplitudes and pictures leave it out (`walkers.inputs.records.signals.slow_part`). The run contains
         it.
         """
         from scipy.interpolate import CubicSpline

@@ -1,7 +1,7 @@
 """Beads of a case: walkers on the boundary, a poured mixture, beads placed one by one.
 
-Each knows its radii and which of its beads bridges join; `walkers.inputs.standing` says where they start. How the beads
-of a cluster stand beside each other is one of `ARRANGEMENTS`: in the cluster's frame, seen from above, whose first axis
+Each knows its radii and which of its beads bridges join; where they start is the subject of
+`walkers.inputs.resolving.standing`. How the beads of a cluster stand beside each other is one of `ARRANGEMENTS`: in the cluster's frame, seen from above, whose first axis
 points where it is to face and the second to the left. The beads are taken in the order of the case, and the point over
 which the first two touch is the origin.
 """
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple
 from pydantic import AfterValidator, Field
 
 from walkers.inputs import units
-from walkers.inputs.table import Choice, Filled, Indirect, Table, key
+from walkers.inputs.config_table import Choice, Filled, Indirect, Table, key
 from walkers.inputs.units import Diameter, Length, Number, Position, Radius, SignedLength, Whole
 from walkers.physics.capillary import bead_volume
 

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.random import default_rng
 
 from walkers.errors import unusable
-from walkers.inputs.bodies import Mixture, Walkers
-from walkers.inputs.boundary import FLOOR, LOOSE, Boundary
-from walkers.inputs.loads import contact_loads
+from walkers.inputs.resolving.loads import contact_loads
+from walkers.inputs.tables.bodies import Mixture, Walkers
+from walkers.inputs.tables.boundary import FLOOR, LOOSE, Boundary
 
 if TYPE_CHECKING:
-    from walkers.inputs.case import Case
+    from walkers.inputs.tables.case import Case
 
 OVERLAP = 0.01
 """Radii by which beads that are given places may overlap with each other and the walls."""

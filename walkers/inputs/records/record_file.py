@@ -1,7 +1,7 @@
 """Files of recorded shaking, as data loggers write them: a header, and rows of numbers.
 
 This module reads a file. Whether its rows are a motion that can be run is a matter of
-`walkers.inputs.record`.
+`walkers.inputs.records.record`.
 """
 
 from __future__ import annotations

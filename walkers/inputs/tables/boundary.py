@@ -1,4 +1,4 @@
-"""Boundaries: planes, channels, grooves, containers, vessels of the user's own (`walkers.inputs.vessel`)."""
+"""Boundaries: planes, channels, grooves, containers, vessels of the user's own (`walkers.inputs.meshes.vessel`)."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ import numpy as np
 
 from walkers.errors import Problem
 from walkers.inputs import units
-from walkers.inputs.drive import Vector
-from walkers.inputs.table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, key, within
-from walkers.inputs.vessel import Facet, Vessel
-from walkers.inputs.vessel_planes import vessel_between
-from walkers.inputs.wall_names import FLOOR_NAME, names_of_faces
+from walkers.inputs.config_table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, key, within
+from walkers.inputs.meshes.vessel import Facet, Vessel
+from walkers.inputs.meshes.vessel_planes import vessel_between
+from walkers.inputs.meshes.wall_names import FLOOR_NAME, names_of_faces
+from walkers.inputs.tables.drive import Vector
 from walkers.physics.bridge import FloatArray
 
 FLOOR = FLOOR_NAME
@@ -203,7 +203,7 @@ class Boundary(Table):
         """Damping of a bead of a radius (m) by the walls that it touches at once, over that by one of them.
 
         It is the largest eigenvalue of the sum of n nᵀ over their normals n. Neighbouring sides of an octagon (1.7) do
-        not count: the step of loose beads allows for more neighbours (`walkers.inputs.bodies.Mixture.bridged`).
+        not count: the step of loose beads allows for more neighbours (`walkers.inputs.tables.bodies.Mixture.bridged`).
         """
         if self.shape == "groove":
             return 1.0 + abs(cos(self.opening))

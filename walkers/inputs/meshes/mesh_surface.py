@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkers.errors import InputError, unusable
-from walkers.inputs.crossings import first_crossing, first_fold
-from walkers.inputs.triangles import SAME_POINT, IntArray, merged
-from walkers.inputs.vessel import Vessel
+from walkers.inputs.meshes.crossings import first_crossing, first_fold
+from walkers.inputs.meshes.triangles import SAME_POINT, IntArray, merged
+from walkers.inputs.meshes.vessel import Vessel
 from walkers.physics.bridge import FloatArray
 
 _ONE_OPENING = "one, at its top: close the others"
@@ -38,7 +38,7 @@ def vessel_of(mesh: Mapping[str, Any], scale: float) -> Vessel:
     Parameters
     ----------
     mesh : mapping
-        Points and triangles, see `walkers.inputs.mesh.read_mesh`.
+        Points and triangles, see `walkers.inputs.meshes.mesh_file.read_mesh`.
     scale : float
         Length of the unit of its points, m.
 

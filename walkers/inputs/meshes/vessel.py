@@ -5,7 +5,7 @@ points within faces, and points of edges and corners that stand out toward the b
 `Facet`, and says of a bead whether the nearest point is in it. A point where facets meet is in one of them
 alone, so that no contact counts twice.
 
-How a mesh file becomes such a surface is in `walkers.inputs.mesh_surface`.
+How a mesh file becomes such a surface is in `walkers.inputs.meshes.mesh_surface`.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.drive import Vector
-from walkers.inputs.flat_faces import FlatFaces
-from walkers.inputs.triangles import SAME_POINT, IntArray, evaluated, groups_of, signed_distance, within_polygon
-from walkers.inputs.wall_names import names_of_faces, numbered, span_text
+from walkers.inputs.meshes.flat_faces import FlatFaces
+from walkers.inputs.meshes.triangles import SAME_POINT, IntArray, evaluated, groups_of, signed_distance, within_polygon
+from walkers.inputs.meshes.wall_names import names_of_faces, numbered, span_text
+from walkers.inputs.tables.drive import Vector
 from walkers.physics.bridge import FloatArray
 
 if TYPE_CHECKING:

@@ -1,0 +1,1 @@
+"""Recorded shaking: files of loggers, and the motion that they describe."""
