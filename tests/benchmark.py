@@ -25,7 +25,7 @@ from walkers.runner.directory import write_deck
 from walkers.runner.launch import ALONE
 from walkers.templates import deck as deck_module
 from walkers.templates.deck import Deck, Segment, compose, plan_of
-from walkers.templates.scene import Bead
+from walkers.templates.placement import Bead
 
 REPEATS = 3
 RATIOS = Path(__file__).with_name("benchmark_ratios.json")

@@ -40,7 +40,7 @@ from walkers.physics.capillary import bead_volume
 from walkers.postprocess.dump import BinaryDump
 from walkers.runner.directory import write_deck
 from walkers.templates.layout import BEAD_COLUMNS
-from walkers.templates.scene import Bead
+from walkers.templates.placement import Bead
 
 _PILES = {"pile-small": 20_000, "pile-fig1a": 6_000}
 """Cases and steps."""

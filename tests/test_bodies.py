@@ -30,7 +30,7 @@ from walkers.runner.binary import find_engine
 from walkers.runner.directory import write_deck
 from walkers.runner.launch import launch
 from walkers.templates.deck import render_deck
-from walkers.templates.scene import place
+from walkers.templates.placement import place
 from walkers.theory.prediction import motion_of
 
 Ran = Callable[..., Path]

@@ -34,7 +34,7 @@ from walkers.runner.manifest import iso_time
 from walkers.show import describe, predicted_overhead, summarise
 from walkers.sweeps.making import progress_in
 from walkers.templates.deck import Segment, compose, plan_of, render_deck
-from walkers.templates.scene import place
+from walkers.templates.placement import place
 
 DENSITY, LARGE, SMALL = 4000.0, 3e-4, 2e-4
 """Of the reference case: kg/m³, m, m."""

@@ -53,7 +53,7 @@ from walkers.runner.failures import AuditFailed, EngineError, UnauditedEngineWar
 from walkers.runner.manifest import read_manifest
 from walkers.templates.deck import Plan, compose
 from walkers.templates.layout import WALL_BRIDGES
-from walkers.templates.scene import Bead
+from walkers.templates.placement import Bead
 
 RADIUS, STILL = 3e-4, (0.0, 0.0, 0.0)
 NO_BRIDGES = ("capillary", "lubrication")
@@ -210,7 +210,7 @@ def _rows(bench: Bench, plan: Plan) -> tuple[FloatArray, FloatArray]:
 
 
 def test_walls_are_as_far_as_the_boundary_says(bench: Bench) -> None:
-    """Planes in any direction and a cylinder: overlaps and nearest points are those of `walkers.inputs.tables.boundary`."""
+    """Planes in any direction and a cylinder: overlaps and nearest points are those of the case."""
     leaning, hollow = Flat((1e-4, 2e-4, -3e-4), (0.48, -0.36, 0.8), "leaning"), Round(2.5e-3)
     turn, out = 2.0, 2.5e-3 - RADIUS + 1e-6
     beads = [over(leaning, -1e-6, RADIUS), Bead(0, (out * cos(turn), out * sin(turn), 4e-3), RADIUS)]

@@ -22,7 +22,7 @@ from walkers.postprocess.sides import REST
 from walkers.postprocess.threshold import _crossed, _thresholds, measure
 from walkers.runner.binary import find_engine
 from walkers.sweeps.making import make_runs
-from walkers.templates.scene import sharing_key
+from walkers.templates.placement import sharing_key
 
 PERIOD = 1.0 / 80.0
 BRIEF = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}

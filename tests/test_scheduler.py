@@ -47,7 +47,7 @@ from walkers.sweeps.scheduler import (
 from walkers.sweeps.site import check_path, decks_at, load_site, prepare
 from walkers.sweeps.table import load, thresholds, write_record
 from walkers.templates.deck import LAYOUT_NAME, OUTPUT_NAME, compose, plan_of
-from walkers.templates.scene import sharing_key
+from walkers.templates.placement import sharing_key
 
 STEP = {"time_step": "2 us"}
 DONE = "finished"

@@ -36,7 +36,7 @@ from walkers.templates.deck import (
     render_deck,
     settling_steps,
 )
-from walkers.templates.scene import Bead, Scene, place
+from walkers.templates.placement import Bead, Scene, place
 
 
 @pytest.mark.parametrize("name", shipped("case"))

@@ -30,7 +30,7 @@ from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.show import describe, summarise
 from walkers.templates.deck import render_deck
-from walkers.templates.scene import Bead
+from walkers.templates.placement import Bead
 
 R = 1e-4
 """Radius of the beads, m."""

@@ -32,7 +32,7 @@ from walkers.physics.contact import Impact, reduced_modulus
 from walkers.physics.laws import young_laplace
 from walkers.runner.binary import find_engine
 from walkers.templates.deck import Plan
-from walkers.templates.scene import Bead, Scene, loading_of, surface_of
+from walkers.templates.placement import Bead, Scene, loading_of, surface_of
 
 FRICTION, G = 0.2, 9.81
 SLOWS = 3.5 * FRICTION * G  # m/s²; friction slows the surface of a solid sphere 7/2 times as much as its centre

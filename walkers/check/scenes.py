@@ -38,7 +38,7 @@ from walkers.runner.launch import launch
 from walkers.templates.bridge_tables import tabulated
 from walkers.templates.deck import BRIDGES_NAME, Deck, Plan, Segment, compose, plan_of
 from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, FORCE_COLUMNS
-from walkers.templates.scene import Bead, Scene
+from walkers.templates.placement import Bead, Scene
 from walkers.text import rendered
 
 EQUAL = 1e-6

@@ -37,7 +37,7 @@ from walkers.runner.failures import AUDITED_VERSION, ContactModelMissing, Engine
 from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, RUN_NAME
 
 ENGINE_VARIABLE = "WALKERS_ENGINE"
-SOURCES = Path(str(files("walkers.engine")))
+SOURCES = Path(str(files("walkers.templates.engine")))
 _MODEL = ("bridge.cpp", "table.h")
 """Source files of the contact model."""
 _FORCES_VERSION = re.compile(rb"^// FORCES_VERSION \d+$", re.MULTILINE)

@@ -44,7 +44,7 @@ from walkers.show import PROGRAM_SECONDS, pairs_of_beads, predicted_overhead, pr
 from walkers.sweeps import table
 from walkers.sweeps.making import check_audit, make_runs, progress_at
 from walkers.sweeps.site import check_path, decks_at, prepare
-from walkers.templates.scene import sharing_key
+from walkers.templates.placement import sharing_key
 
 if TYPE_CHECKING:
     from parsl.config import Config

@@ -1,6 +1,6 @@
 """Tables of a bridge law that the contact model ``cohesion bridge`` interpolates.
 
-``walkers/engine/table.h`` describes their format. A law may have a kink at the gap ``scale``, between two cells.
+``walkers/templates/engine/table.h`` describes their format. A law may have a kink at the gap ``scale``, between two cells.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from walkers.physics.bridge import BridgeLaw, Curve, FloatArray, Forces, Surfaces, UnusableLawError, columns_at
 from walkers.physics.laws import by_name
-from walkers.templates.scene import Surface
+from walkers.templates.placement import Surface
 
 TOLERANCE = 1e-6
 """Tolerance of interpolated forces, relative to a column's largest value within a factor of two of the gap."""

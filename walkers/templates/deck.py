@@ -17,7 +17,7 @@ from walkers.inputs.tables.run import limits_of
 from walkers.physics.capillary import bead_volume
 from walkers.physics.laws import LAWS
 from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, MEAN_SPIN_COLUMNS, Layout, PlacedWalker
-from walkers.templates.scene import Scene, Surface, place, surface_of
+from walkers.templates.placement import Scene, Surface, place, surface_of
 from walkers.text import rendered
 
 if TYPE_CHECKING:

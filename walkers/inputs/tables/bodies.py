@@ -1,9 +1,10 @@
 """Beads of a case: walkers on the boundary, a poured mixture, beads placed one by one.
 
 Each knows its radii and which of its beads bridges join; where they start is the subject of
-`walkers.inputs.resolving.standing`. How the beads of a cluster stand beside each other is one of `ARRANGEMENTS`: in the cluster's frame, seen from above, whose first axis
-points where it is to face and the second to the left. The beads are taken in the order of the case, and the point over
-which the first two touch is the origin.
+`walkers.inputs.resolving.standing`. How the beads of a cluster stand beside each other is one of
+`ARRANGEMENTS`: in the cluster's frame, seen from above, whose first axis points where it is to face
+and the second to the left. The beads are taken in the order of the case, and the point over which
+the first two touch is the origin.
 """
 
 from __future__ import annotations
