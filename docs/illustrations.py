@@ -41,8 +41,8 @@ from walkers.inputs.sweep import Sweep, load_sweep
 from walkers.inputs.tables.case import Case
 from walkers.paper.make import COMPARED, FIGURES, make_figures
 from walkers.paper.sources import sweep_of
-from walkers.postprocess.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, save_figure, styled
-from walkers.postprocess.results import VERSION
+from walkers.postprocess.measure.results import VERSION
+from walkers.postprocess.show.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, save_figure, styled
 from walkers.sweeps.climbing import texts_of
 from walkers.sweeps.scheduler import Options
 from walkers.templates.deck import CONTENT_VERSION

@@ -37,7 +37,7 @@ from tests.benchmark import (
 from walkers.inputs.reading import load_case
 from walkers.inputs.tables.case import Case
 from walkers.physics.capillary import bead_volume
-from walkers.postprocess.dump import BinaryDump
+from walkers.postprocess.measure.dump import BinaryDump
 from walkers.runner.directory import write_deck
 from walkers.templates.layout import BEAD_COLUMNS
 from walkers.templates.placement import Bead

@@ -30,8 +30,8 @@ from walkers.inputs.sweep import expand
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
 from walkers.main import main
-from walkers.postprocess import series
-from walkers.postprocess.motion import Group, read_motion
+from walkers.postprocess.measure.motion import Group, read_motion
+from walkers.postprocess.show import series
 from walkers.runner.binary import Engine
 from walkers.runner.directory import locked, run_place
 from walkers.runner.failures import RunBusy

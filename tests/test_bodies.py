@@ -20,12 +20,12 @@ from walkers.inputs.resolving.standing import standing
 from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
-from walkers.postprocess.figures import figures_of
-from walkers.postprocess.gait import postures
-from walkers.postprocess.meetings import collective
-from walkers.postprocess.motion import Group, read_motion
-from walkers.postprocess.results import read
-from walkers.postprocess.tables import read_table
+from walkers.postprocess.measure.gait import postures
+from walkers.postprocess.measure.meetings import collective
+from walkers.postprocess.measure.motion import Group, read_motion
+from walkers.postprocess.measure.results import read
+from walkers.postprocess.measure.tables import read_table
+from walkers.postprocess.show.figures import figures_of
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import write_deck
 from walkers.runner.launch import launch

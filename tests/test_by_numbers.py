@@ -20,16 +20,16 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.loads import bridge_at_rest, contact_loads
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import Harmonic, waveform
-from walkers.postprocess import meetings
-from walkers.postprocess.films import speed_text
-from walkers.postprocess.gait import averages, fit_slopes, settled_samples
-from walkers.postprocess.motion import Bridges, Motion
-from walkers.postprocess.numbers import in_short
-from walkers.postprocess.piles import _of_climbs, _state_of
-from walkers.postprocess.report.player import _points
-from walkers.postprocess.scene import Scene, rotations_at, turned_in
-from walkers.postprocess.uncertainty import SPREAD_NAME, bands_of, spread_of
-from walkers.postprocess.walking import _doubts, _posture, _scatter, _velocities, tables_of
+from walkers.postprocess.measure import meetings
+from walkers.postprocess.measure.gait import averages, fit_slopes, settled_samples
+from walkers.postprocess.measure.motion import Bridges, Motion
+from walkers.postprocess.measure.numbers import in_short
+from walkers.postprocess.measure.piles import _of_climbs, _state_of
+from walkers.postprocess.measure.uncertainty import SPREAD_NAME, bands_of, spread_of
+from walkers.postprocess.measure.walking import _doubts, _posture, _scatter, _velocities, tables_of
+from walkers.postprocess.show.films import speed_text
+from walkers.postprocess.show.report.player import _points
+from walkers.postprocess.show.scene import Scene, rotations_at, turned_in
 from walkers.runner.manifest import iso_time
 from walkers.show import describe, predicted_overhead, summarise
 from walkers.sweeps.making import progress_in

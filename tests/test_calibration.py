@@ -26,8 +26,8 @@ from walkers.calibration.report import draw_facts, record_of, summary
 from walkers.errors import InputError
 from walkers.inputs.axes import unit_cube
 from walkers.inputs.reading import load_case, shipped
-from walkers.postprocess.gait import misalignment
-from walkers.postprocess.tables import read_columns, write_table
+from walkers.postprocess.measure.gait import misalignment
+from walkers.postprocess.measure.tables import read_columns, write_table
 from walkers.runner.directory import recomputed
 from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import load

@@ -45,8 +45,8 @@ from walkers.inputs.toml import read_toml
 from walkers.physics.bridge import Surfaces
 from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.physics.laws import by_name
-from walkers.postprocess.dump import FloatArray, local_frames
-from walkers.postprocess.motion import Motion, read_motion
+from walkers.postprocess.measure.dump import FloatArray, local_frames
+from walkers.postprocess.measure.motion import Motion, read_motion
 from walkers.runner import binary
 from walkers.runner.binary import SOURCES, find_engine, read_audit, write_audit
 from walkers.runner.failures import AuditFailed, EngineError, UnauditedEngineWarning

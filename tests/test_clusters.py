@@ -13,8 +13,8 @@ import pytest
 
 from walkers.inputs.reading import load_case
 from walkers.inputs.tables.boundary import Flat
-from walkers.postprocess import clusters
-from walkers.postprocess.clusters import (
+from walkers.postprocess.measure import clusters
+from walkers.postprocess.measure.clusters import (
     Beads,
     Track,
     _walls_apart,
@@ -25,9 +25,9 @@ from walkers.postprocess.clusters import (
     connected,
     floor_of,
 )
-from walkers.postprocess.motion import Bridges
-from walkers.postprocess.piles import segregation
-from walkers.postprocess.tables import Columns
+from walkers.postprocess.measure.motion import Bridges
+from walkers.postprocess.measure.piles import segregation
+from walkers.postprocess.measure.tables import Columns
 from walkers.sweeps.climbing import summary
 
 BULK = list(range(20))

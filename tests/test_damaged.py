@@ -41,11 +41,11 @@ from walkers.files import read_json, write_json
 from walkers.inputs.reading import load_case
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
-from walkers.postprocess.dump import BinaryDump, DumpError, local_frames
-from walkers.postprocess.motion import read_motion
-from walkers.postprocess.paraview import write_vtk
-from walkers.postprocess.report.run import result_html
-from walkers.postprocess.results import measure, read
+from walkers.postprocess.measure.dump import BinaryDump, DumpError, local_frames
+from walkers.postprocess.measure.motion import read_motion
+from walkers.postprocess.measure.results import measure, read
+from walkers.postprocess.show.paraview import write_vtk
+from walkers.postprocess.show.report.run import result_html
 from walkers.runner.directory import CASE_NAME, FIRST_SEGMENT, case_of, locked, recomputed
 from walkers.runner.failures import DiskFull, RunBusy
 from walkers.runner.launch import launch

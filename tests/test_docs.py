@@ -130,7 +130,7 @@ def test_numbers_and_outputs_on_pages_are_todays(
     assert without_hashes(refreshed(text, facts(DOCS), printed)) == without_hashes(text)
 
 
-@pytest.mark.parametrize("module", ["walkers.api", "walkers.inputs.reading", "walkers.postprocess.motion"])
+@pytest.mark.parametrize("module", ["walkers.api", "walkers.inputs.reading", "walkers.postprocess.measure.motion"])
 def test_examples_give_what_they_say(module: str, runs_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a folder of the tests (``tmp``), with what a user would have imported."""
     if module == "walkers.api":  # its sweep is there for its table: Fig. 4b would take all of 60 cycles

@@ -15,11 +15,11 @@ from walkers import load_case, run
 from walkers.check.crosscheck import compare
 from walkers.inputs.sweep import load_sweep
 from walkers.inputs.tables.case import Case
-from walkers.postprocess.motion import boundary_motion
-from walkers.postprocess.numbers import rows, state
-from walkers.postprocess.quantities import declared
-from walkers.postprocess.sides import REST
-from walkers.postprocess.threshold import _crossed, _thresholds, measure
+from walkers.postprocess.measure.motion import boundary_motion
+from walkers.postprocess.measure.numbers import rows, state
+from walkers.postprocess.measure.quantities import declared
+from walkers.postprocess.measure.sides import REST
+from walkers.postprocess.measure.threshold import _crossed, _thresholds, measure
 from walkers.runner.binary import find_engine
 from walkers.sweeps.making import make_runs
 from walkers.templates.placement import sharing_key

@@ -32,7 +32,7 @@ from walkers import load_case
 from walkers.files import read_json, scratch_folder, write_json
 from walkers.inputs.reading import shipped
 from walkers.inputs.toml import read_toml
-from walkers.postprocess.uncertainty import ACCURACY_NAME, SPREAD_NAME, spread_of
+from walkers.postprocess.measure.uncertainty import ACCURACY_NAME, SPREAD_NAME, spread_of
 from walkers.runner.directory import case_of, locked
 from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.sweeps.comparison import Side, compare_runs

@@ -25,7 +25,7 @@ from walkers.inputs.sweep import expand
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import parse_quantity, quantity_text
 from walkers.physics.mixtures import water_glycerol
-from walkers.postprocess.uncertainty import lines_of_rest, rests_on
+from walkers.postprocess.measure.uncertainty import lines_of_rest, rests_on
 from walkers.show import describe, summarise
 from walkers.sweeps.spread import spread_sweep
 

@@ -21,7 +21,7 @@ from walkers.inputs.meshes.vessel import Vessel
 from walkers.inputs.meshes.wall_names import names_of_faces
 from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.case import Case
-from walkers.postprocess.dump import FloatArray
+from walkers.postprocess.measure.dump import FloatArray
 from walkers.runner import failures
 from walkers.show import describe, predicted_seconds, summarise
 

@@ -23,7 +23,7 @@ from walkers.paper.comparison import _text_of, compare
 from walkers.paper.figures import theory_of_cycles
 from walkers.paper.make import FIGURES, make_figures
 from walkers.paper.sources import NothingFinishedError, Sources, of_facts, ruby, sets, sweep_of
-from walkers.postprocess.gait import gait
+from walkers.postprocess.measure.gait import gait
 from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep
 from walkers.sweeps.table import read_record, write_record
 from walkers.text import rendered

@@ -17,9 +17,9 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.resolving.loads import bridge_at_rest, delay_of, delay_of_loose_beads, softness_warning
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
-from walkers.postprocess.figures import figures_of
-from walkers.postprocess.motion import FLOOR, read_bridges, read_motion
-from walkers.postprocess.results import read
+from walkers.postprocess.measure.motion import FLOOR, read_bridges, read_motion
+from walkers.postprocess.measure.results import read
+from walkers.postprocess.show.figures import figures_of
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.show import notes
 

@@ -34,8 +34,8 @@ from walkers.extras import EXTRAS, ExtraMissing, module_of
 from walkers.inputs.reading import shipped
 from walkers.main import program
 from walkers.paper.make import make_figures
-from walkers.postprocess.results import read
-from walkers.postprocess.tables import read_table
+from walkers.postprocess.measure.results import read
+from walkers.postprocess.measure.tables import read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import is_finished
 from walkers.runner.manifest import read_manifest
@@ -276,7 +276,7 @@ def test_help_names_every_command() -> None:
 
 
 SLOW = "cyclopts rich pydantic numpy scipy pandas matplotlib pyarrow pyvista pint"
-PUBLIC = "import walkers.inputs, walkers.api, walkers.postprocess.report.run, walkers.sweeps.report"
+PUBLIC = "import walkers.inputs, walkers.api, walkers.postprocess.show.report.run, walkers.sweeps.report"
 LOADED: dict[str, tuple[str, str, set[str]]] = {
     "help": ("import walkers.main as m; m._status(['--help'])", SLOW, set()),
     "list": ("import walkers.main as m; m._status(['list'])", SLOW, {"cyclopts", "numpy", "pydantic"}),

@@ -15,9 +15,9 @@ from walkers.errors import InputError
 from walkers.inputs.records.record import Record, record_of
 from walkers.inputs.records.record_file import read_record
 from walkers.inputs.records.signals import slow_part
-from walkers.postprocess.motion import boundary_motion, read_motion
-from walkers.postprocess.scene import Scene
-from walkers.postprocess.threshold import applies, directions
+from walkers.postprocess.measure.motion import boundary_motion, read_motion
+from walkers.postprocess.measure.threshold import applies, directions
+from walkers.postprocess.show.scene import Scene
 from walkers.show import notes
 
 G = 9.8

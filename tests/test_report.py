@@ -27,16 +27,16 @@ from scipy.spatial.transform import Rotation
 import walkers
 from tests.conftest import PATIENCE, document, make_case, to_toml, wait_for
 from walkers.inputs.sweep import expand
-from walkers.postprocess.caption import caption
-from walkers.postprocess.figures import figures_of
-from walkers.postprocess.motion import read_bridges, read_motion
-from walkers.postprocess.numbers import rows, shown
-from walkers.postprocess.report.page import LARGEST, svg_of
-from walkers.postprocess.report.player import camera_of, player_of
-from walkers.postprocess.report.run import report_run
-from walkers.postprocess.results import not_computed, read
-from walkers.postprocess.scene import gathered
-from walkers.postprocess.tables import read_table
+from walkers.postprocess.measure.caption import caption
+from walkers.postprocess.measure.motion import read_bridges, read_motion
+from walkers.postprocess.measure.numbers import rows, shown
+from walkers.postprocess.measure.results import not_computed, read
+from walkers.postprocess.measure.tables import read_table
+from walkers.postprocess.show.figures import figures_of
+from walkers.postprocess.show.report.page import LARGEST, svg_of
+from walkers.postprocess.show.report.player import camera_of, player_of
+from walkers.postprocess.show.report.run import report_run
+from walkers.postprocess.show.scene import gathered
 from walkers.rounding import rounded
 from walkers.sweeps.scheduler import Options, run_sweep
 from walkers.sweeps.table import load
@@ -150,7 +150,9 @@ def test_a_reports_figures_are_those_that_are_plotted_and_fewer_frames_make_it_s
     text, drawings = walked_report.read_text("utf-8"), [svg_of(one) for one in figures_of(read(walked_run)).values()]
     assert len(drawings) == 2
     assert all(one in text and "<metadata" not in one and "purl.org" not in one for one in drawings)
-    monkeypatch.setattr("walkers.postprocess.report.run.MOST_PLACES", 4 * 181)  # all at first, and then half of them
+    monkeypatch.setattr(
+        "walkers.postprocess.show.report.run.MOST_PLACES", 4 * 181
+    )  # all at first, and then half of them
     less = report_run(walked_run, tmp_path / "less.html", largest=walked_report.stat().st_size - 1000)
     assert less.stat().st_size < walked_report.stat().st_size - 1000
     assert "frames shown" in Report(less).words

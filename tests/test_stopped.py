@@ -35,7 +35,7 @@ from tests.conftest import (
 from walkers import run as run_case
 from walkers.inputs.reading import shipped
 from walkers.inputs.toml import read_toml
-from walkers.postprocess.results import measure, read
+from walkers.postprocess.measure.results import measure, read
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import RunBusy
 from walkers.runner.launch import ALONE, _off_the_network

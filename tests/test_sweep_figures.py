@@ -38,7 +38,7 @@ def _legend(figure: Figure) -> list[str]:
 
 
 COLOURS = ("#111111", "#1f4e8c")
-"""The first two of `walkers/postprocess/style.mplstyle`."""
+"""The first two of `walkers/postprocess/show/style.mplstyle`."""
 
 
 def _table(units: dict[str, str], rows: list[list[Any]], **speeds: Any) -> pd.DataFrame:

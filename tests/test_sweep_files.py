@@ -21,10 +21,10 @@ from walkers.inputs.resolving.library import unmeasured
 from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.sweep import Sweep, expand, load_sweep
 from walkers.inputs.tables.case import Case
-from walkers.postprocess import meetings
-from walkers.postprocess.dump import DumpError
-from walkers.postprocess.numbers import band_text
-from walkers.postprocess.uncertainty import SPREAD_NAME, held_text, spread_of
+from walkers.postprocess.measure import meetings
+from walkers.postprocess.measure.dump import DumpError
+from walkers.postprocess.measure.numbers import band_text
+from walkers.postprocess.measure.uncertainty import SPREAD_NAME, held_text, spread_of
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.spread import describe, run_spread, spread_in, spread_sweep
 from walkers.sweeps.table import groups, thresholds

@@ -17,10 +17,10 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.resolving.loads import dimer_of, resistances_at_rest
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
-from walkers.postprocess.gait import gait
-from walkers.postprocess.motion import Group
-from walkers.postprocess.results import read
-from walkers.postprocess.tables import read_table
+from walkers.postprocess.measure.gait import gait
+from walkers.postprocess.measure.motion import Group
+from walkers.postprocess.measure.results import read
+from walkers.postprocess.measure.tables import read_table
 from walkers.theory.mathieu import LARGEST_STABLE_V, Alignment, alignment, time_to_turn, turning_rate
 from walkers.theory.motion import Walker, walk
 from walkers.theory.prediction import alignment_of, describe, motion_of, predict, threshold

@@ -23,13 +23,13 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.steps import library
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import parse_quantity
-from walkers.postprocess.motion import read_motion
-from walkers.postprocess.numbers import fell, headline, rows
-from walkers.postprocess.quantities import declared, ordered
-from walkers.postprocess.results import NotComputed, headlines, not_computed, text
-from walkers.postprocess.tables import read_columns
-from walkers.postprocess.uncertainty import SPREAD_NAME, spread_of
-from walkers.postprocess.walking import _velocities
+from walkers.postprocess.measure.motion import read_motion
+from walkers.postprocess.measure.numbers import fell, headline, rows
+from walkers.postprocess.measure.quantities import declared, ordered
+from walkers.postprocess.measure.results import NotComputed, headlines, not_computed, text
+from walkers.postprocess.measure.tables import read_columns
+from walkers.postprocess.measure.uncertainty import SPREAD_NAME, spread_of
+from walkers.postprocess.measure.walking import _velocities
 from walkers.rounding import rounded
 from walkers.sweeps.accuracy import measure_accuracy, times_of
 from walkers.sweeps.folder import as_text, inventory

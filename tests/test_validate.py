@@ -24,7 +24,7 @@ from walkers.check.crosscheck import courses
 from walkers.check.lines import Line, Verdict, as_dict, as_text, failures
 from walkers.inputs.reading import load_case
 from walkers.physics.capillary import derjaguin_radius
-from walkers.postprocess.motion import Motion
+from walkers.postprocess.measure.motion import Motion
 from walkers.runner.failures import EngineFailure
 from walkers.runner.launch import ALONE
 

@@ -22,10 +22,10 @@ from walkers.inputs.resolving.standing import standing as starts
 from walkers.inputs.sweep import load_sweep
 from walkers.inputs.tables.boundary import FLOOR, LOOSE
 from walkers.inputs.tables.case import Case
-from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.motion import read_bridges
-from walkers.postprocess.necks import ends_of
-from walkers.postprocess.scene import walls_of
+from walkers.postprocess.measure.dump import FloatArray
+from walkers.postprocess.measure.motion import read_bridges
+from walkers.postprocess.show.necks import ends_of
+from walkers.postprocess.show.scene import walls_of
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.show import describe, summarise

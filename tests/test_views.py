@@ -25,16 +25,16 @@ from tests.printed import letters, spoilt
 from walkers.errors import InputError
 from walkers.inputs.resolving.loads import bridge_at_rest
 from walkers.inputs.tables.boundary import Boundary
-from walkers.postprocess.figures import MOST_NAMED, _interpolated, figures_of, looks_of, plot_run
-from walkers.postprocess.film_options import FilmOptions
-from walkers.postprocess.films import film_times
-from walkers.postprocess.motion import Group, Motion, read_bridges, read_motion
-from walkers.postprocess.necks import NO_BRIDGES, bridges_at, ends_of, necks_of
-from walkers.postprocess.paraview import _walls, write_vtk
-from walkers.postprocess.results import read
-from walkers.postprocess.scene import Scene, Window, axes_toward, camera_axes, gathered, mesh_of, walls_of
-from walkers.postprocess.series import _figure
-from walkers.postprocess.tables import read_table
+from walkers.postprocess.measure.motion import Group, Motion, read_bridges, read_motion
+from walkers.postprocess.measure.results import read
+from walkers.postprocess.measure.tables import read_table
+from walkers.postprocess.show.figures import MOST_NAMED, _interpolated, figures_of, looks_of, plot_run
+from walkers.postprocess.show.film_options import FilmOptions
+from walkers.postprocess.show.films import film_times
+from walkers.postprocess.show.necks import NO_BRIDGES, bridges_at, ends_of, necks_of
+from walkers.postprocess.show.paraview import _walls, write_vtk
+from walkers.postprocess.show.scene import Scene, Window, axes_toward, camera_axes, gathered, mesh_of, walls_of
+from walkers.postprocess.show.series import _figure
 
 
 @pytest.fixture(scope="module")
@@ -202,7 +202,7 @@ def test_smooth_curves_are_those_of_scipy(shape: str) -> None:
 def test_plots_of_walkers_load_neither_scipy_nor_pandas(directory: Path, tmp_path: Path) -> None:
     """Each takes a third of a second or more."""
     script = (
-        "import sys; from pathlib import Path; from walkers.postprocess.figures import plot_run\n"
+        "import sys; from pathlib import Path; from walkers.postprocess.show.figures import plot_run\n"
         "plot_run(Path(sys.argv[1]), Path(sys.argv[2]))\n"
         "print({'scipy', 'pandas', 'pyarrow.dataset'} & {*sys.modules})"
     )

@@ -23,16 +23,16 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.resolving.loads import contact_loads, dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
-from walkers.postprocess.dump import DumpError
-from walkers.postprocess.figures import figures_of
-from walkers.postprocess.gait import averages, gait, settled_samples, turns_away_after, walk
-from walkers.postprocess.motion import Group, read_bridges, read_motion
-from walkers.postprocess.numbers import rows
-from walkers.postprocess.quantities import TABLES, axis, declared, matches
-from walkers.postprocess.results import read
-from walkers.postprocess.sides import sides
-from walkers.postprocess.tables import read_columns, read_table, write_table
-from walkers.postprocess.walking import measure, walkers_met
+from walkers.postprocess.measure.dump import DumpError
+from walkers.postprocess.measure.gait import averages, gait, settled_samples, turns_away_after, walk
+from walkers.postprocess.measure.motion import Group, read_bridges, read_motion
+from walkers.postprocess.measure.numbers import rows
+from walkers.postprocess.measure.quantities import TABLES, axis, declared, matches
+from walkers.postprocess.measure.results import read
+from walkers.postprocess.measure.sides import sides
+from walkers.postprocess.measure.tables import read_columns, read_table, write_table
+from walkers.postprocess.measure.walking import measure, walkers_met
+from walkers.postprocess.show.figures import figures_of
 from walkers.progress import Progress
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import FIRST_SEGMENT, case_of, segment_directories

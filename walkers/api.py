@@ -21,17 +21,17 @@ from walkers.errors import InputError, Problem, WalkersError, apply_all, check_u
 from walkers.files import read_json
 from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped
 from walkers.inputs.sweep import load_sweep
-from walkers.postprocess import results
-from walkers.postprocess.drawing import FORMATS, check_place, save_figure
-from walkers.postprocess.figures import plot_run
-from walkers.postprocess.film_options import FilmOptions
-from walkers.postprocess.films import render_film
-from walkers.postprocess.motion import Motion, read_motion
-from walkers.postprocess.report.player import player_of
-from walkers.postprocess.report.run import report_run, result_html
-from walkers.postprocess.results import Results
-from walkers.postprocess.series import render_series
-from walkers.postprocess.tables import read_table
+from walkers.postprocess.measure import results
+from walkers.postprocess.measure.motion import Motion, read_motion
+from walkers.postprocess.measure.results import Results
+from walkers.postprocess.measure.tables import read_table
+from walkers.postprocess.show.drawing import FORMATS, check_place, save_figure
+from walkers.postprocess.show.figures import plot_run
+from walkers.postprocess.show.film_options import FilmOptions
+from walkers.postprocess.show.films import render_film
+from walkers.postprocess.show.report.player import player_of
+from walkers.postprocess.show.report.run import report_run, result_html
+from walkers.postprocess.show.series import render_series
 from walkers.progress import Progress, in_notebook, progress_of
 from walkers.runner import directory as on_disk
 from walkers.runner.binary import find_engine
@@ -67,8 +67,8 @@ Changes: TypeAlias = "Mapping[str, Any] | None"
 Export = Literal["deck", "vtk", "lammps", "archive"]
 EXPORTS = {
     "deck": "walkers.sweeps.by_hand:write_folder",
-    "vtk": "walkers.postprocess.paraview:write_vtk",
-    "lammps": "walkers.postprocess.trajectory_files:write_trajectory",
+    "vtk": "walkers.postprocess.show.paraview:write_vtk",
+    "lammps": "walkers.postprocess.show.lammps:write_trajectory",
     "archive": "walkers.archive.writing:write_archive",
 }
 """Functions that write the forms of exports."""
@@ -298,7 +298,7 @@ class Run:
         return self.table("walkers")
 
     def table(self, name: str) -> pd.DataFrame:
-        """A table of the run, see `walkers.postprocess.tables.read_table`."""
+        """A table of the run, see `walkers.postprocess.measure.tables.read_table`."""
         return read_table(self.finished_directory, name)
 
     def describe(self) -> str:
@@ -314,15 +314,15 @@ class Run:
         return result_html(self.result, self.origins)
 
     def plot(self, to: str | Path | None = None, formats: str | Sequence[str] = ("png",)) -> Pictures:
-        """Draw the figures and return their files; see `walkers.postprocess.figures.plot_run`."""
+        """Draw the figures and return their files; see `walkers.postprocess.show.figures.plot_run`."""
         return Pictures(plot_run(self.finished_directory, _path(to), formats))
 
     def render(self, to: str | Path | None = None, *, images: int = 6, walker: int | None = None) -> Pictures:
-        """Render pictures at several times; see `walkers.postprocess.series.render_series`."""
+        """Render pictures at several times; see `walkers.postprocess.show.series.render_series`."""
         return Pictures(render_series(self.finished_directory, _path(to), images=images, walker=walker))
 
     def film(self, to: str | Path | None = None, *, progress: bool | None = None, **options: Any) -> Path:
-        """Render a film with `walkers.postprocess.film_options.FilmOptions`, such as ``slowdown``."""
+        """Render a film with `walkers.postprocess.show.film_options.FilmOptions`, such as ``slowdown``."""
         with progress_of(self.case.name, progress) as advance:
             return render_film(self.finished_directory, _path(to), FilmOptions(**options), on_progress=advance)
 
@@ -339,7 +339,7 @@ class Run:
     def report(self, to: str | Path | None = None) -> Path:
         """Write a self-contained HTML report, with the figure of the run's spread if it has one.
 
-        See `walkers.postprocess.report.run.report_run`.
+        See `walkers.postprocess.show.report.run.report_run`.
 
         Examples
         --------

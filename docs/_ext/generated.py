@@ -28,7 +28,7 @@ from walkers.inputs.resolving.steps import SUPPLIED
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION, AUTO, TEMPERATURE, Kind, kind_in, quantity_text
 from walkers.main import print_help, program
-from walkers.postprocess.quantities import GROUPS, TABLES, Quantity
+from walkers.postprocess.measure.quantities import GROUPS, TABLES, Quantity
 from walkers.sweeps.table import STATE
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from walkers.errors import refused
 from walkers.extras import require
 from walkers.files import beside, checksum, json_bytes
 from walkers.inputs.toml import toml_bytes
-from walkers.postprocess.uncertainty import ACCURACY, ACCURACY_NAME, SPREAD, SPREAD_NAME
+from walkers.postprocess.measure.uncertainty import ACCURACY, ACCURACY_NAME, SPREAD, SPREAD_NAME
 from walkers.regular_files import open_regular
 from walkers.runner.binary import build_script, model_sources, model_version
 from walkers.runner.directory import CASE_NAME, case_of, name_of

@@ -18,8 +18,8 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from walkers.inputs.config_table import Table
 from walkers.inputs.units import ANGLE, SPEED, WRITTEN, Kind, Number, parse_quantity
-from walkers.postprocess.gait import misalignment, settled_samples, steady_walkers, together
-from walkers.postprocess.results import read
+from walkers.postprocess.measure.gait import misalignment, settled_samples, steady_walkers, together
+from walkers.postprocess.measure.results import read
 from walkers.runner.directory import case_of
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 FloatArray = npt.NDArray[np.float64]
 Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_pair_1"]
-"""Means over the cycles and over steady walkers (`walkers.postprocess.gait`), m/s."""
+"""Means over the cycles and over steady walkers (`walkers.postprocess.measure.gait`), m/s."""
 Slip = Literal["slip_1", "slip_2"]
 """How much a bead slides within a cycle: root mean square of its sliding velocity over that of the walker's velocity.
 

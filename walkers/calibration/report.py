@@ -16,7 +16,7 @@ from walkers.calibration.observations import FloatArray
 from walkers.files import write_bytes, write_json
 from walkers.inputs.keys import flatten
 from walkers.inputs.toml import toml_bytes
-from walkers.postprocess.drawing import TWO_COLUMNS, new_figure, save_figure, styled
+from walkers.postprocess.show.drawing import TWO_COLUMNS, new_figure, save_figure, styled
 from walkers.text import aligned, rendered
 
 if TYPE_CHECKING:

@@ -22,8 +22,8 @@ from walkers.check.lines import Line, Verdict
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
-from walkers.postprocess.gait import averages, walk
-from walkers.postprocess.motion import Motion
+from walkers.postprocess.measure.gait import averages, walk
+from walkers.postprocess.measure.motion import Motion
 
 SPEED, GAIT, ORIENTATION = 1e-4, 1e-3, 0.1
 """Tolerances: velocities of walkers (relative); rotation and sliding, relative to the fastest of them; final

@@ -10,7 +10,7 @@ from math import inf, isfinite, nan
 from typing import Any, TypeVar
 
 from walkers.errors import expected_of, refused
-from walkers.postprocess.results import plain
+from walkers.postprocess.measure.results import plain
 from walkers.text import aligned
 
 T = TypeVar("T")

@@ -30,8 +30,8 @@ from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import Vector
 from walkers.physics.bridge import Curve, Forces, Surfaces
 from walkers.physics.laws import LAWS, by_name
-from walkers.postprocess.dump import BinaryDump
-from walkers.postprocess.motion import prescribed_motion
+from walkers.postprocess.measure.dump import BinaryDump
+from walkers.postprocess.measure.motion import prescribed_motion
 from walkers.runner.binary import Engine
 from walkers.runner.directory import write_deck
 from walkers.runner.launch import launch

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 import walkers
 from walkers import DEFAULT_OUT
 from walkers.commands.options import At, Formats, Json, Out, Run, RunOrSweep, print_as, print_lines, refuse, refuse_any
-from walkers.postprocess.film_options import FilmOptions, Seconds
+from walkers.postprocess.show.film_options import FilmOptions, Seconds
 from walkers.sweeps.figure_options import FigureOptions
 
 

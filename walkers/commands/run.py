@@ -162,7 +162,7 @@ def sweep(
         Number of runs of each point for --spread; default: 32.
     """
     from walkers.inputs.sweep import load_sweep
-    from walkers.postprocess.uncertainty import lines_of_rest, rests_on
+    from walkers.postprocess.measure.uncertainty import lines_of_rest, rests_on
     from walkers.sweeps.scheduler import Options, plan_sweep
     from walkers.sweeps.site import load_site
     from walkers.sweeps.spread import spread_sweep

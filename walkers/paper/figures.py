@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.paper.sources import Sources, described, ruby, thresholds_with_theory
-from walkers.postprocess.drawing import ONE_COLUMN, TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
-from walkers.postprocess.gait import gait
-from walkers.postprocess.necks import bridges_at
-from walkers.postprocess.scene import Scene, Window, axes_toward
+from walkers.postprocess.measure.gait import gait
+from walkers.postprocess.show.drawing import ONE_COLUMN, TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
+from walkers.postprocess.show.necks import bridges_at
+from walkers.postprocess.show.scene import Scene, Window, axes_toward
 from walkers.sweeps.figure import figure_of
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.theory.prediction import MODEL, motion_of, predicted_column
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from walkers.postprocess.motion import Group
+    from walkers.postprocess.measure.motion import Group
 
 _INTERVAL, _IMAGES = 0.3, 6
 """Fig. 1b: seconds between images, and number of images."""

@@ -13,7 +13,7 @@ from walkers.files import write_bytes, write_json
 from walkers.paper.comparison import compare
 from walkers.paper.figures import fig1b, fig2_threshold, fig3, fig4, of_sweep
 from walkers.paper.sources import NothingFinishedError, Sources, of_facts, sets, sweep_of
-from walkers.postprocess.drawing import check_formats, save_figure
+from walkers.postprocess.show.drawing import check_formats, save_figure
 from walkers.progress import progress_of
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
 from walkers.text import rendered
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FORMATS = ("png", "svg")
-"""Default formats of figures, from `walkers.postprocess.drawing`."""
+"""Default formats of figures, from `walkers.postprocess.show.drawing`."""
 
 
 class Drawing(NamedTuple):

@@ -15,8 +15,8 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.sweep import Sweep, load_sweep
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
-from walkers.postprocess.caption import liquid_text, radii_text
-from walkers.postprocess.motion import Group, read_motion
+from walkers.postprocess.measure.caption import liquid_text, radii_text
+from walkers.postprocess.measure.motion import Group, read_motion
 from walkers.sweeps.table import load, thresholds
 from walkers.theory.prediction import threshold
 

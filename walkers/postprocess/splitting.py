@@ -10,8 +10,8 @@ import numpy as np
 
 from walkers.files import write_json
 from walkers.inputs.tables.case import Case
-from walkers.postprocess.dump import BinaryDump, local_frames, write_local_dump
-from walkers.postprocess.motion import NEAR, came_near
+from walkers.postprocess.measure.dump import BinaryDump, local_frames, write_local_dump
+from walkers.postprocess.measure.motion import NEAR, came_near
 from walkers.runner.failures import WalkersMet
 from walkers.templates.deck import LAYOUT_NAME
 from walkers.templates.layout import Layout

@@ -17,9 +17,9 @@ from walkers.errors import refused
 from walkers.files import write_json
 from walkers.inputs.sweep import Sweep, expand
 from walkers.inputs.tables.case import STIFFEST, Case
-from walkers.postprocess.results import recorded
-from walkers.postprocess.sides import STEADY_SPEED
-from walkers.postprocess.uncertainty import ACCURACY, ACCURACY_NAME
+from walkers.postprocess.measure.results import recorded
+from walkers.postprocess.measure.sides import STEADY_SPEED
+from walkers.postprocess.measure.uncertainty import ACCURACY, ACCURACY_NAME
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import case_of, recomputed, run_place
 from walkers.sweeps.scheduler import Options, SweepStopped, run_sweep

@@ -21,8 +21,8 @@ from walkers.inputs.config_table import changed
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.run import CONSTANT, settling_of
 from walkers.physics.laws import source_of
-from walkers.postprocess.dump import DumpError
-from walkers.postprocess.results import measure
+from walkers.postprocess.measure.dump import DumpError
+from walkers.postprocess.measure.results import measure
 from walkers.rounding import percent
 from walkers.runner import directory as on_disk
 from walkers.runner.binary import find_engine, plugin_of, write_run_script
@@ -121,7 +121,7 @@ def _age(path: Path) -> int:
 
 def _measure(folder: Path, deck: Path, log: Path) -> None:
     """Write the files of a run directory: case, layout, segment, tables, result, last the manifest."""
-    from walkers.postprocess.gait import are_constant
+    from walkers.postprocess.measure.gait import are_constant
 
     record = read_json(folder / on_disk.DECK_RECORD_NAME)
     before = on_disk.with_recorded_law(Case.from_dict(record["case"]), folder)

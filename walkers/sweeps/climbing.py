@@ -20,10 +20,10 @@ import numpy as np
 
 from walkers.errors import refused
 from walkers.files import write_bytes
-from walkers.postprocess.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, save_figure, styled
-from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.results import plain, read
-from walkers.postprocess.uncertainty import guesses
+from walkers.postprocess.measure.dump import FloatArray
+from walkers.postprocess.measure.results import plain, read
+from walkers.postprocess.measure.uncertainty import guesses
+from walkers.postprocess.show.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, save_figure, styled
 from walkers.rounding import percent
 from walkers.sweeps.table import SEEDS, groups, key_texts
 from walkers.text import aligned

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.physics.laws import LAWS
-from walkers.postprocess.numbers import ASIDE, band_of, error_text, headline, is_of_up, saying_nothing
-from walkers.postprocess.quantities import declared, is_error, scatter_of, unit_shown
-from walkers.postprocess.results import Results, not_computed, plain, read
+from walkers.postprocess.measure.numbers import ASIDE, band_of, error_text, headline, is_of_up, saying_nothing
+from walkers.postprocess.measure.quantities import declared, is_error, scatter_of, unit_shown
+from walkers.postprocess.measure.results import Results, not_computed, plain, read
 from walkers.rounding import counted, rounded
 from walkers.runner.manifest import read_manifest
 from walkers.sweeps.readable import differing, flattened, readable

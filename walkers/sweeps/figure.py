@@ -18,11 +18,11 @@ import numpy.typing as npt
 from walkers.errors import InputError, expected_of, refused
 from walkers.inputs.resolving.library import unmeasured
 from walkers.inputs.tables.case import Case
-from walkers.postprocess.drawing import TWO_COLUMNS, errors_seen, letter_panels, new_figure, plain_text, styled
-from walkers.postprocess.numbers import draws_text
-from walkers.postprocess.quantities import declared, is_declared, scatter_of, unit_shown
-from walkers.postprocess.results import derived
-from walkers.postprocess.uncertainty import few_draws
+from walkers.postprocess.measure.numbers import draws_text
+from walkers.postprocess.measure.quantities import declared, is_declared, scatter_of, unit_shown
+from walkers.postprocess.measure.results import derived
+from walkers.postprocess.measure.uncertainty import few_draws
+from walkers.postprocess.show.drawing import TWO_COLUMNS, errors_seen, letter_panels, new_figure, plain_text, styled
 from walkers.runner.directory import case_of
 from walkers.sweeps.figure_options import FigureOptions, Log
 from walkers.sweeps.table import (

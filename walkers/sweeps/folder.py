@@ -21,9 +21,9 @@ from typing import Any, TypeAlias
 from walkers.errors import InputError, refused, suggestion
 from walkers.files import VTK_SCRATCH, abandoned, read_json
 from walkers.inputs.tables.case import Case
-from walkers.postprocess.numbers import headline, in_short
-from walkers.postprocess.results import plain, read
-from walkers.postprocess.uncertainty import ACCURACY, SPREAD
+from walkers.postprocess.measure.numbers import headline, in_short
+from walkers.postprocess.measure.results import plain, read
+from walkers.postprocess.measure.uncertainty import ACCURACY, SPREAD
 from walkers.rounding import counted, duration_text
 from walkers.runner import directory as on_disk
 from walkers.runner.manifest import MANIFEST_NAME

@@ -25,7 +25,7 @@ from walkers.errors import Stopped, WalkersError
 from walkers.files import fsync_path, link_or_copy, make_folder, read_json, write_json
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.run import Run
-from walkers.postprocess.results import measure
+from walkers.postprocess.measure.results import measure
 from walkers.progress import Progress, Tell
 from walkers.rounding import duration_text
 from walkers.runner import directory as on_disk
@@ -184,7 +184,7 @@ def progress_in(run: Run, cycles: int, segment: Segment, step: int, seconds: flo
 
 
 def _are_constant(directory: Path) -> bool:
-    from walkers.postprocess.gait import are_constant  # numpy is loaded while the engine runs
+    from walkers.postprocess.measure.gait import are_constant  # numpy is loaded while the engine runs
 
     return are_constant(directory)
 
@@ -245,8 +245,8 @@ class OpenRun:
 
     def _has_climbed(self) -> bool:
         """Whether a cluster has climbed in the complete segments."""
-        from walkers.postprocess.motion import read_motion  # numpy is loaded while the engine runs
-        from walkers.postprocess.piles import has_climbed
+        from walkers.postprocess.measure.motion import read_motion  # numpy is loaded while the engine runs
+        from walkers.postprocess.measure.piles import has_climbed
 
         if on_disk.drive_from(self.case, self.done[:-1]) is None:  # the beads came to rest in this segment
             return False

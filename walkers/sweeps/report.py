@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from walkers.errors import InputError
 from walkers.files import write_bytes
-from walkers.postprocess.report.page import NAME, check_report, fill, page_of, svg_of
-from walkers.postprocess.results import read
-from walkers.postprocess.uncertainty import lines_of_rest
+from walkers.postprocess.measure.results import read
+from walkers.postprocess.measure.uncertainty import lines_of_rest
+from walkers.postprocess.show.report.page import NAME, check_report, fill, page_of, svg_of
 from walkers.sweeps.figure import LeftOutWarning, figure_of, readable_key
 from walkers.sweeps.table import cells_of, load
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def report_sweep(directory: Path, to: Path | None = None) -> Path:
     """Write the report of a sweep as one HTML file that needs no network.
 
-    Points link to the reports of their runs (`walkers.postprocess.report.run.report_run`) where these exist. The
+    Points link to the reports of their runs (`walkers.postprocess.show.report.run.report_run`) where these exist. The
     default file is ``report.html`` in the sweep's directory.
     """
     path = to or directory / NAME

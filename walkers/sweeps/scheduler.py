@@ -33,7 +33,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from walkers.errors import InputError, Problem, Stopped, WalkersError, check_utf8, refused
 from walkers.inputs.sweep import Sweep
 from walkers.inputs.tables.case import Case
-from walkers.postprocess.results import ensure_measured
+from walkers.postprocess.measure.results import ensure_measured
 from walkers.progress import Progress, Tell
 from walkers.rounding import counted, duration_text
 from walkers.runner.binary import Engine, find_engine

@@ -17,11 +17,11 @@ from walkers.inputs.origins import Origin
 from walkers.inputs.sweep import Sweep, expand
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import parse_quantity
-from walkers.postprocess.numbers import MAIN
-from walkers.postprocess.quantities import declared, unit_shown
-from walkers.postprocess.results import read
-from walkers.postprocess.sides import REST
-from walkers.postprocess.uncertainty import SPREAD_NAME, few_draws, held_of, held_text, in_lines, spread_of
+from walkers.postprocess.measure.numbers import MAIN
+from walkers.postprocess.measure.quantities import declared, unit_shown
+from walkers.postprocess.measure.results import read
+from walkers.postprocess.measure.sides import REST
+from walkers.postprocess.measure.uncertainty import SPREAD_NAME, few_draws, held_of, held_text, in_lines, spread_of
 from walkers.rounding import counted, rounded
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
@@ -53,7 +53,7 @@ class Spread:
     """Results of a spread, in the directory of its sweep.
 
     ``varied`` are the values that were drawn from their ranges, ``held`` those of the liquid and unmeasured ones that
-    have no range (`walkers.postprocess.uncertainty.held_of`).
+    have no range (`walkers.postprocess.measure.uncertainty.held_of`).
     ``bands`` has percentiles of the main results by the columns of the sweep's table (``low``, ``median`` and ``high``
     for 5, 50 and 95 %), their ``smallest`` and ``largest`` values (SI units), and numbers of ``points``, without
     walkers that came apart; ``depends`` has their rank correlations (Spearman) with the drawn values, the strongest

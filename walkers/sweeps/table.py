@@ -26,10 +26,10 @@ from walkers.errors import InputError, refused, suggestion
 from walkers.files import json_bytes, make_folder, read_json, write_bytes, write_json
 from walkers.inputs.axes import ranges_of
 from walkers.inputs.origins import text_of
-from walkers.postprocess.numbers import headline
-from walkers.postprocess.quantities import ENDS, GROUPS, declared, is_declared, ordered, unit_shown
-from walkers.postprocess.results import Results, modules_of, read
-from walkers.postprocess.sides import SEPARATED
+from walkers.postprocess.measure.numbers import headline
+from walkers.postprocess.measure.quantities import ENDS, GROUPS, declared, is_declared, ordered, unit_shown
+from walkers.postprocess.measure.results import Results, modules_of, read
+from walkers.postprocess.measure.sides import SEPARATED
 from walkers.rounding import counted, rounded
 from walkers.runner.directory import FAILURE_NAME, is_finished, is_locked, unfinished
 from walkers.sweeps.making import share_kept

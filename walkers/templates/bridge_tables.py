@@ -1,6 +1,7 @@
 """Tables of a bridge law that the contact model ``cohesion bridge`` interpolates.
 
-``walkers/templates/engine/table.h`` describes their format. A law may have a kink at the gap ``scale``, between two cells.
+``walkers/templates/engine/table.h`` describes their format. A law may have a kink at the gap
+``scale``, between two cells.
 """
 
 from __future__ import annotations

@@ -13,8 +13,8 @@ import numpy.typing as npt
 from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
-from walkers.postprocess.gait import GROWS
-from walkers.postprocess.results import plain
+from walkers.postprocess.measure.gait import GROWS
+from walkers.postprocess.measure.results import plain
 from walkers.rounding import with_decimals
 from walkers.text import aligned
 from walkers.theory.mathieu import LARGEST_STABLE_V, alignment, time_to_turn, turning_rate

@@ -24,7 +24,7 @@ FIRST_ATTEMPTS = (12, 24)
 CONSTANT = 0.002
 """Share within which the velocities of the halves of a walker's cycles agree where a run ends early: they are constant.
 
-`walkers.postprocess.gait.walk` calls a walker steady by a looser criterion.
+`walkers.postprocess.measure.gait.walk` calls a walker steady by a looser criterion.
 """
 _SEGMENT_SECONDS = 0.5
 _MOST_CYCLES = 60

@@ -9,9 +9,9 @@ from fnmatch import fnmatchcase
 from math import isfinite, nan
 from typing import Any
 
-from walkers.postprocess.quantities import SHOWN, Quantity, declared, is_error, ordered, unit_shown
-from walkers.postprocess.sides import REST
-from walkers.postprocess.tables import Columns
+from walkers.postprocess.measure.quantities import SHOWN, Quantity, declared, is_error, ordered, unit_shown
+from walkers.postprocess.measure.sides import REST
+from walkers.postprocess.measure.tables import Columns
 from walkers.rounding import counted, rounded, with_decimals
 
 
@@ -19,7 +19,8 @@ from walkers.rounding import counted, rounded, with_decimals
 class Measured:
     """What a module measures: tables, numbers in SI units, reasons to doubt them.
 
-    Names of numbers are those of `walkers.postprocess.quantities.GROUPS`. One that is not defined is None or NaN.
+    Names of numbers are those of `walkers.postprocess.measure.quantities.GROUPS`. A number that is
+    not defined is None or NaN.
     """
 
     tables: Mapping[str, Columns]

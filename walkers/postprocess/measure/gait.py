@@ -24,15 +24,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from walkers.inputs.tables.run import CONSTANT, Run
-from walkers.postprocess.dump import BoolArray, DumpError, FloatArray
-from walkers.postprocess.motion import Group, between, read_motion
-from walkers.postprocess.sides import REST, SEPARATED, STEADY_SPEED
-from walkers.postprocess.tables import Columns
+from walkers.postprocess.measure.dump import BoolArray, DumpError, FloatArray
+from walkers.postprocess.measure.motion import Group, between, read_motion
+from walkers.postprocess.measure.sides import REST, SEPARATED, STEADY_SPEED
+from walkers.postprocess.measure.tables import Columns
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from walkers.postprocess.results import Results
+    from walkers.postprocess.measure.results import Results
 
 STEADY_DIFFERENCE = 0.05
 """A walker is steady if the velocities of the two halves of the measured cycles differ by less than this share, or by

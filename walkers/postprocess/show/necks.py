@@ -18,8 +18,8 @@ import numpy.typing as npt
 from walkers.inputs.tables.boundary import Flat, Round
 from walkers.inputs.tables.case import Case
 from walkers.physics.capillary import bridge_volume
-from walkers.postprocess.dump import FloatArray, IntArray
-from walkers.postprocess.motion import Motion, read_bridges
+from walkers.postprocess.measure.dump import FloatArray, IntArray
+from walkers.postprocess.measure.motion import Motion, read_bridges
 
 BLUE, OPACITY = 0x3FA0FF, 0.8
 """Colour of necks; they are translucent."""

@@ -15,7 +15,15 @@ from walkers.files import read_json
 from walkers.inputs.tables.bodies import Walkers
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import Excitation
-from walkers.postprocess.dump import BinaryDump, BoolArray, DumpError, FloatArray, IntArray, NoNumberError, local_frames
+from walkers.postprocess.measure.dump import (
+    BinaryDump,
+    BoolArray,
+    DumpError,
+    FloatArray,
+    IntArray,
+    NoNumberError,
+    local_frames,
+)
 from walkers.runner.directory import SEGMENT_NAME, case_of, layout_of, run_of, segment_directories
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.templates.layout import MEAN_SPIN_COLUMNS, Layout, PlacedWalker

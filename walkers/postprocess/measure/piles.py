@@ -10,12 +10,12 @@ import numpy as np
 
 from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.case import Case
-from walkers.postprocess import clusters
-from walkers.postprocess.clusters import Beads, Cluster
-from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
-from walkers.postprocess.motion import Bridges, Motion, read_bridges
-from walkers.postprocess.numbers import Measured
-from walkers.postprocess.tables import Columns, read_columns
+from walkers.postprocess.measure import clusters
+from walkers.postprocess.measure.clusters import Beads, Cluster
+from walkers.postprocess.measure.dump import BoolArray, FloatArray, IntArray
+from walkers.postprocess.measure.motion import Bridges, Motion, read_bridges
+from walkers.postprocess.measure.numbers import Measured
+from walkers.postprocess.measure.tables import Columns, read_columns
 
 _WHOLE = 1.0 - 1e-6
 """Fraction of the duration below which a run ended early."""

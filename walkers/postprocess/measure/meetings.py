@@ -16,11 +16,11 @@ import numpy as np
 
 from walkers.inputs.tables.boundary import FLOOR
 from walkers.inputs.tables.case import Case
-from walkers.postprocess.clusters import connected
-from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
-from walkers.postprocess.motion import Bridges, Motion
-from walkers.postprocess.numbers import Measured
-from walkers.postprocess.tables import columns_of
+from walkers.postprocess.measure.clusters import connected
+from walkers.postprocess.measure.dump import BoolArray, FloatArray, IntArray
+from walkers.postprocess.measure.motion import Bridges, Motion
+from walkers.postprocess.measure.numbers import Measured
+from walkers.postprocess.measure.tables import columns_of
 
 _SLOW = 0.1
 """Walkers below this fraction of the speed of free walkers are slow."""

@@ -18,12 +18,12 @@ import numpy as np
 from walkers.errors import WalkersError, refused
 from walkers.extras import require
 from walkers.files import beside
-from walkers.postprocess import scene as view
-from walkers.postprocess.drawing import check_place
-from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.film_options import FilmOptions
-from walkers.postprocess.motion import Motion, read_motion
-from walkers.postprocess.necks import bridges_at, bridges_text
+from walkers.postprocess.measure.dump import FloatArray
+from walkers.postprocess.measure.motion import Motion, read_motion
+from walkers.postprocess.show import scene as view
+from walkers.postprocess.show.drawing import check_place
+from walkers.postprocess.show.film_options import FilmOptions
+from walkers.postprocess.show.necks import bridges_at, bridges_text
 from walkers.progress import Progress, Tell
 
 _AROUND, _AROUND_TRAY = 1.2, 1.3  # extent of the picture over that of the paths of the beads, or of the tray

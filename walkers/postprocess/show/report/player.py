@@ -1,7 +1,7 @@
 """Interactive 3-D player of the beads of a run: a K3D plot for reports and notebooks.
 
 Lengths are in mm, in the frame of the boundary; the view follows a walker with a long path. Two-coloured balls show how
-beads roll, unless the frames are too far apart (`walkers.postprocess.scene.turned_in`).
+beads roll, unless the frames are too far apart (`walkers.postprocess.show.scene.turned_in`).
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.extras import require
-from walkers.postprocess import scene as view
-from walkers.postprocess.dump import FloatArray, IntArray
-from walkers.postprocess.motion import Motion
-from walkers.postprocess.necks import (
+from walkers.postprocess.measure.dump import FloatArray, IntArray
+from walkers.postprocess.measure.motion import Motion
+from walkers.postprocess.show import scene as view
+from walkers.postprocess.show.necks import (
     BLUE,
     OPACITY,
     at_front_walls,
@@ -94,7 +94,7 @@ def player_of(
 def camera_of(motion: Motion, path: FloatArray | None = None) -> list[float]:
     """Position, target (mm) and upward direction of a camera that sees everything, with gravity downward.
 
-    ``path`` is subtracted from the positions of the beads (`walkers.postprocess.scene.Scene`).
+    ``path`` is subtracted from the positions of the beads (`walkers.postprocess.show.scene.Scene`).
     """
     axes = _axes_of_camera(motion)
     seen = view.Scene.around(motion, axes, _AROUND, shaken=False, path=path)

@@ -25,9 +25,9 @@ import numpy as np
 
 from walkers.inputs.tables.boundary import FLOOR as FLOOR_NAME
 from walkers.inputs.tables.boundary import Wall
-from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
-from walkers.postprocess.motion import FLOOR, Bridges
-from walkers.postprocess.tables import Columns, columns_of
+from walkers.postprocess.measure.dump import BoolArray, FloatArray, IntArray
+from walkers.postprocess.measure.motion import FLOOR, Bridges
+from walkers.postprocess.measure.tables import Columns, columns_of
 
 Cluster = tuple[frozenset[int], frozenset[int]]
 """Beads of a cluster in a frame, and side walls that hold it."""

@@ -6,8 +6,8 @@ A record that does not repeat is run up to a whole number of cycles.
 from __future__ import annotations
 
 from walkers.inputs.tables.case import Case
-from walkers.postprocess.motion import Motion
-from walkers.postprocess.numbers import Measured
+from walkers.postprocess.measure.motion import Motion
+from walkers.postprocess.measure.numbers import Measured
 
 
 def applies(case: Case) -> bool:

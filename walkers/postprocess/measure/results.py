@@ -1,7 +1,7 @@
 """Results of runs: measured and written once, read by all.
 
-A result is flat: a number of each name of `walkers.postprocess.quantities.GROUPS`. Each module of `modules_of` has
-three functions: ``applies(case)``; ``derived(case)``, numbers that follow from the case alone; and ``measure(motion)``.
+A result is flat: a number of each name of `walkers.postprocess.measure.quantities.GROUPS`. Each
+module of `modules_of` has three functions: ``applies(case)``; ``derived(case)``, numbers that follow from the case alone; and ``measure(motion)``.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from walkers.errors import InputError, refused
 from walkers.files import read_json, write_json
 from walkers.inputs.resolving.loads import gravity_warnings, softness_warning
 from walkers.inputs.tables.run import limits_of
-from walkers.postprocess import meetings, piles, record_part, threshold, walking
-from walkers.postprocess.caption import conditions
-from walkers.postprocess.motion import read_motion
-from walkers.postprocess.numbers import MAIN, headline, rows, state
-from walkers.postprocess.tables import Columns, read_columns, read_table, write_table
-from walkers.postprocess.uncertainty import accuracy_of, bands_of, lines_of_rest, rests_on
+from walkers.postprocess.measure import meetings, piles, record_part, threshold, walking
+from walkers.postprocess.measure.caption import conditions
+from walkers.postprocess.measure.motion import read_motion
+from walkers.postprocess.measure.numbers import MAIN, headline, rows, state
+from walkers.postprocess.measure.tables import Columns, read_columns, read_table, write_table
+from walkers.postprocess.measure.uncertainty import accuracy_of, bands_of, lines_of_rest, rests_on
 from walkers.rounding import counted, percent
 from walkers.runner.directory import SEGMENT_NAME, files_of_segments, recomputed, segment_directories
 from walkers.runner.manifest import RESULT_NAME, check_unchanged
@@ -51,8 +51,8 @@ class Results(dict[str, Any]):
     warnings
         Reasons to doubt the numbers.
     about
-        ``case``, ``drive``, ``rests_on`` (`walkers.postprocess.uncertainty.rests_on`), ``by_hand`` (notes on a deck
-        that was run by hand), ``tables`` (their names).
+        ``case``, ``drive``, ``rests_on`` (`walkers.postprocess.measure.uncertainty.rests_on`),
+        ``by_hand`` (notes on a deck that was run by hand), ``tables`` (their names).
     """
 
     def __init__(
@@ -97,7 +97,7 @@ def derived(case: Case) -> dict[str, Any]:
 def measure(directory: Path) -> None:
     """Measure a run, finished or not; write its tables and, last, ``result.json``.
 
-    `walkers.postprocess.dump.DumpError` if a dump cannot be read, `walkers.runner.manifest.FileChanged` if it changed.
+    `walkers.postprocess.measure.dump.DumpError` if a dump cannot be read, `walkers.runner.manifest.FileChanged` if it changed.
     """
     check_unchanged(directory, files_of_segments(directory))
     motion = read_motion(directory)

@@ -1,6 +1,6 @@
 """Scene of a run: beads, walls, colours, motion and camera; rendered off-screen (PyVista).
 
-Reports and notebooks (`walkers.postprocess.report.player`) and ParaView (`walkers.postprocess.paraview`) show the same.
+Reports and notebooks (`walkers.postprocess.show.report.player`) and ParaView (`walkers.postprocess.show.paraview`) show the same.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ import numpy.typing as npt
 from walkers.errors import refused
 from walkers.inputs.tables.boundary import Flat, Round
 from walkers.inputs.tables.case import Case
-from walkers.postprocess import piles
-from walkers.postprocess.dump import FloatArray, IntArray
-from walkers.postprocess.motion import Motion, between, visible_displacement
-from walkers.postprocess.necks import BLUE, NO_BRIDGES, OPACITY, at_front_walls, ends_of, necks_of, triangles_of
+from walkers.postprocess.measure import piles
+from walkers.postprocess.measure.dump import FloatArray, IntArray
+from walkers.postprocess.measure.motion import Motion, between, visible_displacement
+from walkers.postprocess.show.necks import BLUE, NO_BRIDGES, OPACITY, at_front_walls, ends_of, necks_of, triangles_of
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -393,7 +393,7 @@ class Window:
     def picture(self, frame: float, bridges: IntArray = NO_BRIDGES) -> Picture:
         """Picture of a frame, or of a time between two frames (a fraction) by cubic interpolation.
 
-        Bridges are contacts as in `walkers.postprocess.motion.Bridges`.
+        Bridges are contacts as in `walkers.postprocess.measure.motion.Bridges`.
         """
         from PIL import Image
 

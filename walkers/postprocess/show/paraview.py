@@ -18,11 +18,11 @@ import numpy as np
 
 from walkers.errors import check_limits, refused
 from walkers.files import VTK_SCRATCH, scratch_folder
-from walkers.postprocess import piles
-from walkers.postprocess.clusters import connected
-from walkers.postprocess.motion import Bridges, Motion, read_bridges, read_motion
-from walkers.postprocess.necks import ends_of
-from walkers.postprocess.scene import Scene, camera_axes, gathered, mesh_of, walls_of
+from walkers.postprocess.measure import piles
+from walkers.postprocess.measure.clusters import connected
+from walkers.postprocess.measure.motion import Bridges, Motion, read_bridges, read_motion
+from walkers.postprocess.show.necks import ends_of
+from walkers.postprocess.show.scene import Scene, camera_axes, gathered, mesh_of, walls_of
 
 if TYPE_CHECKING:
     import meshio

@@ -13,8 +13,13 @@ import numpy.typing as npt
 
 from walkers.errors import refused
 from walkers.inputs.tables.case import Case
-from walkers.postprocess.caption import caption
-from walkers.postprocess.drawing import (
+from walkers.postprocess.measure.caption import caption
+from walkers.postprocess.measure.motion import LEAST_SAMPLES
+from walkers.postprocess.measure.quantities import axis, declared, matches
+from walkers.postprocess.measure.results import Results, read
+from walkers.postprocess.measure.sides import directions, sides
+from walkers.postprocess.measure.tables import Columns
+from walkers.postprocess.show.drawing import (
     FORMATS,
     TWO_COLUMNS,
     check_formats,
@@ -24,11 +29,6 @@ from walkers.postprocess.drawing import (
     save_figure,
     styled,
 )
-from walkers.postprocess.motion import LEAST_SAMPLES
-from walkers.postprocess.quantities import axis, declared, matches
-from walkers.postprocess.results import Results, read
-from walkers.postprocess.sides import directions, sides
-from walkers.postprocess.tables import Columns
 from walkers.rounding import rounded
 from walkers.runner.directory import case_of
 
@@ -95,7 +95,7 @@ def figures_of(results: Results) -> dict[str, Figure]:
 def plot_run(directory: Path, destination: Path | None = None, formats: str | Sequence[str] = ("png",)) -> list[Path]:
     """Draw the figures of a run, ``walk``, ``gait``, ``paths`` or ``climb``, into a folder, by default that of the run.
 
-    `InputError` for formats that are not in `walkers.postprocess.drawing.FORMATS`, and for a picture's name as folder.
+    `InputError` for formats that are not in `walkers.postprocess.show.drawing.FORMATS`, and for a picture's name as folder.
     """
     formats = check_formats(formats)
     destination = destination or directory

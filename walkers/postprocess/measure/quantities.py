@@ -1,7 +1,7 @@
 """Name, unit, label and meaning of each column of a table and of each number of a result.
 
 They are declared once, in ``quantities.toml``. Files, axes and the reference take them from here.
-`walkers.postprocess.numbers` formats the numbers of results.
+`walkers.postprocess.measure.numbers` formats the numbers of results.
 """
 
 from __future__ import annotations
@@ -63,9 +63,9 @@ def _quantities(entries: Mapping[str, str | list[str]]) -> tuple[Quantity, ...]:
 TABLES: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(columns) for name, columns in _FILE["tables"].items()}
 """The columns of the tables of runs, in their order."""
 GROUPS: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(group) for name, group in _FILE["numbers"].items()}
-"""The numbers of results: of each module of `walkers.postprocess.results.modules_of`, and of all."""
+"""The numbers of results: of each module of `walkers.postprocess.measure.results.modules_of`, and of all."""
 SHOWN: Mapping[str, frozenset[str]] = {name: frozenset(names) for name, names in _FILE["shown"].items()}
-"""Which numbers are shown (`walkers.postprocess.numbers.rows`)."""
+"""Which numbers are shown (`walkers.postprocess.measure.numbers.rows`)."""
 _NUMBERS = [
     quantity
     for number in (number for group in GROUPS.values() for number in group)

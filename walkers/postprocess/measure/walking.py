@@ -17,12 +17,12 @@ import numpy as np
 from walkers.inputs.resolving.loads import contact_loads, dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
-from walkers.postprocess import gait
-from walkers.postprocess.dump import FloatArray, IntArray
-from walkers.postprocess.motion import NEAR, Group, Motion, came_near
-from walkers.postprocess.numbers import Measured
-from walkers.postprocess.sides import REST, SAME, SEPARATED, STEADY_SPEED, alike, differ, sides
-from walkers.postprocess.tables import Columns, numbered
+from walkers.postprocess.measure import gait
+from walkers.postprocess.measure.dump import FloatArray, IntArray
+from walkers.postprocess.measure.motion import NEAR, Group, Motion, came_near
+from walkers.postprocess.measure.numbers import Measured
+from walkers.postprocess.measure.sides import REST, SAME, SEPARATED, STEADY_SPEED, alike, differ, sides
+from walkers.postprocess.measure.tables import Columns, numbered
 from walkers.rounding import counted, percent
 
 _LONGER = 1.5

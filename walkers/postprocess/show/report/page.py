@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import refused
-from walkers.postprocess.drawing import check_place, styled
+from walkers.postprocess.show.drawing import check_place, styled
 from walkers.runner.provenance import PROJECT, software
 from walkers.text import environment
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_PACKAGE = "walkers.postprocess.report"
+_PACKAGE = "walkers.postprocess.show.report"
 NAME = "report.html"
 LARGEST = 5_000_000
 """Largest size of a report in bytes, small enough for mail."""

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from walkers.errors import check_limits
-from walkers.postprocess.drawing import check_place, new_figure, plain_text, save_figure, styled
-from walkers.postprocess.dump import FloatArray
-from walkers.postprocess.motion import Motion, read_motion
-from walkers.postprocess.necks import EXPLAINED, bridges_at
-from walkers.postprocess.scene import Scene, Window, from_the_side, gathered, named_direction, plan_axes, shown_of
+from walkers.postprocess.measure.dump import FloatArray
+from walkers.postprocess.measure.motion import Motion, read_motion
+from walkers.postprocess.show.drawing import check_place, new_figure, plain_text, save_figure, styled
+from walkers.postprocess.show.necks import EXPLAINED, bridges_at
+from walkers.postprocess.show.scene import Scene, Window, from_the_side, gathered, named_direction, plan_axes, shown_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

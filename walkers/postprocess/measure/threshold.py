@@ -4,7 +4,7 @@ The drive changes by a ramp, or because the amplitude of a record changes. Its s
 amplitude of its acceleration (`walkers.inputs.tables.drive.Excitation.local_amplitude`).
 
 A window is a few cycles. A walker moves in it if it is faster than
-`walkers.postprocess.sides.REST`. It stops at the end of the last window in which it moves while the
+`walkers.postprocess.measure.sides.REST`. It stops at the end of the last window in which it moves while the
 drive falls, and starts at the begin of the first one in which it moves while the drive rises, if it
 rests in others. The resolution is the change of the drive in this window.
 """
@@ -18,11 +18,11 @@ import numpy as np
 from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
-from walkers.postprocess.dump import BoolArray, FloatArray, IntArray
-from walkers.postprocess.gait import distance_walked
-from walkers.postprocess.motion import Motion
-from walkers.postprocess.numbers import Measured
-from walkers.postprocess.sides import REST
+from walkers.postprocess.measure.dump import BoolArray, FloatArray, IntArray
+from walkers.postprocess.measure.gait import distance_walked
+from walkers.postprocess.measure.motion import Motion
+from walkers.postprocess.measure.numbers import Measured
+from walkers.postprocess.measure.sides import REST
 
 WINDOW = 8
 """Cycles of a window."""

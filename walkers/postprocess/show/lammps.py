@@ -12,8 +12,8 @@ import numpy as np
 
 from walkers.errors import check_limits
 from walkers.files import beside
-from walkers.postprocess.drawing import check_place
-from walkers.postprocess.motion import read_motion
+from walkers.postprocess.measure.motion import read_motion
+from walkers.postprocess.show.drawing import check_place
 
 _COLUMNS = ("id", "type", "mol", "radius", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz")
 _FORMAT = "%d %d %d" + " %.10g" * 10

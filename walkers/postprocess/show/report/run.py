@@ -11,14 +11,14 @@ from walkers.extras import require
 from walkers.files import write_bytes
 from walkers.inputs.origins import Origin, text_of
 from walkers.inputs.tables.case import Case
-from walkers.postprocess.caption import caption
-from walkers.postprocess.figures import figures_of
-from walkers.postprocess.motion import read_motion
-from walkers.postprocess.numbers import rows
-from walkers.postprocess.report.page import LARGEST, NAME, check_report, fill, page_of, svg_of
-from walkers.postprocess.report.player import MOST_PLACES, player_of
-from walkers.postprocess.results import BAND_NOTE, Results, has_band, headlines, not_computed, read
-from walkers.postprocess.uncertainty import held_of, held_text
+from walkers.postprocess.measure.caption import caption
+from walkers.postprocess.measure.motion import read_motion
+from walkers.postprocess.measure.numbers import rows
+from walkers.postprocess.measure.results import BAND_NOTE, Results, has_band, headlines, not_computed, read
+from walkers.postprocess.measure.uncertainty import held_of, held_text
+from walkers.postprocess.show.figures import figures_of
+from walkers.postprocess.show.report.page import LARGEST, NAME, check_report, fill, page_of, svg_of
+from walkers.postprocess.show.report.player import MOST_PLACES, player_of
 from walkers.runner.directory import case_of
 from walkers.runner.manifest import read_manifest
 
@@ -41,7 +41,7 @@ def report_run(
 
     ``origins`` are the sources of the values of its case, ``figures`` further ones, such as that of its spread. The
     player shows fewer frames of runs of many beads, so that the file has fewer bytes than ``largest``. `InputError` if
-    the file is no HTML file in an existing folder, `walkers.postprocess.dump.DumpError` if a dump cannot be read.
+    the file is no HTML file in an existing folder, `walkers.postprocess.measure.dump.DumpError` if a dump cannot be read.
     """
     require("report")
     path = to or directory / NAME

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from walkers.errors import refused
 from walkers.files import beside
-from walkers.postprocess.quantities import TABLES, declared, matches
+from walkers.postprocess.measure.quantities import TABLES, declared, matches
 from walkers.regular_files import read_regular
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def columns_of(rows: Iterable[Sequence[Any]], **kinds: type) -> Columns:
 
 
 def write_table(directory: Path, name: str, columns: Columns) -> None:
-    """Write a table of a run; KeyError if columns are missing or not in `walkers.postprocess.quantities.TABLES`."""
+    """Write a table of a run; KeyError if columns are missing or not in `walkers.postprocess.measure.quantities.TABLES`."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
