@@ -35,7 +35,7 @@ from walkers.postprocess.show import series
 from walkers.runner.binary import Engine
 from walkers.runner.directory import locked, run_place
 from walkers.runner.failures import RunBusy
-from walkers.sweeps.making import OpenRun, open_locked
+from walkers.runs.making import OpenRun, open_locked
 from walkers.sweeps.scheduler import Options, run_sweep
 
 # The walker of the published tables: R 0.3/0.2 mm, Si AK5, 80 Hz, no rolling friction, one walker that starts on the

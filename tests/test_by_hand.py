@@ -16,8 +16,8 @@ from walkers.errors import InputError
 from walkers.inputs.config_table import changed
 from walkers.inputs.tables.case import Case
 from walkers.runner.directory import FIRST_SEGMENT
-from walkers.sweeps.by_hand import take_in, write_folder
-from walkers.sweeps.readable import differing, flattened
+from walkers.runs.by_hand import take_in, write_folder
+from walkers.runs.case_text import differing, flattened
 
 
 def _edit(folder: Path, **values: str) -> None:

@@ -31,8 +31,8 @@ from walkers.postprocess.show.films import speed_text
 from walkers.postprocess.show.report.player import _points
 from walkers.postprocess.show.scene import Scene, rotations_at, turned_in
 from walkers.runner.manifest import iso_time
-from walkers.show import describe, predicted_overhead, summarise
-from walkers.sweeps.making import progress_in
+from walkers.runs.making import progress_in
+from walkers.runs.preview import describe, predicted_overhead, summarise
 from walkers.templates.deck import Segment, compose, plan_of, render_deck
 from walkers.templates.placement import place
 

@@ -433,7 +433,7 @@ def test_a_run_goes_on_when_a_full_disk_has_room_again(tmp_path: Path, monkeypat
             return launch(deck, folder, *given, **how)
 
         with monkeypatch.context() as patch:
-            patch.setattr("walkers.sweeps.making.launch", on_a_full_disk)
+            patch.setattr("walkers.runs.making.launch", on_a_full_disk)
             with pytest.raises(DiskFull, match="disk full"):
                 run_case(case, place)
         assert not list(place.glob("*/manifest.json"))

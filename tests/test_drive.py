@@ -21,7 +21,7 @@ from walkers.postprocess.measure.quantities import declared
 from walkers.postprocess.measure.sides import REST
 from walkers.postprocess.measure.threshold import _crossed, _thresholds, measure
 from walkers.runner.binary import find_engine
-from walkers.sweeps.making import make_runs
+from walkers.runs.making import make_runs
 from walkers.templates.placement import sharing_key
 
 PERIOD = 1.0 / 80.0

@@ -35,9 +35,9 @@ from walkers.inputs.toml import read_toml
 from walkers.postprocess.measure.uncertainty import ACCURACY_NAME, SPREAD_NAME, spread_of
 from walkers.runner.directory import case_of, locked
 from walkers.runner.manifest import MANIFEST_NAME, checksums
-from walkers.sweeps.comparison import Side, compare_runs
+from walkers.runs.case_text import readable
+from walkers.runs.comparison import Side, compare_runs
 from walkers.sweeps.folder import bytes_text, weigh
-from walkers.sweeps.readable import readable
 from walkers.sweeps.scheduler import Options, plan_sweep
 from walkers.sweeps.table import read_record
 

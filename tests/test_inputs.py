@@ -26,7 +26,7 @@ from walkers.inputs.tables.case import Case
 from walkers.inputs.units import parse_quantity, quantity_text
 from walkers.physics.mixtures import water_glycerol
 from walkers.postprocess.measure.uncertainty import lines_of_rest, rests_on
-from walkers.show import describe, summarise
+from walkers.runs.preview import describe, summarise
 from walkers.sweeps.spread import spread_sweep
 
 QUANTITIES = {

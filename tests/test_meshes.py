@@ -23,7 +23,7 @@ from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.dump import FloatArray
 from walkers.runner import failures
-from walkers.show import describe, predicted_seconds, summarise
+from walkers.runs.preview import describe, predicted_seconds, summarise
 
 DATA = Path(__file__).parent / "data" / "meshes"
 BOXES = [

@@ -29,7 +29,7 @@ from walkers.physics.capillary import rupture_distance as rupture_of_lian
 from walkers.physics.laplace import force_curve, rupture_distance
 from walkers.physics.laws import LAWS, by_name, rabinovich, willett, young_laplace
 from walkers.physics.time_step import FRACTIONS
-from walkers.show import summarise
+from walkers.runs.preview import summarise
 
 pytestmark = pytest.mark.filterwarnings("ignore::walkers.physics.laws.ExecutedLawWarning")
 

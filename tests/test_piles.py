@@ -21,7 +21,7 @@ from walkers.postprocess.measure.motion import FLOOR, read_bridges, read_motion
 from walkers.postprocess.measure.results import read
 from walkers.postprocess.show.figures import figures_of
 from walkers.runner.manifest import MANIFEST_NAME
-from walkers.show import notes
+from walkers.runs.preview import notes
 
 QUICK = {"time_step": "3 us", "longest_settling": "0.05 s"}
 """Half the steps of "auto"; the beads are shaken as soon as they have come down."""

@@ -18,7 +18,7 @@ from walkers.inputs.records.signals import slow_part
 from walkers.postprocess.measure.motion import boundary_motion, read_motion
 from walkers.postprocess.measure.threshold import applies, directions
 from walkers.postprocess.show.scene import Scene
-from walkers.show import notes
+from walkers.runs.preview import notes
 
 G = 9.8
 F = 80.0

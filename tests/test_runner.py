@@ -55,7 +55,7 @@ from walkers.runner.directory import (
 from walkers.runner.failures import EngineNeverStarted
 from walkers.runner.launch import EngineReport, judge
 from walkers.runner.manifest import read_manifest, write_manifest
-from walkers.sweeps.making import make_runs
+from walkers.runs.making import make_runs
 from walkers.templates.deck import RESTART_NAME, Deck, Segment, render_deck, whole
 
 PATIENCE_OF_LOCKS = "walkers.runner.directory._PATIENCE_SECONDS"

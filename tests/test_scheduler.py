@@ -32,7 +32,7 @@ from walkers.progress import Progress
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import case_of, unfinished
 from walkers.runner.failures import WalkersMet
-from walkers.sweeps.making import DECK_FOLDER, make_runs, progress_at
+from walkers.runs.making import DECK_FOLDER, make_runs, progress_at
 from walkers.sweeps.scheduler import (
     LONGEST_SECONDS,
     MOST_WALKERS,
@@ -67,7 +67,7 @@ def sweep_file(in_folder: Path) -> Callable[..., str]:
 
 def test_walkers_that_meet_are_taken_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """They have room for more than they walk; so what counts as near is made larger than all of it."""
-    monkeypatch.setattr("walkers.postprocess.splitting.NEAR", 1e3)
+    monkeypatch.setattr("walkers.runs.splitting.NEAR", 1e3)
     with pytest.raises(WalkersMet):
         make_runs([make_case(run={**TINY, "seed": seed}) for seed in (1, 2)], tmp_path, find_engine())
     assert not list(tmp_path.glob("*"))

@@ -28,7 +28,7 @@ from walkers.postprocess.show.necks import ends_of
 from walkers.postprocess.show.scene import walls_of
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
-from walkers.show import describe, summarise
+from walkers.runs.preview import describe, summarise
 from walkers.templates.deck import render_deck
 from walkers.templates.placement import Bead
 

@@ -37,7 +37,7 @@ from walkers.progress import Progress
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import FIRST_SEGMENT, case_of, segment_directories
 from walkers.runner.manifest import RESULT_NAME, read_manifest
-from walkers.sweeps.making import make_runs
+from walkers.runs.making import make_runs
 from walkers.theory.mathieu import turning_rate
 
 RunDirectory = Callable[..., Path]

@@ -37,15 +37,15 @@ from walkers.runner import directory as on_disk
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import EngineMissing, RunBusy
 from walkers.runner.manifest import read_manifest
+from walkers.runs.by_hand import as_run, take_in
+from walkers.runs.comparison import Comparison, Side, compare_runs
+from walkers.runs.making import check_audit, make_runs, progress_at
 from walkers.sweeps import table as of_points
 from walkers.sweeps.accuracy import measure_accuracy
-from walkers.sweeps.by_hand import as_run, take_in
 from walkers.sweeps.climbing import conditions_in, summarise_climbs, write_climbs
-from walkers.sweeps.comparison import Comparison, Side, compare_runs
 from walkers.sweeps.figure import column_of, figure_of
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.folder import run_text
-from walkers.sweeps.making import check_audit, make_runs, progress_at
 from walkers.sweeps.report import report_sweep
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
 from walkers.sweeps.site import load_site
@@ -66,7 +66,7 @@ Named: TypeAlias = "Case | str | Path | Mapping[str, Any]"
 Changes: TypeAlias = "Mapping[str, Any] | None"
 Export = Literal["deck", "vtk", "lammps", "archive"]
 EXPORTS = {
-    "deck": "walkers.sweeps.by_hand:write_folder",
+    "deck": "walkers.runs.by_hand:write_folder",
     "vtk": "walkers.postprocess.show.paraview:write_vtk",
     "lammps": "walkers.postprocess.show.lammps:write_trajectory",
     "archive": "walkers.archive.writing:write_archive",

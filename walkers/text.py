@@ -59,6 +59,11 @@ _FILTERS: Mapping[str, Callable[..., Any]] = {
 }
 
 
+def with_unit(words: str, unit: str | None) -> str:
+    """A label with its unit, if there is one."""
+    return f"{words} ({unit})" if unit else words
+
+
 @cache
 def environment(*packages: str, html: bool = False) -> Environment:
     """The environment that renders templates of packages; in ``html`` values are escaped."""

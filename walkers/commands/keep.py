@@ -15,8 +15,8 @@ from walkers.api import Export, case_and_run, directory_of, writer_of
 from walkers.commands.options import At, Out, RunOrSweep, refuse, tell
 from walkers.errors import apply_all
 from walkers.runner.directory import UNFINISHED
+from walkers.runs.by_hand import as_run, write_folder
 from walkers.sweeps import folder
-from walkers.sweeps.by_hand import as_run, write_folder
 from walkers.templates.deck import RUN_NAME, render_deck, whole
 
 _REMOVED = "Runs, with their spreads and accuracies, and sweeps, with the runs that no other sweep has."

@@ -56,7 +56,7 @@ def show(case: Case, /, *, at: At = At(), theory: bool = False, as_json: Json = 
         print_as(as_json, lambda: predicted, lambda: describe_prediction(predicted, predicted["engine"]))
         return
     from walkers.api import case_at
-    from walkers.show import describe, summarise
+    from walkers.runs.preview import describe, summarise
 
     summary = summarise(case_at(case, at.out, at.values)[0])
     print_as(as_json, lambda: summary, lambda: describe(summary))
@@ -98,7 +98,7 @@ def run(
     """
     from walkers.api import case_at, finished_at
     from walkers.runner.failures import EngineFailure
-    from walkers.show import notes
+    from walkers.runs.preview import notes
     from walkers.sweeps.accuracy import times_of
     from walkers.sweeps.spread import describe, spread_sweep
 

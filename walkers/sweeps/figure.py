@@ -34,8 +34,8 @@ from walkers.sweeps.table import (
     status_text,
     together,
     value_text,
-    with_unit,
 )
+from walkers.text import with_unit
 
 if TYPE_CHECKING:
     import pandas as pd

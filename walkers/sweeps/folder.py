@@ -27,8 +27,8 @@ from walkers.postprocess.measure.uncertainty import ACCURACY, SPREAD
 from walkers.rounding import counted, duration_text
 from walkers.runner import directory as on_disk
 from walkers.runner.manifest import MANIFEST_NAME
-from walkers.sweeps.making import progress_at
-from walkers.sweeps.readable import FlatCase, differing, flattened, has_value, readable, short_keys
+from walkers.runs.case_text import FlatCase, differing, flattened, has_value, readable, short_keys
+from walkers.runs.making import progress_at
 from walkers.sweeps.table import RECORD_NAME, read_record, state_at, states, status_text, worst_status
 from walkers.text import aligned
 

@@ -40,11 +40,12 @@ from walkers.runner.binary import Engine, find_engine
 from walkers.runner.directory import is_finished, is_locked, run_place, unfinished
 from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, OutputGone, ProgramDiffers
 from walkers.runner.launch import cores_here
-from walkers.show import PROGRAM_SECONDS, pairs_of_beads, predicted_overhead, predicted_seconds
+from walkers.runs.making import check_audit, make_runs, progress_at
+from walkers.runs.preview import PROGRAM_SECONDS, pairs_of_beads, predicted_overhead, predicted_seconds
 from walkers.sweeps import table
-from walkers.sweeps.making import check_audit, make_runs, progress_at
 from walkers.sweeps.site import check_path, decks_at, prepare
 from walkers.templates.placement import sharing_key
+from walkers.text import with_unit
 
 if TYPE_CHECKING:
     from parsl.config import Config
@@ -224,7 +225,7 @@ class SweepPlan:
         apart = besides + sum(predicted_seconds(case) * case.run.ranks for case in missing)
         # Python works for one deck at a time, while other engines run.
         until = max(makespan((deck.seconds for deck in self.decks), at_once) + PROGRAM_SECONDS, besides)
-        keys = ", ".join(table.with_unit(key, unit) for key, unit in record.sweep.units.items())
+        keys = ", ".join(with_unit(key, unit) for key, unit in record.sweep.units.items())
         return "\n".join(
             [
                 f"{record.sweep.name}: {record.sweep.title}".rstrip(": "),

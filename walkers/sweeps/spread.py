@@ -25,8 +25,8 @@ from walkers.postprocess.measure.uncertainty import SPREAD_NAME, few_draws, held
 from walkers.rounding import counted, rounded
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
+from walkers.runs.case_text import kind_of
 from walkers.sweeps.figure import LeftOutWarning, figure_of, rank_correlations
-from walkers.sweeps.readable import kind_of
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
 from walkers.sweeps.table import load, main_columns, together
 

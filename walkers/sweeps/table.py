@@ -27,14 +27,14 @@ from walkers.files import json_bytes, make_folder, read_json, write_bytes, write
 from walkers.inputs.axes import ranges_of
 from walkers.inputs.origins import text_of
 from walkers.postprocess.measure.numbers import headline
-from walkers.postprocess.measure.quantities import ENDS, GROUPS, declared, is_declared, ordered, unit_shown
+from walkers.postprocess.measure.quantities import ENDS, GROUPS, described_columns, is_declared, unit_shown
 from walkers.postprocess.measure.results import Results, modules_of, read
 from walkers.postprocess.measure.sides import SEPARATED
 from walkers.rounding import counted, rounded
 from walkers.runner.directory import FAILURE_NAME, is_finished, is_locked, unfinished
-from walkers.sweeps.making import share_kept
-from walkers.sweeps.readable import short_keys
-from walkers.text import aligned
+from walkers.runs.case_text import short_keys
+from walkers.runs.making import share_kept
+from walkers.text import aligned, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -192,7 +192,7 @@ def load(directory: str | Path) -> pd.DataFrame:
         parts = max((len(value) for value in values if isinstance(value, list)), default=0)
         varied |= dict.fromkeys([f"{key}[{part}]" for part in range(parts)] or [key], (unit or "", "varied"))
     numbers = {name for point in points for name in point.result or _declared(sweep)}
-    described = {"point": ("", "number of the point"), **varied, **columns_of(numbers), **STATE}
+    described = {"point": ("", "number of the point"), **varied, **described_columns(numbers), **STATE}
     rows = [_row(number, sweep, state) for number, state in enumerate(points)]
     frame = pd.DataFrame(rows, columns=list(described))
     frame.attrs["units"] = {name: unit for name, (unit, _) in described.items()}
@@ -202,11 +202,6 @@ def load(directory: str | Path) -> pd.DataFrame:
     samples = [ranges_of(sample["ranges"]) for sample in sweep.file.get("sample", [])]
     frame.attrs["sampled"] = {key: span.logarithmic for ranges in samples for key, span in ranges.items()}
     return frame
-
-
-def columns_of(names: Iterable[str]) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of numbers of results, in the order of their declarations."""
-    return {quantity.name: (quantity.si_unit, quantity.meaning) for quantity in map(declared, ordered(names))}
 
 
 def _declared(sweep: Sweep) -> list[str]:
@@ -270,11 +265,6 @@ def find_name(option: str, word: str, names: Iterable[str]) -> str:
         return matches[0]
     text = f"expected one of {', '.join(matches or candidates)}{'' if matches else suggestion(word, candidates)}"
     raise refused(option, f'"{word}": {text}')
-
-
-def with_unit(words: str, unit: str | None) -> str:
-    """A label with its unit, if there is one."""
-    return f"{words} ({unit})" if unit else words
 
 
 def value_text(value: Any, unit: str | None = None) -> str:

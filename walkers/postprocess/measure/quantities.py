@@ -131,6 +131,12 @@ def ordered(names: Iterable[str]) -> list[str]:
     return sorted(names, key=lambda name: (places.get(re.sub(r"_\d+(?=_|$)", "_*", name), places.get(name, -1)), name))
 
 
+def described_columns(names: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of numbers of results, in the order of their declarations."""
+    quantities = [declared(name) for name in ordered(names)]
+    return {quantity.name: (quantity.si_unit, quantity.meaning) for quantity in quantities}
+
+
 def unit_shown(unit: str) -> tuple[str, float]:
     """The displayed unit of an SI unit, and how many of it one SI unit is."""
     return SHOWN_UNITS.get(unit, (unit, 1.0))

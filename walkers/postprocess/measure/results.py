@@ -1,7 +1,8 @@
 """Results of runs: measured and written once, read by all.
 
 A result is flat: a number of each name of `walkers.postprocess.measure.quantities.GROUPS`. Each
-module of `modules_of` has three functions: ``applies(case)``; ``derived(case)``, numbers that follow from the case alone; and ``measure(motion)``.
+module of `modules_of` has three functions: ``applies(case)``; ``derived(case)``, numbers that follow
+from the case alone; and ``measure(motion)``.
 """
 
 from __future__ import annotations
@@ -97,7 +98,8 @@ def derived(case: Case) -> dict[str, Any]:
 def measure(directory: Path) -> None:
     """Measure a run, finished or not; write its tables and, last, ``result.json``.
 
-    `walkers.postprocess.measure.dump.DumpError` if a dump cannot be read, `walkers.runner.manifest.FileChanged` if it changed.
+    `walkers.postprocess.measure.dump.DumpError` if a dump cannot be read,
+    `walkers.runner.manifest.FileChanged` if it changed.
     """
     check_unchanged(directory, files_of_segments(directory))
     motion = read_motion(directory)

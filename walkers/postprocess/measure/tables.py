@@ -35,7 +35,10 @@ def columns_of(rows: Iterable[Sequence[Any]], **kinds: type) -> Columns:
 
 
 def write_table(directory: Path, name: str, columns: Columns) -> None:
-    """Write a table of a run; KeyError if columns are missing or not in `walkers.postprocess.measure.quantities.TABLES`."""
+    """Write a table of a run.
+
+    KeyError if columns are missing or not in `walkers.postprocess.measure.quantities.TABLES`.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 

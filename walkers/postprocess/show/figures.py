@@ -95,7 +95,8 @@ def figures_of(results: Results) -> dict[str, Figure]:
 def plot_run(directory: Path, destination: Path | None = None, formats: str | Sequence[str] = ("png",)) -> list[Path]:
     """Draw the figures of a run, ``walk``, ``gait``, ``paths`` or ``climb``, into a folder, by default that of the run.
 
-    `InputError` for formats that are not in `walkers.postprocess.show.drawing.FORMATS`, and for a picture's name as folder.
+    `InputError` for formats that are not in `walkers.postprocess.show.drawing.FORMATS`, and for a
+    picture's name as folder.
     """
     formats = check_formats(formats)
     destination = destination or directory

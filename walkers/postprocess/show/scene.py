@@ -1,6 +1,7 @@
 """Scene of a run: beads, walls, colours, motion and camera; rendered off-screen (PyVista).
 
-Reports and notebooks (`walkers.postprocess.show.report.player`) and ParaView (`walkers.postprocess.show.paraview`) show the same.
+Reports and notebooks (`walkers.postprocess.show.report.player`) and ParaView
+(`walkers.postprocess.show.paraview`) show the same.
 """
 
 from __future__ import annotations

@@ -39,9 +39,10 @@ def report_run(
 ) -> Path:
     """Write the report of a run as a self-contained HTML file, by default ``report.html`` in the run directory.
 
-    ``origins`` are the sources of the values of its case, ``figures`` further ones, such as that of its spread. The
-    player shows fewer frames of runs of many beads, so that the file has fewer bytes than ``largest``. `InputError` if
-    the file is no HTML file in an existing folder, `walkers.postprocess.measure.dump.DumpError` if a dump cannot be read.
+    ``origins`` are the sources of the values of its case, ``figures`` further ones, such as that of
+    its spread. The player shows fewer frames of runs of many beads, so that the file has fewer
+    bytes than ``largest``. `InputError` if the file is no HTML file in an existing folder,
+    `walkers.postprocess.measure.dump.DumpError` if a dump cannot be read.
     """
     require("report")
     path = to or directory / NAME

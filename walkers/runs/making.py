@@ -403,7 +403,7 @@ def _make_together(
 
 def _part(incomplete: Path, cases: Mapping[str, Case], deck: Deck, report: EngineReport) -> None:
     """Give each run its part of the output, and the deck."""
-    from walkers.postprocess.splitting import split_output
+    from walkers.runs.splitting import split_output
 
     places = {incomplete / name / on_disk.FIRST_SEGMENT: case for name, case in cases.items()}
     for place in places:

@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from walkers.physics.laws import LAWS
 from walkers.postprocess.measure.numbers import ASIDE, band_of, error_text, headline, is_of_up, saying_nothing
-from walkers.postprocess.measure.quantities import declared, is_error, scatter_of, unit_shown
+from walkers.postprocess.measure.quantities import declared, described_columns, is_error, scatter_of, unit_shown
 from walkers.postprocess.measure.results import Results, not_computed, plain, read
 from walkers.rounding import counted, rounded
 from walkers.runner.manifest import read_manifest
-from walkers.sweeps.readable import differing, flattened, readable
-from walkers.sweeps.table import columns_of, with_unit
+from walkers.runs.case_text import differing, flattened, readable
 from walkers.templates.deck import bridge_tables_digest
-from walkers.text import aligned
+from walkers.text import aligned, with_unit
 
 if TYPE_CHECKING:
     from walkers.inputs.tables.case import Case
@@ -151,7 +150,7 @@ def _rows(first: Results, second: Results) -> list[dict[str, Any]]:
     little.update(ASIDE, ["coverage"], *map(saying_nothing, results.values()))
     names = {name for name in {*first, *second} - little if not is_error(name)}
     rows = []
-    for name, (unit, _) in columns_of(names).items():
+    for name, (unit, _) in described_columns(names).items():
         numbers = {side: _number(result.get(name)) for side, result in results.items()}
         scatters = {f"{side}_scatter": result.get(scatter_of(name)) for side, result in results.items()}
         error = hypot(*(result.get(f"{name}_error", nan) for result in results.values()))

@@ -29,7 +29,7 @@ from walkers.runner.binary import find_engine, plugin_of, write_run_script
 from walkers.runner.failures import EngineFailure, MissingFrames
 from walkers.runner.launch import judge
 from walkers.runner.manifest import MANIFEST_NAME, checksums, read_manifest, write_manifest
-from walkers.sweeps.readable import kind_of
+from walkers.runs.case_text import kind_of
 from walkers.templates import deck as decks
 from walkers.templates.deck import PRINTED, Segment, suffixes
 
