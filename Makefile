@@ -61,7 +61,7 @@ test: setup cluster chromium .venv/with-dev ## Lint, check types, run the tests 
 	  wait $$types; typed=$$?; cat build/types.txt; exit $$((tests | typed))
 
 # Both integrators are compiled once, beside the smoke test; each worker of the tests would by itself.
-build/integrators: walkers/theory/stepping.py walkers/check/kernels.py
+build/integrators: walkers/theory/stepping.py walkers/second_engine/kernels.py
 	@{ $(WALKERS) show fig1b --theory; .venv/bin/pytest -q tests/test_check.py -k momentum; } > /dev/null && touch $@
 
 .PHONY: test-slow

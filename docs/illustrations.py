@@ -31,10 +31,6 @@ from walkers.api import Changes, climb
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.file import load_calibration
 from walkers.calibration.report import write_outcome
-from walkers.check import experiments
-from walkers.check.benchmarks import curve_of, published
-from walkers.check.lines import as_dict, failures, run_checks
-from walkers.check.literature import LITERATURE
 from walkers.errors import InputError, Problem
 from walkers.files import read_json, write_bytes, write_json
 from walkers.inputs.sweep import Sweep, load_sweep
@@ -43,12 +39,16 @@ from walkers.paper.make import COMPARED, FIGURES, make_figures
 from walkers.paper.sources import sweep_of
 from walkers.postprocess.measure.results import VERSION
 from walkers.postprocess.show.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, save_figure, styled
+from walkers.second_engine import experiments
+from walkers.second_engine.benchmarks import curve_of, published
+from walkers.second_engine.lines import as_dict, failures, run_checks
+from walkers.second_engine.literature import LITERATURE
 from walkers.sweeps.climbing import texts_of
 from walkers.sweeps.scheduler import Options
 from walkers.templates.deck import CONTENT_VERSION
 
 if TYPE_CHECKING:
-    from walkers.check.scenes import Bench
+    from walkers.second_engine.scenes import Bench
 
 RECORD = Path("figures") / "made-from.json"
 CHECKED = Path("figures") / "validation.json"

@@ -18,25 +18,6 @@ import pytest
 
 from tests.conftest import SHORT, call, document, make_case, to_toml
 from walkers import Run, run
-from walkers.check import kernels
-from walkers.check.audit import CHECKS, record, run_audit
-from walkers.check.crosscheck import compare, full_cases, shortened, simulate
-from walkers.check.engine import TERMS, SecondEngine
-from walkers.check.lines import Line, Verdict, as_text, failures
-from walkers.check.scenes import (
-    DEEP,
-    DRY,
-    FLOOR,
-    Bench,
-    bench_case,
-    full_case,
-    liquid_lines,
-    over,
-    pair,
-    prescribed,
-    second_engine,
-    standing,
-)
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.tables.boundary import BOTTOM, Flat, Round, Wall
 from walkers.inputs.tables.case import Case
@@ -51,6 +32,25 @@ from walkers.runner import binary
 from walkers.runner.binary import SOURCES, find_engine, read_audit, write_audit
 from walkers.runner.failures import AuditFailed, EngineError, UnauditedEngineWarning
 from walkers.runner.manifest import read_manifest
+from walkers.second_engine import kernels
+from walkers.second_engine.audit import CHECKS, record, run_audit
+from walkers.second_engine.crosscheck import compare, full_cases, shortened, simulate
+from walkers.second_engine.engine import TERMS, SecondEngine
+from walkers.second_engine.lines import Line, Verdict, as_text, failures
+from walkers.second_engine.scenes import (
+    DEEP,
+    DRY,
+    FLOOR,
+    Bench,
+    bench_case,
+    full_case,
+    liquid_lines,
+    over,
+    pair,
+    prescribed,
+    second_engine,
+    standing,
+)
 from walkers.templates.deck import Plan, compose
 from walkers.templates.layout import WALL_BRIDGES
 from walkers.templates.placement import Bead

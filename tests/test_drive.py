@@ -12,7 +12,6 @@ import pytest
 
 from tests.conftest import call, document, make_case, to_toml
 from walkers import load_case, run
-from walkers.check.crosscheck import compare
 from walkers.inputs.sweep import load_sweep
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.motion import boundary_motion
@@ -22,6 +21,7 @@ from walkers.postprocess.measure.sides import REST
 from walkers.postprocess.measure.threshold import _crossed, _thresholds, measure
 from walkers.runner.binary import find_engine
 from walkers.runs.making import make_runs
+from walkers.second_engine.crosscheck import compare
 from walkers.templates.placement import sharing_key
 
 PERIOD = 1.0 / 80.0

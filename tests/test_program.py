@@ -139,7 +139,7 @@ def test_mandatory_packages_run_tabulate_and_draw(bare: Path, in_folder: Path) -
 NEEDING: dict[str, list[Callable[[walkers.Run, Path], object]]] = {
     "archive": [lambda run, out: run.export("archive", out / "run.zip")],
     "calibrate": [lambda _, out: calibrate(load_calibration("ruby"), out, Options(1))],
-    "check": [lambda *_: importlib.reload(importlib.import_module("walkers.check"))],
+    "check": [lambda *_: importlib.reload(importlib.import_module("walkers.second_engine"))],
     "cluster": [lambda _, out: load_site(out / "site.toml")],
     "film": [lambda run, out: run.film(out / "film.mp4")],
     "report": [lambda run, out: run.report(out / "run.html"), lambda run, _: run.view()],

@@ -17,16 +17,16 @@ import numpy as np
 import pytest
 
 from tests.conftest import call
-from walkers.check import experiments, literature
-from walkers.check.benchmarks import TESTS, largest, published
-from walkers.check.bridges import LAWS, pulls
-from walkers.check.crosscheck import courses
-from walkers.check.lines import Line, Verdict, as_dict, as_text, failures
 from walkers.inputs.reading import load_case
 from walkers.physics.capillary import derjaguin_radius
 from walkers.postprocess.measure.motion import Motion
 from walkers.runner.failures import EngineFailure
 from walkers.runner.launch import ALONE
+from walkers.second_engine import experiments, literature
+from walkers.second_engine.benchmarks import TESTS, largest, published
+from walkers.second_engine.bridges import LAWS, pulls
+from walkers.second_engine.crosscheck import courses
+from walkers.second_engine.lines import Line, Verdict, as_dict, as_text, failures
 
 
 def test_the_published_points_are_those_of_the_tests() -> None:

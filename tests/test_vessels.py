@@ -13,8 +13,6 @@ import pytest
 
 import walkers
 from tests.conftest import to_toml
-from walkers.check.crosscheck import compare
-from walkers.check.scenes import DRY, Bench, bench_case, full_case, prescribed, standing
 from walkers.errors import InputError
 from walkers.inputs.meshes.vessel import Vessel
 from walkers.inputs.reading import load_case
@@ -29,6 +27,8 @@ from walkers.postprocess.show.scene import walls_of
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.runs.preview import describe, summarise
+from walkers.second_engine.crosscheck import compare
+from walkers.second_engine.scenes import DRY, Bench, bench_case, full_case, prescribed, standing
 from walkers.templates.deck import render_deck
 from walkers.templates.placement import Bead
 

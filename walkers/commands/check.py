@@ -30,7 +30,7 @@ from walkers.commands.options import (
 from walkers.errors import refused
 
 if TYPE_CHECKING:
-    from walkers.check.lines import Line
+    from walkers.second_engine.lines import Line
 
 # A section does not inherit the heading of its options.
 check = App(name="check", version_flags=(), group_parameters="Options")
@@ -46,8 +46,8 @@ def engine(*, only: list[str] | None = None, as_json: Json = False, engine: Engi
     only
         Run only the check with this name. Repeatable.
     """
-    from walkers.check.audit import record, run_audit
     from walkers.runner.binary import find_engine
+    from walkers.second_engine.audit import record, run_audit
 
     binary = find_engine(engine)
     lines, version = run_audit(only or (), engine=binary, on_done=tell)
@@ -62,7 +62,7 @@ def engine(*, only: list[str] | None = None, as_json: Json = False, engine: Engi
 
 
 def _print_checked(lines: Sequence[Line], as_json: bool, of: str = "", **more: Any) -> int:
-    from walkers.check.lines import as_dict, as_text, failures
+    from walkers.second_engine.lines import as_dict, as_text, failures
 
     print_as(as_json, lambda: as_dict(lines, **more), lambda: as_text(lines, of))
     return 1 if failures(lines) else 0
@@ -77,8 +77,8 @@ def literature(*only: Annotated[str, Parameter(name="CHECK")], out: Out = DEFAUL
     only
         benchmarks, bridges, crosscheck or experiments; default: all.
     """
-    from walkers.check.lines import run_checks
-    from walkers.check.literature import LITERATURE
+    from walkers.second_engine.lines import run_checks
+    from walkers.second_engine.literature import LITERATURE
 
     return _print_checked(run_checks(LITERATURE, out, only, tell), as_json)
 
@@ -118,8 +118,8 @@ def case(
         Piles: number of random starts.
     """
     from walkers.api import case_at
-    from walkers.check.crosscheck import crosscheck, shortened
-    from walkers.check.engine import TERMS
+    from walkers.second_engine.crosscheck import crosscheck, shortened
+    from walkers.second_engine.engine import TERMS
 
     loaded = case_at(case, at.out, at.values)[0]
     refuse("--seeds", seeds > 1 and loaded.mixture is None, "is for piles: walkers and placed beads have one start")

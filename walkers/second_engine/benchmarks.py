@@ -16,12 +16,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from walkers.check.engine import SecondEngine
-from walkers.check.kernels import FloatArray
-from walkers.check.lines import Line
-from walkers.check.scenes import DRY, FLOOR, bench_case
 from walkers.inputs.tables.case import Friction, Roughness
 from walkers.physics.contact import Impact, reduced_modulus
+from walkers.second_engine.engine import SecondEngine
+from walkers.second_engine.kernels import FloatArray
+from walkers.second_engine.lines import Line
+from walkers.second_engine.scenes import DRY, FLOOR, bench_case
 
 READING, STEP, SLIDING = 0.02, 2e-3, 4e-3
 """Tolerances: a point of a printed figure, over its axis; forces and durations at a thousand steps a contact; sliding,
@@ -178,7 +178,7 @@ PANELS: Mapping[str, Panel] = {
 
 def published() -> dict[str, Any]:
     """The panels of ``chung_ooi.toml``, points as arrays of shape (N, 2)."""
-    panels = tomllib.loads(files("walkers.check").joinpath("chung_ooi.toml").read_text("utf-8"))
+    panels = tomllib.loads(files("walkers.second_engine").joinpath("chung_ooi.toml").read_text("utf-8"))
     for panel in panels.values():
         for series in panel["series"]:
             series["points"] = np.array(series["points"], dtype=np.float64)

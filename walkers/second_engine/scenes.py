@@ -19,9 +19,6 @@ from typing import Any
 
 import numpy as np
 
-from walkers.check.engine import SecondEngine
-from walkers.check.kernels import FloatArray
-from walkers.check.lines import Line
 from walkers.errors import Stopped
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.loads import surfaces_of
@@ -35,6 +32,9 @@ from walkers.postprocess.measure.motion import prescribed_motion
 from walkers.runner.binary import Engine
 from walkers.runner.directory import write_deck
 from walkers.runner.launch import launch
+from walkers.second_engine.engine import SecondEngine
+from walkers.second_engine.kernels import FloatArray
+from walkers.second_engine.lines import Line
 from walkers.templates.bridge_tables import tabulated
 from walkers.templates.deck import BRIDGES_NAME, Deck, Plan, Segment, compose, plan_of
 from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, FORCE_COLUMNS
@@ -370,7 +370,7 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
     angle = degrees(sqrt(2.0 * bare.liquid.contact_angle))
     closest = meeting.roughness / meeting.reduced_radius
     given = {"case": bare, "scene": scene, "layout": deck.layout, "angle": angle, "closest": closest}
-    text = rendered("walkers.check", "stock.lig.j2", **given)
+    text = rendered("walkers.second_engine", "stock.lig.j2", **given)
     theirs = bench.run(replace(deck, text=text))
     error = farthest(ours.forces[..., :3], theirs.forces[..., :3])
     yield Line("two beads separate: force, Debian's own bridge model", 0.0, error, 1e-9)

@@ -18,9 +18,6 @@ from typing import Any
 import numpy as np
 
 from walkers.api import run
-from walkers.check.kernels import FloatArray
-from walkers.check.lines import Line
-from walkers.check.scenes import DRY, FLOOR, STILL, Bench, R, bench_case, over, recording
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.loads import bridge_at_rest, contact_loads, resistances_at_rest
 from walkers.inputs.tables.boundary import Flat, Wall
@@ -31,6 +28,9 @@ from walkers.physics.capillary import bead_volume
 from walkers.physics.contact import Impact, reduced_modulus
 from walkers.physics.laws import young_laplace
 from walkers.runner.binary import find_engine
+from walkers.second_engine.kernels import FloatArray
+from walkers.second_engine.lines import Line
+from walkers.second_engine.scenes import DRY, FLOOR, STILL, Bench, R, bench_case, over, recording
 from walkers.templates.deck import Plan
 from walkers.templates.placement import Bead, Scene, loading_of, surface_of
 

@@ -8,10 +8,10 @@ from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from walkers.check.lines import Line, Verdict, failures, run_checks
-from walkers.check.scenes import CHECKS, Bench
 from walkers.runner.binary import Engine, find_engine, model_sha256, write_audit
 from walkers.runner.manifest import iso_time
+from walkers.second_engine.lines import Line, Verdict, failures, run_checks
+from walkers.second_engine.scenes import CHECKS, Bench
 
 
 def run_audit(

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from walkers.check.benchmarks import benchmarks
-from walkers.check.bridges import pulls, velocities
-from walkers.check.crosscheck import crosschecks
-from walkers.check.experiments import experiments
-from walkers.check.lines import Line
+from walkers.second_engine.benchmarks import benchmarks
+from walkers.second_engine.bridges import pulls, velocities
+from walkers.second_engine.crosscheck import crosschecks
+from walkers.second_engine.experiments import experiments
+from walkers.second_engine.lines import Line
 
 LITERATURE: Mapping[str, Callable[[Path], Iterable[Line]]] = {
     "benchmarks": lambda _: benchmarks(),
