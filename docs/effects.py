@@ -15,10 +15,10 @@ from numba import njit
 
 from docs.tables import page
 from walkers import load_case
+from walkers.arrays import FloatArray
 from walkers.inputs.resolving.loads import contact_loads, dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.theory.motion import Walker, walk
-from walkers.theory.quasistatic import FloatArray
 
 _STEPS = 512  # per cycle; 2048 change velocities by less than 0.01 mm/s
 _LIFT = sqrt(140.0)  # a sphere under the load N rolls at h = 140 R (η U R/N)² in a liquid that cavitates

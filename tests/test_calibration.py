@@ -18,10 +18,11 @@ from scipy.stats import t as student
 from tests.conftest import call, to_toml
 from tests.printed import spoilt
 from walkers import run
+from walkers.arrays import FloatArray
 from walkers.calibration.calibrate import PROPOSED, Outcome, calibrate, nearest
 from walkers.calibration.emulator import LARGEST, Emulator, Posterior, middle
 from walkers.calibration.file import Calibration, Parameter, load_calibration, read_calibration
-from walkers.calibration.observations import NO_NUMBERS, FloatArray, Observation, numbers_in, numbers_of
+from walkers.calibration.observations import NO_NUMBERS, Observation, numbers_in, numbers_of
 from walkers.calibration.report import draw_facts, record_of, summary
 from walkers.errors import InputError
 from walkers.inputs.axes import unit_cube

@@ -18,15 +18,15 @@ import pytest
 
 from tests.conftest import SHORT, call, document, make_case, to_toml
 from walkers import Run, run
+from walkers.arrays import FloatArray, Vector
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.tables.boundary import BOTTOM, Flat, Round, Wall
 from walkers.inputs.tables.case import Case
-from walkers.inputs.tables.drive import Vector
 from walkers.inputs.toml import read_toml
 from walkers.physics.bridge import Surfaces
 from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.physics.laws import by_name
-from walkers.postprocess.measure.dump import FloatArray, local_frames
+from walkers.postprocess.measure.dump import local_frames
 from walkers.postprocess.measure.motion import Motion, read_motion
 from walkers.runner import binary
 from walkers.runner.binary import SOURCES, find_engine, read_audit, write_audit

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 import pytest
 from matplotlib.axes import Axes
@@ -54,7 +53,6 @@ CLIMBS = pd.DataFrame(
 """Climbs of four runs of 10 s; the first climb of the first run is the second in the table."""
 GARWOOD = {0: (0.0, 3.6889), 1: (0.0253, 5.5716), 2: (0.2422, 7.2247), 3: (0.6187, 8.7673)}
 """Exact 95 % intervals of the mean of a Poisson distribution by the observed number, as tabulated."""
-FloatArray = npt.NDArray[np.float64]
 
 
 PILES = pd.DataFrame({"beads": BEADS, "large": LARGE, "driven": [LENGTH] * 4})

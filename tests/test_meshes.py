@@ -13,6 +13,7 @@ import pytest
 
 import walkers
 from tests.test_vessels import bowl, cuboid, poured, prism, write
+from walkers.arrays import FloatArray
 from walkers.errors import InputError
 from walkers.inputs.meshes.flat_faces import LEAST_STEP
 from walkers.inputs.meshes.mesh_file import MOST_BYTES, read_mesh
@@ -21,7 +22,6 @@ from walkers.inputs.meshes.vessel import Vessel
 from walkers.inputs.meshes.wall_names import names_of_faces
 from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.case import Case
-from walkers.postprocess.measure.dump import FloatArray
 from walkers.runner import failures
 from walkers.runs.preview import describe, predicted_seconds, summarise
 

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 from tests.conftest import call
 from tests.printed import letters, spoilt
+from walkers.arrays import FloatArray
 from walkers.calibration.observations import numbers_of
 from walkers.inputs.keys import flatten
 from walkers.inputs.reading import load_case, shipped
@@ -29,7 +30,6 @@ from walkers.sweeps.table import read_record, write_record
 from walkers.text import rendered
 from walkers.theory.mathieu import alignment
 from walkers.theory.prediction import alignment_of, motion_of, outside_of_the_paper, predicted_column
-from walkers.theory.quasistatic import FloatArray
 
 SHORT = {"dimers.replicates": 2, "run.cycles": 8, "run.settling_cycles": 4}
 FEWER: dict[str, dict[str, Any]] = {

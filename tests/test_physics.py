@@ -18,12 +18,13 @@ import pytest
 from tests.conftest import call, make_case
 from tests.test_bad_input import LAW
 from walkers import run as run_case
+from walkers.arrays import FloatArray
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.loads import bridge_at_rest, delay
 from walkers.inputs.tables.case import Roughness
 from walkers.inputs.tables.run import limits_of
 from walkers.physics import reynolds
-from walkers.physics.bridge import FloatArray, Surfaces
+from walkers.physics.bridge import Surfaces
 from walkers.physics.capillary import BridgeLiquid, largest_normal, share_of_bead
 from walkers.physics.capillary import rupture_distance as rupture_of_lian
 from walkers.physics.laplace import force_curve, rupture_distance

@@ -13,6 +13,7 @@ from numba import njit
 from scipy.special import mathieu_a, mathieu_b
 
 from tests.conftest import call, document, make_case, to_toml
+from walkers.arrays import FloatArray
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.resolving.loads import dimer_of, resistances_at_rest
 from walkers.inputs.tables.case import Case
@@ -24,7 +25,7 @@ from walkers.postprocess.measure.tables import read_table
 from walkers.theory.mathieu import LARGEST_STABLE_V, Alignment, alignment, time_to_turn, turning_rate
 from walkers.theory.motion import Walker, walk
 from walkers.theory.prediction import alignment_of, describe, motion_of, predict, threshold
-from walkers.theory.quasistatic import CONTACTS, FloatArray, detachment, mass_asymmetry, mean_velocity
+from walkers.theory.quasistatic import CONTACTS, detachment, mass_asymmetry, mean_velocity
 
 
 @pytest.mark.parametrize("radii", [["0.3 mm", "0.2 mm"], ["0.2 mm", "0.3 mm"]])

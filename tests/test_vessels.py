@@ -13,6 +13,7 @@ import pytest
 
 import walkers
 from tests.conftest import to_toml
+from walkers.arrays import FloatArray
 from walkers.errors import InputError
 from walkers.inputs.meshes.vessel import Vessel
 from walkers.inputs.reading import load_case
@@ -20,7 +21,6 @@ from walkers.inputs.resolving.standing import standing as starts
 from walkers.inputs.sweep import load_sweep
 from walkers.inputs.tables.boundary import FLOOR, LOOSE
 from walkers.inputs.tables.case import Case
-from walkers.postprocess.measure.dump import FloatArray
 from walkers.postprocess.measure.motion import read_bridges
 from walkers.postprocess.show.necks import ends_of
 from walkers.postprocess.show.scene import walls_of

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from walkers.arrays import FloatArray
 from walkers.calibration.emulator import Emulator, Posterior
 from walkers.calibration.file import Calibration
-from walkers.calibration.observations import NO_NUMBERS, FloatArray, Observation, numbers_in
+from walkers.calibration.observations import NO_NUMBERS, Observation, numbers_in
 from walkers.errors import WalkersError
 from walkers.extras import require
 from walkers.inputs.axes import unit_cube

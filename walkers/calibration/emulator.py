@@ -13,7 +13,8 @@ from scipy.linalg import cho_solve
 from scipy.special import logsumexp
 from scipy.stats import t as student
 
-from walkers.calibration.observations import FloatArray, Observation
+from walkers.arrays import FloatArray
+from walkers.calibration.observations import Observation
 from walkers.inputs.axes import unit_cube
 
 LARGEST = 10.0

@@ -15,7 +15,8 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 from scipy.stats import truncnorm, uniform
 
-from walkers.calibration.observations import FloatArray, Names, Observation
+from walkers.arrays import FloatArray
+from walkers.calibration.observations import Names, Observation
 from walkers.errors import InputError, Problem, suggestion
 from walkers.inputs.config_table import Table, changed
 from walkers.inputs.keys import Value, flatten

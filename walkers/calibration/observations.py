@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field, ValidationInfo, field_validator
 
 from walkers.inputs.config_table import Table
@@ -25,7 +24,6 @@ from walkers.runner.directory import case_of
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = npt.NDArray[np.float64]
 Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_pair_1"]
 """Means over the cycles and over steady walkers (`walkers.postprocess.measure.gait`), m/s."""
 Slip = Literal["slip_1", "slip_2"]

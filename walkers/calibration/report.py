@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from walkers.arrays import FloatArray
 from walkers.calibration.calibrate import PROPOSED, Outcome
 from walkers.calibration.file import Calibration
-from walkers.calibration.observations import FloatArray
 from walkers.files import write_bytes, write_json
 from walkers.inputs.keys import flatten
 from walkers.inputs.toml import toml_bytes

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from walkers.arrays import FloatArray
 from walkers.errors import unusable
 from walkers.inputs.keys import DISTRIBUTIONS, SPACINGS, Value, flatten
 from walkers.inputs.units import as_quantity
-from walkers.physics.bridge import FloatArray
 
 MOST_POINTS = 1_000_000
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from walkers.arrays import FloatArray
 from walkers.paper.sources import Sources, described, ruby, thresholds_with_theory
 from walkers.postprocess.measure.gait import gait
 from walkers.postprocess.show.drawing import ONE_COLUMN, TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
@@ -15,7 +16,7 @@ from walkers.postprocess.show.scene import Scene, Window, axes_toward
 from walkers.sweeps.figure import figure_of
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.theory.prediction import MODEL, motion_of, predicted_column
-from walkers.theory.quasistatic import FloatArray, translation
+from walkers.theory.quasistatic import translation
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -28,11 +28,10 @@ from math import inf, sqrt
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from walkers.arrays import FloatArray
 from walkers.physics.capillary import BridgeLiquid, bridge_volume, film_volume, share_of_bead
 
-FloatArray = npt.NDArray[np.float64]
 _COLUMNS = ("pull", "normal resistance", "sliding resistance", "coupling", "rolling resistance")
 
 

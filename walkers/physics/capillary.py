@@ -18,7 +18,7 @@ from walkers.cache import kept_numbers, place_of_numbers
 from walkers.physics.portable import cosine, cube_root
 
 if TYPE_CHECKING:
-    from walkers.physics.bridge import FloatArray
+    from walkers.arrays import FloatArray
 
 DEFAULT_LAW = "young-laplace"
 _AIR_PRESSURE = 101_325.0

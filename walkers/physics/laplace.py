@@ -45,6 +45,7 @@ import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
+from walkers.arrays import FloatArray
 from walkers.physics.portable import (
     cube_root,
     exponential,
@@ -54,8 +55,6 @@ from walkers.physics.portable import (
     sine_and_cosine,
     solve_linear,
 )
-
-FloatArray = npt.NDArray[np.float64]
 
 _NODES, _WEIGHTS = gauss_legendre(48)
 _PLACES = np.append(0.5 * (_NODES + 1.0), 1.0)

@@ -26,7 +26,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from walkers.arrays import FloatArray
 
 _QUARTERS_PER_RADIAN = 6.36619772367581382433e-01
 _QUARTER_HIGH = 1.57079632673412561417e00

@@ -60,7 +60,8 @@ from math import pi, sqrt
 
 import numpy as np
 
-from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
+from walkers.arrays import FloatArray
+from walkers.physics.bridge import Curve, Forces, Surfaces
 from walkers.physics.capillary import cavitation_gap
 from walkers.physics.portable import logarithm_of_one_plus, polynomial, power
 

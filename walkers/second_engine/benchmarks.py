@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from walkers.arrays import FloatArray
 from walkers.inputs.tables.case import Friction, Roughness
 from walkers.physics.contact import Impact, reduced_modulus
 from walkers.second_engine.engine import SecondEngine
-from walkers.second_engine.kernels import FloatArray
 from walkers.second_engine.lines import Line
 from walkers.second_engine.scenes import DRY, FLOOR, bench_case
 

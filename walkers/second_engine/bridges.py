@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 
 from walkers.api import run
+from walkers.arrays import FloatArray
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.loads import dimer_of, surfaces_of
 from walkers.physics import capillary
-from walkers.physics.bridge import FloatArray
 from walkers.physics.laws import rabinovich, soulie, willett, young_laplace
 from walkers.second_engine.lines import Line
 

@@ -16,13 +16,13 @@ import numpy as np
 from scipy.spatial.distance import pdist
 
 from walkers.api import run
+from walkers.arrays import FloatArray
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.measure.gait import averages, walk
 from walkers.postprocess.measure.motion import Motion
 from walkers.second_engine.engine import SecondEngine
-from walkers.second_engine.kernels import FloatArray
 from walkers.second_engine.lines import Line, Verdict
 
 SPEED, GAIT, ORIENTATION = 1e-4, 1e-3, 0.1

@@ -9,13 +9,14 @@ from math import inf, log, pi, sqrt
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from walkers.arrays import FloatArray
 from walkers.errors import refused
 from walkers.inputs.resolving.loads import surfaces_of
 from walkers.inputs.tables.boundary import Flat, Round, Wall
 from walkers.inputs.tables.case import Case
 from walkers.physics.bridge import BridgeLaw, Surfaces
 from walkers.second_engine import kernels
-from walkers.second_engine.kernels import CELLS, Bridges, Constants, FloatArray, State
+from walkers.second_engine.kernels import CELLS, Bridges, Constants, State
 
 TERMS = ("capillary", "lubrication", "damping", "friction", "rolling-friction", "gravity", "drive")
 """Terms that can be left out: pull and resistances of bridges, damping of contacts, the tangential contact force, the

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from walkers.api import run
+from walkers.arrays import FloatArray
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.loads import bridge_at_rest, contact_loads, resistances_at_rest
 from walkers.inputs.tables.boundary import Flat, Wall
@@ -28,7 +29,6 @@ from walkers.physics.capillary import bead_volume
 from walkers.physics.contact import Impact, reduced_modulus
 from walkers.physics.laws import young_laplace
 from walkers.runner.binary import find_engine
-from walkers.second_engine.kernels import FloatArray
 from walkers.second_engine.lines import Line
 from walkers.second_engine.scenes import DRY, FLOOR, STILL, Bench, R, bench_case, over, recording
 from walkers.templates.deck import Plan

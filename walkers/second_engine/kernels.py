@@ -24,10 +24,9 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from walkers.arrays import FloatArray, IntArray, Vector
+
 compiled = numba.njit(cache=True, error_model="numpy")
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-Vector = tuple[float, float, float]
 
 CELLS = 512
 """Cells of each of the three pieces of a bridge's splines."""

@@ -19,12 +19,12 @@ from typing import Any
 
 import numpy as np
 
+from walkers.arrays import FloatArray, Vector
 from walkers.errors import Stopped
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.loads import surfaces_of
 from walkers.inputs.tables.boundary import BOTTOM, Flat, Round, Wall
 from walkers.inputs.tables.case import Case
-from walkers.inputs.tables.drive import Vector
 from walkers.physics.bridge import Curve, Forces, Surfaces
 from walkers.physics.laws import LAWS, by_name
 from walkers.postprocess.measure.dump import BinaryDump
@@ -33,7 +33,6 @@ from walkers.runner.binary import Engine
 from walkers.runner.directory import write_deck
 from walkers.runner.launch import launch
 from walkers.second_engine.engine import SecondEngine
-from walkers.second_engine.kernels import FloatArray
 from walkers.second_engine.lines import Line
 from walkers.templates.bridge_tables import tabulated
 from walkers.templates.deck import BRIDGES_NAME, Deck, Plan, Segment, compose, plan_of

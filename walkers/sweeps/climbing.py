@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from walkers.arrays import FloatArray
 from walkers.errors import refused
 from walkers.files import write_bytes
-from walkers.postprocess.measure.dump import FloatArray
 from walkers.postprocess.measure.results import plain, read
 from walkers.postprocess.measure.uncertainty import guesses
 from walkers.postprocess.show.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, save_figure, styled

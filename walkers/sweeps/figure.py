@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 import numpy.typing as npt
 
+from walkers.arrays import FloatArray
 from walkers.errors import InputError, expected_of, refused
 from walkers.inputs.resolving.library import unmeasured
 from walkers.inputs.tables.case import Case
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FloatArray = npt.NDArray[np.float64]
 Predict = Callable[[Sequence[Case], str], tuple[Mapping[str, FloatArray], Mapping[str, int]]]
 """Function of N cases and a column: predictions of models, SI units, shape (N,); remarks, with the number of cases."""
 SCATTER = "bars: standard deviation of the copies (uncertain parameters not varied)"

@@ -15,7 +15,8 @@ from math import inf, log2
 
 import numpy as np
 
-from walkers.physics.bridge import BridgeLaw, Curve, FloatArray, Forces, Surfaces, UnusableLawError, columns_at
+from walkers.arrays import FloatArray
+from walkers.physics.bridge import BridgeLaw, Curve, Forces, Surfaces, UnusableLawError, columns_at
 from walkers.physics.laws import by_name
 from walkers.templates.placement import Surface
 

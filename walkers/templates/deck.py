@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from math import ceil, inf, prod, sqrt
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from walkers.arrays import Vector
 from walkers.errors import InputError, Problem
 from walkers.inputs.resolving.loads import bridge_at_rest, hop_height, reach
 from walkers.inputs.tables.boundary import Flat, Round
 from walkers.inputs.tables.case import Case
-from walkers.inputs.tables.drive import AXES, Excitation, Vector
+from walkers.inputs.tables.drive import AXES, Excitation
 from walkers.inputs.tables.run import limits_of
 from walkers.physics.capillary import bead_volume
 from walkers.physics.laws import LAWS

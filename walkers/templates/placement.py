@@ -12,11 +12,12 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
+from walkers.arrays import Vector
 from walkers.inputs.resolving.loads import hop_height, reach
 from walkers.inputs.resolving.standing import standing
 from walkers.inputs.tables.boundary import Wall
 from walkers.inputs.tables.case import Case, Contact
-from walkers.inputs.tables.drive import AXES, Vector
+from walkers.inputs.tables.drive import AXES
 from walkers.physics.capillary import BridgeLiquid
 from walkers.templates.layout import PlacedWalker
 

@@ -26,11 +26,12 @@ from math import log, pi, radians, sqrt, tan
 import numpy as np
 import numpy.typing as npt
 
+from walkers.arrays import FloatArray
 from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.physics.dimer import Dimer
 from walkers.theory.motion import Walker, walk
-from walkers.theory.quasistatic import FloatArray, inertia_matrix, normal_force_matrix, rolling_matrix, translation
+from walkers.theory.quasistatic import inertia_matrix, normal_force_matrix, rolling_matrix, translation
 
 LARGEST_STABLE_V = 0.45402316686747424
 """Largest V with stable small angles on a level substrate: the characteristic value b1(q = 2V) is zero."""

@@ -23,10 +23,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from walkers.arrays import FloatArray
 from walkers.extras import require
 from walkers.inputs.resolving.loads import contact_loads, dimer_of, resistances_at_rest
 from walkers.inputs.tables.case import Case
-from walkers.theory.quasistatic import FloatArray, inertia_matrix, normal_force_matrix, rolling_matrix, translation
+from walkers.theory.quasistatic import inertia_matrix, normal_force_matrix, rolling_matrix, translation
 
 if TYPE_CHECKING:
     from walkers.theory.stepping import Effect

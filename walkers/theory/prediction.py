@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from walkers.arrays import FloatArray
 from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
@@ -19,7 +20,7 @@ from walkers.rounding import with_decimals
 from walkers.text import aligned
 from walkers.theory.mathieu import LARGEST_STABLE_V, alignment, time_to_turn, turning_rate
 from walkers.theory.motion import Motion, Walker, walk
-from walkers.theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, FloatArray, detachment, mean_velocity
+from walkers.theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, detachment, mean_velocity
 
 MOVING = 1e-6
 """A walker faster than this, m/s, moves."""

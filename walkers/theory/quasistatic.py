@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from walkers.arrays import FloatArray
 
 FRICTION_OF_THE_PAPER = 33.0
 """κ of F∥ = κ v F, s/m: 0.033 s/mm, fitted in the paper to its Figs. 2 and 3."""

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
-from walkers.theory.quasistatic import FloatArray
+from walkers.arrays import BoolArray, FloatArray
 
-BoolArray = npt.NDArray[np.bool_]
 Three = tuple[float, float, float]
 Effect = Callable[[Three, FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 

@@ -14,9 +14,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from walkers.inputs.meshes.triangles import IntArray
+from walkers.arrays import FloatArray, IntArray
 from walkers.inputs.meshes.vessel import Vessel
-from walkers.physics.bridge import FloatArray
 
 _SLACK = 1e-7  # of the extent of a surface: depth of an intersection that counts as touching
 _EDGES_AT_ONCE = 64

@@ -6,8 +6,7 @@ from collections import defaultdict
 
 import numpy as np
 
-from walkers.inputs.meshes.triangles import IntArray
-from walkers.physics.bridge import FloatArray
+from walkers.arrays import FloatArray, IntArray
 
 LEAST_STEP = 1e-9
 """Distance from the plane of a face within which all of its corners are, m.

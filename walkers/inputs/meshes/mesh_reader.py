@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from walkers.arrays import FloatArray
+
 Polygons = list[npt.NDArray[np.int64]]
 """Corners of polygons: arrays of shape (polygons, corners), one for each number of corners."""
 

@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from walkers.arrays import FloatArray, IntArray
 from walkers.errors import InputError, unusable
 from walkers.inputs.meshes.crossings import first_crossing, first_fold
-from walkers.inputs.meshes.triangles import SAME_POINT, IntArray, merged
+from walkers.inputs.meshes.triangles import SAME_POINT, merged
 from walkers.inputs.meshes.vessel import Vessel
-from walkers.physics.bridge import FloatArray
 
 _ONE_OPENING = "one, at its top: close the others"
 _STEEPEST_OPENING = radians(45.0)  # between the vertical and the direction of the opening

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from walkers.arrays import FloatArray, IntArray
 from walkers.errors import unusable
-from walkers.physics.bridge import FloatArray
 
 if TYPE_CHECKING:
     import pyvista as pv
 
-IntArray = npt.NDArray[np.int64]
 SAME_POINT = 1e-6
 """Of the extent of a surface: points that are nearer are one."""
 

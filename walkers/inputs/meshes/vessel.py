@@ -20,11 +20,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from walkers.arrays import FloatArray, IntArray, Vector
 from walkers.inputs.meshes.flat_faces import FlatFaces
-from walkers.inputs.meshes.triangles import SAME_POINT, IntArray, evaluated, groups_of, signed_distance, within_polygon
+from walkers.inputs.meshes.triangles import SAME_POINT, evaluated, groups_of, signed_distance, within_polygon
 from walkers.inputs.meshes.wall_names import names_of_faces, numbered, span_text
-from walkers.inputs.tables.drive import Vector
-from walkers.physics.bridge import FloatArray
 
 if TYPE_CHECKING:
     import pyvista as pv

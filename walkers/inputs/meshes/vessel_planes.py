@@ -7,10 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from walkers.arrays import Vector
 from walkers.errors import unusable
 from walkers.inputs.meshes.triangles import merged
 from walkers.inputs.meshes.vessel import Vessel
-from walkers.inputs.tables.drive import Vector
 
 
 def vessel_between(planes: Sequence[tuple[Vector, Vector]], height: float) -> Vessel:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from math import acos, atan2, degrees
 
-from walkers.inputs.tables.drive import Vector
+from walkers.arrays import Vector
 
 FLOOR_NAME = "floor"
 """Name of a level face at the lowest point."""

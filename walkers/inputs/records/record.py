@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from walkers.arrays import FloatArray
 from walkers.inputs.config_table import SAME_RUN, Table
 from walkers.inputs.records.signals import (
     ComplexArray,
@@ -37,7 +38,6 @@ from walkers.inputs.records.signals import (
     slow_part,
 )
 from walkers.inputs.units import ACCELERATION, ACCELERATION_OF_ONE_G
-from walkers.physics.bridge import FloatArray
 from walkers.rounding import counted
 
 if TYPE_CHECKING:

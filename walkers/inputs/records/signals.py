@@ -16,7 +16,7 @@ from typing import TypeVar, cast
 import numpy as np
 import numpy.typing as npt
 
-from walkers.physics.bridge import FloatArray
+from walkers.arrays import FloatArray
 
 ComplexArray = npt.NDArray[np.complex128]
 Samples = TypeVar("Samples", FloatArray, ComplexArray)

@@ -11,14 +11,13 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
+from walkers.arrays import FloatArray, Vector
 from walkers.errors import Problem
 from walkers.inputs import units
 from walkers.inputs.config_table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, key, within
 from walkers.inputs.meshes.vessel import Facet, Vessel
 from walkers.inputs.meshes.vessel_planes import vessel_between
 from walkers.inputs.meshes.wall_names import FLOOR_NAME, names_of_faces
-from walkers.inputs.tables.drive import Vector
-from walkers.physics.bridge import FloatArray
 
 FLOOR = FLOOR_NAME
 LOOSE = 1.03

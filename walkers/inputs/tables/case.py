@@ -16,6 +16,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import BeforeValidator, Field, ValidationError
 
+from walkers.arrays import Vector
 from walkers.errors import InputError, Problem, apply_all, refused, unusable
 from walkers.inputs import units
 from walkers.inputs.axes import ranges_of
@@ -38,7 +39,7 @@ from walkers.inputs.resolving.library import library_of
 from walkers.inputs.resolving.steps import NAMES, SUPPLIED, resolve, supplied
 from walkers.inputs.tables.bodies import MOST_BEADS, Cluster, Dimers, Mixture, PlacedBead, Walkers
 from walkers.inputs.tables.boundary import Boundary
-from walkers.inputs.tables.drive import AXES, Drive, Excitation, Vector
+from walkers.inputs.tables.drive import AXES, Drive, Excitation
 from walkers.inputs.tables.run import Run, settling_of
 from walkers.inputs.toml import with_files
 from walkers.inputs.units import Coefficient, Number, kind_in

@@ -16,17 +16,16 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
+from walkers.arrays import FloatArray, Vector
 from walkers.errors import Problem, unusable
 from walkers.inputs import units
 from walkers.inputs.config_table import Choice, Filled, Indirect, Table, key
 from walkers.inputs.records.record import FEWEST_PERIODS, Record, course_text, record_of
 from walkers.inputs.units import Angle, Coefficient
-from walkers.physics.bridge import FloatArray
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
-Vector = tuple[float, float, float]
 Frame = Literal["lab", "container"]
 AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 LARGEST_RATIO = 24

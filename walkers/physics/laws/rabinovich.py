@@ -18,8 +18,9 @@ from math import pi
 
 import numpy as np
 
+from walkers.arrays import FloatArray
 from walkers.physics import reynolds
-from walkers.physics.bridge import Curve, FloatArray, Surfaces
+from walkers.physics.bridge import Curve, Surfaces
 from walkers.physics.capillary import derjaguin_radius, rupture_distance
 from walkers.physics.portable import cosine, sine
 

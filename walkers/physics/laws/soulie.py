@@ -19,7 +19,8 @@ from math import inf, pi, sqrt
 
 import numpy as np
 
-from walkers.physics.bridge import Curve, FloatArray, Forces, Surfaces
+from walkers.arrays import FloatArray
+from walkers.physics.bridge import Curve, Forces, Surfaces
 from walkers.physics.capillary import rupture_distance
 from walkers.physics.portable import exponential, logarithm, power
 

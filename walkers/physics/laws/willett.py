@@ -16,8 +16,9 @@ from math import pi, sqrt
 
 import numpy as np
 
+from walkers.arrays import FloatArray
 from walkers.physics import reynolds
-from walkers.physics.bridge import Curve, FloatArray, Surfaces
+from walkers.physics.bridge import Curve, Surfaces
 from walkers.physics.capillary import derjaguin_radius
 from walkers.physics.portable import cube_root, exponential, logarithm
 

@@ -18,9 +18,10 @@ from pathlib import Path
 import numpy as np
 from numpy.polynomial import Chebyshev
 
+from walkers.arrays import FloatArray
 from walkers.cache import is_trusted, kept_numbers, place_of_numbers
 from walkers.physics import reynolds
-from walkers.physics.bridge import Curve, FloatArray, Surfaces
+from walkers.physics.bridge import Curve, Surfaces
 from walkers.physics.capillary import solver
 from walkers.physics.portable import chebyshev_coefficients, chebyshev_nodes
 

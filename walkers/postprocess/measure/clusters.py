@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 
+from walkers.arrays import BoolArray, FloatArray, IntArray
 from walkers.inputs.tables.boundary import FLOOR as FLOOR_NAME
 from walkers.inputs.tables.boundary import Wall
-from walkers.postprocess.measure.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.measure.motion import FLOOR, Bridges
 from walkers.postprocess.measure.tables import Columns, columns_of
 

@@ -13,14 +13,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from walkers.arrays import FloatArray
 from walkers.errors import WalkersError
 from walkers.regular_files import open_regular
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
 
 _HEADER = struct.Struct("=qqi6i6dii")
 _COUNT = struct.Struct("=i")

@@ -23,8 +23,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from walkers.arrays import BoolArray, FloatArray
 from walkers.inputs.tables.run import CONSTANT, Run
-from walkers.postprocess.measure.dump import BoolArray, DumpError, FloatArray
+from walkers.postprocess.measure.dump import DumpError
 from walkers.postprocess.measure.motion import Group, between, read_motion
 from walkers.postprocess.measure.sides import REST, SEPARATED, STEADY_SPEED
 from walkers.postprocess.measure.tables import Columns

@@ -11,19 +11,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from walkers.arrays import BoolArray, FloatArray, IntArray
 from walkers.files import read_json
 from walkers.inputs.tables.bodies import Walkers
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import Excitation
-from walkers.postprocess.measure.dump import (
-    BinaryDump,
-    BoolArray,
-    DumpError,
-    FloatArray,
-    IntArray,
-    NoNumberError,
-    local_frames,
-)
+from walkers.postprocess.measure.dump import BinaryDump, DumpError, NoNumberError, local_frames
 from walkers.runner.directory import SEGMENT_NAME, case_of, layout_of, run_of, segment_directories
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.templates.layout import MEAN_SPIN_COLUMNS, Layout, PlacedWalker

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from walkers.arrays import BoolArray, FloatArray, IntArray
 from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure import clusters
 from walkers.postprocess.measure.clusters import Beads, Cluster
-from walkers.postprocess.measure.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.measure.motion import Bridges, Motion, read_bridges
 from walkers.postprocess.measure.numbers import Measured
 from walkers.postprocess.measure.tables import Columns, read_columns

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from walkers.postprocess.measure.dump import BoolArray, IntArray
+from walkers.arrays import BoolArray, IntArray
 
 if TYPE_CHECKING:
     import pandas as pd

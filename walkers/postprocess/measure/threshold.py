@@ -15,10 +15,10 @@ from math import isfinite, nan
 
 import numpy as np
 
+from walkers.arrays import BoolArray, FloatArray, IntArray
 from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
-from walkers.postprocess.measure.dump import BoolArray, FloatArray, IntArray
 from walkers.postprocess.measure.gait import distance_walked
 from walkers.postprocess.measure.motion import Motion
 from walkers.postprocess.measure.numbers import Measured

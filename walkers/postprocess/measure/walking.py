@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from walkers.arrays import FloatArray, IntArray
 from walkers.inputs.resolving.loads import contact_loads, dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.measure import gait
-from walkers.postprocess.measure.dump import FloatArray, IntArray
 from walkers.postprocess.measure.motion import NEAR, Group, Motion, came_near
 from walkers.postprocess.measure.numbers import Measured
 from walkers.postprocess.measure.sides import REST, SAME, SEPARATED, STEADY_SPEED, alike, differ, sides

@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from walkers.arrays import FloatArray
 from walkers.errors import WalkersError, refused
 from walkers.extras import require
 from walkers.files import beside
-from walkers.postprocess.measure.dump import FloatArray
 from walkers.postprocess.measure.motion import Motion, read_motion
 from walkers.postprocess.show import scene as view
 from walkers.postprocess.show.drawing import check_place

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from walkers.arrays import FloatArray, IntArray
 from walkers.inputs.tables.boundary import Flat, Round
 from walkers.inputs.tables.case import Case
 from walkers.physics.capillary import bridge_volume
-from walkers.postprocess.measure.dump import FloatArray, IntArray
 from walkers.postprocess.measure.motion import Motion, read_bridges
 
 BLUE, OPACITY = 0x3FA0FF, 0.8

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from walkers.arrays import FloatArray, IntArray
 from walkers.errors import refused
 from walkers.inputs.tables.boundary import Flat, Round
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure import piles
-from walkers.postprocess.measure.dump import FloatArray, IntArray
 from walkers.postprocess.measure.motion import Motion, between, visible_displacement
 from walkers.postprocess.show.necks import BLUE, NO_BRIDGES, OPACITY, at_front_walls, ends_of, necks_of, triangles_of
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from walkers.arrays import FloatArray
 from walkers.errors import check_limits
-from walkers.postprocess.measure.dump import FloatArray
 from walkers.postprocess.measure.motion import Motion, read_motion
 from walkers.postprocess.show.drawing import check_place, new_figure, plain_text, save_figure, styled
 from walkers.postprocess.show.necks import EXPLAINED, bridges_at

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from walkers.arrays import FloatArray, IntArray
 from walkers.extras import require
-from walkers.postprocess.measure.dump import FloatArray, IntArray
 from walkers.postprocess.measure.motion import Motion
 from walkers.postprocess.show import scene as view
 from walkers.postprocess.show.necks import (
