@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from platformdirs import user_cache_path
 
-from walkers.regular_files import read_regular
+from walkers.files import read_regular
 
 _NOWHERE = Path("/proc/no-home")  # a folder that nobody can make
 _CHECKSUM_BYTES = 32

@@ -19,10 +19,9 @@ from walkers.archive.crate import METADATA_NAME, PAPER, Author, describe_crate
 from walkers.archive.verification import SUMS_NAME
 from walkers.errors import refused
 from walkers.extras import require
-from walkers.files import beside, checksum, json_bytes
+from walkers.files import beside, checksum, json_bytes, open_regular
 from walkers.inputs.toml import toml_bytes
 from walkers.postprocess.measure.uncertainty import ACCURACY, ACCURACY_NAME, SPREAD, SPREAD_NAME
-from walkers.regular_files import open_regular
 from walkers.runner.binary import build_script, model_sources, model_version
 from walkers.runner.directory import CASE_NAME, case_of, name_of
 from walkers.runner.manifest import MANIFEST_NAME, FileChanged, read_manifest

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from walkers.errors import refused, unusable
+from walkers.files import read_limited
 from walkers.inputs.keys import parts_of, value_at
-from walkers.regular_files import read_limited
 
 _MOST_BYTES = 16 << 20
 _FILES = {

@@ -26,10 +26,9 @@ from pathlib import Path
 from typing import Any
 
 from walkers.errors import refused
-from walkers.files import fsync_path, link_or_copy, read_json, write_bytes, write_json
+from walkers.files import fsync_path, link_or_copy, open_regular, read_json, write_bytes, write_json
 from walkers.inputs.tables.case import Case
 from walkers.physics.laws import LAWS, source_of, source_sha256
-from walkers.regular_files import open_regular
 from walkers.runner.binary import Engine
 from walkers.runner.failures import DiskFull, FileTooLarge, OutputGone, RunBusy
 from walkers.runner.launch import EngineReport

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from walkers.regular_files import open_regular, read_regular
+from walkers.files import open_regular, read_regular
 from walkers.runner import failures
 from walkers.runner.binary import Engine, plugin_of, version_in, write_run_script
 from walkers.runner.failures import AUDITED_VERSION

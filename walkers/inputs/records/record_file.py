@@ -14,8 +14,8 @@ from math import isfinite
 from pathlib import Path
 from typing import TypedDict
 
+from walkers.files import read_limited
 from walkers.inputs.units import ACCELERATION, TIME, Kind, parse_quantity
-from walkers.regular_files import read_limited
 
 _MOST_BYTES = 64 << 20
 _EXAMPLE = '"time (ms), x (g), z (m/s^2)"'

@@ -16,7 +16,7 @@ import numpy as np
 
 from walkers.arrays import FloatArray
 from walkers.errors import WalkersError
-from walkers.regular_files import open_regular
+from walkers.files import open_regular
 
 _HEADER = struct.Struct("=qqi6i6dii")
 _COUNT = struct.Struct("=i")

@@ -13,9 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.errors import refused
-from walkers.files import beside
+from walkers.files import beside, read_regular
 from walkers.postprocess.measure.quantities import TABLES, declared, matches
-from walkers.regular_files import read_regular
 
 if TYPE_CHECKING:
     import pandas as pd
