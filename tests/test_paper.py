@@ -25,8 +25,8 @@ from walkers.paper.figures import theory_of_cycles
 from walkers.paper.make import FIGURES, make_figures
 from walkers.paper.sources import NothingFinishedError, Sources, of_facts, ruby, sets, sweep_of
 from walkers.postprocess.measure.gait import gait
+from walkers.sweeps.record import read_record, write_record
 from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep
-from walkers.sweeps.table import read_record, write_record
 from walkers.text import rendered
 from walkers.theory.mathieu import alignment
 from walkers.theory.prediction import alignment_of, motion_of, outside_of_the_paper, predicted_column

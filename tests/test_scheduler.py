@@ -33,6 +33,7 @@ from walkers.runner.binary import find_engine
 from walkers.runner.directory import case_of, unfinished
 from walkers.runner.failures import WalkersMet
 from walkers.runs.making import DECK_FOLDER, make_runs, progress_at
+from walkers.sweeps.record import write_record
 from walkers.sweeps.scheduler import (
     LONGEST_SECONDS,
     MOST_WALKERS,
@@ -45,7 +46,7 @@ from walkers.sweeps.scheduler import (
     run_sweep,
 )
 from walkers.sweeps.site import check_path, decks_at, load_site, prepare
-from walkers.sweeps.table import load, thresholds, write_record
+from walkers.sweeps.table import load, thresholds
 from walkers.templates.deck import LAYOUT_NAME, OUTPUT_NAME, compose, plan_of
 from walkers.templates.placement import sharing_key
 

@@ -40,12 +40,14 @@ from walkers.runner.manifest import read_manifest
 from walkers.runs.by_hand import as_run, take_in
 from walkers.runs.comparison import Comparison, Side, compare_runs
 from walkers.runs.making import check_audit, make_runs, progress_at
+from walkers.runs.status import state_at, worst_status
 from walkers.sweeps import table as of_points
 from walkers.sweeps.accuracy import measure_accuracy
 from walkers.sweeps.climbing import conditions_in, summarise_climbs, write_climbs
 from walkers.sweeps.figure import column_of, figure_of
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.folder import run_text
+from walkers.sweeps.record import read_record
 from walkers.sweeps.report import report_sweep
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
 from walkers.sweeps.site import load_site
@@ -239,7 +241,7 @@ class Run:
     @property
     def status(self) -> str:
         """``finished``, ``running``, ``interrupted`` or ``failed``."""
-        return of_points.worst_status([of_points.state_at(self.directory).status])
+        return worst_status([state_at(self.directory).status])
 
     @property
     def progress(self) -> Progress | None:
@@ -512,12 +514,12 @@ class Sweep:
     @property
     def status(self) -> str:
         """``finished``, ``running``, ``failed`` (some points) or ``interrupted`` (points are missing)."""
-        return of_points.worst_status(self.table()["status"])
+        return worst_status(self.table()["status"])
 
     @cached_property
     def runs(self) -> list[Run]:
         """The runs of all points, finished or not."""
-        record = of_points.read_record(self.directory)
+        record = read_record(self.directory)
         return [Run(record.out / name) for name in record.runs]
 
     def table(self) -> pd.DataFrame:

@@ -10,7 +10,7 @@ from walkers.archive.crate import METADATA_NAME
 from walkers.errors import refused
 from walkers.runner.directory import CASE_NAME, SEGMENTS
 from walkers.runner.manifest import MANIFEST_NAME, checksums, read_manifest
-from walkers.sweeps.table import RECORD_NAME, read_record, states
+from walkers.sweeps.record import RECORD_NAME, read_record, states
 from walkers.text import printable
 
 SUMS_NAME = "sha256sums.txt"

@@ -25,7 +25,7 @@ from walkers.postprocess.measure.uncertainty import ACCURACY, ACCURACY_NAME, SPR
 from walkers.runner.binary import build_script, model_sources, model_version
 from walkers.runner.directory import CASE_NAME, case_of, name_of
 from walkers.runner.manifest import MANIFEST_NAME, FileChanged, read_manifest
-from walkers.sweeps.table import RECORD_NAME, SweepRecord, read_record, states
+from walkers.sweeps.record import RECORD_NAME, SweepRecord, read_record, states
 from walkers.text import printable, rendered
 
 RUNS = "runs"

@@ -25,17 +25,9 @@ from walkers.postprocess.measure.results import derived
 from walkers.postprocess.measure.uncertainty import few_draws
 from walkers.postprocess.show.drawing import TWO_COLUMNS, errors_seen, letter_panels, new_figure, plain_text, styled
 from walkers.runner.directory import case_of
+from walkers.runs.status import status_text
 from walkers.sweeps.figure_options import FigureOptions, Log
-from walkers.sweeps.table import (
-    FACING_DOWN,
-    SEEDS,
-    default_column,
-    find_name,
-    key_values,
-    status_text,
-    together,
-    value_text,
-)
+from walkers.sweeps.table import FACING_DOWN, SEEDS, default_column, find_name, key_values, together, value_text
 from walkers.text import with_unit
 
 if TYPE_CHECKING:

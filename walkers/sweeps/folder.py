@@ -29,7 +29,8 @@ from walkers.runner import directory as on_disk
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.runs.case_text import FlatCase, differing, flattened, has_value, readable, short_keys
 from walkers.runs.making import progress_at
-from walkers.sweeps.table import RECORD_NAME, read_record, state_at, states, status_text, worst_status
+from walkers.runs.status import state_at, status_text, worst_status
+from walkers.sweeps.record import RECORD_NAME, read_record, states
 from walkers.text import aligned
 
 Row: TypeAlias = dict[str, Any]

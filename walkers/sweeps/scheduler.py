@@ -42,7 +42,8 @@ from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, Outp
 from walkers.runner.launch import cores_here
 from walkers.runs.making import check_audit, make_runs, progress_at
 from walkers.runs.preview import PROGRAM_SECONDS, pairs_of_beads, predicted_overhead, predicted_seconds
-from walkers.sweeps import table
+from walkers.runs.status import PointState, status_text
+from walkers.sweeps.record import RECORD_NAME, UNREADABLE, SweepRecord, read_record, states, write_record
 from walkers.sweeps.site import check_path, decks_at, prepare
 from walkers.templates.placement import sharing_key
 from walkers.text import with_unit
@@ -193,7 +194,7 @@ def unfinished_parts(points: Sequence[int], cases: Sequence[Case], finished: Col
 class SweepPlan:
     """Plan of a sweep: points with their status, missing decks, failures that are not repeated."""
 
-    record: table.SweepRecord
+    record: SweepRecord
     cases: Sequence[Case]
     engine: Engine
     decks: Sequence[PlannedDeck]
@@ -230,7 +231,7 @@ class SweepPlan:
             [
                 f"{record.sweep.name}: {record.sweep.title}".rstrip(": "),
                 f"  varied     {keys or 'nothing'}",
-                f"  points     {len(record.runs)}: {table.status_text(Counter(self.statuses))}",
+                f"  points     {len(record.runs)}: {status_text(Counter(self.statuses))}",
                 f"  to do      {counted(len(missing), 'point')} in {counted(len(self.decks), 'deck')}",
                 f"  predicted  {whole:.0f} core-seconds ({apart:.0f} without shared decks), "
                 f"{duration_text(until)} with {counted(at_once, 'deck')} in parallel",
@@ -267,10 +268,10 @@ def plan_sweep(
     options = options.for_ranks(max(case.run.ranks for case in cases))
     if sweep.until_below is not None and not any(case.walkers for case in cases):
         raise InputError(sweep.source, [Problem("descend", None, "expected walkers: a pile has no velocity")])
-    record = table.SweepRecord(out / sweep.name, sweep, [run_place(case, binary, out).name for case in cases])
+    record = SweepRecord(out / sweep.name, sweep, [run_place(case, binary, out).name for case in cases])
     if options.site is not None:
         check_path(record.directory)
-    point_states = table.states(record)
+    point_states = states(record)
     final = _failures(record, point_states, options.final)
     settled = {point for point, state in enumerate(point_states) if state.status == "finished"}
     settled |= {failure.point for failure in final}
@@ -281,7 +282,7 @@ def plan_sweep(
     return SweepPlan(record, cases, binary, decks, [state.status for state in point_states], options, final)
 
 
-def _failures(record: table.SweepRecord, states: Sequence[table.PointState], reasons: Collection[str]) -> list[Failure]:
+def _failures(record: SweepRecord, states: Sequence[PointState], reasons: Collection[str]) -> list[Failure]:
     points = enumerate(zip(record.runs, states, strict=True))
     return [
         Failure(point, run, state.reason or "", state.message or "", str(state.directory))
@@ -298,7 +299,7 @@ def run_sweep(
     engine: str | None = None,
     allow_failed_audit: bool = False,
     on_progress: Tell | None = None,
-) -> tuple[table.SweepRecord, list[Failure]]:
+) -> tuple[SweepRecord, list[Failure]]:
     """Make the missing runs of a sweep, and return its record and the failed points.
 
     `InputError` if a point is invalid, or the path of the folder cannot be used in the shell scripts of a cluster;
@@ -310,10 +311,10 @@ def run_sweep(
     if plan.decks:
         check_audit(plan.engine, allow_failed_audit)
     with suppress(InputError):  # no sweep of this name, or none that can be read
-        if not set(table.read_record(record.directory).runs) & set(record.runs):
+        if not set(read_record(record.directory).runs) & set(record.runs):
             text = "replaces a sweep of the same name without common runs; figures and reports there show the old one"
             warnings.warn(f"{record.directory}: {text}", SweepReplacedWarning, stacklevel=2)
-    table.write_record(record)
+    write_record(record)
     for place in {record.out / run for run in record.runs}:
         if is_finished(place):
             with suppress(WalkersError, OSError, ValueError):  # it is among the failures
@@ -325,11 +326,11 @@ def run_sweep(
     if plan.decks:
         with _workers(plan.options, record) as (executor, stop):
             failures = _Loop(plan, executor, stop).run(on_progress or (lambda _: None))
-    if not (record.directory / table.RECORD_NAME).is_file():
+    if not (record.directory / RECORD_NAME).is_file():
         raise OutputGone(record.directory)
-    if list(table.read_record(record.directory).runs) != list(record.runs):
+    if list(read_record(record.directory).runs) != list(record.runs):
         raise SweepStopped(f"{record.directory} was replaced by another sweep of the same name; the runs are kept")
-    return record, [*failures, *_failures(record, table.states(record, results=True), [table.UNREADABLE])]
+    return record, [*failures, *_failures(record, states(record, results=True), [UNREADABLE])]
 
 
 # --- workers ----------------------------------------------------------------------------------------------------------
@@ -375,7 +376,7 @@ def work(
 
 
 @contextmanager
-def _workers(options: Options, record: table.SweepRecord) -> Iterator[tuple[Executor, threading.Event | None]]:
+def _workers(options: Options, record: SweepRecord) -> Iterator[tuple[Executor, threading.Event | None]]:
     """The executor of a sweep, and the event that stops its threads; threads and Parsl's workers end with it."""
     if options.executor is not None:
         yield options.executor, None

@@ -1,8 +1,4 @@
-"""Sweeps on disk and as tables.
-
-A sweep's directory contains ``sweep.json``: the tables of the sweep's file and of its base case, and the names of its
-runs. Reading expands the file again. The status of a point is the status of its run directory. The run directories are
-beside the sweep's directory, and all sweeps of a folder share them.
+"""The table of a sweep.
 
 The table has one row per point: the varied keys and the numbers of the run. Lists, figures, reports and spreads are
 groupings and prints of it. Its ``attrs`` describe the columns (``units``, ``meanings``) and the sweep
@@ -15,25 +11,24 @@ from __future__ import annotations
 import io
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, refused, suggestion
-from walkers.files import json_bytes, make_folder, read_json, write_bytes, write_json
+from walkers.files import json_bytes, write_bytes
 from walkers.inputs.axes import ranges_of
 from walkers.inputs.origins import text_of
 from walkers.postprocess.measure.numbers import headline
 from walkers.postprocess.measure.quantities import ENDS, GROUPS, described_columns, is_declared, unit_shown
-from walkers.postprocess.measure.results import Results, modules_of, read
+from walkers.postprocess.measure.results import modules_of
 from walkers.postprocess.measure.sides import SEPARATED
 from walkers.rounding import counted, rounded
-from walkers.runner.directory import FAILURE_NAME, is_finished, is_locked, unfinished
 from walkers.runs.case_text import short_keys
-from walkers.runs.making import share_kept
+from walkers.runs.status import PointState, status_text
+from walkers.sweeps.record import read_record, states
 from walkers.text import aligned, with_unit
 
 if TYPE_CHECKING:
@@ -41,8 +36,6 @@ if TYPE_CHECKING:
 
     from walkers.inputs.sweep import Sweep
 
-RECORD_NAME = "sweep.json"
-_FORMAT = 4
 STATE = {
     "status": ("", "finished, failed, running or missing"),
     "lost": ("", "number of beads that left the simulation box; a run that loses beads has no result"),
@@ -67,113 +60,7 @@ _SHOWN = {
 """Numbers of results in the printed table, beside the main one."""
 _ASIDE = ("lost", "reason", "message")
 """Columns of `STATE` that the printed table leaves out."""
-UNREADABLE = "ResultUnreadable"
-"""Reason of points whose run is finished and whose result cannot be read."""
-_STATUSES = ("finished", "running", "failed", "missing")
 _MOST_FAILURES = 10
-
-
-# --- on disk ----------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class SweepRecord:
-    """A sweep in its directory, with the name of the run of each point."""
-
-    directory: Path
-    sweep: Sweep
-    runs: Sequence[str]
-
-    @property
-    def out(self) -> Path:
-        """Folder of the run directories."""
-        return self.directory.parent
-
-
-def write_record(record: SweepRecord) -> None:
-    """Write ``sweep.json`` into the sweep's directory, which is made if necessary."""
-    make_folder(record.directory)
-    sweep = record.sweep
-    contents = {"format": _FORMAT, "file": dict(sweep.file), "case": sweep.case_name, "base": dict(sweep.base)}
-    write_json(record.directory / RECORD_NAME, {**contents, "runs": list(record.runs)})
-
-
-def read_record(directory: str | Path) -> SweepRecord:
-    """Read the record in a sweep's directory, and expand the sweep; `InputError` if there is none."""
-    from walkers.inputs.sweep import expand
-
-    named, directory = directory, Path(directory).resolve()
-    try:
-        contents = read_json(directory / RECORD_NAME)
-        if contents["format"] != _FORMAT:
-            raise ValueError(f"its format is {contents['format']!r}, expected {_FORMAT}")
-        base = contents["case"], contents["base"]
-        sweep = expand(contents["file"], source=f"{named}/{RECORD_NAME}", name=directory.name, base=base)
-        runs = contents["runs"]
-        if len(runs) != len(sweep.rows) or not all(isinstance(run, str) for run in runs):
-            raise ValueError(f"{len(runs)} runs, expected the names of {len(sweep.rows)}")
-        return SweepRecord(directory, sweep, runs)
-    except (FileNotFoundError, NotADirectoryError) as error:
-        raise refused(named, f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2") from error
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        text = f"{RECORD_NAME} cannot be read ({error}); run the sweep again: finished runs are kept"
-        raise refused(named, text) from error
-
-
-@dataclass(frozen=True)
-class PointState:
-    """State of a point: finished, failed, running or missing.
-
-    ``directory`` is the directory of the finished or failed run, ``result`` its result if it was read. ``reason``,
-    ``message`` and ``lost`` describe a failure. The ``message`` of a missing point whose run was interrupted says how
-    much of it is done.
-    """
-
-    status: str
-    directory: Path | None = None
-    reason: str | None = None
-    message: str | None = None
-    lost: int = 0
-    result: Results | None = None
-
-
-def states(record: SweepRecord, *, results: bool = False) -> list[PointState]:
-    """State of each point; with ``results``, runs are read, and finished runs without a readable result have failed."""
-    points = [state_at(record.out / run) for run in record.runs]
-    for number, state in enumerate(points if results else ()):
-        if state.status == "finished" and state.directory is not None:
-            try:
-                points[number] = replace(state, result=read(state.directory))
-            except InputError as error:
-                points[number] = PointState("failed", state.directory, UNREADABLE, str(error))
-    return points
-
-
-def worst_status(points: Iterable[str]) -> str:
-    """Status of a sweep from its points: running, interrupted or failed if one is, in this order, or finished."""
-    statuses = set(points)
-    worst = {"running": "running", "missing": "interrupted", "failed": "failed"}
-    return next((status for status_of_point, status in worst.items() if status_of_point in statuses), "finished")
-
-
-def state_at(place: Path, directory: Path | None = None) -> PointState:
-    """State of the run that belongs in a place, or with a ``directory`` of the unfinished run in it."""
-    if directory is None and is_finished(place):
-        return PointState("finished", place)
-    if is_locked(place):
-        return PointState("running")
-    directory = directory or unfinished(place)
-    try:
-        failure = read_json(directory / FAILURE_NAME)
-        reason, message = str(failure["reason"]), str(failure["message"])
-        return PointState("failed", directory, reason, message, int(failure.get("lost", 0)))
-    except (OSError, ValueError, KeyError, TypeError):
-        share = share_kept(place)
-        done = None if share is None else f"{100 * share:.0f} % done"
-        return PointState("missing", message=done)
-
-
-# --- the table --------------------------------------------------------------------------------------------------------
 
 
 def load(directory: str | Path) -> pd.DataFrame:
@@ -389,11 +276,6 @@ def thresholds(frame: pd.DataFrame) -> pd.DataFrame:
     ends = {"moving": units[lowered], "gamma0_moving": "", "at_rest": units[lowered], "gamma0_at_rest": ""}
     table.attrs |= {"units": {name: units[name] for name in kept} | ends, "varied": kept}
     return table
-
-
-def status_text(numbers: Mapping[str, int]) -> str:
-    """Numbers of points by status as text: ``8 finished, 2 failed``."""
-    return ", ".join(f"{numbers[status]} {status}" for status in _STATUSES if numbers.get(status))
 
 
 def describe_status(frame: pd.DataFrame) -> str:
