@@ -30,9 +30,10 @@ from walkers.postprocess.measure.walking import _doubts, _posture, _scatter, _ve
 from walkers.postprocess.show.films import speed_text
 from walkers.postprocess.show.report.player import _points
 from walkers.postprocess.show.scene import Scene, rotations_at, turned_in
+from walkers.runner.cost import predicted_overhead
 from walkers.runner.manifest import iso_time
 from walkers.runs.making import progress_in
-from walkers.runs.preview import describe, predicted_overhead, summarise
+from walkers.runs.preview import describe, summarise
 from walkers.templates.deck import Segment, compose, plan_of, render_deck
 from walkers.templates.placement import place
 

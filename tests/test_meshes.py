@@ -23,7 +23,8 @@ from walkers.inputs.meshes.wall_names import names_of_faces
 from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.case import Case
 from walkers.runner import failures
-from walkers.runs.preview import describe, predicted_seconds, summarise
+from walkers.runner.cost import predicted_seconds
+from walkers.runs.preview import describe, summarise
 
 DATA = Path(__file__).parent / "data" / "meshes"
 BOXES = [

@@ -37,11 +37,11 @@ from walkers.postprocess.measure.results import ensure_measured
 from walkers.progress import Progress, Tell
 from walkers.rounding import counted, duration_text
 from walkers.runner.binary import Engine, find_engine
+from walkers.runner.cost import PROGRAM_SECONDS, pairs_of_beads, predicted_overhead, predicted_seconds
 from walkers.runner.directory import is_finished, is_locked, run_place, unfinished
 from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, OutputGone, ProgramDiffers
 from walkers.runner.launch import cores_here
 from walkers.runs.making import check_audit, make_runs, progress_at
-from walkers.runs.preview import PROGRAM_SECONDS, pairs_of_beads, predicted_overhead, predicted_seconds
 from walkers.runs.status import PointState, status_text
 from walkers.sweeps.record import RECORD_NAME, UNREADABLE, SweepRecord, read_record, states, write_record
 from walkers.sweeps.site import check_path, decks_at, prepare
