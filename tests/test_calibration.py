@@ -22,12 +22,11 @@ from walkers.arrays import FloatArray
 from walkers.calibration.calibrate import PROPOSED, Outcome, calibrate, nearest
 from walkers.calibration.emulator import LARGEST, Emulator, Posterior, middle
 from walkers.calibration.file import Calibration, Parameter, load_calibration, read_calibration
-from walkers.calibration.observations import NO_NUMBERS, Observation, numbers_in, numbers_of
+from walkers.calibration.observations import NO_NUMBERS, Observation, misalignment, numbers_in, numbers_of
 from walkers.calibration.report import draw_facts, record_of, summary
 from walkers.errors import InputError
 from walkers.inputs.axes import unit_cube
 from walkers.inputs.reading import load_case, shipped
-from walkers.postprocess.measure.gait import misalignment
 from walkers.postprocess.measure.tables import read_columns, write_table
 from walkers.runner.directory import recomputed
 from walkers.sweeps.scheduler import Options, run_sweep

@@ -15,10 +15,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
+from walkers.arrays import FloatArray
 from walkers.inputs.config_table import Table
 from walkers.inputs.units import ANGLE, SPEED, WRITTEN, Kind, Number, parse_quantity
-from walkers.postprocess.measure.gait import misalignment, settled_samples, steady_walkers, together
-from walkers.postprocess.measure.results import read
+from walkers.postprocess.measure.gait import settled_samples
+from walkers.postprocess.measure.results import Results, read
+from walkers.postprocess.measure.sides import SEPARATED
 from walkers.runner.directory import case_of
 
 if TYPE_CHECKING:
@@ -31,6 +33,8 @@ Slip = Literal["slip_1", "slip_2"]
 
 A bead that only rolls has 0, one that is dragged without rolling has 1.
 """
+ASTRAY = np.pi / 4.0
+"""Largest final angle of a walker that is on the axis, rad."""
 Angle = Literal["largest_angle", "smallest_angle"]
 """Of all walkers to the drive axis at the end of the run, in either direction, 0 to 90 degrees."""
 NO_NUMBERS: dict[str, float] = dict.fromkeys((*get_args(Speed), *get_args(Slip), *get_args(Angle)), nan)
@@ -154,3 +158,27 @@ def numbers_in(table: pd.DataFrame) -> list[dict[str, float]]:
     """`numbers_of` the runs of a sweep's table; NaN for those that are not finished."""
     points = zip(table["run"], table["status"], strict=True)
     return [numbers_of(run) if status == "finished" else NO_NUMBERS for run, status in points]
+
+
+def misalignment(walkers: pd.DataFrame) -> FloatArray:
+    """Angles to the drive axis at the end, in either direction, 0 to 90 degrees, of a table ``walkers``."""
+    ends = np.degrees(walkers["orientation_end"].to_numpy())
+    angles: FloatArray = np.abs((ends + 90.0) % 180.0 - 90.0)
+    return angles
+
+
+def together(walkers: pd.DataFrame) -> pd.Series[bool]:
+    """Whether the beads of walkers of a table ``walkers`` stay together."""
+    return walkers["separated_fraction"] < SEPARATED
+
+
+def steady_walkers(results: Results) -> pd.DataFrame:
+    """Rows of a run's table ``walkers`` that are steady, on the axis and whose beads stay together.
+
+    Symmetric dimers, which do not walk and turn across the axis, need only stay together.
+    """
+    walkers = results.table("walkers")
+    kept = together(walkers)
+    if results.get("sin_delta") != 0.0:
+        kept &= walkers["steady"] & (walkers["orientation_end"].abs() < ASTRAY)
+    return walkers.loc[kept]

@@ -19,7 +19,7 @@ from dataclasses import replace
 from itertools import chain, pairwise
 from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,13 +27,8 @@ from walkers.arrays import BoolArray, FloatArray
 from walkers.inputs.tables.run import CONSTANT, Run
 from walkers.postprocess.measure.dump import DumpError
 from walkers.postprocess.measure.motion import Group, between, read_motion
-from walkers.postprocess.measure.sides import REST, SEPARATED, STEADY_SPEED
+from walkers.postprocess.measure.sides import REST, STEADY_SPEED
 from walkers.postprocess.measure.tables import Columns
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from walkers.postprocess.measure.results import Results
 
 STEADY_DIFFERENCE = 0.05
 """A walker is steady if the velocities of the two halves of the measured cycles differ by less than this share, or by
@@ -42,8 +37,6 @@ UPRIGHT = np.radians(15.0)
 """Largest final angle of an upright walker, rad."""
 _NO_MORE = np.radians(0.5)
 """Largest increase of its angle in the second half of a run, rad."""
-ASTRAY = np.pi / 4.0
-"""Largest final angle of a walker that is on the axis, rad."""
 _LITTLE, _FADING, _NO_FASTER = 0.005, 0.9, 1e-4
 """A velocity is constant only if the walker stops turning. Its largest rotation per cycle in the second half of the run
 must be below the first angle (rad) and exceed that in the first half by less than the third angle; or it must be at
@@ -275,27 +268,3 @@ def _is_constant(group: Group) -> bool:
     allowed = max(CONSTANT * float(np.abs(walked["velocity"]).max()), REST)
     agree = np.abs(walked["first_half"] - walked["second_half"]).max() <= allowed
     return bool(agree and np.all(little | (after < _FADING * before)))
-
-
-def misalignment(walkers: pd.DataFrame) -> FloatArray:
-    """Angles to the drive axis at the end, in either direction, 0 to 90 degrees, of a table ``walkers``."""
-    ends = np.degrees(walkers["orientation_end"].to_numpy())
-    angles: FloatArray = np.abs((ends + 90.0) % 180.0 - 90.0)
-    return angles
-
-
-def together(walkers: pd.DataFrame) -> pd.Series[bool]:
-    """Whether the beads of walkers of a table ``walkers`` stay together."""
-    return walkers["separated_fraction"] < SEPARATED
-
-
-def steady_walkers(results: Results) -> pd.DataFrame:
-    """Rows of a run's table ``walkers`` that are steady, on the axis and whose beads stay together.
-
-    Symmetric dimers, which do not walk and turn across the axis, need only stay together.
-    """
-    walkers = results.table("walkers")
-    kept = together(walkers)
-    if results.get("sin_delta") != 0.0:
-        kept &= walkers["steady"] & (walkers["orientation_end"].abs() < ASTRAY)
-    return walkers.loc[kept]
