@@ -20,7 +20,7 @@ from tests.conftest import call, make_case
 from walkers.commands.catalogue import catalogue
 from walkers.files import write_json
 from walkers.inputs.reading import load_case
-from walkers.inputs.resolving.steps import library
+from walkers.inputs.resolving import library
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import parse_quantity
 from walkers.postprocess.measure.motion import read_motion

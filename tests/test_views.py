@@ -101,7 +101,7 @@ def test_walkers_are_exported_side_by_side_once_a_cycle_with_the_script_that_sho
     directory: Path, moved: Group, tmp_path: Path
 ) -> None:
     collection = walkers.load(directory).export("vtk", tmp_path / "vtk")
-    script = files("walkers.postprocess").joinpath("show.py.txt").read_bytes()
+    script = files("walkers.postprocess.show").joinpath("show.py.txt").read_bytes()
     assert collection.with_name("show.py").read_bytes() == script
     np.testing.assert_allclose(pv.get_reader(collection).time_values, np.arange(9) / 80.0)
     points = [pv.read(collection.parent / f"beads_{frame:06d}.vtu").points for frame in (0, 160)]
