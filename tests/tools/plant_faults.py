@@ -12,6 +12,7 @@ Ctrl-C.
 
 from __future__ import annotations
 
+import argparse
 import os
 import re
 import shlex
@@ -116,4 +117,8 @@ def main(table: str, word: str = "") -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("table", help="the table to write, or check")
+    parser.add_argument("word", nargs="?", default="", help="part of the names or files of the faults to plant")
+    given = parser.parse_args()
+    main(given.table, given.word)
