@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from math import isfinite, nan
 from typing import Any
 
-from walkers.postprocess.measure.quantities import SHOWN, Quantity, declared, is_error, ordered, unit_shown
+from walkers.postprocess.measure.quantities import LABELS, SHOWN, Quantity, declared, is_error, ordered, unit_shown
 from walkers.postprocess.measure.sides import REST
 from walkers.postprocess.measure.tables import Columns
 from walkers.rounding import counted, rounded, with_decimals
@@ -43,8 +42,6 @@ MAIN = ("velocity", "right_facing", "axial_velocity", "climbs", "highest", "spee
 """Main numbers, of which a spread measures bands."""
 ASIDE = SHOWN["aside"]
 """Numbers that are not shown by themselves: errors of others, values of the case, conditions."""
-_OF_UP = "on a slope of those that started facing up"
-"""Ends the meaning of a number that leaves out walkers that face down."""
 
 
 def headline(numbers: Mapping[str, Any]) -> str:
@@ -134,17 +131,17 @@ def saying_nothing(numbers: Mapping[str, Any]) -> set[str]:
 
 def _label(quantity: Quantity, numbers: Mapping[str, Any]) -> str:
     """Label of a number: on a slope directions are up and down, and means over those that face up are called so."""
-    uphill = numbers.get("goes_uphill", False)
-    label = re.sub(r"(\w+) \((\w+)\)", r"\2" if uphill else r"\1", quantity.label)
-    if not uphill:
-        return label
-    label = label.replace("along the drive axis", "up the slope").replace("across the drive axis", "across the slope")
-    return f"{label}, facing up" if is_of_up(quantity, numbers) else label
+    ground = "slope" if numbers.get("goes_uphill", False) else "level"
+    label = LABELS.get(quantity.name, {}).get(ground, quantity.label)
+    if ground == "slope" and is_of_up(quantity, numbers):
+        return f"{label}, facing up"
+    return label
 
 
 def is_of_up(quantity: Quantity, numbers: Mapping[str, Any]) -> bool:
     """Whether a number of a slope leaves out walkers that face down, of which there are some."""
-    return bool(numbers["goes_uphill"] and numbers.get("facing_left") and _OF_UP in quantity.meaning)
+    is_mean_over_up = any(fnmatchcase(quantity.name, pattern) for pattern in SHOWN["facing_up"])
+    return bool(numbers["goes_uphill"] and numbers.get("facing_left") and is_mean_over_up)
 
 
 def shown(number: float, unit: str) -> tuple[str, str]:

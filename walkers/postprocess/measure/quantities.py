@@ -65,7 +65,9 @@ TABLES: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(columns) for nam
 GROUPS: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(group) for name, group in _FILE["numbers"].items()}
 """The numbers of results: of each module of `walkers.postprocess.measure.results.modules_of`, and of all."""
 SHOWN: Mapping[str, frozenset[str]] = {name: frozenset(names) for name, names in _FILE["shown"].items()}
-"""Which numbers are shown (`walkers.postprocess.measure.numbers.rows`)."""
+"""Which numbers are shown (`walkers.postprocess.measure.numbers.rows`), and which are of walkers that face up."""
+LABELS: Mapping[str, Mapping[str, str]] = _FILE["labels"]
+"""Labels of numbers that are called otherwise on a ``level`` boundary and on a ``slope``."""
 _NUMBERS = [
     quantity
     for number in (number for group in GROUPS.values() for number in group)
