@@ -16,8 +16,19 @@ AUDITED_VERSION = "LIGGGHTS-PUBLIC 3.8.0"
 
 
 class EngineFailure(WalkersError):
-    """Base class of the failures of a run, in a ``directory``; ``lost`` is the number of lost beads.
+    """Base class of the failures of a run.
 
+    Attributes
+    ----------
+    message
+        What failed, without the directory.
+    directory
+        Where the files of the failed run are; None if there are none.
+    lost
+        Number of beads that left the simulation box.
+
+    Notes
+    -----
     ``hits`` says which points of a sweep such a failure hits: every point; all at first, until a point is finished; one
     point; or empty if this is not certain.
     """
@@ -25,7 +36,9 @@ class EngineFailure(WalkersError):
     hits = ""
 
     def __init__(self, message: str, directory: Path | None = None, *, lost: int = 0) -> None:
-        self.directory, self.lost = directory, lost
+        self.message = message
+        self.directory = directory
+        self.lost = lost
         super().__init__(f"{message} (see {directory})" if directory else message)
 
     def __init_subclass__(cls, hits: str = "") -> None:

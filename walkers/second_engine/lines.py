@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from walkers.errors import expected_of, refused
 from walkers.postprocess.measure.results import plain
+from walkers.runner.failures import EngineFailure
 from walkers.text import aligned
 
 T = TypeVar("T")
@@ -82,7 +83,8 @@ def run_checks(
         try:
             lines = list(checks[name](argument))
         except Exception as failure:  # another build of the engine may fail in any way
-            reason = str(failure).split(" (see ", 1)[0] or type(failure).__name__
+            reason = failure.message if isinstance(failure, EngineFailure) else str(failure)
+            reason = reason or type(failure).__name__
             lines = [Line(f"could not be computed: {reason}", nan, nan, decided=Verdict.ERROR)]
         if on_done:
             on_done(name)

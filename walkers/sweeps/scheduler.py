@@ -108,7 +108,25 @@ class Options:
 
 @dataclass(frozen=True)
 class Failure:
-    """A failed point: number, run, name and message of the failure, directory of the unfinished run, `hits`."""
+    """A failed point of a sweep.
+
+    Attributes
+    ----------
+    point
+        Number of the point.
+    run
+        Name of its run.
+    reason
+        Name of the failure, such as ``BlowUp``.
+    message
+        What failed, and where its files are.
+    directory
+        Directory of the unfinished run; None if there is none.
+    hits
+        Which points such a failure hits, see `walkers.runner.failures.EngineFailure`.
+    cause
+        The message without the directory: the same of points that fail alike.
+    """
 
     point: int
     run: str
@@ -116,6 +134,7 @@ class Failure:
     message: str
     directory: str | None
     hits: str = field(default="", repr=False)
+    cause: str = field(default="", repr=False)
 
 
 @dataclass(frozen=True)
@@ -364,15 +383,19 @@ def work(
             raise ProgramDiffers(f"the program on {node()} has another version than the one that started the sweep")
         return [*make_runs(cases, out, local, dumps=dumps, on_progress=look, time_limit=time_limit)]
     except (OSError, WalkersError) as error:
-        kind, message, directory = type(error), str(error), None
+        kind: type[Exception] = type(error)
+        message = cause = str(error)
+        directory = None
         if isinstance(error, EngineFailure):
+            cause = error.message
             directory = str(unfinished(out / runs[0])) if error.directory else None
         elif isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-            kind, message = DiskFull, f"disk full: {error.filename or out}"
+            kind = DiskFull
+            message = cause = f"disk full: {error.filename or out}"
         elif isinstance(error, OSError) and error.filename:
             kind = OutputGone if error.errno == errno.ENOENT else kind
-            message = f"{error.filename}: {error.strerror}"
-        return Failure(-1, "", kind.__name__, message, directory, getattr(kind, "hits", ""))
+            message = cause = f"{error.filename}: {error.strerror}"
+        return Failure(-1, "", kind.__name__, message, directory, getattr(kind, "hits", ""), cause)
 
 
 @contextmanager
@@ -420,7 +443,8 @@ def _report_of(future: Future[Report]) -> Report:
             first = " ".join(str(error).partition("Error 2:")[0].split())  # the other errors repeat the first
             raise SweepStopped(f"the cluster's jobs fail: {first}") from error
         if isinstance(error, ParslError):
-            return Failure(-1, "", type(error).__name__, str(error) or repr(error), None)
+            text = str(error) or repr(error)
+            return Failure(-1, "", type(error).__name__, text, None, cause=text)
     raise error
 
 
@@ -479,13 +503,14 @@ class _Loop:
 
     def _check_hits(self, failure: Failure, *, alone: bool) -> None:
         """Raise `SweepStopped` if a failure hits every point, or the first points alone in the same way."""
-        at_first, alike = self.done == self.finished_before, (failure.reason, failure.message.partition(" (see ")[0])
+        at_first = self.done == self.finished_before
+        alike = (failure.reason, failure.cause)
         if failure.hits == "every point" or (failure.hits == "all at first" and at_first):
             raise SweepStopped(f"{failure.message}; this would hit every point, and the sweep is stopped")
         self.alone[alike] += alone
         if self.alone[alike] >= _MOST_ALIKE and at_first and failure.hits != "one point":  # not by its parameters
             text = f"the first {_MOST_ALIKE} points failed in the same way, and the sweep is stopped"
-            raise SweepStopped(f"{alike[1]}; {text}")
+            raise SweepStopped(f"{failure.cause}; {text}")
 
     def _progress(self) -> Progress:
         first = list(self.decks.values())[: 4 * self.plan.options.decks_at_once]  # later decks have not started
